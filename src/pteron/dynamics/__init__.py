@@ -1,0 +1,24 @@
+"""Dynamics in numbers: batched, validated, documented."""
+
+from pteron.dynamics.forces import forward_dynamics, inverse_dynamics
+from pteron.dynamics.model import (
+    bias_forces,
+    coriolis_matrix,
+    gravity_forces,
+    kinetic_energy,
+    mass_matrix,
+    potential_energy,
+)
+from pteron.dynamics.regressor import regressor
+
+__all__ = [
+    "bias_forces",
+    "coriolis_matrix",
+    "forward_dynamics",
+    "gravity_forces",
+    "inverse_dynamics",
+    "kinetic_energy",
+    "mass_matrix",
+    "potential_energy",
+    "regressor",
+]

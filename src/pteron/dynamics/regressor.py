@@ -1,0 +1,59 @@
+"""The dynamics as a form linear in the inertial parameters."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pteron.conventions import BatchOfRegressors, OnFailure, PoseLike
+from pteron.kernels import compile
+from pteron.kinematics.poses import finite, usable_poses
+from pteron.manipulator import Manipulator
+
+__all__ = ["regressor"]
+
+
+def regressor(
+    robot: Manipulator,
+    pose: PoseLike,
+    velocity: PoseLike,
+    acceleration: PoseLike,
+    *,
+    on_failure: OnFailure = "raise",
+) -> BatchOfRegressors:
+    """Return the dynamic matrix D of Eq. (15): D @ parameters(robot) = inverse_dynamics(...).
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine; its inertial parameters play no part.
+    pose, velocity, acceleration : array, shape (..., m)
+        The platform's motion; m, rad and s. Leading axes broadcast.
+    on_failure : {"raise", "nan"}
+        Whether a pose that fails raises, or gives NaN.
+
+    Returns
+    -------
+    array, shape (..., n, N)
+        Newtons per unit of each parameter, in the order of `parameter_names`.
+
+    Raises
+    ------
+    UnreachablePose
+        If a leg's links do not reach a pose.
+    SingularPose
+        If a leg is stretched or folded (type I), or the sliders do not hold the platform (type II).
+
+    Examples
+    --------
+    >>> import numpy as np, pteron
+    >>> robot = pteron.load("quadrupteron")
+    >>> state = [0.01, 0.02, 0.03, 0.1], [0.1, 0.0, 0.2, 1.0], [1.0, 2.0, 0.0, 3.0]
+    >>> D = pteron.regressor(robot, *state)
+    >>> D.shape, np.allclose(D @ pteron.parameters(robot), pteron.inverse_dynamics(robot, *state))
+    ((4, 40), True)
+    """
+    poses = usable_poses(robot, pose, bent=True, held=True, on_failure=on_failure)
+    rate = finite(robot, velocity, "velocity", on_failure)
+    second = finite(robot, acceleration, "acceleration", on_failure)
+    matrices: BatchOfRegressors = compile(robot, "regressor")(poses, rate, second)
+    return np.where(np.isnan(matrices).any(axis=(-2, -1), keepdims=True), np.nan, matrices)

@@ -1,0 +1,63 @@
+"""A body in planar motion: the force and the moment of gravity and inertia about its reference point.
+
+Inertial parameters come as columns: one column for the values of a machine, or a column for each
+parameter, which turns every force below into the regressor of that force. Hence one set of
+equations serves both.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import casadi as ca
+
+from pteron.equations.geometry import Expression
+
+
+class Inertia(NamedTuple):
+    """m, m gamma_x, m gamma_y and I of a body, each a row (1, K)."""
+
+    m: Expression
+    hx: Expression
+    hy: Expression
+    i: Expression
+
+    @classmethod
+    def rows(cls, block: Expression) -> Inertia:
+        """Return the four rows of a block (4, K)."""
+        return cls(block[0, :], block[1, :], block[2, :], block[3, :])
+
+
+class LegInertia(NamedTuple):
+    """The inertia of a leg's slider (a row) and of its two links."""
+
+    slider: Expression
+    upper: Inertia
+    lower: Inertia
+
+
+def split(parameters: Expression, legs: int) -> tuple[list[LegInertia], Inertia]:
+    """Return the legs' inertia and the platform's from P (N, K), in the order of Eq. (16)."""
+    bodies = [Inertia.rows(parameters[i : i + 4, :]) for i in range(legs, 9 * legs + 4, 4)]
+    sliders = ca.vertsplit(parameters[:legs, :])
+    return [LegInertia(sliders[i], bodies[i], bodies[legs + i]) for i in range(legs)], bodies[-1]
+
+
+def first_moment(
+    x: Expression, y: Expression, hx: Expression, hy: Expression
+) -> tuple[Expression, Expression]:
+    """Return h = x hx + y hy and z x h = y hx - x hy, each (3, K), in the body's axes x and y."""
+    return ca.mtimes(x, hx) + ca.mtimes(y, hy), ca.mtimes(y, hx) - ca.mtimes(x, hy)
+
+
+def turning_force(h: Expression, dh: Expression, rate2: Expression, ddtheta: Expression) -> Expression:
+    """Return -w' z x h + w^2 h, the inertia force (3, K) of a first moment h that turns about z.
+
+    `h` is perpendicular to z and `dh` is z x h; `rate2` is w^2.
+    """
+    return rate2 * h - ddtheta * dh
+
+
+def moment(dh: Expression, i: Expression, g_a: Expression, ddtheta: Expression) -> Expression:
+    """Return z . (h x (g - a)) - I w', the moment (1, K) about z through the reference point."""
+    return ca.mtimes(g_a.T, dh) - ddtheta * i

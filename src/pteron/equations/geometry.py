@@ -1,0 +1,129 @@
+"""The geometry that the equations see: of one machine, in numbers, or of a topology, in symbols."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from pteron.manipulator import Manipulator
+
+Expression = Any
+"""A CasADi SX matrix; CasADi has no types that a checker could read."""
+
+SYMBOLS_PER_LEG = 15
+"""r, d, e and s0 (three each), lu, ll and sigma."""
+
+
+@dataclass(frozen=True)
+class LegGeometry:
+    """What the equations need of a leg; see the table of symbols in `pteron.manipulator.Leg`."""
+
+    r: Expression
+    d: Expression
+    e: Expression
+    s0: Expression
+    lu: Expression
+    ll: Expression
+    sigma: Expression
+    d_bar: Expression
+    """d / (d . e): the slider coordinate is rho = d_bar . (c - r), Eq. (4) in the general family."""
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """What the equations need of a machine: its legs, the platform's frame, gravity.
+
+    `x0`, `y0` and `k` are the platform frame's axes at phi = 0 in the base frame; `turns` says
+    whether the pose has an angle.
+    """
+
+    legs: tuple[LegGeometry, ...]
+    x0: Expression
+    y0: Expression
+    k: Expression
+    gravity: Expression
+    turns: bool
+
+    @property
+    def freedom(self) -> int:
+        """Number of pose coordinates, m = n."""
+        return len(self.legs)
+
+    @classmethod
+    def of(cls, robot: Manipulator) -> Geometry:
+        """Return the geometry of one machine, in numbers."""
+        legs = []
+        for leg in robot.legs:
+            d, e = ca.SX(leg.direction), ca.SX(leg.e)
+            legs.append(
+                LegGeometry(
+                    r=ca.SX(leg.guide_point),
+                    d=d,
+                    e=e,
+                    s0=ca.SX(leg.platform_point),
+                    lu=ca.SX(leg.upper_length),
+                    ll=ca.SX(leg.lower_length),
+                    sigma=ca.SX(leg.elbow),
+                    d_bar=d if leg.e == leg.direction else d / ca.dot(d, e),
+                )
+            )
+        x0, y0, k = (ca.SX(axis) for axis in robot.platform.frame)
+        return cls(tuple(legs), x0, y0, k, ca.SX(robot.gravity), robot.platform.turns)
+
+    @classmethod
+    def symbols(cls, legs: int, turns: bool) -> tuple[Geometry, Expression]:
+        """Return the geometry of a topology in symbols, and the symbols as one vector.
+
+        The vector holds, for each leg, r, d, e, s0, lu, ll and sigma; then x0, y0, k and gravity.
+        """
+        vectors = [ca.SX.sym(f"leg{i + 1}", SYMBOLS_PER_LEG) for i in range(legs)]
+        frame = ca.SX.sym("frame", 12)
+        parts = tuple(
+            LegGeometry(
+                r=v[0:3],
+                d=v[3:6],
+                e=v[6:9],
+                s0=v[9:12],
+                lu=v[12],
+                ll=v[13],
+                sigma=v[14],
+                d_bar=v[3:6] / ca.dot(v[3:6], v[6:9]),
+            )
+            for v in vectors
+        )
+        geometry = cls(parts, frame[0:3], frame[3:6], frame[6:9], frame[9:12], turns)
+        return geometry, ca.vertcat(*vectors, frame)
+
+
+def times(constant: Expression, expression: Expression) -> Expression:
+    """Return constant times expression, with a negative number's sign taken out of the product.
+
+    So 0.04 cos(phi) and -0.04 cos(phi) share their product: CasADi turns a + (-b) into a - b.
+    """
+    if constant.is_constant() and float(constant) < 0.0:
+        return -(-constant * expression)
+    return constant * expression
+
+
+def along(vector: Expression, expression: Expression) -> Expression:
+    """Return a constant three-vector times an expression, component by component (see `times`)."""
+    return ca.vertcat(*(times(vector[i], expression) for i in range(3)))
+
+
+def weighted_sum(weights: Expression, terms: Sequence[Expression]) -> Expression:
+    """Return the sum of weight times term; terms whose weights agree but for sign share a product."""
+    shared: dict[float, Expression] = {}
+    total = ca.SX(*terms[0].shape)
+    for weight, term in zip(ca.vertsplit(weights), terms, strict=True):
+        if not weight.is_constant():
+            total = total + weight * term
+        elif weight != 0:
+            value = abs(float(weight))
+            signed = term if weight > 0 else -term
+            shared[value] = shared[value] + signed if value in shared else signed
+    for value, sum_of_terms in shared.items():
+        total = total + value * sum_of_terms
+    return total

@@ -1,0 +1,97 @@
+"""The position problems: poses to slider coordinates and back, with every assembly mode."""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from pteron.equations.circles import reach_margin, squared_reach
+from pteron.equations.closure import closure, singularity
+from pteron.equations.geometry import Expression, Geometry
+from pteron.equations.legs import closing_vector, leg_position, slider_coordinate
+from pteron.equations.platforms import PlatformMotion, platform_motion, resting_offset
+
+
+def platform_at(geometry: Geometry, pose: Expression) -> PlatformMotion:
+    """Return the platform at rest in a pose."""
+    rest = ca.SX.zeros(geometry.freedom)
+    return platform_motion(geometry, pose, rest, rest)
+
+
+def inverse_position(geometry: Geometry, pose: Expression) -> Expression:
+    """Return the slider coordinates (n, 1), Eq. (4)."""
+    points = platform_at(geometry, pose).points
+    return ca.vertcat(
+        *(
+            slider_coordinate(leg, point.position)
+            for leg, point in zip(geometry.legs, points, strict=True)
+        )
+    )
+
+
+def links(geometry: Geometry, pose: Expression) -> tuple[Expression, Expression]:
+    """Return l_u and l_l of every leg, each (n, 3): Eqs. (6) and (7)."""
+    points = platform_at(geometry, pose).points
+    legs = [
+        leg_position(leg, point.position)
+        for leg, point in zip(geometry.legs, points, strict=True)
+    ]
+    return (
+        ca.vertcat(*(leg.l_u.T for leg in legs)),
+        ca.vertcat(*(leg.l_l.T for leg in legs)),
+    )
+
+
+def reach(geometry: Geometry, pose: Expression) -> tuple[Expression, Expression, Expression]:
+    """Return, for every leg (n, 1), n = |u|, its reach margin and the sine of its elbow's angle.
+
+    n and the margin are in metres. The sine is sqrt(Delta) / (2 lu ll): 0 where the leg is stretched
+    or folded (type I), NaN out of reach.
+    """
+    points = platform_at(geometry, pose).points
+    distances, margins, sines = [], [], []
+    for leg, point in zip(geometry.legs, points, strict=True):
+        u = closing_vector(leg, point.position)
+        distances.append(ca.sqrt(ca.dot(u, u)))
+        margins.append(reach_margin(leg, u))
+        sines.append(ca.sqrt(squared_reach(leg, u)) / (2 * leg.lu * leg.ll))
+    return ca.vertcat(*distances), ca.vertcat(*margins), ca.vertcat(*sines)
+
+
+def direct_position(geometry: Geometry, sliders: Expression) -> Expression:
+    """Return every pose that the slider coordinates allow, as columns (m, k).
+
+    The closures d_bar . (p + R(phi) s0 - r) = rho are linear in (p, cos phi, sin phi). For 3T they
+    give one pose. For 3T1R their left null vector leaves A' cos(phi) + B' sin(phi) = C, with two
+    angles: the first column has N . j > 0, the second N . j < 0 (see `closure`), so that each
+    column is one assembly mode throughout. Not real where C^2 > A'^2 + B'^2.
+    """
+    c = closure(geometry)
+    known = ca.vertcat(
+        *(
+            rho + ca.dot(leg.d_bar, leg.r - _constant_offset(geometry, i))
+            for i, (leg, rho) in enumerate(
+                zip(geometry.legs, ca.vertsplit(sliders), strict=True)
+            )
+        )
+    )
+    if c.null is None:
+        return ca.mtimes(c.right_inverse.T, known)
+    # The derivative of d_bar . s with respect to phi is j, so that d_bar . s itself is
+    # cosines sin(phi) - sines cos(phi); hence A' = -B and B' = A of `singularity`.
+    a, b = singularity(geometry)
+    total = ca.dot(c.null, known)
+    square = a * a + b * b
+    root = ca.sqrt(square - total * total)
+    poses = []
+    for branch in (1, -1):
+        cosine = (-b * total + branch * a * root) / square
+        sine = (a * total + branch * b * root) / square
+        offset = c.cosines * sine - c.sines * cosine
+        p = ca.mtimes(c.right_inverse.T, known - offset)
+        poses.append(ca.vertcat(p, ca.atan2(sine, cosine)))
+    return ca.horzcat(*poses)
+
+
+def _constant_offset(geometry: Geometry, i: int) -> Expression:
+    a, _, constant = resting_offset(geometry, i)
+    return constant if geometry.turns else a + constant

@@ -1,0 +1,138 @@
+"""Inverse dynamics by virtual work, Eqs. (13) and (14), in factored form.
+
+Each leg answers to its platform point alone: its links' wrenches become a force on that point and
+a reaction along its slider. So J_u and J_l of Eq. (13) are never multiplied out: they are their
+rows with respect to c, times C_i. A mass that two bodies carry at a point they share may be given
+to either: m_u goes with the slider, m_l with the platform.
+
+Given one column of parameters this is the inverse dynamics; given the identity matrix instead, the
+same lines return the regressor of Eq. (15).
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from pteron.equations.bodies import (
+    Inertia,
+    LegInertia,
+    first_moment,
+    moment,
+    split,
+    turning_force,
+)
+from pteron.equations.closure import actuator_forces
+from pteron.equations.geometry import Expression, Geometry, LegGeometry, weighted_sum
+from pteron.equations.legs import LegMotion, leg_motion
+from pteron.equations.platforms import PlatformMotion, platform_motion
+
+
+def inverse_dynamics(
+    geometry: Geometry,
+    pose: Expression,
+    velocity: Expression,
+    acceleration: Expression,
+    parameters: Expression,
+    wrench: Expression | None = None,
+) -> Expression:
+    """Return the actuator forces F_a (n, K) for the columns of parameters (N, K), Eq. (13).
+
+    `wrench` (m, K) acts on the platform at P: a force and, for 3T1R, a moment about k.
+    """
+    motion = platform_motion(geometry, pose, velocity, acceleration)
+    on_sliders, on_platform = active_forces(geometry, motion, parameters)
+    if wrench is not None:
+        on_platform = on_platform + wrench
+    cosine, sine = (motion.turn.cosine, motion.turn.sine) if motion.turn else (1, 0)
+    return -(on_sliders + actuator_forces(geometry, on_platform, cosine, sine))
+
+
+def generalized_forces(
+    geometry: Geometry,
+    pose: Expression,
+    velocity: Expression,
+    acceleration: Expression,
+    parameters: Expression,
+) -> Expression:
+    """Return M x'' + h (m, K), the forces of the motion in platform coordinates: J^T F_a."""
+    motion = platform_motion(geometry, pose, velocity, acceleration)
+    on_sliders, total = active_forces(geometry, motion, parameters)
+    for leg, point, force in zip(
+        geometry.legs, motion.points, ca.vertsplit(on_sliders), strict=True
+    ):
+        total = total + ca.mtimes(ca.mtimes(point.matrix.T, leg.d_bar), force)
+    return -total
+
+
+def active_forces(
+    geometry: Geometry, motion: PlatformMotion, parameters: Expression
+) -> tuple[Expression, Expression]:
+    """Return the forces of gravity and inertia on the sliders (n, K) and on the platform (m, K)."""
+    bodies, platform = split(parameters, len(geometry.legs))
+    carried = carried_inertia(geometry, platform, [leg.lower.m for leg in bodies])
+    on_platform = platform_wrench(geometry, motion, carried)
+    on_sliders = []
+    for leg, point, inertia in zip(geometry.legs, motion.points, bodies, strict=True):
+        on_slider, on_point = leg_forces(
+            leg,
+            leg_motion(leg, point),
+            geometry.gravity,
+            geometry.gravity - point.acceleration,
+            inertia,
+        )
+        on_sliders.append(on_slider)
+        on_platform = on_platform + ca.mtimes(point.matrix.T, on_point)
+    return ca.vertcat(*on_sliders), on_platform
+
+
+def leg_forces(
+    leg: LegGeometry, motion: LegMotion, gravity: Expression, g_c: Expression, bodies: LegInertia
+) -> tuple[Expression, Expression]:
+    """Return the force of a leg's bodies on its slider (1, K) and on its platform point (3, K).
+
+    The moments of the links act through theta_u and theta_l, whose rows with respect to u turn them
+    into a force tau; as u' = c' - e rho', tau acts on the point and -e . tau on the slider. `g_c` is
+    g - c''. The mass of the lower link is left to the platform.
+    """
+    at, upper, lower = motion.position, bodies.upper, bodies.lower
+    h, dh = first_moment(at.l_u, ca.cross(leg.d, at.l_u), upper.hx / leg.lu, upper.hy / leg.lu)
+    turning = turning_force(h, dh, motion.upper_rate**2, motion.upper_acceleration)
+    g_slider = gravity - motion.slider_acceleration * leg.e
+    upper_moment = moment(dh, upper.i, g_slider, motion.upper_acceleration)
+    on_slider = (bodies.slider + upper.m) * (
+        ca.dot(leg.e, gravity) - motion.slider_acceleration
+    ) + ca.mtimes(leg.e.T, turning)
+
+    h, dh = first_moment(at.l_l, ca.cross(leg.d, at.l_l), lower.hx / leg.ll, lower.hy / leg.ll)
+    on_point = turning_force(h, dh, motion.lower_rate**2, motion.lower_acceleration)
+    lower_moment = moment(dh, lower.i, g_c, motion.lower_acceleration)
+
+    tau = ca.mtimes(at.upper_row, upper_moment) + ca.mtimes(at.lower_row, lower_moment)
+    return on_slider - ca.mtimes(leg.e.T, tau), on_point + tau
+
+
+def carried_inertia(
+    geometry: Geometry, platform: Inertia, masses: list[Expression]
+) -> Inertia:
+    """Return the platform's inertia with the lower links' masses placed on its points."""
+    s0 = ca.horzcat(*(leg.s0 for leg in geometry.legs))
+    x, y = s0[0, :].T, s0[1, :].T
+    return Inertia(
+        platform.m + weighted_sum(ca.SX.ones(len(masses)), masses),
+        platform.hx + weighted_sum(x, masses),
+        platform.hy + weighted_sum(y, masses),
+        platform.i + weighted_sum(x * x + y * y, masses),
+    )
+
+
+def platform_wrench(geometry: Geometry, motion: PlatformMotion, inertia: Inertia) -> Expression:
+    """Return F_e (m, K): gravity and inertia of the platform, force and moment about k at P."""
+    g_p = geometry.gravity - motion.acceleration
+    weight = ca.mtimes(g_p, inertia.m)
+    if motion.turn is None:
+        return weight
+    turn = motion.turn
+    h0, dh0 = first_moment(geometry.x0, geometry.y0, inertia.hx, inertia.hy)
+    force = weight - (turn.cosine_acceleration * h0 + turn.sine_acceleration * dh0)
+    dh = turn.cosine * dh0 - turn.sine * h0
+    return ca.vertcat(force, moment(dh, inertia.i, g_p, motion.angular_acceleration))

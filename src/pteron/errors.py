@@ -1,0 +1,72 @@
+"""The errors a user can meet; every one says what was given, what was expected and what to do."""
+
+from __future__ import annotations
+
+__all__ = [
+    "DataError",
+    "ModelError",
+    "OutputError",
+    "PteronError",
+    "SingularPose",
+    "UnreachablePose",
+]
+
+
+class PteronError(ValueError):
+    """Root of every error that Pteron raises for something the user can mend."""
+
+
+class ModelError(PteronError):
+    """A manipulator, or the file that describes it, is not a machine Pteron can model."""
+
+
+class DataError(PteronError):
+    """An array, a table or a log does not hold what it should."""
+
+
+class OutputError(PteronError):
+    """A result cannot be written where it was asked for."""
+
+
+class UnreachablePose(PteronError):
+    """A leg is too short, or folds too far, for the pose.
+
+    Attributes
+    ----------
+    leg : int
+        The leg that fails, counted from 1 as in the paper.
+    shortfall : float
+        By how many metres its links miss the platform point.
+    index : tuple of int
+        Which element of the batch; empty for a single pose.
+    """
+
+    def __init__(self, message: str, *, leg: int, shortfall: float, index: tuple[int, ...]) -> None:
+        super().__init__(message)
+        self.leg = leg
+        self.shortfall = shortfall
+        self.index = index
+
+
+class SingularPose(PteronError):
+    """The pose is singular, so that what was asked for is not determined there.
+
+    Attributes
+    ----------
+    kind : str
+        ``"I"`` (a leg stretched or folded), ``"II"`` (the sliders do not hold the platform) or
+        ``"elbow"`` (R1 and R3 of a leg coincide, so that its elbow may be anywhere).
+    closeness : float
+        A number without unit that is 0 at the singularity: the sine of the elbow's angle for
+        kind I, the ratio abs(det J) to its largest value over all orientations for kind II.
+    index : tuple of int
+        Which element of the batch; empty for a single pose.
+    """
+
+    def __init__(
+        self, message: str, *, kind: str, closeness: float, index: tuple[int, ...]
+    ) -> None:
+        super().__init__(message)
+        self.kind = kind
+        self.closeness = closeness
+        self.index = index

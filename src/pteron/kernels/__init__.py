@@ -1,0 +1,28 @@
+"""Expressions made executable: by CasADi's virtual machine, and exactly in a field.
+
+Batching and caching live here and only here.
+"""
+
+from pteron.kernels.fields import Field, NoSquareRoot, PrimeField, RationalField, evaluate
+from pteron.kernels.functions import FUNCTIONS, Program, program
+from pteron.kernels.kernel import Array, Kernel, Port, as_array
+from pteron.kernels.operations import count_operations
+from pteron.kernels.targets import TARGETS, compile
+
+__all__ = [
+    "FUNCTIONS",
+    "TARGETS",
+    "Array",
+    "Field",
+    "Kernel",
+    "NoSquareRoot",
+    "Port",
+    "PrimeField",
+    "Program",
+    "RationalField",
+    "as_array",
+    "compile",
+    "count_operations",
+    "evaluate",
+    "program",
+]

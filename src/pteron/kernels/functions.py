@@ -1,0 +1,255 @@
+"""The table of what can be compiled: each public function's inputs, outputs and expressions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import casadi as ca
+
+from pteron.equations.closure import regularity
+from pteron.equations.geometry import Expression, Geometry
+from pteron.equations.jacobians import jacobian, link_jacobians
+from pteron.equations.lagrangian import (
+    coriolis_matrix,
+    forward_dynamics,
+    kinetic_energy,
+    mass_matrix,
+    potential_energy,
+)
+from pteron.equations.position import direct_position, inverse_position, links, reach
+from pteron.equations.rates import joint_motion
+from pteron.equations.regressor import paper_regressor, terms
+from pteron.equations.screws import joint_screws
+from pteron.equations.virtual_work import generalized_forces, inverse_dynamics
+from pteron.errors import ModelError
+from pteron.kernels.kernel import Port
+from pteron.manipulator import Manipulator, PlanarInertia
+
+__all__ = ["FUNCTIONS", "Program", "program"]
+
+Outputs = dict[str, tuple[Expression, tuple[int, ...]]]
+"""Each output's expression and its shape; a matrix is (rows, columns), a stack of them vertical."""
+
+
+@dataclass(frozen=True)
+class Program:
+    """A named CasADi function of one state, with its ports."""
+
+    name: str
+    function: ca.Function
+    inputs: tuple[Port, ...]
+    outputs: tuple[Port, ...]
+
+
+@dataclass(frozen=True)
+class _Entry:
+    inputs: tuple[str, ...]
+    build: Callable[[Geometry, dict[str, Expression]], Outputs]
+
+
+def _count(g: Geometry) -> int:
+    return 9 * g.freedom + 4
+
+
+def _position(g: Geometry, v: dict[str, Expression]) -> Outputs:
+    return {"sliders": (inverse_position(g, v["pose"]), (g.freedom,))}
+
+
+def _links(g: Geometry, v: dict[str, Expression]) -> Outputs:
+    l_u, l_l = links(g, v["pose"])
+    return {"l_u": (l_u, (g.freedom, 3)), "l_l": (l_l, (g.freedom, 3))}
+
+
+def _direct(g: Geometry, v: dict[str, Expression]) -> Outputs:
+    poses = direct_position(g, v["sliders"]).T
+    return {"poses": (poses, poses.shape)}
+
+
+def _reach(g: Geometry, v: dict[str, Expression]) -> Outputs:
+    distance, margin, sine = reach(g, v["pose"])
+    shape = (g.freedom,)
+    return {"distance": (distance, shape), "margin": (margin, shape), "sine": (sine, shape)}
+
+
+def _regularity(g: Geometry, v: dict[str, Expression]) -> Outputs:
+    return {"regularity": (regularity(g, v["pose"]), ())}
+
+
+def _jacobian(g: Geometry, v: dict[str, Expression]) -> Outputs:
+    return {"jacobian": (jacobian(g, v["pose"]), (g.freedom, g.freedom))}
+
+
+def _link_jacobians(g: Geometry, v: dict[str, Expression]) -> Outputs:
+    upper, lower = link_jacobians(g, v["pose"])
+    shape = (g.freedom, 6, g.freedom)
+    return {"upper": (ca.vertcat(*upper), shape), "lower": (ca.vertcat(*lower), shape)}
+
+
+def _screws(g: Geometry, v: dict[str, Expression]) -> Outputs:
+    rows = [screws.T for screws in joint_screws(g, v["pose"])]
+    return {"screws": (ca.vertcat(*rows), (g.freedom, *rows[0].shape))}
+
+
+def _rates(g: Geometry, v: dict[str, Expression]) -> Outputs:
+    rest = ca.SX.zeros(g.freedom)
+    rates, _ = joint_motion(g, v["pose"], v["velocity"], rest)
+    return {"rates": (rates, (g.freedom, 3))}
+
+
+def _accelerations(g: Geometry, v: dict[str, Expression]) -> Outputs:
+    _, accelerations = joint_motion(g, v["pose"], v["velocity"], v["acceleration"])
+    return {"accelerations": (accelerations, (g.freedom, 3))}
+
+
+def _inverse_dynamics(g: Geometry, v: dict[str, Expression]) -> Outputs:
+    forces = inverse_dynamics(
+        g, v["pose"], v["velocity"], v["acceleration"], v["parameters"], v.get("wrench")
+    )
+    return {"forces": (forces, (g.freedom,))}
+
+
+def _forward_dynamics(g: Geometry, v: dict[str, Expression]) -> Outputs:
+    wrench = v.get("wrench", ca.SX.zeros(g.freedom))
+    acceleration = forward_dynamics(
+        g, v["pose"], v["velocity"], v["forces"], v["parameters"], wrench
+    )
+    return {"acceleration": (acceleration, (g.freedom,))}
+
+
+def _mass_matrix(g: Geometry, v: dict[str, Expression]) -> Outputs:
+    return {"mass": (mass_matrix(g, v["pose"], v["parameters"]), (g.freedom, g.freedom))}
+
+
+def _coriolis_matrix(g: Geometry, v: dict[str, Expression]) -> Outputs:
+    matrix = coriolis_matrix(g, v["pose"], v["velocity"], v["parameters"])
+    return {"coriolis": (matrix, (g.freedom, g.freedom))}
+
+
+def _bias_forces(g: Geometry, v: dict[str, Expression]) -> Outputs:
+    rest = ca.SX.zeros(g.freedom)
+    bias = generalized_forces(g, v["pose"], v["velocity"], rest, v["parameters"])
+    return {"bias": (bias, (g.freedom,))}
+
+
+def _gravity_forces(g: Geometry, v: dict[str, Expression]) -> Outputs:
+    rest = ca.SX.zeros(g.freedom)
+    return {
+        "gravity": (generalized_forces(g, v["pose"], rest, rest, v["parameters"]), (g.freedom,))
+    }
+
+
+def _kinetic_energy(g: Geometry, v: dict[str, Expression]) -> Outputs:
+    return {"energy": (kinetic_energy(g, v["pose"], v["velocity"], v["parameters"]), ())}
+
+
+def _potential_energy(g: Geometry, v: dict[str, Expression]) -> Outputs:
+    return {"energy": (potential_energy(g, v["pose"], v["parameters"]), ())}
+
+
+def _regressor(g: Geometry, v: dict[str, Expression]) -> Outputs:
+    identity = ca.SX.eye(_count(g))
+    matrix = inverse_dynamics(g, v["pose"], v["velocity"], v["acceleration"], identity)
+    return {"regressor": (matrix, matrix.shape)}
+
+
+def _paper_regressor(g: Geometry, v: dict[str, Expression]) -> Outputs:
+    matrix = paper_regressor(g, v["pose"], v["velocity"], v["acceleration"])
+    return {"regressor": (matrix, matrix.shape)}
+
+
+def _paper_terms(g: Geometry, v: dict[str, Expression]) -> Outputs:
+    parts = terms(g, v["pose"], v["velocity"], v["acceleration"])
+    links, m = len(parts.links), g.freedom
+    return {
+        "jacobian": (parts.jacobian, (m, m)),
+        "sliders": (parts.sliders, (m, m)),
+        "link_jacobians": (ca.vertcat(*parts.link_jacobians), (links, 6, m)),
+        "links": (ca.vertcat(*parts.links), (links, 6, 4)),
+        "platform": (parts.platform, (m, 4)),
+    }
+
+
+_STATE = ("pose", "velocity", "acceleration")
+
+_TABLE: dict[str, _Entry] = {
+    "inverse_kinematics": _Entry(("pose",), _position),
+    "link_vectors": _Entry(("pose",), _links),
+    "direct_kinematics": _Entry(("sliders",), _direct),
+    "reach": _Entry(("pose",), _reach),
+    "regularity": _Entry(("pose",), _regularity),
+    "jacobian": _Entry(("pose",), _jacobian),
+    "link_jacobians": _Entry(("pose",), _link_jacobians),
+    "joint_screws": _Entry(("pose",), _screws),
+    "joint_rates": _Entry(("pose", "velocity"), _rates),
+    "joint_accelerations": _Entry(_STATE, _accelerations),
+    "inverse_dynamics": _Entry((*_STATE, "parameters"), _inverse_dynamics),
+    "inverse_dynamics_loaded": _Entry((*_STATE, "wrench", "parameters"), _inverse_dynamics),
+    "forward_dynamics": _Entry(("pose", "velocity", "forces", "parameters"), _forward_dynamics),
+    "forward_dynamics_loaded": _Entry(
+        ("pose", "velocity", "forces", "wrench", "parameters"), _forward_dynamics
+    ),
+    "mass_matrix": _Entry(("pose", "parameters"), _mass_matrix),
+    "coriolis_matrix": _Entry(("pose", "velocity", "parameters"), _coriolis_matrix),
+    "bias_forces": _Entry(("pose", "velocity", "parameters"), _bias_forces),
+    "gravity_forces": _Entry(("pose", "parameters"), _gravity_forces),
+    "kinetic_energy": _Entry(("pose", "velocity", "parameters"), _kinetic_energy),
+    "potential_energy": _Entry(("pose", "parameters"), _potential_energy),
+    "regressor": _Entry(_STATE, _regressor),
+    "paper_regressor": _Entry(_STATE, _paper_regressor),
+    "paper_terms": _Entry(_STATE, _paper_terms),
+}
+
+FUNCTIONS = tuple(_TABLE)
+"""What `compile` accepts. The `_loaded` ones take a wrench on the platform as well."""
+
+
+def program(robot: Manipulator, what: str) -> Program:
+    """Return the function `what` of a machine's geometry; inertial parameters stay inputs.
+
+    Raises
+    ------
+    ModelError
+        If there is no function of that name.
+    """
+    if what not in _TABLE:
+        raise ModelError(f"what: {what!r} cannot be compiled; choose from {', '.join(FUNCTIONS)}")
+    return _built(_bare(robot), what)
+
+
+@lru_cache(maxsize=256)
+def _bare(robot: Manipulator) -> Manipulator:
+    """Return the machine with unit inertia, so that machines of one geometry share programs."""
+    unit = PlanarInertia(1.0, (0.0, 0.0), 1.0)
+    legs = tuple(replace(leg, slider_mass=1.0, upper=unit, lower=unit) for leg in robot.legs)
+    return replace(robot, name="any", legs=legs, platform=replace(robot.platform, inertia=unit))
+
+
+@lru_cache(maxsize=512)
+def _built(robot: Manipulator, what: str) -> Program:
+    return _program(Geometry.of(robot), what)
+
+
+def _program(geometry: Geometry, what: str) -> Program:
+    entry = _TABLE[what]
+    symbols = {
+        name: ca.SX.sym(name, _count(geometry) if name == "parameters" else geometry.freedom)
+        for name in entry.inputs
+    }
+    outputs = entry.build(geometry, symbols)
+    # A matrix goes out transposed: CasADi stores columns, NumPy rows.
+    dense = [ca.densify(expression).T for expression, _ in outputs.values()]
+    function = ca.Function(
+        what, list(symbols.values()), ca.cse(dense), list(symbols), list(outputs)
+    )
+    inputs = tuple(
+        Port(name, symbol.shape[:1], shared=name == "parameters")
+        for name, symbol in symbols.items()
+    )
+    return Program(
+        what,
+        function,
+        inputs,
+        tuple(Port(name, tuple(shape)) for name, (_, shape) in outputs.items()),
+    )

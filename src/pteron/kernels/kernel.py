@@ -1,0 +1,152 @@
+"""A kernel: a CasADi function made executable, with its name, its shapes and its cost."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pteron.errors import DataError
+from pteron.kernels.operations import count_operations
+
+__all__ = ["Array", "Kernel", "Port"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Port:
+    """An input or an output of a kernel.
+
+    Parameters
+    ----------
+    name : str
+        What it holds.
+    shape : tuple of int
+        Its shape for one state; the batch axes lead.
+    shared : bool
+        For an input: one value serves the whole batch.
+    """
+
+    name: str
+    shape: tuple[int, ...]
+    shared: bool = False
+
+    @property
+    def size(self) -> int:
+        """Number of values for one state."""
+        return int(np.prod(self.shape, dtype=int))
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """Something that can be called with batches of states.
+
+    A target subclasses it and gives `source` and `_run`; see `pteron.kernels.targets`.
+
+    Parameters
+    ----------
+    name : str
+        The public function it stands for.
+    function : casadi.Function
+        The SX function it executes. A matrix is stored by columns, hence its outputs are
+        transposed: row-major memory on the other side.
+    inputs, outputs : tuple of Port
+        Names and shapes.
+    fixed : dict
+        Values of shared inputs that need not be given in a call, by name.
+    """
+
+    name: str
+    function: ca.Function
+    inputs: tuple[Port, ...]
+    outputs: tuple[Port, ...]
+    fixed: dict[str, Array] = field(default_factory=dict, hash=False, compare=False)
+
+    @property
+    def operations(self) -> int:
+        """Arithmetic operations for one state; see `count_operations`."""
+        return count_operations(self.function)
+
+    @property
+    def source(self) -> str:
+        """The code that runs, as text."""
+        raise NotImplementedError
+
+    def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
+        """Fill `outputs` (batch, size) from `inputs` (batch, size), or (size,) where shared."""
+        raise NotImplementedError
+
+    def __call__(self, *values: ArrayLike) -> Any:
+        """Evaluate the kernel.
+
+        Parameters
+        ----------
+        *values : array, shape (..., *port.shape)
+            The inputs that are not fixed, in order. Leading axes broadcast.
+
+        Returns
+        -------
+        array or tuple of array
+            The outputs, with the broadcast leading axes; not a tuple where there is one.
+
+        Raises
+        ------
+        DataError
+            If the number of inputs or a shape is wrong.
+        """
+        ports = [port for port in self.inputs if port.name not in self.fixed]
+        if len(values) != len(ports):
+            names = ", ".join(port.name for port in ports)
+            raise DataError(f"{self.name}: {len(values)} inputs given, {len(ports)} expected ({names})")
+        given = {
+            port.name: as_array(value, port.name, port.shape)
+            for port, value in zip(ports, values, strict=True)
+        }
+        lead = broadcast_lead(
+            {
+                port.name: given[port.name].shape[: given[port.name].ndim - len(port.shape)]
+                for port in ports
+                if not port.shared
+            }
+        )
+        batch = int(np.prod(lead, dtype=int))
+        inputs = []
+        for port in self.inputs:
+            if port.shared or port.name in self.fixed:
+                value = self.fixed.get(port.name, given.get(port.name))
+                inputs.append(np.ascontiguousarray(value, dtype=float).reshape(port.size))
+            else:
+                whole = np.broadcast_to(given[port.name], lead + port.shape)
+                inputs.append(np.ascontiguousarray(whole).reshape(batch, port.size))
+        outputs = [np.empty((batch, port.size)) for port in self.outputs]
+        self._run(batch, inputs, outputs)
+        results = tuple(
+            out.reshape(lead + port.shape) for out, port in zip(outputs, self.outputs, strict=True)
+        )
+        return results[0] if len(results) == 1 else results
+
+
+def as_array(value: ArrayLike, name: str, shape: tuple[int, ...]) -> Array:
+    """Return `value` as floats whose last axes are `shape`, or say what was expected."""
+    try:
+        array = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise DataError(f"{name}: not an array of numbers") from None
+    if len(shape) > array.ndim or array.shape[array.ndim - len(shape) :] != shape:
+        expected = ", ".join(["...", *map(str, shape)])
+        raise DataError(f"{name}: shape {array.shape} given, ({expected}) expected")
+    return array
+
+
+def broadcast_lead(shapes: dict[str, tuple[int, ...]]) -> tuple[int, ...]:
+    """Return the common shape of the leading axes, or name the inputs that do not agree."""
+    try:
+        return np.broadcast_shapes(*shapes.values())
+    except ValueError:
+        listed = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
+        raise DataError(f"leading axes do not broadcast: {listed}") from None

@@ -1,0 +1,60 @@
+"""`compile`: a machine's function made executable on a target."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+from pteron.errors import ModelError
+from pteron.kernels.functions import program
+from pteron.kernels.kernel import Kernel
+from pteron.kernels.vm import VirtualMachine
+from pteron.manipulator import Manipulator, parameters
+
+__all__ = ["TARGETS", "compile"]
+
+TARGETS: dict[str, type[Kernel]] = {"vm": VirtualMachine}
+"""The targets by name."""
+
+
+def compile(robot: Manipulator, what: str, target: str = "vm") -> Kernel:
+    """Compile one of the numeric functions for a machine.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine; its geometry and gravity are folded in, its inertial parameters are inputs of
+        the code and fixed to the machine's own in a call.
+    what : str
+        A function's name: `"inverse_dynamics"`, `"jacobian"`, ...; `pteron.kernels.FUNCTIONS` has
+        them all.
+    target : str
+        What executes it: `"vm"`, CasADi's virtual machine.
+
+    Returns
+    -------
+    Kernel
+        Called with the same arrays as the function (without `robot`); it has `operations`,
+        `inputs`, `outputs` and `source`. It does not check poses: NaN where out of reach.
+
+    Raises
+    ------
+    ModelError
+        If there is no such function or target.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> kernel = pteron.compile(pteron.load("quadrupteron"), "inverse_dynamics")
+    >>> kernel.operations, [port.name for port in kernel.inputs]
+    (427, ['pose', 'velocity', 'acceleration', 'parameters'])
+    """
+    if target not in TARGETS:
+        raise ModelError(f"target: {target!r} is not known; choose from {', '.join(TARGETS)}")
+    return _compiled(robot, what, target)
+
+
+@lru_cache(maxsize=512)
+def _compiled(robot: Manipulator, what: str, target: str) -> Kernel:
+    built = program(robot, what)
+    fixed = {port.name: parameters(robot) for port in built.inputs if port.name == "parameters"}
+    return TARGETS[target](built.name, built.function, built.inputs, built.outputs, fixed)

@@ -1,0 +1,161 @@
+"""Poses as the user gives them: checked once, at the boundary, before a kernel sees them."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pteron.conventions import OnFailure
+from pteron.errors import DataError, SingularPose, UnreachablePose
+from pteron.kernels import Array, as_array, compile
+from pteron.kinematics.singularities import EVERYWHERE, is_singular_everywhere
+from pteron.manipulator import Manipulator
+
+__all__ = ["SINGULAR", "finite", "usable_poses"]
+
+SINGULAR = 1e-9
+"""Closeness (see `SingularPose`) at which a pose counts as singular. What is computed from J^-1 or
+from 1/D loses as many digits as the closeness has zeros, so that half of them are left here."""
+
+
+def finite(
+    robot: Manipulator, value: ArrayLike, name: str, on_failure: OnFailure = "raise"
+) -> Array:
+    """Return an array (..., m) of finite numbers, or say which element is not one.
+
+    Under ``on_failure="nan"`` what is not finite is let through, to end as NaN in its own row.
+    """
+    array = as_array(value, name, (robot.freedom,))
+    if on_failure == "raise" and not np.isfinite(array).all():
+        index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        where = f"{name}{list(index)}" if index else name
+        raise DataError(f"{where}: {array[index]} given, a finite number expected")
+    return array
+
+
+def usable_poses(
+    robot: Manipulator,
+    pose: ArrayLike,
+    *,
+    reach: bool = False,
+    bent: bool = False,
+    held: bool = False,
+    on_failure: OnFailure = "raise",
+) -> Array:
+    """Return the poses (..., m), those that cannot be used replaced by NaN or refused.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    pose : array, shape (..., m)
+        The poses.
+    reach, bent, held : bool
+        What the caller needs: that the links reach the pose; that no leg is stretched or folded
+        (type I), which implies reach; that the sliders hold the platform (type II).
+    on_failure : {"raise", "nan"}
+        Whether a pose that fails raises or becomes NaN.
+
+    Raises
+    ------
+    DataError, UnreachablePose, SingularPose
+        For the first pose, in memory order, that cannot be used.
+    """
+    if on_failure not in get_args(OnFailure):
+        raise DataError(f'on_failure: {on_failure!r} is neither "raise" nor "nan"')
+    poses = finite(robot, pose, "pose", on_failure)
+    bad = ~np.isfinite(poses).all(axis=-1)
+    # An infinite pose would make the kernels subtract infinities; NaN is quiet.
+    poses = np.where(bad[..., None], np.nan, poses)
+    if reach or bent:
+        distance, margin, sine = compile(robot, "reach")(poses)
+        beyond = np.isnan(sine) & ~bad[..., None]
+        # lu and ll are equal where the elbow is undetermined, so that n = 0 is within reach.
+        coincident = distance <= 1e-12 * _spans(robot)
+        stuck = (sine <= SINGULAR) if bent else coincident
+        if on_failure == "raise" and (beyond.any() or stuck.any()):
+            index = np.argwhere(beyond | stuck)[0]
+            at, leg = tuple(int(i) for i in index[:-1]), int(index[-1])
+            count = int((beyond | stuck).any(axis=-1).sum())
+            if beyond[(*at, leg)]:
+                raise _unreachable(robot, at, leg, distance, margin, count)
+            raise _stretched(at, leg, float(sine[(*at, leg)]), bool(coincident[(*at, leg)]), count)
+        bad = bad | (beyond | stuck).any(axis=-1)
+    if held:
+        if is_singular_everywhere(robot):
+            closeness: Array = np.zeros(poses.shape[:-1])
+        else:
+            closeness = np.abs(compile(robot, "regularity")(poses))
+        loose = closeness <= SINGULAR
+        if on_failure == "raise" and loose.any():
+            at = tuple(int(i) for i in np.argwhere(loose)[0])
+            raise _loose(robot, at, poses[at], float(closeness[at]), int(loose.sum()))
+        bad = bad | loose
+    return np.where(bad[..., None], np.nan, poses)
+
+
+def _spans(robot: Manipulator) -> Array:
+    return np.array([leg.upper_length + leg.lower_length for leg in robot.legs])
+
+
+def _where(index: tuple[int, ...]) -> str:
+    return f"pose[{', '.join(map(str, index))}]" if index else "pose"
+
+
+def _others(count: int) -> str:
+    return f" ({count} such poses in the batch)" if count > 1 else ""
+
+
+def _unreachable(
+    robot: Manipulator,
+    index: tuple[int, ...],
+    i: int,
+    distance: Array,
+    margin: Array,
+    count: int,
+) -> UnreachablePose:
+    leg = robot.legs[i]
+    shortfall = max(-float(margin[(*index, i)]), 0.0)
+    lengths = leg.upper_length, leg.lower_length
+    return UnreachablePose(
+        f"{_where(index)}: leg {i + 1} misses it by {shortfall:.3g} m: its links span "
+        f"{abs(lengths[0] - lengths[1]):.4g} to {sum(lengths):.4g} m, but the platform point is "
+        f"{float(distance[(*index, i)]):.4g} m from R1; move the pose towards the legs' reach"
+        f"{_others(count)}",
+        leg=i + 1,
+        shortfall=shortfall,
+        index=index,
+    )
+
+
+def _stretched(
+    index: tuple[int, ...], i: int, sine: float, coincident: bool, count: int
+) -> SingularPose:
+    what = (
+        "R1 and R3 coincide, so that its elbow may be anywhere"
+        if coincident
+        else f"it is stretched or folded (type I; sine of the elbow's angle {sine:.1e})"
+    )
+    return SingularPose(
+        f"{_where(index)}: singular for leg {i + 1}: {what}; move away from the edge of its reach"
+        f"{_others(count)}",
+        kind="elbow" if coincident else "I",
+        closeness=sine,
+        index=index,
+    )
+
+
+def _loose(
+    robot: Manipulator, index: tuple[int, ...], pose: Array, closeness: float, count: int
+) -> SingularPose:
+    if is_singular_everywhere(robot):
+        message = EVERYWHERE.format(name=robot.name)
+    else:
+        message = (
+            f"{_where(index)}: singular orientation (type II), {closeness:.1e} rad from where the "
+            f"sliders no longer hold the platform (phi = {np.degrees(pose[-1]):.4g} deg); turn "
+            f"away from it{_others(count)}"
+        )
+    return SingularPose(message, kind="II", closeness=closeness, index=index)

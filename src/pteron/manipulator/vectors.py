@@ -1,0 +1,103 @@
+"""Three-vectors of plain floats, and the checks that a manipulator's numbers pass when it is made."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from pteron.errors import ModelError
+
+Vector = tuple[float, float, float]
+
+UNIT_TOLERANCE = 1e-6
+"""How far from 1 the length of a unit vector may be before it is refused instead of normalised."""
+
+PARALLEL_TOLERANCE = 1e-9
+"""Sine of the angle under which two unit vectors count as parallel."""
+
+_ROUNDING = 4 * math.ulp(1.0)
+
+
+def number(value: object, key: str) -> float:
+    """Return `value` as a finite float, or say under which `key` it is not one."""
+    try:
+        result = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        raise ModelError(f"{key}: {value!r} is not a number") from None
+    if not math.isfinite(result):
+        raise ModelError(f"{key}: {result} is not a finite number")
+    return result
+
+
+def positive(value: object, key: str, unit: str) -> float:
+    """Return `value` as a float above zero."""
+    result = number(value, key)
+    if result <= 0.0:
+        raise ModelError(f"{key}: {result:g} {unit} is not positive; give a value above 0 {unit}")
+    return result
+
+
+def numbers(values: Sequence[object], key: str, count: int) -> tuple[float, ...]:
+    """Return `values` as a tuple of `count` finite floats."""
+    try:
+        items = list(values)
+    except TypeError:
+        raise ModelError(f"{key}: {values!r} is not a list of {count} numbers") from None
+    if len(items) != count:
+        raise ModelError(f"{key}: {len(items)} numbers given, {count} expected")
+    return tuple(number(item, f"{key}[{i}]") for i, item in enumerate(items))
+
+
+def vector(values: Sequence[object], key: str) -> Vector:
+    """Return `values` as a vector of three finite floats."""
+    x, y, z = numbers(values, key, 3)
+    return (x, y, z)
+
+
+def unit_vector(values: Sequence[object], key: str) -> Vector:
+    """Return `values` normalised; a length further than `UNIT_TOLERANCE` from 1 is refused.
+
+    A vector that is a unit vector to rounding is kept bit for bit, so that a file that is read and
+    written again does not drift.
+    """
+    given = vector(values, key)
+    length = norm(given)
+    if abs(length - 1.0) > UNIT_TOLERANCE:
+        mend = (
+            "a zero vector has no direction"
+            if length == 0.0
+            else "write " + str([float(f"{c / length:.12g}") for c in given])
+        )
+        raise ModelError(f"{key}: {list(given)} has length {length:.6g}, not 1; {mend}")
+    if abs(length - 1.0) <= _ROUNDING:
+        return given
+    return scaled(given, 1.0 / length)
+
+
+def dot(a: Vector, b: Vector) -> float:
+    """Return the scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """Return the vector product."""
+    return (
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    )
+
+
+def norm(a: Vector) -> float:
+    """Return the Euclidean length."""
+    return math.hypot(*a)
+
+
+def scaled(a: Vector, factor: float) -> Vector:
+    """Return `factor` times `a`."""
+    return (factor * a[0], factor * a[1], factor * a[2])
+
+
+def parallel(a: Vector, b: Vector) -> bool:
+    """Say whether two unit vectors are parallel, in the same or in opposite sense."""
+    return norm(cross(a, b)) < PARALLEL_TOLERANCE
