@@ -1,9 +1,15 @@
 """Pteron: parallel manipulators whose legs carry points of the platform.
 
-Closed-form kinematics, dynamics by virtual work, and base inertial parameters, for the Quadrupteron,
-the Tripteron and their oblique relatives. `robot` is a `Manipulator`; poses, velocities and
-accelerations have shape (..., m), slider coordinates and forces (..., n), in SI units and radians.
+Closed-form kinematics, dynamics by virtual work, and base inertial parameters, for the
+Quadrupteron, the Tripteron and their oblique relatives. `robot` is a `Manipulator`; poses,
+velocities and accelerations have shape (..., m), slider coordinates and forces (..., n), in SI
+units and radians.
 """
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from pteron.dynamics import (
     bias_forces,
@@ -53,9 +59,31 @@ from pteron.manipulator import (
     working_modes,
 )
 
+if TYPE_CHECKING:
+    from pteron import motion, plots, report, workspace
+    from pteron.reduction import BaseParameters, base_parameters, base_regressor
+
 __version__ = "0.1.0"
 
+_LATER = {
+    "BaseParameters": "pteron.reduction",
+    "base_parameters": "pteron.reduction",
+    "base_regressor": "pteron.reduction",
+}
+_LATER_MODULES = ("motion", "plots", "report", "workspace")
+"""What would slow the start of those who do not use it (SymPy, SciPy, matplotlib)."""
+
+
+def __getattr__(name: str) -> Any:
+    if name in _LATER:
+        return getattr(import_module(_LATER[name]), name)
+    if name in _LATER_MODULES:
+        return import_module(f"pteron.{name}")
+    raise AttributeError(f"module 'pteron' has no attribute {name!r}")
+
+
 __all__ = [
+    "BaseParameters",
     "DataError",
     "JointMotion",
     "Leg",
@@ -67,6 +95,8 @@ __all__ = [
     "PteronError",
     "SingularPose",
     "UnreachablePose",
+    "base_parameters",
+    "base_regressor",
     "bias_forces",
     "catalog",
     "compile",
@@ -85,14 +115,18 @@ __all__ = [
     "link_vectors",
     "load",
     "mass_matrix",
+    "motion",
     "parameter_names",
     "parameters",
+    "plots",
     "potential_energy",
     "random_poses",
     "regressor",
+    "report",
     "save",
     "singular_orientations",
     "turned",
     "with_parameters",
     "working_modes",
+    "workspace",
 ]

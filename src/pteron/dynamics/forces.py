@@ -55,7 +55,7 @@ def inverse_dynamics(
     >>> rest = np.zeros(4)
     >>> forces = pteron.inverse_dynamics(robot, rest, rest, rest)
     >>> forces.round(3)
-    array([33.01 , -0.118,  9.371,  0.118])
+    array([31.082, -1.881,  2.566,  0.685])
     """
     poses = usable_poses(robot, pose, bent=True, held=True, on_failure=on_failure)
     rate = finite(robot, velocity, "velocity", on_failure)

@@ -1,4 +1,4 @@
-"""A body in planar motion: the force and the moment of gravity and inertia about its reference point.
+"""A body in planar motion: force and moment of gravity and inertia about its reference point.
 
 Inertial parameters come as columns: one column for the values of a machine, or a column for each
 parameter, which turns every force below into the regressor of that force. Hence one set of
@@ -50,7 +50,9 @@ def first_moment(
     return ca.mtimes(x, hx) + ca.mtimes(y, hy), ca.mtimes(y, hx) - ca.mtimes(x, hy)
 
 
-def turning_force(h: Expression, dh: Expression, rate2: Expression, ddtheta: Expression) -> Expression:
+def turning_force(
+    h: Expression, dh: Expression, rate2: Expression, ddtheta: Expression
+) -> Expression:
     """Return -w' z x h + w^2 h, the inertia force (3, K) of a first moment h that turns about z.
 
     `h` is perpendicular to z and `dh` is z x h; `rate2` is w^2.

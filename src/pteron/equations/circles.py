@@ -10,7 +10,7 @@ from pteron.equations.geometry import Expression, LegGeometry
 def squared_reach(leg: LegGeometry, u: Expression) -> Expression:
     """Return Delta, the product under the radical of Eqs. (1) and (2): below 0 out of reach.
 
-    The paper's four factors pair into ((lu + ll)^2 - n^2) (n^2 - (lu - ll)^2), which needs n^2 only.
+    The paper's four factors pair into ((lu + ll)^2 - n^2) (n^2 - (lu - ll)^2): n^2 is enough.
     """
     n2 = ca.dot(u, u)
     longest, shortest = leg.lu + leg.ll, leg.lu - leg.ll

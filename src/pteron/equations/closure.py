@@ -23,11 +23,11 @@ class Closure:
     """D, (n, 3): the rows d_bar."""
     right_inverse: Expression
     """P, (n, 3), with D^T P = 1."""
-    null: Expression | None
-    """N, (n, 1), with N^T D = 0; None for 3T."""
-    cosines: Expression | None
+    null: Expression
+    """N, (n, 1), with N^T D = 0; None for 3T, as are the two that follow."""
+    cosines: Expression
     """(n, 1): j_i = cosines_i cos(phi) + sines_i sin(phi) is the Jacobian's fourth column."""
-    sines: Expression | None
+    sines: Expression
 
 
 def closure(geometry: Geometry) -> Closure:

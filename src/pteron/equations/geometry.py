@@ -29,7 +29,7 @@ class LegGeometry:
     ll: Expression
     sigma: Expression
     d_bar: Expression
-    """d / (d . e): the slider coordinate is rho = d_bar . (c - r), Eq. (4) in the general family."""
+    """d / (d . e): the slider coordinate is rho = d_bar . (c - r), Eq. (4) generalised."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ def along(vector: Expression, expression: Expression) -> Expression:
 
 
 def weighted_sum(weights: Expression, terms: Sequence[Expression]) -> Expression:
-    """Return the sum of weight times term; terms whose weights agree but for sign share a product."""
+    """Return the sum of weight times term; equal weights, but for sign, share one product."""
     shared: dict[float, Expression] = {}
     total = ca.SX(*terms[0].shape)
     for weight, term in zip(ca.vertsplit(weights), terms, strict=True):

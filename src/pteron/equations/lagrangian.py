@@ -94,12 +94,8 @@ def potential_energy(geometry: Geometry, pose: Expression, parameters: Expressio
         inertia, c = bodies[i], motion.points[i].position
         at = leg_position(leg, c)
         upper, lower = inertia.upper, inertia.lower
-        h_u, _ = first_moment(
-            at.l_u, ca.cross(leg.d, at.l_u), upper.hx / leg.lu, upper.hy / leg.lu
-        )
-        h_l, _ = first_moment(
-            at.l_l, ca.cross(leg.d, at.l_l), lower.hx / leg.ll, lower.hy / leg.ll
-        )
+        h_u, _ = first_moment(at.l_u, ca.cross(leg.d, at.l_u), upper.hx / leg.lu, upper.hy / leg.lu)
+        h_l, _ = first_moment(at.l_l, ca.cross(leg.d, at.l_l), lower.hx / leg.ll, lower.hy / leg.ll)
         slide = leg.r + slider_coordinate(leg, c) * leg.e
         height = lower.m * leg.s0[2] * geometry.k
         moments = moments + (inertia.slider + upper.m) * slide + h_u + h_l + height

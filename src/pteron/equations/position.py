@@ -32,8 +32,7 @@ def links(geometry: Geometry, pose: Expression) -> tuple[Expression, Expression]
     """Return l_u and l_l of every leg, each (n, 3): Eqs. (6) and (7)."""
     points = platform_at(geometry, pose).points
     legs = [
-        leg_position(leg, point.position)
-        for leg, point in zip(geometry.legs, points, strict=True)
+        leg_position(leg, point.position) for leg, point in zip(geometry.legs, points, strict=True)
     ]
     return (
         ca.vertcat(*(leg.l_u.T for leg in legs)),
@@ -44,8 +43,8 @@ def links(geometry: Geometry, pose: Expression) -> tuple[Expression, Expression]
 def reach(geometry: Geometry, pose: Expression) -> tuple[Expression, Expression, Expression]:
     """Return, for every leg (n, 1), n = |u|, its reach margin and the sine of its elbow's angle.
 
-    n and the margin are in metres. The sine is sqrt(Delta) / (2 lu ll): 0 where the leg is stretched
-    or folded (type I), NaN out of reach.
+    n and the margin are in metres. The sine is sqrt(Delta) / (2 lu ll): 0 where the leg is
+    stretched or folded (type I), NaN out of reach.
     """
     points = platform_at(geometry, pose).points
     distances, margins, sines = [], [], []
@@ -69,9 +68,7 @@ def direct_position(geometry: Geometry, sliders: Expression) -> Expression:
     known = ca.vertcat(
         *(
             rho + ca.dot(leg.d_bar, leg.r - _constant_offset(geometry, i))
-            for i, (leg, rho) in enumerate(
-                zip(geometry.legs, ca.vertsplit(sliders), strict=True)
-            )
+            for i, (leg, rho) in enumerate(zip(geometry.legs, ca.vertsplit(sliders), strict=True))
         )
     )
     if c.null is None:

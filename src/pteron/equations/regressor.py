@@ -43,7 +43,7 @@ def body_matrix(
 ) -> Expression:
     """Return Om (6, 4) of a body: the wrench at its reference point, per unit of m, mgx, mgy, I.
 
-    `x` and `z` are the body's axes, `g_a` is g - a, `rate` and `ddtheta` its angular motion about z.
+    `x` and `z` are the body's axes, `g_a` is g - a, `rate` and `ddtheta` its motion about z.
     """
     unit = Inertia.rows(ca.SX.eye(4))
     h, dh = first_moment(x, ca.cross(z, x), unit.hx, unit.hy)

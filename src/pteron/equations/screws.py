@@ -45,7 +45,7 @@ def reciprocal_wrench(geometry: Geometry, pose: Expression, i: int) -> Expressio
 
 
 def jacobian_by_screws(geometry: Geometry, pose: Expression) -> Expression:
-    """Return J (n, m) from the screws: the wrench's power on the platform's twist over that on P."""
+    """Return J (n, m) by screws: the wrench's power on the platform's twist over that on P."""
     twists = ca.vertcat(
         ca.horzcat(ca.SX.zeros(3, 3), *([geometry.k] if geometry.turns else [])),
         ca.horzcat(ca.SX.eye(3), *([ca.SX.zeros(3)] if geometry.turns else [])),

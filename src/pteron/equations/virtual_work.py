@@ -90,9 +90,9 @@ def leg_forces(
 ) -> tuple[Expression, Expression]:
     """Return the force of a leg's bodies on its slider (1, K) and on its platform point (3, K).
 
-    The moments of the links act through theta_u and theta_l, whose rows with respect to u turn them
-    into a force tau; as u' = c' - e rho', tau acts on the point and -e . tau on the slider. `g_c` is
-    g - c''. The mass of the lower link is left to the platform.
+    The moments of the links act through theta_u and theta_l, whose rows with respect to u turn
+    them into a force tau; as u' = c' - e rho', tau acts on the point and -e . tau on the slider.
+    `g_c` is g - c''. The mass of the lower link is left to the platform.
     """
     at, upper, lower = motion.position, bodies.upper, bodies.lower
     h, dh = first_moment(at.l_u, ca.cross(leg.d, at.l_u), upper.hx / leg.lu, upper.hy / leg.lu)
@@ -111,9 +111,7 @@ def leg_forces(
     return on_slider - ca.mtimes(leg.e.T, tau), on_point + tau
 
 
-def carried_inertia(
-    geometry: Geometry, platform: Inertia, masses: list[Expression]
-) -> Inertia:
+def carried_inertia(geometry: Geometry, platform: Inertia, masses: list[Expression]) -> Inertia:
     """Return the platform's inertia with the lower links' masses placed on its points."""
     s0 = ca.horzcat(*(leg.s0 for leg in geometry.legs))
     x, y = s0[0, :].T, s0[1, :].T

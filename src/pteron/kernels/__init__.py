@@ -4,7 +4,7 @@ Batching and caching live here and only here.
 """
 
 from pteron.kernels.fields import Field, NoSquareRoot, PrimeField, RationalField, evaluate
-from pteron.kernels.functions import FUNCTIONS, Program, program
+from pteron.kernels.functions import FUNCTIONS, Program, general_program, program
 from pteron.kernels.kernel import Array, Kernel, Port, as_array
 from pteron.kernels.operations import count_operations
 from pteron.kernels.targets import TARGETS, compile
@@ -24,5 +24,6 @@ __all__ = [
     "compile",
     "count_operations",
     "evaluate",
+    "general_program",
     "program",
 ]

@@ -7,8 +7,9 @@ root must exist in the field, or `NoSquareRoot` is raised.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
+from functools import lru_cache
 from math import isqrt
 from typing import Generic, Protocol, TypeVar
 
@@ -128,46 +129,69 @@ def evaluate(
     ZeroDivisionError
         If a denominator vanishes.
     """
-    work: list[Element] = [field.number(0)] * function.sz_w()
-    outputs = [[field.number(0)] * function.nnz_out(i) for i in range(function.n_out())]
-    two, one = field.number(2), field.number(1)
+    zero, one, two = field.number(0), field.number(1), field.number(2)
+    unary: dict[int, Callable[[Element], Element]] = {
+        ca.OP_SQ: lambda a: field.multiply(a, a),
+        ca.OP_NEG: lambda a: field.subtract(zero, a),
+        ca.OP_TWICE: lambda a: field.add(a, a),
+        ca.OP_INV: lambda a: field.divide(one, a),
+        ca.OP_SQRT: field.square_root,
+        ca.OP_ASSIGN: lambda a: a,
+        ca.OP_SIN: lambda t: field.divide(
+            field.multiply(two, t), field.add(one, field.multiply(t, t))
+        ),
+        ca.OP_COS: lambda t: field.divide(
+            field.subtract(one, field.multiply(t, t)), field.add(one, field.multiply(t, t))
+        ),
+    }
+    binary: dict[int, Callable[[Element, Element], Element]] = {
+        ca.OP_ADD: field.add,
+        ca.OP_SUB: field.subtract,
+        ca.OP_MUL: field.multiply,
+        ca.OP_DIV: field.divide,
+    }
+    work = [zero] * function.sz_w()
+    outputs = [[zero] * function.nnz_out(i) for i in range(function.n_out())]
+    tape, constants = _tape(function)
+    for op, first, second, target in tape:
+        if op in binary:
+            work[target] = binary[op](work[first], work[second])
+        elif op in unary:
+            work[target] = unary[op](work[first])
+        elif op == ca.OP_INPUT:
+            work[target] = inputs[first][second]
+        elif op == ca.OP_OUTPUT:
+            outputs[first][second] = work[target]
+        else:
+            work[target] = field.number(constants[first])
+    return outputs
+
+
+@lru_cache(maxsize=64)
+def _tape(function: ca.Function) -> tuple[list[tuple[int, int, int, int]], list[Fraction]]:
+    """Return the instructions as (operation, first, second, work slot), and the constants.
+
+    An input's pair is (argument, element), an output's (result, element), a constant's first its
+    place in the list. Asking CasADi for them costs more than the arithmetic, hence the cache.
+    """
+    tape: list[tuple[int, int, int, int]] = []
+    constants: list[Fraction] = []
+    exact = {
+        *(ca.OP_ADD, ca.OP_SUB, ca.OP_MUL, ca.OP_DIV, ca.OP_SQ, ca.OP_NEG, ca.OP_TWICE),
+        *(ca.OP_INV, ca.OP_SQRT, ca.OP_ASSIGN, ca.OP_SIN, ca.OP_COS),
+    }
     for k in range(function.n_instructions()):
         op = function.instruction_id(k)
-        source = function.instruction_input(k)
-        target = function.instruction_output(k)
+        source, target = function.instruction_input(k), function.instruction_output(k)
         if op == ca.OP_OUTPUT:
-            outputs[target[0]][target[1]] = work[source[0]]
-            continue
-        if op == ca.OP_INPUT:
-            value = inputs[source[0]][source[1]]
+            tape.append((op, target[0], target[1], source[0]))
+        elif op == ca.OP_INPUT:
+            tape.append((op, source[0], source[1], target[0]))
         elif op == ca.OP_CONST:
-            value = field.number(Fraction(function.instruction_constant(k)))
+            tape.append((op, len(constants), 0, target[0]))
+            constants.append(Fraction(function.instruction_constant(k)))
+        elif op in exact:
+            tape.append((op, source[0], source[-1], target[0]))
         else:
-            a = work[source[0]]
-            b = work[source[1]] if len(source) > 1 else a
-            if op == ca.OP_ADD:
-                value = field.add(a, b)
-            elif op == ca.OP_SUB:
-                value = field.subtract(a, b)
-            elif op == ca.OP_MUL or op == ca.OP_SQ:
-                value = field.multiply(a, b)
-            elif op == ca.OP_DIV:
-                value = field.divide(a, b)
-            elif op == ca.OP_NEG:
-                value = field.subtract(field.number(0), a)
-            elif op == ca.OP_TWICE:
-                value = field.add(a, a)
-            elif op == ca.OP_INV:
-                value = field.divide(one, a)
-            elif op == ca.OP_SQRT:
-                value = field.square_root(a)
-            elif op == ca.OP_ASSIGN:
-                value = a
-            elif op in (ca.OP_COS, ca.OP_SIN):
-                t2 = field.multiply(a, a)
-                top = field.subtract(one, t2) if op == ca.OP_COS else field.multiply(two, a)
-                value = field.divide(top, field.add(one, t2))
-            else:
-                raise ValueError(f"operation {op} of {function.name()} is not exact in a field")
-        work[target[0]] = value
-    return outputs
+            raise ValueError(f"operation {op} of {function.name()} is not exact in a field")
+    return tape, constants

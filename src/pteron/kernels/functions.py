@@ -8,6 +8,7 @@ from functools import lru_cache
 
 import casadi as ca
 
+from pteron.equations.circles import squared_reach
 from pteron.equations.closure import regularity
 from pteron.equations.geometry import Expression, Geometry
 from pteron.equations.jacobians import jacobian, link_jacobians
@@ -18,7 +19,14 @@ from pteron.equations.lagrangian import (
     mass_matrix,
     potential_energy,
 )
-from pteron.equations.position import direct_position, inverse_position, links, reach
+from pteron.equations.legs import closing_vector
+from pteron.equations.position import (
+    direct_position,
+    inverse_position,
+    links,
+    platform_at,
+    reach,
+)
 from pteron.equations.rates import joint_motion
 from pteron.equations.regressor import paper_regressor, terms
 from pteron.equations.screws import joint_screws
@@ -27,7 +35,7 @@ from pteron.errors import ModelError
 from pteron.kernels.kernel import Port
 from pteron.manipulator import Manipulator, PlanarInertia
 
-__all__ = ["FUNCTIONS", "Program", "program"]
+__all__ = ["FUNCTIONS", "Program", "general_program", "program"]
 
 Outputs = dict[str, tuple[Expression, tuple[int, ...]]]
 """Each output's expression and its shape; a matrix is (rows, columns), a stack of them vertical."""
@@ -71,6 +79,20 @@ def _reach(g: Geometry, v: dict[str, Expression]) -> Outputs:
     distance, margin, sine = reach(g, v["pose"])
     shape = (g.freedom,)
     return {"distance": (distance, shape), "margin": (margin, shape), "sine": (sine, shape)}
+
+
+def _platform_points(g: Geometry, v: dict[str, Expression]) -> Outputs:
+    points = platform_at(g, v["pose"]).points
+    return {"points": (ca.vertcat(*(point.position.T for point in points)), (g.freedom, 3))}
+
+
+def _discriminants(g: Geometry, v: dict[str, Expression]) -> Outputs:
+    points = platform_at(g, v["pose"]).points
+    deltas = (
+        squared_reach(leg, closing_vector(leg, point.position))
+        for leg, point in zip(g.legs, points, strict=True)
+    )
+    return {"discriminants": (ca.vertcat(*deltas), (g.freedom,))}
 
 
 def _regularity(g: Geometry, v: dict[str, Expression]) -> Outputs:
@@ -178,6 +200,8 @@ _TABLE: dict[str, _Entry] = {
     "link_vectors": _Entry(("pose",), _links),
     "direct_kinematics": _Entry(("sliders",), _direct),
     "reach": _Entry(("pose",), _reach),
+    "platform_points": _Entry(("pose",), _platform_points),
+    "discriminants": _Entry(("pose",), _discriminants),
     "regularity": _Entry(("pose",), _regularity),
     "jacobian": _Entry(("pose",), _jacobian),
     "link_jacobians": _Entry(("pose",), _link_jacobians),
@@ -231,7 +255,17 @@ def _built(robot: Manipulator, what: str) -> Program:
     return _program(Geometry.of(robot), what)
 
 
-def _program(geometry: Geometry, what: str) -> Program:
+@lru_cache(maxsize=32)
+def general_program(legs: int, turns: bool, what: str) -> Program:
+    """Return the function `what` of a topology: the geometry is its first input, `geometry`.
+
+    The vector's order is that of `Geometry.symbols`.
+    """
+    geometry, vector = Geometry.symbols(legs, turns)
+    return _program(geometry, what, vector)
+
+
+def _program(geometry: Geometry, what: str, vector: Expression | None = None) -> Program:
     entry = _TABLE[what]
     symbols = {
         name: ca.SX.sym(name, _count(geometry) if name == "parameters" else geometry.freedom)
@@ -240,11 +274,13 @@ def _program(geometry: Geometry, what: str) -> Program:
     outputs = entry.build(geometry, symbols)
     # A matrix goes out transposed: CasADi stores columns, NumPy rows.
     dense = [ca.densify(expression).T for expression, _ in outputs.values()]
+    if vector is not None:
+        symbols = {"geometry": vector, **symbols}
     function = ca.Function(
         what, list(symbols.values()), ca.cse(dense), list(symbols), list(outputs)
     )
     inputs = tuple(
-        Port(name, symbol.shape[:1], shared=name == "parameters")
+        Port(name, symbol.shape[:1], shared=name in ("parameters", "geometry"))
         for name, symbol in symbols.items()
     )
     return Program(

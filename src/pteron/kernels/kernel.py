@@ -102,7 +102,9 @@ class Kernel:
         ports = [port for port in self.inputs if port.name not in self.fixed]
         if len(values) != len(ports):
             names = ", ".join(port.name for port in ports)
-            raise DataError(f"{self.name}: {len(values)} inputs given, {len(ports)} expected ({names})")
+            raise DataError(
+                f"{self.name}: {len(values)} inputs given, {len(ports)} expected ({names})"
+            )
         given = {
             port.name: as_array(value, port.name, port.shape)
             for port, value in zip(ports, values, strict=True)
@@ -115,7 +117,7 @@ class Kernel:
             }
         )
         batch = int(np.prod(lead, dtype=int))
-        inputs = []
+        inputs: list[Array] = []
         for port in self.inputs:
             if port.shared or port.name in self.fixed:
                 value = self.fixed.get(port.name, given.get(port.name))

@@ -15,6 +15,4 @@ def count_operations(function: ca.Function) -> int:
     + - * / negation, square root, sine, cosine and the like count one each; inputs, outputs, moves
     and constants are free. Shared subexpressions count once, if `casadi.cse` was applied.
     """
-    return sum(
-        function.instruction_id(k) not in _FREE for k in range(function.n_instructions())
-    )
+    return sum(function.instruction_id(k) not in _FREE for k in range(function.n_instructions()))

@@ -50,11 +50,11 @@ def _sweep(
     buffer, evaluate = function.buffer()
     for i, value in enumerate(inputs):
         if value.ndim == 1:
-            buffer.set_arg(i, memoryview(value))
+            buffer.set_arg(i, value.data)
     batched = [(i, value) for i, value in enumerate(inputs) if value.ndim == 2]
     for start in starts:
         for i, value in batched:
-            buffer.set_arg(i, memoryview(value[start : start + step]))
+            buffer.set_arg(i, value[start : start + step].data)
         for i, value in enumerate(outputs):
-            buffer.set_res(i, memoryview(value[start : start + step]))
+            buffer.set_res(i, value[start : start + step].data)
         evaluate()

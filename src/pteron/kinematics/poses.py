@@ -13,7 +13,7 @@ from pteron.kernels import Array, as_array, compile
 from pteron.kinematics.singularities import EVERYWHERE, is_singular_everywhere
 from pteron.manipulator import Manipulator
 
-__all__ = ["SINGULAR", "finite", "usable_poses"]
+__all__ = ["SINGULAR", "blanked", "finite", "usable_poses"]
 
 SINGULAR = 1e-9
 """Closeness (see `SingularPose`) at which a pose counts as singular. What is computed from J^-1 or
@@ -66,7 +66,7 @@ def usable_poses(
     if on_failure not in get_args(OnFailure):
         raise DataError(f'on_failure: {on_failure!r} is neither "raise" nor "nan"')
     poses = finite(robot, pose, "pose", on_failure)
-    bad = ~np.isfinite(poses).all(axis=-1)
+    bad = np.asarray(~np.isfinite(poses).all(axis=-1))
     # An infinite pose would make the kernels subtract infinities; NaN is quiet.
     poses = np.where(bad[..., None], np.nan, poses)
     if reach or bent:
@@ -82,7 +82,7 @@ def usable_poses(
             if beyond[(*at, leg)]:
                 raise _unreachable(robot, at, leg, distance, margin, count)
             raise _stretched(at, leg, float(sine[(*at, leg)]), bool(coincident[(*at, leg)]), count)
-        bad = bad | (beyond | stuck).any(axis=-1)
+        bad = np.asarray(bad | (beyond | stuck).any(axis=-1))
     if held:
         if is_singular_everywhere(robot):
             closeness: Array = np.zeros(poses.shape[:-1])
@@ -92,8 +92,17 @@ def usable_poses(
         if on_failure == "raise" and loose.any():
             at = tuple(int(i) for i in np.argwhere(loose)[0])
             raise _loose(robot, at, poses[at], float(closeness[at]), int(loose.sum()))
-        bad = bad | loose
+        bad = np.asarray(bad | loose)
     return np.where(bad[..., None], np.nan, poses)
+
+
+def blanked(poses: Array, values: Array) -> Array:
+    """Return values (..., *shape) with NaN wherever the pose (..., m) is NaN.
+
+    A kernel's constant entries do not see the pose; a pose that fails must not leave them behind.
+    """
+    lost = np.isnan(poses[..., 0])
+    return np.where(lost.reshape(lost.shape + (1,) * (values.ndim - lost.ndim)), np.nan, values)
 
 
 def _spans(robot: Manipulator) -> Array:

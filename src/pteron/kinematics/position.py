@@ -14,7 +14,7 @@ from pteron.conventions import (
 )
 from pteron.errors import SingularPose, UnreachablePose
 from pteron.kernels import compile
-from pteron.kinematics.poses import finite, usable_poses
+from pteron.kinematics.poses import blanked, finite, usable_poses
 from pteron.kinematics.singularities import EVERYWHERE, is_singular_everywhere
 from pteron.manipulator import Manipulator
 
@@ -55,7 +55,7 @@ def inverse_kinematics(
     """
     poses = usable_poses(robot, pose, reach=True, on_failure=on_failure)
     sliders: BatchOfSliders = compile(robot, "inverse_kinematics")(poses)
-    return np.where(np.isnan(poses).any(axis=-1, keepdims=True), np.nan, sliders)
+    return blanked(poses, sliders)
 
 
 def link_vectors(
@@ -128,7 +128,7 @@ def direct_kinematics(
     >>> poses = pteron.direct_kinematics(robot, [0.03, 0.02, 0.01, 0.02])
     >>> np.round(poses, 12) + 0.0
     array([[0.01      , 0.02      , 0.03      , 0.        ],
-           [0.09      , 0.02      , 0.03      , 3.14159265]])
+           [0.01      , 0.02      , 0.03      , 3.14159265]])
     """
     if is_singular_everywhere(robot):
         raise SingularPose(EVERYWHERE.format(name=robot.name), kind="II", closeness=0.0, index=())

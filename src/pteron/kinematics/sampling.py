@@ -14,6 +14,7 @@ __all__ = ["random_poses"]
 
 _BATCH = 4096
 _ATTEMPTS = 250
+_SCOUTS = 100
 
 
 def random_poses(
@@ -24,7 +25,9 @@ def random_poses(
     bend: float = 0.1,
     hold: float = 0.1,
 ) -> BatchOfPoses:
-    """Return poses drawn uniformly from those in reach and away from singularities.
+    """Return poses drawn at random from those in reach and away from singularities.
+
+    Uniformly in position and orientation, within a box that holds all but the rarest corners.
 
     Parameters
     ----------
@@ -57,12 +60,33 @@ def random_poses(
     """
     rng = np.random.default_rng(seed)
     center, radius = _search_ball(robot)
+    low, high = center - radius, center + radius
+    coarse = _drawn(robot, low, high, min(count, _SCOUTS), rng, bend, hold)
+    if len(coarse) >= count:
+        return coarse[:count]
+    # The ball is generous: with scouts in, their bounding box, widened, serves the rest.
+    least, most = coarse[:, :3].min(axis=0), coarse[:, :3].max(axis=0)
+    margin = 0.25 * (most - least)
+    low, high = np.maximum(least - margin, low), np.minimum(most + margin, high)
+    return _drawn(robot, low, high, count, rng, bend, hold)[:count]
+
+
+def _drawn(
+    robot: Manipulator,
+    low: Array,
+    high: Array,
+    count: int,
+    rng: np.random.Generator,
+    bend: float,
+    hold: float,
+) -> Array:
+    """Return at least `count` usable poses with positions drawn from a box."""
     held = 0.0 if is_singular_everywhere(robot) else hold
     found: list[Array] = []
     total = 0
-    for _ in range(_ATTEMPTS):
+    for _ in range(_ATTEMPTS + count // 16):
         poses = rng.uniform(-1.0, 1.0, (_BATCH, robot.freedom))
-        poses[:, :3] = center + radius * poses[:, :3]
+        poses[:, :3] = 0.5 * (low + high) + 0.5 * (high - low) * poses[:, :3]
         if robot.platform.turns:
             poses[:, 3] *= np.pi
         _, _, sine = compile(robot, "reach")(poses)
@@ -72,7 +96,7 @@ def random_poses(
         found.append(poses[good])
         total += int(good.sum())
         if total >= count:
-            return np.concatenate(found)[:count]
+            return np.concatenate(found)
     raise ModelError(
         f"{robot.name}: only {total} of {_ATTEMPTS * _BATCH} random poses are in reach of all legs "
         "and away from singularities; bring the guide points nearer or lengthen the links"
@@ -96,4 +120,4 @@ def _search_ball(robot: Manipulator) -> tuple[Array, float]:
         slant = abs(float(np.dot(leg.direction, leg.e)))
         reach = max(reach, s + (leg.upper_length + leg.lower_length) / slant)
     center = np.linalg.lstsq(normal, right, rcond=None)[0]
-    return center, 1.5 * reach
+    return np.asarray(center, dtype=float), 1.5 * reach

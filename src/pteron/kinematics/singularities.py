@@ -45,9 +45,7 @@ def is_singular_everywhere(robot: Manipulator) -> bool:
     if c.null is None:
         return False
     a, b = (float(value) for value in singularity(geometry))
-    null, cosines, sines = (
-        np.array(ca.evalf(v)).ravel() for v in (c.null, c.cosines, c.sines)
-    )
+    null, cosines, sines = (np.array(ca.evalf(v)).ravel() for v in (c.null, c.cosines, c.sines))
     scale = np.abs(null) @ np.hypot(cosines, sines)
     return bool(np.hypot(a, b) <= _VANISHING * scale)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from pteron.conventions import BatchOfMatrices, BatchOfSliders, OnFailure, PoseLike
 from pteron.kernels import Array, compile
-from pteron.kinematics.poses import finite, usable_poses
+from pteron.kinematics.poses import blanked, finite, usable_poses
 from pteron.manipulator import Manipulator
 from pteron.manipulator.vectors import dot, parallel
 
@@ -47,7 +47,7 @@ def jacobian(
     """
     poses = usable_poses(robot, pose, on_failure=on_failure)
     matrices: BatchOfMatrices = compile(robot, "jacobian")(poses)
-    return np.where(np.isnan(poses).any(axis=-1)[..., None, None], np.nan, matrices)
+    return blanked(poses, matrices)
 
 
 def link_jacobians(
@@ -79,13 +79,10 @@ def link_jacobians(
     """
     poses = usable_poses(robot, pose, bent=True, on_failure=on_failure)
     upper, lower = compile(robot, "link_jacobians")(poses)
-    out = np.isnan(poses).any(axis=-1)[..., None, None, None]
-    return np.where(out, np.nan, upper), np.where(out, np.nan, lower)
+    return blanked(poses, upper), blanked(poses, lower)
 
 
-def joint_screws(
-    robot: Manipulator, pose: PoseLike, *, on_failure: OnFailure = "raise"
-) -> Array:
+def joint_screws(robot: Manipulator, pose: PoseLike, *, on_failure: OnFailure = "raise") -> Array:
     """Return the unit screws of every leg's joints about P, Eq. (8).
 
     Parameters
@@ -109,7 +106,7 @@ def joint_screws(
     """
     poses = usable_poses(robot, pose, bent=True, on_failure=on_failure)
     screws: Array = compile(robot, "joint_screws")(poses)
-    return np.where(np.isnan(poses).any(axis=-1)[..., None, None, None], np.nan, screws)
+    return blanked(poses, screws)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Manipulators in TOML files: `load` reads one, from the catalog or a path, and `save` writes one."""
+"""Manipulators in TOML files: `load` reads one, by catalog name or path, and `save` writes one."""
 
 from __future__ import annotations
 
@@ -76,9 +76,7 @@ def _not_found(path: Path, error: OSError) -> str:
         return f"{path}: cannot be read ({error.strerror})"
     close = get_close_matches(str(path), catalog(), n=1)
     guess = f'; did you mean "{close[0]}"?' if close else ""
-    return (
-        f"{path}: neither a file nor a machine of the catalog ({', '.join(catalog())}){guess}"
-    )
+    return f"{path}: neither a file nor a machine of the catalog ({', '.join(catalog())}){guess}"
 
 
 def _parse(text: str, source: str) -> Manipulator:
@@ -182,7 +180,9 @@ def save(robot: Manipulator, path: str | Path) -> Path:
     import tomlkit
 
     document = tomlkit.document()
-    document.add(tomlkit.comment("A parallel manipulator for Pteron. SI units: m, kg, kg m, kg m^2, m/s^2."))
+    document.add(
+        tomlkit.comment("A parallel manipulator for Pteron. SI units: m, kg, kg m, kg m^2, m/s^2.")
+    )
     document.add("name", tomlkit.item(robot.name))
     document.add("gravity", tomlkit.item(list(robot.gravity)))
     platform = tomlkit.table()

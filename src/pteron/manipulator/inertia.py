@@ -61,9 +61,7 @@ class PlanarInertia:
         object.__setattr__(self, "inertia", inertia)
 
     @classmethod
-    def of_body(
-        cls, mass: float, center_of_mass: Sequence[float], inertia: float
-    ) -> PlanarInertia:
+    def of_body(cls, mass: float, center_of_mass: Sequence[float], inertia: float) -> PlanarInertia:
         """Build the inertia from the centre of mass (m) instead of the first moment (kg m)."""
         mass = positive(mass, "mass", "kg")
         x, y = numbers(center_of_mass, "center_of_mass", 2)

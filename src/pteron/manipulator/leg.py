@@ -91,5 +91,7 @@ def _limits(limits: tuple[float, float] | None) -> tuple[float, float] | None:
         return None
     low, high = numbers(limits, "slider_limits", 2)
     if low >= high:
-        raise ModelError(f"slider_limits: {low:g} m is not below {high:g} m; give [least, greatest]")
+        raise ModelError(
+            f"slider_limits: {low:g} m is not below {high:g} m; give [least, greatest]"
+        )
     return (low, high)

@@ -1,4 +1,4 @@
-"""Three-vectors of plain floats, and the checks that a manipulator's numbers pass when it is made."""
+"""Three-vectors of plain floats, and the checks that a manipulator's numbers must pass."""
 
 from __future__ import annotations
 

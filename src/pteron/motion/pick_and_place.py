@@ -1,0 +1,148 @@
+"""The standard pick-and-place cycle of 25, 305 and 25 mm, out and back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import minimize_scalar  # type: ignore[import-untyped]
+
+from pteron.conventions import PoseLike
+from pteron.errors import DataError
+from pteron.kernels import Array
+from pteron.kinematics.poses import finite
+from pteron.manipulator import Manipulator
+from pteron.motion.cycle import Cycle, across_directions, up
+from pteron.motion.motion import Motion
+from pteron.motion.scaling import LEAST_RESERVE, TURN, scaled_to_reach
+
+__all__ = ["PEAK_ACCELERATION", "PickAndPlace", "pick_and_place"]
+
+PEAK_ACCELERATION = 10.0
+"""Of the platform's reference point, where no duration is given, m/s^2."""
+
+
+@dataclass(frozen=True)
+class PickAndPlace(Motion):
+    """A pick-and-place cycle: up, across and down, and the same way back.
+
+    Attributes
+    ----------
+    scale : float
+        Factor on the standard cycle's 25 mm and 305 mm, and on the turn.
+    across, up : array, shape (3,)
+        Unit vectors of the moves, in the base frame.
+    turn : float
+        By how much the platform turns on its way across, rad, the scale included.
+    """
+
+    scale: float
+    across: Array
+    up: Array
+    turn: float
+
+
+def pick_and_place(
+    robot: Manipulator,
+    around: PoseLike,
+    *,
+    scale: float | None = None,
+    duration: float | None = None,
+    samples: int = 401,
+    direction: ArrayLike | None = None,
+    turn: float = TURN,
+    peak: float = PEAK_ACCELERATION,
+    least: float = LEAST_RESERVE,
+) -> PickAndPlace:
+    """Return the standard pick-and-place cycle: 25 mm up, 305 mm across, 25 mm down, and back.
+
+    Up is against gravity, or along the platform's axis where there is none. Each move is a quintic
+    in time; they overlap, so that the corners are round. The platform rests at both ends.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    around : array, shape (m,)
+        The pose in the middle of the cycle, m and rad; `pteron.workspace.home_pose` is a good one.
+    scale : float, optional
+        Factor on the cycle's size, taken as it is; by default the largest up to 1 that
+        `scaled_to_reach` finds.
+    duration : float, optional
+        Of the cycle, out and back, s; by default what gives the peak acceleration.
+    samples : int
+        Number of samples; an odd number includes the turning point.
+    direction : array, shape (3,), optional
+        Where the cycle goes across; see `scaled_to_reach`.
+    turn : float
+        Turn of the platform on its way across, at scale 1, rad; without effect for 3T.
+    peak : float
+        Largest acceleration of P, m/s^2, where no duration is given.
+    least : float
+        Reserve that the cycle keeps, where no scale is given; see `scaled_to_reach`.
+
+    Returns
+    -------
+    PickAndPlace
+
+    Raises
+    ------
+    ModelError
+        If no scale is given and not even the smallest cycle fits.
+    DataError
+        If a number is not positive, or the direction is vertical.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.motion import pick_and_place
+    >>> cycle = pick_and_place(pteron.load("tripteron"), [0.0, 0.0, 0.0], duration=1.0, samples=5)
+    >>> cycle.time, bool((cycle.pose[0] == cycle.pose[-1]).all())
+    (array([0.  , 0.25, 0.5 , 0.75, 1.  ]), True)
+    """
+    for name, value in {"scale": scale, "duration": duration, "peak": peak}.items():
+        if value is not None and not (np.isfinite(value) and value > 0.0):
+            raise DataError(f"{name}: {value} given, a number above 0 expected")
+    if samples < 2:
+        raise DataError(f"samples: {samples} given, at least 2 expected")
+    middle = finite(robot, around, "around")
+    if scale is None:
+        scale, across = scaled_to_reach(robot, middle, direction=direction, turn=turn, least=least)
+    else:
+        given = None if direction is None else np.asarray(direction, dtype=float)
+        across = across_directions(robot, given, 1)[0]
+    angle = turn if robot.platform.turns else 0.0
+    cycle = Cycle(middle, across, up(robot), angle, scale)
+    if duration is None:
+        # Accelerations go with 1 / duration^2.
+        duration = float(np.sqrt(_peak_acceleration(cycle) / peak))
+    tau = np.linspace(0.0, 1.0, samples)
+    pose, first, second = cycle.at(tau)
+    return PickAndPlace(
+        duration * tau,
+        pose,
+        first / duration,
+        second / duration**2,
+        scale,
+        across,
+        cycle.up,
+        scale * angle,
+    )
+
+
+def _peak_acceleration(cycle: Cycle) -> float:
+    """Return the largest acceleration of P over a cycle that takes one second, m/s^2."""
+
+    def size(tau: Array) -> Array:
+        return np.linalg.norm(cycle.at(tau)[2][:, :3], axis=-1)
+
+    tau = np.linspace(0.0, 0.5, 1001)
+    highest = int(size(tau).argmax())
+    found = minimize_scalar(
+        lambda t: -float(size(np.array([t]))[0]),
+        bounds=(tau[max(highest - 1, 0)], tau[min(highest + 1, 1000)]),
+        method="bounded",
+        options={"xatol": 1e-12},
+    )
+    return max(-float(found.fun), float(size(tau)[highest]))

@@ -1,0 +1,134 @@
+"""The largest pick-and-place cycle that a machine can do."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pteron.conventions import PoseLike
+from pteron.errors import ModelError
+from pteron.kernels import Array, compile
+from pteron.kinematics.poses import finite
+from pteron.manipulator import Manipulator
+from pteron.motion.cycle import Cycle, across_directions, up
+
+__all__ = ["LEAST_RESERVE", "TURN", "scaled_to_reach"]
+
+LEAST_RESERVE = 0.2
+"""Least sine of every elbow's angle, and least regularity, that a cycle keeps."""
+
+TURN = np.pi / 3.0
+"""Turn of the platform on its way across in the full cycle, rad."""
+
+_DIRECTIONS = 12
+_SAMPLES = 501
+"""Poses checked on the way across; the way back is the same path."""
+
+_DIP = 1e-4
+"""By how much, in units of the reserve and in metres, a limit is kept clear: more than a reserve
+or a slider can dip between two checked poses."""
+
+_STEPS = 1000
+"""The scale is a multiple of one thousandth."""
+
+_WORTH = 1.01
+"""Factor by which a later direction must allow a larger cycle to be preferred to an earlier one."""
+
+
+def scaled_to_reach(
+    robot: Manipulator,
+    around: PoseLike,
+    *,
+    direction: ArrayLike | None = None,
+    turn: float = TURN,
+    least: float = LEAST_RESERVE,
+) -> tuple[float, Array]:
+    """Return the scale of the largest pick-and-place cycle about a pose, and its direction.
+
+    The whole cycle stays in reach, keeps the sine of every elbow's angle and the regularity (see
+    `pteron.workspace.Reserve`) at `least` or above, and the sliders within their limits. The scale
+    is found by bisection: a smaller cycle stays nearer to the pose in its middle.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    around : array, shape (m,)
+        The pose in the middle of the cycle, m and rad.
+    direction : array, shape (3,), optional
+        Where the cycle goes across; its horizontal part counts. By default the best of twelve, the
+        platform's x axis where another is hardly better.
+    turn : float
+        Turn of the platform on its way across, at scale 1, rad; without effect for 3T.
+    least : float
+        What the reserves must keep.
+
+    Returns
+    -------
+    scale : float
+        At most 1, where the cycle is 25 mm high and 305 mm wide; a multiple of 0.001.
+    across : array, shape (3,)
+        The horizontal unit vector.
+
+    Raises
+    ------
+    ModelError
+        If not even the smallest cycle fits.
+    DataError
+        If the direction is vertical.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.motion import scaled_to_reach
+    >>> scale, across = scaled_to_reach(pteron.load("tripteron"), [0.0, 0.0, 0.0])
+    >>> 0.5 < scale <= 1.0
+    True
+    """
+    middle = finite(robot, around, "around")
+    given = None if direction is None else np.asarray(direction, dtype=float)
+    scale, best = 0, None
+    for across in across_directions(robot, given, _DIRECTIONS):
+        fits = _largest(robot, middle, across, turn, least)
+        if best is None or fits > _WORTH * scale:
+            scale, best = fits, across
+    if best is None or scale == 0:
+        raise ModelError(
+            f"{robot.name}: no pick-and-place cycle about pose {middle.tolist()} keeps a reserve "
+            f"of {least:g} to the singularities and the sliders' limits; choose a better pose"
+        )
+    return scale / _STEPS, best
+
+
+def _largest(robot: Manipulator, around: Array, across: Array, turn: float, least: float) -> int:
+    """Return the largest scale that fits, in thousandths; 0 if none does."""
+    way = np.linspace(0.0, 0.5, _SAMPLES)
+
+    def fits(thousandths: int) -> bool:
+        cycle = Cycle(around, across, up(robot), turn, thousandths / _STEPS)
+        return _keeps(robot, cycle.at(way)[0], least)
+
+    if fits(_STEPS):
+        return _STEPS
+    low, high = 0, _STEPS
+    while high - low > 1:
+        middle = (low + high) // 2
+        if fits(middle):
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+def _keeps(robot: Manipulator, poses: Array, least: float) -> bool:
+    """Say whether all poses keep the reserves and the sliders' limits."""
+    _, _, sine = compile(robot, "reach")(poses)
+    good = (sine >= least + _DIP).all()  # NaN, out of reach, compares false
+    if robot.platform.turns:
+        good &= (np.abs(compile(robot, "regularity")(poses)) >= least + _DIP).all()
+    sliders = compile(robot, "inverse_kinematics")(poses)
+    for leg, rho in zip(robot.legs, sliders.T, strict=True):
+        if leg.slider_limits is not None:
+            low, high = leg.slider_limits
+            good &= bool(rho.min() >= low + _DIP and rho.max() <= high - _DIP)
+    return bool(good)

@@ -1,0 +1,22 @@
+"""Which inertial parameters count: base parameters, three ways, and the reduced model."""
+
+from pteron.reduction.certificate import (
+    Certificate,
+    ExactCertificate,
+    NumericalCertificate,
+)
+from pteron.reduction.find import base_parameters
+from pteron.reduction.forms import FORMS, model_forms
+from pteron.reduction.reduced import base_regressor
+from pteron.reduction.result import BaseParameters
+
+__all__ = [
+    "FORMS",
+    "BaseParameters",
+    "Certificate",
+    "ExactCertificate",
+    "NumericalCertificate",
+    "base_parameters",
+    "base_regressor",
+    "model_forms",
+]

@@ -1,0 +1,153 @@
+"""What proves a count of base parameters, in terms a reader can check."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+__all__ = ["Certificate", "ExactCertificate", "NumericalCertificate"]
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """Root of the certificates.
+
+    Attributes
+    ----------
+    method : str
+        "exact", "svd" or "qr".
+    rank : int
+        The number of base parameters.
+    columns : int
+        The number of columns they were found among.
+    """
+
+    method: str
+    rank: int
+    columns: int
+
+    def summary(self) -> str:
+        """Return the certificate in a few sentences."""
+        raise NotImplementedError
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the certificate as plain data."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class NumericalCertificate(Certificate):
+    """The rank as floating-point arithmetic sees it.
+
+    Attributes
+    ----------
+    states : int
+        Random states stacked.
+    tolerance : float
+        Relative to the largest singular value (svd) or column (qr).
+    smallest_kept, largest_dropped : float
+        The two values, relative to the largest, between which the rank was decided.
+    residual : float
+        Largest relative misfit of the dependent columns by the kept ones.
+    """
+
+    states: int
+    tolerance: float
+    smallest_kept: float
+    largest_dropped: float
+    residual: float
+
+    @property
+    def gap(self) -> float:
+        """How many times the smallest value kept exceeds the largest one dropped."""
+        return self.smallest_kept / max(self.largest_dropped, 1e-300)
+
+    def summary(self) -> str:
+        """Return the certificate in a few sentences."""
+        return (
+            f"Numerical rank {self.rank} of {self.columns} columns ({self.method}, {self.states} "
+            f"random states, columns scaled). Smallest value kept {self.smallest_kept:.1e}, "
+            f"largest dropped {self.largest_dropped:.1e}, relative to the largest: a gap of "
+            f"{self.gap:.0e}. "
+            f"Residual of the grouping {self.residual:.0e}. It confirms a rank, it proves none."
+        )
+
+
+@dataclass(frozen=True)
+class ExactCertificate(Certificate):
+    """The rank in exact arithmetic.
+
+    Attributes
+    ----------
+    primes : tuple of int
+        The primes modulo which the regressor was eliminated, for the machine's own guides.
+    states : int
+        Random states stacked for each prime. A minor of size `rank` is not zero: the rank is at
+        least that.
+    null_vectors : int
+        Relations found: columns - rank.
+    rational_configurations : int
+        Random configurations with rational links at which every null vector, in fractions,
+        annihilates the regressor exactly (zero where the geometry holds roots).
+    modular_configurations : int
+        Further random configurations, modulo a prime that was not used to find them, at which every
+        null vector does so.
+    degree : int
+        Bound on the degree of a null vector's product with the regressor.
+    false_acceptance : float
+        Bound on the probability that a vector which does not annihilate the regressor passes them
+        all (Schwartz, Zippel).
+    transfers : int
+        How many of the null vectors are mass transfers, known in symbols of the geometry.
+    unexplained : tuple of str
+        The columns whose relations are due to this machine's special geometry instead.
+    coefficients : str
+        "rational", "algebraic" or "floating point": what the groupings are known as.
+    recognised, approximated, lost : tuple of str
+        How the machine's floats were made exact; see `ExactGeometry`.
+    """
+
+    primes: tuple[int, ...]
+    states: int
+    null_vectors: int
+    rational_configurations: int
+    modular_configurations: int
+    degree: int
+    false_acceptance: float
+    transfers: int
+    unexplained: tuple[str, ...]
+    coefficients: str
+    recognised: tuple[str, ...]
+    approximated: tuple[str, ...]
+    lost: tuple[str, ...]
+
+    def summary(self) -> str:
+        """Return the certificate in a few sentences."""
+        checked = (
+            f"{self.rational_configurations} rational configurations in fractions and at "
+            if self.rational_configurations
+            else ""
+        )
+        lines = [
+            f"Exact rank {self.rank} of {self.columns} columns.",
+            f"At least {self.rank}: a minor of that size of the regressor at {self.states} states "
+            f"is not zero modulo {' nor modulo '.join(map(str, self.primes))}.",
+            f"At most {self.rank}: {self.null_vectors} null vectors annihilate the regressor "
+            f"exactly at {checked}{self.modular_configurations} independent configurations modulo "
+            "a fresh prime; a false one would pass with probability below "
+            f"{self.false_acceptance:.0e}.",
+            f"{self.transfers} of the null vectors are mass transfers between bodies that share a "
+            f"point. Coefficients: {self.coefficients}.",
+        ]
+        if self.unexplained:
+            lines.append(
+                "No transfer explains, but this machine's special geometry adds, what is grouped "
+                f"of {', '.join(self.unexplained)}."
+            )
+        if self.recognised:
+            lines.append("Recognised: " + "; ".join(self.recognised) + ".")
+        if self.approximated:
+            lines.append("Approximated: " + "; ".join(self.approximated) + ".")
+        if self.lost:
+            lines.append("Not kept exactly: " + "; ".join(self.lost) + ".")
+        return "\n".join(lines)

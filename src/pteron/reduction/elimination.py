@@ -1,0 +1,79 @@
+"""Which columns depend on which, by Gaussian elimination modulo a prime, and back to fractions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from math import isqrt
+
+__all__ = ["dependencies", "reconstruct", "remainder"]
+
+
+def dependencies(
+    rows: Sequence[Sequence[int]], order: Sequence[int], prime: int
+) -> tuple[list[int], dict[int, dict[int, int]]]:
+    """Return the independent columns of a matrix modulo a prime, and how the others follow.
+
+    Parameters
+    ----------
+    rows : sequence of rows
+        The matrix.
+    order : sequence of int
+        The columns in order of preference: one is kept if those kept before do not give it.
+    prime : int
+        The modulus.
+
+    Returns
+    -------
+    kept : list of int
+        In the order of preference.
+    given : dict
+        For each other column, its coefficients on the kept columns.
+    """
+    work = [[row[j] % prime for j in order] for row in rows]
+    kept: list[int] = []
+    for place, column in enumerate(order):
+        top = len(kept)
+        pivot = next((i for i in range(top, len(work)) if work[i][place]), None)
+        if pivot is None:
+            continue
+        work[top], work[pivot] = work[pivot], work[top]
+        inverse = pow(work[top][place], -1, prime)
+        lead = work[top] = [value * inverse % prime for value in work[top]]
+        for i, row in enumerate(work):
+            factor = row[place]
+            if i != top and factor:
+                work[i] = [(a - factor * b) % prime for a, b in zip(row, lead, strict=True)]
+        kept.append(column)
+    given = {
+        column: {k: work[i][place] for i, k in enumerate(kept) if work[i][place]}
+        for place, column in enumerate(order)
+        if column not in kept
+    }
+    return kept, given
+
+
+def remainder(values: Sequence[int], primes: Sequence[int]) -> tuple[int, int]:
+    """Return the number modulo the product of the primes (Chinese remainders), and that product."""
+    total, modulus = 0, 1
+    for value, prime in zip(values, primes, strict=True):
+        step = (value - total) * pow(modulus, -1, prime) % prime
+        total, modulus = total + modulus * step, modulus * prime
+    return total, modulus
+
+
+def reconstruct(value: int, modulus: int) -> Fraction | None:
+    """Return the fraction a / b = value (mod modulus) with a and b below sqrt(modulus / 2), if any.
+
+    There is at most one. Wang's algorithm: Euclid's, stopped half way.
+    """
+    bound = isqrt(modulus // 2)
+    a, b = modulus, value % modulus
+    u, v = 0, 1
+    while b > bound:
+        quotient = a // b
+        a, b = b, a - quotient * b
+        u, v = v, u - quotient * v
+    if v == 0 or abs(v) > bound:
+        return None
+    return Fraction(b, v)

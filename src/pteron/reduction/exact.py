@@ -1,0 +1,240 @@
+"""Method `exact`: the null space of the regressor by exact arithmetic, with a certificate.
+
+Found modulo primes of 61 bits, lifted to fractions, and verified in fractions: so the rank is
+bounded from below by a minor that does not vanish, and from above by null vectors that annihilate.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
+from functools import reduce
+from operator import add
+from typing import TypeVar
+
+import numpy as np
+from sympy import factorint, isprime
+
+from pteron.errors import SingularPose
+from pteron.kernels import Array, PrimeField
+from pteron.kinematics import is_singular_everywhere
+from pteron.manipulator import Manipulator
+from pteron.reduction.certificate import ExactCertificate
+from pteron.reduction.configurations import (
+    Topology,
+    is_square,
+    modular_rows,
+    rational_rows,
+)
+from pteron.reduction.degrees import degree_bound
+from pteron.reduction.elimination import dependencies, reconstruct, remainder
+from pteron.reduction.exact_geometry import ExactGeometry, exact_geometry
+from pteron.reduction.grouping import Grouping, Shares
+from pteron.reduction.numerical import fitted_shares
+from pteron.reduction.symbols import algebraic_values, symbolic_shares
+from pteron.reduction.transfers import Transfer
+
+__all__ = ["exact_grouping"]
+
+_BITS = 61
+_MOST_PRIMES = 8
+_ROOTS_PRIMES = 3
+"""With roots in the geometry, shares are hardly ever fractions: they are not tried for long."""
+_SPARE_STATES = 4
+_RATIONAL_CHECKS = 2
+_MODULAR_CHECKS = 2
+
+Number = TypeVar("Number", int, Fraction)
+Relations = dict[int, dict[int, int]]
+
+
+def exact_grouping(
+    robot: Manipulator,
+    names: Sequence[str],
+    order: Sequence[int],
+    sharing: Array,
+    mass_transfers: Sequence[Transfer],
+    seed: int,
+) -> Grouping:
+    """Return the grouping of a machine's columns, kept in the order of preference.
+
+    Raises
+    ------
+    SingularPose
+        If every pose is singular, so that there is no regressor.
+    """
+    if is_singular_everywhere(robot):
+        raise SingularPose(
+            f"{robot.name}: singular at every pose (type II), so that it has no inverse dynamics "
+            "and no base parameters",
+            kind="II",
+            closeness=0.0,
+            index=(),
+        )
+    geometry = exact_geometry(robot)
+    topology = Topology(len(robot.legs), robot.platform.turns)
+    rng = random.Random(seed)
+    primes = _primes(geometry, rng)
+    states = -(-len(order) // topology.legs) + _SPARE_STATES
+
+    found: dict[int, tuple[list[int], Relations]] = {}
+    shares: dict[int, dict[int, Fraction]] | None = None
+    most = _ROOTS_PRIMES if geometry.radicands else _MOST_PRIMES
+    while len(found) < most and shares is None:
+        prime = next(primes)
+        rows = _shared_rows(modular_rows(topology, geometry, prime, states, rng), sharing)
+        found[prime] = dependencies(rows, order, prime)
+        # A prime may hide a column by bad luck, never invent one: keep those of greatest rank.
+        best = max(len(kept) for kept, _ in found.values())
+        found = {p: result for p, result in found.items() if len(result[0]) == best}
+        if len(found) > 1:
+            shares = _lifted(found)
+    kept, relations = next(iter(found.values()))
+    dropped = [column for column in order if column not in kept]
+    by_mass = [
+        _modular(transfer, geometry, names, next(iter(found))) for transfer in mass_transfers
+    ]
+    extra = _unexplained(by_mass, relations, dropped, len(order), next(iter(found)))
+
+    fresh = next(primes)
+    rational_checks = 0
+    coefficients = "rational"
+    given: Shares
+    if shares is not None:
+        given = {column: dict(terms) for column, terms in shares.items()}
+        field = PrimeField(fresh)
+        residues = {
+            column: {k: field.number(share) for k, share in terms.items()}
+            for column, terms in shares.items()
+        }
+        if not geometry.radicands:
+            rational_checks = _RATIONAL_CHECKS
+            exact_rows = rational_rows(topology, geometry, rational_checks, rng)
+            _verify(_shared_rows(exact_rows, sharing), shares, None)
+    else:
+        new_rows = modular_rows(topology, geometry, fresh, states, rng)
+        residues = dependencies(_shared_rows(new_rows, sharing), order, fresh)[1]
+        if extra:
+            coefficients = "floating point"
+            given = fitted_shares(robot, sharing, kept, dropped, seed)
+        else:
+            coefficients = "algebraic"
+            given = symbolic_shares(
+                names, sorted(kept), mass_transfers, [], algebraic_values(geometry)
+            )
+    rows = _shared_rows(modular_rows(topology, geometry, fresh, _MODULAR_CHECKS, rng), sharing)
+    _verify(rows, residues, fresh)
+    for transfer in mass_transfers:
+        _verify(rows, {-1: _modular(transfer, geometry, names, fresh)}, fresh)
+
+    degree = degree_bound(topology)
+    # A pose is drawn among the 1 in 2^n whose Deltas are squares, and the 2^n choices of their
+    # roots multiply the degree.
+    odds = min(1.0, degree * 4.0**topology.legs / fresh) ** _MODULAR_CHECKS
+    certificate = ExactCertificate(
+        method="exact",
+        rank=len(kept),
+        columns=len(order),
+        primes=tuple(found),
+        states=states,
+        null_vectors=len(dropped),
+        rational_configurations=rational_checks,
+        modular_configurations=_MODULAR_CHECKS,
+        degree=degree,
+        false_acceptance=len(dropped) * odds,
+        transfers=len(mass_transfers),
+        unexplained=tuple(names[column] for column in extra),
+        coefficients=coefficients,
+        recognised=geometry.recognised,
+        approximated=geometry.approximated,
+        lost=geometry.lost,
+    )
+    return Grouping(tuple(sorted(kept)), given, certificate)
+
+
+def _modular(
+    transfer: Transfer, geometry: ExactGeometry, names: Sequence[str], prime: int
+) -> dict[int, int]:
+    """Return a transfer's null vector modulo a prime, by column."""
+    field = PrimeField(prime)
+    symbols = {name: value.within(field) for name, value in geometry.symbols().items()}
+    entries = transfer.evaluate(
+        symbols, lambda n: field.number(Fraction(n)), field.add, field.multiply
+    )
+    return {names.index(column): value for column, value in entries.items() if value}
+
+
+def _unexplained(
+    by_mass: Sequence[dict[int, int]],
+    relations: Relations,
+    dropped: Sequence[int],
+    columns: int,
+    prime: int,
+) -> list[int]:
+    """Return the dropped columns whose relations do not follow from the mass transfers."""
+    vectors = [*by_mass]
+    for column in dropped:
+        shares = {k: -share % prime for k, share in relations[column].items()}
+        vectors.append({**shares, column: 1})
+    rows = [[vector.get(j, 0) for vector in vectors] for j in range(columns)]
+    kept, _ = dependencies(rows, range(len(vectors)), prime)
+    return [dropped[i - len(by_mass)] for i in kept if i >= len(by_mass)]
+
+
+def _primes(geometry: ExactGeometry, rng: random.Random) -> Iterator[int]:
+    """Yield primes p = 3 (mod 4) in which the geometry's roots exist."""
+    factors = {prime for s in geometry.radicands for prime in factorint(s)}
+    while True:
+        candidate = rng.getrandbits(_BITS) | (1 << (_BITS - 1)) | 3
+        if isprime(candidate) and all(is_square(f % candidate, candidate) for f in factors):
+            yield candidate
+
+
+def _shared_rows(rows: Sequence[Sequence[Number]], sharing: Array) -> list[list[Number]]:
+    """Return the rows with the columns of legs that share parameters added up."""
+    members = [np.flatnonzero(column).tolist() for column in sharing.T]
+    return [[reduce(add, (row[j] for j in group)) for group in members] for row in rows]
+
+
+def _lifted(
+    found: dict[int, tuple[list[int], Relations]],
+) -> dict[int, dict[int, Fraction]] | None:
+    """Return the shares as fractions, if all primes but the last give what the last confirms."""
+    primes = list(found)
+    *earlier, last = primes
+    lifted: dict[int, dict[int, Fraction]] = {}
+    field = PrimeField(last)
+    for column in found[last][1]:
+        terms = {k for prime in primes for k in found[prime][1][column]}
+        lifted[column] = {}
+        for k in sorted(terms):
+            residues = [found[prime][1][column].get(k, 0) for prime in earlier]
+            share = reconstruct(*remainder(residues, earlier))
+            if share is None or share.denominator % last == 0:
+                return None
+            if field.number(share) != found[last][1][column].get(k, 0):
+                return None
+            if share:
+                lifted[column][k] = share
+    return lifted
+
+
+def _verify(
+    rows: Sequence[Sequence[int]] | Sequence[Sequence[Fraction]],
+    relations: Mapping[int, Mapping[int, Fraction]] | Mapping[int, Mapping[int, int]],
+    prime: int | None,
+) -> None:
+    """Check that every null vector annihilates the rows; it cannot fail, unless Pteron is wrong.
+
+    A relation says which share of the kept columns a column is; under the key -1 stands a null
+    vector as such.
+    """
+    for row in rows:
+        for column, terms in relations.items():
+            whole = row[column] if column >= 0 else 0
+            misfit = whole - sum(share * row[k] for k, share in terms.items())
+            if prime is not None:
+                misfit %= prime
+            if misfit != 0:
+                raise AssertionError(f"null vector of column {column} does not annihilate")

@@ -1,0 +1,294 @@
+"""A machine's geometry in exact numbers, with its special relations kept.
+
+Floats blur what the rank of the regressor depends on: right angles, parallel axes, equal lengths.
+So the machine is looked at in a frame of its own, chosen so that as many components of its unit
+vectors as possible are simple numbers (see `surds`); these are taken for what they stand for. What
+is not simple is approximated by rational numbers that keep zeros, parallels and unit lengths exact.
+A machine turned in space gives the same numbers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import permutations
+from typing import TypeVar
+
+import numpy as np
+
+from pteron.kernels import Array, Field
+from pteron.manipulator import Manipulator
+from pteron.reduction.surds import Surd, direction_cosine, length
+
+__all__ = ["ExactGeometry", "ExactLeg", "exact_geometry"]
+
+Element = TypeVar("Element")
+ExactVector = tuple[Surd, Surd, Surd]
+
+_PARALLEL = 1e-9
+_FINE = 10**12
+"""Largest denominator of an approximation: its error is below 1e-12 times 1e-6."""
+
+ZERO, ONE = Surd(Fraction(0)), Surd(Fraction(1))
+
+
+@dataclass(frozen=True)
+class ExactLeg:
+    """A leg's geometry in exact numbers, in the machine's own frame."""
+
+    r: ExactVector
+    d: ExactVector
+    e: ExactVector
+    s0: ExactVector
+    lu: Surd
+    ll: Surd
+    sigma: int
+
+    def numbers(self) -> list[Surd]:
+        """Return r, d, e, s0, lu, ll and sigma, the order of `Geometry.symbols`."""
+        sigma = Surd(Fraction(self.sigma))
+        return [*self.r, *self.d, *self.e, *self.s0, self.lu, self.ll, sigma]
+
+
+@dataclass(frozen=True)
+class ExactGeometry:
+    """A machine's geometry in exact numbers, and how far they are from the floats given.
+
+    Attributes
+    ----------
+    legs : tuple of ExactLeg
+        The legs.
+    gravity : vector of Surd
+        In the machine's own frame, m/s^2.
+    frame : array, shape (3, 3)
+        The machine's own frame: its rows are the axes, in the base frame. For 3T1R they are the
+        platform frame's at some phi.
+    recognised, approximated : tuple of str
+        What was taken for a root, and what was approximated, each with the error made.
+    lost : tuple of str
+        Right angles between directions which the exact numbers do not keep.
+    """
+
+    legs: tuple[ExactLeg, ...]
+    gravity: ExactVector
+    frame: Array
+    recognised: tuple[str, ...]
+    approximated: tuple[str, ...]
+    lost: tuple[str, ...]
+
+    @property
+    def radicands(self) -> frozenset[int]:
+        """The s > 1 of all numbers q sqrt(s)."""
+        numbers = [n for leg in self.legs for n in leg.numbers()] + list(self.gravity)
+        return frozenset(n.s for n in numbers if n.s != 1)
+
+    def symbols(self) -> dict[str, Surd]:
+        """Return the values of the geometric symbols lu1, ll1, s1x, s1y, ... of the transfers."""
+        values = {}
+        for i, leg in enumerate(self.legs, start=1):
+            values[f"lu{i}"], values[f"ll{i}"] = leg.lu, leg.ll
+            values[f"s{i}x"], values[f"s{i}y"] = leg.s0[:2]
+        return values
+
+    def within(self, field: Field[Element]) -> list[Element]:
+        """Return the geometry vector of `Geometry.symbols` in a field."""
+        one, zero = field.number(1), field.number(0)
+        frame = [one, zero, zero, zero, one, zero, zero, zero, one]
+        numbers = [number.within(field) for leg in self.legs for number in leg.numbers()]
+        return numbers + frame + [g.within(field) for g in self.gravity]
+
+
+def exact_geometry(robot: Manipulator) -> ExactGeometry:
+    """Return a machine's geometry in exact numbers."""
+    unit = {f"d{i + 1}": np.array(leg.direction) for i, leg in enumerate(robot.legs)}
+    for i, leg in enumerate(robot.legs):
+        if leg.slider_direction is not None:
+            unit[f"e{i + 1}"] = np.array(leg.slider_direction)
+    size = float(np.linalg.norm(robot.gravity))
+    if size > 0.0:
+        unit["gravity"] = np.array(robot.gravity) / size
+    frame = _best_frame(robot, list(unit.values()))
+    notes = _Notes([], [])
+    exact = _exact_directions({name: frame @ v for name, v in unit.items()}, notes)
+    legs = []
+    for i, leg in enumerate(robot.legs):
+        d = exact[f"d{i + 1}"]
+        s0, r = _points(robot, i, frame, notes)
+        legs.append(
+            ExactLeg(
+                r=r,
+                d=d,
+                e=exact.get(f"e{i + 1}", d),
+                s0=s0,
+                lu=notes.length(f"lu{i + 1}", leg.upper_length),
+                ll=notes.length(f"ll{i + 1}", leg.lower_length),
+                sigma=leg.elbow,
+            )
+        )
+    gravity: ExactVector = (ZERO, ZERO, ZERO)
+    if size > 0.0:
+        x, y, z = exact["gravity"]
+        scale = Fraction(size).limit_denominator(10**6)
+        gravity = (x.times(scale), y.times(scale), z.times(scale))
+    return ExactGeometry(
+        tuple(legs),
+        gravity,
+        frame,
+        tuple(notes.recognised),
+        tuple(notes.approximated),
+        tuple(_lost_right_angles(unit, exact)),
+    )
+
+
+@dataclass(frozen=True)
+class _Notes:
+    """What was recognised and what approximated, gathered on the way."""
+
+    recognised: list[str]
+    approximated: list[str]
+
+    def length(self, name: str, value: float) -> Surd:
+        """Return a length in exact numbers."""
+        exact = length(value)
+        if exact is None:
+            exact = Surd(Fraction(value).limit_denominator(_FINE))
+            self._approximated(name, value, exact)
+        elif exact.s != 1:
+            self._recognised(name, value, exact)
+        return exact
+
+    def direction(self, name: str, given: Array) -> ExactVector:
+        """Return a unit vector in exact numbers, of unit length exactly."""
+        simple = [direction_cosine(float(c)) for c in given]
+        known = [c for c in simple if c is not None]
+        if len(known) == 3 and sum(c.square for c in known) == 1:
+            for axis, value, exact in zip("xyz", given, known, strict=True):
+                if exact.s != 1:
+                    self._recognised(f"{name}.{axis}", float(value), exact)
+            return (known[0], known[1], known[2])
+        vector = _stereographic(given)
+        for axis, value, exact in zip("xyz", given, vector, strict=True):
+            self._approximated(f"{name}.{axis}", float(value), exact)
+        return vector
+
+    def planar(self, name: str, x: float, y: float) -> tuple[Surd, Surd]:
+        """Return a vector in the platform's plane; where only its length is simple, keep that."""
+        simple = length(x), length(y)
+        radius = length(float(np.hypot(x, y)))
+        if None in simple and radius is not None and radius.q != 0:
+            ux, uy, _ = _stereographic(np.array([x, y, 0.0]) / np.hypot(x, y))
+            polar = Surd(ux.q * radius.q, radius.s), Surd(uy.q * radius.q, radius.s)
+            for axis, value, exact in zip("xy", (x, y), polar, strict=True):
+                self._approximated(f"{name}.{axis}", value, exact)
+            return polar
+        return self.length(f"{name}.x", x), self.length(f"{name}.y", y)
+
+    def _recognised(self, name: str, value: float, exact: Surd) -> None:
+        self.recognised.append(f"{name} = {exact} (off by {abs(float(exact) - value):.0e})")
+
+    def _approximated(self, name: str, value: float, exact: Surd) -> None:
+        error = abs(float(exact) - value)
+        if error:
+            self.approximated.append(f"{name} (off by {error:.0e})")
+
+
+def _points(
+    robot: Manipulator, i: int, frame: Array, notes: _Notes
+) -> tuple[ExactVector, ExactVector]:
+    """Return s0 and r of a leg. For 3T a platform point only shifts the guide: s0 becomes zero."""
+    leg = robot.legs[i]
+    r = np.array(leg.guide_point)
+    if robot.platform.turns:
+        x, y = notes.planar(f"s{i + 1}", *leg.platform_point[:2])
+        s0 = (x, y, notes.length(f"s{i + 1}.z", leg.platform_point[2]))
+    else:
+        r = r - np.array(robot.platform.frame).T @ np.array(leg.platform_point)
+        s0 = (ZERO, ZERO, ZERO)
+    # A guide point enters the regressor only through u, so that no rank hangs on its last digits.
+    x, y, z = (Surd(Fraction(float(c)).limit_denominator(10**9)) for c in frame @ r)
+    return s0, (x, y, z)
+
+
+def _best_frame(robot: Manipulator, vectors: list[Array]) -> Array:
+    """Return the frame, as rows, in which most components of the vectors are simple."""
+    frames = []
+    if robot.platform.turns:
+        x0, _, k = (np.array(axis) for axis in robot.platform.frame)
+        firsts = [x0, *(v - (v @ k) * k for v in vectors)]
+        frames = [(v / np.linalg.norm(v), k) for v in firsts if np.linalg.norm(v) > 1e-6]
+        candidates = [np.array([x, np.cross(k, x), k]) for x, k in frames]
+    else:
+        candidates = [np.eye(3), np.array(robot.platform.frame)]
+        for a, b in permutations(vectors, 2):
+            n = np.cross(a, b)
+            if np.linalg.norm(n) > 1e-6:
+                n = n / np.linalg.norm(n)
+                candidates.append(np.array([a, np.cross(n, a), n]))
+    return max(candidates, key=lambda frame: _simplicity(frame, vectors))
+
+
+def _simplicity(frame: Array, vectors: list[Array]) -> int:
+    """Return how many components are simple; zeros count twice, rational ones more than roots."""
+    score = 0
+    for vector in vectors:
+        for c in frame @ vector:
+            simple = direction_cosine(float(c))
+            if simple is not None:
+                score += 3 if simple.q == 0 else 2 if simple.s == 1 else 1
+    return score
+
+
+def _exact_directions(given: dict[str, Array], notes: _Notes) -> dict[str, ExactVector]:
+    """Return unit vectors in exact numbers; one parallel to another becomes plus or minus it."""
+    exact: dict[str, ExactVector] = {}
+    for name, vector in given.items():
+        for earlier, kept in exact.items():
+            if np.linalg.norm(np.cross(vector, given[earlier])) < _PARALLEL:
+                sense = Fraction(round(float(vector @ given[earlier])))
+                x, y, z = kept
+                exact[name] = (x.times(sense), y.times(sense), z.times(sense))
+                break
+        else:
+            exact[name] = notes.direction(name, vector)
+    return exact
+
+
+def _stereographic(given: Array) -> ExactVector:
+    """Return a rational unit vector near one given; components that are zero stay zero.
+
+    It is projected from the pole opposite to its largest component, rounded, and projected back.
+    """
+    pole = int(np.argmax(np.abs(given)))
+    sign = Fraction(1 if given[pole] > 0 else -1)
+    others = [i for i in range(3) if i != pole]
+    plane: list[Fraction] = []
+    for i in others:
+        t = float(given[i]) / (1.0 + abs(float(given[pole])))
+        plane.append(Fraction(0) if abs(t) < _PARALLEL else Fraction(t).limit_denominator(10**8))
+    square: Fraction = sum((t * t for t in plane), Fraction(0))
+    result = [Fraction(0)] * 3
+    result[pole] = sign * (1 - square) / (1 + square)
+    for i, t in zip(others, plane, strict=True):
+        result[i] = 2 * t / (1 + square)
+    return (Surd(result[0]), Surd(result[1]), Surd(result[2]))
+
+
+def _lost_right_angles(given: dict[str, Array], exact: dict[str, ExactVector]) -> list[str]:
+    names = list(given)
+    lost = []
+    for i, a in enumerate(names):
+        for b in names[i + 1 :]:
+            if abs(float(given[a] @ given[b])) < _PARALLEL and not _perpendicular(
+                exact[a], exact[b]
+            ):
+                lost.append(f"{a} at a right angle to {b}")
+    return lost
+
+
+def _perpendicular(a: ExactVector, b: ExactVector) -> bool:
+    """Say whether a . b = 0 exactly: the terms of each radicand must cancel by themselves."""
+    sums: dict[int, Fraction] = {}
+    for x, y in zip(a, b, strict=True):
+        term = Surd.root(Fraction(x.s * y.s), 1.0)
+        sums[term.s] = sums.get(term.s, Fraction(0)) + x.q * y.q * term.q
+    return not any(sums.values())

@@ -1,0 +1,40 @@
+"""What every method returns: the columns kept, and how the others join them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from pteron.kernels import Array
+from pteron.reduction.certificate import Certificate
+
+__all__ = ["Grouping", "Share", "Shares"]
+
+Share = Fraction | float | Any
+"""A fraction where it is known as one, a SymPy number where it holds roots, else a float."""
+
+Shares = dict[int, dict[int, Share]]
+"""`shares[j][k]`: how much of the dependent column j goes with the kept column k."""
+
+
+@dataclass(frozen=True)
+class Grouping:
+    """Columns kept, in their original order, and the shares of the others on them."""
+
+    kept: tuple[int, ...]
+    given: Shares
+    certificate: Certificate
+
+    def matrix(self, columns: int) -> Array:
+        """Return the matrix (rank, columns) that takes column parameters to base parameters."""
+        matrix = np.zeros((len(self.kept), columns))
+        for row, column in enumerate(self.kept):
+            matrix[row, column] = 1.0
+        place = {column: row for row, column in enumerate(self.kept)}
+        for column, shares in self.given.items():
+            for k, share in shares.items():
+                matrix[place[k], column] = float(share)
+        return matrix

@@ -1,0 +1,149 @@
+"""Methods `svd` and `qr`: the null space of a regressor at random states, in floating point."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pteron.dynamics import regressor
+from pteron.kernels import Array
+from pteron.kinematics import random_poses
+from pteron.manipulator import Manipulator
+from pteron.reduction.certificate import NumericalCertificate
+from pteron.reduction.grouping import Grouping, Shares
+
+__all__ = ["fitted_shares", "qr_grouping", "svd_grouping"]
+
+_TOLERANCE = 1e-10
+"""Relative to the largest; columns are scaled to unit length. Rounding leaves 1e-14, and what is
+identifiable at all 1e-6 and more: the certificate reports the gap."""
+
+_STATES_PER_COLUMN = 4
+
+
+def svd_grouping(robot: Manipulator, order: Sequence[int], sharing: Array, seed: int) -> Grouping:
+    """Return the grouping from the singular value decomposition (Gautier's, the paper's method).
+
+    The null vectors are the right singular vectors of vanishing values. Columns are dropped, those
+    least preferred first, as long as the null vectors' entries at them stay independent.
+    """
+    matrix, scale, states = _scaled_regressor(robot, sharing, seed)
+    _, values, vectors = np.linalg.svd(matrix, full_matrices=True)
+    values = np.pad(values, (0, matrix.shape[1] - len(values)))
+    rank = int((values > _TOLERANCE * values[0]).sum())
+    null = vectors[rank:].T
+    dropped = _independent(null.T, list(reversed(order)), len(order) - rank)[0]
+    kept = sorted(set(order) - set(dropped))
+    shares = -np.linalg.solve(null[dropped].T, null[kept].T).T if dropped else np.empty((rank, 0))
+    return _grouping(
+        "svd",
+        kept,
+        dropped,
+        shares,
+        matrix,
+        scale,
+        states,
+        values[rank - 1],
+        values[rank:],
+        values[0],
+    )
+
+
+def qr_grouping(robot: Manipulator, order: Sequence[int], sharing: Array, seed: int) -> Grouping:
+    """Return the grouping from a QR decomposition with the columns in the order of preference."""
+    matrix, scale, states = _scaled_regressor(robot, sharing, seed)
+    kept, norms = _independent(matrix, order, len(order))
+    kept = sorted(kept)
+    dropped = [column for column in order if column not in kept]
+    shares = _least_squares(matrix, kept, dropped)
+    smallest: float = min(norms[column] for column in kept)
+    rest = np.array([norms[column] for column in dropped])
+    return _grouping("qr", kept, dropped, shares, matrix, scale, states, smallest, rest, 1.0)
+
+
+def fitted_shares(
+    robot: Manipulator, sharing: Array, kept: Sequence[int], dropped: Sequence[int], seed: int
+) -> Shares:
+    """Return the shares of columns known to depend on the kept ones, by least squares."""
+    matrix, scale, _ = _scaled_regressor(robot, sharing, seed)
+    shares = _least_squares(matrix, list(kept), list(dropped))
+    return _given(list(kept), list(dropped), shares, scale)
+
+
+def _least_squares(matrix: Array, kept: list[int], dropped: list[int]) -> Array:
+    shares = np.linalg.lstsq(matrix[:, kept], matrix[:, dropped], rcond=None)[0]
+    return np.asarray(shares, dtype=float)
+
+
+def _scaled_regressor(robot: Manipulator, sharing: Array, seed: int) -> tuple[Array, Array, int]:
+    """Return regressors at random states, stacked, columns scaled to length 1; the lengths."""
+    rng = np.random.default_rng(seed)
+    states = _STATES_PER_COLUMN * sharing.shape[1]
+    poses = random_poses(robot, states, seed=rng, bend=0.2, hold=0.2)
+    velocity = rng.normal(size=poses.shape)
+    acceleration = 10.0 * rng.normal(size=poses.shape)
+    stacked = regressor(robot, poses, velocity, acceleration) @ sharing
+    stacked = stacked.reshape(-1, sharing.shape[1])
+    scale = np.linalg.norm(stacked, axis=0)
+    # A column that does nothing stays zero instead of being blown up to noise.
+    scale = np.where(scale > _TOLERANCE * scale.max(), scale, np.inf)
+    return stacked / scale, scale, states
+
+
+def _independent(
+    matrix: Array, order: Sequence[int], most: int
+) -> tuple[list[int], dict[int, float]]:
+    """Return the first `most` columns that those taken before do not give, and all remainders.
+
+    Gram and Schmidt, twice over, which is as good as Householder.
+    """
+    basis = np.empty((matrix.shape[0], 0))
+    taken: list[int] = []
+    norms: dict[int, float] = {}
+    for column in order:
+        rest = matrix[:, column]
+        for _ in range(2):
+            rest = rest - basis @ (basis.T @ rest)
+        norms[column] = float(np.linalg.norm(rest))
+        if norms[column] > _TOLERANCE and len(taken) < most:
+            taken.append(column)
+            basis = np.column_stack([basis, rest / norms[column]])
+    return taken, norms
+
+
+def _grouping(
+    method: str,
+    kept: list[int],
+    dropped: list[int],
+    shares: Array,
+    matrix: Array,
+    scale: Array,
+    states: int,
+    smallest: float,
+    rest: Array,
+    largest: float,
+) -> Grouping:
+    misfit = matrix[:, dropped] - matrix[:, kept] @ shares
+    certificate = NumericalCertificate(
+        method=method,
+        rank=len(kept),
+        columns=matrix.shape[1],
+        states=states,
+        tolerance=_TOLERANCE,
+        smallest_kept=float(smallest / largest),
+        largest_dropped=float(np.max(rest, initial=0.0) / largest),
+        residual=float(np.abs(misfit).max(initial=0.0)),
+    )
+    return Grouping(tuple(kept), _given(kept, dropped, shares, scale), certificate)
+
+
+def _given(kept: list[int], dropped: list[int], shares: Array, scale: Array) -> Shares:
+    """Undo the scaling of the columns; shares that are rounding only are left out."""
+    given: Shares = {}
+    for j, column in enumerate(dropped):
+        given[column] = {}
+        for i, k in enumerate(kept):
+            if abs(shares[i, j]) > _TOLERANCE and np.isfinite(scale[column]):
+                given[column][k] = float(shares[i, j] * scale[column] / scale[k])
+    return given

@@ -1,0 +1,70 @@
+"""The reduced model: forces from base parameters alone."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pteron.conventions import BatchOfRegressors, OnFailure, PoseLike
+from pteron.dynamics import regressor
+from pteron.errors import ModelError
+from pteron.manipulator import Manipulator, parameter_names
+from pteron.reduction.result import BaseParameters
+
+__all__ = ["base_regressor"]
+
+
+def base_regressor(
+    robot: Manipulator,
+    base: BaseParameters,
+    pose: PoseLike,
+    velocity: PoseLike,
+    acceleration: PoseLike,
+    *,
+    on_failure: OnFailure = "raise",
+) -> BatchOfRegressors:
+    """Return the reduced dynamic matrix: base_regressor @ base.values(robot) = inverse_dynamics.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    base : BaseParameters
+        Its base parameters, from `base_parameters`.
+    pose, velocity, acceleration : array, shape (..., m)
+        The platform's motion; m, rad and s. Leading axes broadcast.
+    on_failure : {"raise", "nan"}
+        Whether a pose that fails raises, or gives NaN.
+
+    Returns
+    -------
+    array, shape (..., n, rank)
+        Newtons per unit of each base parameter.
+
+    Raises
+    ------
+    ModelError
+        If `base` belongs to a machine with another number of parameters.
+    UnreachablePose
+        If a leg's links do not reach a pose.
+    SingularPose
+        If a leg is stretched or folded (type I), or the sliders do not hold the platform (type II).
+
+    Examples
+    --------
+    >>> import numpy as np, pteron
+    >>> robot = pteron.load("quadrupteron")
+    >>> base = pteron.base_parameters(robot)
+    >>> state = [0.01, 0.02, 0.03, 0.1], [0.1, 0.0, 0.2, 1.0], [1.0, 2.0, 0.0, 3.0]
+    >>> forces = pteron.base_regressor(robot, base, *state) @ base.values(robot)
+    >>> np.allclose(forces, pteron.inverse_dynamics(robot, *state))
+    True
+    """
+    if base.selection.shape[0] != len(parameter_names(robot)):
+        raise ModelError(
+            f"base: belongs to {base.robot.name} with {base.selection.shape[0]} parameters, but "
+            f"{robot.name} has {len(parameter_names(robot))}"
+        )
+    matrices = regressor(robot, pose, velocity, acceleration, on_failure=on_failure)
+    failed = np.isnan(matrices).any(axis=(-2, -1), keepdims=True)
+    # 0 * NaN is NaN, so that failed rows stay NaN in the product; put there for clarity.
+    return np.where(failed, np.nan, np.nan_to_num(matrices) @ base.selection)

@@ -1,0 +1,180 @@
+"""The base inertial parameters of a machine: names, grouping, expressions and certificate."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from pteron.errors import ModelError
+from pteron.kernels import Array
+from pteron.manipulator import Manipulator, parameters
+from pteron.reduction.certificate import Certificate, ExactCertificate
+from pteron.reduction.exact_geometry import exact_geometry
+from pteron.reduction.expressions import as_latex, as_sympy, as_text, terms_of
+from pteron.reduction.grouping import Grouping, Shares
+from pteron.reduction.symbols import named_values, symbolic_shares
+from pteron.reduction.transfers import Transfer
+
+__all__ = ["BaseParameters", "Form"]
+
+Form = Literal["text", "sympy", "latex"]
+
+
+@dataclass(frozen=True)
+class BaseParameters:
+    """The parameters that alone act on the actuator forces, each a sum of inertial parameters.
+
+    Attributes
+    ----------
+    robot : Manipulator
+        The machine they belong to; its inertial parameters play no part.
+    columns : tuple of str
+        The parameters they are made of: `parameter_names`, or fewer where legs share theirs.
+    kept : tuple of int
+        Which columns are kept; the others join them.
+    grouping : array, shape (rank, N)
+        base = grouping @ parameters. Where legs share parameters it takes their mean.
+    selection : array, shape (N, rank)
+        base regressor = regressor @ selection.
+    transfers : tuple of Transfer
+        The mass transfers, which give the groupings in symbols.
+    certificate : Certificate
+        What proves, or supports, the rank.
+    """
+
+    robot: Manipulator
+    columns: tuple[str, ...]
+    kept: tuple[int, ...]
+    grouping: Array = field(repr=False, compare=False)
+    selection: Array = field(repr=False, compare=False)
+    transfers: tuple[Transfer, ...] = field(repr=False, compare=False)
+    certificate: Certificate = field(repr=False)
+    shares: Shares = field(repr=False, compare=False)
+
+    @classmethod
+    def of(
+        cls,
+        robot: Manipulator,
+        columns: tuple[str, ...],
+        sharing: Array,
+        transfers: tuple[Transfer, ...],
+        grouping: Grouping,
+    ) -> BaseParameters:
+        """Assemble the result from what a method found; `sharing` is (N, columns)."""
+        mean = (sharing / sharing.sum(axis=0)).T
+        return cls(
+            robot=robot,
+            columns=columns,
+            kept=grouping.kept,
+            grouping=grouping.matrix(len(columns)) @ mean,
+            selection=sharing[:, list(grouping.kept)],
+            transfers=transfers,
+            certificate=grouping.certificate,
+            shares=grouping.given,
+        )
+
+    @property
+    def rank(self) -> int:
+        """How many base parameters there are."""
+        return len(self.kept)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The kept columns, which name the base parameters."""
+        return tuple(self.columns[column] for column in self.kept)
+
+    def values(self, robot: Manipulator | None = None) -> Array:
+        """Return the base parameters' values (rank,) for a machine of this geometry."""
+        return np.asarray(self.grouping @ parameters(robot or self.robot))
+
+    @cached_property
+    def _symbolic(self) -> Shares:
+        """The shares in symbols of the geometry."""
+        if not isinstance(self.certificate, ExactCertificate):
+            raise ModelError(
+                f'symbols: not known to method "{self.certificate.method}"; use method="exact"'
+            )
+        unexplained = [self.columns.index(name) for name in self.certificate.unexplained]
+        if unexplained and self.certificate.coefficients != "rational":
+            raise ModelError(
+                "symbols: this machine's special geometry groups "
+                f"{', '.join(self.certificate.unexplained)} by numbers that are not rational; "
+                "use symbols=False"
+            )
+        extra = [
+            {column: Fraction(1), **{k: -share for k, share in self.shares[column].items()}}
+            for column in unexplained
+        ]
+        named = named_values(exact_geometry(self.robot))
+        return symbolic_shares(self.columns, self.kept, self.transfers, extra, named)
+
+    @property
+    def geometry_values(self) -> dict[str, float]:
+        """The geometric symbols of the expressions, and their values in metres."""
+        exact = exact_geometry(self.robot)
+        named = named_values(exact)
+        return {
+            name: float(value)
+            for name, value in exact.symbols().items()
+            if str(named[name]) == name
+        }
+
+    def expressions(
+        self, form: Form = "text", *, symbols: bool = False, digits: int = 4
+    ) -> tuple[Any, ...]:
+        """Return each base parameter as a sum of inertial parameters.
+
+        Parameters
+        ----------
+        form : {"text", "sympy", "latex"}
+            Strings to read, SymPy expressions, or LaTeX.
+        symbols : bool
+            Whether coefficients are written in symbols of the geometry (1/ll1^2, lu1/ll1^2, ...)
+            instead of numbers. `geometry_values` says what they stand for; lengths that are equal
+            share a symbol. Relations that no mass transfer explains stay numbers.
+        digits : int
+            Significant digits of numbers in text and LaTeX; SymPy keeps fractions exact.
+
+        Returns
+        -------
+        tuple of str or of SymPy expression
+
+        Raises
+        ------
+        ModelError
+            If the form is not known, or symbols are not known to the method.
+        """
+        if form not in get_args(Form):
+            raise ModelError(f"form: {form!r} is not one of {', '.join(get_args(Form))}")
+        shares = self._symbolic if symbols else self.shares
+        sums = [terms_of(column, shares) for column in self.kept]
+        if form == "sympy":
+            return tuple(as_sympy(self.columns, terms) for terms in sums)
+        write = as_text if form == "text" else as_latex
+        return tuple(write(self.columns, terms, digits) for terms in sums)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return everything as plain data, fractions as text."""
+        return {
+            "robot": self.robot.name,
+            "rank": self.rank,
+            "names": list(self.names),
+            "columns": list(self.columns),
+            "expressions": list(self.expressions(digits=12)),
+            "grouping": self.grouping.tolist(),
+            "shares": {
+                self.columns[j]: {self.columns[k]: str(share) for k, share in shares.items()}
+                for j, shares in self.shares.items()
+            },
+            "values": self.values().tolist(),
+            "certificate": self.certificate.as_dict(),
+        }
+
+    def to_json(self) -> str:
+        """Return `as_dict` as JSON."""
+        return json.dumps(self.as_dict(), indent=2)

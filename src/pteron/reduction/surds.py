@@ -1,0 +1,100 @@
+"""Exact numbers q sqrt(s), and how a float is recognised as one.
+
+A file holds sqrt(3)/2 as sixteen digits. What depends on exact relations between such numbers, the
+rank of a regressor above all, needs the number that was meant.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import TypeVar
+
+from sympy import factorint
+
+from pteron.kernels import Field
+
+__all__ = ["Surd", "direction_cosine", "length"]
+
+Element = TypeVar("Element")
+
+
+@dataclass(frozen=True)
+class Surd:
+    """The number q sqrt(s), with s a positive integer that no square divides."""
+
+    q: Fraction
+    s: int = 1
+
+    @classmethod
+    def root(cls, square: Fraction, sign: float) -> Surd:
+        """Return the square root of a rational number, with the sign of `sign`."""
+        outside, inside = 1, 1
+        for prime, power in factorint(square.numerator * square.denominator).items():
+            outside *= prime ** (power // 2)
+            inside *= prime ** (power % 2)
+        return cls(Fraction(int(math.copysign(outside, sign)), square.denominator), inside)
+
+    def __float__(self) -> float:
+        return float(self.q) * math.sqrt(self.s)
+
+    def __str__(self) -> str:
+        return str(self.q) if self.s == 1 else f"{self.q} sqrt({self.s})"
+
+    @property
+    def square(self) -> Fraction:
+        """q^2 s."""
+        return self.q * self.q * self.s
+
+    def times(self, factor: Fraction) -> Surd:
+        """Return the number times a rational one."""
+        return Surd(self.q * factor, self.s)
+
+    def within(self, field: Field[Element]) -> Element:
+        """Return the number as an element of a field.
+
+        The root of s is the product of the roots of its primes, so that sqrt(2) sqrt(3) = sqrt(6)
+        holds in every field.
+        """
+        value = field.number(self.q)
+        for prime in factorint(self.s):
+            value = field.multiply(value, field.square_root(field.number(prime)))
+        return value
+
+
+_COSINE_TOLERANCE = 1e-9
+_COSINE_DENOMINATOR = 300
+"""A random number in [-1, 1] passes for a fraction of this denominator with odds below 1e-4."""
+
+_LENGTH_TOLERANCE = 1e-15
+_LENGTH_DENOMINATOR = 10**6
+"""Lengths in metres are decimals to the micrometre, or roots of such."""
+
+
+def direction_cosine(value: float) -> Surd | None:
+    """Return the simple number that a component of a unit vector stands for, if there is one.
+
+    Simple: itself or its square a fraction with a denominator up to 300, within 1e-9.
+    """
+    plain = Fraction(value).limit_denominator(_COSINE_DENOMINATOR)
+    if abs(plain - Fraction(value)) <= _COSINE_TOLERANCE:
+        return Surd(plain)
+    square = Fraction(value * value).limit_denominator(_COSINE_DENOMINATOR)
+    if square > 0 and abs(square - Fraction(value * value)) <= _COSINE_TOLERANCE:
+        return Surd.root(square, value)
+    return None
+
+
+def length(value: float) -> Surd | None:
+    """Return the simple number that a length in metres stands for, if there is one.
+
+    Simple: a decimal to the micrometre, or the root of a fraction with a denominator up to 10^6.
+    """
+    plain = Fraction(value).limit_denominator(_LENGTH_DENOMINATOR)
+    if abs(plain - Fraction(value)) <= _LENGTH_TOLERANCE:
+        return Surd(plain)
+    square = Fraction(value * value).limit_denominator(_LENGTH_DENOMINATOR)
+    if square > 0 and abs(square - Fraction(value * value)) <= abs(value) * _LENGTH_TOLERANCE:
+        return Surd.root(square, value)
+    return None

@@ -1,0 +1,94 @@
+"""The groupings in symbols of the geometry, from the mass transfers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from typing import Any
+
+from sympy import Integer, Rational, Symbol, sqrt
+from sympy.polys.matrices import DomainMatrix
+
+from pteron.reduction.exact_geometry import ExactGeometry
+from pteron.reduction.surds import Surd
+from pteron.reduction.transfers import Transfer
+
+__all__ = ["algebraic_values", "named_values", "symbolic_shares"]
+
+
+def named_values(geometry: ExactGeometry) -> dict[str, Any]:
+    """Return what stands for each geometric symbol: a SymPy symbol, minus one, or zero.
+
+    Values that agree but for their sign share the symbol of the first leg that has them, so that
+    relations which hold because of it are seen.
+    """
+    named: dict[str, Any] = {}
+    first: dict[Fraction, tuple[str, Surd]] = {}
+    for name, value in geometry.symbols().items():
+        if value.q == 0:
+            named[name] = Integer(0)
+            continue
+        bearer, held = first.setdefault(value.square, (name, value))
+        sign = 1 if (held.q > 0) == (value.q > 0) else -1
+        named[name] = sign * Symbol(bearer)
+    return named
+
+
+def algebraic_values(geometry: ExactGeometry) -> dict[str, Any]:
+    """Return the values of the geometric symbols as exact SymPy numbers."""
+    return {name: _number(value) for name, value in geometry.symbols().items()}
+
+
+def _number(value: Surd) -> Any:
+    return Rational(value.q.numerator, value.q.denominator) * sqrt(value.s)
+
+
+def symbolic_shares(
+    names: Sequence[str],
+    kept: Sequence[int],
+    found: Sequence[Transfer],
+    extra: Sequence[Mapping[int, Any]],
+    symbols: Mapping[str, Any],
+) -> dict[int, dict[int, Any]]:
+    """Return the shares of the dependent columns on the kept ones, as SymPy expressions.
+
+    Parameters
+    ----------
+    names : sequence of str
+        The columns.
+    kept : sequence of int
+        The columns kept.
+    found : sequence of Transfer
+        The transfers.
+    extra : sequence of mapping
+        Null vectors that no transfer explains, by column, as numbers.
+    symbols : mapping
+        What is put for the geometry: SymPy symbols, or exact numbers.
+    """
+    dropped = [j for j in range(len(names)) if j not in kept]
+    order = [*dropped, *kept]
+    rows = []
+    for transfer in found:
+        values = transfer.evaluate(
+            symbols, lambda n: Rational(n), lambda a, b: a + b, lambda a, b: a * b
+        )
+        rows.append([values.get(names[j], Rational(0)) for j in order])
+    for vector in extra:
+        rows.append([_rational(vector.get(j, Fraction(0))) for j in order])
+    matrix = DomainMatrix.from_list_sympy(len(rows), len(order), rows, extension=True).to_field()
+    reduced, pivots = matrix.rref()
+    if pivots != tuple(range(len(dropped))):
+        raise AssertionError("the transfers do not give the dependent columns")
+    solved = reduced.to_Matrix()
+    return {
+        j: {
+            k: -solved[row, len(dropped) + place]
+            for place, k in enumerate(kept)
+            if solved[row, len(dropped) + place] != 0
+        }
+        for row, j in enumerate(dropped)
+    }
+
+
+def _rational(value: Fraction) -> Any:
+    return Rational(value.numerator, value.denominator)

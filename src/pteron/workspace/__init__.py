@@ -1,0 +1,22 @@
+"""Where a machine can work: its reserves, its home pose, its reach and its sliders' ranges."""
+
+from pteron.workspace.home import home_pose
+from pteron.workspace.reach import BEYOND_LIMITS, REACHABLE, ReachSlice, reach_slice
+from pteron.workspace.reserve import Reserve, reserve
+from pteron.workspace.sliders import SliderRanges, slider_ranges
+from pteron.workspace.volume import ReachVolume, bounding_box, reach_volume
+
+__all__ = [
+    "BEYOND_LIMITS",
+    "REACHABLE",
+    "ReachSlice",
+    "ReachVolume",
+    "Reserve",
+    "SliderRanges",
+    "bounding_box",
+    "home_pose",
+    "reach_slice",
+    "reach_volume",
+    "reserve",
+    "slider_ranges",
+]

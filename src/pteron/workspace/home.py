@@ -1,0 +1,116 @@
+"""The home pose: where a machine has the best reserve."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import minimize  # type: ignore[import-untyped]
+
+from pteron.errors import ModelError
+from pteron.kernels import Array
+from pteron.kinematics import inverse_kinematics, random_poses, singular_orientations
+from pteron.manipulator import Manipulator
+from pteron.workspace.reserve import reserve
+
+__all__ = ["home_pose"]
+
+_SEARCHES = ((0.3, 0.3), (0.02, 0.02), (0.0, 0.0))
+"""Bend and hold that random poses must have: less where the legs have little common reach."""
+
+_SAMPLES = 200
+_STARTS = 12
+
+_STEPS = (0.02, 0.2)
+"""Size of the first simplex: m and rad."""
+
+_GRIDS = ((0.1, 30.0), (0.05, 15.0), (0.01, 5.0), (0.001, 1.0))
+"""Round poses that are tried, coarsest first: multiples of so many metres and degrees."""
+
+_WORTH = 0.99
+"""The share of the best reserve that counts as equal to it: nobody wants to type the rest."""
+
+
+def home_pose(robot: Manipulator) -> Array:
+    """Return the pose with the best reserve, rounded where that costs next to nothing.
+
+    The reserve is the smallest of the sines of the elbows' angles, the regularity and the sliders'
+    clearance (see `Reserve`); a random search with a fixed seed finds it, and Nelder and Mead's
+    method refines it. The result is always the same for the same machine.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+
+    Returns
+    -------
+    array, shape (m,)
+        m and rad. Its reserve is at least 98 % of the best one found; of equals, the one whose
+        sliders are nearest to their guide points.
+
+    Raises
+    ------
+    ModelError
+        If no pose is in reach of all legs and within the sliders' limits.
+    SingularPose
+        If the machine is singular at every pose.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.workspace import home_pose
+    >>> home_pose(pteron.load("quadrupteron"))
+    array([0., 0., 0., 0.])
+    """
+    singular_orientations(robot)  # refuses a machine that is singular everywhere
+    drawn = _random_poses(robot)
+    order = np.argsort(-reserve(robot, drawn).smallest, kind="stable")
+    refined = np.array([_refined(robot, drawn[i]) for i in order[:_STARTS]])
+    reserves = reserve(robot, refined).smallest
+    most = float(reserves.max())
+    if most <= 0.0:
+        raise ModelError(
+            f"{robot.name}: no pose in reach of all legs found within the sliders' limits; widen "
+            "slider_limits or move the guide points"
+        )
+    # The guide points say where the sliders are meant to be, where nothing else tells.
+    equals = refined[reserves >= _WORTH * most]
+    travel = np.abs(inverse_kinematics(robot, equals)).max(axis=-1)
+    best = equals[travel.argmin()]
+    least = _WORTH * float(reserve(robot, best).smallest)
+    if robot.platform.turns:
+        best[3] = np.pi - (np.pi - best[3]) % (2.0 * np.pi)
+    for metres, degrees in _GRIDS:
+        step = np.array([metres] * 3 + [np.radians(degrees)])[: robot.freedom]
+        rounded: Array = np.round(best / step) * step + 0.0  # -0.0 becomes 0.0
+        if reserve(robot, rounded).smallest >= least:
+            return rounded
+    return best
+
+
+def _random_poses(robot: Manipulator) -> Array:
+    for bend, hold in _SEARCHES:
+        try:
+            return random_poses(robot, _SAMPLES, bend=bend, hold=hold)
+        except ModelError:
+            continue
+    try:
+        return random_poses(robot, 1, bend=0.0, hold=0.0)
+    except ModelError:
+        raise ModelError(
+            f"{robot.name}: no pose is in reach of all legs; bring the guide points nearer or "
+            "lengthen the links"
+        ) from None
+
+
+def _refined(robot: Manipulator, start: Array) -> Array:
+    """Return the pose of a locally best reserve."""
+    steps = np.array([_STEPS[0]] * 3 + [_STEPS[1]])[: robot.freedom]
+    simplex = np.vstack([start, start + np.diag(steps)])
+    found = minimize(
+        lambda pose: -float(reserve(robot, pose).smallest),
+        start,
+        method="Nelder-Mead",
+        options={"initial_simplex": simplex, "xatol": 1e-5, "fatol": 1e-6, "maxiter": 500},
+    )
+    best: Array = found.x
+    return best

@@ -1,0 +1,133 @@
+"""Plane slices through the reach at constant orientation: which poses serve, and what ends them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.conventions import PoseLike
+from pteron.errors import DataError
+from pteron.kernels import Array, compile
+from pteron.kinematics import inverse_kinematics
+from pteron.kinematics.poses import finite
+from pteron.manipulator import Manipulator
+from pteron.workspace.reserve import clearances
+from pteron.workspace.volume import bounding_box
+
+__all__ = ["BEYOND_LIMITS", "REACHABLE", "ReachSlice", "reach_slice"]
+
+REACHABLE = 0
+"""Status of a pose that serves."""
+
+BEYOND_LIMITS = -1
+"""Status of a pose that the links reach but a slider's limits forbid."""
+
+_RIM = 0.08
+"""Share of the reach's width that a slice shows around it."""
+
+Plane = Literal["xy", "xz", "yz"]
+
+
+@dataclass(frozen=True)
+class ReachSlice:
+    """A grid of poses that differ in two of x, y and z.
+
+    Attributes
+    ----------
+    plane : str
+        The two coordinates that vary: ``"xy"``, ``"xz"`` or ``"yz"``.
+    center : array, shape (m,)
+        The pose the slice goes through; its other coordinates hold for the whole grid.
+    first, second : array, shape (A,) and (B,)
+        Values of the two coordinates, m.
+    status : array of int, shape (B, A)
+        `REACHABLE`; `BEYOND_LIMITS`; or the leg, from 1, that misses the pose by most.
+    margin : array, shape (B, A)
+        Metres to the nearest end of a leg's reach or of a slider's way; negative outside.
+    leg_margins : array, shape (B, A, n)
+        Metres within what each leg's links reach: zero on the leg's type-I singularity.
+    """
+
+    plane: Plane
+    center: Array
+    first: Array
+    second: Array
+    status: NDArray[np.int_]
+    margin: Array
+    leg_margins: Array
+
+
+def reach_slice(
+    robot: Manipulator,
+    center: PoseLike,
+    plane: Plane = "xy",
+    *,
+    extent: tuple[float, float, float, float] | None = None,
+    points: int = 81,
+) -> ReachSlice:
+    """Return a slice through the reach at the orientation of a pose.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    center : array, shape (m,)
+        The pose the slice goes through, m and rad.
+    plane : {"xy", "xz", "yz"}
+        The two coordinates, of the base frame, that vary.
+    extent : (float, float, float, float), optional
+        Least and greatest value of the first coordinate, then of the second, m; by default what
+        shows the whole reach at this orientation.
+    points : int
+        Number of grid points along each side.
+
+    Returns
+    -------
+    ReachSlice
+
+    Raises
+    ------
+    DataError
+        If the plane is none of the three or there are fewer than 2 points.
+    ModelError
+        If no extent is given and no position is in reach at this orientation.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.workspace import reach_slice
+    >>> cut = reach_slice(pteron.load("quadrupteron"), [0.0, 0.0, 0.0, 0.0], "xz", points=3)
+    >>> cut.status[1, 1], cut.margin[1, 1].round(3)
+    (np.int64(0), np.float64(0.095))
+    """
+    if plane not in ("xy", "xz", "yz"):
+        raise DataError(f'plane: {plane!r} is none of "xy", "xz" and "yz"')
+    if points < 2:
+        raise DataError(f"points: {points} given, at least 2 expected")
+    pose = finite(robot, center, "center")
+    i, j = ("xyz".index(letter) for letter in plane)
+    if extent is None:
+        box = bounding_box(robot, pose)
+        rim = _RIM * (box[1] - box[0])
+        low, high = box[0] - rim, box[1] + rim
+        extent = (float(low[i]), float(high[i]), float(low[j]), float(high[j]))
+    first = np.linspace(extent[0], extent[1], points)
+    second = np.linspace(extent[2], extent[3], points)
+    poses = np.broadcast_to(pose, (points, points, robot.freedom)).copy()
+    poses[..., i] = first
+    poses[..., j] = second[:, None]
+
+    _, leg_margins, _ = compile(robot, "reach")(poses)
+    sliders = inverse_kinematics(robot, poses, on_failure="nan")
+    missed = np.isnan(sliders).any(axis=-1)
+    room = clearances(robot, sliders).min(axis=-1)
+    status = np.where(
+        missed,
+        leg_margins.argmin(axis=-1) + 1,
+        np.where(room < 0.0, BEYOND_LIMITS, REACHABLE),
+    )
+    margin = np.fmin(leg_margins.min(axis=-1), room)
+    return ReachSlice(plane, pose, first, second, status, margin, leg_margins)

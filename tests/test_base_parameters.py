@@ -1,0 +1,281 @@
+"""Base parameters: counts of the literature, three methods that agree, certificates, symbols."""
+
+import json
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+import sympy
+from scipy.spatial.transform import Rotation
+
+import pteron
+from pteron.reduction import ExactCertificate, NumericalCertificate, base_regressor
+
+METHODS = ("exact", "svd", "qr")
+GENERIC = (1.2, -2.3, -9.4)
+NONE = (0.0, 0.0, 0.0)
+
+
+def machine(name, gravity=None, lengths=None):
+    robot = pteron.load(name)
+    if gravity is not None:
+        robot = replace(robot, gravity=gravity)
+    if lengths is not None:
+        legs = tuple(
+            replace(leg, upper_length=lengths[0], lower_length=lengths[1]) for leg in robot.legs
+        )
+        robot = replace(robot, legs=legs)
+    return robot
+
+
+def threefold(offset=0.04):
+    """A Quadrupteron with three legs at 120 degrees about k: its directions hold sqrt(3)."""
+    robot = pteron.load("quadrupteron")
+    legs = [robot.legs[0]]
+    for i in range(3):
+        turn = Rotation.from_rotvec([0.0, 0.0, 2 * np.pi * i / 3]).as_matrix()
+        model = robot.legs[2]
+        legs.append(
+            replace(
+                model,
+                guide_point=turn @ model.guide_point,
+                direction=turn @ model.direction,
+                platform_point=turn @ [0.0, offset, 0.0],
+            )
+        )
+    return replace(robot, name="threefold", legs=tuple(legs))
+
+
+COUNTS = {
+    "quadrupteron, gravity along leg 1": (machine("quadrupteron"), False, 26),
+    "quadrupteron, generic gravity": (machine("quadrupteron", GENERIC), False, 28),
+    "quadrupteron-oblique": (machine("quadrupteron-oblique"), False, 28),
+    "tripteron-oblique": (machine("tripteron-oblique"), False, 19),
+    "tripteron, generic gravity": (machine("tripteron", GENERIC), False, 18),
+    "tripteron, gravity along a leg": (machine("tripteron"), False, 16),
+    "tripteron, no gravity": (machine("tripteron", NONE), False, 12),
+    "quadrupteron, shared": (machine("quadrupteron", GENERIC), True, 11),
+    "quadrupteron, shared, equal lengths": (
+        machine("quadrupteron", GENERIC, (0.18, 0.18)),
+        True,
+        10,
+    ),
+    "tripteron-oblique, shared": (machine("tripteron-oblique", None, (0.2, 0.21)), True, 7),
+    "tripteron, shared": (machine("tripteron", GENERIC), True, 6),
+    "tripteron, shared, no gravity": (machine("tripteron", NONE), True, 4),
+}
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("case", COUNTS)
+def test_counts_of_the_literature(case, method):
+    robot, shared, count = COUNTS[case]
+    assert pteron.base_parameters(robot, method, shared=shared).rank == count
+
+
+@pytest.mark.parametrize("case", COUNTS)
+def test_methods_agree(case):
+    robot, shared, _ = COUNTS[case]
+    exact, svd, qr = (pteron.base_parameters(robot, m, shared=shared) for m in METHODS)
+    assert exact.names == svd.names == qr.names
+    scale = np.abs(exact.grouping).max()
+    np.testing.assert_allclose(svd.grouping, exact.grouping, atol=1e-10 * scale)
+    np.testing.assert_allclose(qr.grouping, exact.grouping, atol=1e-10 * scale)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("case", [c for c in COUNTS if "shared" not in c])
+def test_a_turned_machine_has_the_same_base_parameters(case, seed):
+    robot, _, count = COUNTS[case]
+    turned = pteron.turned(robot, Rotation.random(rng=seed).as_matrix())
+    base = pteron.base_parameters(turned)
+    assert base.rank == count
+    assert base.names == pteron.base_parameters(robot).names
+    np.testing.assert_allclose(
+        base.grouping, pteron.base_parameters(robot).grouping, rtol=1e-13, atol=0
+    )
+
+
+@pytest.mark.parametrize("modes", [1, 6, 15])
+def test_working_modes_share_their_base_parameters(modes):
+    robot = pteron.load("quadrupteron")
+    mode = pteron.working_modes(robot)[modes]
+    np.testing.assert_array_equal(
+        pteron.base_parameters(mode).grouping, pteron.base_parameters(robot).grouping
+    )
+
+
+@pytest.mark.parametrize("turn", [None, 5])
+def test_roots_in_the_geometry_are_recognised(turn):
+    robot = threefold()
+    if turn is not None:
+        robot = pteron.turned(robot, Rotation.random(rng=turn).as_matrix())
+    base = pteron.base_parameters(robot)
+    svd = pteron.base_parameters(robot, "svd")
+    assert base.rank == svd.rank == 26
+    assert base.certificate.coefficients == "algebraic"
+    assert any("sqrt(3)" in line for line in base.certificate.recognised)
+    assert base.names == svd.names
+    np.testing.assert_allclose(base.grouping, svd.grouping, atol=1e-9 * np.abs(base.grouping).max())
+
+
+def test_equal_distances_from_p_survive_when_the_points_are_no_simple_numbers():
+    """Four platform points on a circle about P: m_e must be kept, whatever their directions."""
+    robot = machine("quadrupteron", GENERIC)
+    angles = np.radians([-90.0, 173.0, 71.0, 14.0])
+    legs = tuple(
+        replace(leg, platform_point=(0.04 * np.cos(a), 0.04 * np.sin(a), 0.0))
+        for leg, a in zip(robot.legs, angles, strict=True)
+    )
+    base = pteron.base_parameters(replace(robot, legs=legs))
+    assert base.rank == 28
+    assert np.abs(base.grouping).max() < 1e4, "a broken circle shows as coefficients of 1e15"
+    everything = ["m_l1", "m_l2", "m_l3", "m_l4"]
+    with pytest.raises(pteron.ModelError, match="keep: m_l4"):
+        pteron.base_parameters(replace(robot, legs=legs), keep=everything)
+
+
+@pytest.mark.parametrize("name", ["quadrupteron", "quadrupteron-oblique", "tripteron"])
+def test_the_certificate_is_what_it_says(name):
+    base = pteron.base_parameters(pteron.load(name))
+    certificate = base.certificate
+    assert isinstance(certificate, ExactCertificate)
+    assert certificate.rank + certificate.null_vectors == certificate.columns
+    assert certificate.transfers + len(certificate.unexplained) == certificate.null_vectors
+    assert certificate.rational_configurations > 0
+    assert certificate.false_acceptance < 1e-15
+    assert len(certificate.primes) >= 2
+    assert not certificate.lost
+    assert f"rank {base.rank} of" in certificate.summary()
+
+
+def test_numerical_methods_report_their_gap():
+    for method in ("svd", "qr"):
+        certificate = pteron.base_parameters(pteron.load("quadrupteron"), method).certificate
+        assert isinstance(certificate, NumericalCertificate)
+        assert certificate.gap > 1e8
+        assert certificate.residual < 1e-12
+
+
+def test_the_orthogonal_tripteron_has_a_relation_that_no_transfer_explains():
+    base = pteron.base_parameters(machine("tripteron", GENERIC))
+    assert base.certificate.unexplained == ("m_e",)
+    assert {base.names[k] for k in np.flatnonzero(base.grouping[:, -4])} == {
+        "m_p1",
+        "m_p2",
+        "m_p3",
+    }
+    assert "special geometry" in base.certificate.summary()
+
+
+@pytest.mark.parametrize("name", pteron.catalog())
+@pytest.mark.parametrize("shared", [False, True])
+def test_symbols_evaluate_to_the_exact_coefficients(name, shared):
+    base = pteron.base_parameters(pteron.load(name), shared=shared)
+    values = {symbol: sympy.Rational(str(value)) for symbol, value in base.geometry_values.items()}
+    numbers = base.expressions("sympy")
+    for symbolic, number in zip(base.expressions("sympy", symbols=True), numbers, strict=True):
+        assert sympy.expand(symbolic.subs(values) - number) == 0
+
+
+@pytest.mark.parametrize("name", pteron.catalog())
+def test_forces_follow_from_base_values_alone(name):
+    robot = pteron.load(name)
+    rng = np.random.default_rng(4)
+    pose = pteron.random_poses(robot, 50, seed=rng)
+    state = pose, rng.normal(size=pose.shape), 5 * rng.normal(size=pose.shape)
+    base = pteron.base_parameters(robot)
+    matrices = base_regressor(robot, base, *state)
+    assert matrices.shape == (50, len(robot.legs), base.rank)
+    forces = pteron.inverse_dynamics(robot, *state)
+    scale = np.abs(forces).max(axis=-1, keepdims=True)
+    assert (np.abs(matrices @ base.values() - forces) / scale).max() < 1e-12
+
+
+def test_other_parameters_with_the_same_base_values_give_the_same_forces():
+    """What is grouped cannot be told apart: move mass along a null direction, keep bodies real."""
+    robot = pteron.load("quadrupteron")
+    base = pteron.base_parameters(robot)
+    values = pteron.parameters(robot)
+    null = np.linalg.svd(base.grouping)[2][base.rank :]
+    other = pteron.with_parameters(robot, values + 1e-3 * null.sum(axis=0))
+    pose = pteron.random_poses(robot, 20)
+    state = pose, np.ones_like(pose), np.ones_like(pose)
+    forces = pteron.inverse_dynamics(robot, *state)
+    assert not np.allclose(pteron.parameters(other), values, atol=1e-5)
+    np.testing.assert_allclose(pteron.inverse_dynamics(other, *state), forces, rtol=1e-11)
+
+
+def test_keep_chooses_the_columns():
+    robot = pteron.load("quadrupteron")
+    base = pteron.base_parameters(robot, keep=["I_l1", "m_l4", "I_e"])
+    assert {"I_l1", "m_l4", "I_e"} <= set(base.names)
+    assert base.rank == 26
+    pose = pteron.random_poses(robot, 10)
+    state = pose, np.ones_like(pose), np.ones_like(pose)
+    forces = base_regressor(robot, base, *state) @ base.values()
+    np.testing.assert_allclose(forces, pteron.inverse_dynamics(robot, *state), rtol=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("keep", "message"),
+    [
+        (["mgx_u1"], "mgx_u1 cannot be kept"),
+        (["m_p1", "m_u1"], "m_u1 cannot be kept"),
+        (["nothing"], "'nothing' is no list of parameter names"),
+        ("m_p1", "'m_p1' is no list of parameter names"),
+    ],
+)
+def test_a_choice_that_cannot_be_is_refused(keep, message):
+    with pytest.raises(pteron.ModelError, match=message):
+        pteron.base_parameters(pteron.load("quadrupteron"), keep=keep)
+
+
+def test_groups_of_legs_share():
+    robot = machine("quadrupteron", GENERIC)
+    base = pteron.base_parameters(robot, shared=[(2, 4)])
+    assert "m_p(2,4)" in base.names
+    assert base.rank == pteron.base_parameters(robot, "svd", shared=[(2, 4)]).rank < 28
+    twin = replace(robot.legs[3], slider_mass=robot.legs[1].slider_mass)
+    twin = replace(twin, upper=robot.legs[1].upper, lower=robot.legs[1].lower)
+    twins = replace(robot, legs=(*robot.legs[:3], twin))
+    pose = pteron.random_poses(twins, 10)
+    state = pose, np.ones_like(pose), np.ones_like(pose)
+    forces = base_regressor(twins, base, *state) @ base.values(twins)
+    np.testing.assert_allclose(forces, pteron.inverse_dynamics(twins, *state), rtol=1e-10)
+    with pytest.raises(pteron.ModelError, match="shared"):
+        pteron.base_parameters(robot, shared=[(1, 5)])
+
+
+def test_forms_of_the_output():
+    base = pteron.base_parameters(pteron.load("quadrupteron"))
+    assert base.expressions()[0] == "m_p1 + m_u1 + 20.11 I_l1"
+    assert base.expressions(symbols=True)[4] == "I_u1 + (lu1^2/ll1^2) I_l1"
+    assert base.expressions("latex")[5] == r"m_{u2}\gamma_{u2,x} + 5.941\, I_{l2}"
+    first = base.expressions("sympy")[0]
+    assert first.coeff(sympy.Symbol("I_l1")) == 1 / sympy.Rational("0.223") ** 2
+    data = json.loads(base.to_json())
+    assert data["rank"] == 26
+    assert Fraction(data["shares"]["I_l1"]["m_p1"]) == 1 / Fraction("0.223") ** 2
+    np.testing.assert_array_equal(data["grouping"], base.grouping)
+
+
+def test_unknown_choices_are_refused():
+    robot = pteron.load("quadrupteron")
+    with pytest.raises(pteron.ModelError, match="method: 'lu'"):
+        pteron.base_parameters(robot, "lu")
+    with pytest.raises(pteron.ModelError, match="form: 'html'"):
+        pteron.base_parameters(robot).expressions("html")
+    with pytest.raises(pteron.ModelError, match='use method="exact"'):
+        pteron.base_parameters(robot, "svd").expressions(symbols=True)
+    other = pteron.base_parameters(pteron.load("tripteron"))
+    with pytest.raises(pteron.ModelError, match="belongs to tripteron"):
+        base_regressor(robot, other, np.zeros(4), np.zeros(4), np.zeros(4))
+
+
+def test_a_machine_that_is_singular_everywhere_has_none():
+    robot = pteron.load("quadrupteron")
+    legs = tuple(replace(leg, platform_point=(0.0, 0.0, 0.0)) for leg in robot.legs)
+    with pytest.raises(pteron.SingularPose, match="singular at every pose"):
+        pteron.base_parameters(replace(robot, legs=legs))
