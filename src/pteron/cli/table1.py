@@ -25,12 +25,10 @@ def table1(json: Json = False) -> None:
         names = ("parameter", "kept", "printed", "computed", "agrees")
         show_json([{name: getattr(row, name) for name in names} for row in found])
     else:
-        made = table("", "kept", "printed", "computed", "agrees")
+        made = table("", "printed", "computed", "agrees")
         for row in found:
             verdict = "yes" if row.agrees else "[bold red]NO[/bold red]"
-            made.add_row(
-                row.parameter, row.kept, escape(row.printed), escape(row.computed), verdict
-            )
+            made.add_row(row.parameter, escape(row.printed), escape(row.computed), verdict)
         show(made, f"{len(found) - wrong} of {len(found)} rows agree.")
     if wrong:
         raise Exit(DISAGREEMENT)

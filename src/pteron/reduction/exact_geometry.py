@@ -268,8 +268,8 @@ def _stereographic(given: Array) -> ExactVector:
     square: Fraction = sum((t * t for t in plane), Fraction(0))
     result = [Fraction(0)] * 3
     result[pole] = sign * (1 - square) / (1 + square)
-    for i, t in zip(others, plane, strict=True):
-        result[i] = 2 * t / (1 + square)
+    for i, tangent in zip(others, plane, strict=True):
+        result[i] = 2 * tangent / (1 + square)
     return (Surd(result[0]), Surd(result[1]), Surd(result[2]))
 
 
