@@ -23,6 +23,7 @@ from pteron.cli.table1 import table1
 __all__ = ["app", "main"]
 
 app = Typer(
+    name="pteron",
     cls=Program,
     rich_markup_mode="rich",
     add_completion=False,

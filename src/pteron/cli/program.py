@@ -64,7 +64,10 @@ def _usage(error: Any) -> str:
     message = " ".join(str(error.format_message()).split()).rstrip(".")
     message = message.replace("Value error, ", "")
     context = getattr(error, "ctx", None)
-    return f"{message}; see {context.command_path} --help" if context else message
+    if context is None:
+        return message
+    joint = " See" if message.endswith("?") else "; see"
+    return f"{message}{joint} {context.command_path} --help"
 
 
 def _close_standard_output() -> None:

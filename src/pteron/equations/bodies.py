@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import casadi as ca
 
-from pteron.equations.geometry import Expression
+from pteron.equations.circles import quarter_turn
+from pteron.equations.geometry import Expression, LegGeometry
 
 
 class Inertia(NamedTuple):
@@ -43,17 +44,24 @@ def split(parameters: Expression, legs: int) -> tuple[list[LegInertia], Inertia]
     return [LegInertia(sliders[i], bodies[i], bodies[legs + i]) for i in range(legs)], bodies[-1]
 
 
+def link_moments(
+    leg: LegGeometry, vector: Expression, length: Expression, link: Inertia
+) -> tuple[Expression, Expression]:
+    """Return h and d x h of a link, each (2, K) in the leg's plane, for its vector and length."""
+    return first_moment(vector, quarter_turn(vector), link.hx / length, link.hy / length)
+
+
 def first_moment(
     x: Expression, y: Expression, hx: Expression, hy: Expression
 ) -> tuple[Expression, Expression]:
-    """Return h = x hx + y hy and z x h = y hx - x hy, each (3, K), in the body's axes x and y."""
+    """Return h = x hx + y hy and z x h = y hx - x hy, for the body's axes x and y."""
     return ca.mtimes(x, hx) + ca.mtimes(y, hy), ca.mtimes(y, hx) - ca.mtimes(x, hy)
 
 
 def turning_force(
     h: Expression, dh: Expression, rate2: Expression, ddtheta: Expression
 ) -> Expression:
-    """Return -w' z x h + w^2 h, the inertia force (3, K) of a first moment h that turns about z.
+    """Return -w' z x h + w^2 h, the inertia force of a first moment h that turns about z.
 
     `h` is perpendicular to z and `dh` is z x h; `rate2` is w^2.
     """

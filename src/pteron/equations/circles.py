@@ -17,16 +17,21 @@ def squared_reach(leg: LegGeometry, u: Expression) -> Expression:
     return (longest * longest - n2) * (n2 - shortest * shortest)
 
 
+def quarter_turn(v: Expression) -> Expression:
+    """Return d x v for a vector v of the leg's plane, or for the columns of a matrix (2, K)."""
+    return ca.vertcat(-v[1, :], v[0, :])
+
+
 def link_vectors(leg: LegGeometry, u: Expression) -> tuple[Expression, Expression, Expression]:
     """Return l_u, l_l (Eqs. 1 and 2, or 6 and 7) and 1/D with D = (l_u x l_l) . d.
 
-    D = -sigma sqrt(Delta) / 2: it is twice the area of the triangle of the links.
+    All in the leg's plane. D = -sigma sqrt(Delta) / 2: twice the area of the links' triangle.
     """
     n2 = ca.dot(u, u)
     root = ca.sqrt(squared_reach(leg, u))
     share = 0.5 + (0.5 * (leg.lu * leg.lu - leg.ll * leg.ll)) / n2
     offset = (0.5 * leg.sigma) * (root / n2)
-    l_u = share * u + offset * ca.cross(leg.d, u)
+    l_u = share * u + offset * quarter_turn(u)
     return l_u, u - l_u, (-2 * leg.sigma) / root
 
 

@@ -13,13 +13,17 @@ from pteron.manipulator import Manipulator
 Expression = Any
 """A CasADi SX matrix; CasADi has no types that a checker could read."""
 
-SYMBOLS_PER_LEG = 15
-"""r, d, e and s0 (three each), lu, ll and sigma."""
+SYMBOLS_PER_LEG = 18
+"""r, d, e, a and s0 (three each), lu, ll and sigma."""
 
 
 @dataclass(frozen=True)
 class LegGeometry:
-    """What the equations need of a leg; see the table of symbols in `pteron.manipulator.Leg`."""
+    """What the equations need of a leg; see the table of symbols in `pteron.manipulator.Leg`.
+
+    The links move in the plane perpendicular to d. Vectors of that plane are written in its axes a
+    and d x a, as two-vectors, wherever that is enough.
+    """
 
     r: Expression
     d: Expression
@@ -30,6 +34,15 @@ class LegGeometry:
     sigma: Expression
     d_bar: Expression
     """d / (d . e): the slider coordinate is rho = d_bar . (c - r), Eq. (4) generalised."""
+    plane: Expression
+    """(3, 2): the axes a and d x a of the leg's plane."""
+    e_plane: Expression
+    """(2, 1): the part of e in the plane; zero where the slider moves along d."""
+
+    @property
+    def plane_rows(self) -> Expression:
+        """(2, 3): u = plane_rows (c - r), the part of c - r - rho e in the plane, Eq. (5)."""
+        return self.plane.T - ca.mtimes(self.e_plane, self.d_bar.T)
 
 
 @dataclass(frozen=True)
@@ -58,6 +71,8 @@ class Geometry:
         legs = []
         for leg in robot.legs:
             d, e = ca.SX(leg.direction), ca.SX(leg.e)
+            plane = _plane(d, plane_axis(d, *pole(leg.direction)))
+            aligned = leg.e == leg.direction
             legs.append(
                 LegGeometry(
                     r=ca.SX(leg.guide_point),
@@ -67,7 +82,9 @@ class Geometry:
                     lu=ca.SX(leg.upper_length),
                     ll=ca.SX(leg.lower_length),
                     sigma=ca.SX(leg.elbow),
-                    d_bar=d if leg.e == leg.direction else d / ca.dot(d, e),
+                    d_bar=d if aligned else d / ca.dot(d, e),
+                    plane=plane,
+                    e_plane=ca.SX.zeros(2) if aligned else ca.mtimes(plane.T, e),
                 )
             )
         x0, y0, k = (ca.SX(axis) for axis in robot.platform.frame)
@@ -77,7 +94,8 @@ class Geometry:
     def symbols(cls, legs: int, turns: bool) -> tuple[Geometry, Expression]:
         """Return the geometry of a topology in symbols, and the symbols as one vector.
 
-        The vector holds, for each leg, r, d, e, s0, lu, ll and sigma; then x0, y0, k and gravity.
+        The vector holds, for each leg, r, d, e, a, s0, lu, ll and sigma; then x0, y0, k, gravity.
+        a is a unit vector perpendicular to d, such as `plane_axis` gives.
         """
         vectors = [ca.SX.sym(f"leg{i + 1}", SYMBOLS_PER_LEG) for i in range(legs)]
         frame = ca.SX.sym("frame", 12)
@@ -86,16 +104,40 @@ class Geometry:
                 r=v[0:3],
                 d=v[3:6],
                 e=v[6:9],
-                s0=v[9:12],
-                lu=v[12],
-                ll=v[13],
-                sigma=v[14],
+                s0=v[12:15],
+                lu=v[15],
+                ll=v[16],
+                sigma=v[17],
                 d_bar=v[3:6] / ca.dot(v[3:6], v[6:9]),
+                plane=_plane(v[3:6], v[9:12]),
+                e_plane=ca.mtimes(_plane(v[3:6], v[9:12]).T, v[6:9]),
             )
             for v in vectors
         )
         geometry = cls(parts, frame[0:3], frame[3:6], frame[6:9], frame[9:12], turns)
         return geometry, ca.vertcat(*vectors, frame)
+
+
+def pole(direction: Sequence[float]) -> tuple[int, int]:
+    """Return the largest component of a unit vector and its sign, which `plane_axis` asks for."""
+    i = max(range(3), key=lambda j: abs(direction[j]))
+    return i, 1 if direction[i] > 0 else -1
+
+
+def plane_axis(d: Expression, i: int, sign: int) -> Expression:
+    """Return a unit vector a perpendicular to d, without a root; d along axis i gives axis i + 1.
+
+    It is the image of axis i + 1 under the reflection that takes axis i to -sign d. `sign` is that
+    of d's component i, so that the denominator is at least 1.
+    """
+    unit = ca.SX.eye(3)
+    v = d + sign * unit[:, i]
+    j = (i + 1) % 3
+    return unit[:, j] - (v[j] / (1 + sign * d[i])) * v
+
+
+def _plane(d: Expression, a: Expression) -> Expression:
+    return ca.horzcat(a, ca.cross(d, a))
 
 
 def times(constant: Expression, expression: Expression) -> Expression:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from pteron.equations.bodies import Inertia, first_moment, split
+from pteron.equations.bodies import Inertia, first_moment, link_moments, split
 from pteron.equations.geometry import Expression, Geometry
 from pteron.equations.jacobians import jacobian
 from pteron.equations.legs import leg_position, point_rows, slider_coordinate
@@ -46,17 +46,13 @@ def mass_matrix(geometry: Geometry, pose: Expression, parameters: Expression) ->
         at = leg_position(leg, point.position)
         slider, upper_row, lower_row = point_rows(leg, at)
         upper, lower = inertia.upper, inertia.lower
-        _, dh_u = first_moment(
-            at.l_u, ca.cross(leg.d, at.l_u), upper.hx / leg.lu, upper.hy / leg.lu
-        )
-        _, dh_l = first_moment(
-            at.l_l, ca.cross(leg.d, at.l_l), lower.hx / leg.ll, lower.hy / leg.ll
-        )
+        _, dh_u = link_moments(leg, at.l_u, leg.lu, upper)
+        _, dh_l = link_moments(leg, at.l_l, leg.ll, lower)
         slides = upper._replace(m=inertia.slider + upper.m)
         rides = lower._replace(m=ca.SX(1, 1))
         at_point = body_mass_matrix(
-            ca.mtimes(leg.e, slider.T), upper_row.T, dh_u, slides
-        ) + body_mass_matrix(ca.SX.eye(3), lower_row.T, dh_l, rides)
+            ca.mtimes(leg.e, slider.T), upper_row.T, ca.mtimes(leg.plane, dh_u), slides
+        ) + body_mass_matrix(ca.SX.eye(3), lower_row.T, ca.mtimes(leg.plane, dh_l), rides)
         total = total + ca.mtimes(point.matrix.T, ca.mtimes(at_point, point.matrix))
     return total
 
@@ -93,12 +89,12 @@ def potential_energy(geometry: Geometry, pose: Expression, parameters: Expressio
         # 3T, nothing else is missing from the platform's planar first moment.
         inertia, c = bodies[i], motion.points[i].position
         at = leg_position(leg, c)
-        upper, lower = inertia.upper, inertia.lower
-        h_u, _ = first_moment(at.l_u, ca.cross(leg.d, at.l_u), upper.hx / leg.lu, upper.hy / leg.lu)
-        h_l, _ = first_moment(at.l_l, ca.cross(leg.d, at.l_l), lower.hx / leg.ll, lower.hy / leg.ll)
+        h_u, _ = link_moments(leg, at.l_u, leg.lu, inertia.upper)
+        h_l, _ = link_moments(leg, at.l_l, leg.ll, inertia.lower)
         slide = leg.r + slider_coordinate(leg, c) * leg.e
-        height = lower.m * leg.s0[2] * geometry.k
-        moments = moments + (inertia.slider + upper.m) * slide + h_u + h_l + height
+        height = inertia.lower.m * leg.s0[2] * geometry.k
+        links = ca.mtimes(leg.plane, h_u + h_l)
+        moments = moments + (inertia.slider + inertia.upper.m) * slide + links + height
     return -ca.dot(geometry.gravity, moments)
 
 

@@ -17,20 +17,20 @@ def slider_coordinate(leg: LegGeometry, c: Expression) -> Expression:
 
 
 def closing_vector(leg: LegGeometry, c: Expression) -> Expression:
-    """Return u, from R1 to R3, Eq. (5); it is perpendicular to d."""
-    return (c - leg.r) - slider_coordinate(leg, c) * leg.e
+    """Return u, from R1 to R3 in the leg's plane, Eq. (5)."""
+    return ca.mtimes(leg.plane_rows, c - leg.r)
 
 
 @dataclass(frozen=True)
 class LegPosition:
-    """The links of a leg at a position of its platform point, and how their angles follow it."""
+    """The links of a leg, in its plane, and how their angles follow u."""
 
     l_u: Expression
     l_l: Expression
     upper_row: Expression
-    """d theta_u / d u = l_l / D, a three-vector."""
+    """d theta_u / d u = l_l / D."""
     lower_row: Expression
-    """d theta_l / d u = -l_u / D, a three-vector."""
+    """d theta_l / d u = -l_u / D."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,8 @@ class LegMotion:
     """Rates and accelerations of a leg's slider and of its two links."""
 
     position: LegPosition
+    closing_acceleration: Expression
+    """u''."""
     slider_rate: Expression
     upper_rate: Expression
     lower_rate: Expression
@@ -61,12 +63,13 @@ def leg_motion(leg: LegGeometry, point: PointMotion) -> LegMotion:
     at = leg_position(leg, point.position)
     slider_rate = ca.dot(leg.d_bar, point.velocity)
     slider_acceleration = ca.dot(leg.d_bar, point.acceleration)
-    du = point.velocity - slider_rate * leg.e
-    ddu = point.acceleration - slider_acceleration * leg.e
+    du = ca.mtimes(leg.plane_rows, point.velocity)
+    ddu = ca.mtimes(leg.plane_rows, point.acceleration)
     upper_rate, lower_rate = ca.dot(at.upper_row, du), ca.dot(at.lower_row, du)
     v = ddu + (upper_rate * upper_rate) * at.l_u + (lower_rate * lower_rate) * at.l_l
     return LegMotion(
         at,
+        ddu,
         slider_rate,
         upper_rate,
         lower_rate,
@@ -77,13 +80,6 @@ def leg_motion(leg: LegGeometry, point: PointMotion) -> LegMotion:
 
 
 def point_rows(leg: LegGeometry, at: LegPosition) -> tuple[Expression, Expression, Expression]:
-    """Return the rows d rho / dc, d theta_u / dc and d theta_l / dc, as three-vectors.
-
-    u' = c' - e rho', so that a row a with respect to u is a - (a . e) d_bar with respect to c.
-    """
-    upper, lower = at.upper_row, at.lower_row
-    return (
-        leg.d_bar,
-        upper - ca.dot(upper, leg.e) * leg.d_bar,
-        lower - ca.dot(lower, leg.e) * leg.d_bar,
-    )
+    """Return the rows d rho / dc, d theta_u / dc and d theta_l / dc, as three-vectors."""
+    across = leg.plane_rows.T
+    return leg.d_bar, ca.mtimes(across, at.upper_row), ca.mtimes(across, at.lower_row)

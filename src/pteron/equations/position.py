@@ -30,14 +30,12 @@ def inverse_position(geometry: Geometry, pose: Expression) -> Expression:
 
 def links(geometry: Geometry, pose: Expression) -> tuple[Expression, Expression]:
     """Return l_u and l_l of every leg, each (n, 3): Eqs. (6) and (7)."""
-    points = platform_at(geometry, pose).points
-    legs = [
-        leg_position(leg, point.position) for leg, point in zip(geometry.legs, points, strict=True)
-    ]
-    return (
-        ca.vertcat(*(leg.l_u.T for leg in legs)),
-        ca.vertcat(*(leg.l_l.T for leg in legs)),
-    )
+    upper, lower = [], []
+    for leg, point in zip(geometry.legs, platform_at(geometry, pose).points, strict=True):
+        at = leg_position(leg, point.position)
+        upper.append(ca.mtimes(leg.plane, at.l_u).T)
+        lower.append(ca.mtimes(leg.plane, at.l_l).T)
+    return ca.vertcat(*upper), ca.vertcat(*lower)
 
 
 def reach(geometry: Geometry, pose: Expression) -> tuple[Expression, Expression, Expression]:

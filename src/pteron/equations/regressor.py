@@ -64,7 +64,7 @@ def terms(
         diagonal.append(ca.dot(leg.e, g) - state.slider_acceleration)
         upper.append(
             body_matrix(
-                at.l_u / leg.lu,
+                ca.mtimes(leg.plane, at.l_u) / leg.lu,
                 leg.d,
                 g - state.slider_acceleration * leg.e,
                 state.upper_rate,
@@ -73,7 +73,7 @@ def terms(
         )
         lower.append(
             body_matrix(
-                at.l_l / leg.ll,
+                ca.mtimes(leg.plane, at.l_l) / leg.ll,
                 leg.d,
                 g - point.acceleration,
                 state.lower_rate,

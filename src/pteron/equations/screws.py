@@ -24,8 +24,8 @@ def joint_screws(geometry: Geometry, pose: Expression) -> list[Expression]:
         s = point.position - p
         columns = [ca.vertcat(ca.SX.zeros(3), leg.e)]
         for axis, through in (
-            (leg.d, s - at.l_u - at.l_l),
-            (leg.d, s - at.l_l),
+            (leg.d, s - ca.mtimes(leg.plane, at.l_u + at.l_l)),
+            (leg.d, s - ca.mtimes(leg.plane, at.l_l)),
             (leg.d, s),
             (geometry.k, s),
         ):

@@ -17,6 +17,7 @@ from pteron.equations.bodies import (
     Inertia,
     LegInertia,
     first_moment,
+    link_moments,
     moment,
     split,
     turning_force,
@@ -73,42 +74,37 @@ def active_forces(
     on_platform = platform_wrench(geometry, motion, carried)
     on_sliders = []
     for leg, point, inertia in zip(geometry.legs, motion.points, bodies, strict=True):
-        on_slider, on_point = leg_forces(
-            leg,
-            leg_motion(leg, point),
-            geometry.gravity,
-            geometry.gravity - point.acceleration,
-            inertia,
-        )
+        on_slider, on_point = leg_forces(leg, leg_motion(leg, point), geometry.gravity, inertia)
         on_sliders.append(on_slider)
         on_platform = on_platform + ca.mtimes(point.matrix.T, on_point)
     return ca.vertcat(*on_sliders), on_platform
 
 
 def leg_forces(
-    leg: LegGeometry, motion: LegMotion, gravity: Expression, g_c: Expression, bodies: LegInertia
+    leg: LegGeometry, motion: LegMotion, gravity: Expression, bodies: LegInertia
 ) -> tuple[Expression, Expression]:
     """Return the force of a leg's bodies on its slider (1, K) and on its platform point (3, K).
 
     The moments of the links act through theta_u and theta_l, whose rows with respect to u turn
-    them into a force tau; as u' = c' - e rho', tau acts on the point and -e . tau on the slider.
-    `g_c` is g - c''. The mass of the lower link is left to the platform.
+    them into a force tau; as u' is the part of c' - e rho' in the plane, tau acts on the point and
+    -e . tau on the slider. The mass of the lower link is left to the platform.
     """
     at, upper, lower = motion.position, bodies.upper, bodies.lower
-    h, dh = first_moment(at.l_u, ca.cross(leg.d, at.l_u), upper.hx / leg.lu, upper.hy / leg.lu)
+    # g - a in the leg's plane, on R1 (a = rho'' e) and on R3 (a = c'' = u'' + rho'' e there).
+    g_slider = ca.mtimes(leg.plane.T, gravity) - motion.slider_acceleration * leg.e_plane
+    g_point = g_slider - motion.closing_acceleration
+
+    h, dh = link_moments(leg, at.l_u, leg.lu, upper)
     turning = turning_force(h, dh, motion.upper_rate**2, motion.upper_acceleration)
-    g_slider = gravity - motion.slider_acceleration * leg.e
     upper_moment = moment(dh, upper.i, g_slider, motion.upper_acceleration)
-    on_slider = (bodies.slider + upper.m) * (
-        ca.dot(leg.e, gravity) - motion.slider_acceleration
-    ) + ca.mtimes(leg.e.T, turning)
+    along_slider = ca.dot(leg.e, gravity) - motion.slider_acceleration
 
-    h, dh = first_moment(at.l_l, ca.cross(leg.d, at.l_l), lower.hx / leg.ll, lower.hy / leg.ll)
-    on_point = turning_force(h, dh, motion.lower_rate**2, motion.lower_acceleration)
-    lower_moment = moment(dh, lower.i, g_c, motion.lower_acceleration)
-
+    h, dh = link_moments(leg, at.l_l, leg.ll, lower)
+    lower_moment = moment(dh, lower.i, g_point, motion.lower_acceleration)
     tau = ca.mtimes(at.upper_row, upper_moment) + ca.mtimes(at.lower_row, lower_moment)
-    return on_slider - ca.mtimes(leg.e.T, tau), on_point + tau
+    on_slider = (bodies.slider + upper.m) * along_slider + ca.mtimes(leg.e_plane.T, turning - tau)
+    on_point = tau + turning_force(h, dh, motion.lower_rate**2, motion.lower_acceleration)
+    return on_slider, ca.mtimes(leg.plane, on_point)
 
 
 def carried_inertia(geometry: Geometry, platform: Inertia, masses: list[Expression]) -> Inertia:

@@ -16,7 +16,6 @@ __all__ = ["Topology", "is_square", "modular_rows", "rational_rows"]
 
 _ATTEMPTS = 20000
 Element = TypeVar("Element")
-Plane = tuple[list[Fraction], list[Fraction]]
 
 
 @dataclass(frozen=True)
@@ -77,15 +76,14 @@ def rational_rows(
     vector = geometry.within(field)
     points = general_program(topology.legs, topology.turns, "platform_points").function
     program = general_program(topology.legs, topology.turns, "regressor").function
-    planes = [_plane([c.q for c in leg.d]) for leg in geometry.legs]
     rows: list[list[Fraction]] = []
     while len(rows) < states * topology.legs:
         pose = [_fraction(rng) for _ in range(topology.legs)]
         flat = evaluate(points, field, [vector, pose])[0]
         placed = list(vector)
-        for i, plane in enumerate(planes):
-            u, sigma = _triangle(plane, placed[SYMBOLS_PER_LEG * i :][:SYMBOLS_PER_LEG], rng)
+        for i in range(topology.legs):
             start = SYMBOLS_PER_LEG * i
+            u, sigma = _triangle(placed[start : start + SYMBOLS_PER_LEG], rng)
             c = flat[3 * i : 3 * i + 3]
             placed[start : start + 3] = [a - b for a, b in zip(c, u, strict=True)]
             placed[start + SYMBOLS_PER_LEG - 1] = Fraction(sigma)
@@ -117,36 +115,17 @@ def _split(values: Sequence[Element], topology: Topology) -> list[list[Element]]
     return [list(values[i * n : (i + 1) * n]) for i in range(topology.legs)]
 
 
-def _plane(d: list[Fraction]) -> Plane:
-    """Return two rational unit vectors, at right angles to d and to each other.
-
-    They are the images of x and y under the reflection that takes z to minus or plus d.
-    """
-    v = list(d)
-    v[2] += 1 if d[2] >= 0 else -1
-    square = sum(c * c for c in v)
-    return (
-        [(1 if i == 0 else 0) - 2 * v[0] * v[i] / square for i in range(3)],
-        [(1 if i == 1 else 0) - 2 * v[1] * v[i] / square for i in range(3)],
-    )
-
-
-def _triangle(
-    plane: Plane, leg: Sequence[Fraction], rng: random.Random
-) -> tuple[list[Fraction], int]:
-    """Return a random u = l_u + l_l in the leg's plane, and the elbow's side sigma.
+def _triangle(leg: Sequence[Fraction], rng: random.Random) -> tuple[list[Fraction], int]:
+    """Return a random u = l_u + l_l in a leg's plane, and the elbow's side sigma.
 
     sigma = - sign((l_u x l_l) . d), because D = -sigma sqrt(Delta) / 2.
     """
-    lengths = leg[12], leg[13]
+    d, a, lengths = leg[3:6], leg[9:12], leg[15:17]
+    b = [d[1] * a[2] - d[2] * a[1], d[2] * a[0] - d[0] * a[2], d[0] * a[1] - d[1] * a[0]]
     links = []
     for size in lengths:
         t = _fraction(rng)
-        cosine, sine = (1 - t * t) / (1 + t * t), 2 * t / (1 + t * t)
-        links.append(
-            [size * (cosine * a + sine * b) for a, b in zip(plane[0], plane[1], strict=True)]
-        )
-    (ux, uy, uz), (lx, ly, lz) = links
-    area = (uy * lz - uz * ly, uz * lx - ux * lz, ux * ly - uy * lx)
-    side = sum(a * b for a, b in zip(area, leg[3:6], strict=True))
-    return [a + b for a, b in zip(*links, strict=True)], -1 if side > 0 else 1
+        links.append((size * (1 - t * t) / (1 + t * t), size * 2 * t / (1 + t * t)))
+    (ua, ub), (la, lb) = links
+    u = [(ua + la) * p + (ub + lb) * q for p, q in zip(a, b, strict=True)]
+    return u, -1 if ua * lb - ub * la > 0 else 1

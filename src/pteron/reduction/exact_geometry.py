@@ -11,12 +11,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 from itertools import permutations
 from typing import TypeVar
 
+import casadi as ca
 import numpy as np
 
-from pteron.kernels import Array, Field
+from pteron.equations.geometry import plane_axis, pole
+from pteron.kernels import Array, Field, evaluate
 from pteron.manipulator import Manipulator
 from pteron.reduction.surds import Surd, direction_cosine, length
 
@@ -45,9 +48,19 @@ class ExactLeg:
     sigma: int
 
     def numbers(self) -> list[Surd]:
-        """Return r, d, e, s0, lu, ll and sigma, the order of `Geometry.symbols`."""
+        """Return r, d, e, s0, lu, ll and sigma."""
         sigma = Surd(Fraction(self.sigma))
         return [*self.r, *self.d, *self.e, *self.s0, self.lu, self.ll, sigma]
+
+    def within(self, field: Field[Element]) -> list[Element]:
+        """Return r, d, e, a, s0, lu, ll and sigma in a field, the order of `Geometry.symbols`."""
+        numbers = [number.within(field) for number in self.numbers()]
+        return [*numbers[:9], *self.plane_axis(field), *numbers[9:]]
+
+    def plane_axis(self, field: Field[Element]) -> list[Element]:
+        """Return a, an axis of the leg's plane, in a field."""
+        program = _plane_axis(*pole([float(c) for c in self.d]))
+        return evaluate(program, field, [[c.within(field) for c in self.d]])[0]
 
 
 @dataclass(frozen=True)
@@ -94,8 +107,14 @@ class ExactGeometry:
         """Return the geometry vector of `Geometry.symbols` in a field."""
         one, zero = field.number(1), field.number(0)
         frame = [one, zero, zero, zero, one, zero, zero, zero, one]
-        numbers = [number.within(field) for leg in self.legs for number in leg.numbers()]
+        numbers = [number for leg in self.legs for number in leg.within(field)]
         return numbers + frame + [g.within(field) for g in self.gravity]
+
+
+@lru_cache(maxsize=6)
+def _plane_axis(i: int, sign: int) -> ca.Function:
+    d = ca.SX.sym("d", 3)
+    return ca.Function("plane_axis", [d], [ca.densify(plane_axis(d, i, sign))])
 
 
 def exact_geometry(robot: Manipulator) -> ExactGeometry:

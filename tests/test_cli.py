@@ -1,0 +1,692 @@
+"""The command line as a person and as a program meet it."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+from typer.testing import CliRunner, Result
+
+import pteron
+from pteron.cli.main import app
+from pteron.cli.numbers import regrouped
+
+PROGRAM = [sys.executable, "-c", "from pteron.cli.main import main; main()"]
+PLAIN = {"COLUMNS": "60", "NO_COLOR": "1", "FORCE_COLOR": None, "TTY_COMPATIBLE": None}
+POSES = "x,y,z,phi\n0.01,0.02,-0.03,0.1\n0.02,-0.01,0.03,-0.2\n"
+COMMANDS = ("catalog", "check", "report", "inverse", "direct", "forces", "base", "table1")
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def run(line: str, stdin: str | None = None, **env: str) -> Result:
+    """Run a command line without a shell."""
+    return CliRunner(env={**PLAIN, **env}).invoke(app, line.split(), input=stdin)
+
+
+def done(line: str, stdin: str | None = None) -> str:
+    """Return the standard output of a command line that must succeed, quietly."""
+    result = run(line, stdin)
+    assert result.exception is None, result.stderr
+    assert (result.exit_code, result.stderr) == (0, "")
+    return result.stdout
+
+
+def refused(line: str, *words: str, stdin: str | None = None) -> str:
+    """Return the one line of a command line that must fail, and must leave nothing behind."""
+    before = sorted(Path().iterdir())
+    result = run(line, stdin)
+    assert result.exit_code == 2, result.output
+    assert result.stdout == ""
+    assert result.stderr.startswith("Error: ")
+    assert result.stderr.count("\n") == 1
+    for word in words:
+        assert word in result.stderr
+    assert sorted(Path().iterdir()) == before
+    return result.stderr
+
+
+def frame(text: str) -> pl.DataFrame:
+    return pl.read_csv(StringIO(text))
+
+
+def motion(rows: int, robot: str = "quadrupteron") -> pl.DataFrame:
+    """Return a table of random motions."""
+    machine = pteron.load(robot)
+    m = machine.freedom
+    rates = np.random.default_rng(1).normal(size=(rows, 2 * m))
+    values = np.hstack([pteron.random_poses(machine, rows), rates])
+    names = [rate + name for rate in ("", "d", "dd") for name in machine.coordinates]
+    return pl.DataFrame(dict(zip(names, values.T, strict=True)))
+
+
+# Help and the program as a whole
+
+
+def test_the_bare_command_shows_its_help():
+    text = done("")
+    assert text == done("--help")
+    assert all(name in text for name in COMMANDS)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_subcommand_has_help_with_an_example_in_60_columns(command: str):
+    text = done(f"{command} --help")
+    assert f"pteron {command}" in text.split("Examples")[1]
+    assert "--json" in text
+    assert max(map(len, text.splitlines())) <= 60
+    assert "\x1b" not in text
+
+
+def test_the_version_is_the_library_s():
+    assert done("--version") == f"pteron {pteron.__version__}\n"
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        (
+            "invrse quadrupteron",
+            ["No such command 'invrse'", "'inverse'? See pteron --help"],
+        ),
+        ("inverse", ["Missing argument 'ROBOT'", "see pteron inverse --help"]),
+        ("inverse quadrupteron 0 0 0 0 --jsno", ["No such option: --jsno", "--json"]),
+        ("inverse quadrupteron 0 0 0 0 --on-failure stop", ["'stop' is not one of", "'nan'"]),
+        ("report quadrupteron", ["Missing option '--out'"]),
+        ("catalog here", ["unexpected extra argument", "here"]),
+    ],
+)
+def test_wrong_usage_is_one_line(line: str, words: list[str]):
+    refused(line, *words)
+
+
+def test_help_loads_nothing_heavy():
+    script = (
+        "import sys, types, pathlib\n"
+        # In place of pteron itself, whose import loads NumPy and CasADi.
+        "package = types.ModuleType('pteron'); package.__path__ = [sys.argv.pop(1)]\n"
+        "sys.modules['pteron'] = package\n"
+        "from pteron.cli.main import main\n"
+        "try:\n    main()\nexcept SystemExit as end:\n    assert not end.code\n"
+        "sys.stderr.write(' '.join(sys.modules))\n"
+    )
+    package = str(Path(pteron.__file__).parent)
+    for words in (["--help"], ["inverse", "--help"], ["base", "--help"]):
+        command = [sys.executable, "-c", script, package, *words]
+        result = subprocess.run(command, capture_output=True, text=True, check=True)
+        loaded = set(result.stderr.split())
+        assert "pteron.cli.main" in loaded
+        heavy = {"numpy", "casadi", "polars", "scipy", "sympy", "matplotlib", "pydantic", "jinja2"}
+        assert loaded & heavy == set()
+
+
+# Poses to sliders
+
+
+def test_sliders_of_one_pose_with_negative_numbers():
+    table = frame(done("inverse quadrupteron 0.01 -0.02 -3e-2 -.1"))
+    assert table.columns == ["x", "y", "z", "phi", "rho1", "rho2", "rho3", "rho4"]
+    expected = pteron.inverse_kinematics(pteron.load("quadrupteron"), [0.01, -0.02, -0.03, -0.1])
+    np.testing.assert_array_equal(table.select("^rho.$").row(0), expected)
+
+
+def test_options_may_stand_anywhere_among_the_numbers():
+    text = done("inverse --json tripteron -0.01 0.02 -0.03")
+    assert text == done("inverse tripteron -0.01 --json 0.02 -0.03")
+    assert text == done("inverse tripteron --json -- -0.01 0.02 -0.03")
+    assert json.loads(text)["x"] == -0.01
+
+
+def test_numbers_go_behind_the_other_words():
+    assert regrouped(["r", "--out", "-1", "-2", "--", "-3", "--json"], ["--out"]) == [
+        *("r", "--out", "-1", "--", "-2", "-3", "--json")
+    ]
+    assert regrouped(["r", "--pose", "--json"], ["--pose"]) == ["r", "--pose", "--json"]
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("inverse quadrupteron 0 0 0", ["3 values given, 4 expected: x y z phi"]),
+        ("inverse tripteron 0 0 0 0", ["4 values given, 3 expected: x y z"]),
+        ("inverse tripteron 0", ["1 value given"]),
+        ("inverse tripteron 0 0 a", ["'a' is not a number", "x y z"]),
+        ("inverse tripteron 0 0 -0.1.2", ["'-0.1.2' is not a number"]),
+        ("inverse tripteron 0 0 nan", ["'nan' is not a finite number"]),
+        ("inverse tripteron 0 0 -inf", ["'-inf' is not a finite number"]),
+        ("inverse tripteron", ["no pose given; give x y z, or --table FILE"]),
+        ("inverse tripteron 0 0 0 --table poses.csv", ["pose and --table given; give one"]),
+        ("inverse quadrupteron 0 0 0.9 0", ["pose: leg", "misses it by", "move the pose"]),
+        ("inverse quadruptron 0 0 0 0", ["neither a file nor a machine", 'mean "quadrupteron"']),
+    ],
+)
+def test_a_pose_that_cannot_be_served_is_one_line(line: str, words: list[str]):
+    assert "row" not in refused(line, *words)
+
+
+def test_a_table_keeps_its_columns_and_rows(tmp_path: Path):
+    Path("poses.csv").write_text("t,x,y,z,note\n0.10,1e-2,0,0,a\n0.20,0,-0.02,0,\n")
+    text = done("inverse tripteron --table poses.csv")
+    first, second = text.splitlines()[1:]
+    assert text.startswith("t,x,y,z,note,rho1,rho2,rho3\n")
+    assert first.startswith("0.10,1e-2,0,0,a,")
+    assert second.startswith("0.20,0,-0.02,0,,")
+    expected = pteron.inverse_kinematics(pteron.load("tripteron"), [[0.01, 0, 0], [0, -0.02, 0]])
+    np.testing.assert_array_equal(frame(text).select("^rho.$").to_numpy(), expected)
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet", "CSV"])
+def test_a_table_goes_from_file_to_file(ending: str):
+    motion(50).write_parquet("motion.parquet")
+    result = run(f"inverse quadrupteron --table motion.parquet --out out.{ending}")
+    assert (result.exit_code, result.stdout) == (0, "")
+    assert result.stderr == f"Wrote 50 rows to out.{ending}\n"
+    read = pl.read_csv if ending.lower() == "csv" else pl.read_parquet
+    written = read(f"out.{ending}")
+    poses = motion(50).select("x", "y", "z", "phi").to_numpy()
+    expected = pteron.inverse_kinematics(pteron.load("quadrupteron"), poses)
+    np.testing.assert_array_equal(written.select("^rho.$").to_numpy(), expected)
+    assert sorted(file.name for file in Path().iterdir()) == ["motion.parquet", f"out.{ending}"]
+
+
+def test_a_table_may_be_written_over_itself_once():
+    Path("poses.csv").write_text(POSES)
+    assert run("inverse quadrupteron --table poses.csv --out poses.csv").exit_code == 0
+    written = Path("poses.csv").read_text()
+    assert written.startswith("x,y,z,phi,rho1")
+    refused(
+        "inverse quadrupteron --table poses.csv --out ./poses.csv",
+        *("its own columns rho1, rho2, rho3, rho4 would be lost", "write to another file"),
+    )
+    assert Path("poses.csv").read_text() == written
+    again = run("inverse quadrupteron --table poses.csv")
+    assert again.stdout == written
+    assert again.stderr == (
+        "Note: poses.csv: columns rho1, rho2, rho3, rho4 replaced by the result\n"
+    )
+
+
+def test_json_is_one_object_for_a_pose_and_a_list_for_a_table():
+    assert json.loads(done("inverse tripteron 0.01 0.02 0.03 --json"))["rho1"] == 0.01
+    rows = json.loads(done("inverse quadrupteron --table - --json", POSES))
+    assert [row["phi"] for row in rows] == [0.1, -0.2]
+    assert set(rows[0]) == {"x", "y", "z", "phi", "rho1", "rho2", "rho3", "rho4"}
+    assert json.loads(done("inverse tripteron 0 0 0 --json --out out.csv")) == {
+        "out": "out.csv",
+        "rows": 1,
+        "empty": 0,
+    }
+
+
+def test_a_person_sees_a_table_of_60_columns(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("pteron.cli.results.is_terminal", lambda: True)
+    text = done("inverse quadrupteron 0.01 0.02 -0.03 0.1")
+    assert "rho1 (m)" in text
+    assert "-0.030000" in text
+    motion(100).write_parquet("motion.parquet")
+    result = run("inverse quadrupteron --table motion.parquet")
+    assert result.stderr == "40 of 100 rows shown; --out FILE writes them all\n"
+    assert "row" in result.stdout
+    assert max(map(len, result.stdout.splitlines())) <= 60
+    monkeypatch.setattr("pteron.cli.results.SHOWN_ROWS", 2)
+    text = run("direct quadrupteron 0.03 0.02 0.01 0.02").stdout
+    assert "mode" in text
+    assert "3.141593" in text
+
+
+# Rows that fail
+
+
+@pytest.mark.parametrize(
+    ("cells", "words"),
+    [
+        ("0,0,0.9,0", ["misses it by", "--on-failure nan"]),
+        ("0,0,,0", ["column z", "the cell is empty", "on-failure nan"]),
+        ("0,nan,0,0", ["column y", "'nan' given, a finite number expected"]),
+        ("0,0,0,abc", ["column phi", "'abc' given, a number expected"]),
+        ("0,0,0", ["has 3 cells, but the header names 4 columns"]),
+    ],
+)
+def test_the_row_and_the_line_of_a_failure_are_named(cells: str, words: list[str]):
+    Path("poses.csv").write_text("x,y,z,phi\n\n" + "0,0,0,0\n" * 16 + cells + "\n0,0,0,0\n")
+    line = "inverse quadrupteron --table poses.csv --out out.csv"
+    message = refused(line, "poses.csv: row 17 (line 19)", *words)
+    assert "batch" not in message
+
+
+def test_a_failure_in_a_later_chunk_has_the_row_of_the_table(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("pteron.cli.rows.CHUNK", 4)
+    poses = np.zeros((18, 4))
+    poses[16:, 2] = 0.9
+    pl.DataFrame(poses, schema=["x", "y", "z", "phi"]).write_parquet("poses.parquet")
+    message = refused("inverse quadrupteron --table poses.parquet", "poses.parquet: row 17: leg")
+    assert "(line" not in message
+
+
+def test_rows_that_fail_may_stay_empty():
+    text = "t,x,y,z,phi\n1,0,0,0.9,0\n2,0,0,0,0\n3,,0,0,0\n"
+    result = run("inverse quadrupteron --table - --on-failure nan", text)
+    assert result.exit_code == 0
+    assert result.stderr == "Printed 3 rows, 2 of them without a result\n"
+    assert result.stdout.splitlines()[1:] == [
+        "1,0,0,0.9,0,,,,",
+        "2,0,0,0,0,0.0,0.0,0.0,0.0",
+        "3,,0,0,0,,,,",
+    ]
+    rows = json.loads(done("inverse quadrupteron --table - --on-failure nan --json", text))
+    assert rows[0]["rho1"] is None
+    assert rows[2]["x"] is None
+    summary = run("inverse quadrupteron --table - --on-failure nan --json --out o.csv", text)
+    assert json.loads(summary.stdout) == {"out": "o.csv", "rows": 3, "empty": 2}
+
+
+def test_a_long_table_shows_a_bar_and_has_the_same_result(monkeypatch: pytest.MonkeyPatch):
+    motion(100).write_csv("motion.csv")
+    line = "forces quadrupteron --table motion.csv"
+    expected = done(line)
+    monkeypatch.setattr("pteron.cli.rows.LONG", 100)
+    monkeypatch.setattr("pteron.cli.rows.CHUNK", 7)
+    assert done(line) == expected
+    # A terminal is where colours are forced.
+    shown = run(line, FORCE_COLOR="1")
+    assert shown.stdout == expected
+    assert "motion.csv" in shown.stderr
+    assert "100%" in shown.stderr
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("poses.csv", "", ["is empty", "name the columns"]),
+        ("poses.csv", "x,y,z,phi\n", ["has no rows below its header"]),
+        (
+            "poses.csv",
+            "x,y,z\n0,0,0\n",
+            ["no column phi", "found: x, y, z", "needed: x, y, z, phi"],
+        ),
+        ("poses.csv", "x;y;z;phi\n0;0;0;0\n", ["separate the cells with commas"]),
+        ("poses.xlsx", POSES, ["unknown ending '.xlsx'", ".csv or .parquet"]),
+        ("poses.parquet", POSES, ["not a Parquet file"]),
+        ("poses", POSES, ["no ending"]),
+    ],
+)
+def test_a_bad_table_is_one_line(name: str, content: str, words: list[str]):
+    Path(name).write_text(content)
+    refused(f"inverse quadrupteron --table {name} --out out.csv", f"{name}: ", *words)
+
+
+def test_a_missing_table_is_one_line():
+    refused("inverse quadrupteron --table poses.csv", "poses.csv: no such file")
+    refused("inverse quadrupteron --table .", ".: is a folder")
+
+
+@pytest.mark.parametrize(
+    ("out", "words"),
+    [
+        ("nowhere/out.csv", ["there is no folder nowhere"]),
+        ("out.xlsx", ["unknown ending '.xlsx'"]),
+        (".", ["is a folder"]),
+        ("/proc/out.csv", ["cannot be written"]),
+    ],
+)
+def test_an_output_that_cannot_be_is_one_line(out: str, words: list[str]):
+    refused(f"inverse tripteron 0 0 0 --out {out}", f"{out}: ", *words)
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_a_folder_that_may_not_be_written_is_one_line():
+    Path("locked").mkdir(mode=0o500)
+    refused("inverse tripteron 0 0 0 --out locked/out.csv", "locked/out.csv: cannot be written")
+
+
+# Sliders to poses
+
+
+def test_all_assembly_modes_of_one_machine():
+    sliders = [0.03, 0.02, 0.01, 0.02]
+    table = frame(done(f"direct quadrupteron {' '.join(map(str, sliders))}"))
+    assert table.columns == [
+        *("row", "rho1", "rho2", "rho3", "rho4", "mode", "x", "y", "z", "phi"),
+    ]
+    assert table["mode"].to_list() == [1, 2]
+    poses = pteron.direct_kinematics(pteron.load("quadrupteron"), sliders)
+    np.testing.assert_array_equal(table.select("x", "y", "z", "phi").to_numpy(), poses)
+    rows = json.loads(done("direct tripteron 0.01 0.02 -0.03 --json"))
+    assert [(row["row"], row["mode"]) for row in rows] == [(1, 1)]
+
+
+def test_sliders_without_a_pose_fail_alone_and_stay_empty_in_a_table():
+    refused("direct quadrupteron 9 0 0 0", "no pose has these slider coordinates")
+    text = "t,rho1,rho2,rho3,rho4\n1,9,0,0,0\n2,0,0.001,0,0\n"
+    result = run("direct quadrupteron --table -", text)
+    table = frame(result.stdout)
+    assert result.stderr.endswith("1 of them without a result\n")
+    assert table["row"].to_list()[:2] == [1, 2]
+    assert table["t"].to_list()[:2] == [1, 2]
+    assert table.row(0)[-5:] == (None,) * 5
+    assert table["mode"].to_list()[1:] == [1, 2][: len(table) - 1]
+    refused("direct quadrupteron --table - --on-failure raise", "row 1 (line 2): ", stdin=text)
+
+
+def test_sliders_and_poses_lead_back_to_each_other():
+    motion(30).select("x", "y", "z", "phi").write_csv("poses.csv")
+    sliders = done("inverse quadrupteron --table poses.csv")
+    back = run("direct quadrupteron --table -", sliders)
+    assert back.stderr == ("Note: standard input: columns x, y, z, phi replaced by the result\n")
+    found = frame(back.stdout).select("row", "x", "y", "z", "phi").to_numpy()
+    for row, *pose in motion(30).select("x", "y", "z", "phi").with_row_index().iter_rows():
+        poses = found[found[:, 0] == row + 1, 1:]
+        assert np.abs(poses - pose).max(axis=1).min() < 1e-9
+
+
+# Forces
+
+
+def test_forces_of_one_motion():
+    line = "forces quadrupteron --pose -0.01 0.02 0.03 -0.1 --velocity 0.1 -0.2 0 1"
+    table = frame(done(f"{line} --acceleration -1 0 0 2 --wrench 0 0 -10 0.1"))
+    robot = pteron.load("quadrupteron")
+    state = [-0.01, 0.02, 0.03, -0.1], [0.1, -0.2, 0.0, 1.0], [-1.0, 0.0, 0.0, 2.0]
+    expected = pteron.inverse_dynamics(robot, *state, [0.0, 0.0, -10.0, 0.1])
+    np.testing.assert_array_equal(table.select("^force.$").row(0), expected)
+    assert len(table.columns) == 20
+
+
+def test_what_is_left_out_is_at_rest():
+    robot, rest = pteron.load("tripteron"), np.zeros(3)
+    row = json.loads(done("forces tripteron --pose 0,0,-0.01 --json"))
+    expected = pteron.inverse_dynamics(robot, [0.0, 0.0, -0.01], rest, rest)
+    assert [row[f"force{i}"] for i in (1, 2, 3)] == expected.tolist()
+
+
+def test_the_working_mode_may_be_chosen():
+    modes = pteron.working_modes(pteron.load("tripteron"))
+    robot, rest = modes[0b010], np.zeros(3)
+    row = json.loads(done("forces tripteron --pose 0 0 0.01 --elbows +-+ --json"))
+    expected = pteron.inverse_dynamics(robot, [0.0, 0.0, 0.01], rest, rest)
+    assert [row[f"force{i}"] for i in (1, 2, 3)] == expected.tolist()
+    assert "force1" in json.loads(done("forces tripteron --pose 0 0 0 --elbows --- --json"))
+
+
+@pytest.mark.parametrize("robot", ["quadrupteron", "tripteron-oblique"])
+def test_forces_of_a_table_with_and_without_a_wrench(robot: str):
+    machine = pteron.load(robot)
+    m = machine.freedom
+    table = motion(20, robot)
+    table.write_csv("motion.csv")
+    states = np.split(table.to_numpy(), 3, axis=1)
+    forces = frame(done(f"forces {robot} --table motion.csv")).select("^force.$").to_numpy()
+    np.testing.assert_array_equal(forces, pteron.inverse_dynamics(machine, *states))
+    wrench = np.random.default_rng(2).normal(size=(20, m))
+    loads = pl.DataFrame(wrench, schema=["fx", "fy", "fz", "mk"][:m])
+    table.hstack(loads).write_csv("loaded.csv")
+    forces = frame(done(f"forces {robot} --table loaded.csv")).select("^force.$").to_numpy()
+    np.testing.assert_array_equal(forces, pteron.inverse_dynamics(machine, *states, wrench))
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("--velocity 0 0 1", ["no pose given; give --pose with x y z"]),
+        ("", ["no pose given", "--table FILE"]),
+        ("--pose", ["'--pose' requires an argument"]),
+        ("--pose 0 0", ["--pose: 2 values given, 3 expected: x y z"]),
+        ("--pose 0 0 0 --velocity 0 0 0 0", ["--velocity: 4 values", "dx dy dz"]),
+        ("--pose 0 0 0 --wrench 0", ["--wrench: 1 value given, 3 expected: fx fy fz"]),
+        ("--pose 0 0 0 --elbows ++", ["--elbows: '++' given, 3 signs", "such as +++"]),
+        ("--pose 0 0 0 --elbows ++x", ["--elbows: '++x'"]),
+        ("--pose 0 0 0 --table a.csv", ["give one of them"]),
+    ],
+)
+def test_a_motion_that_cannot_be_served_is_one_line(line: str, words: list[str]):
+    refused(f"forces tripteron {line}", *words)
+
+
+def test_columns_missing_from_a_motion_are_named():
+    motion(3).drop("ddphi").write_csv("motion.csv")
+    refused("forces quadrupteron --table motion.csv", "no column ddphi", "found: x, y, z, phi, dx")
+    motion(3).with_columns(fx=1.0).write_csv("loaded.csv")
+    refused("forces quadrupteron --table loaded.csv", "no columns fy, fz, mk")
+
+
+def test_a_singular_orientation_is_one_line():
+    pose = f"0 0 0 {np.pi / 2}"
+    refused(f"forces quadrupteron --pose {pose}", "pose: singular orientation (type II)", "90 deg")
+    table = motion(4).with_columns(phi=pl.Series([0.0, 0.1, np.pi / 2, 0.0]), x=0.0, y=0.0, z=0.0)
+    table.write_csv("motion.csv")
+    refused("forces quadrupteron --table motion.csv", "row 3 (line 4): singular orientation")
+    result = run("forces quadrupteron --table motion.csv --on-failure nan")
+    assert frame(result.stdout)["force1"].is_null().to_list() == [False, False, True, False]
+
+
+# Machines
+
+
+def test_the_catalog_is_listed():
+    listed = json.loads(done("catalog --json"))
+    assert [robot["name"] for robot in listed] == list(pteron.catalog())
+    text = done("catalog")
+    assert all(name in text for name in pteron.catalog())
+    assert max(map(len, text.splitlines())) <= 60
+
+
+@pytest.mark.parametrize("robot", ["quadrupteron", "tripteron-oblique"])
+def test_a_good_file_is_described(robot: str, monkeypatch: pytest.MonkeyPatch):
+    machine = pteron.load(robot)
+    pteron.save(machine, "robot.toml")
+    assert "This machine can work." in done("check robot.toml")
+    monkeypatch.setattr("pteron.cli.screen.is_terminal", lambda: True)
+    text = done("check robot.toml")
+    assert max(map(len, text.splitlines())) <= 60
+    found = json.loads(done("check robot.toml --json"))
+    assert found["motion"] == machine.platform.motion
+    assert len(found["legs"]) == machine.freedom
+    assert found["working_mode"] == "".join("+-"[leg.elbow < 0] for leg in machine.legs)
+    assert found["singular_orientations"] == pteron.singular_orientations(machine).tolist()
+    assert np.isfinite(pteron.inverse_kinematics(machine, found["home_pose"])).all()
+
+
+def symmetric() -> str:
+    """Return a machine with fourfold symmetry, which is singular everywhere."""
+    text = 'name = "cross"\n[platform]\nmotion = "3T1R"\nmass = 1.0\ncenter_of_mass = [0.0, 0.0]\ninertia = 0.01\n'
+    for x, y in ((1, 0), (0, 1), (-1, 0), (0, -1)):
+        text += (
+            f"[[legs]]\nguide_point = [{0.2 * x}, {0.2 * y}, 0.0]\n"
+            f"direction = [{-0.6 * y}, {0.6 * x}, 0.8]\n"
+            f"platform_point = [{0.05 * x}, {0.05 * y}, 0.0]\n"
+            "upper_length = 0.2\nlower_length = 0.2\nslider = { mass = 0.5 }\n"
+            "upper = { mass = 0.3, center_of_mass = [0.1, 0.0], inertia = 0.004 }\n"
+            "lower = { mass = 0.3, center_of_mass = [-0.1, 0.0], inertia = 0.004 }\n"
+        )
+    return text
+
+
+def broken(old: str, new: str) -> str:
+    pteron.save(pteron.load("tripteron"), "good.toml")
+    text = Path("good.toml").read_text()
+    Path("good.toml").unlink()
+    assert old in text
+    return text.replace(old, new)
+
+
+@pytest.mark.parametrize("command", ["check bad.toml", "inverse bad.toml 0 0 0"])
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("name =", "nmae =", ["name: missing"]),
+        ("elbow = 1", "elbw = 1", ["elbw: unknown key"]),
+        ('motion = "3T"', 'motion = "4T"', ["platform.motion", "'4T'"]),
+        ("[platform]", "[platform", ["not a TOML file", "line"]),
+        ("upper_length = ", "upper_length = -", ["upper_length"]),
+        ("[platform]", "[platform]\n\x07", ["not a TOML file"]),
+    ],
+)
+def test_a_bad_file_is_one_line(command: str, old: str, new: str, words: list[str]):
+    Path("bad.toml").write_text(broken(old, new))
+    refused(command, "bad.toml: ", *words)
+
+
+def test_a_machine_that_cannot_work_is_refused_with_the_file_s_name():
+    Path("cross.toml").write_text(symmetric())
+    refused("check cross.toml", "cross.toml: singular at every pose")
+    refused("forces cross.toml --pose 0 0 0 0", "singular at every pose")
+    refused("direct cross.toml 0 0 0 0", "singular at every pose")
+    Path("apart.toml").write_text(broken("guide_point = [", "guide_point = [30.0, 30.0, 30.0] #"))
+    machine = pteron.load("apart.toml")
+    assert len(machine.legs) == 3
+    refused("check nowhere.toml", "nowhere.toml: neither a file nor a machine of the catalog")
+    refused("check .", ".: cannot be read")
+    Path("binary.toml").write_bytes(b"\xff\xfe\x00")
+    refused("check binary.toml", "binary.toml: not a TOML file")
+
+
+def test_a_machine_without_a_common_reach_is_refused():
+    text = broken('name = "tripteron"', 'name = "short"')
+    # Links of a centimetre, guides a decimetre apart.
+    for leg in pteron.load("tripteron").legs:
+        text = text.replace(f"upper_length = {leg.upper_length}", "upper_length = 0.01")
+        text = text.replace(f"lower_length = {leg.lower_length}", "lower_length = 0.01")
+    Path("short.toml").write_text(text)
+    refused("check short.toml", "short.toml: no pose is in reach of all legs")
+
+
+# Base parameters
+
+
+def test_base_parameters_with_their_proof():
+    text = done("base quadrupteron")
+    assert text.startswith("m_p1 + m_u1 + 20.11 I_l1\n")
+    assert "Exact rank 26 of 40" in text
+    assert "\x1b" not in text
+    found = json.loads(done("base quadrupteron --json"))
+    assert (found["rank"], found["names"][0]) == (26, "m_p1")
+    assert found == json.loads(done("base quadrupteron --format json"))
+
+
+def test_base_parameters_in_other_forms():
+    assert "ll1" in done("base quadrupteron --symbols").splitlines()[0]
+    latex = done("base quadrupteron --format latex").splitlines()
+    assert latex[0].startswith("m_{p1} + m_{u1}")
+    assert all(line.startswith("% ") for line in latex[26:])
+    python = done("base tripteron --format sympy --symbols").splitlines()
+    assert sum(not line.startswith("# ") for line in python) == 16
+    symbolic = json.loads(done("base tripteron --symbols --json"))
+    assert len(symbolic["symbolic"]) == symbolic["rank"] == 16
+    assert symbolic["geometry"]
+
+
+def test_base_parameters_as_asked_for():
+    kept = json.loads(done("base quadrupteron --keep I_l1,I_e --json"))["names"]
+    assert {"I_l1", "I_e"} <= set(kept)
+    assert json.loads(done("base quadrupteron --shared --json"))["rank"] < 26
+    assert "Numerical rank 26" in done("base quadrupteron --method svd")
+    refused("base quadrupteron --keep I_l1,I_x", "'I_x'")
+    refused("base quadrupteron --method qr --symbols", "symbols", "exact")
+    Path("cross.toml").write_text(symmetric())
+    refused("base cross.toml", "singular at every pose")
+
+
+def test_a_person_sees_base_parameters_with_values(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("pteron.cli.base.is_terminal", lambda: True)
+    monkeypatch.setattr("pteron.cli.screen.is_terminal", lambda: True)
+    text = done("base quadrupteron")
+    assert "26 base parameters of 40" in text
+    assert "kg m^2" in text
+    assert max(map(len, text.splitlines())) <= 60
+
+
+def test_table_1_stands_printed_beside_computed(monkeypatch: pytest.MonkeyPatch):
+    from pteron.report import table1
+
+    text = done("table1")
+    assert "26 of 26 rows agree." in text
+    rows = json.loads(done("table1 --json"))
+    assert rows[0]["printed"] == "m_p1 + m_u1 + 20.11 I_l1"
+    assert all(row["agrees"] for row in rows)
+    wrong = table1.Row("P_b1", "m_p1", "m_p1 + 2 m_u1", "m_p1 + m_u1", agrees=False)
+    monkeypatch.setattr(table1, "rows", lambda: (wrong,))
+    result = run("table1")
+    assert result.exit_code == 1
+    assert "NO" in result.stdout
+    assert "0 of 1 rows agree." in result.stdout
+    assert run("table1 --json").exit_code == 1
+
+
+# Pipes, interruptions and the like, some in a process of their own
+
+
+def test_an_interruption_is_quiet(monkeypatch: pytest.MonkeyPatch):
+    def interrupt(path: str) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("pteron.tables.read_table", interrupt)
+    result = run("inverse tripteron --table poses.csv")
+    assert (result.exit_code, result.output) == (130, "")
+
+
+def test_a_defect_of_pteron_is_not_hidden(monkeypatch: pytest.MonkeyPatch):
+    def fail(path: str) -> None:
+        raise RuntimeError("a defect")
+
+    monkeypatch.setattr("pteron.tables.read_table", fail)
+    assert isinstance(run("inverse tripteron --table poses.csv").exception, RuntimeError)
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize("as_json", [[], ["--json"]])
+def test_a_pipe_that_closes_ends_the_program_quietly(unbuffered: str, as_json: list[str]):
+    motion(5000).write_csv("motion.csv")
+    command = [*PROGRAM, "inverse", "quadrupteron", "--table", "motion.csv", *as_json]
+    env = {**os.environ, "PYTHONUNBUFFERED": unbuffered}
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=env
+    ) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        assert process.stdout.read(3)
+        process.stdout.close()
+        assert process.stderr.read() == b""
+        assert process.wait() == 1
+
+
+def test_a_pipeline_of_programs():
+    first = subprocess.Popen(
+        [*PROGRAM, "inverse", "quadrupteron", "--table", "-"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    )
+    second = subprocess.Popen(
+        [*PROGRAM, "direct", "quadrupteron", "--table", "-", "--json"],
+        stdin=first.stdout,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+    )
+    assert first.stdin is not None
+    assert first.stdout is not None
+    first.stdout.close()
+    first.stdin.write(POSES.encode())
+    first.stdin.close()
+    rows = json.loads(second.communicate()[0])
+    assert (first.wait(), second.returncode) == (0, 0)
+    assert {row["row"] for row in rows} == {1, 2}
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no full device here")
+def test_a_full_disk_is_one_line():
+    with Path("/dev/full").open("w") as full:
+        result = subprocess.run(
+            [*PROGRAM, "catalog"], stdout=full, stderr=subprocess.PIPE, text=True, check=False
+        )
+    assert result.returncode == 2
+    assert result.stderr.count("\n") == 1
+    assert result.stderr.startswith("Error: standard output: No space left")
