@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
+from io import StringIO
 from typing import Any
 
 from typer.core import TyperGroup
@@ -33,6 +34,7 @@ class Program(TyperGroup):
         **extra: Any,
     ) -> Any:
         """Run a subcommand and exit; `standalone_mode` is always on."""
+        _open_closed_streams()
         try:
             status = super().main(
                 args, prog_name, complete_var, False, windows_expand_args, **extra
@@ -58,6 +60,13 @@ class Program(TyperGroup):
             complain(_usage(error))
             status = USER_ERROR
         sys.exit(status if isinstance(status, int) else 0)
+
+
+def _open_closed_streams() -> None:
+    """Let what is printed go nowhere if the caller has closed the stream (``>&-``)."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, StringIO())
 
 
 def _usage(error: Any) -> str:

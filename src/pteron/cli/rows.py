@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import signal
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -109,4 +110,7 @@ def rows_of_table(file: str | None, typed: bool, what: str, names: Sequence[str]
         raise DataError(f"no {what} given; give {' '.join(names)}, or --table FILE")
     from pteron.tables import read_table
 
+    if hasattr(signal, "siginterrupt"):
+        # Polars, once imported, lets a read of standard input go on through Ctrl-C.
+        signal.siginterrupt(signal.SIGINT, True)
     return Rows(read_table(file))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import sys
+from io import TextIOWrapper
 from typing import Any
 
 from rich.box import SIMPLE_HEAD
@@ -32,7 +33,9 @@ def show(*things: str | Table) -> None:
 
 
 def write(text: str) -> None:
-    """Write text on standard output as it is."""
+    """Write text on standard output as it is: data is UTF-8 whatever the locale."""
+    if isinstance(sys.stdout, TextIOWrapper):
+        sys.stdout.reconfigure(encoding="utf-8")
     # In pieces: who stops reading is noticed at the next one, also where nothing is buffered.
     for start in range(0, len(text), _PIECE):
         sys.stdout.write(text[start : start + _PIECE])

@@ -41,6 +41,8 @@ def read_table(path: str | Path) -> Table:
     source = str(path)
     try:
         if source == STANDARD_INPUT:
+            if sys.stdin is None:
+                raise DataError("standard input: is closed; give it a table, or name a file")
             return _from_csv(sys.stdin.buffer.read(), "standard input")
         file = Path(path)
         special = file.is_fifo() or file.is_char_device()
