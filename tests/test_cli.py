@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
+import time
 from io import StringIO
 from pathlib import Path
 
@@ -171,7 +173,7 @@ def test_a_pose_that_cannot_be_served_is_one_line(line: str, words: list[str]):
     assert "row" not in refused(line, *words)
 
 
-def test_a_table_keeps_its_columns_and_rows(tmp_path: Path):
+def test_a_table_keeps_its_columns_and_rows():
     Path("poses.csv").write_text("t,x,y,z,note\n0.10,1e-2,0,0,a\n0.20,0,-0.02,0,\n")
     text = done("inverse tripteron --table poses.csv")
     first, second = text.splitlines()[1:]
@@ -291,7 +293,7 @@ def test_a_long_table_shows_a_bar_and_has_the_same_result(monkeypatch: pytest.Mo
     motion(100).write_csv("motion.csv")
     line = "forces quadrupteron --table motion.csv"
     expected = done(line)
-    monkeypatch.setattr("pteron.cli.rows.LONG", 100)
+    monkeypatch.setattr("pteron.cli.rows.LONG", 99)
     monkeypatch.setattr("pteron.cli.rows.CHUNK", 7)
     assert done(line) == expected
     # A terminal is where colours are forced.
@@ -320,6 +322,14 @@ def test_a_long_table_shows_a_bar_and_has_the_same_result(monkeypatch: pytest.Mo
 def test_a_bad_table_is_one_line(name: str, content: str, words: list[str]):
     Path(name).write_text(content)
     refused(f"inverse quadrupteron --table {name} --out out.csv", f"{name}: ", *words)
+
+
+def test_a_table_that_cannot_be_printed_is_one_line():
+    pl.DataFrame({"x": [0.0], "y": [0.0], "z": [0.0], "tags": [["a"]]}).write_parquet("in.parquet")
+    refused("inverse tripteron --table in.parquet", "in.parquet: ", "CSV")
+    assert json.loads(done("inverse tripteron --table in.parquet --json"))[0]["tags"] == ["a"]
+    pl.DataFrame({"x": [0.0], "y": [0.0], "z": [0.0], "b": [b"\xff"]}).write_parquet("in.parquet")
+    refused("inverse tripteron --table in.parquet --json", "in.parquet: ", "JSON")
 
 
 def test_a_missing_table_is_one_line():
@@ -493,6 +503,11 @@ def test_a_good_file_is_described(robot: str, monkeypatch: pytest.MonkeyPatch):
     assert np.isfinite(pteron.inverse_kinematics(machine, found["home_pose"])).all()
 
 
+def test_a_name_is_no_markup():
+    Path("odd.toml").write_text(broken('name = "tripteron"', 'name = "[/red] [bold]odd"'))
+    assert "[/red] [bold]odd: a 3T machine" in done("check odd.toml")
+
+
 def symmetric() -> str:
     """Return a machine with fourfold symmetry, which is singular everywhere."""
     text = (
@@ -541,9 +556,6 @@ def test_a_machine_that_cannot_work_is_refused_with_the_file_s_name():
     refused("check cross.toml", "cross.toml: singular at every pose")
     refused("forces cross.toml --pose 0 0 0 0", "singular at every pose")
     refused("direct cross.toml 0 0 0 0", "singular at every pose")
-    Path("apart.toml").write_text(broken("guide_point = [", "guide_point = [30.0, 30.0, 30.0] #"))
-    machine = pteron.load("apart.toml")
-    assert len(machine.legs) == 3
     refused("check nowhere.toml", "nowhere.toml: neither a file nor a machine of the catalog")
     refused("check .", ".: cannot be read")
     Path("binary.toml").write_bytes(b"\xff\xfe\x00")
@@ -679,6 +691,65 @@ def test_a_pipeline_of_programs():
     rows = json.loads(second.communicate()[0])
     assert (first.wait(), second.returncode) == (0, 0)
     assert {row["row"] for row in rows} == {1, 2}
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of another kind")
+def test_a_wait_for_standard_input_can_be_interrupted():
+    script = (
+        "import sys\n"
+        "class Input:\n"
+        "    buffer = property(lambda self: self)\n"
+        "    def read(self):\n"
+        "        sys.stderr.write('reading\\n'); sys.stderr.flush()\n"
+        "        return sys.__stdin__.buffer.read()\n"
+        "sys.stdin = Input()\n"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", script + PROGRAM[-1], "inverse", "tripteron", "--table", "-"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    ) as process:
+        assert process.stderr is not None
+        assert process.stderr.readline() == b"reading\n"
+        time.sleep(0.2)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(timeout=20) == 130
+        assert process.stderr.read() == b""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a shell of another kind")
+@pytest.mark.parametrize(
+    ("closed", "line", "status"),
+    [
+        (">&-", "catalog", 0),
+        (">&-", "inverse tripteron 0 0 0", 0),
+        ("2>&-", "inverse tripteron 0 0 9", 2),
+        ("<&-", "inverse tripteron --table -", 2),
+    ],
+)
+def test_a_closed_stream_is_no_defect(closed: str, line: str, status: int):
+    result = subprocess.run(
+        f'"{sys.executable}" -c "{PROGRAM[-1]}" {line} {closed}',
+        shell=True,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert result.returncode == status
+    assert "Traceback" not in result.stderr
+    assert result.stderr.count("\n") <= 1
+
+
+def test_data_is_utf_8_in_every_locale():
+    result = subprocess.run(
+        [*PROGRAM, "inverse", "tripteron", "--table", "-"],
+        input="größe,x,y,z\nä,0,0,0\n".encode(),
+        capture_output=True,
+        env={**os.environ, "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
+        check=True,
+    )
+    assert result.stdout.decode().startswith("größe,x,y,z,rho1,rho2,rho3\nä,")
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no full device here")

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Annotated, Any
 
+from rich.markup import escape
 from typer import Argument
 
 from pteron.cli.arguments import Json
@@ -73,8 +75,9 @@ def _leg(leg: Leg) -> dict[str, Any]:
 
 def _show(robot: Manipulator, found: dict[str, Any]) -> None:
     show(
-        f"[bold]{found['name']}[/bold]: a {found['motion']} machine with {len(robot.legs)} legs, "
-        f"pose {' '.join(robot.coordinates)}, working mode {found['working_mode']}"
+        f"[bold]{escape(robot.name)}[/bold]: a {robot.platform.motion} machine with "
+        f"{len(robot.legs)} legs, pose {' '.join(robot.coordinates)}, "
+        f"working mode {signs(robot)}"
     )
     numbers = ("leg", "upper (m)", "lower (m)")
     made = table("leg", "direction", "upper (m)", "lower (m)", "slider (m)", numbers=numbers)
@@ -87,8 +90,6 @@ def _show(robot: Manipulator, found: dict[str, Any]) -> None:
             "no limits" if leg.slider_limits is None else "{:g} to {:g}".format(*leg.slider_limits),
         )
     show(made)
-    import math
-
     turns = ", ".join(f"{math.degrees(angle):.4g}" for angle in found["singular_orientations"])
     show(
         f"Singular orientations: {turns} deg" if turns else "Singular orientations: none",

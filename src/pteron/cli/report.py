@@ -1,32 +1,78 @@
-"""`pteron report`: everything about a machine, in a folder."""
+"""`pteron report`: everything about a machine, on one page."""
 
 from __future__ import annotations
 
-from typing import Annotated
+import json
+import math
+from typing import Annotated, Any
 
+from rich.markup import escape
+from rich.table import Table
 from typer import Option
 
 from pteron.cli.arguments import Elbows, Json, Robot
 from pteron.cli.progress import spinner
 from pteron.cli.robots import load_robot
-from pteron.cli.screen import show, show_json
+from pteron.cli.screen import show, show_json, table
 
 __all__ = ["report"]
+
+_SERIES = ("time", "pose", "velocity", "acceleration", "forces")
+"""What the report's file holds of each sample of the cycle: nothing to print."""
 
 
 def report(
     robot: Robot,
     out: Annotated[str, Option("--out", metavar="DIR", help="The folder to write it to.")],
     elbows: Elbows = None,
-    json: Json = False,
+    as_json: Json = False,
 ) -> None:
-    """Write a report on a machine: tables, pictures and base parameters."""
+    """Write a report on a machine: one page with pictures, and its numbers.
+
+    The page is report.html, the numbers are in report.json beside it.
+    """
     machine = load_robot(robot, elbows)
     with spinner(f"Writing the report on {machine.name}"):
         from pteron.report import write_report
 
-        path = write_report(machine, out)
-    if json:
-        show_json({"robot": machine.name, "report": str(path)})
-    else:
-        show(f"{path}")
+        page = write_report(machine, out)
+    found = json.loads((page.parent / "report.json").read_text(encoding="utf-8"))
+    if as_json:
+        cycle = {key: value for key, value in found["cycle"].items() if key not in _SERIES}
+        show_json({"page": str(page), **found, "cycle": cycle})
+        return
+    show(_machine(found), _legs(found["cycle"]))
+    if found["costs"]:
+        show(_costs(found["costs"]))
+    show(f"Written to {escape(str(page))}")
+
+
+def _machine(found: dict[str, Any]) -> Table:
+    home, reach, base = found["home"], found["reach"], found["base_parameters"]
+    singular = ", ".join(f"{math.degrees(a):.4g}" for a in found["singular_orientations"] or ())
+    made = table(escape(found["robot"]), "")
+    made.add_row("home pose", " ".join(f"{value:.4g}" for value in home["pose"]))
+    made.add_row("reserve there", f"{home['reserve']:.3f} of 1")
+    made.add_row("condition number there", f"{home['condition_number']:.4g}")
+    made.add_row("singular orientations", f"{singular} deg" if singular else "none")
+    made.add_row("reach", f"{1e3 * reach['volume']:.4g} litres")
+    made.add_row("cycle", f"{found['cycle']['duration']:.3g} s")
+    made.add_row("base parameters", f"{base['rank']} of {base['of']}")
+    return made
+
+
+def _legs(cycle: dict[str, Any]) -> Table:
+    headings = ("leg", "peak force (N)", "RMS (N)", "peak speed (m/s)")
+    made = table(*headings, numbers=headings)
+    columns = (cycle[key] for key in ("peak_forces", "rms_forces", "peak_slider_speeds"))
+    for i, values in enumerate(zip(*columns, strict=True), start=1):
+        made.add_row(str(i), *(f"{value:.3f}" for value in values))
+    return made
+
+
+def _costs(costs: list[dict[str, Any]]) -> Table:
+    headings = ("operations", "us a state")
+    made = table("inverse dynamics", *headings, numbers=headings)
+    for cost in costs:
+        made.add_row(escape(cost["form"]), str(cost["operations"]), f"{cost['microseconds']:.3g}")
+    return made

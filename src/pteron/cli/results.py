@@ -15,7 +15,6 @@ __all__ = ["check_destination", "deliver"]
 
 SHOWN_ROWS = 40
 """More rows than that are no reading for a person."""
-_SLICE = 10_000
 DECIMALS = {"m": 6, "rad": 6, "N": 4}
 
 
@@ -85,9 +84,8 @@ def deliver(
     elif is_terminal():
         _show(result, shown, single=single)
     else:
-        for start in range(0, len(result), _SLICE):
-            part = result.frame.slice(start, _SLICE)
-            write(part.write_csv(include_header=start == 0))
+        for text in result.text():
+            write(text)
         if empty and not single:
             note(f"Printed {_count(len(result))}{_left_empty(empty)}")
 

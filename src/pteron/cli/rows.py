@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import signal
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +22,7 @@ __all__ = ["Rows", "rows_of_table", "single_row"]
 CHUNK = 50_000
 """Rows served at once: enough to be fast, few enough to show how far the work is."""
 LONG = 200_000
-"""Rows from which a table is worth a progress bar."""
+"""More rows than that are worth a progress bar."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Rows:
         import numpy as np
 
         values = self.table.numbers(columns, on_failure.value)
-        if len(values) < LONG:
+        if len(values) <= LONG:
             return np.concatenate(list(self._chunks(serve, values)))
         parts = []
         with progress_bar(self.table.source, len(values)) as advance:
@@ -65,7 +65,9 @@ class Rows:
                 advance(len(part))
         return np.concatenate(parts)
 
-    def _chunks(self, serve: Any, values: NDArray[Any]) -> Any:
+    def _chunks(
+        self, serve: Callable[[NDArray[Any]], NDArray[Any]], values: NDArray[Any]
+    ) -> Iterator[NDArray[Any]]:
         for start in range(0, len(values), CHUNK):
             try:
                 yield serve(values[start : start + CHUNK])

@@ -176,6 +176,11 @@ def _regressor(g: Geometry, v: dict[str, Expression]) -> Outputs:
     return {"regressor": (matrix, matrix.shape)}
 
 
+def _base_regressor(g: Geometry, v: dict[str, Expression]) -> Outputs:
+    matrix = inverse_dynamics(g, v["pose"], v["velocity"], v["acceleration"], v["selection"])
+    return {"regressor": (matrix, matrix.shape)}
+
+
 def _paper_regressor(g: Geometry, v: dict[str, Expression]) -> Outputs:
     matrix = paper_regressor(g, v["pose"], v["velocity"], v["acceleration"])
     return {"regressor": (matrix, matrix.shape)}
@@ -221,6 +226,7 @@ _TABLE: dict[str, _Entry] = {
     "kinetic_energy": _Entry(("pose", "velocity", "parameters"), _kinetic_energy),
     "potential_energy": _Entry(("pose", "parameters"), _potential_energy),
     "regressor": _Entry(_STATE, _regressor),
+    "base_regressor": _Entry(_STATE, _base_regressor),
     "paper_regressor": _Entry(_STATE, _paper_regressor),
     "paper_terms": _Entry(_STATE, _paper_terms),
 }
@@ -229,17 +235,25 @@ FUNCTIONS = tuple(_TABLE)
 """What `compile` accepts. The `_loaded` ones take a wrench on the platform as well."""
 
 
-def program(robot: Manipulator, what: str) -> Program:
+Columns = tuple[tuple[int, ...], ...]
+"""For each column of a base regressor, the inertial parameters whose columns it adds up."""
+
+
+def program(robot: Manipulator, what: str, columns: Columns | None = None) -> Program:
     """Return the function `what` of a machine's geometry; inertial parameters stay inputs.
 
     Raises
     ------
     ModelError
-        If there is no function of that name.
+        If there is no function of that name, or `columns` are missing or out of place.
     """
     if what not in _TABLE:
         raise ModelError(f"what: {what!r} cannot be compiled; choose from {', '.join(FUNCTIONS)}")
-    return _built(_bare(robot), what)
+    if what == "base_regressor" and columns is None:
+        raise ModelError('base: missing; "base_regressor" needs base=base_parameters(robot)')
+    if what != "base_regressor" and columns is not None:
+        raise ModelError(f'base: {what!r} has no use for it; it goes with "base_regressor"')
+    return _built(_bare(robot), what, columns)
 
 
 @lru_cache(maxsize=256)
@@ -251,8 +265,15 @@ def _bare(robot: Manipulator) -> Manipulator:
 
 
 @lru_cache(maxsize=512)
-def _built(robot: Manipulator, what: str) -> Program:
-    return _program(Geometry.of(robot), what)
+def _built(robot: Manipulator, what: str, columns: Columns | None) -> Program:
+    geometry = Geometry.of(robot)
+    if columns is None:
+        return _program(geometry, what)
+    selection = ca.SX(_count(geometry), len(columns))
+    for k, members in enumerate(columns):
+        for j in members:
+            selection[j, k] = 1
+    return _program(geometry, what, constants={"selection": selection})
 
 
 @lru_cache(maxsize=32)
@@ -265,13 +286,18 @@ def general_program(legs: int, turns: bool, what: str) -> Program:
     return _program(geometry, what, vector)
 
 
-def _program(geometry: Geometry, what: str, vector: Expression | None = None) -> Program:
+def _program(
+    geometry: Geometry,
+    what: str,
+    vector: Expression | None = None,
+    constants: dict[str, Expression] | None = None,
+) -> Program:
     entry = _TABLE[what]
     symbols = {
         name: ca.SX.sym(name, _count(geometry) if name == "parameters" else geometry.freedom)
         for name in entry.inputs
     }
-    outputs = entry.build(geometry, symbols)
+    outputs = entry.build(geometry, symbols | (constants or {}))
     # A matrix goes out transposed: CasADi stores columns, NumPy rows.
     dense = [ca.densify(expression).T for expression, _ in outputs.values()]
     if vector is not None:

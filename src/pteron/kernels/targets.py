@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Protocol
+
+import numpy as np
 
 from pteron.errors import ModelError
-from pteron.kernels.functions import program
-from pteron.kernels.kernel import Kernel
+from pteron.kernels.functions import Columns, program
+from pteron.kernels.kernel import Array, Kernel
 from pteron.kernels.vm import VirtualMachine
 from pteron.manipulator import Manipulator, parameters
 
@@ -16,7 +19,17 @@ TARGETS: dict[str, type[Kernel]] = {"vm": VirtualMachine}
 """The targets by name."""
 
 
-def compile(robot: Manipulator, what: str, target: str = "vm") -> Kernel:
+class Selects(Protocol):
+    """A choice of base parameters, such as `pteron.BaseParameters`."""
+
+    @property
+    def selection(self) -> Array:
+        """(N, rank): base regressor = regressor @ selection."""
+
+
+def compile(
+    robot: Manipulator, what: str, target: str = "vm", *, base: Selects | None = None
+) -> Kernel:
     """Compile one of the numeric functions for a machine.
 
     Parameters
@@ -29,6 +42,8 @@ def compile(robot: Manipulator, what: str, target: str = "vm") -> Kernel:
         them all.
     target : str
         What executes it: `"vm"`, CasADi's virtual machine.
+    base : BaseParameters, optional
+        Which base parameters `"base_regressor"` is for.
 
     Returns
     -------
@@ -39,7 +54,7 @@ def compile(robot: Manipulator, what: str, target: str = "vm") -> Kernel:
     Raises
     ------
     ModelError
-        If there is no such function or target.
+        If there is no such function or target, or `base` is missing or out of place.
 
     Examples
     --------
@@ -50,11 +65,12 @@ def compile(robot: Manipulator, what: str, target: str = "vm") -> Kernel:
     """
     if target not in TARGETS:
         raise ModelError(f"target: {target!r} is not known; choose from {', '.join(TARGETS)}")
-    return _compiled(robot, what, target)
+    columns = base and tuple(tuple(np.flatnonzero(c).tolist()) for c in base.selection.T)
+    return _compiled(robot, what, target, columns)
 
 
 @lru_cache(maxsize=512)
-def _compiled(robot: Manipulator, what: str, target: str) -> Kernel:
-    built = program(robot, what)
+def _compiled(robot: Manipulator, what: str, target: str, columns: Columns | None) -> Kernel:
+    built = program(robot, what, columns)
     fixed = {port.name: parameters(robot) for port in built.inputs if port.name == "parameters"}
     return TARGETS[target](built.name, built.function, built.inputs, built.outputs, fixed)

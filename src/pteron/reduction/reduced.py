@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from pteron.conventions import BatchOfRegressors, OnFailure, PoseLike
-from pteron.dynamics import regressor
 from pteron.errors import ModelError
+from pteron.kernels import compile
+from pteron.kinematics.poses import finite, usable_poses
 from pteron.manipulator import Manipulator, parameter_names
 from pteron.reduction.result import BaseParameters
 
@@ -64,7 +65,8 @@ def base_regressor(
             f"base: belongs to {base.robot.name} with {base.selection.shape[0]} parameters, but "
             f"{robot.name} has {len(parameter_names(robot))}"
         )
-    matrices = regressor(robot, pose, velocity, acceleration, on_failure=on_failure)
-    failed = np.isnan(matrices).any(axis=(-2, -1), keepdims=True)
-    # 0 * NaN is NaN, so that failed rows stay NaN in the product; put there for clarity.
-    return np.where(failed, np.nan, np.nan_to_num(matrices) @ base.selection)
+    poses = usable_poses(robot, pose, bent=True, held=True, on_failure=on_failure)
+    rate = finite(robot, velocity, "velocity", on_failure)
+    second = finite(robot, acceleration, "acceleration", on_failure)
+    matrices: BatchOfRegressors = compile(robot, "base_regressor", base=base)(poses, rate, second)
+    return np.where(np.isnan(matrices).any(axis=(-2, -1), keepdims=True), np.nan, matrices)

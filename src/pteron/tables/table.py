@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,6 +15,8 @@ from pteron.errors import DataError
 from pteron.tables.csv_text import line_of_row
 
 __all__ = ["Table", "typed"]
+
+_ROWS_AT_A_TIME = 10_000
 
 
 @dataclass(frozen=True)
@@ -96,7 +98,23 @@ class Table:
 
     def json(self) -> str:
         """Return the rows as a JSON list of objects; what is not a finite number is null."""
+        for name, kind in self.frame.schema.items():
+            # Polars would panic, which nobody can catch quietly.
+            if any(word in str(kind) for word in ("Binary", "Object")):
+                raise self._unfit("JSON", f"column {name} holds {kind}")
         return typed(self.frame).write_json()
+
+    def text(self) -> Iterator[str]:
+        """Yield the rows as CSV, some at a time, the header first."""
+        for start in range(0, len(self), _ROWS_AT_A_TIME):
+            part = self.frame.slice(start, _ROWS_AT_A_TIME)
+            try:
+                yield part.write_csv(include_header=start == 0)
+            except pl.exceptions.PolarsError as error:
+                raise self._unfit("CSV", str(error).splitlines()[0]) from None
+
+    def _unfit(self, kind: str, reason: str) -> DataError:
+        return DataError(f"{self.source}: cannot be written as {kind} ({reason}); drop the column")
 
     def _require(self, columns: Sequence[str]) -> None:
         missing = [name for name in columns if name not in self.columns]

@@ -1,0 +1,96 @@
+"""Maps of the reach: slices of poses, coloured by what they are good for."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from pteron.kernels import Array
+from pteron.plots.canvas import FONT_SIZE, blank, plain_axes
+from pteron.plots.colors import INK, LEG_COLORS, MUTED, PAPER, REACH
+from pteron.workspace import BEYOND_LIMITS, ReachSlice
+
+__all__ = ["reach_figure"]
+
+_BANDS = 4
+"""Shades of the margin inside the reach."""
+
+
+def reach_figure(cut: ReachSlice, *, path: Array | None = None) -> Figure:
+    """Return the map of a slice.
+
+    In reach, the shade deepens with the margin. Outside, the colour is that of the leg that misses
+    the pose by most; a line in a leg's colour is where it is stretched or folded (type I).
+
+    Parameters
+    ----------
+    cut : ReachSlice
+        The slice.
+    path : array, shape (T, 3), optional
+        Positions of a motion, drawn in projection.
+
+    Returns
+    -------
+    matplotlib Figure
+    """
+    figure = blank(3.9, 3.9)
+    axes = plain_axes(figure, f"{cut.plane[0]} (mm)", f"{cut.plane[1]} (mm)")
+    first, second = 1e3 * cut.first, 1e3 * cut.second
+    axes.grid(visible=False)
+
+    legs = np.moveaxis(cut.leg_margins, -1, 0)
+    for i, field in enumerate(_territories(legs)):
+        if (field > 0.0).any():
+            axes.contourf(
+                first, second, field, levels=[0.0, np.inf], colors=[LEG_COLORS[i]], alpha=0.16
+            )
+    barred = legs.min(axis=0)
+    if (cut.status == BEYOND_LIMITS).any():
+        axes.contourf(
+            first,
+            second,
+            np.minimum(barred, -cut.margin),
+            levels=[0.0, np.inf],
+            colors=[MUTED],
+            alpha=0.4,
+        )
+    deepest = float(cut.margin.max())
+    if deepest > 0.0:
+        for level in np.linspace(0.0, deepest, _BANDS, endpoint=False):
+            axes.contourf(
+                first, second, cut.margin, levels=[level, np.inf], colors=[REACH], alpha=0.24
+            )
+    for i, margin in enumerate(legs):
+        if margin.min() < 0.0 < margin.max():
+            axes.contour(first, second, margin, levels=[0.0], colors=[LEG_COLORS[i]], linewidths=1.6)
+    i, j = ("xyz".index(letter) for letter in cut.plane)
+    if path is not None:
+        axes.plot(
+            1e3 * path[:, i], 1e3 * path[:, j], color=PAPER, linewidth=3.2, solid_capstyle="round"
+        )
+        axes.plot(
+            1e3 * path[:, i], 1e3 * path[:, j], color=INK, linewidth=1.4, solid_capstyle="round"
+        )
+    axes.plot(
+        [1e3 * cut.center[i]],
+        [1e3 * cut.center[j]],
+        marker="o",
+        markersize=6.0,
+        color=INK,
+        markeredgecolor=PAPER,
+        linestyle="none",
+        zorder=5,
+    )
+    axes.set_aspect("equal")
+    axes.tick_params(labelsize=FONT_SIZE)
+    axes.locator_params(nbins=5)
+    return figure
+
+
+def _territories(legs: Array) -> Array:
+    """Return, for each leg (n, B, A), a field that is positive where it misses the pose by most."""
+    fields = np.empty_like(legs)
+    for i, margin in enumerate(legs):
+        others = np.delete(legs, i, axis=0).min(axis=0)
+        fields[i] = np.minimum(-margin, others - margin)
+    return fields
