@@ -19,7 +19,10 @@ def along(function, step):
 def gradient(function, poses, step=STEP):
     """Return the derivative of function(poses (..., m)) -> (..., *shape): (..., *shape, m)."""
     columns = [
-        along(lambda t, axis=axis: function(poses + np.multiply.outer(t, axis * np.ones_like(poses))), step)
+        along(
+            lambda t, axis=axis: function(poses + np.multiply.outer(t, axis * np.ones_like(poses))),
+            step,
+        )
         for axis in np.eye(poses.shape[-1])
     ]
     return np.stack(columns, axis=-1)

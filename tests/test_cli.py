@@ -572,6 +572,35 @@ def test_a_machine_without_a_common_reach_is_refused():
     refused("check short.toml", "short.toml: no pose is in reach of all legs")
 
 
+# The report
+
+
+def test_a_report_is_a_page_with_its_numbers(monkeypatch: pytest.MonkeyPatch):
+    found = json.loads(done("report tripteron --out one/two --json"))
+    assert found["page"] == str(Path("one/two/report.html"))
+    assert Path(found["page"]).read_text().lstrip().startswith("<!")
+    written = json.loads(Path("one/two/report.json").read_text())
+    assert found["home"] == written["home"]
+    assert found["base_parameters"]["rank"] == 16
+    assert "forces" not in found["cycle"]
+    monkeypatch.setattr("pteron.cli.screen.is_terminal", lambda: True)
+    text = done("report tripteron --out here --elbows +-+")
+    assert json.loads(Path("here/report.json").read_text())["elbows"] == [1, -1, 1]
+    assert "base parameters         16 of 31" in text
+    assert f"Written to {Path('here/report.html')}" in text
+    assert max(map(len, text.splitlines())) <= 60
+
+
+def test_a_report_that_cannot_be_written_is_one_line():
+    Path("file").write_text("mine")
+    refused("report tripteron --out file", "file: cannot be written to as a folder (it is a file)")
+    refused("report tripteron --out file/folder", "file/folder: cannot be written")
+    refused("report tripteron --out /proc/here", "/proc/here: cannot be written")
+    assert Path("file").read_text() == "mine"
+    Path("cross.toml").write_text(symmetric())
+    refused("report cross.toml --out .", "singular at every pose")
+
+
 # Base parameters
 
 

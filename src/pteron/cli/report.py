@@ -71,8 +71,8 @@ def _legs(cycle: dict[str, Any]) -> Table:
 
 
 def _costs(costs: list[dict[str, Any]]) -> Table:
-    headings = ("operations", "us a state")
-    made = table("inverse dynamics", *headings, numbers=headings)
+    headings = ("operations", "us/state")
+    made = table("inverse dynamics as", *headings, numbers=headings)
     for cost in costs:
-        made.add_row(escape(cost["form"]), str(cost["operations"]), f"{cost['microseconds']:.3g}")
+        made.add_row(escape(cost["form"]), str(cost["operations"]), f"{cost['microseconds']:.2f}")
     return made

@@ -100,4 +100,5 @@ def across_directions(robot: Manipulator, direction: Array | None, count: int) -
     first = x if np.linalg.norm(x) > 0.5 else y
     first = first / np.linalg.norm(first)
     angles = 2.0 * np.pi * np.arange(count) / count
-    return np.outer(np.cos(angles), first) + np.outer(np.sin(angles), np.cross(vertical, first))
+    second = np.cross(vertical, first)
+    return np.asarray(np.outer(np.cos(angles), first) + np.outer(np.sin(angles), second))

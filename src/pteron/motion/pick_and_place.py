@@ -135,7 +135,7 @@ def _peak_acceleration(cycle: Cycle) -> float:
     """Return the largest acceleration of P over a cycle that takes one second, m/s^2."""
 
     def size(tau: Array) -> Array:
-        return np.linalg.norm(cycle.at(tau)[2][:, :3], axis=-1)
+        return np.asarray(np.linalg.norm(cycle.at(tau)[2][:, :3], axis=-1))
 
     tau = np.linspace(0.0, 0.5, 1001)
     highest = int(size(tau).argmax())

@@ -7,12 +7,13 @@ from pteron.plots.colors import LEG_COLORS
 from pteron.plots.forces import forces_figure
 from pteron.plots.jacobian import regularity_figure
 from pteron.plots.reach import reach_figure
-from pteron.plots.robot import robot_figure
+from pteron.plots.robot import outline, robot_figure
 from pteron.plots.svg import svg
 
 __all__ = [
     "LEG_COLORS",
     "forces_figure",
+    "outline",
     "reach_figure",
     "regularity_figure",
     "robot_figure",

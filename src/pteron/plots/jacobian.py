@@ -57,7 +57,7 @@ def regularity_figure(
     for angle in np.degrees(singular):
         axes.axvline(angle, color=WARNING, linewidth=1.2, linestyle=(0, (4, 2)))
         axes.annotate(
-            f"singular, {angle:.1f}°",
+            f"singular, {angle:.1f}°".replace("-", "\u2212"),
             (angle, 1.0),
             xycoords=("data", "axes fraction"),
             xytext=(0.0, 3.0),

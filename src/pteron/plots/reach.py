@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MultipleLocator
 
 from pteron.kernels import Array
 from pteron.plots.canvas import FONT_SIZE, blank, plain_axes
@@ -14,6 +15,12 @@ __all__ = ["reach_figure"]
 
 _BANDS = 4
 """Shades of the margin inside the reach."""
+
+_TIE = 1e-9
+"""Metres."""
+
+_DASHES = ("-", "-", (0, (3, 2)), (0, (3, 2)))
+"""Of legs 1 to 4, so that lines which coincide, as those of mirrored legs do, both show."""
 
 
 def reach_figure(cut: ReachSlice, *, path: Array | None = None) -> Figure:
@@ -62,7 +69,15 @@ def reach_figure(cut: ReachSlice, *, path: Array | None = None) -> Figure:
             )
     for i, margin in enumerate(legs):
         if margin.min() < 0.0 < margin.max():
-            axes.contour(first, second, margin, levels=[0.0], colors=[LEG_COLORS[i]], linewidths=1.6)
+            axes.contour(
+                first,
+                second,
+                margin,
+                levels=[0.0],
+                colors=[LEG_COLORS[i]],
+                linewidths=1.6,
+                linestyles=[_DASHES[i]],
+            )
     i, j = ("xyz".index(letter) for letter in cut.plane)
     if path is not None:
         axes.plot(
@@ -83,14 +98,27 @@ def reach_figure(cut: ReachSlice, *, path: Array | None = None) -> Figure:
     )
     axes.set_aspect("equal")
     axes.tick_params(labelsize=FONT_SIZE)
-    axes.locator_params(nbins=5)
+    axes.set(xlim=(first[0], first[-1]), ylim=(second[0], second[-1]))
+    step = _nice(max(first[-1] - first[0], second[-1] - second[0]) / 5.0)
+    axes.xaxis.set_major_locator(MultipleLocator(step))
+    axes.yaxis.set_major_locator(MultipleLocator(step))
     return figure
 
 
+def _nice(step: float) -> float:
+    """Return the largest of 1, 2 and 5 times a power of ten that is no larger than a step."""
+    power = 10.0 ** np.floor(np.log10(step))
+    return float(power * max(factor for factor in (1.0, 2.0, 5.0) if factor * power <= step))
+
+
 def _territories(legs: Array) -> Array:
-    """Return, for each leg (n, B, A), a field that is positive where it misses the pose by most."""
+    """Return, for each leg (n, B, A), a field that is positive where it misses the pose by most.
+
+    Where legs tie, as mirrored ones do in a plane of symmetry, the first of them has it.
+    """
     fields = np.empty_like(legs)
+    ranked = legs + _TIE * np.arange(len(legs))[:, None, None]
     for i, margin in enumerate(legs):
-        others = np.delete(legs, i, axis=0).min(axis=0)
-        fields[i] = np.minimum(-margin, others - margin)
+        others = np.delete(ranked, i, axis=0).min(axis=0)
+        fields[i] = np.minimum(-margin, others - ranked[i])
     return fields

@@ -6,8 +6,11 @@ from itertools import product
 
 import numpy as np
 from matplotlib.figure import Figure
-from mpl_toolkits.mplot3d import Axes3D
-from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
+from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
+from mpl_toolkits.mplot3d.art3d import (  # type: ignore[import-untyped]
+    Line3DCollection,
+    Poly3DCollection,
+)
 
 from pteron.kernels import Array
 from pteron.motion import JointPoints
@@ -18,6 +21,9 @@ __all__ = ["outline", "robot_figure", "upright"]
 
 _ELEVATION, _AZIMUTH = 24.0, -52.0
 """Degrees, from which the machine is seen."""
+
+_PLATFORM_AXES = ("x\u2032", "y\u2032", "z\u2032")
+"""x, y and z with a prime."""
 
 _GRID_STEP = 0.1
 """Of the ground's squares, m."""
@@ -169,9 +175,7 @@ class _Scene:
         z = low[2]
         lines = [[(a, y[0], z), (a, y[-1], z)] for a in x]
         lines += [[(x[0], b, z), (x[-1], b, z)] for b in y]
-        self.axes.add_collection3d(
-            Line3DCollection(lines, colors=GRID, linewidths=0.7, zorder=0.0)
-        )
+        self.axes.add_collection3d(Line3DCollection(lines, colors=GRID, linewidths=0.7, zorder=0.0))
 
 
 def _draw_leg(scene: _Scene, points: JointPoints, ends: Array, i: int, size: float) -> None:
@@ -213,10 +217,10 @@ def _block(center: Array, along: Array, size: float) -> list[Array]:
 def _draw_platform(scene: _Scene, points: JointPoints, size: float, angle: str) -> None:
     scene.faces([points.platform_points[outline(points)]], REACH, 0.55)
     p = points.reference
-    for axis, name in zip(points.axes, ("x′", "y′", "z′"), strict=True):
+    for axis, name in zip(points.axes, _PLATFORM_AXES, strict=True):
         tip = p + 0.13 * size * axis
         scene.line(np.array([p, tip]), INK, 1.3, raised=0.5)
-        label = f"{name}, {angle}" if angle and name == "x′" else name
+        label = f"{name}, {angle}" if angle and name == _PLATFORM_AXES[0] else name
         scene.text(p + 0.16 * size * axis, label, INK)
     scene.mark(p, INK, PAPER, 5.0, raised=0.6)
 

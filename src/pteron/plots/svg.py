@@ -7,7 +7,6 @@ from html import escape
 from io import StringIO
 
 import matplotlib as mpl
-from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from pteron.plots.colors import VARIABLES
@@ -21,7 +20,8 @@ def svg(figure: Figure, *, name: str, title: str) -> str:
     """Return a figure as one `<svg>` element for an HTML page.
 
     It holds no date, no random identifier and no address, and its colours are CSS variables with
-    the printed colours as defaults (see `pteron.plots.colors`). Text stays text, in the page's font.
+    the printed colours as defaults (see `pteron.plots.colors`). Text stays text, in the page's
+    font.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def svg(figure: Figure, *, name: str, title: str) -> str:
     """
     buffer = StringIO()
     with mpl.rc_context({"svg.hashsalt": "pteron", "svg.fonttype": "none"}):
-        FigureCanvasSVG(figure).print_svg(buffer, metadata=_NO_METADATA)
+        figure.savefig(buffer, format="svg", metadata=_NO_METADATA)
     text = buffer.getvalue()
     text = text[text.index("<svg") :].rstrip()
     text = re.sub(r"\s*<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
@@ -48,7 +48,8 @@ def svg(figure: Figure, *, name: str, title: str) -> str:
     text = re.sub(r"url\(#", f"url(#{name}-", text)
     # The generic families that end matplotlib's list are the page's affair too.
     text = re.sub(r"font: ([^'\";]*?)'[^;\"]*", r"font: \1var(--font, sans-serif)", text)
-    text = re.sub(r"(\.\d\d)\d+", r"\1", text)
+    # A hundredth of a point is enough; only tags hold coordinates, the rest is text to read.
+    text = re.sub(r"<[^>]*>", lambda tag: re.sub(r"(\.\d\d)\d+", r"\1", tag[0]), text)
     for color, variable in VARIABLES.items():
         text = text.replace(color, f"var({variable}, {color})")
     box = re.search(r'viewBox="([^"]+)"', text)
@@ -56,6 +57,7 @@ def svg(figure: Figure, *, name: str, title: str) -> str:
     _, _, width, height = box[1].split()
     head = (
         f'<svg class="plot" role="img" aria-label="{escape(title)}" viewBox="{box[1]}" '
-        f'style="--width: {width}px; aspect-ratio: {width} / {height}"><title>{escape(title)}</title>'
+        f'style="--width: {width}px; aspect-ratio: {width} / {height}">'
+        f"<title>{escape(title)}</title>"
     )
     return head + text[text.index(">") + 1 :]

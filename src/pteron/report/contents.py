@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from pteron.motion import JointPoints, PickAndPlace, joint_points, pick_and_plac
 from pteron.reduction import BaseParameters, base_parameters
 from pteron.report.costs import Cost, costs
 from pteron.workspace import (
+    BEYOND_LIMITS,
     ReachSlice,
     ReachVolume,
     Reserve,
@@ -32,7 +34,7 @@ _SAMPLES = 481
 """Of the cycle: 120 steps of the moving picture, four samples each."""
 
 _LEAST_RESERVE = 0.2
-_PLANES = ("xy", "xz", "yz")
+_PLANES: tuple[Literal["xy", "xz", "yz"], ...] = ("xy", "xz", "yz")
 _ANGLES = 361
 
 _BARE_RAIL = 0.25
@@ -88,6 +90,8 @@ class Report:
         The home pose.
     reserve : Reserve
         Of the home pose.
+    least : float
+        The reserve that the cycle keeps.
     cycle : PickAndPlace
         The largest pick-and-place cycle about it, T samples.
     points : JointPoints
@@ -117,6 +121,7 @@ class Report:
     robot: Manipulator
     home: Array
     reserve: Reserve
+    least: float
     cycle: PickAndPlace
     points: JointPoints
     home_points: JointPoints
@@ -130,6 +135,11 @@ class Report:
     orientations: Orientations | None
     base: BaseParameters
     costs: tuple[Cost, ...]
+
+    @property
+    def limited(self) -> bool:
+        """Whether a slice shows poses that only the sliders' limits forbid."""
+        return any(bool((cut.status == BEYOND_LIMITS).any()) for cut in self.slices)
 
     @property
     def peak_forces(self) -> Array:
@@ -178,6 +188,7 @@ def contents(robot: Manipulator) -> Report:
         robot=robot,
         home=home,
         reserve=at_home,
+        least=least,
         cycle=cycle,
         points=joint_points(robot, cycle.pose),
         home_points=joint_points(robot, home),

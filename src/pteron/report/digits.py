@@ -8,11 +8,11 @@ from math import floor, isfinite, log10
 
 from markupsafe import Markup, escape
 
-__all__ = ["expression", "fixed", "significant", "symbol", "triple"]
+__all__ = ["compact", "expression", "fixed", "significant", "symbol", "triple"]
 
 _MINUS = "\u2212"
 _NAME = re.compile(r"\b(mgx|mgy|m|I)_([pule]\d*)\b")
-_SHORT = {"m": "m", "I": "I", "mgx": "mγ", "mgy": "mγ"}
+_SHORT = {"m": "m", "I": "I", "mgx": "m\u03b3", "mgy": "m\u03b3"}
 
 
 def significant(value: float, digits: int = 3) -> str:
@@ -24,7 +24,7 @@ def significant(value: float, digits: int = 3) -> str:
     ('0.0123', '1235', '−2.0')
     """
     if not isfinite(value):
-        return "∞" if value > 0 else "–"
+        return "∞" if value > 0 else "\u2013"
     if value == 0.0:
         return "0"
     places = max(digits - 1 - floor(log10(abs(value))), 0)
@@ -53,8 +53,18 @@ def triple(values: Iterable[float], factor: float = 1.0) -> str:
     >>> triple((0.0, -0.34, 0.0), 1000.0)
     '(0, −340, 0)'
     """
-    parts = (f"{factor * value:.4g}" if abs(value) > 1e-12 else "0" for value in values)
-    return f"({', '.join(parts)})".replace("-", _MINUS)
+    return f"({', '.join(compact(factor * value) for value in values)})"
+
+
+def compact(value: float) -> str:
+    """Return a number with at most four significant digits and no needless zeros.
+
+    Examples
+    --------
+    >>> compact(-0.04), compact(0.123456), compact(1e-17)
+    ('−0.04', '0.1235', '0')
+    """
+    return "0" if abs(value) < 1e-9 else f"{value:.4g}".replace("-", _MINUS)
 
 
 def symbol(name: str) -> Markup:
@@ -78,4 +88,4 @@ def expression(text: str) -> Markup:
 
     safe = str(escape(text)).replace("-", _MINUS)
     terms = re.sub(r"(\d) (?=[A-Za-z])", "\\1\u202f", safe)
-    return Markup(_NAME.sub(typeset, terms))  # noqa: S704 - escaped above
+    return Markup(_NAME.sub(typeset, terms))

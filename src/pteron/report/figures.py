@@ -43,7 +43,6 @@ def figures(report: Report) -> Figures:
         angle=f"φ = {fixed(float(np.degrees(report.home[3])), 0)}°" if robot.platform.turns else "",
     )
     forces = forces_figure(cycle.time, report.forces, turning_point=cycle.duration / 2.0)
-    at = report.orientations
     return Figures(
         _inline(svg(machine, name="robot", title=f"{robot.name} in its home pose")),
         _inline(svg(forces, name="forces", title="Actuator forces over the pick-and-place cycle")),
@@ -57,22 +56,25 @@ def figures(report: Report) -> Figures:
             )
             for cut in report.slices
         ),
-        at
-        and _inline(
-            svg(
-                regularity_figure(
-                    at.angles,
-                    at.regularity,
-                    at.singular,
-                    home=float(report.home[3]),
-                    used=(float(cycle.pose[:, 3].min()), float(cycle.pose[:, 3].max())),
-                ),
-                name="regularity",
-                title="Determinant of the Jacobian over the orientation",
-            )
-        ),
+        _regularity(report),
+    )
+
+
+def _regularity(report: Report) -> Markup | None:
+    at, turns = report.orientations, report.cycle.pose[:, -1]
+    if at is None:
+        return None
+    figure = regularity_figure(
+        at.angles,
+        at.regularity,
+        at.singular,
+        home=float(report.home[3]),
+        used=(float(turns.min()), float(turns.max())),
+    )
+    return _inline(
+        svg(figure, name="regularity", title="Determinant of the Jacobian over the orientation")
     )
 
 
 def _inline(text: str) -> Markup:
-    return Markup(text)  # noqa: S704 - made by `svg`, which escapes its titles
+    return Markup(text)

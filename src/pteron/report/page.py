@@ -8,12 +8,12 @@ from typing import Any
 
 import jinja2
 import numpy as np
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 import pteron
 from pteron.manipulator import parameter_names, parameter_units
 from pteron.report.contents import Report
-from pteron.report.digits import expression, fixed, significant, symbol, triple
+from pteron.report.digits import compact, expression, fixed, significant, symbol, triple
 from pteron.report.figures import figures
 from pteron.report.scene import scene
 
@@ -41,6 +41,7 @@ def page(report: Report) -> str:
         lstrip_blocks=True,
     )
     environment.filters |= {
+        "compact": compact,
         "degrees": lambda angle, places=1: fixed(float(np.degrees(angle)), places),
         "expression": expression,
         "fixed": fixed,
@@ -48,6 +49,9 @@ def page(report: Report) -> str:
         "significant": significant,
         "symbol": symbol,
         "triple": triple,
+        "typeset": lambda text: escape(text).replace("J^-T", Markup("<b>J</b><sup>\u2212T</sup>")),
+        "unit": lambda text: text.replace(" ", "\u202f").replace("^2", "²"),
+        "zip": zip,
     }
     robot = report.robot
     units = dict(zip(parameter_names(robot), parameter_units(robot), strict=True))
@@ -67,10 +71,10 @@ def page(report: Report) -> str:
 
 
 def _resource(name: str) -> Markup:
-    return Markup((files("pteron.report") / name).read_text(encoding="utf-8"))  # noqa: S704
+    return Markup((files("pteron.report") / name).read_text(encoding="utf-8"))
 
 
 def _data(value: Any) -> Markup:
     """Return JSON that cannot end the script element it stands in."""
     text = json.dumps(value, separators=(",", ":"))
-    return Markup(text.replace("<", "\\u003c"))  # noqa: S704
+    return Markup(text.replace("<", "\\u003c"))

@@ -13,7 +13,7 @@ from pteron.report.contents import Report
 __all__ = ["FRAMES", "scene"]
 
 FRAMES = 120
-"""Of the moving picture; it repeats, so that the cycle's last sample, its first again, is left out."""
+"""Of the moving picture; it repeats, so that the cycle's last sample, its first, is left out."""
 
 _DECIMALS = 6
 

@@ -75,7 +75,7 @@ def home_pose(robot: Manipulator) -> Array:
     # The guide points say where the sliders are meant to be, where nothing else tells.
     equals = refined[reserves >= _WORTH * most]
     travel = np.abs(inverse_kinematics(robot, equals)).max(axis=-1)
-    best = equals[travel.argmin()]
+    best: Array = equals[travel.argmin()]
     least = _WORTH * float(reserve(robot, best).smallest)
     if robot.platform.turns:
         best[3] = np.pi - (np.pi - best[3]) % (2.0 * np.pi)

@@ -81,7 +81,8 @@ def clearances(robot: Manipulator, sliders: Array) -> Array:
     """
     limits = [leg.slider_limits or (-np.inf, np.inf) for leg in robot.legs]
     low, high = np.array(limits).T
-    return np.minimum(sliders - low, high - sliders)
+    distances: Array = np.minimum(sliders - low, high - sliders)
+    return distances
 
 
 def _half_range(limits: tuple[float, float] | None) -> float:

@@ -73,5 +73,5 @@ def slider_ranges(robot: Manipulator, poses: PoseLike) -> SliderRanges:
         sliders.min(axis=0),
         sliders.max(axis=0),
         tuple(leg.slider_limits for leg in robot.legs),
-        (clearances(robot, sliders) >= 0.0).all(axis=0),
+        np.asarray((clearances(robot, sliders) >= 0.0).all(axis=0)),
     )
