@@ -41,7 +41,9 @@ def bodies(robot, x, sliders):
     p = x[:3]
     phi = x[3] if robot.platform.turns else 0
     turn = ca.vertcat(
-        ca.horzcat(ca.cos(phi), -ca.sin(phi), 0), ca.horzcat(ca.sin(phi), ca.cos(phi), 0), ca.DM([[0, 0, 1]])
+        ca.horzcat(ca.cos(phi), -ca.sin(phi), 0),
+        ca.horzcat(ca.sin(phi), ca.cos(phi), 0),
+        ca.DM([[0, 0, 1]]),
     )
     rotation = ca.mtimes(frame, turn)
     for leg in robot.legs:
@@ -65,7 +67,9 @@ def bodies(robot, x, sliders):
         for origin, angle, body in ((joint1, upper, leg.upper), (c, lower, leg.lower)):
             yield planar(origin, ca.cos(angle) * a + ca.sin(angle) * b, d, angle, body)
     axis = rotation[:, 2]
-    yield planar(p, rotation[:, 0], axis, phi if robot.platform.turns else None, robot.platform.inertia)
+    yield planar(
+        p, rotation[:, 0], axis, phi if robot.platform.turns else None, robot.platform.inertia
+    )
 
 
 def planar(origin, x_axis, z_axis, angle, body):

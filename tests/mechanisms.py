@@ -29,9 +29,7 @@ def inertia(rng, length):
     """Return the inertia of a real link or platform, its centre of mass off both axes."""
     mass = rng.uniform(0.2, 0.6)
     x, y = rng.uniform(-0.6, 0.6) * length, rng.uniform(-0.1, 0.1) * length
-    return pteron.PlanarInertia.of_body(
-        mass, (x, y), mass * (x * x + y * y + (0.3 * length) ** 2)
-    )
+    return pteron.PlanarInertia.of_body(mass, (x, y), mass * (x * x + y * y + (0.3 * length) ** 2))
 
 
 def random_machine(seed, turns):

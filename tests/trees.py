@@ -128,7 +128,11 @@ class Pinocchio:
         for k, chain in enumerate(chains(robot)):
             parent = 0
             for j, body in enumerate(chain.bodies):
-                kind = pin.JointModelPrismaticUnaligned if body.slides else pin.JointModelRevoluteUnaligned
+                kind = (
+                    pin.JointModelPrismaticUnaligned
+                    if body.slides
+                    else pin.JointModelRevoluteUnaligned
+                )
                 place = pin.SE3(np.eye(3), body.offset)
                 parent = model.addJoint(parent, kind(body.axis), place, f"joint {k} {j}")
                 inertia = pin.Inertia(body.mass, body.center, body.inertia)
@@ -136,9 +140,7 @@ class Pinocchio:
             self.frames.append(
                 [
                     model.addFrame(
-                        pin.Frame(
-                            f"point {k} {j}", parent, pin.SE3(np.eye(3), point), pin.OP_FRAME
-                        )
+                        pin.Frame(f"point {k} {j}", parent, pin.SE3(np.eye(3), point), pin.OP_FRAME)
                     )
                     for j, point in enumerate(chain.points)
                 ]

@@ -22,13 +22,15 @@ def table1(json: Json = False) -> None:
         found = rows()
     wrong = sum(not row.agrees for row in found)
     if json:
-        names = ("parameter", "kept", "printed", "computed", "agrees")
+        names = ("parameter", "kept", "printed", "computed", "agrees", "restored")
         show_json([{name: getattr(row, name) for name in names} for row in found])
     else:
         made = table("", "printed", "computed", "agrees")
         for row in found:
             verdict = "yes" if row.agrees else "[bold red]NO[/bold red]"
+            verdict += " *" if row.restored else ""
             made.add_row(row.parameter, escape(row.printed), escape(row.computed), verdict)
-        show(made, f"{len(found) - wrong} of {len(found)} rows agree.")
+        note = "* damaged in the scan of the paper; restored from its legible rows"
+        show(made, f"{len(found) - wrong} of {len(found)} rows agree.", note)
     if wrong:
         raise Exit(DISAGREEMENT)

@@ -65,7 +65,9 @@ def compile(
     """
     if target not in TARGETS:
         raise ModelError(f"target: {target!r} is not known; choose from {', '.join(TARGETS)}")
-    columns = base and tuple(tuple(np.flatnonzero(c).tolist()) for c in base.selection.T)
+    columns: Columns | None = None
+    if base is not None:
+        columns = tuple(tuple(np.flatnonzero(column).tolist()) for column in base.selection.T)
     return _compiled(robot, what, target, columns)
 
 

@@ -99,16 +99,16 @@ def reach_figure(cut: ReachSlice, *, path: Array | None = None) -> Figure:
     axes.set_aspect("equal")
     axes.tick_params(labelsize=FONT_SIZE)
     axes.set(xlim=(first[0], first[-1]), ylim=(second[0], second[-1]))
-    step = _nice(max(first[-1] - first[0], second[-1] - second[0]) / 5.0)
+    step = _nice(max(first[-1] - first[0], second[-1] - second[0]) / 6.0)
     axes.xaxis.set_major_locator(MultipleLocator(step))
     axes.yaxis.set_major_locator(MultipleLocator(step))
     return figure
 
 
 def _nice(step: float) -> float:
-    """Return the largest of 1, 2 and 5 times a power of ten that is no larger than a step."""
+    """Return the least of 1, 2 and 5 times a power of ten that is no smaller than a step."""
     power = 10.0 ** np.floor(np.log10(step))
-    return float(power * max(factor for factor in (1.0, 2.0, 5.0) if factor * power <= step))
+    return float(power * min(factor for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= step))
 
 
 def _territories(legs: Array) -> Array:

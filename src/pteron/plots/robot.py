@@ -11,6 +11,7 @@ from mpl_toolkits.mplot3d.art3d import (  # type: ignore[import-untyped]
     Line3DCollection,
     Poly3DCollection,
 )
+from mpl_toolkits.mplot3d.proj3d import proj_transform  # type: ignore[import-untyped]
 
 from pteron.kernels import Array
 from pteron.motion import JointPoints
@@ -21,6 +22,9 @@ __all__ = ["outline", "robot_figure", "upright"]
 
 _ELEVATION, _AZIMUTH = 24.0, -52.0
 """Degrees, from which the machine is seen."""
+
+_MARGIN = 0.04
+"""Of the figure, on each side."""
 
 _PLATFORM_AXES = ("x\u2032", "y\u2032", "z\u2032")
 """x, y and z with a prime."""
@@ -77,8 +81,7 @@ def robot_figure(
     if path is not None:
         scene.line(path, INK, 1.2, raised=1.0, style=(0, (1.5, 1.2)))
     _draw_base_frame(scene, low, size, gravity)
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axes.set_box_aspect(high - low, zoom=1.25)
+    scene.fill(figure)
     return figure
 
 
@@ -104,6 +107,7 @@ class _Scene:
     def __init__(self, axes: Axes3D, rotation: Array) -> None:
         self.axes = axes
         self.rotation = rotation
+        self._drawn: list[Array] = []
         elevation, azimuth = np.radians(_ELEVATION), np.radians(_AZIMUTH)
         self._towards_eye = np.array(
             [
@@ -126,6 +130,7 @@ class _Scene:
         style: str | tuple[float, tuple[float, ...]] = "-",
     ) -> None:
         p = points @ self.rotation.T
+        self._drawn.append(p)
         self.axes.plot(
             *p.T,
             color=color,
@@ -157,8 +162,10 @@ class _Scene:
         self.axes.add_collection3d(collection)
 
     def text(self, point: Array, text: str, color: str, *, bold: bool = False) -> None:
+        p = point @ self.rotation.T
+        self._drawn.append(p[None])
         self.axes.text(
-            *(point @ self.rotation.T),
+            *p,
             text,
             color=color,
             fontsize=FONT_SIZE,
@@ -168,11 +175,30 @@ class _Scene:
             zorder=30.0,
         )
 
+    def fill(self, figure: Figure) -> None:
+        """Place the axes so that what was drawn fills the figure."""
+        drawn = np.vstack(self._drawn)
+        low, high = drawn.min(axis=0), drawn.max(axis=0)
+        self.axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+        self.axes.set_box_aspect(high - low)
+        figure.set_layout_engine("none")
+        self.axes.set_position((0.0, 0.0, 1.0, 1.0))
+        self.axes.apply_aspect()
+        x, y, _ = proj_transform(*drawn.T, self.axes.get_proj())
+        seen = figure.transFigure.inverted().transform(
+            self.axes.transData.transform(np.column_stack([x, y]))
+        )
+        left, right = seen.min(axis=0), seen.max(axis=0)
+        scale = (1.0 - 2.0 * _MARGIN) / float((right - left).max())
+        corner = 0.5 - scale * (left + right) / 2.0
+        self.axes.set_position((corner[0], corner[1], scale, scale))
+
     def ground(self, low: Array, high: Array) -> None:
         """Draw squares under everything, one rim wider than it."""
         first, last = np.floor(low / _GRID_STEP) - 0.5, np.ceil(high / _GRID_STEP) + 0.5
         x, y = (np.arange(first[i] + 0.5, last[i], 1.0) * _GRID_STEP for i in (0, 1))
         z = low[2]
+        self._drawn.append(np.array([(a, b, z) for a in (x[0], x[-1]) for b in (y[0], y[-1])]))
         lines = [[(a, y[0], z), (a, y[-1], z)] for a in x]
         lines += [[(x[0], b, z), (x[-1], b, z)] for b in y]
         self.axes.add_collection3d(Line3DCollection(lines, colors=GRID, linewidths=0.7, zorder=0.0))
@@ -217,10 +243,12 @@ def _block(center: Array, along: Array, size: float) -> list[Array]:
 def _draw_platform(scene: _Scene, points: JointPoints, size: float, angle: str) -> None:
     scene.faces([points.platform_points[outline(points)]], REACH, 0.55)
     p = points.reference
+    for corner in points.platform_points:
+        scene.line(np.array([p, corner]), REACH, 2.0, raised=-2e-3)
     for axis, name in zip(points.axes, _PLATFORM_AXES, strict=True):
         tip = p + 0.13 * size * axis
         scene.line(np.array([p, tip]), INK, 1.3, raised=0.5)
-        label = f"{name}, {angle}" if angle and name == _PLATFORM_AXES[0] else name
+        label = f"{name} ({angle})" if angle and name == _PLATFORM_AXES[0] else name
         scene.text(p + 0.16 * size * axis, label, INK)
     scene.mark(p, INK, PAPER, 5.0, raised=0.6)
 

@@ -26,9 +26,8 @@ def as_text(names: Sequence[str], terms: Terms, digits: int) -> str:
     text = ""
     for column, share in terms.items():
         value, exact = _plain(share)
-        size = "" if abs(value) == 1.0 else f"{abs(value):.{digits}g} "
-        if exact and abs(value) != 1.0:
-            size = f"({exact.lstrip('-')}) "
+        rounded = f"{abs(value):.{digits}g}"
+        size = f"({exact.lstrip('-')}) " if exact else "" if rounded == "1" else f"{rounded} "
         minus = exact.startswith("-") if exact else value < 0
         joint = ("- " if minus else "+ ") if text else ("-" if minus else "")
         text += f" {joint}{size}{names[column]}" if text else f"{joint}{size}{names[column]}"
@@ -67,7 +66,8 @@ def as_latex(names: Sequence[str], terms: Terms, digits: int) -> str:
             size = size.lstrip("- ")
         else:
             value = float(share)
-            size = "" if abs(value) == 1.0 else f"{abs(value):.{digits}g}"
+            rounded = f"{abs(value):.{digits}g}"
+            size = "" if rounded == "1" else rounded
             minus = value < 0
         joint = ("- " if minus else "+ ") if text else ("-" if minus else "")
         body = f"{size}\\, {_latex_name(names[column])}" if size else _latex_name(names[column])

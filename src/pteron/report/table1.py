@@ -38,8 +38,11 @@ PRINTED = (
     "mgy_l4",
     "m_e - 625 I_e",
 )
-"""The 26 rows as the paper prints them, in this project's names; where the scan is damaged (rows
-6 to 14 in part, and 21), as the legible rows determine them."""
+"""The 26 rows as the paper prints them, in this project's names."""
+
+RESTORED = frozenset({15, 21, 24})
+"""Rows that the scan of the paper damages (15 has m gamma_x of the platform twice, 21 lacks terms,
+24 an axis): they stand here as the other rows and the symmetry of the machine determine them."""
 
 _TERM = re.compile(r"([+-]?)\s*([\d.]+)?\s*([A-Za-z]\w*)")
 
@@ -58,6 +61,8 @@ class Row:
         The sums.
     agrees : bool
         Whether both have the same terms, and every computed coefficient rounds to the printed one.
+    restored : bool
+        Whether the scan of the paper is damaged there; see `RESTORED`.
     """
 
     parameter: str
@@ -65,6 +70,7 @@ class Row:
     printed: str
     computed: str
     agrees: bool
+    restored: bool
 
 
 def rows() -> tuple[Row, ...]:
@@ -76,7 +82,8 @@ def rows() -> tuple[Row, ...]:
         zip(PRINTED, exact, base.names, strict=True), start=1
     ):
         shown = base.expressions()[i - 1]
-        found.append(Row(f"P_b{i}", name, printed, shown, _agree(printed, computed)))
+        agrees = _agree(printed, computed)
+        found.append(Row(f"P_b{i}", name, printed, shown, agrees, i in RESTORED))
     return tuple(found)
 
 

@@ -1,0 +1,295 @@
+"use strict";
+// The machine in motion, drawn on a plain canvas from the joints' positions in each frame.
+(() => {
+  const data = JSON.parse(document.getElementById("scene").textContent);
+  const canvas = document.getElementById("view");
+  const pen = canvas.getContext("2d");
+  if (!pen) return;
+  document.documentElement.classList.add("scripted");
+  const play = document.getElementById("play"), seek = document.getElementById("seek");
+  const clock = document.getElementById("clock");
+  const frames = data.time.length, legs = data.rails.length;
+  const calm = window.matchMedia("(prefers-reduced-motion: reduce)");
+
+  const add = (a, b, t = 1) => [a[0] + t * b[0], a[1] + t * b[1], a[2] + t * b[2]];
+  const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+  const unit = (a) => { const l = Math.hypot(...a) || 1; return [a[0] / l, a[1] / l, a[2] / l]; };
+
+  // The picture's vertical is `up`; the base frame's x stays as nearly to the right as it can.
+  const up = unit(data.up);
+  const side = unit(cross(cross(up, Math.abs(up[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0]), up));
+  const basis = [side, cross(up, side), up];
+  const upright = (p) => basis.map((axis) => dot(axis, p));
+  const deep = (value) => (typeof value[0] === "number" ? upright(value) : value.map(deep));
+  const rails = deep(data.rails), directions = deep(data.directions), axes = deep(data.axes);
+  const sliders = deep(data.sliders), elbows = deep(data.elbows), platform = deep(data.platform);
+  const position = data.pose.map((pose) => upright(pose.slice(0, 3)));
+  const baseAxes = deep([[1, 0, 0], [0, 1, 0], [0, 0, 1]]);
+
+  const cloud = rails.flat().concat(sliders.flat(), elbows.flat(), platform.flat());
+  const low = [0, 1, 2].map((k) => Math.min(...cloud.map((p) => p[k])));
+  const high = [0, 1, 2].map((k) => Math.max(...cloud.map((p) => p[k])));
+  const size = Math.max(...[0, 1, 2].map((k) => high[k] - low[k]));
+  const floor = low[2] - 0.03 * size, step = 0.1;
+  const gridLow = [0, 1].map((k) => Math.floor(low[k] / step) * step);
+  const gridHigh = [0, 1].map((k) => Math.ceil(high[k] / step) * step);
+  const center = [(gridLow[0] + gridHigh[0]) / 2, (gridLow[1] + gridHigh[1]) / 2, (floor + high[2]) / 2];
+  const peak = Math.max(1e-9, ...data.forces.flat().map(Math.abs));
+
+  const start = { yaw: -0.95, pitch: 0.4, zoom: 1 };
+  const camera = { ...start };
+  let width = 0, height = 0, scale = 1, middle = 0, frame = 0, playing = false, phase = 0, last = null, shown = true;
+  let colors = {};
+
+  function theme() {
+    const style = getComputedStyle(document.documentElement);
+    const get = (name) => style.getPropertyValue(name).trim();
+    colors = {
+      ink: get("--ink"), muted: get("--muted"), grid: get("--grid"), paper: get("--panel"), rail: get("--rail"),
+      reach: get("--reach"), shade: get("--shade"), legs: [1, 2, 3, 4].map((i) => get("--leg" + i)),
+    };
+  }
+
+  // Camera coordinates: x to the right, y down, depth away from the eye, in metres; then pixels.
+  function project(p, yaw = camera.yaw, pitch = camera.pitch) {
+    const q = add(p, center, -1);
+    const c = Math.cos(yaw), s = Math.sin(yaw), cp = Math.cos(pitch), sp = Math.sin(pitch);
+    const x = c * q[0] - s * q[1], y = s * q[0] + c * q[1];
+    const depth = cp * y - sp * q[2], rise = sp * y + cp * q[2];
+    const eye = 3.2 * size, near = eye / Math.max(eye + depth, 0.1 * eye);
+    return [x * near, -rise * near, depth, near];
+  }
+  const pixel = (p) => {
+    const q = project(p), k = scale * camera.zoom;
+    return [width / 2 + k * q[0], height / 2 + k * (q[1] - middle), q[2], k * q[3]];
+  };
+
+  function fit() {
+    const ratio = window.devicePixelRatio || 1;
+    width = canvas.clientWidth; height = canvas.clientHeight;
+    canvas.width = Math.round(width * ratio); canvas.height = Math.round(height * ratio);
+    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    // The size that holds the machine from any side, at the pitch it starts with.
+    const corners = [gridLow, [gridLow[0], gridHigh[1]], gridHigh, [gridHigh[0], gridLow[1]]].map((p) => [...p, floor]);
+    const outer = rails.flat().concat(sliders[0], elbows[0], corners);
+    let wide = 0, top = 0, bottom = 0;
+    for (let turn = 0; turn < 12; turn++) {
+      for (const p of outer) {
+        const q = project(p, start.yaw + (turn * Math.PI) / 6, start.pitch);
+        wide = Math.max(wide, Math.abs(q[0])); top = Math.min(top, q[1]); bottom = Math.max(bottom, q[1]);
+      }
+    }
+    scale = 0.97 * Math.min(width / 2 / wide, height / (bottom - top));
+    middle = (top + bottom) / 2;
+  }
+
+  function path(points) {
+    pen.beginPath();
+    points.forEach((p, i) => { const q = pixel(p); if (i) pen.lineTo(q[0], q[1]); else pen.moveTo(q[0], q[1]); });
+  }
+  function line(a, b, color, thick) {
+    path([a, b]); pen.lineCap = "round"; pen.strokeStyle = color; pen.lineWidth = thick; pen.stroke();
+  }
+  function rod(a, b, color, metres) {
+    const thick = Math.max(2, metres * pixel(add(a, add(b, a, -1), 0.5))[3]);
+    line(a, b, colors.paper, thick + 2.5); line(a, b, color, thick);
+    pen.globalAlpha = 0.35; line(a, b, "#fff", 0.28 * thick); pen.globalAlpha = 1;
+  }
+  function ball(p, color, metres) {
+    const q = pixel(p);
+    pen.beginPath(); pen.arc(q[0], q[1], Math.max(2, metres * q[3]), 0, 2 * Math.PI);
+    pen.fillStyle = colors.paper; pen.fill(); pen.strokeStyle = color; pen.lineWidth = 2; pen.stroke();
+  }
+  function label(p, text, color, bold) {
+    const q = pixel(p);
+    pen.font = (bold ? "650 " : "") + "13px system-ui, sans-serif";
+    pen.textAlign = "center"; pen.textBaseline = "middle";
+    pen.strokeStyle = colors.paper; pen.lineWidth = 4; pen.lineJoin = "round";
+    pen.strokeText(text, q[0], q[1]); pen.fillStyle = color; pen.fillText(text, q[0], q[1]);
+  }
+  function face(points, color, alpha) {
+    path(points); pen.closePath(); pen.globalAlpha = alpha; pen.fillStyle = color; pen.fill();
+    pen.globalAlpha = 1; pen.strokeStyle = colors.paper; pen.lineWidth = 1; pen.lineJoin = "round"; pen.stroke();
+  }
+  // A convex solid: only faces towards the eye, shaded by how much they face the light.
+  function solid(faces, color, alpha = 1) {
+    for (const f of faces) {
+      const q = f.map(pixel);
+      const area = (q[1][0] - q[0][0]) * (q[2][1] - q[0][1]) - (q[1][1] - q[0][1]) * (q[2][0] - q[0][0]);
+      if (area >= 0) continue;
+      face(f, color, alpha);
+      const n = unit(cross(add(f[1], f[0], -1), add(f[2], f[0], -1)));
+      const light = dot(n, unit([0.3, -0.5, 0.8]));
+      path(f); pen.closePath(); pen.globalAlpha = 0.28 * Math.abs(light); pen.fillStyle = light > 0 ? "#fff" : "#000";
+      pen.fill(); pen.globalAlpha = 1;
+    }
+  }
+  function box(c, along, half) {
+    const a = unit(along), b = unit(cross(a, Math.abs(a[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0])), n = cross(a, b);
+    const corner = (i, j, k) => add(add(add(c, a, i * half[0]), b, j * half[1]), n, k * half[2]);
+    const faces = [];
+    for (const s of [-1, 1]) {
+      const loops = [
+        [corner(s, -1, -1), corner(s, 1, -1), corner(s, 1, 1), corner(s, -1, 1)],
+        [corner(-1, s, -1), corner(-1, s, 1), corner(1, s, 1), corner(1, s, -1)],
+        [corner(-1, -1, s), corner(1, -1, s), corner(1, 1, s), corner(-1, 1, s)],
+      ];
+      faces.push(...loops.map((loop) => (s > 0 ? loop : loop.reverse())));
+    }
+    return faces;
+  }
+  function prism(points, axis, thick) {
+    const top = points.map((p) => add(p, axis, thick / 2)), bottom = points.map((p) => add(p, axis, -thick / 2));
+    const sides = points.map((_, i) => { const j = (i + 1) % points.length; return [bottom[i], bottom[j], top[j], top[i]]; });
+    return [top, bottom.slice().reverse(), ...sides];
+  }
+
+  function ground() {
+    pen.lineCap = "butt"; pen.strokeStyle = colors.grid; pen.lineWidth = 1;
+    for (let x = gridLow[0]; x <= gridHigh[0] + 1e-9; x += step) {
+      path([[x, gridLow[1], floor], [x, gridHigh[1], floor]]); pen.stroke();
+    }
+    for (let y = gridLow[1]; y <= gridHigh[1] + 1e-9; y += step) {
+      path([[gridLow[0], y, floor], [gridHigh[0], y, floor]]); pen.stroke();
+    }
+    const corner = [...gridLow, floor];
+    "xyz".split("").forEach((name, k) => {
+      line(corner, add(corner, baseAxes[k], 0.13 * size), colors.ink, 1.8);
+      label(add(corner, baseAxes[k], 0.17 * size), name, colors.ink);
+    });
+  }
+  function shadow(k) {
+    const drop = (p) => [p[0], p[1], floor];
+    pen.lineJoin = "round"; pen.lineCap = "round"; pen.strokeStyle = colors.shade; pen.fillStyle = colors.shade;
+    for (let i = 0; i < legs; i++) {
+      path([sliders[k][i], elbows[k][i], platform[k][i]].map(drop));
+      pen.lineWidth = Math.max(2, 0.016 * size * pixel(drop(elbows[k][i]))[3]); pen.stroke();
+      path(rails[i].map(drop)); pen.lineWidth = 2; pen.stroke();
+    }
+    path(data.outline.map((i) => drop(platform[k][i]))); pen.closePath(); pen.fill();
+  }
+
+  function draw() {
+    pen.clearRect(0, 0, width, height);
+    const k = frame;
+    ground(); shadow(k);
+    const items = [];
+    const put = (points, run, nearer = 0) => {
+      const depth = points.reduce((sum, p) => sum + project(p)[2], 0) / points.length;
+      items.push([depth - nearer * size, run]);
+    };
+    for (let i = 0; i < legs; i++) {
+      const color = colors.legs[i], a = sliders[k][i], b = elbows[k][i], c = platform[k][i];
+      // In two halves, split at the slider: a long rail has no one distance.
+      for (const end of rails[i]) put([end, a], () => line(end, a, colors.rail, Math.max(2.5, 0.011 * size * pixel(end)[3])), -0.02);
+      put([a], () => solid(box(a, directions[i], [0.036 * size, 0.02 * size, 0.02 * size]), color));
+      put([a, b], () => rod(a, b, color, 0.022 * size));
+      put([b, c], () => rod(b, c, color, 0.015 * size));
+      for (const p of [a, b, c]) put([p], () => ball(p, color, 0.011 * size), 0.012);
+    }
+    const plate = data.outline.map((i) => platform[k][i]);
+    put(plate, () => solid(prism(plate, axes[k][2], 0.014 * size), colors.reach, 0.85));
+    for (const corner of plate) put([position[k], corner], () => line(position[k], corner, colors.reach, Math.max(2, 0.009 * size * pixel(corner)[3])));
+    items.sort((a, b) => b[0] - a[0]).forEach((item) => item[1]());
+
+    pen.setLineDash([2, 4]); path(position.slice(0, Math.floor(frames / 2) + 1));
+    pen.strokeStyle = colors.ink; pen.lineWidth = 1.4; pen.stroke(); pen.setLineDash([]);
+    const p = position[k];
+    axes[k].forEach((axis, j) => line(p, add(p, axis, (j < 2 ? 0.1 : 0.07) * size), colors.ink, 1.6));
+    for (let i = 0; i < legs; i++) {
+      const a = sliders[k][i], out = add(a, p, -1), d = directions[i];
+      const away = unit(add(out, d, -dot(out, d)));
+      label(add(a, away, 0.075 * size), String(i + 1), colors.legs[i], true);
+    }
+    readout(k);
+  }
+
+  const minus = (value, places) => {
+    const text = value.toFixed(places);
+    return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", "\u2212");
+  };
+  const put = (id, text) => { document.getElementById(id).textContent = text; };
+  function readout(k) {
+    for (let i = 0; i < legs; i++) {
+      const force = data.forces[k][i], share = (50 * Math.abs(force)) / peak;
+      const bar = document.getElementById("bar" + i);
+      bar.style.width = share + "%"; bar.style.left = (force < 0 ? 50 - share : 50) + "%";
+      put("force" + i, minus(force, 1)); put("rho" + i, minus(1e3 * data.coordinates[k][i], 1));
+    }
+    data.pose[k].forEach((value, j) => put("pose" + j, minus(value * (j < 3 ? 1e3 : 180 / Math.PI), 1)));
+    put("clock", data.time[k].toFixed(2) + " s");
+    seek.value = k;
+    seek.setAttribute("aria-valuetext", data.time[k].toFixed(2) + " seconds");
+  }
+
+  let queued = false;
+  const redraw = () => {
+    if (queued) return;
+    queued = true;
+    requestAnimationFrame(() => { queued = false; draw(); });
+  };
+  function show(k) { frame = ((k % frames) + frames) % frames; phase = frame / frames; redraw(); }
+  function tick(now) {
+    if (!playing) return;
+    if (last !== null && shown) {
+      // A real cycle is over in a second; at 40 % of its speed the eye can follow.
+      phase = (phase + (0.4 * (now - last)) / 1e3 / data.duration) % 1;
+      const k = Math.floor(phase * frames);
+      if (k !== frame) { frame = k; draw(); }
+    }
+    last = now; requestAnimationFrame(tick);
+  }
+  function run(on) {
+    playing = on; last = null;
+    play.firstElementChild.textContent = on ? "\u275A\u275A" : "\u25B6";
+    play.setAttribute("aria-pressed", String(on));
+    if (on) requestAnimationFrame(tick);
+  }
+  function turn(yaw, pitch) {
+    camera.yaw += yaw; camera.pitch = Math.min(1.5, Math.max(-0.3, camera.pitch + pitch)); redraw();
+  }
+  function zoom(factor) {
+    const before = camera.zoom;
+    camera.zoom = Math.min(8, Math.max(0.5, before * factor)); redraw();
+    return camera.zoom !== before;
+  }
+
+  const fingers = new Map();
+  canvas.addEventListener("pointerdown", (event) => {
+    fingers.set(event.pointerId, [event.clientX, event.clientY]); canvas.setPointerCapture(event.pointerId);
+  });
+  canvas.addEventListener("pointermove", (event) => {
+    const from = fingers.get(event.pointerId);
+    if (!from) return;
+    const to = [event.clientX, event.clientY];
+    if (fingers.size === 2) {
+      const other = [...fingers.entries()].find(([id]) => id !== event.pointerId)[1];
+      const span = (p) => Math.hypot(p[0] - other[0], p[1] - other[1]);
+      zoom(span(to) / Math.max(span(from), 1));
+    } else turn(0.008 * (to[0] - from[0]), 0.008 * (to[1] - from[1]));
+    fingers.set(event.pointerId, to);
+  });
+  for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, (event) => fingers.delete(event.pointerId));
+  // At either end of the zoom the wheel scrolls the page again.
+  canvas.addEventListener("wheel", (event) => { if (zoom(Math.exp(-0.0016 * event.deltaY))) event.preventDefault(); }, { passive: false });
+  canvas.addEventListener("keydown", (event) => {
+    const keys = {
+      ArrowLeft: () => turn(-0.09, 0), ArrowRight: () => turn(0.09, 0), ArrowUp: () => turn(0, -0.07), ArrowDown: () => turn(0, 0.07),
+      "+": () => zoom(1.15), "=": () => zoom(1.15), "-": () => zoom(1 / 1.15), " ": () => run(!playing), Home: reset,
+    };
+    if (keys[event.key] && !event.ctrlKey && !event.metaKey && !event.altKey) { keys[event.key](); event.preventDefault(); }
+  });
+  function reset() { Object.assign(camera, start); redraw(); }
+  play.addEventListener("click", () => run(!playing));
+  document.getElementById("reset").addEventListener("click", reset);
+  seek.addEventListener("input", () => { run(false); show(Number(seek.value)); });
+  window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { theme(); redraw(); });
+  calm.addEventListener("change", () => { if (calm.matches) run(false); });
+  if ("IntersectionObserver" in window) new IntersectionObserver((seen) => { shown = seen[0].isIntersecting; last = null; }).observe(canvas);
+  if ("ResizeObserver" in window) new ResizeObserver(() => { fit(); redraw(); }).observe(canvas);
+
+  seek.max = String(frames - 1);
+  theme(); fit(); draw();
+  if (!calm.matches) run(true);
+})();

@@ -1,0 +1,506 @@
+"""Manipulators as values: their checks, their files, their parameters, and turning them."""
+
+import os
+import re
+from dataclasses import FrozenInstanceError, fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mechanisms import CATALOG, MECHANISMS, random_machine
+from scipy.spatial.transform import Rotation
+
+import pteron
+from pteron import Leg, Manipulator, ModelError, OutputError, PlanarInertia, Platform
+
+EVERY = pytest.mark.parametrize("name", MECHANISMS)
+BODY = PlanarInertia(1.0, (0.0, 0.0), 1.0)
+LEG = {
+    "guide_point": (0.0, 0.0, 0.0),
+    "direction": (0.0, 0.0, 1.0),
+    "platform_point": (0.1, 0.0, 0.0),
+    "upper_length": 0.2,
+    "lower_length": 0.3,
+    "slider_mass": 1.0,
+    "upper": BODY,
+    "lower": BODY,
+}
+
+
+def refused(call, *words, error=ModelError):
+    """Check that a call raises, on one line, and that the message holds the words in order."""
+    with pytest.raises(error, match=".*".join(re.escape(word) for word in words)) as caught:
+        call()
+    assert "\n" not in str(caught.value)
+    assert isinstance(caught.value, pteron.PteronError)
+    assert isinstance(caught.value, ValueError)
+
+
+# What a leg, an inertia, a platform and a manipulator refuse: the key, and what to do.
+
+NOT_NUMBERS = {
+    "nan": (np.nan, "is not a finite number"),
+    "inf": (np.inf, "is not a finite number"),
+    "text": ("long", "is not a number"),
+    "none": (None, "is not a number"),
+    "list": ([1.0], "is not a number"),
+}
+
+
+@pytest.mark.parametrize("kind", NOT_NUMBERS)
+@pytest.mark.parametrize("key", ["upper_length", "lower_length", "slider_mass"])
+def test_a_leg_refuses_what_is_no_number(key, kind):
+    value, words = NOT_NUMBERS[kind]
+    shown = "slider.mass" if key == "slider_mass" else key
+    refused(lambda: Leg(**{**LEG, key: value}), f"{shown}: ", words)
+
+
+@pytest.mark.parametrize("value", [0.0, -0.0, -0.1])
+@pytest.mark.parametrize(
+    ("key", "shown", "unit"),
+    [
+        ("upper_length", "upper_length", "m"),
+        ("lower_length", "lower_length", "m"),
+        ("slider_mass", "slider.mass", "kg"),
+    ],
+)
+def test_a_leg_refuses_what_is_not_positive(key, shown, unit, value):
+    words = f"{shown}: {value:g} {unit} is not positive", f"give a value above 0 {unit}"
+    refused(lambda: Leg(**{**LEG, key: value}), *words)
+
+
+@pytest.mark.parametrize("key", ["guide_point", "direction", "platform_point", "slider_direction"])
+def test_a_leg_refuses_what_is_no_vector(key):
+    def leg(value):
+        return lambda: Leg(**{**LEG, key: value})
+
+    refused(leg((0.0, 1.0)), f"{key}: 2 numbers given, 3 expected")
+    refused(leg((0.0, np.nan, 1.0)), f"{key}[1]: nan is not a finite number")
+    refused(leg((0.0, 0.0, "x")), f"{key}[2]: 'x' is not a number")
+    refused(leg(5.0), f"{key}: 5.0 is not a list of 3 numbers")
+
+
+@pytest.mark.parametrize("key", ["direction", "slider_direction"])
+def test_a_direction_must_have_unit_length(key):
+    def leg(value):
+        return Leg(**{**LEG, key: value})
+
+    words = f"{key}: [0.0, 3.0, 4.0] has length 5, not 1", "write [0.0, 0.6, 0.8]"
+    refused(lambda: leg((0.0, 3.0, 4.0)), *words)
+    refused(lambda: leg((0.0, 0.0, 0.0)), f"{key}: ", "a zero vector has no direction")
+    refused(lambda: leg((0.0, 0.0, 1.0 + 2e-6)), key, "not 1; write")
+    # Digits of a file, short of the last ones, are made a unit vector.
+    near = leg((0.0, 0.6 * (1 + 5e-7), 0.8 * (1 + 5e-7)))
+    np.testing.assert_allclose(getattr(near, key), [0.0, 0.6, 0.8], rtol=0, atol=1e-16)
+
+
+def test_a_slider_may_not_run_in_the_legs_plane():
+    words = "slider_direction: ", "is perpendicular to direction", "tilt one against the other"
+    refused(lambda: Leg(**LEG, slider_direction=(1.0, 0.0, 0.0)), *words)
+    assert Leg(**LEG, slider_direction=(0.6, 0.0, -0.8)).e == (0.6, 0.0, -0.8)
+    assert Leg(**LEG).e == LEG["direction"]
+
+
+@pytest.mark.parametrize("elbow", [0, 2, -2, 0.5, "1", None])
+def test_an_elbow_is_one_or_minus_one(elbow):
+    refused(lambda: Leg(**LEG, elbow=elbow), f"elbow: {elbow!r} is neither 1 nor -1")
+
+
+def test_slider_limits_are_ordered():
+    def leg(limits):
+        return lambda: Leg(**LEG, slider_limits=limits)
+
+    words = "slider_limits: ", "is not below", "give [least, greatest]"
+    refused(leg((0.2, -0.1)), *words)
+    refused(leg((0.1, 0.1)), *words)
+    refused(leg((0.1,)), "slider_limits: 1 numbers given, 2 expected")
+    refused(leg((np.nan, 1.0)), "slider_limits[0]: nan is not a finite number")
+    assert leg((-1, 2))().slider_limits == (-1.0, 2.0)
+
+
+@pytest.mark.parametrize("mass", [0.0, -1.0])
+def test_a_body_has_mass(mass):
+    words = f"mass: {mass:g} kg is not positive; give a value above 0 kg"
+    refused(lambda: PlanarInertia(mass, (0.0, 0.0), 1.0), words)
+    refused(lambda: PlanarInertia.of_body(mass, (0.0, 0.0), 1.0), words)
+
+
+def test_an_inertia_belongs_to_a_real_body():
+    words = "inertia: ", "belongs to no real body", "must be above 0.125 kg m^2"
+    refused(lambda: PlanarInertia(2.0, (0.3, 0.4), 0.1249), *words)
+    refused(lambda: PlanarInertia.of_body(2.0, (0.15, 0.2), 0.1249), *words)
+    refused(lambda: PlanarInertia(1.0, (0.0, 0.0), 0.0), "inertia: 0", "belongs to no real body")
+    refused(lambda: PlanarInertia(1.0, (0.0, 0.0), -1.0), "inertia: -1")
+    refused(lambda: PlanarInertia(1.0, (0.0, 0.0), np.nan), "inertia: nan is not a finite number")
+    refused(lambda: PlanarInertia(1.0, (0.0,), 1.0), "first_moment: 1 numbers given, 2 expected")
+    refused(lambda: PlanarInertia(1.0, (0.0, np.inf), 1.0), "first_moment[1]: inf")
+    refused(lambda: PlanarInertia.of_body(1.0, (np.nan, 0.0), 1.0), "center_of_mass[0]: nan")
+    assert PlanarInertia(2.0, (0.3, 0.4), 0.125).inertia == 0.125, "a point mass is a body"
+
+
+def test_an_inertia_gives_its_values_back():
+    body = PlanarInertia.of_body(0.5, (0.2, -0.1), 0.1)
+    assert body.values == (0.5, 0.1, -0.05, 0.1)
+    assert body.center_of_mass == (0.2, -0.1)
+
+
+def test_a_platform_has_a_motion_and_axes():
+    def platform(motion="3T1R", **axes):
+        return lambda: Platform(motion, BODY, **axes)
+
+    refused(platform("2T"), 'motion: \'2T\' is not "3T" or "3T1R"')
+    refused(platform(axis=(0.0, 2.0, 0.0)), "axis: [0.0, 2.0, 0.0] has length 2, not 1; write")
+    words = "x_axis: missing; axis [0.0, 1.0, 0.0] is not the base frame's z", "must say"
+    refused(platform(axis=(0.0, 1.0, 0.0)), *words)
+    words = "x_axis: [0.0, 0.0, 1.0] is not perpendicular to axis [0.0, 0.0, 1.0]"
+    refused(platform(x_axis=(0.0, 0.0, 1.0)), words)
+    refused(platform(x_axis=(1.0, 0.0)), "x_axis: 2 numbers given, 3 expected")
+    assert platform()().frame == ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    turned = platform(axis=(0.0, 1.0, 0.0), x_axis=(0.0, 0.0, 1.0))()
+    assert turned.frame == ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    assert (platform()().coordinates, platform("3T")().coordinates) == (
+        ("x", "y", "z", "phi"),
+        ("x", "y", "z"),
+    )
+
+
+def test_an_x_axis_that_leans_by_rounding_is_set_upright():
+    lean = 5e-7
+    x = Platform("3T1R", BODY, x_axis=(np.cos(lean), 0.0, np.sin(lean))).x_axis
+    assert x == (1.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("name", CATALOG)
+def test_a_manipulator_needs_as_many_legs_as_freedoms(name):
+    robot = CATALOG[name]
+    n, motion = len(robot.legs), robot.platform.motion
+    words = f"{motion} platform has {n} freedoms and needs {n} legs"
+    refused(lambda: replace(robot, legs=robot.legs[1:]), f"legs: {n - 1} given, ", words)
+    refused(lambda: replace(robot, legs=(*robot.legs, *robot.legs[:1])), f"legs: {n + 1} ", words)
+    refused(lambda: replace(robot, legs=()), "legs: 0 given")
+
+
+def test_a_manipulator_has_a_name_and_gravity():
+    robot = CATALOG["tripteron"]
+    refused(lambda: replace(robot, name="  "), "name: '  ' is empty; give the machine a name")
+    refused(lambda: replace(robot, gravity=(0.0, 1.0)), "gravity: 2 numbers given, 3 expected")
+    refused(lambda: replace(robot, gravity=(0.0, 0.0, np.nan)), "gravity[2]: nan is not a finite")
+    assert Manipulator("t", robot.platform, list(robot.legs)).gravity == (0.0, 0.0, -9.81)
+
+
+def with_directions(robot, *directions):
+    legs = zip(robot.legs, directions, strict=True)
+    return replace(robot, legs=tuple(replace(leg, direction=d) for leg, d in legs))
+
+
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+TILTED = (0.0, 0.6, 0.8)
+
+
+def test_constraints_that_leave_the_platform_a_freedom_are_refused():
+    three, four = CATALOG["tripteron"], CATALOG["quadrupteron"]
+    words = "legs: all directions are parallel", "free to turn", "needs two legs"
+    refused(lambda: with_directions(three, Z, Z, (0.0, 0.0, -1.0)), *words)
+    words = "legs: all directions lie in one plane with the platform's axis", "free to tilt", "turn"
+    refused(lambda: with_directions(four, Y, Y, TILTED, TILTED), *words)
+    # A leg along k has no universal joint; two that are not parallel hold a 3T platform.
+    assert with_directions(four, Z, Y, TILTED, TILTED).freedom == 4
+    assert with_directions(four, X, Y, TILTED, TILTED).freedom == 4
+    assert with_directions(three, Z, Z, X).freedom == 3
+
+
+def test_values_are_frozen_and_hashable():
+    robot = CATALOG["quadrupteron"]
+    again = replace(robot, gravity=list(robot.gravity))
+    assert again == robot
+    assert hash(again) == hash(robot)
+    for value in (robot, robot.legs[0], robot.platform, robot.legs[0].upper):
+        with pytest.raises(FrozenInstanceError):
+            setattr(value, fields(value)[0].name, 1.0)
+
+
+# Files.
+
+
+@EVERY
+def test_a_saved_machine_is_loaded_without_loss(name, tmp_path):
+    robot = MECHANISMS[name]
+    file = pteron.save(robot, tmp_path / "robot.toml")
+    assert file == tmp_path / "robot.toml"
+    assert pteron.load(file) == robot
+    assert pteron.load(str(file)) == robot
+    text = file.read_text(encoding="utf-8")
+    pteron.save(pteron.load(file), file)
+    assert file.read_text(encoding="utf-8") == text
+    assert [f.name for f in tmp_path.iterdir()] == ["robot.toml"]
+
+
+def test_names_and_limits_survive_too(tmp_path):
+    robot = CATALOG["tripteron"]
+    legs = (replace(robot.legs[0], slider_limits=None), *robot.legs[1:])
+    robot = replace(robot, name='Mühle "3T"\n\\ # = 翼', legs=legs)
+    assert pteron.load(pteron.save(robot, tmp_path / "a b.toml")) == robot
+
+
+@settings(deadline=None, derandomize=True, max_examples=25)
+@given(st.integers(0, 10**6), st.booleans())
+def test_random_machines_are_loaded_without_loss(tmp_path_factory, seed, turns):
+    robot = random_machine(seed, turns)
+    assert pteron.load(pteron.save(robot, tmp_path_factory.mktemp("saved") / "r.toml")) == robot
+
+
+def test_the_catalog():
+    names = pteron.catalog()
+    assert names == ("quadrupteron", "quadrupteron-oblique", "tripteron", "tripteron-oblique")
+    for name in names:
+        robot = pteron.load(name)
+        assert robot.name == name
+        assert robot.platform.motion == ("3T1R" if name.startswith("quadrupteron") else "3T")
+        assert pteron.random_poses(robot, 1, bend=0.5, hold=0.5).shape == (1, robot.freedom)
+
+
+def test_the_catalogs_quadrupteron_is_that_of_table_1():
+    legs = CATALOG["quadrupteron"].legs
+    assert [leg.direction for leg in legs] == [Z, Y, X, Y]
+    assert [leg.platform_point for leg in legs] == [
+        (0.0, -0.04, 0.0),
+        (-0.04, 0.0, 0.0),
+        (0.0, 0.04, 0.0),
+        (0.04, 0.0, 0.0),
+    ]
+    lengths = [(leg.upper_length, leg.lower_length) for leg in legs]
+    assert lengths == [(0.203, 0.223), (0.154, 0.161), (0.167, 0.167), (0.154, 0.161)]
+
+
+CATALOG_TEXT = (
+    Path(pteron.__file__).parent / "manipulator" / "catalog" / "quadrupteron.toml"
+).read_text(encoding="utf-8")
+
+
+BAD_FILES = {
+    "missing key": ("upper_length = 0.203\n", "", "legs[0].upper_length: missing"),
+    "missing name": ('name = "quadrupteron"\n', "", "name: missing; the file must give it"),
+    "missing inertia": (", inertia = 0.003871914", "", "legs[2].upper.inertia: missing"),
+    "missing motion": ('motion = "3T1R"\n', "", "platform.motion: missing"),
+    "unknown key": ("mass = 0.8\n", "mass = 0.8\nmas = 1\n", "platform.mas: unknown key (value 1)"),
+    "unknown key at the top": ("gravity", "gravitation", "gravitation: unknown key"),
+    "unknown key of a link": ("mass = 0.36,", "mass = 0.36, kg = 1,", "legs[0].lower.kg: unknown"),
+    "text for a number": ("mass = 0.8", 'mass = "0.8"', "platform.mass: '0.8' given; "),
+    "boolean for a number": ("mass = 0.8", "mass = true", "platform.mass: True given; "),
+    "number for text": ('name = "quadrupteron"', "name = 3", "name: 3 given; "),
+    "number for a vector": ("[0.0, -0.34, 0.0]", "0.34", "legs[0].guide_point: 0.34 given; "),
+    "short vector": ("[0.0, -0.34, 0.0]", "[0.0, -0.34]", "legs[0].guide_point[2]: missing"),
+    "long vector": ("[0.0, -0.34, 0.0]", "[0, 0, 0, 0]", "legs[0].guide_point: "),
+    "nan": ("mass = 0.8", "mass = nan", "platform.mass: nan given; "),
+    "inf": ("[0.0, 0.0, -9.81]", "[0.0, 0.0, -inf]", "gravity[2]: -inf given; "),
+    "unknown motion": ('"3T1R"', '"2T"', "platform.motion: '2T' given; "),
+    "elbow": ("elbow = 1", "elbow = 0", "legs[0].elbow: 0 given; input should be 1 or -1"),
+    "not a unit vector": (
+        "direction = [0.0, 0.0, 1.0]",
+        "direction = [0.0, 0.0, 2.0]",
+        "legs[0].direction: [0.0, 0.0, 2.0] has length 2, not 1; write [0.0, 0.0, 1.0]",
+    ),
+    "zero mass": ("mass = 0.8", "mass = 0", "platform.mass: 0 kg is not positive; give"),
+    "zero mass of a slider": ("mass = 0.65", "mass = 0.0", "legs[2].slider.mass: 0 kg is not"),
+    "negative length": ("upper_length = 0.203", "upper_length = -1", "legs[0].upper_length: -1 m"),
+    "impossible inertia": (
+        "inertia = 0.003871914",
+        "inertia = 0.001",
+        "legs[2].upper.inertia: 0.001 kg m^2 belongs to no real body",
+    ),
+    "limits": ("[-0.3, 0.3]", "[0.3, -0.3]", "legs[0].slider_limits: 0.3 m is not below -0.3 m"),
+    "both": (
+        "center_of_mass = [0.006, -0.004]",
+        "center_of_mass = [0.006, -0.004]\nfirst_moment = [0.0, 0.0]",
+        "platform.center_of_mass: both it and first_moment given; give one of the two",
+    ),
+    "neither": (
+        "center_of_mass = [0.006, -0.004]",
+        "",
+        "platform.center_of_mass: neither it and first_moment given; give one of the two",
+    ),
+    "an axis without x_axis": (
+        "axis = [0.0, 0.0, 1.0]",
+        "axis = [0.0, 1.0, 0.0]",
+        "platform.x_axis: missing",
+    ),
+    "wrong number of legs": ('"3T1R"', '"3T"', "legs: 4 given, but a 3T platform has 3 freedoms"),
+    "empty name": ('"quadrupteron"', '" "', "name: ' ' is empty; give the machine a name"),
+    "no legs": ("[[legs]]", "[[leg]]", "legs: missing"),
+    "not TOML": ("mass = 0.8", "mass = = 0.8", "not a TOML file (Invalid value (at line 11"),
+    "a key twice": ("mass = 0.8", "mass = 0.8\nmass = 0.8", "not a TOML file (Cannot overwrite"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_FILES)
+def test_a_bad_file_is_refused_with_the_key(case, tmp_path):
+    old, new, words = BAD_FILES[case]
+    assert old in CATALOG_TEXT
+    count = -1 if case == "no legs" else 1
+    file = tmp_path / "bad.toml"
+    file.write_text(CATALOG_TEXT.replace(old, new, count), encoding="utf-8")
+    refused(lambda: pteron.load(file), f"{file}: {words}")
+
+
+def test_a_file_whose_legs_leave_a_freedom_is_refused(tmp_path):
+    text = CATALOG_TEXT.replace("direction = [1.0, 0.0, 0.0]", "direction = [0.0, 1.0, 0.0]")
+    text = text.replace("direction = [0.0, 0.0, 1.0]", "direction = [0.0, 0.6, 0.8]")
+    file = tmp_path / "bad.toml"
+    file.write_text(text, encoding="utf-8")
+    refused(lambda: pteron.load(file), f"{file}: legs: all directions lie in one plane")
+
+
+def test_more_faults_are_counted(tmp_path):
+    file = tmp_path / "bad.toml"
+    file.write_text(CATALOG_TEXT.replace("mass = 0.8", "mas = 0.8"), encoding="utf-8")
+    refused(lambda: pteron.load(file), "platform.", "(and 1 more fault)")
+
+
+def test_files_that_cannot_be_read_are_refused(tmp_path):
+    missing = tmp_path / "nowhere.toml"
+    words = "neither a file nor a machine of the catalog (quadrupteron, "
+    refused(lambda: pteron.load(missing), f"{missing}: {words}")
+    refused(lambda: pteron.load("quadrupteorn"), 'did you mean "quadrupteron"?')
+    refused(lambda: pteron.load(tmp_path), f"{tmp_path}: cannot be read")
+    binary = tmp_path / "binary.toml"
+    binary.write_bytes(bytes(range(256)))
+    refused(lambda: pteron.load(binary), f"{binary}: not a TOML file (it is not UTF-8 text)")
+    empty = tmp_path / "empty.toml"
+    empty.write_bytes(b"")
+    refused(lambda: pteron.load(empty), f"{empty}: name: missing; the file must give it (and 2")
+    nul = tmp_path / "nul.toml"
+    nul.write_bytes(b'name = "a\0b"\n')
+    refused(lambda: pteron.load(nul), f"{nul}: not a TOML file")
+
+
+NOT_HANDLED = pytest.mark.xfail(raises=(OSError, ValueError), reason="reported: files.load")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param("", id="empty"),
+        pytest.param("a\0b", id="nul", marks=NOT_HANDLED),
+        pytest.param("x" * 5000, id="long", marks=NOT_HANDLED),
+    ],
+)
+def test_a_name_that_can_be_no_file_is_refused(name):
+    refused(lambda: pteron.load(name), ": ")
+
+
+def test_saving_to_an_unwritable_place_leaves_nothing(tmp_path):
+    robot = CATALOG["tripteron"]
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    (tmp_path / "file").write_text("kept")
+    for place in (tmp_path / "no" / "such.toml", folder, tmp_path / "file" / "robot.toml"):
+        words = f"{place}: cannot be written ("
+        refused(lambda place=place: pteron.save(robot, place), words, error=OutputError)
+    assert sorted(f.name for f in tmp_path.rglob("*")) == ["file", "folder"]
+    assert (tmp_path / "file").read_text() == "kept"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="permissions of POSIX")
+def test_a_saved_file_has_the_usual_permissions(tmp_path):
+    plain = tmp_path / "plain"
+    plain.touch()
+    saved = pteron.save(CATALOG["tripteron"], tmp_path / "robot.toml")
+    assert saved.stat().st_mode == plain.stat().st_mode
+
+
+# Parameters.
+
+
+@EVERY
+def test_parameters_stand_in_the_papers_order(name):
+    robot = MECHANISMS[name]
+    legs = robot.legs
+    expected = {f"m_p{i}": leg.slider_mass for i, leg in enumerate(legs, start=1)}
+    for letter, link in (("u", "upper"), ("l", "lower")):
+        for i, leg in enumerate(legs, start=1):
+            body = getattr(leg, link)
+            expected[f"m_{letter}{i}"] = body.mass
+            expected[f"mgx_{letter}{i}"] = body.first_moment[0]
+            expected[f"mgy_{letter}{i}"] = body.first_moment[1]
+            expected[f"I_{letter}{i}"] = body.inertia
+    body = robot.platform.inertia
+    platform = body.mass, *body.first_moment, body.inertia
+    expected.update(zip(("m_e", "mgx_e", "mgy_e", "I_e"), platform, strict=True))
+    assert pteron.parameter_names(robot) == tuple(expected)
+    assert pteron.parameters(robot).tolist() == list(expected.values())
+    assert len(expected) == 9 * len(legs) + 4
+
+
+@EVERY
+def test_with_parameters_gives_the_same_machine_back(name):
+    robot = MECHANISMS[name]
+    values = pteron.parameters(robot)
+    assert pteron.with_parameters(robot, values) == robot
+    doubled = pteron.with_parameters(robot, 2 * values)
+    assert doubled != robot
+    np.testing.assert_array_equal(pteron.parameters(doubled), 2 * values)
+    assert pteron.with_parameters(doubled, values.tolist()) == robot
+
+
+def test_parameters_of_no_real_body_are_refused():
+    robot = CATALOG["quadrupteron"]
+    names = pteron.parameter_names(robot)
+
+    def changed(name, value):
+        values = pteron.parameters(robot)
+        values[names.index(name)] = value
+        return lambda: pteron.with_parameters(robot, values)
+
+    refused(changed("m_p3", -1.0), "parameters of leg 3: slider.mass: -1 kg is not positive")
+    refused(changed("m_u2", 0.0), "parameters of body u2: mass: 0 kg is not positive")
+    refused(changed("I_l4", 1e-9), "parameters of body l4: inertia: 1e-09 kg m^2 belongs to no")
+    refused(changed("mgx_e", 9.0), "parameters of body e: inertia: ", "belongs to no real body")
+    refused(changed("mgy_u1", np.nan), "parameters of body u1: first_moment[1]: nan")
+    words = "parameters: shape (39,) given, (40,) expected"
+    refused(lambda: pteron.with_parameters(robot, np.ones(39)), words)
+    refused(lambda: pteron.with_parameters(robot, np.ones((1, 40))), "parameters: shape (1, 40)")
+
+
+# Turning.
+
+
+@EVERY
+def test_turning_keeps_every_angle_and_length(name):
+    robot = MECHANISMS[name]
+    rotation = Rotation.random(rng=4).as_matrix()
+    moved = pteron.turned(robot, rotation)
+
+    def vectors(machine):
+        found = [machine.gravity, *machine.platform.frame]
+        for leg in machine.legs:
+            found += [leg.guide_point, leg.direction, leg.e]
+        return np.array(found)
+
+    np.testing.assert_allclose(vectors(moved), vectors(robot) @ rotation.T, atol=1e-14)
+    for before, after in zip(robot.legs, moved.legs, strict=True):
+        same = ("platform_point", "upper_length", "lower_length", "slider_mass", "upper", "lower")
+        for key in (*same, "elbow", "slider_limits"):
+            assert getattr(after, key) == getattr(before, key)
+        assert (after.slider_direction is None) == (before.slider_direction is None)
+    assert moved.name == robot.name
+    assert moved.platform.inertia == robot.platform.inertia
+
+
+def test_turning_back_gives_the_machine_back():
+    robot = CATALOG["quadrupteron"]
+    assert pteron.turned(robot, np.eye(3)) == robot
+    quarter = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    assert pteron.turned(pteron.turned(robot, quarter), quarter.T) == robot
+    assert pteron.turned(robot, quarter, gravity=False).gravity == robot.gravity
+
+
+def test_what_is_no_rotation_is_refused():
+    robot = CATALOG["quadrupteron"]
+    words = "rotation: not an orthogonal 3x3 matrix"
+    refused(lambda: pteron.turned(robot, 2 * np.eye(3)), words)
+    refused(lambda: pteron.turned(robot, np.eye(2)), words)
+    refused(lambda: pteron.turned(robot, np.full((3, 3), np.nan)), words)
+    words = "rotation: the matrix is a reflection (determinant -1); negate one column"
+    refused(lambda: pteron.turned(robot, np.diag([1, 1, -1])), words)
