@@ -654,7 +654,7 @@ def test_table_1_stands_printed_beside_computed(monkeypatch: pytest.MonkeyPatch)
     rows = json.loads(done("table1 --json"))
     assert rows[0]["printed"] == "m_p1 + m_u1 + 20.11 I_l1"
     assert all(row["agrees"] for row in rows)
-    wrong = table1.Row("P_b1", "m_p1", "m_p1 + 2 m_u1", "m_p1 + m_u1", agrees=False)
+    wrong = table1.Row("P_b1", "m_p1", "m_p1 + 2 m_u1", "m_p1 + m_u1", agrees=False, restored=False)
     monkeypatch.setattr(table1, "rows", lambda: (wrong,))
     result = run("table1")
     assert result.exit_code == 1

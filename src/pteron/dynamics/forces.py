@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from pteron.conventions import BatchOfPoses, BatchOfSliders, OnFailure, PoseLike, SliderLike
-from pteron.kernels import Array, compile
-from pteron.kinematics.poses import finite, usable_poses
+from pteron.kernels import compile
+from pteron.kinematics.poses import blanked, finite, usable_poses
 from pteron.manipulator import Manipulator
 
 __all__ = ["forward_dynamics", "inverse_dynamics"]
@@ -61,9 +59,10 @@ def inverse_dynamics(
     rate = finite(robot, velocity, "velocity", on_failure)
     second = finite(robot, acceleration, "acceleration", on_failure)
     if wrench is None:
-        return _whole(compile(robot, "inverse_dynamics")(poses, rate, second))
+        return blanked(compile(robot, "inverse_dynamics")(poses, rate, second), poses, rate, second)
     load = finite(robot, wrench, "wrench", on_failure)
-    return _whole(compile(robot, "inverse_dynamics_loaded")(poses, rate, second, load))
+    forces = compile(robot, "inverse_dynamics_loaded")(poses, rate, second, load)
+    return blanked(forces, poses, rate, second, load)
 
 
 def forward_dynamics(
@@ -117,11 +116,7 @@ def forward_dynamics(
     rate = finite(robot, velocity, "velocity", on_failure)
     push = finite(robot, forces, "forces", on_failure)
     if wrench is None:
-        return _whole(compile(robot, "forward_dynamics")(poses, rate, push))
+        return blanked(compile(robot, "forward_dynamics")(poses, rate, push), poses, rate, push)
     load = finite(robot, wrench, "wrench", on_failure)
-    return _whole(compile(robot, "forward_dynamics_loaded")(poses, rate, push, load))
-
-
-def _whole(vectors: Array) -> Array:
-    """Return the vectors, all NaN where a component is: a state is served whole or not at all."""
-    return np.where(np.isnan(vectors).any(axis=-1, keepdims=True), np.nan, vectors)
+    acceleration = compile(robot, "forward_dynamics_loaded")(poses, rate, push, load)
+    return blanked(acceleration, poses, rate, push, load)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pteron.conventions import BatchOfMatrices, BatchOfNumbers, BatchOfPoses, OnFailure, PoseLike
 from pteron.kernels import compile
-from pteron.kinematics.poses import finite, usable_poses
+from pteron.kinematics.poses import blanked, finite, usable_poses
 from pteron.manipulator import Manipulator
 
 __all__ = [
@@ -51,8 +51,7 @@ def mass_matrix(
     (True, np.True_)
     """
     poses = usable_poses(robot, pose, bent=True, on_failure=on_failure)
-    matrices: BatchOfMatrices = compile(robot, "mass_matrix")(poses)
-    return matrices
+    return blanked(compile(robot, "mass_matrix")(poses), poses)
 
 
 def coriolis_matrix(
@@ -84,8 +83,7 @@ def coriolis_matrix(
     """
     poses = usable_poses(robot, pose, bent=True, on_failure=on_failure)
     rate = finite(robot, velocity, "velocity", on_failure)
-    matrices: BatchOfMatrices = compile(robot, "coriolis_matrix")(poses, rate)
-    return matrices
+    return blanked(compile(robot, "coriolis_matrix")(poses, rate), poses, rate)
 
 
 def bias_forces(
@@ -116,8 +114,7 @@ def bias_forces(
     """
     poses = usable_poses(robot, pose, bent=True, on_failure=on_failure)
     rate = finite(robot, velocity, "velocity", on_failure)
-    forces: BatchOfPoses = compile(robot, "bias_forces")(poses, rate)
-    return forces
+    return blanked(compile(robot, "bias_forces")(poses, rate), poses, rate)
 
 
 def gravity_forces(
@@ -147,8 +144,7 @@ def gravity_forces(
         If a leg is stretched or folded (type I).
     """
     poses = usable_poses(robot, pose, bent=True, on_failure=on_failure)
-    forces: BatchOfPoses = compile(robot, "gravity_forces")(poses)
-    return forces
+    return blanked(compile(robot, "gravity_forces")(poses), poses)
 
 
 def kinetic_energy(
@@ -179,8 +175,7 @@ def kinetic_energy(
     """
     poses = usable_poses(robot, pose, bent=True, on_failure=on_failure)
     rate = finite(robot, velocity, "velocity", on_failure)
-    energies: BatchOfNumbers = compile(robot, "kinetic_energy")(poses, rate)
-    return energies
+    return blanked(compile(robot, "kinetic_energy")(poses, rate), poses, rate)
 
 
 def potential_energy(
@@ -210,5 +205,4 @@ def potential_energy(
         If R1 and R3 of a leg coincide, so that its elbow is undetermined.
     """
     poses = usable_poses(robot, pose, reach=True, on_failure=on_failure)
-    energies: BatchOfNumbers = compile(robot, "potential_energy")(poses)
-    return energies
+    return blanked(compile(robot, "potential_energy")(poses), poses)

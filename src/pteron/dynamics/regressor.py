@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from pteron.conventions import BatchOfRegressors, OnFailure, PoseLike
 from pteron.kernels import compile
-from pteron.kinematics.poses import finite, usable_poses
+from pteron.kinematics.poses import blanked, finite, usable_poses
 from pteron.manipulator import Manipulator
 
 __all__ = ["regressor"]
@@ -56,4 +54,4 @@ def regressor(
     rate = finite(robot, velocity, "velocity", on_failure)
     second = finite(robot, acceleration, "acceleration", on_failure)
     matrices: BatchOfRegressors = compile(robot, "regressor")(poses, rate, second)
-    return np.where(np.isnan(matrices).any(axis=(-2, -1), keepdims=True), np.nan, matrices)
+    return blanked(matrices, poses, rate, second)

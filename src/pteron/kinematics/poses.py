@@ -25,14 +25,19 @@ def finite(
 ) -> Array:
     """Return an array (..., m) of finite numbers, or say which element is not one.
 
-    Under ``on_failure="nan"`` what is not finite is let through, to end as NaN in its own row.
+    Under ``on_failure="nan"`` a row with a number that is not finite becomes NaN as a whole: an
+    infinity would make the kernels subtract infinities, where NaN is quiet.
     """
+    if on_failure not in get_args(OnFailure):
+        raise DataError(f'on_failure: {on_failure!r} is neither "raise" nor "nan"')
     array = as_array(value, name, (robot.freedom,))
-    if on_failure == "raise" and not np.isfinite(array).all():
-        index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
-        where = f"{name}{list(index)}" if index else name
-        raise DataError(f"{where}: {array[index]} given, a finite number expected")
-    return array
+    good = np.isfinite(array)
+    if good.all():
+        return array
+    if on_failure == "raise":
+        index = tuple(int(i) for i in np.argwhere(~good)[0])
+        raise DataError(f"{name}{list(index)}: {array[index]} given, a finite number expected")
+    return np.where(good.all(axis=-1, keepdims=True), array, np.nan)
 
 
 def usable_poses(
@@ -63,12 +68,8 @@ def usable_poses(
     DataError, UnreachablePose, SingularPose
         For the first pose, in memory order, that cannot be used.
     """
-    if on_failure not in get_args(OnFailure):
-        raise DataError(f'on_failure: {on_failure!r} is neither "raise" nor "nan"')
     poses = finite(robot, pose, "pose", on_failure)
-    bad = np.asarray(~np.isfinite(poses).all(axis=-1))
-    # An infinite pose would make the kernels subtract infinities; NaN is quiet.
-    poses = np.where(bad[..., None], np.nan, poses)
+    bad = np.isnan(poses[..., 0])
     if reach or bent:
         distance, margin, sine = compile(robot, "reach")(poses)
         beyond = np.isnan(sine) & ~bad[..., None]
@@ -96,13 +97,16 @@ def usable_poses(
     return np.where(bad[..., None], np.nan, poses)
 
 
-def blanked(poses: Array, values: Array) -> Array:
-    """Return values (..., *shape) with NaN wherever the pose (..., m) is NaN.
+def blanked(values: Array, *states: Array) -> Array:
+    """Return values (..., *shape) with NaN wherever one of the states (..., m) is NaN.
 
-    A kernel's constant entries do not see the pose; a pose that fails must not leave them behind.
+    A kernel's constant entries do not see its inputs; a failed state must not leave them behind.
     """
-    lost = np.isnan(poses[..., 0])
-    return np.where(lost.reshape(lost.shape + (1,) * (values.ndim - lost.ndim)), np.nan, values)
+    lost = np.zeros((), dtype=bool)
+    for state in states:
+        lost = lost | np.isnan(state[..., 0])
+    axes = (1,) * (values.ndim - lost.ndim)
+    return np.where(lost.reshape(lost.shape + axes), np.nan, values)
 
 
 def _spans(robot: Manipulator) -> Array:

@@ -55,7 +55,7 @@ def inverse_kinematics(
     """
     poses = usable_poses(robot, pose, reach=True, on_failure=on_failure)
     sliders: BatchOfSliders = compile(robot, "inverse_kinematics")(poses)
-    return blanked(poses, sliders)
+    return blanked(sliders, poses)
 
 
 def link_vectors(
@@ -86,7 +86,7 @@ def link_vectors(
     """
     poses = usable_poses(robot, pose, reach=True, on_failure=on_failure)
     l_u, l_l = compile(robot, "link_vectors")(poses)
-    return l_u, l_l
+    return blanked(l_u, poses), blanked(l_l, poses)
 
 
 def direct_kinematics(
@@ -133,7 +133,6 @@ def direct_kinematics(
     if is_singular_everywhere(robot):
         raise SingularPose(EVERYWHERE.format(name=robot.name), kind="II", closeness=0.0, index=())
     given = finite(robot, sliders, "sliders", on_failure)
-    given = np.where(np.isfinite(given).all(axis=-1, keepdims=True), given, np.nan)
     poses = usable_poses(
         robot, compile(robot, "direct_kinematics")(given), reach=True, on_failure="nan"
     )

@@ -47,7 +47,7 @@ def jacobian(
     """
     poses = usable_poses(robot, pose, on_failure=on_failure)
     matrices: BatchOfMatrices = compile(robot, "jacobian")(poses)
-    return blanked(poses, matrices)
+    return blanked(matrices, poses)
 
 
 def link_jacobians(
@@ -79,7 +79,7 @@ def link_jacobians(
     """
     poses = usable_poses(robot, pose, bent=True, on_failure=on_failure)
     upper, lower = compile(robot, "link_jacobians")(poses)
-    return blanked(poses, upper), blanked(poses, lower)
+    return blanked(upper, poses), blanked(lower, poses)
 
 
 def joint_screws(robot: Manipulator, pose: PoseLike, *, on_failure: OnFailure = "raise") -> Array:
@@ -106,7 +106,7 @@ def joint_screws(robot: Manipulator, pose: PoseLike, *, on_failure: OnFailure = 
     """
     poses = usable_poses(robot, pose, bent=True, on_failure=on_failure)
     screws: Array = compile(robot, "joint_screws")(poses)
-    return blanked(poses, screws)
+    return blanked(screws, poses)
 
 
 @dataclass(frozen=True)
@@ -197,16 +197,17 @@ def joint_rates(
     """
     poses = usable_poses(robot, pose, bent=True, on_failure=on_failure)
     rate = finite(robot, velocity, "velocity", on_failure)
-    rates = _joint_motion(robot, compile(robot, "joint_rates")(poses, rate), rate)
+    first = blanked(compile(robot, "joint_rates")(poses, rate), poses, rate)
+    rates = _joint_motion(robot, first, rate)
     if acceleration is None:
         return rates
     second = finite(robot, acceleration, "acceleration", on_failure)
-    accelerations = compile(robot, "joint_accelerations")(poses, rate, second)
+    kernel = compile(robot, "joint_accelerations")
+    accelerations = blanked(kernel(poses, rate, second), poses, rate, second)
     return rates, _joint_motion(robot, accelerations, second)
 
 
 def _joint_motion(robot: Manipulator, motion: Array, platform: Array) -> JointMotion:
-    motion = np.where(np.isnan(motion).any(axis=(-2, -1), keepdims=True), np.nan, motion)
     slider, upper, lower = np.moveaxis(motion, -1, 0)
     joints = [upper, lower - upper, -lower]
     if robot.platform.turns:

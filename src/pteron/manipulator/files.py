@@ -5,6 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Callable
 from difflib import get_close_matches
+from errno import ENOENT
 from functools import partial
 from importlib.resources import files
 from pathlib import Path
@@ -66,13 +67,13 @@ def load(name_or_path: str | Path) -> Manipulator:
         text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError:
         raise ModelError(f"{path}: not a TOML file (it is not UTF-8 text)") from None
-    except OSError as error:
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         raise ModelError(_not_found(path, error)) from None
     return _parse(text, str(path))
 
 
-def _not_found(path: Path, error: OSError) -> str:
-    if path.exists():
+def _not_found(path: Path, error: OSError | ValueError) -> str:
+    if isinstance(error, OSError) and error.errno != ENOENT:
         return f"{path}: cannot be read ({error.strerror})"
     close = get_close_matches(str(path), catalog(), n=1)
     guess = f'; did you mean "{close[0]}"?' if close else ""

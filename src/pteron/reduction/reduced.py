@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from pteron.conventions import BatchOfRegressors, OnFailure, PoseLike
 from pteron.errors import ModelError
 from pteron.kernels import compile
-from pteron.kinematics.poses import finite, usable_poses
+from pteron.kinematics.poses import blanked, finite, usable_poses
 from pteron.manipulator import Manipulator, parameter_names
 from pteron.reduction.result import BaseParameters
 
@@ -69,4 +67,4 @@ def base_regressor(
     rate = finite(robot, velocity, "velocity", on_failure)
     second = finite(robot, acceleration, "acceleration", on_failure)
     matrices: BatchOfRegressors = compile(robot, "base_regressor", base=base)(poses, rate, second)
-    return np.where(np.isnan(matrices).any(axis=(-2, -1), keepdims=True), np.nan, matrices)
+    return blanked(matrices, poses, rate, second)

@@ -95,7 +95,7 @@ def costs(base: BaseParameters, seed: int = 0) -> tuple[Cost, ...]:
                 # Pair by pair: what slows the machine for a while slows both runs of a round.
                 ratio = np.median(seconds[form, which] / seconds[form, "complete"])
                 share = operations[form, which] / operations[form, "complete"]
-                note = f"{_less(share)} operations, {_less(float(ratio))} time"
+                note = f"{_change(share, 'fewer')} operations, {_change(float(ratio), 'less')} time"
             found.append(
                 Cost(
                     f"{name}, {columns[which]} parameters",
@@ -118,6 +118,6 @@ def _interleaved(runs: dict[tuple[str, str], Callable[[], object]]) -> dict[tupl
     return {key: np.array(values) for key, values in times.items()}
 
 
-def _less(ratio: float) -> str:
-    change = 100.0 * (1.0 - ratio)
-    return f"{abs(change):.0f} % {'less' if change >= 0 else 'more'}"
+def _change(ratio: float, word: str) -> str:
+    percent = 100.0 * (1.0 - ratio)
+    return f"{abs(percent):.0f} % {word if percent >= 0 else 'more'}"

@@ -27,7 +27,9 @@ def significant(value: float, digits: int = 3) -> str:
         return "∞" if value > 0 else "\u2013"
     if value == 0.0:
         return "0"
-    places = max(digits - 1 - floor(log10(abs(value))), 0)
+    # 999.6 is 1000 in three digits: the size counts after rounding.
+    rounded = float(f"{value:.{digits - 1}e}")
+    places = max(digits - 1 - floor(log10(abs(rounded))), 0)
     return fixed(value, places)
 
 

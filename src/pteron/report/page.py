@@ -16,6 +16,7 @@ from pteron.report.contents import Report
 from pteron.report.digits import compact, expression, fixed, significant, symbol, triple
 from pteron.report.figures import figures
 from pteron.report.scene import scene
+from pteron.report.symbols import in_symbols
 
 __all__ = ["page"]
 
@@ -63,6 +64,7 @@ def page(report: Report) -> str:
         figures=figures(report),
         units=[units.get(name, "") for name in report.base.names],
         values=report.base.values(),
+        symbols=in_symbols(report.base),
         version=pteron.__version__,
         style=_resource("page.css"),
         script=_resource("view.js"),
@@ -76,5 +78,5 @@ def _resource(name: str) -> Markup:
 
 def _data(value: Any) -> Markup:
     """Return JSON that cannot end the script element it stands in."""
-    text = json.dumps(value, separators=(",", ":"))
+    text = json.dumps(value, separators=(",", ":"), allow_nan=False)
     return Markup(text.replace("<", "\\u003c"))

@@ -101,12 +101,12 @@
     pen.beginPath(); pen.arc(q[0], q[1], Math.max(2, metres * q[3]), 0, 2 * Math.PI);
     pen.fillStyle = colors.paper; pen.fill(); pen.strokeStyle = color; pen.lineWidth = 2; pen.stroke();
   }
-  function label(p, text, color, bold) {
-    const q = pixel(p);
+  function label(p, text, color) { const q = pixel(p); write(q[0], q[1], text, color); }
+  function write(x, y, text, color, bold) {
     pen.font = (bold ? "650 " : "") + "13px system-ui, sans-serif";
     pen.textAlign = "center"; pen.textBaseline = "middle";
     pen.strokeStyle = colors.paper; pen.lineWidth = 4; pen.lineJoin = "round";
-    pen.strokeText(text, q[0], q[1]); pen.fillStyle = color; pen.fillText(text, q[0], q[1]);
+    pen.strokeText(text, x, y); pen.fillStyle = color; pen.fillText(text, x, y);
   }
   function face(points, color, alpha) {
     path(points); pen.closePath(); pen.globalAlpha = alpha; pen.fillStyle = color; pen.fill();
@@ -198,9 +198,11 @@
     const p = position[k];
     axes[k].forEach((axis, j) => line(p, add(p, axis, (j < 2 ? 0.1 : 0.07) * size), colors.ink, 1.6));
     for (let i = 0; i < legs; i++) {
-      const a = sliders[k][i], out = add(a, p, -1), d = directions[i];
-      const away = unit(add(out, d, -dot(out, d)));
-      label(add(a, away, 0.075 * size), String(i + 1), colors.legs[i], true);
+      const a = pixel(sliders[k][i]), ahead = pixel(add(sliders[k][i], directions[i], 0.1)), from = pixel(p);
+      const across = unit([a[1] - ahead[1], ahead[0] - a[0], 0]);
+      const sign = across[0] * (a[0] - from[0]) + across[1] * (a[1] - from[1]) < 0 ? -1 : 1;
+      const gap = sign * (0.034 * size * a[3] + 11);
+      write(a[0] + gap * across[0], a[1] + gap * across[1], String(i + 1), colors.legs[i], true);
     }
     readout(k);
   }

@@ -45,5 +45,7 @@ def write_report(robot: Manipulator, folder: str | Path) -> Path:
     target = make_folder(folder)
     report = contents(robot)
     html = page(report)
-    write_text(target / "report.json", json.dumps(numbers(report), indent=2) + "\n")
+    write_text(
+        target / "report.json", json.dumps(numbers(report), indent=1, allow_nan=False) + "\n"
+    )
     return write_text(target / "report.html", html)

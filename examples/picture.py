@@ -1,0 +1,28 @@
+"""Pictures: the machine on its way through a pick-and-place cycle, and its forces there.
+
+Writes `quadrupteron.png` and `forces.png` to the folder it is run in.
+"""
+
+import numpy as np
+
+import pteron
+from pteron.motion import joint_points, pick_and_place
+from pteron.plots import forces_figure, robot_figure
+from pteron.workspace import home_pose
+
+robot = pteron.load("quadrupteron")
+cycle = pick_and_place(robot, home_pose(robot))
+forces = pteron.inverse_dynamics(robot, cycle.pose, cycle.velocity, cycle.acceleration)
+
+limits = np.array([leg.slider_limits for leg in robot.legs])
+guides = np.array([leg.guide_point for leg in robot.legs])
+directions = np.array([leg.e for leg in robot.legs])
+rails = guides[:, None, :] + limits[:, :, None] * directions[:, None, :]
+
+points = joint_points(robot, cycle.pose[len(cycle.time) // 8])
+machine = robot_figure(points, rails, gravity=np.array(robot.gravity), path=cycle.pose[:, :3])
+machine.savefig("quadrupteron.png", dpi=160, facecolor="white")
+forces_figure(cycle.time, forces, turning_point=cycle.duration / 2).savefig("forces.png", dpi=160)
+
+print(f"cycle of {305 * cycle.scale:.0f} mm in {cycle.duration:.2f} s")
+print("peak forces (N):", np.abs(forces).max(axis=0).round(1))

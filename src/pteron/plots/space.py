@@ -1,0 +1,156 @@
+"""Three-dimensional axes on which what is nearer to the eye hides what is farther away."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
+from mpl_toolkits.mplot3d.art3d import (  # type: ignore[import-untyped]
+    Line3DCollection,
+    Poly3DCollection,
+)
+from mpl_toolkits.mplot3d.proj3d import proj_transform  # type: ignore[import-untyped]
+
+from pteron.kernels import Array
+from pteron.plots.canvas import FONT_SIZE
+from pteron.plots.colors import GRID, PAPER
+
+__all__ = ["Space", "upright"]
+
+_ELEVATION, _AZIMUTH = 24.0, -52.0
+"""Degrees, from which the machine is seen."""
+
+_MARGIN = 0.04
+"""Of the figure, on each side."""
+
+_GRID_STEP = 0.1
+"""Of the ground's squares, m."""
+
+
+def upright(vertical: Array) -> Array:
+    """Return a rotation (3, 3) that takes a direction to z, and x as nearly to x as it can."""
+    z = vertical / np.linalg.norm(vertical)
+    near = np.eye(3)[0] if abs(z[0]) < 0.9 else np.eye(3)[1]
+    y = np.cross(z, near)
+    y = y / np.linalg.norm(y)
+    return np.array([np.cross(y, z), y, z])
+
+
+class Space:
+    """Axes onto which segments and faces are put in the order of their distance."""
+
+    def __init__(self, figure: Figure, vertical: Array) -> None:
+        axes = figure.add_subplot(projection="3d", computed_zorder=False)
+        assert isinstance(axes, Axes3D)
+        axes.patch.set_alpha(0.0)
+        axes.set_axis_off()
+        axes.set_proj_type("persp", focal_length=1.6)
+        axes.view_init(elev=_ELEVATION, azim=_AZIMUTH)
+        self.figure = figure
+        self.axes = axes
+        self.rotation = upright(vertical)
+        self._drawn: list[Array] = []
+        elevation, azimuth = np.radians(_ELEVATION), np.radians(_AZIMUTH)
+        self._towards_eye = np.array(
+            [
+                np.cos(elevation) * np.cos(azimuth),
+                np.cos(elevation) * np.sin(azimuth),
+                np.sin(elevation),
+            ]
+        )
+
+    def _order(self, points: Array, raised: float) -> float:
+        return 10.0 + float(points.mean(axis=0) @ self._towards_eye) + raised
+
+    def beside(self, away: Array, along: Array) -> Array:
+        """Return the unit vector in the picture's plane, across a line, nearest to `away`."""
+        across = np.cross(along, self.rotation.T @ self._towards_eye)
+        across = across / max(float(np.linalg.norm(across)), 1e-12)
+        return np.asarray(np.copysign(1.0, across @ away) * across)
+
+    def line(
+        self,
+        points: Array,
+        color: str,
+        width: float,
+        *,
+        raised: float = 0.0,
+        style: str | tuple[float, tuple[float, ...]] = "-",
+    ) -> None:
+        """Draw a line through points (K, 3)."""
+        p = points @ self.rotation.T
+        self._drawn.append(p)
+        self.axes.plot(
+            *p.T,
+            color=color,
+            linewidth=width,
+            linestyle=style,
+            solid_capstyle="round",
+            zorder=self._order(p, raised),
+        )
+
+    def mark(self, point: Array, face: str, edge: str, size: float, raised: float = 0.03) -> None:
+        """Draw a ring at a point."""
+        p = (point @ self.rotation.T)[None]
+        self.axes.plot(
+            *p.T,
+            marker="o",
+            markersize=size,
+            markerfacecolor=face,
+            markeredgecolor=edge,
+            markeredgewidth=1.4,
+            linestyle="none",
+            zorder=self._order(p, raised),
+        )
+
+    def faces(self, faces: list[Array], color: str, alpha: float, raised: float = 0.0) -> None:
+        """Draw polygons, at one distance."""
+        turned = [f @ self.rotation.T for f in faces]
+        collection = Poly3DCollection(
+            turned, facecolors=color, edgecolors=PAPER, linewidths=0.6, alpha=alpha
+        )
+        collection.set_zorder(self._order(np.vstack(turned), raised))
+        self.axes.add_collection3d(collection)
+
+    def text(self, point: Array, text: str, color: str, *, bold: bool = False) -> None:
+        """Write beside a point, over everything."""
+        p = point @ self.rotation.T
+        self._drawn.append(p[None])
+        self.axes.text(
+            *p,
+            text,
+            color=color,
+            fontsize=FONT_SIZE,
+            fontweight="bold" if bold else "normal",
+            ha="center",
+            va="center",
+            zorder=30.0,
+        )
+
+    def fill(self) -> None:
+        """Place the axes so that what was drawn fills the figure."""
+        drawn = np.vstack(self._drawn)
+        low, high = drawn.min(axis=0), drawn.max(axis=0)
+        self.axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+        self.axes.set_box_aspect(high - low)
+        self.figure.set_layout_engine("none")
+        self.axes.set_position((0.0, 0.0, 1.0, 1.0))
+        self.axes.apply_aspect()
+        x, y, _ = proj_transform(*drawn.T, self.axes.get_proj())
+        seen = self.figure.transFigure.inverted().transform(
+            self.axes.transData.transform(np.column_stack([x, y]))
+        )
+        left, right = seen.min(axis=0), seen.max(axis=0)
+        scale = (1.0 - 2.0 * _MARGIN) / float((right - left).max())
+        corner = 0.5 - scale * (left + right) / 2.0
+        self.axes.set_position((corner[0], corner[1], scale, scale))
+
+    def ground(self, low: Array, high: Array) -> None:
+        """Draw squares under everything, one rim wider than it."""
+        first, last = np.floor(low / _GRID_STEP) - 0.5, np.ceil(high / _GRID_STEP) + 0.5
+        x, y = (np.arange(first[i] + 0.5, last[i], 1.0) * _GRID_STEP for i in (0, 1))
+        z = low[2]
+        self._drawn.append(np.array([(a, b, z) for a in (x[0], x[-1]) for b in (y[0], y[-1])]))
+        lines = [[(a, y[0], z), (a, y[-1], z)] for a in x]
+        lines += [[(x[0], b, z), (x[-1], b, z)] for b in y]
+        self.axes.add_collection3d(Line3DCollection(lines, colors=GRID, linewidths=0.7, zorder=0.0))

@@ -1,0 +1,236 @@
+"""Motions: exact derivatives, limits that hold between the samples, and where the joints are."""
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from differences import along
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mechanisms import BATCH_SHAPES, CATALOG, MECHANISMS, states
+from scipy.spatial.transform import Rotation
+
+import pteron
+from pteron.motion import joint_points, pick_and_place, scaled_to_reach
+from pteron.motion.cycle import Cycle
+from pteron.motion.laws import quintic
+from pteron.workspace import home_pose, reserve
+
+EVERY = pytest.mark.parametrize("name", MECHANISMS)
+LEAST = 0.2
+
+
+@lru_cache
+def home(name):
+    return home_pose(MECHANISMS[name])
+
+
+@lru_cache
+def cycle(name):
+    return pick_and_place(MECHANISMS[name], home(name), least=LEAST)
+
+
+def column(robot, name):
+    return np.array([getattr(leg, name) for leg in robot.legs])
+
+
+@given(st.floats(-0.5, 1.5), st.floats(0.0, 0.4), st.floats(0.6, 1.0))
+@settings(deadline=None)
+def test_the_quintic_is_its_derivatives_integral(tau, begin, end):
+    # The third derivative jumps at both ends: differences reach across them only to O(step).
+    step = 1e-4
+    times = tau + np.arange(-4, 5) * step
+    if np.abs(times[:, None] - [begin, end]).min() < step:
+        return
+    s, ds, dds = quintic(np.array(tau), begin, end)
+    assert 0.0 <= s <= 1.0
+    assert along(lambda t: quintic(tau + t, begin, end)[0], step) == pytest.approx(ds, abs=1e-9)
+    assert along(lambda t: quintic(tau + t, begin, end)[1], step) == pytest.approx(dds, abs=1e-7)
+
+
+def test_the_quintic_rests_at_both_ends():
+    for s, tau in ((0.0, [-1.0, 0.2]), (1.0, [0.8, 3.0])):
+        found = np.array(quintic(np.array(tau), 0.2, 0.8))
+        np.testing.assert_allclose(found, [[s, s], [0, 0], [0, 0]], atol=1e-13)
+
+
+@EVERY
+def test_a_cycles_derivatives_are_exact(name):
+    found = cycle(name)
+    robot = MECHANISMS[name]
+    turn = found.turn / found.scale
+    path = Cycle(np.array(home(name)), found.across, found.up, turn, found.scale)
+    tau = np.random.default_rng(3).uniform(size=200)
+    knots = np.array([0.0, 0.075, 0.2, 0.3, 0.425, 0.5])
+    knots = np.concatenate([knots, 1.0 - knots])
+    tau = tau[np.abs(tau[:, None] - knots).min(axis=1) > 5e-4]
+    assert len(tau) > 150
+    _, first, second = path.at(tau)
+    for order, expected in enumerate((first, second)):
+
+        def function(offsets, order=order):
+            grid = tau + offsets[:, None]
+            return path.at(grid.ravel())[order].reshape(*grid.shape, robot.freedom)
+
+        np.testing.assert_allclose(along(function, 1e-4), expected, atol=1e-9 * 10**order)
+    at = found.time / found.duration
+    for mine, theirs, order in zip(
+        (found.pose, found.velocity, found.acceleration), path.at(at), range(3), strict=True
+    ):
+        np.testing.assert_allclose(mine, theirs / found.duration**order, rtol=1e-12, atol=1e-12)
+
+
+@EVERY
+def test_a_cycle_keeps_its_limits_between_the_samples(name):
+    robot, found = MECHANISMS[name], cycle(name)
+    dense = pick_and_place(
+        robot, home(name), scale=found.scale, direction=found.across, samples=20_011
+    )
+    kept = reserve(robot, dense.pose)
+    assert kept.elbow_sines.min() >= LEAST
+    assert kept.regularity.min() >= LEAST
+    assert kept.slider_clearances.min() >= 0.0
+    speed = np.linalg.norm(dense.acceleration[:, :3], axis=-1)
+    assert 10.0 * (1.0 - 1e-5) < speed.max() < 10.0 * (1.0 + 1e-9)
+
+
+@EVERY
+def test_a_cycle_is_the_largest_that_fits(name):
+    robot, found = MECHANISMS[name], cycle(name)
+    assert 0.0 < found.scale <= 1.0
+    if found.scale < 1.0:
+        larger = pick_and_place(
+            robot, home(name), scale=found.scale + 0.005, direction=found.across, samples=2001
+        )
+        kept = reserve(robot, larger.pose)
+        # The sliders' clearance is kept to a hair's breadth, the others to the least reserve.
+        tightest = min(kept.elbow_sines.min(), kept.regularity.min()) - LEAST
+        assert min(tightest, kept.slider_clearances.min()) < 1e-3
+
+
+@EVERY
+def test_a_cycle_goes_up_across_down_and_back(name):
+    robot, found = MECHANISMS[name], cycle(name)
+    offset = found.pose[:, :3] - np.array(home(name))[:3]
+    heights, widths = offset @ found.up, offset @ found.across
+    assert np.ptp(heights) == pytest.approx(0.025 * found.scale)
+    assert np.ptp(widths) == pytest.approx(0.305 * found.scale)
+    assert heights.sum() / len(heights) > heights[0], "it lifts before it goes across"
+    third = np.cross(found.up, found.across)
+    np.testing.assert_allclose(offset @ third, 0.0, atol=1e-15)
+    np.testing.assert_allclose(found.pose, found.pose[::-1], atol=1e-15)
+    for ends in (found.velocity, found.acceleration):
+        np.testing.assert_allclose(ends[[0, 200, -1]], 0.0, atol=1e-12)
+    if robot.platform.turns:
+        assert np.ptp(found.pose[:, 3]) == pytest.approx(np.pi / 3 * found.scale)
+    gravity = np.array(robot.gravity)
+    if gravity.any():
+        np.testing.assert_allclose(found.up, -gravity / np.linalg.norm(gravity), atol=1e-15)
+    else:
+        np.testing.assert_allclose(found.up, robot.platform.axis)
+
+
+@pytest.mark.parametrize("name", CATALOG)
+def test_a_turned_machine_makes_the_turned_cycle(name):
+    rotation = Rotation.random(rng=8).as_matrix()
+    robot, first = MECHANISMS[name], cycle(name)
+    middle = np.array(home(name))
+    middle[:3] = rotation @ middle[:3]
+    turned = pteron.turned(robot, rotation)
+    second = pick_and_place(turned, middle, direction=rotation @ first.across)
+    np.testing.assert_allclose(second.pose[:, :3], first.pose[:, :3] @ rotation.T, atol=1e-12)
+    np.testing.assert_allclose(second.pose[:, 3:], first.pose[:, 3:], atol=1e-15)
+    forces = [
+        pteron.inverse_dynamics(machine, motion.pose, motion.velocity, motion.acceleration)
+        for machine, motion in ((robot, first), (turned, second))
+    ]
+    np.testing.assert_allclose(*forces, atol=1e-9)
+
+
+def test_sliders_limits_bound_the_cycle():
+    robot = MECHANISMS["quadrupteron"]
+    tight = replace(
+        robot, legs=tuple(replace(leg, slider_limits=(-0.05, 0.04)) for leg in robot.legs)
+    )
+    scale, _ = scaled_to_reach(tight, home_pose(tight))
+    assert scale < cycle("quadrupteron").scale
+    found = pick_and_place(tight, home_pose(tight), samples=5001)
+    sliders = pteron.inverse_kinematics(tight, found.pose)
+    assert sliders.min() >= -0.05
+    assert sliders.max() <= 0.04
+    assert max(-0.05 - sliders.min(), sliders.max() - 0.04) > -2e-3, "a limit is what bounds it"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        ({"scale": 0.0}, "scale: 0.0 given"),
+        ({"duration": -1.0}, "duration: -1.0 given"),
+        ({"peak": float("nan")}, "peak: nan given"),
+        ({"samples": 1}, "samples: 1 given"),
+        ({"direction": [0.0, 0.0, 2.0]}, "no horizontal part"),
+        ({"direction": [0.0, 0.0, 0.0]}, "no horizontal part"),
+    ],
+)
+def test_a_cycle_that_cannot_be_is_refused(arguments, complaint):
+    with pytest.raises(pteron.DataError, match=complaint):
+        pick_and_place(MECHANISMS["tripteron"], [0.0, 0.0, 0.0], **arguments)
+
+
+def test_no_cycle_fits_at_a_singular_pose():
+    with pytest.raises(pteron.ModelError, match="choose a better pose"):
+        pick_and_place(MECHANISMS["quadrupteron"], [0.0, 0.0, 0.0, np.pi / 2])
+    with pytest.raises(pteron.ModelError, match="choose a better pose"):
+        pick_and_place(MECHANISMS["tripteron"], [5.0, 0.0, 0.0])
+
+
+@EVERY
+def test_joint_points_close_the_chains(name):
+    robot = MECHANISMS[name]
+    pose, _, _ = states(robot, 50)
+    points = joint_points(robot, pose)
+    upper = points.elbows - points.sliders
+    lower = points.platform_points - points.elbows
+    for link, length in ((upper, "upper_length"), (lower, "lower_length")):
+        sizes = np.linalg.norm(link, axis=-1)
+        np.testing.assert_allclose(sizes, np.tile(column(robot, length), (50, 1)), rtol=1e-12)
+        np.testing.assert_allclose((link * column(robot, "direction")).sum(-1), 0.0, atol=1e-14)
+    way = points.sliders - column(robot, "guide_point")
+    np.testing.assert_allclose(
+        way, points.coordinates[..., None] * column(robot, "e"), rtol=1e-12, atol=1e-14
+    )
+    side = (np.cross(upper, lower) * column(robot, "direction")).sum(axis=-1)
+    # u x (elbow side) points along sigma d; l_u x l_l has the opposite sign.
+    assert (np.sign(side) == -column(robot, "elbow")).all()
+
+
+@EVERY
+def test_the_platform_is_rigid_and_turns_about_its_axis(name):
+    robot = MECHANISMS[name]
+    pose, _, _ = states(robot, 20)
+    points = joint_points(robot, pose)
+    angle = pose[:, 3] if robot.platform.turns else np.zeros(20)
+    turn = Rotation.from_rotvec(np.multiply.outer(angle, robot.platform.axis)).as_matrix()
+    frame = np.array(robot.platform.frame)
+    np.testing.assert_allclose(points.axes, np.einsum("bij,kj->bki", turn, frame), atol=1e-14)
+    arms = column(robot, "platform_point") @ points.axes
+    expected = points.reference[:, None] + arms
+    np.testing.assert_allclose(points.platform_points, expected, atol=1e-14)
+
+
+@pytest.mark.parametrize("shape", BATCH_SHAPES)
+def test_joint_points_take_batches(shape):
+    robot = MECHANISMS["quadrupteron"]
+    pose = np.random.default_rng(1).uniform(-0.05, 0.05, (*shape, 4))
+    points = joint_points(robot, pose)
+    assert points.sliders.shape == points.elbows.shape == (*shape, 4, 3)
+    assert points.platform_points.shape == (*shape, 4, 3)
+    assert points.axes.shape == (*shape, 3, 3)
+    assert points.reference.shape == (*shape, 3)
+    assert points.coordinates.shape == (*shape, 4)
+
+
+def test_joint_points_out_of_reach_are_refused():
+    with pytest.raises(pteron.UnreachablePose, match="leg 1 misses it"):
+        joint_points(MECHANISMS["tripteron"], [[0.0, 0.0, 0.0], [0.0, 9.0, 0.0]])

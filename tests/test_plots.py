@@ -1,0 +1,190 @@
+"""Pictures: they show the numbers they are given, and their SVG is the same on every run."""
+
+import re
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from mechanisms import MECHANISMS, random_machine
+from mpl_toolkits.mplot3d.art3d import Line3D, Poly3DCollection
+
+import pteron
+from pteron.motion import joint_points
+from pteron.plots import (
+    LEG_COLORS,
+    forces_figure,
+    outline,
+    reach_figure,
+    regularity_figure,
+    robot_figure,
+    svg,
+)
+from pteron.plots.robot import upright
+from pteron.workspace import reach_slice
+
+MACHINES = ["quadrupteron", "tripteron", "quadrupteron turned", "random 3T 0"]
+
+
+def rails(points):
+    return np.stack([points.sliders - 0.1, points.sliders + 0.1], axis=-2)
+
+
+def machine(name):
+    robot = MECHANISMS[name]
+    points = joint_points(robot, pteron.random_poses(robot, 1, seed=2)[0])
+    gravity = np.array(robot.gravity)
+    return robot_figure(points, rails(points), gravity=gravity, angle="φ = 10°")
+
+
+def reach(name):
+    robot = MECHANISMS[name]
+    center = pteron.random_poses(robot, 1, seed=2, bend=0.8)[0]
+    path = np.linspace(center[:3], center[:3] + 0.05, 9)
+    return reach_figure(reach_slice(robot, center, points=31), path=path)
+
+
+def forces(name):
+    n = MECHANISMS[name].freedom
+    time = np.linspace(0.0, 1.0, 50)
+    return forces_figure(time, np.sin(np.outer(time, np.arange(1, n + 1))), turning_point=0.5)
+
+
+def regularity():
+    angles = np.linspace(-np.pi, np.pi, 91)
+    singular = np.array([-np.pi / 2, np.pi / 2])
+    return regularity_figure(angles, np.cos(angles), singular, home=0.1, used=(-0.4, 0.4))
+
+
+PICTURES = {
+    **{f"{make.__name__} {m}": (make, m) for make in (machine, reach, forces) for m in MACHINES},
+    "regularity": (regularity,),
+}
+
+
+@pytest.mark.parametrize("picture", PICTURES)
+def test_svg_is_the_same_each_time_and_refers_to_nothing(picture):
+    make, *arguments = PICTURES[picture]
+    figure = make(*arguments)
+    assert isinstance(figure, Figure)
+    first = svg(figure, name="one", title="What <it> is")
+    assert svg(make(*arguments), name="one", title="What <it> is") == first
+    root = ElementTree.fromstring(first.replace("xlink:href", "href"))
+    assert root.tag == "svg"
+    assert root.find("title").text == "What <it> is"
+    names = [element.get("id") for element in root.iter() if element.get("id")]
+    assert len(set(names)) == len(names)
+    assert all(name.startswith("one-") for name in names)
+    for target in re.findall(r'href="([^"]*)"', first) + re.findall(r"url\(([^)]*)\)", first):
+        assert target.startswith("#one-")
+        assert target[1:] in names
+    for word in ("http", "src=", "<metadata", "<?xml", "<!", "Date"):
+        assert word not in first
+
+
+def test_pictures_with_other_names_share_no_identifier():
+    first, second = (
+        set(re.findall(r'id="([^"]*)"', svg(regularity(), name=n, title=""))) for n in "ab"
+    )
+    assert first
+    assert not first & second
+
+
+def test_pictures_need_no_pyplot():
+    script = "import sys, pteron.plots; print('matplotlib.pyplot' in sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "False\n"
+
+
+def lines(figure):
+    found = [a for a in figure.axes[0].get_children() if isinstance(a, Line3D)]
+    return [(np.array(a.get_data_3d()).T, a.get_color()) for a in found]
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_the_drawn_links_have_their_lengths_and_their_legs_colour(name):
+    robot = MECHANISMS[name]
+    drawn = lines(machine(name))
+    for leg, color in zip(robot.legs, LEG_COLORS, strict=False):
+        own = [points for points, c in drawn if c == color and len(points) == 2]
+        lengths = [np.linalg.norm(points[1] - points[0]) for points in own]
+        np.testing.assert_allclose(lengths, [leg.upper_length, leg.lower_length], rtol=1e-12)
+        # Both meet in the elbow.
+        np.testing.assert_allclose(own[0][1], own[1][0], atol=1e-15)
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_the_drawn_machine_is_not_distorted(name):
+    figure = machine(name)
+    axes = figure.axes[0]
+    limits = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
+    aspect = np.asarray(axes._box_aspect)
+    ratio = np.ptp(limits, axis=1) / aspect
+    np.testing.assert_allclose(ratio, ratio[0], rtol=1e-9)
+    texts = [text.get_text() for text in axes.texts]
+    n = MECHANISMS[name].freedom
+    assert [text for text in texts if text.isdigit()] == [str(i + 1) for i in range(n)]
+    assert {"x", "y", "z", "g"} < set(texts)
+    assert sum(isinstance(a, Poly3DCollection) for a in axes.get_children()) > n
+
+
+def test_gravity_points_down_in_the_picture():
+    for seed in range(5):
+        robot = random_machine(seed, True)
+        gravity = np.array(robot.gravity)
+        rotation = upright(-gravity)
+        np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-15)
+        assert np.linalg.det(rotation) == pytest.approx(1.0)
+        np.testing.assert_allclose(
+            rotation @ gravity, [0.0, 0.0, -np.linalg.norm(gravity)], atol=1e-14
+        )
+    np.testing.assert_allclose(upright(np.array([0.0, 0.0, 2.0])), np.eye(3), atol=1e-15)
+
+
+def test_the_outline_goes_round_the_platform():
+    robot = MECHANISMS["quadrupteron"]
+    order = outline(joint_points(robot, np.zeros(4)))
+    # Points at -y, -x, +y and +x: round from one to its neighbour.
+    at = [("-y", "-x", "+y", "+x")[i] for i in order]
+    start = at.index("+x")
+    assert at[start:] + at[:start] == ["+x", "+y", "-x", "-y"]
+
+
+def test_forces_are_drawn_as_given():
+    time = np.linspace(0.0, 2.0, 30)
+    values = np.random.default_rng(0).normal(size=(30, 4))
+    axes = forces_figure(time, values).axes[0]
+    curves = [line for line in axes.lines if len(line.get_xdata()) == 30]
+    assert [curve.get_color() for curve in curves] == list(LEG_COLORS)
+    for curve, force in zip(curves, values.T, strict=True):
+        np.testing.assert_array_equal(curve.get_xdata(), time)
+        np.testing.assert_array_equal(curve.get_ydata(), force)
+    assert len({str(curve.get_linestyle()) + str(curve._dash_pattern) for curve in curves}) == 4
+    assert "N" in axes.get_ylabel()
+    assert "s" in axes.get_xlabel()
+
+
+def test_singular_orientations_are_marked():
+    figure = regularity()
+    axes = figure.axes[0]
+    words = [text.get_text() for text in axes.texts]
+    assert [word for word in words if "singular" in word] == [
+        "singular, \u221290.0°",
+        "singular, 90.0°",
+    ]
+    curve = max(axes.lines, key=lambda line: len(line.get_xdata()))
+    assert curve.get_ydata().min() >= 0.0
+    np.testing.assert_allclose(
+        curve.get_ydata(), np.abs(np.cos(np.radians(curve.get_xdata()))), atol=1e-12
+    )
+
+
+def test_a_map_keeps_its_aspect():
+    axes = reach("quadrupteron").axes[0]
+    assert axes.get_aspect() == 1.0
+    assert axes.get_xlabel() == "x (mm)"
+    assert axes.get_ylabel() == "y (mm)"

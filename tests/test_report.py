@@ -1,0 +1,340 @@
+"""The report: one page that needs nothing else, and numbers that agree with the library."""
+
+import getpass
+import json
+import re
+import socket
+from dataclasses import replace
+from functools import lru_cache
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mechanisms import CATALOG, MECHANISMS, with_elbows
+from test_workspace import fourfold, with_limits
+
+import pteron
+from pteron.report import write_report
+from pteron.report.contents import contents
+from pteron.report.costs import Cost
+from pteron.report.digits import expression, fixed, significant, symbol, triple
+from pteron.report.numbers import numbers
+from pteron.report.page import page
+from pteron.report.symbols import in_symbols
+
+HOSTILE = '</script><b onload="x">&\'{{ 7 * 6 }}'
+"""A machine's name comes from a file that anyone may have written."""
+
+MACHINES = {
+    **{name: CATALOG[name] for name in CATALOG},
+    "no gravity, other mode": with_elbows(MECHANISMS["quadrupteron, no gravity"], "+-+-"),
+    "turned": MECHANISMS["tripteron on a wall"],
+    "random": MECHANISMS["random 3T1R 1"],
+    "hostile": replace(with_limits(CATALOG["tripteron"], -0.05, 0.08), name=HOSTILE),
+}
+EVERY = pytest.mark.parametrize("name", MACHINES)
+
+VOID = {"meta", "input", "br", "hr", "img", "link"}
+
+
+@lru_cache
+def report(name):
+    return contents(MACHINES[name])
+
+
+@lru_cache
+def html(name):
+    return page(report(name))
+
+
+class Reader(HTMLParser):
+    """Collects what a page holds, and what does not balance."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.faults, self.ids, self.links, self.sources = [], [], [], [], []
+        self.counts, self.words, self.scripts = {}, [], {}
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag, attributes):
+        found = dict(attributes)
+        self.counts[tag] = self.counts.get(tag, 0) + 1
+        if "id" in found:
+            self.ids.append(found["id"])
+        self.links += [v for k, v in attributes if k.endswith("href")]
+        self.sources += [v for k, v in attributes if k in ("src", "srcset", "data", "action")]
+        self.faults += [f"{k} on {tag}" for k, _ in attributes if k.startswith("on")]
+        if tag not in VOID:
+            self.open.append((tag, found.get("id")))
+
+    def handle_startendtag(self, tag, attributes):
+        self.handle_starttag(tag, attributes)
+        if tag not in VOID:
+            self.open.pop()
+
+    def handle_endtag(self, tag):
+        if not self.open or self.open[-1][0] != tag:
+            self.faults.append(f"</{tag}> at {self.getpos()}, open: {self.open[-3:]}")
+        else:
+            self.open.pop()
+
+    def handle_data(self, data):
+        if self.open and self.open[-1][0] == "script":
+            key = self.open[-1][1]
+            self.scripts[key] = self.scripts.get(key, "") + data
+        elif not (self.open and self.open[-1][0] == "style"):
+            self.words.append(data)
+
+    @property
+    def text(self):
+        return re.sub(r"\s+", " ", " ".join(self.words))
+
+
+@lru_cache
+def read(name):
+    return Reader(html(name))
+
+
+@lru_cache
+def scene(name):
+    return json.loads(read(name).scripts["scene"])
+
+
+@EVERY
+def test_the_page_is_whole_and_needs_nothing_else(name):
+    found = read(name)
+    assert found.faults == []
+    assert found.open == []
+    assert found.sources == []
+    assert "link" not in found.counts
+    assert "img" not in found.counts
+    for word in ("http", "@import", "url(//", "fetch(", "XMLHttpRequest", "import("):
+        assert word not in html(name)
+    assert len(set(found.ids)) == len(found.ids)
+    assert found.links
+    for link in found.links:
+        assert link.startswith("#")
+        assert link[1:] in found.ids
+    wanted = set(re.findall(r'getElementById\("(\w+)"\)', found.scripts[None]))
+    assert wanted <= set(found.ids)
+    assert found.counts["canvas"] == 1
+    assert found.counts["svg"] == (6 if MACHINES[name].platform.turns else 5)
+    assert found.counts["h1"] == 1
+
+
+@EVERY
+def test_the_page_says_nothing_of_this_computer(name):
+    for word in (str(Path.home()), str(Path.cwd()), socket.gethostname(), "site-packages", "/tmp"):
+        assert len(word) < 4 or word not in html(name)
+    user = getpass.getuser()
+    assert len(user) < 4 or user == "root" or user not in html(name)
+
+
+@EVERY
+def test_no_number_is_missing(name):
+    for word in ("nan", "None", "Undefined", "inf", "{{", "{%"):
+        text = read(name).text.replace(HOSTILE, "")
+        assert not re.search(rf"(?<!\w){re.escape(word)}(?!\w)", text), word
+    assert not re.search(r"(?<!\de)-\d", text), "a hyphen where a minus belongs"
+
+
+def test_a_name_is_text_wherever_it_stands():
+    found = read("hostile")
+    assert HOSTILE in found.text
+    assert "b" not in found.counts or "<b onload" not in html("hostile")
+    assert html("hostile").count("</script>") == found.counts["script"] == 2
+
+
+@EVERY
+def test_3t_machines_have_no_angle(name):
+    turns = MACHINES[name].platform.turns
+    assert ("φ" in read(name).text) == turns
+    assert ("singular, " in read(name).text) == turns
+    assert (report(name).orientations is None) != turns
+
+
+@EVERY
+def test_a_page_is_the_same_each_time(name):
+    assert page(report(name)) == html(name)
+
+
+@EVERY
+def test_the_moving_picture_is_the_machine(name):
+    robot, data = MACHINES[name], scene(name)
+    frames = len(data["time"])
+    assert 60 <= frames <= 120
+    n = robot.freedom
+    sliders, elbows, platform = (np.array(data[key]) for key in ("sliders", "elbows", "platform"))
+    assert sliders.shape == elbows.shape == platform.shape == (frames, n, 3)
+    for link, length in ((elbows - sliders, "upper_length"), (platform - elbows, "lower_length")):
+        expected = np.tile([getattr(leg, length) for leg in robot.legs], (frames, 1))
+        np.testing.assert_allclose(np.linalg.norm(link, axis=-1), expected, atol=3e-6)
+    pose = np.array(data["pose"])
+    np.testing.assert_allclose(
+        pteron.inverse_kinematics(robot, pose), data["coordinates"], atol=5e-6
+    )
+    assert sorted(data["outline"]) == list(range(n))
+    rails = np.array(data["rails"])
+    low, high = rails[None, :, 0], rails[None, :, 1]
+    along = ((sliders - low) * (high - low)).sum(-1) / ((high - low) ** 2).sum(-1)
+    assert along.min() >= 0.0
+    assert along.max() <= 1.0
+    on_rail = low + along[..., None] * (high - low)
+    np.testing.assert_allclose(on_rail, sliders, atol=3e-6)
+    gravity = np.array(robot.gravity)
+    assert data["gravity"] == bool(gravity.any())
+    if gravity.any():
+        np.testing.assert_allclose(data["up"], -gravity / np.linalg.norm(gravity), atol=1e-6)
+    # The last frame is followed by the first: no jump, and no frame twice.
+    steps = np.diff(np.append(data["time"], data["duration"]))
+    np.testing.assert_allclose(steps, steps[0], atol=2e-6)
+
+
+def strict(text):
+    def refuse(constant):
+        raise AssertionError(f"{constant} is not JSON")
+
+    return json.loads(text, parse_constant=refuse)
+
+
+@EVERY
+def test_the_numbers_are_the_librarys(name):
+    robot = MACHINES[name]
+    data = strict(json.dumps(numbers(report(name))))
+    cycle = data["cycle"]
+    state = [np.array(cycle[key]) for key in ("pose", "velocity", "acceleration")]
+    forces = np.array(cycle["forces"])
+    np.testing.assert_allclose(pteron.inverse_dynamics(robot, *state), forces, atol=1e-10)
+    np.testing.assert_allclose(np.abs(forces).max(axis=0), cycle["peak_forces"])
+    # Over one period, by the trapezoidal rule.
+    mean = np.trapezoid(forces**2, cycle["time"], axis=0) / cycle["duration"]
+    np.testing.assert_allclose(np.sqrt(mean), cycle["rms_forces"])
+    speeds = (pteron.jacobian(robot, state[0]) @ state[1][..., None])[..., 0]
+    np.testing.assert_allclose(np.abs(speeds).max(axis=0), cycle["peak_slider_speeds"], atol=1e-12)
+    sliders = pteron.inverse_kinematics(robot, state[0])
+    np.testing.assert_array_equal(cycle["sliders"]["least"], sliders.min(axis=0))
+    np.testing.assert_array_equal(cycle["sliders"]["greatest"], sliders.max(axis=0))
+    assert all(cycle["sliders"]["within"])
+    home = data["home"]
+    np.testing.assert_array_equal(home["jacobian"], pteron.jacobian(robot, home["pose"]))
+    assert home["reserve"] > 0.4
+    assert home["condition_number"] >= 1.0
+    base = pteron.base_parameters(robot)
+    assert data["base_parameters"]["rank"] == base.rank == len(data["base_parameters"]["values"])
+    np.testing.assert_allclose(data["base_parameters"]["values"], base.values())
+    if robot.platform.turns:
+        singular = data["singular_orientations"]
+        np.testing.assert_allclose(singular, pteron.singular_orientations(robot))
+    else:
+        assert data["singular_orientations"] is None
+
+
+@EVERY
+def test_the_page_shows_the_numbers(name):
+    found, text = report(name), read(name).text
+    for value in (*found.peak_forces, *found.rms_forces, *found.peak_speeds):
+        assert significant(float(value)) in text
+    assert significant(found.jacobian.condition, 4) in text
+    for i, value in enumerate(found.base.values(), start=1):
+        assert significant(float(value), 4) in text
+        assert f"P b{i} " in text
+    for cost in found.costs:
+        assert str(cost.operations) in text
+        assert significant(cost.microseconds) in text
+
+
+def test_the_condition_number_mixes_no_units():
+    # In millimetres a machine is the same machine.
+    robot = CATALOG["quadrupteron"]
+    found = report("quadrupteron").jacobian
+    assert found.radius == pytest.approx(0.04)
+    scaled = found.matrix / [1.0, 1.0, 1.0, found.radius]
+    assert found.condition == pytest.approx(1.0 + np.sqrt(2.0))
+    assert found.condition == pytest.approx(np.linalg.cond(scaled))
+    assert robot.platform.turns
+    assert report("tripteron").jacobian.condition == pytest.approx(1.0)
+
+
+def test_symbols_stand_for_their_numbers():
+    for name in ("quadrupteron", "tripteron-oblique"):
+        base = report(name).base
+        found = in_symbols(base)
+        names = [re.sub("<[^>]*>", "", line) for line, _ in found.lengths]
+        values = {n: v for n, (_, v) in zip(names, found.lengths, strict=True)}
+        for line, expected in zip(found.sums, base.expressions(digits=12), strict=True):
+            text = re.sub(r"<sup>(\d)</sup>", r"**\1", line)
+            text = re.sub("<[^>]*>", "", text).replace("\u2212", "-").replace("\u202f", "*")
+            given = [eval(size, {}, values) for size in re.findall(r"\((.*?)\) [mI]", text)]
+            sizes = [abs(float(s)) for s in re.findall(r"([\d.]+) [mI]", expected)]
+            # Factors of one are not written as numbers, but may be as symbols that cancel.
+            np.testing.assert_allclose(np.abs([g for g in given if g != 1.0]), sizes)
+    assert in_symbols(report("quadrupteron-oblique").base) is None
+    assert "In symbols of the geometry" in read("quadrupteron").text
+    assert "In symbols of the geometry" not in read("quadrupteron-oblique").text
+
+
+def test_costs_on_the_page_are_those_of_the_run():
+    made_up = tuple(
+        Cost(f"form {k}", 7001 + k, 1234.0 + k, f"note {k}")
+        for k in range(len(report("tripteron").costs))
+    )
+    text = Reader(page(replace(report("tripteron"), costs=made_up))).text
+    for cost in made_up:
+        assert f"{cost.form} {cost.operations} {cost.microseconds:.0f} " in text
+        assert cost.note in text
+    section = text[text.index("What the model costs") :]
+    for cost in report("tripteron").costs:
+        assert not re.search(rf"\b{cost.operations}\b", section)
+    text = Reader(page(replace(report("tripteron"), costs=()))).text
+    assert "Too few poses are in reach to measure it" in text
+
+
+def test_the_report_is_written_whole(tmp_path: Path):
+    found = write_report(CATALOG["tripteron"], tmp_path / "a" / "b")
+    assert found == tmp_path / "a" / "b" / "report.html"
+    assert sorted(p.name for p in found.parent.iterdir()) == ["report.html", "report.json"]
+    assert found.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+    data = strict((found.parent / "report.json").read_text(encoding="utf-8"))
+    assert data["robot"] == "tripteron"
+    assert str(tmp_path) not in found.read_text(encoding="utf-8")
+
+
+def test_the_folder_is_checked_before_the_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def worked(robot):
+        raise AssertionError("worked")
+
+    monkeypatch.setattr("pteron.report.contents.contents", worked)
+    file = tmp_path / "file"
+    file.write_text("mine")
+    with pytest.raises(pteron.OutputError, match="it is a file"):
+        write_report(CATALOG["tripteron"], file)
+    assert file.read_text() == "mine"
+    with pytest.raises(AssertionError, match="worked"):
+        write_report(CATALOG["tripteron"], tmp_path)
+
+
+def test_machines_that_cannot_work_are_refused(tmp_path: Path):
+    robot = CATALOG["quadrupteron"]
+    short = replace(
+        robot, legs=tuple(replace(leg, upper_length=0.02, lower_length=0.02) for leg in robot.legs)
+    )
+    for machine in (short, with_limits(robot, 3.0, 4.0)):
+        with pytest.raises(pteron.ModelError):
+            write_report(machine, tmp_path / "none")
+    with pytest.raises(pteron.SingularPose, match="singular at every pose"):
+        write_report(fourfold(), tmp_path / "none")
+    assert list((tmp_path / "none").iterdir()) == []
+
+
+def test_numbers_as_people_read_them():
+    assert significant(0.0) == "0"
+    assert significant(999.6) == "1000"
+    assert significant(0.00099999, 3) == "0.00100"
+    assert significant(float("inf")) == "∞"
+    assert fixed(-0.04) == "0.0"
+    assert triple((1 / 3, -1e-17, 2.0)) == "(0.3333, 0, 2)"
+    assert str(symbol("I_e")) == "<i>I</i><sub>e</sub>"
+    assert str(expression("m_e - 625 I_e")).startswith("<i>m</i><sub>e</sub> \u2212 625\u202f<i>I")
+    assert "<b>" not in expression("<b> m_p1")
