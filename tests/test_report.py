@@ -338,3 +338,11 @@ def test_numbers_as_people_read_them():
     assert str(symbol("I_e")) == "<i>I</i><sub>e</sub>"
     assert str(expression("m_e - 625 I_e")).startswith("<i>m</i><sub>e</sub> \u2212 625\u202f<i>I")
     assert "<b>" not in expression("<b> m_p1")
+
+
+def test_a_machine_without_a_report_leaves_no_folder(tmp_path):
+    robot = pteron.load("quadrupteron")
+    legs = tuple(replace(leg, platform_point=(0.0, 0.0, 0.0)) for leg in robot.legs)
+    with pytest.raises(pteron.SingularPose):
+        write_report(replace(robot, legs=legs), tmp_path / "new")
+    assert not (tmp_path / "new").exists()

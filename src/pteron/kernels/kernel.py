@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from math import prod
 from typing import Any
 
 import casadi as ca
@@ -39,7 +40,7 @@ class Port:
     @property
     def size(self) -> int:
         """Number of values for one state."""
-        return int(np.prod(self.shape, dtype=int))
+        return prod(self.shape)
 
 
 @dataclass(frozen=True)
@@ -116,14 +117,16 @@ class Kernel:
                 if not port.shared
             }
         )
-        batch = int(np.prod(lead, dtype=int))
+        batch = prod(lead)
         inputs: list[Array] = []
         for port in self.inputs:
             if port.shared or port.name in self.fixed:
                 value = self.fixed.get(port.name, given.get(port.name))
                 inputs.append(np.ascontiguousarray(value, dtype=float).reshape(port.size))
             else:
-                whole = np.broadcast_to(given[port.name], lead + port.shape)
+                whole = given[port.name]
+                if whole.shape != lead + port.shape:
+                    whole = np.broadcast_to(whole, lead + port.shape)
                 inputs.append(np.ascontiguousarray(whole).reshape(batch, port.size))
         outputs = [np.empty((batch, port.size)) for port in self.outputs]
         self._run(batch, inputs, outputs)
@@ -147,8 +150,11 @@ def as_array(value: ArrayLike, name: str, shape: tuple[int, ...]) -> Array:
 
 def broadcast_lead(shapes: dict[str, tuple[int, ...]]) -> tuple[int, ...]:
     """Return the common shape of the leading axes, or name the inputs that do not agree."""
+    first, *others = shapes.values()
+    if all(shape == first for shape in others):
+        return first
     try:
-        return np.broadcast_shapes(*shapes.values())
+        return np.broadcast_shapes(first, *others)
     except ValueError:
         listed = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
         raise DataError(f"leading axes do not broadcast: {listed}") from None

@@ -289,7 +289,7 @@
   window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { theme(); redraw(); });
   calm.addEventListener("change", () => { if (calm.matches) run(false); });
   if ("IntersectionObserver" in window) new IntersectionObserver((seen) => { shown = seen[0].isIntersecting; last = null; }).observe(canvas);
-  if ("ResizeObserver" in window) new ResizeObserver(() => { fit(); redraw(); }).observe(canvas);
+  if ("ResizeObserver" in window) new ResizeObserver(() => { fit(); draw(); }).observe(canvas);
 
   seek.max = String(frames - 1);
   theme(); fit(); draw();

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 from pteron.atomic import make_folder, write_text
+from pteron.errors import PteronError
 from pteron.manipulator import Manipulator
 
 __all__ = ["write_report"]
@@ -42,9 +43,15 @@ def write_report(robot: Manipulator, folder: str | Path) -> Path:
     from pteron.report.numbers import numbers
     from pteron.report.page import page
 
-    target = make_folder(folder)
-    report = contents(robot)
-    html = page(report)
+    there = Path(folder).exists()
+    target = make_folder(folder)  # before the work, not after it
+    try:
+        report = contents(robot)
+        html = page(report)
+    except PteronError:
+        if not there:
+            target.rmdir()
+        raise
     write_text(
         target / "report.json", json.dumps(numbers(report), indent=1, allow_nan=False) + "\n"
     )
