@@ -30,7 +30,7 @@ MACHINES = {
     **{name: CATALOG[name] for name in CATALOG},
     "no gravity, other mode": with_elbows(MECHANISMS["quadrupteron, no gravity"], "+-+-"),
     "turned": MECHANISMS["tripteron on a wall"],
-    "random": MECHANISMS["random 3T1R 1"],
+    "random": MECHANISMS["random 3T 1"],
     "hostile": replace(with_limits(CATALOG["tripteron"], -0.05, 0.08), name=HOSTILE),
 }
 EVERY = pytest.mark.parametrize("name", MACHINES)
@@ -325,7 +325,12 @@ def test_machines_that_cannot_work_are_refused(tmp_path: Path):
             write_report(machine, tmp_path / "none")
     with pytest.raises(pteron.SingularPose, match="singular at every pose"):
         write_report(fourfold(), tmp_path / "none")
-    assert list((tmp_path / "none").iterdir()) == []
+    assert list(tmp_path.iterdir()) == [], "nothing is left behind"
+    mine = tmp_path / "mine.txt"
+    mine.write_text("mine")
+    with pytest.raises(pteron.SingularPose):
+        write_report(fourfold(), tmp_path)
+    assert list(tmp_path.iterdir()) == [mine], "a folder that was there stays"
 
 
 def test_numbers_as_people_read_them():

@@ -60,7 +60,7 @@ def geometric(text: Markup) -> Markup:
     --------
     >>> geometric(Markup("lu1/ll1^2")), geometric(Markup("1/(2*s1y)"))
     (Markup('<i>l</i><sub>u1</sub>/<i>l</i><sub>l1</sub><sup>2</sup>'),
-     Markup('1/(2\\u202f<i>s</i><sub>1y</sub>)'))
+     Markup('1/(2\u202f<i>s</i><sub>1y</sub>)'))
     """
     marked = _LENGTH.sub(r"<i>l</i><sub>\1</sub>", str(text).replace("*", "\u202f"))
     marked = _OFFSET.sub(r"<i>s</i><sub>\1\2</sub>", marked)
