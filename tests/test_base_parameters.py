@@ -1,12 +1,14 @@
 """Base parameters: counts of the literature, three methods that agree, certificates, symbols."""
 
 import json
+import re
 from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 import pytest
 import sympy
+from mechanisms import MECHANISMS
 from scipy.spatial.transform import Rotation
 
 import pteron
@@ -177,6 +179,25 @@ def test_symbols_evaluate_to_the_exact_coefficients(name, shared):
     numbers = base.expressions("sympy")
     for symbolic, number in zip(base.expressions("sympy", symbols=True), numbers, strict=True):
         assert sympy.expand(symbolic.subs(values) - number) == 0
+
+
+def value_of(text, numbers):
+    """Evaluate a text such as ``m_l1 - (1/(2*s1y)) mgx_e`` with Python's own arithmetic."""
+    text = re.sub(r"(\)|\b[\d.]+(?:e[-+]?\d+)?) (?=[A-Za-z])", r"\1*", text).replace("^", "**")
+    return eval(text, {"__builtins__": {}}, numbers)
+
+
+@pytest.mark.parametrize("symbols", [False, True])
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_the_text_evaluates_to_the_values(name, symbols):
+    robot = MECHANISMS[name]
+    base = pteron.base_parameters(robot)
+    parameters = dict(zip(pteron.parameter_names(robot), pteron.parameters(robot), strict=True))
+    numbers = base.geometry_values | {key: float(value) for key, value in parameters.items()}
+    found = [value_of(text, numbers) for text in base.expressions(symbols=symbols, digits=17)]
+    # Sums of large opposite terms: relative to the terms, not to what is left of them.
+    scale = np.abs(base.grouping) @ np.abs(pteron.parameters(robot))
+    assert (np.abs(found - base.values()) / scale).max() < 1e-12
 
 
 @pytest.mark.parametrize("name", pteron.catalog())

@@ -45,7 +45,11 @@ def _fraction_text(expression: Any) -> str:
     """Return numerator / denominator; SymPy itself prints 1/x^2 as x^(-2)."""
     top, bottom = expression.as_numer_denom()
     minus = top.could_extract_minus_sign()
-    text = str(-top if minus else top)
+    top = -top if minus else top
+    text = str(top)
+    # A sum needs brackets under a sign or over a denominator, and must not show its own sign.
+    if top.is_Add and (minus or bottom != 1 or text.startswith("-")):
+        text = f"({text})"
     if bottom != 1:
         text += f"/({bottom})" if bottom.is_Mul or bottom.is_Add else f"/{bottom}"
     return ("-" if minus else "") + text.replace("**", "^")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 from pathlib import Path
 
 from pteron.atomic import make_folder, write_text
@@ -50,7 +51,8 @@ def write_report(robot: Manipulator, folder: str | Path) -> Path:
         html = page(report)
     except PteronError:
         if not there:
-            target.rmdir()
+            with suppress(OSError):  # unless somebody has put something there meanwhile
+                target.rmdir()
         raise
     write_text(
         target / "report.json", json.dumps(numbers(report), indent=1, allow_nan=False) + "\n"
