@@ -4,6 +4,7 @@ import json
 import re
 from dataclasses import replace
 from fractions import Fraction
+from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -181,6 +182,11 @@ def test_symbols_evaluate_to_the_exact_coefficients(name, shared):
         assert sympy.expand(symbolic.subs(values) - number) == 0
 
 
+@lru_cache
+def base_of(name):
+    return pteron.base_parameters(MECHANISMS[name])
+
+
 def value_of(text, numbers):
     """Evaluate a text such as ``m_l1 - (1/(2*s1y)) mgx_e`` with Python's own arithmetic."""
     text = re.sub(r"(\)|\b[\d.]+(?:e[-+]?\d+)?) (?=[A-Za-z])", r"\1*", text).replace("^", "**")
@@ -191,11 +197,37 @@ def value_of(text, numbers):
 @pytest.mark.parametrize("name", MECHANISMS)
 def test_the_text_evaluates_to_the_values(name, symbols):
     robot = MECHANISMS[name]
-    base = pteron.base_parameters(robot)
+    base = base_of(name)
     parameters = dict(zip(pteron.parameter_names(robot), pteron.parameters(robot), strict=True))
     numbers = base.geometry_values | {key: float(value) for key, value in parameters.items()}
     found = [value_of(text, numbers) for text in base.expressions(symbols=symbols, digits=17)]
     # Sums of large opposite terms: relative to the terms, not to what is left of them.
+    scale = np.abs(base.grouping) @ np.abs(pteron.parameters(robot))
+    assert (np.abs(found - base.values()) / scale).max() < 1e-12
+
+
+def value_of_latex(text, numbers):
+    """Evaluate what `expressions("latex")` prints, after rewriting it as Python."""
+    text = re.sub(r"m_\{(\w+)\}\\gamma_\{\w+,([xy])\}", r"mg\2_\1", text)
+    text = re.sub(r"\b([mI])_\{(\w+)\}", r"\1_\2", text)
+    text = re.sub(r"\b([ls])_\{(\w+)\}", r"\1\2", text)
+    text = text.replace(r"\left(", "(").replace(r"\right)", ")").replace(r"\,", " ")
+    text = re.sub(r"\^\{(\d+)\}", r"**\1", text).replace("^", "**")
+    while r"\frac" in text:
+        text = re.sub(r"\\frac\{([^{}]*)\}\{([^{}]*)\}", r"((\1)/(\2))", text)
+    text = re.sub(r"(?<=[\w)])\s+(?=[\w(])", "*", text)
+    return eval(text, {"__builtins__": {}}, numbers)
+
+
+@pytest.mark.parametrize("symbols", [False, True])
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_the_latex_evaluates_to_the_values(name, symbols):
+    robot = MECHANISMS[name]
+    base = base_of(name)
+    parameters = dict(zip(pteron.parameter_names(robot), pteron.parameters(robot), strict=True))
+    numbers = base.geometry_values | {key: float(value) for key, value in parameters.items()}
+    texts = base.expressions("latex", symbols=symbols, digits=17)
+    found = [value_of_latex(text, numbers) for text in texts]
     scale = np.abs(base.grouping) @ np.abs(pteron.parameters(robot))
     assert (np.abs(found - base.values()) / scale).max() < 1e-12
 

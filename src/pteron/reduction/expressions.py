@@ -14,6 +14,9 @@ __all__ = ["as_latex", "as_sympy", "as_text"]
 
 Terms = Mapping[int, Share]
 
+_FACTORED = 60
+"""Operations up to which a share is factored, to be read; longer ones only cost minutes."""
+
 
 def terms_of(kept: int, given: Shares) -> dict[int, Share]:
     """Return the share of every column in the base parameter of a kept one, itself first."""
@@ -36,23 +39,26 @@ def as_text(names: Sequence[str], terms: Terms, digits: int) -> str:
 
 def _plain(share: Share) -> tuple[float, str]:
     """Return a share's value, and its text where it holds geometric symbols."""
-    if getattr(share, "free_symbols", None):
-        return 0.0, _fraction_text(factor(share))
-    return float(share), ""
-
-
-def _fraction_text(expression: Any) -> str:
-    """Return numerator / denominator; SymPy itself prints 1/x^2 as x^(-2)."""
-    top, bottom = expression.as_numer_denom()
-    minus = top.could_extract_minus_sign()
-    top = -top if minus else top
-    text = str(top)
+    if not _is_symbolic(share):
+        return float(share), ""
+    minus, size = _signed(share)
+    top, bottom = size.as_numer_denom()
     # A sum needs brackets under a sign or over a denominator, and must not show its own sign.
-    if top.is_Add and (minus or bottom != 1 or text.startswith("-")):
-        text = f"({text})"
+    text = f"({top})" if top.is_Add else str(top)
     if bottom != 1:
         text += f"/({bottom})" if bottom.is_Mul or bottom.is_Add else f"/{bottom}"
-    return ("-" if minus else "") + text.replace("**", "^")
+    return 0.0, ("-" if minus else "") + text.replace("**", "^")
+
+
+def _is_symbolic(share: Share) -> bool:
+    return bool(getattr(share, "free_symbols", None))
+
+
+def _signed(share: Any) -> tuple[bool, Any]:
+    """Return whether a share is written with a minus sign, and what is then written after it."""
+    size = factor(share) if share.count_ops() <= _FACTORED else share
+    minus = size.could_extract_minus_sign()
+    return minus, -size if minus else size
 
 
 def as_sympy(names: Sequence[str], terms: Terms) -> Any:
@@ -64,10 +70,10 @@ def as_latex(names: Sequence[str], terms: Terms, digits: int) -> str:
     """Return a base parameter in LaTeX, in the paper's notation."""
     text = ""
     for column, share in terms.items():
-        if getattr(share, "free_symbols", None):
-            size = latex(factor(share), symbol_names=_geometry_names(share))
-            minus = size.startswith("-")
-            size = size.lstrip("- ")
+        if _is_symbolic(share):
+            minus, value = _signed(share)
+            size = latex(value, symbol_names=_geometry_names(share))
+            size = rf"\left({size}\right)" if value.is_Add or size.startswith("-") else size
         else:
             value = float(share)
             rounded = f"{abs(value):.{digits}g}"
