@@ -323,7 +323,7 @@ def test_unknown_choices_are_refused():
     with pytest.raises(pteron.ModelError, match='use method="exact"'):
         pteron.base_parameters(robot, "svd").expressions(symbols=True)
     other = pteron.base_parameters(pteron.load("tripteron"))
-    with pytest.raises(pteron.ModelError, match="belongs to tripteron"):
+    with pytest.raises(pteron.ModelError, match="layout or gravity differ"):
         base_regressor(robot, other, np.zeros(4), np.zeros(4), np.zeros(4))
 
 
@@ -332,3 +332,99 @@ def test_a_machine_that_is_singular_everywhere_has_none():
     legs = tuple(replace(leg, platform_point=(0.0, 0.0, 0.0)) for leg in robot.legs)
     with pytest.raises(pteron.SingularPose, match="singular at every pose"):
         pteron.base_parameters(replace(robot, legs=legs))
+
+
+def two_legs_along_k():
+    """Two legs along the platform's axis: J is singular at every pose, by exact cancellation."""
+    robot = machine("quadrupteron")
+    first, second, third, _ = robot.legs
+    twin = replace(first, platform_point=(0.05, 0.03, 0.0), guide_point=(0.05, -0.3, 0.0))
+    return replace(robot, legs=(first, second, twin, third))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_turned_machine_that_is_singular_everywhere_is_recognised(seed):
+    turned = pteron.turned(two_legs_along_k(), Rotation.random(rng=seed).as_matrix())
+    assert pteron.is_singular_everywhere(turned)
+    with pytest.raises(pteron.SingularPose):
+        pteron.base_parameters(turned)
+
+
+@pytest.mark.parametrize("size", [1e-3, 1e-2, 1e3])
+@pytest.mark.parametrize("name", ["quadrupteron", "quadrupteron-oblique", "tripteron"])
+def test_counts_do_not_depend_on_the_machines_size(name, size):
+    robot = pteron.load(name)
+    legs = tuple(
+        replace(
+            leg,
+            guide_point=tuple(size * np.array(leg.guide_point)),
+            platform_point=tuple(size * np.array(leg.platform_point)),
+            upper_length=size * leg.upper_length,
+            lower_length=size * leg.lower_length,
+        )
+        for leg in robot.legs
+    )
+    scaled = replace(robot, legs=legs)
+    expected = pteron.base_parameters(robot).rank
+    assert [pteron.base_parameters(scaled, method).rank for method in METHODS] == [expected] * 3
+
+
+def tilted(angle):
+    """An orthogonal Tripteron whose first direction is tilted by a small angle."""
+    robot = machine("tripteron", GENERIC)
+    d = (np.cos(angle), np.sin(angle) * 0.6, np.sin(angle) * 0.8)
+    return replace(robot, legs=(replace(robot.legs[0], direction=d), *robot.legs[1:]))
+
+
+@pytest.mark.parametrize(
+    ("angle", "rank"), [(1e-12, 18), (5e-10, 18), (8e-9, 19), (2e-8, 19), (1e-6, 19), (1e-3, 19)]
+)
+def test_a_right_angle_that_is_nearly_one(angle, rank):
+    certificate = pteron.base_parameters(tilted(angle)).certificate
+    assert certificate.rank == rank
+    if rank == 18:
+        assert any("d1" in line for line in certificate.recognised), "what was snapped is said"
+    if 1e-9 <= angle < 1e-5:
+        assert any("d1 and d2" in line for line in certificate.nearly)
+        assert "perhaps meant to be" in certificate.summary()
+
+
+def test_a_relation_that_exactness_loses_is_seen_in_floating_point():
+    """Sliders along gravity's projections keep m_e dependent, which no right angle shows."""
+    robot = machine("tripteron", (5.0, -6.0, -5.5))
+    rng = np.random.default_rng(1)
+    legs = []
+    for leg in robot.legs:
+        d = np.array(leg.direction)
+        t = np.cross(d, rng.normal(size=3))
+        t /= np.linalg.norm(t)
+        g = np.array(robot.gravity)
+        e = (g @ d) * d + (g @ t) * t
+        legs.append(replace(leg, slider_direction=tuple(e / np.linalg.norm(e))))
+    certificate = pteron.base_parameters(replace(robot, legs=tuple(legs))).certificate
+    if certificate.rank != certificate.numerical_rank:
+        assert "IN FLOATING POINT" in certificate.summary()
+    assert certificate.numerical_rank == 18
+
+
+def test_tiny_gravity_counts():
+    robot = machine("tripteron", (0.0, 0.0, -4e-7))
+    assert pteron.base_parameters(robot).rank == 16
+
+
+def test_a_base_of_another_layout_is_refused():
+    robot = machine("quadrupteron")
+    longer = replace(robot.legs[1], lower_length=0.17)
+    other = replace(robot, legs=(robot.legs[0], longer, *robot.legs[2:]))
+    base = pteron.base_parameters(other)
+    with pytest.raises(pteron.ModelError, match="layout or gravity differ"):
+        base_regressor(robot, base, np.zeros(4), np.zeros(4), np.zeros(4))
+    mode = pteron.working_modes(robot)[5]
+    own = pteron.base_parameters(robot)
+    assert base_regressor(mode, own, np.zeros(4), np.zeros(4), np.zeros(4)).shape == (4, 26)
+
+
+@pytest.mark.parametrize("shared", [[1, 2], [(1.0, 2)], 3, [(1, 2), (2, 3)], "all", [("1",)]])
+def test_groups_that_are_none_are_refused(shared):
+    with pytest.raises(pteron.ModelError, match=r"^shared: "):
+        pteron.base_parameters(machine("quadrupteron"), shared=shared)

@@ -297,7 +297,7 @@ def test_a_wrong_shape_is_refused_with_what_was_expected(name):
             assert str(caught.value) == f"{argument}: shape {shown} given, (..., 4) expected"
         for wrong in ("text", [[1, 2, 3, 4], [1]], {"x": 1}):
             given = [*values[:k], wrong, *values[k + 1 :]]
-            with pytest.raises(DataError, match=f"^{argument}: not an array of numbers$"):
+            with pytest.raises(DataError, match=f"^{argument}: not an array of real numbers$"):
                 CALLS[name][0](ROBOT, *given)
 
 

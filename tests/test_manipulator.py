@@ -184,7 +184,7 @@ def test_a_manipulator_needs_as_many_legs_as_freedoms(name):
 
 def test_a_manipulator_has_a_name_and_gravity():
     robot = CATALOG["tripteron"]
-    refused(lambda: replace(robot, name="  "), "name: '  ' is empty; give the machine a name")
+    refused(lambda: replace(robot, name="  "), "name: '  ' is not a text with at least one letter")
     refused(lambda: replace(robot, gravity=(0.0, 1.0)), "gravity: 2 numbers given, 3 expected")
     refused(lambda: replace(robot, gravity=(0.0, 0.0, np.nan)), "gravity[2]: nan is not a finite")
     assert Manipulator("t", robot.platform, list(robot.legs)).gravity == (0.0, 0.0, -9.81)
@@ -327,7 +327,7 @@ BAD_FILES = {
         "platform.x_axis: missing",
     ),
     "wrong number of legs": ('"3T1R"', '"3T"', "legs: 4 given, but a 3T platform has 3 freedoms"),
-    "empty name": ('"quadrupteron"', '" "', "name: ' ' is empty; give the machine a name"),
+    "empty name": ('"quadrupteron"', '" "', "name: ' ' is not a text with at least one letter"),
     "no legs": ("[[legs]]", "[[leg]]", "legs: missing"),
     "not TOML": ("mass = 0.8", "mass = = 0.8", "not a TOML file (Invalid value (at line 11"),
     "a key twice": ("mass = 0.8", "mass = 0.8\nmass = 0.8", "not a TOML file (Cannot overwrite"),

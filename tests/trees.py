@@ -15,10 +15,13 @@ import pteron
 
 @dataclass(frozen=True)
 class Body:
-    """A body of a chain: its joint to the body before, and its inertia in base axes at rest."""
+    """A body of a chain: its joints to the body before, and its inertia in base axes at rest.
 
-    slides: bool
-    axis: np.ndarray
+    Several joints at one place, none of them with a body of its own: MuJoCo wants mass on every
+    body that moves, and a mass made up for it would be seen in the forces.
+    """
+
+    joints: list
     offset: np.ndarray
     mass: float
     center: np.ndarray
@@ -33,8 +36,12 @@ class Chain:
     points: list
 
 
-# MuJoCo wants mass on every moving body; a body of this size is far below every tolerance.
-SPECK = (1e-12, np.zeros(3), 1e-12 * np.eye(3))
+def slide(axis):
+    return True, np.array(axis)
+
+
+def hinge(axis):
+    return False, np.array(axis)
 
 
 def plane_axis(leg):
@@ -58,25 +65,22 @@ def chains(robot):
     found = []
     for leg in robot.legs:
         a, d = plane_axis(leg), np.array(leg.direction)
+        turning = [hinge(d)]
         slider = (leg.slider_mass, np.zeros(3), 1e-6 * np.eye(3))
         mass, center, spatial = planar(leg.lower, a, d)
         lower = (mass, center + leg.lower_length * a, spatial)
         bodies = [
-            Body(True, np.array(leg.e), np.array(leg.guide_point), *slider),
-            Body(False, d, np.zeros(3), *planar(leg.upper, a, d)),
-            Body(False, d, leg.upper_length * a, *lower),
+            Body([slide(leg.e)], np.array(leg.guide_point), *slider),
+            Body(turning, np.zeros(3), *planar(leg.upper, a, d)),
+            Body(turning, leg.upper_length * a, *lower),
         ]
         found.append(Chain(bodies, [leg.lower_length * a]))
     x, y, k = (np.array(axis) for axis in robot.platform.frame)
     inertia = planar(robot.platform.inertia, x, k)
     frame = np.column_stack([x, y, k])
     points = [frame @ leg.platform_point for leg in robot.legs]
-    bodies = [Body(True, axis, np.zeros(3), *SPECK) for axis in np.eye(3)]
-    if robot.platform.turns:
-        bodies.append(Body(False, k, np.zeros(3), *inertia))
-    else:
-        bodies[-1] = Body(True, np.eye(3)[2], np.zeros(3), *inertia)
-    found.append(Chain(bodies, points))
+    joints = [slide(axis) for axis in np.eye(3)] + ([hinge(k)] if robot.platform.turns else [])
+    found.append(Chain([Body(joints, np.zeros(3), *inertia)], points))
     return found
 
 
@@ -128,13 +132,15 @@ class Pinocchio:
         for k, chain in enumerate(chains(robot)):
             parent = 0
             for j, body in enumerate(chain.bodies):
-                kind = (
-                    pin.JointModelPrismaticUnaligned
-                    if body.slides
-                    else pin.JointModelRevoluteUnaligned
-                )
                 place = pin.SE3(np.eye(3), body.offset)
-                parent = model.addJoint(parent, kind(body.axis), place, f"joint {k} {j}")
+                for i, (slides, axis) in enumerate(body.joints):
+                    kind = (
+                        pin.JointModelPrismaticUnaligned
+                        if slides
+                        else pin.JointModelRevoluteUnaligned
+                    )
+                    parent = model.addJoint(parent, kind(axis), place, f"joint {k} {j} {i}")
+                    place = pin.SE3.Identity()
                 inertia = pin.Inertia(body.mass, body.center, body.inertia)
                 model.appendBodyToJoint(parent, inertia, pin.SE3.Identity())
             self.frames.append(
@@ -198,8 +204,9 @@ class MuJoCo:
                     fullinertia=body.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]],
                     explicitinertial=True,
                 )
-                kind = mujoco.mjtJoint.mjJNT_SLIDE if body.slides else mujoco.mjtJoint.mjJNT_HINGE
-                parent.add_joint(type=kind, axis=body.axis)
+                for slides, axis in body.joints:
+                    kind = mujoco.mjtJoint.mjJNT_SLIDE if slides else mujoco.mjtJoint.mjJNT_HINGE
+                    parent.add_joint(type=kind, axis=axis)
             self.points_of.append([parent.add_site(pos=point) for point in chain.points])
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)

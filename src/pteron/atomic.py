@@ -13,7 +13,11 @@ __all__ = ["make_folder", "write_bytes", "write_text"]
 
 def write_text(path: str | Path, text: str) -> Path:
     """Write `text` to `path` in UTF-8, through a temporary file beside it and a rename."""
-    return write_bytes(path, text.encode("utf-8"))
+    try:
+        data = text.encode("utf-8")
+    except UnicodeEncodeError as error:
+        raise OutputError(f"{path}: cannot be written in UTF-8 ({error.reason})") from None
+    return write_bytes(path, data)
 
 
 def write_bytes(path: str | Path, data: bytes) -> Path:

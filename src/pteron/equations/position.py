@@ -10,6 +10,8 @@ from pteron.equations.geometry import Expression, Geometry
 from pteron.equations.legs import closing_vector, leg_position, slider_coordinate
 from pteron.equations.platforms import PlatformMotion, platform_motion, resting_offset
 
+_ROUNDING = 1e-14
+
 
 def platform_at(geometry: Geometry, pose: Expression) -> PlatformMotion:
     """Return the platform at rest in a pose."""
@@ -76,7 +78,10 @@ def direct_position(geometry: Geometry, sliders: Expression) -> Expression:
     a, b = singularity(geometry)
     total = ca.dot(c.null, known)
     square = a * a + b * b
-    root = ca.sqrt(square - total * total)
+    # At a singular orientation both poses meet and the radicand is all rounding: what is barely
+    # below zero counts as zero, an error of 1e-7 rad there.
+    rest, slack = square - total * total, _ROUNDING * square
+    root = ca.sqrt(ca.fmax(rest, ca.fmin(rest + slack, 0)))
     poses = []
     for branch in (1, -1):
         cosine = (-b * total + branch * a * root) / square

@@ -139,9 +139,12 @@ class Kernel:
 def as_array(value: ArrayLike, name: str, shape: tuple[int, ...]) -> Array:
     """Return `value` as floats whose last axes are `shape`, or say what was expected."""
     try:
-        array = np.asarray(value, dtype=float)
+        given = np.asarray(value)
+        if given.dtype.kind not in "biufO":
+            raise TypeError
+        array = np.asarray(given, dtype=float)
     except (TypeError, ValueError):
-        raise DataError(f"{name}: not an array of numbers") from None
+        raise DataError(f"{name}: not an array of real numbers") from None
     if len(shape) > array.ndim or array.shape[array.ndim - len(shape) :] != shape:
         expected = ", ".join(["...", *map(str, shape)])
         raise DataError(f"{name}: shape {array.shape} given, ({expected}) expected")

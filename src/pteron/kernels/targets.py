@@ -74,5 +74,7 @@ def compile(
 @lru_cache(maxsize=512)
 def _compiled(robot: Manipulator, what: str, target: str, columns: Columns | None) -> Kernel:
     built = program(robot, what, columns)
-    fixed = {port.name: parameters(robot) for port in built.inputs if port.name == "parameters"}
+    values = parameters(robot)
+    values.setflags(write=False)  # the kernel is shared by all who ask for it
+    fixed = {port.name: values for port in built.inputs if port.name == "parameters"}
     return TARGETS[target](built.name, built.function, built.inputs, built.outputs, fixed)

@@ -12,6 +12,7 @@ from pteron.errors import DataError, SingularPose, UnreachablePose
 from pteron.kernels import Array, as_array, compile
 from pteron.kinematics.singularities import EVERYWHERE, is_singular_everywhere
 from pteron.manipulator import Manipulator
+from pteron.manipulator.vectors import norm
 
 __all__ = ["SINGULAR", "blanked", "finite", "usable_poses"]
 
@@ -74,7 +75,8 @@ def usable_poses(
         distance, margin, sine = compile(robot, "reach")(poses)
         beyond = np.isnan(sine) & ~bad[..., None]
         # lu and ll are equal where the elbow is undetermined, so that n = 0 is within reach.
-        coincident = distance <= 1e-12 * _spans(robot)
+        far = np.abs(poses[..., :3]).sum(axis=-1, keepdims=True) + _guides(robot)
+        coincident = distance <= 1e-12 * _spans(robot) + 1e-15 * far
         stuck = (sine <= SINGULAR) if bent else coincident
         if on_failure == "raise" and (beyond.any() or stuck.any()):
             index = np.argwhere(beyond | stuck)[0]
@@ -111,6 +113,10 @@ def blanked(values: Array, *states: Array) -> Array:
 
 def _spans(robot: Manipulator) -> Array:
     return np.array([leg.upper_length + leg.lower_length for leg in robot.legs])
+
+
+def _guides(robot: Manipulator) -> Array:
+    return np.array([norm(leg.guide_point) for leg in robot.legs])
 
 
 def _where(index: tuple[int, ...]) -> str:

@@ -133,9 +133,10 @@ def direct_kinematics(
     if is_singular_everywhere(robot):
         raise SingularPose(EVERYWHERE.format(name=robot.name), kind="II", closeness=0.0, index=())
     given = finite(robot, sliders, "sliders", on_failure)
-    poses = usable_poses(
-        robot, compile(robot, "direct_kinematics")(given), reach=True, on_failure="nan"
-    )
+    found = compile(robot, "direct_kinematics")(given)
+    if robot.platform.turns:
+        found[..., 3] = np.where(found[..., 3] <= -np.pi, np.pi, found[..., 3])
+    poses = usable_poses(robot, found, reach=True, on_failure="nan")
     lost = np.isnan(poses).all(axis=(-2, -1))
     if on_failure == "raise" and lost.any():
         index = tuple(int(i) for i in np.argwhere(lost)[0])

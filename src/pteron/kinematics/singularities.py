@@ -45,9 +45,11 @@ def is_singular_everywhere(robot: Manipulator) -> bool:
     if c.null is None:
         return False
     a, b = (float(value) for value in singularity(geometry))
-    null, cosines, sines = (np.array(ca.evalf(v)).ravel() for v in (c.null, c.cosines, c.sines))
-    scale = np.abs(null) @ np.hypot(cosines, sines)
-    return bool(np.hypot(a, b) <= _VANISHING * scale)
+    # Of what cannot vanish by cancellation, else noise would be measured against noise.
+    null = np.abs(np.array(ca.evalf(c.null))).max()
+    bars = np.linalg.norm(np.array(ca.evalf(c.rows)), axis=1)
+    offsets = np.linalg.norm([leg.platform_point for leg in robot.legs], axis=1)
+    return bool(np.hypot(a, b) <= _VANISHING * null * bars.max() * offsets.max())
 
 
 def singular_orientations(robot: Manipulator) -> Array:

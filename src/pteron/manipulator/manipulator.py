@@ -46,8 +46,8 @@ class Manipulator:
     gravity: Vector = STANDARD_GRAVITY
 
     def __post_init__(self) -> None:
-        if not str(self.name).strip():
-            raise ModelError(f"name: {self.name!r} is empty; give the machine a name")
+        if type(self.name) is not str or not self.name.strip():
+            raise ModelError(f"name: {self.name!r} is not a text with at least one letter")
         legs = tuple(self.legs)
         freedom = len(self.platform.coordinates)
         if len(legs) != freedom:

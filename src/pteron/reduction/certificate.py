@@ -103,8 +103,11 @@ class ExactCertificate(Certificate):
         The columns whose relations are due to this machine's special geometry instead.
     coefficients : str
         "rational", "algebraic" or "floating point": what the groupings are known as.
-    recognised, approximated, lost : tuple of str
+    recognised, approximated, lost, nearly : tuple of str
         How the machine's floats were made exact; see `ExactGeometry`.
+    numerical_rank : int or None
+        Where floats were approximated, and states in reach could be found: the rank that the
+        singular values of the regressor show.
     """
 
     primes: tuple[int, ...]
@@ -120,6 +123,8 @@ class ExactCertificate(Certificate):
     recognised: tuple[str, ...]
     approximated: tuple[str, ...]
     lost: tuple[str, ...]
+    nearly: tuple[str, ...]
+    numerical_rank: int | None
 
     def summary(self) -> str:
         """Return the certificate in a few sentences."""
@@ -145,9 +150,20 @@ class ExactCertificate(Certificate):
                 f"of {', '.join(self.unexplained)}."
             )
         if self.recognised:
-            lines.append("Recognised: " + "; ".join(self.recognised) + ".")
+            lines.append("Taken as exact: " + "; ".join(self.recognised) + ".")
         if self.approximated:
             lines.append("Approximated: " + "; ".join(self.approximated) + ".")
+        if self.numerical_rank is not None:
+            agrees = self.numerical_rank == self.rank
+            lines.append(
+                "The rank is that of the machine so approximated; in floating point that of the "
+                f"machine itself is {self.numerical_rank} too."
+                if agrees
+                else "The rank is that of the machine so approximated, but IN FLOATING POINT THAT "
+                f"OF THE MACHINE ITSELF IS {self.numerical_rank}: a special relation may be lost."
+            )
         if self.lost:
             lines.append("Not kept exactly: " + "; ".join(self.lost) + ".")
+        if self.nearly:
+            lines.append("Nearly special, and perhaps meant to be: " + "; ".join(self.nearly) + ".")
         return "\n".join(lines)

@@ -16,7 +16,7 @@ from typing import TypeVar
 import numpy as np
 from sympy import factorint, isprime
 
-from pteron.errors import SingularPose
+from pteron.errors import ModelError, SingularPose
 from pteron.kernels import Array, PrimeField
 from pteron.kinematics import is_singular_everywhere
 from pteron.manipulator import Manipulator
@@ -31,7 +31,7 @@ from pteron.reduction.degrees import degree_bound
 from pteron.reduction.elimination import dependencies, reconstruct, remainder
 from pteron.reduction.exact_geometry import ExactGeometry, exact_geometry
 from pteron.reduction.grouping import Grouping, Shares
-from pteron.reduction.numerical import fitted_shares
+from pteron.reduction.numerical import fitted_shares, numerical_rank
 from pteron.reduction.symbols import algebraic_values, symbolic_shares
 from pteron.reduction.transfers import Transfer
 
@@ -149,8 +149,22 @@ def exact_grouping(
         recognised=geometry.recognised,
         approximated=geometry.approximated,
         lost=geometry.lost,
+        nearly=geometry.nearly,
+        numerical_rank=_numerical_rank(robot, geometry, sharing, seed),
     )
     return Grouping(tuple(sorted(kept)), given, certificate)
+
+
+def _numerical_rank(
+    robot: Manipulator, geometry: ExactGeometry, sharing: Array, seed: int
+) -> int | None:
+    """Return the rank in floating point where it can tell something, and states can be found."""
+    if not geometry.approximated:
+        return None
+    try:
+        return numerical_rank(robot, sharing, seed)
+    except ModelError:
+        return None
 
 
 def _modular(

@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
-from itertools import permutations
+from itertools import combinations, permutations
 from typing import TypeVar
 
 import casadi as ca
@@ -32,7 +32,13 @@ _PARALLEL = 1e-9
 _FINE = 10**12
 """Largest denominator of an approximation: its error is below 1e-12 times 1e-6."""
 
-ZERO, ONE = Surd(Fraction(0)), Surd(Fraction(1))
+_NOISE = 1e-14
+"""What rounding leaves of a unit vector; a larger error is reported."""
+
+_NEARLY = 1e-5
+"""Angle, rad, within which a relation that does not hold was perhaps meant to."""
+
+ZERO = Surd(Fraction(0))
 
 
 @dataclass(frozen=True)
@@ -80,6 +86,8 @@ class ExactGeometry:
         What was taken for a root, and what was approximated, each with the error made.
     lost : tuple of str
         Right angles between directions which the exact numbers do not keep.
+    nearly : tuple of str
+        Right angles and parallels that are missed by little, and taken as missed.
     """
 
     legs: tuple[ExactLeg, ...]
@@ -88,6 +96,7 @@ class ExactGeometry:
     recognised: tuple[str, ...]
     approximated: tuple[str, ...]
     lost: tuple[str, ...]
+    nearly: tuple[str, ...]
 
     @property
     def radicands(self) -> frozenset[int]:
@@ -147,7 +156,7 @@ def exact_geometry(robot: Manipulator) -> ExactGeometry:
     gravity: ExactVector = (ZERO, ZERO, ZERO)
     if size > 0.0:
         x, y, z = exact["gravity"]
-        scale = Fraction(size).limit_denominator(10**6)
+        scale = Fraction(size).limit_denominator(10**6) or Fraction(size)
         gravity = (x.times(scale), y.times(scale), z.times(scale))
     return ExactGeometry(
         tuple(legs),
@@ -156,6 +165,7 @@ def exact_geometry(robot: Manipulator) -> ExactGeometry:
         tuple(notes.recognised),
         tuple(notes.approximated),
         tuple(_lost_right_angles(unit, exact)),
+        tuple(_near_relations(unit)),
     )
 
 
@@ -182,7 +192,7 @@ class _Notes:
         known = [c for c in simple if c is not None]
         if len(known) == 3 and sum(c.square for c in known) == 1:
             for axis, value, exact in zip("xyz", given, known, strict=True):
-                if exact.s != 1:
+                if exact.s != 1 or abs(float(exact) - float(value)) > _NOISE:
                     self._recognised(f"{name}.{axis}", float(value), exact)
             return (known[0], known[1], known[2])
         vector = _stereographic(given)
@@ -266,6 +276,9 @@ def _exact_directions(given: dict[str, Array], notes: _Notes) -> dict[str, Exact
                 sense = Fraction(round(float(vector @ given[earlier])))
                 x, y, z = kept
                 exact[name] = (x.times(sense), y.times(sense), z.times(sense))
+                error = float(np.linalg.norm(vector - float(sense) * given[earlier]))
+                if error > _NOISE:
+                    notes.recognised.append(f"{name} parallel to {earlier} (off by {error:.0e})")
                 break
         else:
             exact[name] = notes.direction(name, vector)
@@ -283,7 +296,7 @@ def _stereographic(given: Array) -> ExactVector:
     plane: list[Fraction] = []
     for i in others:
         t = float(given[i]) / (1.0 + abs(float(given[pole])))
-        plane.append(Fraction(0) if abs(t) < _PARALLEL else Fraction(t).limit_denominator(10**8))
+        plane.append(Fraction(0) if abs(t) < _PARALLEL else Fraction(t).limit_denominator(_FINE))
     square: Fraction = sum((t * t for t in plane), Fraction(0))
     result = [Fraction(0)] * 3
     result[pole] = sign * (1 - square) / (1 + square)
@@ -302,6 +315,18 @@ def _lost_right_angles(given: dict[str, Array], exact: dict[str, ExactVector]) -
             ):
                 lost.append(f"{a} at a right angle to {b}")
     return lost
+
+
+def _near_relations(given: dict[str, Array]) -> list[str]:
+    found = []
+    for (a, u), (b, v) in combinations(given.items(), 2):
+        for relation, angle in (
+            ("at a right angle", abs(float(u @ v))),
+            ("parallel", float(np.linalg.norm(np.cross(u, v)))),
+        ):
+            if _PARALLEL <= angle < _NEARLY:
+                found.append(f"{a} and {b} are not {relation}, by {angle:.0e} rad")
+    return found
 
 
 def _perpendicular(a: ExactVector, b: ExactVector) -> bool:

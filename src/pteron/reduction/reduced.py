@@ -6,7 +6,7 @@ from pteron.conventions import BatchOfRegressors, OnFailure, PoseLike
 from pteron.errors import ModelError
 from pteron.kernels import compile
 from pteron.kinematics.poses import blanked, finite, usable_poses
-from pteron.manipulator import Manipulator, parameter_names
+from pteron.manipulator import Manipulator
 from pteron.reduction.result import BaseParameters
 
 __all__ = ["base_regressor"]
@@ -42,7 +42,7 @@ def base_regressor(
     Raises
     ------
     ModelError
-        If `base` belongs to a machine with another number of parameters.
+        If `base` belongs to a machine of another layout, or with other gravity.
     UnreachablePose
         If a leg's links do not reach a pose.
     SingularPose
@@ -58,13 +58,22 @@ def base_regressor(
     >>> np.allclose(forces, pteron.inverse_dynamics(robot, *state))
     True
     """
-    if base.selection.shape[0] != len(parameter_names(robot)):
+    if _layout(base.robot) != _layout(robot):
         raise ModelError(
-            f"base: belongs to {base.robot.name} with {base.selection.shape[0]} parameters, but "
-            f"{robot.name} has {len(parameter_names(robot))}"
+            f"base: belongs to {base.robot.name}, whose layout or gravity differ from those of "
+            f"{robot.name}; ask for base_parameters of this one"
         )
     poses = usable_poses(robot, pose, bent=True, held=True, on_failure=on_failure)
     rate = finite(robot, velocity, "velocity", on_failure)
     second = finite(robot, acceleration, "acceleration", on_failure)
     matrices: BatchOfRegressors = compile(robot, "base_regressor", base=base)(poses, rate, second)
     return blanked(matrices, poses, rate, second)
+
+
+def _layout(robot: Manipulator) -> tuple[object, ...]:
+    """Return what base parameters depend on: neither inertia, nor guide points, nor elbows."""
+    legs = [
+        (leg.direction, leg.e, leg.platform_point, leg.upper_length, leg.lower_length)
+        for leg in robot.legs
+    ]
+    return (robot.platform.motion, robot.platform.frame, robot.gravity, *legs)

@@ -24,18 +24,20 @@ _PREFERENCE = (
 
 def leg_groups(robot: Manipulator, shared: Sharing) -> list[tuple[int, ...]]:
     """Return the legs, counted from 1, in groups with one parameter set each."""
-    n = len(robot.legs)
-    if shared is True:
-        return [tuple(range(1, n + 1))]
-    groups = [] if shared is False else [tuple(sorted(group)) for group in shared]
-    named = [leg for group in groups for leg in group]
-    if len(set(named)) != len(named) or not set(named) <= set(range(1, n + 1)):
+    legs = range(1, len(robot.legs) + 1)
+    if isinstance(shared, bool):
+        return [tuple(legs)] if shared else [(leg,) for leg in legs]
+    try:
+        groups = [tuple(sorted(group)) for group in shared if len(group)]
+        named = [leg for group in groups for leg in group]
+    except TypeError:
+        named, groups = [0], []
+    if len(set(named)) != len(named) or not all(type(n) is int and n in legs for n in named):
         raise ModelError(
-            f"shared: {shared!r} does not name legs 1 to {n}, each at most once; "
+            f"shared: {shared!r} does not name legs 1 to {len(legs)}, each at most once; "
             "give True, or groups such as [(1, 2), (3, 4)]"
         )
-    groups += [(leg,) for leg in range(1, n + 1) if leg not in named]
-    return sorted(groups)
+    return sorted([*groups, *((leg,) for leg in legs if leg not in named)])
 
 
 def share(robot: Manipulator, shared: Sharing) -> tuple[tuple[str, ...], Array]:
