@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import prod
@@ -44,7 +45,7 @@ class Port:
 
 
 @dataclass(frozen=True)
-class Kernel:
+class Kernel(ABC):
     """Something that can be called with batches of states.
 
     A target subclasses it and gives `source` and `_run`; see `pteron.kernels.targets`.
@@ -74,13 +75,13 @@ class Kernel:
         return count_operations(self.function)
 
     @property
+    @abstractmethod
     def source(self) -> str:
         """The code that runs, as text."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
         """Fill `outputs` (batch, size) from `inputs` (batch, size), or (size,) where shared."""
-        raise NotImplementedError
 
     def __call__(self, *values: ArrayLike) -> Any:
         """Evaluate the kernel.

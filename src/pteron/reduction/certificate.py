@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -9,7 +10,7 @@ __all__ = ["Certificate", "ExactCertificate", "NumericalCertificate"]
 
 
 @dataclass(frozen=True)
-class Certificate:
+class Certificate(ABC):
     """Root of the certificates.
 
     Attributes
@@ -26,9 +27,9 @@ class Certificate:
     rank: int
     columns: int
 
+    @abstractmethod
     def summary(self) -> str:
         """Return the certificate in a few sentences."""
-        raise NotImplementedError
 
     def as_dict(self) -> dict[str, Any]:
         """Return the certificate as plain data."""
