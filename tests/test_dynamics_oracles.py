@@ -18,7 +18,7 @@ def test_lagrange(name):
     forces = lagrange.inverse_dynamics(robot)
     motion = states(robot, COUNT, seed=11)
     expected = np.array([forces(*state) for state in zip(*motion, strict=True)])
-    assert relative_error(pteron.inverse_dynamics(robot, *motion), expected) < 1e-9
+    assert relative_error(pteron.inverse_dynamics(robot, *motion), expected) < 1e-12
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -33,4 +33,4 @@ def test_newton_euler_through_the_closure(name, engine):
         expected.append(forces)
         closing = max(closing, gap)
     assert closing < 1e-13, "the engine's loops must close, in metres"
-    assert relative_error(pteron.inverse_dynamics(robot, *motion), np.array(expected)) < 1e-8
+    assert relative_error(pteron.inverse_dynamics(robot, *motion), np.array(expected)) < 1e-12

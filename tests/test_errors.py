@@ -184,6 +184,18 @@ def test_closeness_is_the_angle_from_the_singular_orientation():
     assert np.isfinite(pteron.inverse_dynamics(ROBOT, pose, np.zeros(4), np.zeros(4))).all()
 
 
+def test_forces_keep_half_of_their_digits_next_to_a_singular_orientation():
+    closeness = 1e-8
+    pose = LOOSE + np.array([0, 0, 0, closeness])
+    velocity, acceleration = np.random.default_rng(0).normal(size=(2, 4))
+    forces = pteron.inverse_dynamics(ROBOT, pose, velocity, acceleration)
+    # One force grows as 1 / closeness, its share lost to rounding with it.
+    there = pteron.forward_dynamics(ROBOT, pose, velocity, forces)
+    np.testing.assert_allclose(there, acceleration, rtol=0, atol=1e-16 / closeness * 1e2)
+    with pytest.raises(SingularPose):
+        pteron.inverse_dynamics(ROBOT, LOOSE + pose / 1e10, velocity, acceleration)
+
+
 def undetermined():
     """Return a machine, and poses in which R1 and R3 of leg 3, whose links are equal, coincide."""
     legs = [longer(leg) for leg in ROBOT.legs]
@@ -211,6 +223,39 @@ def test_an_undetermined_elbow_is_nan_where_asked(name):
     for part in found:
         assert np.isnan(part[:2]).all()
         assert np.isfinite(part[2]).all()
+
+
+@EVERY
+@pytest.mark.parametrize("offset", [1e-13, 1e-10])
+def test_an_elbow_is_undetermined_to_rounding_and_no_further(name, offset):
+    robot, poses = undetermined()
+    pose = poses[0] + np.array([0.0, offset, 0.0, 0.0])
+    if name in REACH_ONLY and offset > 1e-12:
+        assert all(np.isfinite(a).all() for a in call(name, robot, pose))
+        return
+    with pytest.raises(SingularPose, match="leg 3") as caught:
+        call(name, robot, pose)
+    assert caught.value.kind == ("elbow" if offset < 1e-12 else "I")
+    assert caught.value.closeness == pytest.approx(offset / ROBOT.legs[2].upper_length, rel=1e-2)
+
+
+@EVERY
+def test_failures_in_batches_of_every_shape(name):
+    good = states(ROBOT, 15)[0].reshape(3, 5, 4)
+    others = arrays(name, good)
+    expected = call(name, ROBOT, good, *others)
+    for bad in (FAR, [0.0, np.nan, 0.0, 0.0], [0.0, 0.0, 0.0, np.inf]):
+        poses = good.copy()
+        poses[1, 3] = bad
+        with np.errstate(all="raise"):
+            found = call(name, ROBOT, poses, *others, on_failure="nan")
+            single = call(name, ROBOT, bad, *(a[1, 3] for a in others), on_failure="nan")
+        for after, before, alone in zip(found, expected, single, strict=True):
+            assert np.isnan(after[1, 3]).all()
+            assert alone.shape == before.shape[2:]
+            assert np.isnan(alone).all()
+            after[1, 3] = before[1, 3]
+            np.testing.assert_array_equal(after, before)
 
 
 @pytest.mark.parametrize("name", CALLS)
@@ -295,7 +340,7 @@ def test_a_wrong_shape_is_refused_with_what_was_expected(name):
             with pytest.raises(DataError) as caught:
                 flat(CALLS[name][0](ROBOT, *given))
             assert str(caught.value) == f"{argument}: shape {shown} given, (..., 4) expected"
-        for wrong in ("text", [[1, 2, 3, 4], [1]], {"x": 1}):
+        for wrong in ("text", ["1", "2", "3", "4"], [1j, 0, 0, 0], [[1, 2, 3, 4], [1]], {"x": 1}):
             given = [*values[:k], wrong, *values[k + 1 :]]
             with pytest.raises(DataError, match=f"^{argument}: not an array of real numbers$"):
                 CALLS[name][0](ROBOT, *given)

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mechanisms import CATALOG, MECHANISMS, random_machine
 from scipy.spatial.transform import Rotation
+from scipy.stats import ks_2samp
 
 import pteron
 from pteron.equations.geometry import Geometry
@@ -133,11 +134,67 @@ def test_each_column_of_direct_kinematics_is_one_assembly_mode(name):
     assert set(mode) == {0, 1}, "the poses must be of both modes"
     found = pteron.direct_kinematics(robot, pteron.inverse_kinematics(robot, poses))
     np.testing.assert_allclose(found[np.arange(COUNT), mode], poses, atol=1e-13)
+    signs = []
     for branch, sign in ((0, 1), (1, -1)):
         real = found[:, branch][~np.isnan(found[:, branch]).any(axis=-1)]
         assert len(real) > 0
         assert (sign * regularity(real) > 0).all()
+        signs.append(set(np.sign(np.linalg.det(pteron.jacobian(robot, real)))))
+    assert signs in ([{1.0}, {-1.0}], [{-1.0}, {1.0}])
     assert (np.abs(found[..., 3][~np.isnan(found[..., 3])]) <= np.pi).all()
+
+
+@pytest.mark.parametrize("name", TURNING)
+def test_the_assembly_modes_meet_at_the_singular_orientations(name):
+    robot = MECHANISMS[name]
+    for angle in pteron.singular_orientations(robot):
+        poses = pteron.random_poses(robot, 50, seed=7, hold=0.0)
+        poses[:, 3] = angle
+        sliders = pteron.inverse_kinematics(robot, poses, on_failure="nan")
+        in_reach = ~np.isnan(sliders[:, 0])
+        assert in_reach.any()
+        found = pteron.direct_kinematics(robot, sliders[in_reach])
+        difference = found - poses[in_reach, None]
+        difference[..., 3] = np.angle(np.exp(1j * difference[..., 3]))
+        # A double root keeps half of the digits: sqrt(1e-14).
+        np.testing.assert_allclose(difference, 0.0, atol=5e-7)
+
+
+def test_half_a_turn_is_pi_and_not_minus_pi():
+    robot = CATALOG["quadrupteron"]
+    positions = states(robot, 400)[0][:, :3]
+    poses = np.column_stack([positions, np.full(400, np.pi)])
+    sliders = pteron.inverse_kinematics(robot, poses, on_failure="nan")
+    in_reach = ~np.isnan(sliders[:, 0])
+    angles = pteron.direct_kinematics(robot, sliders[in_reach])[..., 3]
+    assert in_reach.sum() > 3
+    assert (angles > -np.pi).all()
+    # The closures' rounding, over the platform points' 0.04 m.
+    np.testing.assert_allclose(np.abs(angles).max(axis=-1), np.pi, atol=1e-14)
+
+
+@pytest.mark.parametrize("shift", [0.0, 1.0, 1e3])
+@pytest.mark.parametrize("name", TURNING)
+def test_the_assembly_modes_meet_wherever_the_base_frame_lies(name, shift):
+    offset = shift * np.array([0.6, -1.0, 0.7])
+    legs = tuple(
+        replace(leg, guide_point=tuple(np.array(leg.guide_point) + offset))
+        for leg in MECHANISMS[name].legs
+    )
+    robot = replace(MECHANISMS[name], legs=legs)
+    poses = pteron.random_poses(robot, 100, seed=7, hold=0.0)
+    for angle in pteron.singular_orientations(robot):
+        for closeness in (0.0, 1e-8, -1e-8):
+            poses[:, 3] = angle + closeness
+            sliders = pteron.inverse_kinematics(robot, poses, on_failure="nan")
+            in_reach = ~np.isnan(sliders[:, 0])
+            assert in_reach.any()
+            found = pteron.direct_kinematics(robot, sliders[in_reach])
+            difference = found - poses[in_reach, None]
+            difference[..., 3] = np.angle(np.exp(1j * difference[..., 3]))
+            # A double root keeps half of the digits, of the sizes that the closures add up.
+            size = 0.1 + shift
+            np.testing.assert_allclose(difference, 0.0, atol=2e-6 * np.sqrt(size / 0.1))
 
 
 @pytest.mark.parametrize("name", TURNING)
@@ -307,7 +364,17 @@ def test_a_layout_with_fourfold_symmetry_is_singular_everywhere():
         with pytest.raises(SingularPose, match="fourfold: singular at every pose") as caught:
             call()
         assert (caught.value.kind, caught.value.closeness) == ("II", 0.0)
-    assert np.isnan(pteron.inverse_dynamics(robot, rest, rest, rest, on_failure="nan")).all()
+    for poses in (rest, np.zeros((3, 5, 4))):
+        lost = pteron.inverse_dynamics(robot, poses, rest, rest, on_failure="nan")
+        assert lost.shape == poses.shape
+        assert np.isnan(lost).all()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_being_singular_everywhere_does_not_depend_on_the_frame(seed):
+    rotation = Rotation.random(rng=seed).as_matrix()
+    assert pteron.is_singular_everywhere(pteron.turned(fourfold(0.0), rotation))
+    assert not pteron.is_singular_everywhere(pteron.turned(fourfold(1e-6), rotation))
 
 
 def test_the_symmetry_broken_is_singular_at_two_orientations():
@@ -420,8 +487,29 @@ def test_random_poses_honour_bend_and_hold(name):
         assert 0.5 - 1e-12 <= ratio.min() < 0.6
 
 
+@pytest.mark.parametrize("name", [*CATALOG, "random 3T1R 0", "random 3T 1"])
+def test_random_poses_are_spread_as_those_of_a_wider_search(name):
+    robot = MECHANISMS[name]
+    found = pteron.random_poses(robot, 2000, seed=2)
+    rng = np.random.default_rng(3)
+    center = found[:, :3].mean(axis=0)
+    size = np.ptp(found[:, :3], axis=0).max()
+    wide = rng.uniform(-1.0, 1.0, (400_000, robot.freedom))
+    wide *= np.array([size, size, size, np.pi][: robot.freedom])
+    wide[:, :3] += center
+    sine = pteron.compile(robot, "reach")(wide)[2]
+    hold = np.abs(pteron.compile(robot, "regularity")(wide))
+    expected = wide[(sine >= 0.1).all(axis=-1) & (hold >= 0.1)]
+    assert len(expected) > 200
+    for one, other in zip(found.T, expected.T, strict=True):
+        assert ks_2samp(one, other).pvalue > 1e-3
+
+
 def test_random_poses_are_seeded():
     robot = CATALOG["quadrupteron"]
+    np.testing.assert_array_equal(
+        pteron.random_poses(robot, 3), pteron.random_poses(robot, 3, seed=0)
+    )
     first = pteron.random_poses(robot, 10, seed=1)
     np.testing.assert_array_equal(first, pteron.random_poses(robot, 10, seed=1))
     rng = np.random.default_rng(1)

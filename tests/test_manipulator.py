@@ -251,6 +251,13 @@ def test_random_machines_are_loaded_without_loss(tmp_path_factory, seed, turns):
     assert pteron.load(pteron.save(robot, tmp_path_factory.mktemp("saved") / "r.toml")) == robot
 
 
+@settings(deadline=None, derandomize=True, max_examples=50)
+@given(st.sampled_from(sorted(MECHANISMS)), st.integers(0, 2**32 - 1))
+def test_turned_machines_are_loaded_without_loss(tmp_path_factory, name, seed):
+    robot = pteron.turned(MECHANISMS[name], Rotation.random(rng=seed).as_matrix())
+    assert pteron.load(pteron.save(robot, tmp_path_factory.mktemp("saved") / "r.toml")) == robot
+
+
 def test_the_catalog():
     names = pteron.catalog()
     assert names == ("quadrupteron", "quadrupteron-oblique", "tripteron", "tripteron-oblique")

@@ -11,6 +11,7 @@ from pteron.equations.legs import closing_vector, leg_position, slider_coordinat
 from pteron.equations.platforms import PlatformMotion, platform_motion, resting_offset
 
 _ROUNDING = 1e-14
+"""What the closures' terms keep, relative to the largest of them."""
 
 
 def platform_at(geometry: Geometry, pose: Expression) -> PlatformMotion:
@@ -79,8 +80,11 @@ def direct_position(geometry: Geometry, sliders: Expression) -> Expression:
     total = ca.dot(c.null, known)
     square = a * a + b * b
     # At a singular orientation both poses meet and the radicand is all rounding: what is barely
-    # below zero counts as zero, an error of 1e-7 rad there.
-    rest, slack = square - total * total, _ROUNDING * square
+    # below zero counts as zero, an error of 1e-7 rad there. N . known cancels the sizes of guides
+    # and sliders, but not their rounding.
+    size = ca.dot(ca.fabs(c.null), _sizes(geometry, sliders))
+    rest = square - total * total
+    slack = _ROUNDING * (square + ca.sqrt(square) * size)
     root = ca.sqrt(ca.fmax(rest, ca.fmin(rest + slack, 0)))
     poses = []
     for branch in (1, -1):
@@ -90,6 +94,15 @@ def direct_position(geometry: Geometry, sliders: Expression) -> Expression:
         p = ca.mtimes(c.right_inverse.T, known - offset)
         poses.append(ca.vertcat(p, ca.atan2(sine, cosine)))
     return ca.horzcat(*poses)
+
+
+def _sizes(geometry: Geometry, sliders: Expression) -> Expression:
+    """Return the sizes (n, 1) of the terms that each closure's known side adds up."""
+    bars, guides = (
+        ca.horzcat(*(ca.fabs(vector) for vector in vectors))
+        for vectors in zip(*((leg.d_bar, leg.r) for leg in geometry.legs), strict=True)
+    )
+    return ca.fabs(sliders) + ca.sum1(bars * guides).T
 
 
 def _constant_offset(geometry: Geometry, i: int) -> Expression:
