@@ -1,4 +1,4 @@
-"""A body in planar motion: force and moment of gravity and inertia about its reference point.
+"""A body in planar motion: the force and the moment that it needs at its reference point.
 
 Inertial parameters come as columns: one column for the values of a machine, or a column for each
 parameter, which turns every force below into the regressor of that force. Hence one set of
@@ -12,7 +12,7 @@ from typing import NamedTuple
 import casadi as ca
 
 from pteron.equations.circles import quarter_turn
-from pteron.equations.geometry import Expression, LegGeometry
+from pteron.equations.geometry import Expression, Geometry, LegGeometry
 
 
 class Inertia(NamedTuple):
@@ -51,6 +51,12 @@ def link_moments(
     return first_moment(vector, quarter_turn(vector), link.hx / length, link.hy / length)
 
 
+def resting_moment(geometry: Geometry, platform: Inertia) -> tuple[Expression, Expression]:
+    """Return the platform's h and k x h at phi = 0, over `Geometry.unit`, each (3, K)."""
+    unit = geometry.unit
+    return first_moment(geometry.x0, geometry.y0, platform.hx / unit, platform.hy / unit)
+
+
 def first_moment(
     x: Expression, y: Expression, hx: Expression, hy: Expression
 ) -> tuple[Expression, Expression]:
@@ -61,13 +67,13 @@ def first_moment(
 def turning_force(
     h: Expression, dh: Expression, rate2: Expression, ddtheta: Expression
 ) -> Expression:
-    """Return -w' z x h + w^2 h, the inertia force of a first moment h that turns about z.
+    """Return w' z x h - w^2 h, the force that a first moment h needs to turn about z.
 
     `h` is perpendicular to z and `dh` is z x h; `rate2` is w^2.
     """
-    return rate2 * h - ddtheta * dh
+    return ddtheta * dh - rate2 * h
 
 
-def moment(dh: Expression, i: Expression, g_a: Expression, ddtheta: Expression) -> Expression:
-    """Return z . (h x (g - a)) - I w', the moment (1, K) about z through the reference point."""
-    return ca.mtimes(g_a.T, dh) - ddtheta * i
+def moment(dh: Expression, i: Expression, a_g: Expression, ddtheta: Expression) -> Expression:
+    """Return I w' + z . (h x (a - g)), the moment (1, K) needed about z, at the reference point."""
+    return ddtheta * i + ca.mtimes(a_g.T, dh)

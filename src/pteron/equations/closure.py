@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from pteron.equations.geometry import Expression, Geometry, times, weighted_sum
-from pteron.equations.platforms import resting_offset
+from pteron.equations.platforms import Turn, offset_in_units, resting_offset
 
 
 @dataclass(frozen=True)
@@ -71,27 +71,82 @@ def regularity(geometry: Geometry, pose: Expression) -> Expression:
     return (a * ca.cos(pose[3]) + b * ca.sin(pose[3])) / ca.sqrt(a * a + b * b)
 
 
-def actuator_forces(
-    geometry: Geometry, w: Expression, cosine: Expression, sine: Expression
-) -> Expression:
-    """Return F (n, K) with J^T F = w, for the columns of w (m, K), in closed form."""
-    c = closure(geometry)
-    forces = ca.vertsplit(w)[:3]
-    particular = ca.vertcat(*(weighted_sum(row.T, forces) for row in ca.vertsplit(c.right_inverse)))
-    if c.null is None:
-        return particular
-    lever = [
-        times(p, cosine) + times(q, sine)
-        for p, q in zip(
-            ca.horzsplit(ca.mtimes(c.cosines.T, c.right_inverse)),
-            ca.horzsplit(ca.mtimes(c.sines.T, c.right_inverse)),
-            strict=True,
+@dataclass(frozen=True)
+class Load:
+    """A wrench on the platform: a force at P, and a moment about k split by how it turns.
+
+    The moment is `cosine` (unit cos phi) + `sine` (unit sin phi) + `moment`: a force f on a
+    platform point has the moment (b . f) cos(phi) - (a . f) sin(phi), and only the sums over the
+    legs of the two products meet the angle. Rows have K columns, as the parameters have.
+    """
+
+    force: Expression
+    """(3, K)."""
+    cosine: Expression
+    sine: Expression
+    moment: Expression
+
+    @classmethod
+    def of(cls, w: Expression) -> Load:
+        """Return the load of a wrench (m, K): a force, and for 3T1R a moment."""
+        none = ca.SX(1, w.shape[1])
+        return cls(w[:3, :], none, none, w[3, :] if w.shape[0] > 3 else none)
+
+    @classmethod
+    def at_point(cls, geometry: Geometry, i: int, force: Expression) -> Load:
+        """Return the load of a force (3, K) on the platform point of leg i."""
+        none = ca.SX(1, force.shape[1])
+        if not geometry.turns:
+            return cls(force, none, none, none)
+        a, b, _ = offset_in_units(geometry, i)
+        return cls(force, _product(b, force), -_product(a, force), none)
+
+    def __add__(self, other: Load) -> Load:
+        return Load(
+            self.force + other.force,
+            self.cosine + other.cosine,
+            self.sine + other.sine,
+            self.moment + other.moment,
         )
-    ]
-    unbalanced = w[3, :] - sum(arm * force for arm, force in zip(lever, forces, strict=True))
-    a, b = singularity(geometry)
-    rest = unbalanced / (times(a, cosine) + times(b, sine))
+
+    def wrench(self, turn: Turn | None) -> Expression:
+        """Return the load as one matrix (m, K)."""
+        if turn is None:
+            return self.force
+        return ca.vertcat(
+            self.force, turn.cosine * self.cosine + turn.sine * self.sine + self.moment
+        )
+
+
+def _product(vector: Expression, force: Expression) -> Expression:
+    """Return vector . force (1, K), the signs of a constant vector taken out of the products."""
+    return sum(times(v, f) for v, f in zip(ca.vertsplit(vector), ca.vertsplit(force), strict=True))
+
+
+def actuator_forces(geometry: Geometry, load: Load, turn: Turn | None) -> Expression:
+    """Return F (n, K) with J^T F = w, the load, in closed form."""
+    c = closure(geometry)
+    forces = ca.vertsplit(load.force)
+    if turn is None:
+        return ca.vertcat(*(weighted_sum(row.T, forces) for row in ca.vertsplit(c.right_inverse)))
+    inverse = c.right_inverse if not c.rows.is_constant() else _sparse_inverse(c.rows)
+    particular = ca.vertcat(*(weighted_sum(row.T, forces) for row in ca.vertsplit(inverse)))
+    cosines, sines = c.cosines / turn.unit, c.sines / turn.unit
+    cosine = load.cosine - weighted_sum(ca.mtimes(cosines.T, inverse).T, forces)
+    sine = load.sine - weighted_sum(ca.mtimes(sines.T, inverse).T, forces)
+    a, b = ca.dot(c.null, cosines), ca.dot(c.null, sines)
+    unbalanced = turn.cosine * cosine + turn.sine * sine + load.moment
+    rest = unbalanced / (times(a, turn.cosine) + times(b, turn.sine))
     return particular + ca.vertcat(*(times(null, rest) for null in ca.vertsplit(c.null)))
+
+
+def _sparse_inverse(rows: Expression) -> Expression:
+    """Return a P with D^T P = 1 that loads three legs only: those that hold a force best."""
+    best = max(range(4), key=lambda i: abs(float(_det3(_without(rows, i)))))
+    held = _without(rows, best)
+    inverse = ca.vertsplit(_adjugate(held).T / _det3(held))
+    inverse.insert(best, ca.SX.zeros(1, 3))
+    return ca.vertcat(*inverse)
 
 
 def platform_acceleration(

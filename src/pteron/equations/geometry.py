@@ -65,6 +65,19 @@ class Geometry:
         """Number of pose coordinates, m = n."""
         return len(self.legs)
 
+    @property
+    def unit(self) -> Expression:
+        """The size that most coordinates of the platform points have, or 1.
+
+        Written as multiples of it they cost fewest operations: a factor of 1 is none.
+        """
+        sizes: list[float] = []
+        for leg in self.legs:
+            for value in ca.vertsplit(leg.s0[:2]):
+                if value.is_constant() and float(value) != 0.0:
+                    sizes.append(abs(float(value)))
+        return max(sizes, key=sizes.count) if self.turns and sizes else 1.0
+
     @classmethod
     def of(cls, robot: Manipulator) -> Geometry:
         """Return the geometry of one machine, in numbers."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from pteron.equations.bodies import Inertia, first_moment, link_moments, split
+from pteron.equations.bodies import Inertia, link_moments, resting_moment, split
 from pteron.equations.geometry import Expression, Geometry
 from pteron.equations.jacobians import jacobian
 from pteron.equations.legs import leg_position, point_rows, slider_coordinate
@@ -39,7 +39,7 @@ def mass_matrix(geometry: Geometry, pose: Expression, parameters: Expression) ->
     if motion.turn is None:
         total = carried.m * ca.mtimes(v.T, v)
     else:
-        h0, dh0 = first_moment(geometry.x0, geometry.y0, carried.hx, carried.hy)
+        h0, dh0 = resting_moment(geometry, carried)
         dh = motion.turn.cosine * dh0 - motion.turn.sine * h0
         total = body_mass_matrix(v, ca.horzcat(ca.SX(1, 3), 1), dh, carried)
     for leg, point, inertia in zip(geometry.legs, motion.points, bodies, strict=True):
@@ -81,7 +81,7 @@ def potential_energy(geometry: Geometry, pose: Expression, parameters: Expressio
     bodies, platform = split(parameters, len(geometry.legs))
     motion = platform_at(geometry, pose)
     carried = carried_inertia(geometry, platform, [leg.lower.m for leg in bodies])
-    h0, dh0 = first_moment(geometry.x0, geometry.y0, carried.hx, carried.hy)
+    h0, dh0 = resting_moment(geometry, carried)
     h = h0 if motion.turn is None else motion.turn.cosine * h0 + motion.turn.sine * dh0
     moments = carried.m * pose[0:3] + h
     for i, leg in enumerate(geometry.legs):

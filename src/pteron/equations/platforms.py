@@ -27,7 +27,12 @@ class PointMotion:
 
 
 class Turn(NamedTuple):
-    """cos(phi), sin(phi) and their first and second derivatives with respect to time."""
+    """unit cos(phi), unit sin(phi) and their first and second derivatives with respect to time.
+
+    The platform's lengths are multiples of `unit`; see `Geometry.unit`.
+    """
+
+    unit: Expression
 
     cosine: Expression
     sine: Expression
@@ -37,15 +42,18 @@ class Turn(NamedTuple):
     sine_acceleration: Expression
 
     @classmethod
-    def of(cls, phi: Expression, rate: Expression, acceleration: Expression) -> Turn:
+    def of(
+        cls, unit: Expression, phi: Expression, rate: Expression, acceleration: Expression
+    ) -> Turn:
         """Return the turn of a platform at the angle phi."""
         cosine, sine = ca.cos(phi), ca.sin(phi)
-        rate2 = rate * rate
+        rate1, rate2, acceleration = unit * rate, unit * rate * rate, unit * acceleration
         return cls(
-            cosine,
-            sine,
-            -(rate * sine),
-            rate * cosine,
+            unit,
+            unit * cosine,
+            unit * sine,
+            -(rate1 * sine),
+            rate1 * cosine,
             -(acceleration * sine + rate2 * cosine),
             acceleration * cosine - rate2 * sine,
         )
@@ -74,10 +82,9 @@ def platform_motion(
         )
         points = tuple(PointMotion(p + s, dp, ddp, None) for s in offsets)
         return PlatformMotion(points, ddp, None, None)
-    turn = Turn.of(pose[3], velocity[3], acceleration[3])
+    turn = Turn.of(geometry.unit, pose[3], velocity[3], acceleration[3])
     points = tuple(
-        _turning_point(p, dp, ddp, turn, *resting_offset(geometry, i))
-        for i in range(len(geometry.legs))
+        _turning_point(p, dp, ddp, turn, *offset_in_units(geometry, i)) for i in range(len(geometry.legs))
     )
     return PlatformMotion(points, ddp, turn, acceleration[3])
 
@@ -88,6 +95,12 @@ def resting_offset(geometry: Geometry, i: int) -> tuple[Expression, Expression, 
     a = geometry.x0 * s0[0] + geometry.y0 * s0[1]
     b = geometry.y0 * s0[0] - geometry.x0 * s0[1]
     return a, b, geometry.k * s0[2]
+
+
+def offset_in_units(geometry: Geometry, i: int) -> tuple[Expression, Expression, Expression]:
+    """Return A / unit, B / unit and the constant part of s, for leg i."""
+    a, b, constant = resting_offset(geometry, i)
+    return a / geometry.unit, b / geometry.unit, constant
 
 
 def _turning_point(

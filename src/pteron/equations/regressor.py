@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from pteron.equations.bodies import Inertia, first_moment, moment, turning_force
-from pteron.equations.closure import actuator_forces
+from pteron.equations.closure import Load, actuator_forces
 from pteron.equations.geometry import Expression, Geometry
 from pteron.equations.jacobians import jacobian, link_jacobians
 from pteron.equations.legs import leg_motion
@@ -47,8 +47,8 @@ def body_matrix(
     """
     unit = Inertia.rows(ca.SX.eye(4))
     h, dh = first_moment(x, ca.cross(z, x), unit.hx, unit.hy)
-    force = ca.mtimes(g_a, unit.m) + turning_force(h, dh, rate * rate, ddtheta)
-    return ca.vertcat(force, ca.mtimes(z, moment(dh, unit.i, g_a, ddtheta)))
+    force = ca.mtimes(g_a, unit.m) - turning_force(h, dh, rate * rate, ddtheta)
+    return ca.vertcat(force, ca.mtimes(z, -moment(dh, unit.i, -g_a, ddtheta)))
 
 
 def terms(
@@ -118,5 +118,5 @@ def paper_regressor(
     Omega holds what acts on the bodies, so that the forces which balance it carry a minus sign.
     """
     bracket = generalized_regressor(terms(geometry, pose, velocity, acceleration))
-    cosine, sine = (ca.cos(pose[3]), ca.sin(pose[3])) if geometry.turns else (1, 0)
-    return -actuator_forces(geometry, bracket, cosine, sine)
+    turn = platform_motion(geometry, pose, velocity, acceleration).turn
+    return -actuator_forces(geometry, Load.of(bracket), turn)

@@ -16,13 +16,13 @@ import casadi as ca
 from pteron.equations.bodies import (
     Inertia,
     LegInertia,
-    first_moment,
     link_moments,
     moment,
+    resting_moment,
     split,
     turning_force,
 )
-from pteron.equations.closure import actuator_forces
+from pteron.equations.closure import Load, actuator_forces
 from pteron.equations.geometry import Expression, Geometry, LegGeometry, weighted_sum
 from pteron.equations.legs import LegMotion, leg_motion
 from pteron.equations.platforms import PlatformMotion, platform_motion
@@ -41,11 +41,10 @@ def inverse_dynamics(
     `wrench` (m, K) acts on the platform at P: a force and, for 3T1R, a moment about k.
     """
     motion = platform_motion(geometry, pose, velocity, acceleration)
-    on_sliders, on_platform = active_forces(geometry, motion, parameters)
+    on_sliders, load = needed_forces(geometry, motion, parameters)
     if wrench is not None:
-        on_platform = on_platform + wrench
-    cosine, sine = (motion.turn.cosine, motion.turn.sine) if motion.turn else (1, 0)
-    return -(on_sliders + actuator_forces(geometry, on_platform, cosine, sine))
+        load = load + Load.of(-wrench)
+    return on_sliders + actuator_forces(geometry, load, motion.turn)
 
 
 def generalized_forces(
@@ -57,50 +56,52 @@ def generalized_forces(
 ) -> Expression:
     """Return M x'' + h (m, K), the forces of the motion in platform coordinates: J^T F_a."""
     motion = platform_motion(geometry, pose, velocity, acceleration)
-    on_sliders, total = active_forces(geometry, motion, parameters)
+    on_sliders, load = needed_forces(geometry, motion, parameters)
+    total = load.wrench(motion.turn)
     for leg, point, force in zip(
         geometry.legs, motion.points, ca.vertsplit(on_sliders), strict=True
     ):
         total = total + ca.mtimes(ca.mtimes(point.matrix.T, leg.d_bar), force)
-    return -total
+    return total
 
 
-def active_forces(
+def needed_forces(
     geometry: Geometry, motion: PlatformMotion, parameters: Expression
-) -> tuple[Expression, Expression]:
-    """Return the forces of gravity and inertia on the sliders (n, K) and on the platform (m, K)."""
+) -> tuple[Expression, Load]:
+    """Return the forces that motion and gravity need on the sliders (n, K), and on the platform."""
     bodies, platform = split(parameters, len(geometry.legs))
     carried = carried_inertia(geometry, platform, [leg.lower.m for leg in bodies])
-    on_platform = platform_wrench(geometry, motion, carried)
+    load = platform_load(geometry, motion, carried)
     on_sliders = []
-    for leg, point, inertia in zip(geometry.legs, motion.points, bodies, strict=True):
-        on_slider, on_point = leg_forces(leg, leg_motion(leg, point), geometry.gravity, inertia)
+    for i, (leg, inertia) in enumerate(zip(geometry.legs, bodies, strict=True)):
+        state = leg_motion(leg, motion.points[i])
+        on_slider, on_point = leg_forces(leg, state, geometry.gravity, inertia)
         on_sliders.append(on_slider)
-        on_platform = on_platform + ca.mtimes(point.matrix.T, on_point)
-    return ca.vertcat(*on_sliders), on_platform
+        load = load + Load.at_point(geometry, i, on_point)
+    return ca.vertcat(*on_sliders), load
 
 
 def leg_forces(
     leg: LegGeometry, motion: LegMotion, gravity: Expression, bodies: LegInertia
 ) -> tuple[Expression, Expression]:
-    """Return the force of a leg's bodies on its slider (1, K) and on its platform point (3, K).
+    """Return the force that a leg needs on its slider (1, K) and on its platform point (3, K).
 
     The moments of the links act through theta_u and theta_l, whose rows with respect to u turn
     them into a force tau; as u' is the part of c' - e rho' in the plane, tau acts on the point and
     -e . tau on the slider. The mass of the lower link is left to the platform.
     """
     at, upper, lower = motion.position, bodies.upper, bodies.lower
-    # g - a in the leg's plane, on R1 (a = rho'' e) and on R3 (a = c'' = u'' + rho'' e there).
-    g_slider = ca.mtimes(leg.plane.T, gravity) - motion.slider_acceleration * leg.e_plane
-    g_point = g_slider - motion.closing_acceleration
+    # a - g in the leg's plane, on R1 (a = rho'' e) and on R3 (a = c'' = u'' + rho'' e there).
+    a_slider = motion.slider_acceleration * leg.e_plane - ca.mtimes(leg.plane.T, gravity)
+    a_point = a_slider + motion.closing_acceleration
 
     h, dh = link_moments(leg, at.l_u, leg.lu, upper)
     turning = turning_force(h, dh, motion.upper_rate**2, motion.upper_acceleration)
-    upper_moment = moment(dh, upper.i, g_slider, motion.upper_acceleration)
-    along_slider = ca.dot(leg.e, gravity) - motion.slider_acceleration
+    upper_moment = moment(dh, upper.i, a_slider, motion.upper_acceleration)
+    along_slider = motion.slider_acceleration - ca.dot(leg.e, gravity)
 
     h, dh = link_moments(leg, at.l_l, leg.ll, lower)
-    lower_moment = moment(dh, lower.i, g_point, motion.lower_acceleration)
+    lower_moment = moment(dh, lower.i, a_point, motion.lower_acceleration)
     tau = ca.mtimes(at.upper_row, upper_moment) + ca.mtimes(at.lower_row, lower_moment)
     on_slider = (bodies.slider + upper.m) * along_slider + ca.mtimes(leg.e_plane.T, turning - tau)
     on_point = tau + turning_force(h, dh, motion.lower_rate**2, motion.lower_acceleration)
@@ -119,14 +120,17 @@ def carried_inertia(geometry: Geometry, platform: Inertia, masses: list[Expressi
     )
 
 
-def platform_wrench(geometry: Geometry, motion: PlatformMotion, inertia: Inertia) -> Expression:
-    """Return F_e (m, K): gravity and inertia of the platform, force and moment about k at P."""
-    g_p = geometry.gravity - motion.acceleration
-    weight = ca.mtimes(g_p, inertia.m)
+def platform_load(geometry: Geometry, motion: PlatformMotion, inertia: Inertia) -> Load:
+    """Return what the platform itself needs, -F_e."""
+    a_p = motion.acceleration - geometry.gravity
+    force = ca.mtimes(a_p, inertia.m)
     if motion.turn is None:
-        return weight
+        return Load.of(force)
     turn = motion.turn
-    h0, dh0 = first_moment(geometry.x0, geometry.y0, inertia.hx, inertia.hy)
-    force = weight - (turn.cosine_acceleration * h0 + turn.sine_acceleration * dh0)
-    dh = turn.cosine * dh0 - turn.sine * h0
-    return ca.vertcat(force, moment(dh, inertia.i, g_p, motion.angular_acceleration))
+    h0, dh0 = resting_moment(geometry, inertia)
+    return Load(
+        force + turn.cosine_acceleration * h0 + turn.sine_acceleration * dh0,
+        ca.mtimes(a_p.T, dh0),
+        -ca.mtimes(a_p.T, h0),
+        motion.angular_acceleration * inertia.i,
+    )

@@ -61,7 +61,7 @@ def compile(
     >>> import pteron
     >>> kernel = pteron.compile(pteron.load("quadrupteron"), "inverse_dynamics")
     >>> kernel.operations, [port.name for port in kernel.inputs]
-    (427, ['pose', 'velocity', 'acceleration', 'parameters'])
+    (385, ['pose', 'velocity', 'acceleration', 'parameters'])
     """
     if target not in TARGETS:
         raise ModelError(f"target: {target!r} is not known; choose from {', '.join(TARGETS)}")

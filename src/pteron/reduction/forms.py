@@ -11,8 +11,9 @@ from collections.abc import Callable
 
 import casadi as ca
 
-from pteron.equations.closure import actuator_forces
+from pteron.equations.closure import Load, actuator_forces
 from pteron.equations.geometry import Expression, Geometry
+from pteron.equations.platforms import platform_motion
 from pteron.equations.regressor import generalized_regressor, paper_regressor, terms
 from pteron.equations.virtual_work import inverse_dynamics
 from pteron.kernels import TARGETS, Kernel, Port
@@ -35,8 +36,7 @@ def _regressor_late(
     g: Geometry, x: Expression, dx: Expression, ddx: Expression, s: Expression, p: Expression
 ) -> Expression:
     total = ca.mtimes(ca.mtimes(generalized_regressor(terms(g, x, dx, ddx)), s), p)
-    cosine, sine = (ca.cos(x[3]), ca.sin(x[3])) if g.turns else (1, 0)
-    return -actuator_forces(g, total, cosine, sine)
+    return -actuator_forces(g, Load.of(total), platform_motion(g, x, dx, ddx).turn)
 
 
 def _factored(
