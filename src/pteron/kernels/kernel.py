@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from functools import cached_property
 from math import prod
 from typing import Any
 
@@ -18,6 +20,9 @@ from pteron.kernels.operations import count_operations
 __all__ = ["Array", "Kernel", "Port"]
 
 Array = NDArray[np.float64]
+
+_SHARE = 4096
+"""States below which a batch is not split over threads: a thread costs more than they do."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +66,10 @@ class Kernel(ABC):
         Names and shapes.
     fixed : dict
         Values of shared inputs that need not be given in a call, by name.
+    dtype : {"float64", "float32"}
+        Of the numbers it computes with.
+    threads : int
+        How many threads share a batch.
     """
 
     name: str
@@ -68,6 +77,8 @@ class Kernel(ABC):
     inputs: tuple[Port, ...]
     outputs: tuple[Port, ...]
     fixed: dict[str, Array] = field(default_factory=dict, hash=False, compare=False)
+    dtype: str = "float64"
+    threads: int = 1
 
     @property
     def operations(self) -> int:
@@ -82,6 +93,11 @@ class Kernel(ABC):
     @abstractmethod
     def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
         """Fill `outputs` (batch, size) from `inputs` (batch, size), or (size,) where shared."""
+
+    @cached_property
+    def _direct(self) -> Callable[..., Any] | None:
+        """Evaluates plain calls without checks, and returns None for any other; see `__call__`."""
+        return None
 
     def __call__(self, *values: ArrayLike) -> Any:
         """Evaluate the kernel.
@@ -101,6 +117,15 @@ class Kernel(ABC):
         DataError
             If the number of inputs or a shape is wrong.
         """
+        direct = self._direct
+        if direct is not None:
+            results = direct(*values)
+            if results is not None:
+                return results
+        return self._checked(values)
+
+    def _checked(self, values: Sequence[ArrayLike]) -> Any:
+        """Evaluate what may need checking, converting and broadcasting first."""
         ports = [port for port in self.inputs if port.name not in self.fixed]
         if len(values) != len(ports):
             names = ", ".join(port.name for port in ports)
@@ -108,7 +133,7 @@ class Kernel(ABC):
                 f"{self.name}: {len(values)} inputs given, {len(ports)} expected ({names})"
             )
         given = {
-            port.name: as_array(value, port.name, port.shape)
+            port.name: as_array(value, port.name, port.shape, self.dtype)
             for port, value in zip(ports, values, strict=True)
         }
         lead = broadcast_lead(
@@ -123,27 +148,45 @@ class Kernel(ABC):
         for port in self.inputs:
             if port.shared or port.name in self.fixed:
                 value = self.fixed.get(port.name, given.get(port.name))
-                inputs.append(np.ascontiguousarray(value, dtype=float).reshape(port.size))
+                inputs.append(np.ascontiguousarray(value, dtype=self.dtype).reshape(port.size))
             else:
                 whole = given[port.name]
                 if whole.shape != lead + port.shape:
                     whole = np.broadcast_to(whole, lead + port.shape)
                 inputs.append(np.ascontiguousarray(whole).reshape(batch, port.size))
-        outputs = [np.empty((batch, port.size)) for port in self.outputs]
-        self._run(batch, inputs, outputs)
+        outputs = [np.empty((batch, port.size), dtype=self.dtype) for port in self.outputs]
+        if self.threads > 1 and batch >= 2 * _SHARE:
+            self._split(batch, inputs, outputs)
+        else:
+            self._run(batch, inputs, outputs)
         results = tuple(
             out.reshape(lead + port.shape) for out, port in zip(outputs, self.outputs, strict=True)
         )
         return results[0] if len(results) == 1 else results
 
 
-def as_array(value: ArrayLike, name: str, shape: tuple[int, ...]) -> Array:
+    def _split(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
+        """Run slices of the batch in threads; a state's numbers do not depend on its slice."""
+        count = min(self.threads, batch // _SHARE)
+        bounds = [batch * k // count for k in range(count + 1)]
+
+        def run(start: int, stop: int) -> None:
+            part = [value if value.ndim == 1 else value[start:stop] for value in inputs]
+            self._run(stop - start, part, [value[start:stop] for value in outputs])
+
+        with ThreadPoolExecutor(count) as pool:
+            list(pool.map(run, bounds[:-1], bounds[1:]))
+
+
+def as_array(
+    value: ArrayLike, name: str, shape: tuple[int, ...], dtype: str = "float64"
+) -> Array:
     """Return `value` as floats whose last axes are `shape`, or say what was expected."""
     try:
         given = np.asarray(value)
         if given.dtype.kind not in "biufO":
             raise TypeError
-        array = np.asarray(given, dtype=float)
+        array = np.asarray(given, dtype=dtype)
     except (TypeError, ValueError):
         raise DataError(f"{name}: not an array of real numbers") from None
     if len(shape) > array.ndim or array.shape[array.ndim - len(shape) :] != shape:

@@ -1,0 +1,99 @@
+"""C and C++ sources that lie beside this file, compiled and loaded."""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from ctypes import c_double, c_int64, c_void_p
+from pathlib import Path
+
+import numpy as np
+from peers.closure import Array
+
+__all__ = ["Missing", "Sweep", "compiled"]
+
+_FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-DNDEBUG", "-shared", "-fPIC", "-w")
+
+
+class Missing(Exception):
+    """What a peer needs is not there; the message says what."""
+
+
+def compiled(compiler: str, source: str, options: Sequence[str]) -> ctypes.CDLL:
+    """Compile a source that lies beside this file, and load it.
+
+    Parameters
+    ----------
+    compiler : str
+        The command, such as ``"gcc"``.
+    source : str
+        The file's name.
+    options : sequence of str
+        What goes after the source: include directories and libraries.
+
+    Returns
+    -------
+    ctypes.CDLL
+
+    Raises
+    ------
+    Missing
+        If there is no such compiler, or if it fails.
+    """
+    command = shutil.which(compiler)
+    if command is None:
+        raise Missing(f"{compiler}: no such compiler")
+    path = Path(__file__).with_name(source)
+    with tempfile.TemporaryDirectory() as folder:
+        library = Path(folder) / f"{path.stem}.so"
+        run = subprocess.run(
+            [command, *_FLAGS, str(path), *options, "-o", str(library)],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        if run.returncode:
+            errors = [line for line in run.stderr.splitlines() if "error" in line]
+            raise Missing(f"{compiler} cannot compile {source}: {(errors or [run.stderr])[0]}")
+        try:
+            return ctypes.CDLL(str(library))
+        except OSError as error:
+            raise Missing(f"{source}: {error}") from None
+
+
+class Sweep:
+    """A compiled peer: the functions `create` and `sweep` of its library.
+
+    Parameters
+    ----------
+    library : ctypes.CDLL
+        The library.
+    *arguments : ctypes value
+        What its `create` asks for.
+    """
+
+    def __init__(self, library: ctypes.CDLL, *arguments: object) -> None:
+        library.create.restype = c_void_p
+        library.sweep.restype = c_double
+        library.sweep.argtypes = [c_void_p, c_int64, *[c_void_p] * 4]
+        self._sweep = library.sweep
+        self._peer = library.create(*arguments)
+        if not self._peer:
+            raise Missing("the engine does not take the tree")
+
+    def _run(self, pose: Array, velocity: Array, acceleration: Array) -> tuple[Array, float]:
+        states = [np.ascontiguousarray(x, dtype=float) for x in (pose, velocity, acceleration)]
+        found = np.empty_like(states[0])
+        pointers = [x.ctypes.data for x in (*states, found)]
+        return found, float(self._sweep(self._peer, len(found), *pointers))
+
+    def forces(self, pose: Array, velocity: Array, acceleration: Array) -> Array:
+        """Return the actuator forces (B, 4)."""
+        return self._run(pose, velocity, acceleration)[0]
+
+    def seconds(self, pose: Array, velocity: Array, acceleration: Array) -> float:
+        """Return the seconds a state that one sweep over the batch takes, timed in C."""
+        return self._run(pose, velocity, acceleration)[1] / len(pose)

@@ -1,0 +1,114 @@
+"""Pinocchio, from Python and in C++."""
+
+from __future__ import annotations
+
+from ctypes import c_int, c_void_p
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+from peers.calls import Calls
+from peers.closure import Array, Closure
+from peers.library import Missing, Sweep, compiled
+from peers.tree import Body, tree
+
+import pteron
+
+__all__ = ["cpp", "python"]
+
+_BOOST = (
+    "-DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS",
+    "-DBOOST_MPL_LIMIT_LIST_SIZE=30",
+    "-DBOOST_MPL_LIMIT_VECTOR_SIZE=30",
+    "-DBOOST_FUSION_INVOKE_MAX_ARITY=12",
+)
+"""What Pinocchio's own CMake files define for those who include it."""
+
+
+def python(robot: pteron.Manipulator) -> Calls:
+    """Return the peer that calls `pinocchio.rnea` from Python."""
+    if find_spec("pinocchio") is None:
+        raise Missing("the package pin is not installed")
+    import pinocchio as pin
+
+    model = pin.Model()
+    model.gravity.linear = np.array(robot.gravity)
+    ids: list[int] = []
+    for n, body in enumerate(tree(robot)):
+        joint = 0 if body.parent < 0 else ids[body.parent]
+        place = pin.SE3(body.rotation, body.offset)
+        if len(body.slides) == 3:
+            resting = pin.SE3.Identity()
+            joint = model.addJoint(joint, pin.JointModelTranslation(), resting, f"p{n}")
+        elif body.slides:
+            (axis,) = body.slides
+            along_z = np.array_equal(axis, [0.0, 0.0, 1.0])
+            kind = pin.JointModelPZ() if along_z else pin.JointModelPrismaticUnaligned(axis)
+            joint = model.addJoint(joint, kind, place, f"p{n}")
+            place = pin.SE3.Identity()
+        joint = model.addJoint(joint, pin.JointModelRUBZ(), place, f"r{n}")
+        inertia = pin.Inertia(body.mass, body.center, np.diag(body.inertia))
+        model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
+        ids.append(joint)
+    data = model.createData()
+    q, v, a = np.empty(model.nq), np.empty(model.nv), np.empty(model.nv)
+    rnea = pin.rnea
+    tau = data.tau
+    return Calls(Closure.of(robot), (q, v, a), tau, lambda: rnea(model, data, q, v, a), True)
+
+
+def cpp(robot: pteron.Manipulator) -> Sweep:
+    """Return the peer that calls `pinocchio::rnea` in C++."""
+    joints = _table(tree(robot))
+    gravity = np.array(robot.gravity)
+    numbers = Closure.of(robot).numbers
+    library = compiled("g++", "pinocchio_peer.cpp", ["-std=c++17", *_BOOST, *_includes()])
+    return Sweep(
+        library,
+        c_void_p(joints.ctypes.data),
+        c_int(len(joints)),
+        c_void_p(gravity.ctypes.data),
+        c_void_p(numbers.ctypes.data),
+    )
+
+
+def _includes() -> list[str]:
+    """Return the options for the headers that the wheels bring; CasADi's brings Eigen's."""
+    cmeel, casadi = find_spec("cmeel"), find_spec("casadi")
+    folders: list[Path] = []
+    if cmeel is not None and cmeel.origin is not None:
+        prefix = Path(cmeel.origin).parent.with_name("cmeel.prefix") / "include"
+        folders += [prefix, prefix / "eigen3"]
+    if casadi is not None and casadi.origin is not None:
+        folders.append(Path(casadi.origin).parent / "include" / "eigen3")
+    wanted = {
+        "pinocchio/algorithm/rnea.hpp": "pin",
+        "boost/variant.hpp": "cmeel-boost",
+        "Eigen/Core": "casadi (or cmeel-eigen)",
+    }
+    for header, package in wanted.items():
+        if not any((folder / header).is_file() for folder in folders):
+            raise Missing(f"no header {header}, which the package {package} brings")
+    return [option for folder in folders for option in ("-isystem", str(folder))]
+
+
+def _table(bodies: list[Body]) -> Array:
+    """Return the joints, one a row, as `Joint` in pinocchio_peer.cpp has them."""
+    slide, turn, translation = 0.0, 1.0, 2.0
+    nothing, identity = np.zeros(7), np.eye(3).ravel()
+    table: list[Array] = []
+    ids: list[float] = []
+    for body in bodies:
+        parent = 0.0 if body.parent < 0 else ids[body.parent]
+        place = np.array([*body.rotation.ravel(), *body.offset])
+        resting = np.array([*identity, 0.0, 0.0, 0.0])
+        if len(body.slides) == 3:
+            table.append(np.array([translation, parent, *resting, 0.0, 0.0, 0.0, *nothing]))
+            parent = float(len(table))
+        elif body.slides:
+            table.append(np.array([slide, parent, *place, *body.slides[0], *nothing]))
+            parent, place = float(len(table)), resting
+        inertia = [body.mass, *body.center, *body.inertia]
+        table.append(np.array([turn, parent, *place, 0.0, 0.0, 1.0, *inertia]))
+        ids.append(float(len(table)))
+    return np.ascontiguousarray(table)

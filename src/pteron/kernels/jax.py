@@ -1,0 +1,112 @@
+"""Target `jax`: a pure function of arrays, which jits, maps, differentiates and runs on a GPU.
+
+It is elementwise from its inputs' components to its outputs', so that XLA makes one loop of it:
+what it reads and writes is its inputs and outputs, once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from pteron.errors import DataError, ModelError
+from pteron.kernels.code import PYTHON, names_of, statements
+from pteron.kernels.graph import graph_of
+from pteron.kernels.kernel import Array, Kernel
+
+__all__ = ["Traced"]
+
+
+@dataclass(frozen=True)
+class Traced(Kernel):
+    """A kernel that JAX traces. It takes and returns JAX arrays, and may be called inside `jit`."""
+
+    @cached_property
+    def source(self) -> str:
+        """The Python code."""
+        graph = graph_of(self.function, self.inputs)
+        names = names_of(graph, lambda i, j: f"{self.inputs[i].name}[..., {j}]", repr)
+        arguments = ", ".join(port.name for port in self.inputs)
+        lines = [f"def {self.name}({arguments}):"]
+        lines += statements(graph, graph.operations(), names, PYTHON, "    {0} = {1}")
+        results = []
+        for port, nodes in zip(self.outputs, graph.outputs, strict=True):
+            values = ", ".join(names[k] for k in nodes)
+            lines.append(f"    {port.name}_out = stack({values})")
+            results.append(f"{port.name}_out")
+        return "\n".join([*lines, f"    return {', '.join(results)},\n"])
+
+    @cached_property
+    def _evaluate(self) -> Callable[..., Any]:
+        try:
+            import jax
+            from jax import numpy as jnp
+        except ImportError:
+            raise ModelError(
+                'target: "jax" needs JAX, which is not installed; pip install "pteron[jax]"'
+            ) from None
+        if self.dtype == "float64" and not jax.config.read("jax_enable_x64"):
+            jax.config.update("jax_enable_x64", True)
+
+        def stack(*values: Any) -> Any:
+            return jnp.stack(jnp.broadcast_arrays(*values), axis=-1)
+
+        names = ("sqrt", "sin", "cos", "fmin", "fmax")
+        space: dict[str, Any] = {name: getattr(jnp, name) for name in names}
+        space |= {"atan2": jnp.arctan2, "fabs": jnp.abs, "stack": stack}
+        exec(self.source, space)
+        dtype = np.dtype(self.dtype)
+        function = space[self.name]
+        fixed = {name: np.asarray(value, dtype).ravel() for name, value in self.fixed.items()}
+
+        def evaluate(*values: Any) -> Any:
+            given = iter(values)
+            arrays = []
+            for port in self.inputs:
+                if port.name in fixed:
+                    arrays.append(jnp.asarray(fixed[port.name]))
+                else:
+                    arrays.append(jnp.asarray(next(given), dtype))
+            lead = jnp.broadcast_shapes(
+                *(
+                    array.shape[: array.ndim - len(port.shape)]
+                    for array, port in zip(arrays, self.inputs, strict=True)
+                )
+            )
+            results = []
+            for value, port in zip(function(*arrays), self.outputs, strict=True):
+                value = jnp.broadcast_to(value, (*lead, value.shape[-1]))
+                results.append(value.reshape(lead + port.shape))
+            return results[0] if len(results) == 1 else tuple(results)
+
+        return jax.jit(evaluate)
+
+    def __call__(self, *values: Any) -> Any:
+        """Evaluate the kernel: arrays (..., *port.shape) or tracers, leading axes broadcast.
+
+        Raises
+        ------
+        DataError
+            If the number of inputs or a shape is wrong.
+        ModelError
+            If JAX is not installed.
+        """
+        ports = [port for port in self.inputs if port.name not in self.fixed]
+        if len(values) != len(ports):
+            names = ", ".join(port.name for port in ports)
+            raise DataError(
+                f"{self.name}: {len(values)} inputs given, {len(ports)} expected ({names})"
+            )
+        for value, port in zip(values, ports, strict=True):
+            shape = np.shape(value)
+            if shape[len(shape) - len(port.shape) :] != port.shape:
+                expected = ", ".join(["...", *map(str, port.shape)])
+                raise DataError(f"{port.name}: shape {shape} given, ({expected}) expected")
+        return self._evaluate(*values)
+
+    def _run(self, batch: int, inputs: Any, outputs: Any) -> None:
+        raise NotImplementedError("JAX arrays are not filled in place")
