@@ -32,8 +32,11 @@ def test_operations_of_the_quadrupteron():
     robot = CATALOG["quadrupteron"]
     kernels = model_forms(pteron.base_parameters(robot))
     count = {key: kernel.operations for key, kernel in kernels.items()}
-    assert count["factored", "complete"] == pteron.compile(robot, "inverse_dynamics").operations
-    assert count["factored", "complete"] <= 450
+    assert count["factored", "complete"] <= 430
+    assert pteron.compile(robot, "inverse_dynamics").operations <= 400
+    # Beyond the paper's 41 %: against Eq. (15) as it is written, shared subexpressions found.
+    assert count["factored", "reduced"] <= 0.42 * count["regressor", "complete"]
+    assert count["factored", "reduced"] <= 0.9 * count["factored", "complete"]
     for form in FORMS:
         assert count[form, "reduced"] < count[form, "complete"]
     assert count["factored", "complete"] < count["regressor", "reduced"]

@@ -42,7 +42,7 @@ def test_unknown_functions_and_targets_are_refused_with_the_choices():
     assert str(caught.value) == (
         f"what: 'inverse_dynamic' cannot be compiled; choose from {', '.join(FUNCTIONS)}"
     )
-    with pytest.raises(ModelError, match="target: 'fortran' is not known; choose from vm"):
+    with pytest.raises(ModelError, match="target: 'fortran' is not known; choose from vm, numba"):
         pteron.compile(ROBOT, "jacobian", "fortran")
 
 
@@ -50,7 +50,7 @@ def test_unknown_functions_and_targets_are_refused_with_the_choices():
 def kernel_of(robot, what):
     """Return the kernel of any function; that of the base regressor needs base parameters."""
     base = pteron.base_parameters(robot) if what == "base_regressor" else None
-    return pteron.compile(robot, what, base=base)
+    return pteron.compile(robot, what, base=base, grade="parametric")
 
 
 def test_base_parameters_go_with_their_regressor_alone():
@@ -125,7 +125,7 @@ PUBLIC = {
 
 @pytest.mark.parametrize("what", PUBLIC)
 def test_a_kernel_gives_what_its_public_function_gives(what):
-    kernel = pteron.compile(ROBOT, what)
+    kernel = pteron.compile(ROBOT, what, grade="parametric")
     values = values_for(ROBOT, kernel, (5,))
     found, expected = kernel(*values), PUBLIC[what](ROBOT, *values)
     if not isinstance(found, tuple):
@@ -136,11 +136,13 @@ def test_a_kernel_gives_what_its_public_function_gives(what):
 
 def test_machines_of_one_geometry_share_a_program_but_not_their_parameters():
     heavy = pteron.with_parameters(ROBOT, 2 * pteron.parameters(ROBOT))
-    light, heavy = (pteron.compile(r, "inverse_dynamics") for r in (ROBOT, heavy))
+    light, heavy = (
+        pteron.compile(r, "inverse_dynamics", grade="parametric") for r in (ROBOT, heavy)
+    )
     assert light.function is heavy.function
     values = values_for(ROBOT, light, (4,))
     np.testing.assert_allclose(heavy(*values), 2 * light(*values), rtol=1e-13)
-    assert pteron.compile(ROBOT, "inverse_dynamics") is light
+    assert pteron.compile(ROBOT, "inverse_dynamics", grade="parametric") is light
 
 
 def test_inputs_of_wrong_number_or_shape_are_refused():

@@ -61,7 +61,12 @@ from pteron.manipulator import (
 
 if TYPE_CHECKING:
     from pteron import motion, plots, report, workspace
-    from pteron.reduction import BaseParameters, base_parameters, base_regressor
+    from pteron.reduction import (
+        BaseParameters,
+        base_parameters,
+        base_regressor,
+        cheapest_parameters,
+    )
 
 __version__ = "0.1.0"
 
@@ -69,6 +74,7 @@ _LATER = {
     "BaseParameters": "pteron.reduction",
     "base_parameters": "pteron.reduction",
     "base_regressor": "pteron.reduction",
+    "cheapest_parameters": "pteron.reduction",
 }
 _LATER_MODULES = ("motion", "plots", "report", "workspace")
 """What would slow the start of those who do not use it (SymPy, SciPy, matplotlib)."""
@@ -99,6 +105,7 @@ __all__ = [
     "base_regressor",
     "bias_forces",
     "catalog",
+    "cheapest_parameters",
     "compile",
     "coriolis_matrix",
     "direct_kinematics",

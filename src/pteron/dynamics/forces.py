@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pteron.conventions import BatchOfPoses, BatchOfSliders, OnFailure, PoseLike, SliderLike
-from pteron.kernels import compile
+from pteron.kernels import numeric
 from pteron.kinematics.poses import blanked, finite, usable_poses
 from pteron.manipulator import Manipulator
 
@@ -59,9 +59,9 @@ def inverse_dynamics(
     rate = finite(robot, velocity, "velocity", on_failure)
     second = finite(robot, acceleration, "acceleration", on_failure)
     if wrench is None:
-        return blanked(compile(robot, "inverse_dynamics")(poses, rate, second), poses, rate, second)
+        return blanked(numeric(robot, "inverse_dynamics")(poses, rate, second), poses, rate, second)
     load = finite(robot, wrench, "wrench", on_failure)
-    forces = compile(robot, "inverse_dynamics_loaded")(poses, rate, second, load)
+    forces = numeric(robot, "inverse_dynamics_loaded")(poses, rate, second, load)
     return blanked(forces, poses, rate, second, load)
 
 
@@ -116,7 +116,7 @@ def forward_dynamics(
     rate = finite(robot, velocity, "velocity", on_failure)
     push = finite(robot, forces, "forces", on_failure)
     if wrench is None:
-        return blanked(compile(robot, "forward_dynamics")(poses, rate, push), poses, rate, push)
+        return blanked(numeric(robot, "forward_dynamics")(poses, rate, push), poses, rate, push)
     load = finite(robot, wrench, "wrench", on_failure)
-    acceleration = compile(robot, "forward_dynamics_loaded")(poses, rate, push, load)
+    acceleration = numeric(robot, "forward_dynamics_loaded")(poses, rate, push, load)
     return blanked(acceleration, poses, rate, push, load)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pteron.conventions import BatchOfMatrices, BatchOfNumbers, BatchOfPoses, OnFailure, PoseLike
-from pteron.kernels import compile
+from pteron.kernels import numeric
 from pteron.kinematics.poses import blanked, finite, usable_poses
 from pteron.manipulator import Manipulator
 
@@ -51,7 +51,7 @@ def mass_matrix(
     (True, np.True_)
     """
     poses = usable_poses(robot, pose, bent=True, on_failure=on_failure)
-    return blanked(compile(robot, "mass_matrix")(poses), poses)
+    return blanked(numeric(robot, "mass_matrix")(poses), poses)
 
 
 def coriolis_matrix(
@@ -83,7 +83,7 @@ def coriolis_matrix(
     """
     poses = usable_poses(robot, pose, bent=True, on_failure=on_failure)
     rate = finite(robot, velocity, "velocity", on_failure)
-    return blanked(compile(robot, "coriolis_matrix")(poses, rate), poses, rate)
+    return blanked(numeric(robot, "coriolis_matrix")(poses, rate), poses, rate)
 
 
 def bias_forces(
@@ -114,7 +114,7 @@ def bias_forces(
     """
     poses = usable_poses(robot, pose, bent=True, on_failure=on_failure)
     rate = finite(robot, velocity, "velocity", on_failure)
-    return blanked(compile(robot, "bias_forces")(poses, rate), poses, rate)
+    return blanked(numeric(robot, "bias_forces")(poses, rate), poses, rate)
 
 
 def gravity_forces(
@@ -144,7 +144,7 @@ def gravity_forces(
         If a leg is stretched or folded (type I).
     """
     poses = usable_poses(robot, pose, bent=True, on_failure=on_failure)
-    return blanked(compile(robot, "gravity_forces")(poses), poses)
+    return blanked(numeric(robot, "gravity_forces")(poses), poses)
 
 
 def kinetic_energy(
@@ -175,7 +175,7 @@ def kinetic_energy(
     """
     poses = usable_poses(robot, pose, bent=True, on_failure=on_failure)
     rate = finite(robot, velocity, "velocity", on_failure)
-    return blanked(compile(robot, "kinetic_energy")(poses, rate), poses, rate)
+    return blanked(numeric(robot, "kinetic_energy")(poses, rate), poses, rate)
 
 
 def potential_energy(
@@ -205,4 +205,4 @@ def potential_energy(
         If R1 and R3 of a leg coincide, so that its elbow is undetermined.
     """
     poses = usable_poses(robot, pose, reach=True, on_failure=on_failure)
-    return blanked(compile(robot, "potential_energy")(poses), poses)
+    return blanked(numeric(robot, "potential_energy")(poses), poses)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pteron.conventions import BatchOfRegressors, OnFailure, PoseLike
-from pteron.kernels import compile
+from pteron.kernels import numeric
 from pteron.kinematics.poses import blanked, finite, usable_poses
 from pteron.manipulator import Manipulator
 
@@ -53,5 +53,5 @@ def regressor(
     poses = usable_poses(robot, pose, bent=True, held=True, on_failure=on_failure)
     rate = finite(robot, velocity, "velocity", on_failure)
     second = finite(robot, acceleration, "acceleration", on_failure)
-    matrices: BatchOfRegressors = compile(robot, "regressor")(poses, rate, second)
+    matrices: BatchOfRegressors = numeric(robot, "regressor")(poses, rate, second)
     return blanked(matrices, poses, rate, second)

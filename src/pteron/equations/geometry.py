@@ -131,6 +131,17 @@ class Geometry:
         return geometry, ca.vertcat(*vectors, frame)
 
 
+def geometry_values(robot: Manipulator) -> list[float]:
+    """Return the numbers of a machine for the vector of `Geometry.symbols`."""
+    g = Geometry.of(robot)
+    values: list[float] = []
+    for leg in g.legs:
+        parts = (leg.r, leg.d, leg.e, leg.plane[:, 0], leg.s0, leg.lu, leg.ll, leg.sigma)
+        values += [float(v) for part in parts for v in ca.vertsplit(ca.densify(part))]
+    frame = (g.x0, g.y0, g.k, g.gravity)
+    return values + [float(v) for part in frame for v in ca.vertsplit(ca.densify(part))]
+
+
 def pole(direction: Sequence[float]) -> tuple[int, int]:
     """Return the largest component of a unit vector and its sign, which `plane_axis` asks for."""
     i = max(range(3), key=lambda j: abs(direction[j]))

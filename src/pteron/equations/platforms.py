@@ -84,7 +84,8 @@ def platform_motion(
         return PlatformMotion(points, ddp, None, None)
     turn = Turn.of(geometry.unit, pose[3], velocity[3], acceleration[3])
     points = tuple(
-        _turning_point(p, dp, ddp, turn, *offset_in_units(geometry, i)) for i in range(len(geometry.legs))
+        _turning_point(p, dp, ddp, turn, *offset_in_units(geometry, i))
+        for i in range(len(geometry.legs))
     )
     return PlatformMotion(points, ddp, turn, acceleration[3])
 

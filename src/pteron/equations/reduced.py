@@ -46,9 +46,7 @@ class ReducedLeg(NamedTuple):
     """eta: first moment of the lower link across it, over its length."""
 
 
-def reduced_inertia(
-    geometry: Geometry, parameters: Expression
-) -> tuple[list[ReducedLeg], Inertia]:
+def reduced_inertia(geometry: Geometry, parameters: Expression) -> tuple[list[ReducedLeg], Inertia]:
     """Return what P (N, K) is to the reduced model; the rows m gamma_x of the lower links are zero.
 
     It is linear in P, one number for each row that is not zero.
@@ -78,10 +76,13 @@ def reduced_dynamics(
     acceleration: Expression,
     legs: list[ReducedLeg],
     platform: Inertia,
+    wrench: Expression | None = None,
 ) -> Expression:
-    """Return the actuator forces (n, K) that `reduced_inertia` needs."""
+    """Return the actuator forces (n, K) for what `reduced_inertia` returns."""
     motion = platform_motion(geometry, pose, velocity, acceleration)
     load = platform_load(geometry, motion, platform)
+    if wrench is not None:
+        load = load + Load.of(-wrench)
     on_sliders = []
     for i, (leg, inertia) in enumerate(zip(geometry.legs, legs, strict=True)):
         on_slider, on_point = leg_forces(leg, motion.points[i], geometry.gravity, inertia)
@@ -116,9 +117,7 @@ def leg_forces(
 
     _, dh = first_moment(l_u, quarter_turn(l_u), inertia.upper_x, inertia.upper_y)
     down = ca.mtimes((a_slider / weight(leg, gravity)).T, dh)
-    upper_moment = (
-        down + inertia.upper_inertia * upper_acceleration + inertia.lower_y * along_upper
-    )
+    upper_moment = down + inertia.upper_inertia * upper_acceleration + inertia.lower_y * along_upper
     lower_moment = inertia.lower_inertia * lower_acceleration + inertia.lower_y * (
         along_lower + ca.dot(a_slider, l_l)
     )
@@ -144,9 +143,7 @@ def aligned(leg: LegGeometry) -> bool:
 def weight(leg: LegGeometry, gravity: Expression) -> Expression:
     """Return gravity in the leg's plane where it is one constant component, or 1."""
     components = [
-        value
-        for value in ca.vertsplit(ca.mtimes(leg.plane.T, gravity))
-        if not value.is_zero()
+        value for value in ca.vertsplit(ca.mtimes(leg.plane.T, gravity)) if not value.is_zero()
     ]
     fit = aligned(leg) and len(components) == 1 and components[0].is_constant()
     return components[0] if fit else ca.SX(1)

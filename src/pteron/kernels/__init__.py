@@ -1,13 +1,14 @@
-"""Expressions made executable: by CasADi's virtual machine, and exactly in a field.
+"""Expressions made executable: by CasADi's virtual machine, Numba, C, JAX, and in fractions.
 
-Batching and caching live here and only here.
+Batching, threads and caching live here and only here.
 """
 
+from pteron.kernels.choice import numeric
 from pteron.kernels.fields import Field, NoSquareRoot, PrimeField, RationalField, evaluate
 from pteron.kernels.functions import FUNCTIONS, Program, general_program, program
 from pteron.kernels.kernel import Array, Kernel, Port, as_array
 from pteron.kernels.operations import count_operations
-from pteron.kernels.targets import TARGETS, compile
+from pteron.kernels.targets import TARGETS, compile, same_layout
 
 __all__ = [
     "FUNCTIONS",
@@ -25,5 +26,7 @@ __all__ = [
     "count_operations",
     "evaluate",
     "general_program",
+    "numeric",
     "program",
+    "same_layout",
 ]

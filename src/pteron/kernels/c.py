@@ -15,7 +15,7 @@ import shutil
 import subprocess
 import sysconfig
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from importlib.machinery import EXTENSION_SUFFIXES, ExtensionFileLoader
 from pathlib import Path
@@ -33,8 +33,6 @@ from pteron.kernels.kernel import Array, Kernel, Port
 __all__ = ["Compiled", "compiler"]
 
 _FLAGS = ("-std=c99", "-O3", "-march=native", "-ffp-contract=off", "-fno-math-errno", "-fPIC")
-_LARGE = 3000
-"""Operations above which optimising takes the compiler minutes for little."""
 
 
 @lru_cache(maxsize=1)
@@ -90,9 +88,7 @@ class Compiled(Kernel):
         source, library = folder / "kernel.c", folder / _LIBRARY
         source.write_text(self.source, encoding="utf-8")
         headers = (sysconfig.get_path("include"), np.get_include())
-        flags = [flag for flag in _FLAGS if flag != "-O3" or self.operations < _LARGE]
-        flags += ["-O1"] * (self.operations >= _LARGE)
-        command = [path, *flags, *(f"-I{header}" for header in headers), "-shared"]
+        command = [path, *_FLAGS, *(f"-I{header}" for header in headers), "-shared"]
         command += [str(source), "-o", str(library), "-lm"]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode != 0:
@@ -101,6 +97,12 @@ class Compiled(Kernel):
                 f'target: "c" could not be compiled with {path}: {lines[0]}; use "numba", or set '
                 "CC to another compiler"
             )
+
+    def with_fixed(self, fixed: dict[str, Array]) -> Compiled:
+        """Return the kernel with other fixed inputs, and the code that is already loaded."""
+        other = replace(self, fixed=fixed)
+        other.__dict__.update(source=self.source, _module=self._module)
+        return other
 
     @cached_property
     def _direct(self) -> Callable[..., Any] | None:
@@ -125,7 +127,7 @@ _LIBRARY = "pteron_kernel" + EXTENSION_SUFFIXES[0]
 def _load(folder: Path) -> ModuleType:
     path = str(folder / _LIBRARY)
     loader = ExtensionFileLoader("pteron_kernel", path)
-    spec = importlib.util.spec_from_loader("pteron_kernel", loader)
+    spec = importlib.util.spec_from_file_location("pteron_kernel", path, loader=loader)
     assert spec is not None
     module = importlib.util.module_from_spec(spec)
     loader.exec_module(module)
@@ -138,7 +140,9 @@ def _source(
     real = "float" if dtype == "float32" else "double"
     printed = C
     if dtype == "float32":
-        printed = {op: text.replace("(", "f(", 1) if "(" in text else text for op, text in C.items()}
+        printed = {
+            op: text.replace("(", "f(", 1) if "(" in text else text for op, text in C.items()
+        }
     arguments = ", ".join(
         [f"const real *restrict {port.name}" for port in inputs]
         + [f"real *restrict {port.name}_out" for port in outputs]
@@ -198,8 +202,11 @@ def _sweep(
     rest = [k for k in operations if not graph.nodes[k].shared and not graph.nodes[k].outlying]
     lines = statements(graph, shared, names, printed, "const real {0} = {1};")
     rows = len(used) + len(outlying)
-    results = [(port, j, k) for port, nodes in zip(outputs, graph.outputs, strict=True)
-               for j, k in enumerate(nodes)]
+    results = [
+        (port, j, k)
+        for port, nodes in zip(outputs, graph.outputs, strict=True)
+        for j, k in enumerate(nodes)
+    ]
     lines += [
         f"real in[{max(rows, 1)}][BLOCK], out[{len(results)}][BLOCK];",
         "for (npy_intp start = 0; start < n; start += BLOCK) {",
@@ -394,13 +401,21 @@ static PyMethodDef METHODS[] = {{
     {{"run", (PyCFunction)(void (*)(void))run, METH_FASTCALL, "fill outputs"}},
     {{NULL, NULL, 0, NULL}}}};
 
+static int start(PyObject *module)
+{{
+    (void)module;
+    import_array1(-1);
+    return 0;
+}}
+
+/* Initialised in two phases: Python takes modules of one phase and of one name for the same. */
+static PyModuleDef_Slot SLOTS[] = {{{{Py_mod_exec, (void *)start}}, {{0, NULL}}}};
 static struct PyModuleDef MODULE = {{
-    PyModuleDef_HEAD_INIT, "pteron_kernel", NULL, -1, METHODS, NULL, NULL, NULL, NULL}};
+    PyModuleDef_HEAD_INIT, "pteron_kernel", NULL, 0, METHODS, SLOTS, NULL, NULL, NULL}};
 
 PyMODINIT_FUNC PyInit_pteron_kernel(void);
 PyMODINIT_FUNC PyInit_pteron_kernel(void)
 {{
-    import_array();
-    return PyModule_Create(&MODULE);
+    return PyModuleDef_Init(&MODULE);
 }}
 """

@@ -15,6 +15,7 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 
@@ -104,10 +105,8 @@ def _moved(work: Path, target: Path) -> Path:
                 return target
             # In place, but damaged: out of the way first, so that nobody sees half of it.
             wreck = Path(tempfile.mkdtemp(prefix=".damaged-", dir=target.parent))
-            try:
+            with suppress(OSError):
                 target.rename(wreck / target.name)
-            except OSError:
-                pass
             shutil.rmtree(wreck, ignore_errors=True)
         else:
             return target

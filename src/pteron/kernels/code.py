@@ -79,4 +79,5 @@ def statements(
 
 def used_inputs(graph: Graph) -> list[tuple[int, int]]:
     """Return the (port, element) pairs that the graph reads, in order."""
-    return sorted(node.arguments for node in graph.nodes if node.operation == INPUT)  # type: ignore[type-var, return-value]
+    places = (node.arguments for node in graph.nodes if node.operation == INPUT)
+    return sorted((port, element) for port, element in places)

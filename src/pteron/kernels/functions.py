@@ -5,9 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
 
+from pteron.equations.bodies import Inertia
 from pteron.equations.circles import squared_reach
 from pteron.equations.closure import regularity
 from pteron.equations.geometry import Expression, Geometry
@@ -28,6 +32,7 @@ from pteron.equations.position import (
     reach,
 )
 from pteron.equations.rates import joint_motion
+from pteron.equations.reduced import ReducedLeg, reduced_dynamics, reduced_inertia
 from pteron.equations.regressor import paper_regressor, terms
 from pteron.equations.screws import joint_screws
 from pteron.equations.virtual_work import generalized_forces, inverse_dynamics
@@ -35,7 +40,7 @@ from pteron.errors import ModelError
 from pteron.kernels.kernel import Port
 from pteron.manipulator import Manipulator, PlanarInertia
 
-__all__ = ["FUNCTIONS", "Program", "general_program", "program"]
+__all__ = ["FUNCTIONS", "Columns", "Program", "general_program", "program", "specialised"]
 
 Outputs = dict[str, tuple[Expression, tuple[int, ...]]]
 """Each output's expression and its shape; a matrix is (rows, columns), a stack of them vertical."""
@@ -49,6 +54,8 @@ class Program:
     function: ca.Function
     inputs: tuple[Port, ...]
     outputs: tuple[Port, ...]
+    scale: ca.DM | None = None
+    """For a reduced model: what takes base parameters to the numbers that it works with."""
 
 
 @dataclass(frozen=True)
@@ -126,6 +133,12 @@ def _accelerations(g: Geometry, v: dict[str, Expression]) -> Outputs:
 
 
 def _inverse_dynamics(g: Geometry, v: dict[str, Expression]) -> Outputs:
+    if "reduced" in v:
+        legs, platform = v["reduced"]
+        forces = reduced_dynamics(
+            g, v["pose"], v["velocity"], v["acceleration"], legs, platform, v.get("wrench")
+        )
+        return {"forces": (forces, (g.freedom,))}
     forces = inverse_dynamics(
         g, v["pose"], v["velocity"], v["acceleration"], v["parameters"], v.get("wrench")
     )
@@ -200,6 +213,9 @@ def _paper_terms(g: Geometry, v: dict[str, Expression]) -> Outputs:
 
 _STATE = ("pose", "velocity", "acceleration")
 
+_REDUCIBLE = ("inverse_dynamics", "inverse_dynamics_loaded", "base_regressor")
+"""What may be asked for base parameters."""
+
 _TABLE: dict[str, _Entry] = {
     "inverse_kinematics": _Entry(("pose",), _position),
     "link_vectors": _Entry(("pose",), _links),
@@ -235,12 +251,17 @@ FUNCTIONS = tuple(_TABLE)
 """What `compile` accepts. The `_loaded` ones take a wrench on the platform as well."""
 
 
+_SHARED = ("geometry", "parameters", "base_parameters")
+"""Inputs of which one value serves a whole batch."""
+
 Columns = tuple[tuple[int, ...], ...]
 """For each column of a base regressor, the inertial parameters whose columns it adds up."""
 
 
 def program(robot: Manipulator, what: str, columns: Columns | None = None) -> Program:
     """Return the function `what` of a machine's geometry; inertial parameters stay inputs.
+
+    With `columns` the dynamics are those of base parameters, which are then the input.
 
     Raises
     ------
@@ -251,9 +272,28 @@ def program(robot: Manipulator, what: str, columns: Columns | None = None) -> Pr
         raise ModelError(f"what: {what!r} cannot be compiled; choose from {', '.join(FUNCTIONS)}")
     if what == "base_regressor" and columns is None:
         raise ModelError('base: missing; "base_regressor" needs base=base_parameters(robot)')
-    if what != "base_regressor" and columns is not None:
-        raise ModelError(f'base: {what!r} has no use for it; it goes with "base_regressor"')
+    if what not in _REDUCIBLE and columns is not None:
+        raise ModelError(f"base: {what!r} has no use for it; it goes with {', '.join(_REDUCIBLE)}")
     return _built(_bare(robot), what, columns)
+
+
+def specialised(given: Program, values: dict[str, NDArray[np.float64]]) -> Program:
+    """Return the program with numbers in place of some of its inputs."""
+    symbols = given.function.sx_in()
+    folded = [
+        ca.SX(ca.DM(values[port.name])) if port.name in values else symbol
+        for port, symbol in zip(given.inputs, symbols, strict=True)
+    ]
+    left = [k for k, port in enumerate(given.inputs) if port.name not in values]
+    outputs = given.function.call(folded)
+    function = ca.Function(
+        given.name,
+        [symbols[k] for k in left],
+        ca.cse([ca.densify(output) for output in outputs]),
+        [given.inputs[k].name for k in left],
+        [port.name for port in given.outputs],
+    )
+    return Program(given.name, function, tuple(given.inputs[k] for k in left), given.outputs)
 
 
 @lru_cache(maxsize=256)
@@ -273,7 +313,37 @@ def _built(robot: Manipulator, what: str, columns: Columns | None) -> Program:
     for k, members in enumerate(columns):
         for j in members:
             selection[j, k] = 1
-    return _program(geometry, what, constants={"selection": selection})
+    if what == "base_regressor":
+        return _program(geometry, what, constants={"selection": selection})
+    return _reduced_program(geometry, what, selection)
+
+
+def _reduced_program(geometry: Geometry, what: str, selection: Expression) -> Program:
+    """Return the inverse dynamics from base parameters, in the cheapest form that they allow."""
+    base = ca.SX.sym("base_parameters", selection.shape[1])
+    columns = ca.mtimes(selection, base)
+    legs = len(geometry.legs)
+    lower = [columns[legs + 4 * (legs + i) + 1] for i in range(legs)]
+    if not all(row.is_zero() for row in lower):
+        # A first moment along a lower link is among them, which that form does without.
+        constants = {"parameters": ca.densify(columns)}
+        return _program(geometry, what, constants=constants, extra={"base_parameters": base})
+    found, platform = reduced_inertia(geometry, columns)
+    rows = ca.vertcat(*(ca.vertcat(*leg) for leg in found), *platform)
+    kept = [k for k in range(rows.shape[0]) if not rows[k].is_zero()]
+    scale = ca.evalf(ca.jacobian(rows[kept], base))
+    numbers = ca.SX.sym("base_parameters", len(kept))
+    full = ca.SX(rows.shape[0], 1)
+    full[kept] = numbers
+    size = len(ReducedLeg._fields)
+    reduced = (
+        [ReducedLeg(*ca.vertsplit(full[size * i : size * (i + 1)])) for i in range(legs)],
+        Inertia(*ca.vertsplit(full[size * legs :])),
+    )
+    built = _program(
+        geometry, what, constants={"reduced": reduced}, extra={"base_parameters": numbers}
+    )
+    return replace(built, scale=scale)
 
 
 @lru_cache(maxsize=32)
@@ -290,13 +360,16 @@ def _program(
     geometry: Geometry,
     what: str,
     vector: Expression | None = None,
-    constants: dict[str, Expression] | None = None,
+    constants: dict[str, Any] | None = None,
+    extra: dict[str, Expression] | None = None,
 ) -> Program:
+    """Return a function of the table; `constants` stand for inputs, `extra` are more inputs."""
     entry = _TABLE[what]
     symbols = {
         name: ca.SX.sym(name, _count(geometry) if name == "parameters" else geometry.freedom)
         for name in entry.inputs
-    }
+        if name != "parameters" or not extra
+    } | (extra or {})
     outputs = entry.build(geometry, symbols | (constants or {}))
     # A matrix goes out transposed: CasADi stores columns, NumPy rows.
     dense = [ca.densify(expression).T for expression, _ in outputs.values()]
@@ -306,8 +379,7 @@ def _program(
         what, list(symbols.values()), ca.cse(dense), list(symbols), list(outputs)
     )
     inputs = tuple(
-        Port(name, symbol.shape[:1], shared=name in ("parameters", "geometry"))
-        for name, symbol in symbols.items()
+        Port(name, symbol.shape[:1], shared=name in _SHARED) for name, symbol in symbols.items()
     )
     return Program(
         what,

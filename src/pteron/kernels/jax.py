@@ -16,14 +16,17 @@ import numpy as np
 from pteron.errors import DataError, ModelError
 from pteron.kernels.code import PYTHON, names_of, statements
 from pteron.kernels.graph import graph_of
-from pteron.kernels.kernel import Array, Kernel
+from pteron.kernels.kernel import Kernel
 
 __all__ = ["Traced"]
 
 
 @dataclass(frozen=True)
 class Traced(Kernel):
-    """A kernel that JAX traces. It takes and returns JAX arrays, and may be called inside `jit`."""
+    """A kernel that JAX traces. It takes and returns JAX arrays, and may be called inside `jit`.
+
+    With dtype float64 it switches JAX to 64 bits (`jax_enable_x64`), for the process.
+    """
 
     @cached_property
     def source(self) -> str:
@@ -49,8 +52,9 @@ class Traced(Kernel):
             raise ModelError(
                 'target: "jax" needs JAX, which is not installed; pip install "pteron[jax]"'
             ) from None
-        if self.dtype == "float64" and not jax.config.read("jax_enable_x64"):
-            jax.config.update("jax_enable_x64", True)
+        if self.dtype == "float64":
+            # Without it JAX would take float64 for float32 and say nothing.
+            jax.config.update("jax_enable_x64", True)  # type: ignore[no-untyped-call]
 
         def stack(*values: Any) -> Any:
             return jnp.stack(jnp.broadcast_arrays(*values), axis=-1)

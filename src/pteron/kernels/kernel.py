@@ -164,7 +164,6 @@ class Kernel(ABC):
         )
         return results[0] if len(results) == 1 else results
 
-
     def _split(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
         """Run slices of the batch in threads; a state's numbers do not depend on its slice."""
         count = min(self.threads, batch // _SHARE)
@@ -178,9 +177,7 @@ class Kernel(ABC):
             list(pool.map(run, bounds[:-1], bounds[1:]))
 
 
-def as_array(
-    value: ArrayLike, name: str, shape: tuple[int, ...], dtype: str = "float64"
-) -> Array:
+def as_array(value: ArrayLike, name: str, shape: tuple[int, ...], dtype: str = "float64") -> Array:
     """Return `value` as floats whose last axes are `shape`, or say what was expected."""
     try:
         given = np.asarray(value)

@@ -3,78 +3,194 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Protocol
+from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
 
+from pteron.equations.geometry import geometry_values
 from pteron.errors import ModelError
-from pteron.kernels.functions import Columns, program
+from pteron.kernels.c import Compiled
+from pteron.kernels.exact import Exact
+from pteron.kernels.functions import Columns, Program, general_program, program, specialised
+from pteron.kernels.jax import Traced
 from pteron.kernels.kernel import Array, Kernel
+from pteron.kernels.numba import Jitted
 from pteron.kernels.vm import VirtualMachine
 from pteron.manipulator import Manipulator, parameters
 
-__all__ = ["TARGETS", "compile"]
+__all__ = ["TARGETS", "Grade", "Selects", "compile", "same_layout"]
 
-TARGETS: dict[str, type[Kernel]] = {"vm": VirtualMachine}
+TARGETS: dict[str, type[Kernel]] = {
+    "vm": VirtualMachine,
+    "numba": Jitted,
+    "c": Compiled,
+    "jax": Traced,
+    "exact": Exact,
+}
 """The targets by name."""
+
+Grade = Literal["specialised", "parametric", "general"]
+
+_DTYPES = {"vm": ("float64",), "numba": ("float64",), "exact": ("float64",)}
 
 
 class Selects(Protocol):
     """A choice of base parameters, such as `pteron.BaseParameters`."""
 
     @property
+    def robot(self) -> Manipulator:
+        """The machine they belong to."""
+
+    @property
     def selection(self) -> Array:
         """(N, rank): base regressor = regressor @ selection."""
 
+    def values(self, robot: Manipulator | None = None) -> Array:
+        """Return the base parameters' values."""
+
 
 def compile(
-    robot: Manipulator, what: str, target: str = "vm", *, base: Selects | None = None
+    robot: Manipulator,
+    what: str,
+    target: str = "vm",
+    *,
+    base: Selects | None = None,
+    grade: Grade = "specialised",
+    dtype: str = "float64",
+    threads: int = 1,
 ) -> Kernel:
     """Compile one of the numeric functions for a machine.
 
     Parameters
     ----------
     robot : Manipulator
-        The machine; its geometry and gravity are folded in, its inertial parameters are inputs of
-        the code and fixed to the machine's own in a call.
+        The machine.
     what : str
         A function's name: `"inverse_dynamics"`, `"jacobian"`, ...; `pteron.kernels.FUNCTIONS` has
         them all.
-    target : str
-        What executes it: `"vm"`, CasADi's virtual machine.
+    target : {"vm", "numba", "c", "jax", "exact"}
+        What executes it: CasADi's virtual machine, ready at once; Numba; the machine's C compiler,
+        fastest, from Python too; JAX, which differentiates and runs on accelerators; fractions.
     base : BaseParameters, optional
-        Which base parameters `"base_regressor"` is for.
+        For `"inverse_dynamics"`: compute from these base parameters alone, in the cheapest form
+        that they allow (see `pteron.cheapest_parameters`). For `"base_regressor"`: whose columns.
+    grade : {"specialised", "parametric", "general"}
+        What is folded into the code: all of the machine's numbers, for fewest operations; its
+        geometry and gravity, so that inertial parameters are an input; or nothing, so that one
+        compilation serves every machine of that topology. The inputs in question are fixed to the
+        machine's own values: a kernel of any grade is called alike.
+    dtype : {"float64", "float32"}
+        Of the numbers; `"float32"` for C and JAX.
+    threads : int
+        Threads that share a large batch (not for JAX, which has its own).
 
     Returns
     -------
     Kernel
         Called with the same arrays as the function (without `robot`); it has `operations`,
-        `inputs`, `outputs` and `source`. It does not check poses: NaN where out of reach.
+        `inputs`, `outputs` and `source`. It does not check poses: NaN where out of reach. All
+        float64 targets but JAX return the same bits. C and Numba compile at the first call, which
+        takes from half a second to some seconds; the result is kept in the user's cache directory
+        (`PTERON_CACHE` names another).
 
     Raises
     ------
     ModelError
-        If there is no such function or target, or `base` is missing or out of place.
+        If there is no such function, target, grade or dtype, or `base` is missing or out of place;
+        in a call, if the target's compiler or library is not installed.
 
     Examples
     --------
     >>> import pteron
-    >>> kernel = pteron.compile(pteron.load("quadrupteron"), "inverse_dynamics")
+    >>> robot = pteron.load("quadrupteron")
+    >>> kernel = pteron.compile(robot, "inverse_dynamics")
     >>> kernel.operations, [port.name for port in kernel.inputs]
-    (385, ['pose', 'velocity', 'acceleration', 'parameters'])
+    (385, ['pose', 'velocity', 'acceleration'])
+    >>> kernel = pteron.compile(robot, "inverse_dynamics", grade="parametric")
+    >>> kernel.operations, [port.name for port in kernel.inputs]
+    (417, ['pose', 'velocity', 'acceleration', 'parameters'])
     """
     if target not in TARGETS:
         raise ModelError(f"target: {target!r} is not known; choose from {', '.join(TARGETS)}")
-    columns: Columns | None = None
-    if base is not None:
-        columns = tuple(tuple(np.flatnonzero(column).tolist()) for column in base.selection.T)
-    return _compiled(robot, what, target, columns)
+    if grade not in get_args(Grade):
+        raise ModelError(f"grade: {grade!r} is not one of {', '.join(get_args(Grade))}")
+    allowed = _DTYPES.get(target, ("float64", "float32"))
+    if dtype not in allowed:
+        raise ModelError(f'dtype: {dtype!r} given, target "{target}" has {", ".join(allowed)}')
+    if threads < 1:
+        raise ModelError(f"threads: {threads} given, 1 or more expected")
+    if base is None:
+        return _compiled(robot, what, target, None, None, grade, dtype, threads)
+    if grade == "general":
+        raise ModelError('base: a choice for one machine; use grade "specialised" or "parametric"')
+    if not same_layout(base.robot, robot):
+        raise ModelError(
+            f"base: belongs to {base.robot.name}, whose layout or gravity differ from those of "
+            f"{robot.name}; ask for base_parameters of this one"
+        )
+    columns = tuple(tuple(np.flatnonzero(column).tolist()) for column in base.selection.T)
+    values = tuple(base.values(robot).tolist())
+    return _compiled(robot, what, target, columns, values, grade, dtype, threads)
 
 
 @lru_cache(maxsize=512)
-def _compiled(robot: Manipulator, what: str, target: str, columns: Columns | None) -> Kernel:
+def _compiled(
+    robot: Manipulator,
+    what: str,
+    target: str,
+    columns: Columns | None,
+    base_values: tuple[float, ...] | None,
+    grade: Grade,
+    dtype: str,
+    threads: int,
+) -> Kernel:
     built = program(robot, what, columns)
-    values = parameters(robot)
-    values.setflags(write=False)  # the kernel is shared by all who ask for it
-    fixed = {port.name: values for port in built.inputs if port.name == "parameters"}
-    return TARGETS[target](built.name, built.function, built.inputs, built.outputs, fixed)
+    fixed: dict[str, Array] = {}
+    for port in built.inputs:
+        if port.name == "parameters":
+            fixed[port.name] = parameters(robot)
+        elif port.name == "base_parameters":
+            values = np.array(base_values)
+            fixed[port.name] = values if built.scale is None else np.array(built.scale) @ values
+    if grade == "specialised" and fixed:
+        built, fixed = specialised(built, fixed), {}
+    elif grade == "general":
+        built = general_program(len(robot.legs), robot.platform.turns, what)
+        fixed["geometry"] = np.array(geometry_values(robot))
+    for value in fixed.values():
+        value.setflags(write=False)  # the kernel is shared by all who ask for it
+    return _made(TARGETS[target], built, fixed, dtype, threads)
+
+
+def _made(
+    kind: type[Kernel], built: Program, fixed: dict[str, Array], dtype: str, threads: int
+) -> Kernel:
+    # Fixed inputs come last, so that a call may append them to what it is given.
+    order = sorted(range(len(built.inputs)), key=lambda k: built.inputs[k].name in fixed)
+    inputs = tuple(built.inputs[k] for k in order)
+    function = built.function
+    if order != sorted(order):
+        symbols = function.sx_in()
+        outputs = function.call(symbols)
+        function = type(function)(
+            built.name,
+            [symbols[k] for k in order],
+            outputs,
+            [port.name for port in inputs],
+            [port.name for port in built.outputs],
+        )
+    return kind(built.name, function, inputs, built.outputs, fixed, dtype, threads)
+
+
+def same_layout(one: Manipulator, other: Manipulator) -> bool:
+    """Return whether two machines have the same base parameters: layout and gravity are equal."""
+    return _layout(one) == _layout(other)
+
+
+def _layout(robot: Manipulator) -> tuple[Any, ...]:
+    """Return what base parameters depend on: neither inertia, nor guide points, nor elbows."""
+    legs = [
+        (leg.direction, leg.e, leg.platform_point, leg.upper_length, leg.lower_length)
+        for leg in robot.legs
+    ]
+    return (robot.platform.motion, robot.platform.frame, robot.gravity, *legs)

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from pteron.conventions import OnFailure
 from pteron.errors import DataError, SingularPose, UnreachablePose
-from pteron.kernels import Array, as_array, compile
+from pteron.kernels import Array, as_array, numeric
 from pteron.kinematics.singularities import EVERYWHERE, is_singular_everywhere
 from pteron.manipulator import Manipulator
 from pteron.manipulator.vectors import norm
@@ -72,7 +72,7 @@ def usable_poses(
     poses = finite(robot, pose, "pose", on_failure)
     bad = np.isnan(poses[..., 0])
     if reach or bent:
-        distance, margin, sine = compile(robot, "reach")(poses)
+        distance, margin, sine = numeric(robot, "reach")(poses)
         beyond = np.isnan(sine) & ~bad[..., None]
         # lu and ll are equal where the elbow is undetermined, so that n = 0 is within reach.
         far = np.abs(poses[..., :3]).sum(axis=-1, keepdims=True) + _guides(robot)
@@ -90,7 +90,7 @@ def usable_poses(
         if is_singular_everywhere(robot):
             closeness: Array = np.zeros(poses.shape[:-1])
         else:
-            closeness = np.abs(compile(robot, "regularity")(poses))
+            closeness = np.abs(numeric(robot, "regularity")(poses))
         loose = closeness <= SINGULAR
         if on_failure == "raise" and loose.any():
             at = tuple(int(i) for i in np.argwhere(loose)[0])

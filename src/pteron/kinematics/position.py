@@ -13,7 +13,7 @@ from pteron.conventions import (
     SliderLike,
 )
 from pteron.errors import SingularPose, UnreachablePose
-from pteron.kernels import compile
+from pteron.kernels import numeric
 from pteron.kinematics.poses import blanked, finite, usable_poses
 from pteron.kinematics.singularities import EVERYWHERE, is_singular_everywhere
 from pteron.manipulator import Manipulator
@@ -54,7 +54,7 @@ def inverse_kinematics(
     array([0.03, 0.02, 0.01, 0.02])
     """
     poses = usable_poses(robot, pose, reach=True, on_failure=on_failure)
-    sliders: BatchOfSliders = compile(robot, "inverse_kinematics")(poses)
+    sliders: BatchOfSliders = numeric(robot, "inverse_kinematics")(poses)
     return blanked(sliders, poses)
 
 
@@ -85,7 +85,7 @@ def link_vectors(
         If R1 and R3 of a leg coincide, so that its elbow is undetermined.
     """
     poses = usable_poses(robot, pose, reach=True, on_failure=on_failure)
-    l_u, l_l = compile(robot, "link_vectors")(poses)
+    l_u, l_l = numeric(robot, "link_vectors")(poses)
     return blanked(l_u, poses), blanked(l_l, poses)
 
 
@@ -133,7 +133,7 @@ def direct_kinematics(
     if is_singular_everywhere(robot):
         raise SingularPose(EVERYWHERE.format(name=robot.name), kind="II", closeness=0.0, index=())
     given = finite(robot, sliders, "sliders", on_failure)
-    found = compile(robot, "direct_kinematics")(given)
+    found = numeric(robot, "direct_kinematics")(given)
     if robot.platform.turns:
         found[..., 3] = np.where(found[..., 3] <= -np.pi, np.pi, found[..., 3])
     poses = usable_poses(robot, found, reach=True, on_failure="nan")

@@ -6,7 +6,7 @@ import numpy as np
 
 from pteron.conventions import BatchOfPoses
 from pteron.errors import ModelError
-from pteron.kernels import Array, compile
+from pteron.kernels import Array, numeric
 from pteron.kinematics.singularities import is_singular_everywhere
 from pteron.manipulator import Manipulator
 
@@ -89,10 +89,10 @@ def _drawn(
         poses[:, :3] = 0.5 * (low + high) + 0.5 * (high - low) * poses[:, :3]
         if robot.platform.turns:
             poses[:, 3] *= np.pi
-        _, _, sine = compile(robot, "reach")(poses)
+        _, _, sine = numeric(robot, "reach")(poses)
         good = (sine >= bend).all(axis=-1)
         if held:
-            good &= np.abs(compile(robot, "regularity")(poses)) >= held
+            good &= np.abs(numeric(robot, "regularity")(poses)) >= held
         found.append(poses[good])
         total += int(good.sum())
         if total >= count:

@@ -8,7 +8,7 @@ from typing import overload
 import numpy as np
 
 from pteron.conventions import BatchOfMatrices, BatchOfSliders, OnFailure, PoseLike
-from pteron.kernels import Array, compile
+from pteron.kernels import Array, numeric
 from pteron.kinematics.poses import blanked, finite, usable_poses
 from pteron.manipulator import Manipulator
 from pteron.manipulator.vectors import dot, parallel
@@ -46,7 +46,7 @@ def jacobian(
            [0., 0., 1.]])
     """
     poses = usable_poses(robot, pose, on_failure=on_failure)
-    matrices: BatchOfMatrices = compile(robot, "jacobian")(poses)
+    matrices: BatchOfMatrices = numeric(robot, "jacobian")(poses)
     return blanked(matrices, poses)
 
 
@@ -78,7 +78,7 @@ def link_jacobians(
         If a leg is stretched or folded (type I).
     """
     poses = usable_poses(robot, pose, bent=True, on_failure=on_failure)
-    upper, lower = compile(robot, "link_jacobians")(poses)
+    upper, lower = numeric(robot, "link_jacobians")(poses)
     return blanked(upper, poses), blanked(lower, poses)
 
 
@@ -105,7 +105,7 @@ def joint_screws(robot: Manipulator, pose: PoseLike, *, on_failure: OnFailure = 
         If a leg's links do not reach a pose.
     """
     poses = usable_poses(robot, pose, bent=True, on_failure=on_failure)
-    screws: Array = compile(robot, "joint_screws")(poses)
+    screws: Array = numeric(robot, "joint_screws")(poses)
     return blanked(screws, poses)
 
 
@@ -197,12 +197,12 @@ def joint_rates(
     """
     poses = usable_poses(robot, pose, bent=True, on_failure=on_failure)
     rate = finite(robot, velocity, "velocity", on_failure)
-    first = blanked(compile(robot, "joint_rates")(poses, rate), poses, rate)
+    first = blanked(numeric(robot, "joint_rates")(poses, rate), poses, rate)
     rates = _joint_motion(robot, first, rate)
     if acceleration is None:
         return rates
     second = finite(robot, acceleration, "acceleration", on_failure)
-    kernel = compile(robot, "joint_accelerations")
+    kernel = numeric(robot, "joint_accelerations")
     accelerations = blanked(kernel(poses, rate, second), poses, rate, second)
     return rates, _joint_motion(robot, accelerations, second)
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
+from typing import Any
 
 from pteron.errors import ModelError
 from pteron.manipulator.leg import Leg
@@ -44,6 +46,18 @@ class Manipulator:
     platform: Platform
     legs: tuple[Leg, ...]
     gravity: Vector = STANDARD_GRAVITY
+
+    def __hash__(self) -> int:
+        """Hash once: the public functions look machines up at every call."""
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash((self.name, self.platform, self.legs, self.gravity))
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Texts hash differently in every process.
+        return {key: value for key, value in self.__dict__.items() if key != "_hash"}
 
     def __post_init__(self) -> None:
         if type(self.name) is not str or not self.name.strip():

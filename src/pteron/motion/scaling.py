@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from pteron.conventions import PoseLike
 from pteron.errors import ModelError
-from pteron.kernels import Array, compile
+from pteron.kernels import Array, numeric
 from pteron.kinematics.poses import finite
 from pteron.manipulator import Manipulator
 from pteron.motion.cycle import Cycle, across_directions, up
@@ -122,11 +122,11 @@ def _largest(robot: Manipulator, around: Array, across: Array, turn: float, leas
 
 def _keeps(robot: Manipulator, poses: Array, least: float) -> bool:
     """Say whether all poses keep the reserves and the sliders' limits."""
-    _, _, sine = compile(robot, "reach")(poses)
+    _, _, sine = numeric(robot, "reach")(poses)
     good = (sine >= least + _DIP).all()  # NaN, out of reach, compares false
     if robot.platform.turns:
-        good &= (np.abs(compile(robot, "regularity")(poses)) >= least + _DIP).all()
-    sliders = compile(robot, "inverse_kinematics")(poses)
+        good &= (np.abs(numeric(robot, "regularity")(poses)) >= least + _DIP).all()
+    sliders = numeric(robot, "inverse_kinematics")(poses)
     for leg, rho in zip(robot.legs, sliders.T, strict=True):
         if leg.slider_limits is not None:
             low, high = leg.slider_limits

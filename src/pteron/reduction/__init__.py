@@ -5,6 +5,7 @@ from pteron.reduction.certificate import (
     ExactCertificate,
     NumericalCertificate,
 )
+from pteron.reduction.cheapest import cheapest_parameters
 from pteron.reduction.find import base_parameters
 from pteron.reduction.forms import FORMS, model_forms
 from pteron.reduction.reduced import base_regressor
@@ -18,5 +19,6 @@ __all__ = [
     "NumericalCertificate",
     "base_parameters",
     "base_regressor",
+    "cheapest_parameters",
     "model_forms",
 ]

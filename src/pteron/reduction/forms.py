@@ -1,8 +1,9 @@
 """The dynamic model in every form that a claim of speed may mean, each as a kernel.
 
-All return the same actuator forces. `regressor` is the paper's Eq. (15) times P, complete or
-reduced to the base parameters, with J^-T taken first or last; `factored` is the inverse dynamics
-as `pteron.inverse_dynamics` evaluates it, for the inertial parameters or for the base parameters.
+All return the same actuator forces. `regressor` is the paper's Eq. (15) times P as it is written,
+J^-T taken first or last, complete or reduced to the base parameters; `factored` is the inverse
+dynamics as `pteron.inverse_dynamics` evaluates it, and, reduced, the model of the cheapest base
+parameters.
 """
 
 from __future__ import annotations
@@ -14,42 +15,29 @@ import casadi as ca
 from pteron.equations.closure import Load, actuator_forces
 from pteron.equations.geometry import Expression, Geometry
 from pteron.equations.platforms import platform_motion
-from pteron.equations.regressor import generalized_regressor, paper_regressor, terms
-from pteron.equations.virtual_work import inverse_dynamics
-from pteron.kernels import TARGETS, Kernel, Port
+from pteron.equations.regressor import generalized_regressor, terms
+from pteron.kernels import TARGETS, Kernel, Port, compile
 from pteron.manipulator import parameters
+from pteron.reduction.cheapest import cheapest_parameters
 from pteron.reduction.result import BaseParameters
 
 __all__ = ["FORMS", "model_forms"]
 
-Form = Callable[[Geometry, Expression, Expression, Expression, Expression, Expression], Expression]
-"""Of geometry, pose, velocity, acceleration, selection (N, K) and parameters (K, 1)."""
+Form = Callable[[Expression, Expression, Expression, Expression], Expression]
+"""Of J^-T (n, m), the bracket of Eq. (15) (m, N), selection (N, K) and parameters (K, 1)."""
 
 
-def _regressor(
-    g: Geometry, x: Expression, dx: Expression, ddx: Expression, s: Expression, p: Expression
-) -> Expression:
-    return ca.mtimes(ca.mtimes(paper_regressor(g, x, dx, ddx), s), p)
+def _regressor(j: Expression, bracket: Expression, s: Expression, p: Expression) -> Expression:
+    return ca.mtimes(ca.mtimes(j, ca.mtimes(bracket, s)), p)
 
 
-def _regressor_late(
-    g: Geometry, x: Expression, dx: Expression, ddx: Expression, s: Expression, p: Expression
-) -> Expression:
-    total = ca.mtimes(ca.mtimes(generalized_regressor(terms(g, x, dx, ddx)), s), p)
-    return -actuator_forces(g, Load.of(total), platform_motion(g, x, dx, ddx).turn)
+def _regressor_late(j: Expression, bracket: Expression, s: Expression, p: Expression) -> Expression:
+    return ca.mtimes(j, ca.mtimes(ca.mtimes(bracket, s), p))
 
 
-def _factored(
-    g: Geometry, x: Expression, dx: Expression, ddx: Expression, s: Expression, p: Expression
-) -> Expression:
-    return inverse_dynamics(g, x, dx, ddx, ca.densify(ca.mtimes(s, p)))
+_GRAPHS: dict[str, Form] = {"regressor": _regressor, "regressor, J^-T last": _regressor_late}
 
-
-FORMS: dict[str, Form] = {
-    "regressor": _regressor,
-    "regressor, J^-T last": _regressor_late,
-    "factored": _factored,
-}
+FORMS = (*_GRAPHS, "factored")
 """The forms by name."""
 
 
@@ -64,7 +52,8 @@ def model_forms(base: BaseParameters) -> dict[tuple[str, str], Kernel]:
     Returns
     -------
     dict of Kernel
-        By form and parameter set; each is called with pose, velocity and acceleration.
+        By form and parameter set; each is called with pose, velocity and acceleration, and has the
+        parameters as an input that is fixed.
     """
     robot = base.robot
     geometry = Geometry.of(robot)
@@ -75,11 +64,14 @@ def model_forms(base: BaseParameters) -> dict[tuple[str, str], Kernel]:
     }
     ports = [Port(name, (geometry.freedom,)) for name in ("pose", "velocity", "acceleration")]
     kernels: dict[tuple[str, str], Kernel] = {}
-    for form, build in FORMS.items():
+    x, dx, ddx = (ca.SX.sym(port.name, *port.shape) for port in ports)
+    bracket = generalized_regressor(terms(geometry, x, dx, ddx))
+    turn = platform_motion(geometry, x, dx, ddx).turn
+    inverse = -actuator_forces(geometry, Load.of(ca.SX.eye(geometry.freedom)), turn)
+    for form, build in _GRAPHS.items():
         for name, (selection, numbers) in sets.items():
-            x, dx, ddx = (ca.SX.sym(port.name, *port.shape) for port in ports)
             symbols = ca.SX.sym("parameters", len(numbers))
-            forces = build(geometry, x, dx, ddx, selection, symbols)
+            forces = build(inverse, bracket, selection, symbols)
             function = ca.Function("forces", [x, dx, ddx, symbols], [ca.cse(forces)])
             kernels[form, name] = TARGETS["vm"](
                 f"{form}, {name}",
@@ -88,4 +80,9 @@ def model_forms(base: BaseParameters) -> dict[tuple[str, str], Kernel]:
                 (Port("forces", (geometry.freedom,)),),
                 {"parameters": numbers},
             )
+    cheapest = cheapest_parameters(robot)
+    for name, chosen in (("complete", None), ("reduced", cheapest)):
+        kernels["factored", name] = compile(
+            robot, "inverse_dynamics", base=chosen, grade="parametric"
+        )
     return kernels

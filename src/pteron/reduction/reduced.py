@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from pteron.conventions import BatchOfRegressors, OnFailure, PoseLike
-from pteron.errors import ModelError
-from pteron.kernels import compile
+from pteron.kernels import numeric
 from pteron.kinematics.poses import blanked, finite, usable_poses
 from pteron.manipulator import Manipulator
 from pteron.reduction.result import BaseParameters
@@ -58,22 +57,9 @@ def base_regressor(
     >>> np.allclose(forces, pteron.inverse_dynamics(robot, *state))
     True
     """
-    if _layout(base.robot) != _layout(robot):
-        raise ModelError(
-            f"base: belongs to {base.robot.name}, whose layout or gravity differ from those of "
-            f"{robot.name}; ask for base_parameters of this one"
-        )
+    evaluate = numeric(robot, "base_regressor", base=base)
     poses = usable_poses(robot, pose, bent=True, held=True, on_failure=on_failure)
     rate = finite(robot, velocity, "velocity", on_failure)
     second = finite(robot, acceleration, "acceleration", on_failure)
-    matrices: BatchOfRegressors = compile(robot, "base_regressor", base=base)(poses, rate, second)
+    matrices: BatchOfRegressors = evaluate(poses, rate, second)
     return blanked(matrices, poses, rate, second)
-
-
-def _layout(robot: Manipulator) -> tuple[object, ...]:
-    """Return what base parameters depend on: neither inertia, nor guide points, nor elbows."""
-    legs = [
-        (leg.direction, leg.e, leg.platform_point, leg.upper_length, leg.lower_length)
-        for leg in robot.legs
-    ]
-    return (robot.platform.motion, robot.platform.frame, robot.gravity, *legs)

@@ -9,7 +9,7 @@ import numpy as np
 
 from pteron.dynamics import inverse_dynamics
 from pteron.errors import ModelError
-from pteron.kernels import Array, compile
+from pteron.kernels import Array, numeric
 from pteron.kinematics import jacobian, joint_rates, singular_orientations
 from pteron.manipulator import Manipulator
 from pteron.motion import JointPoints, PickAndPlace, joint_points, pick_and_place
@@ -230,7 +230,7 @@ def _orientations(robot: Manipulator, home: Array) -> Orientations | None:
     poses = np.tile(home, (_ANGLES, 1))
     poses[:, 3] = np.linspace(-np.pi, np.pi, _ANGLES)
     return Orientations(
-        poses[:, 3], compile(robot, "regularity")(poses), singular_orientations(robot)
+        poses[:, 3], numeric(robot, "regularity")(poses), singular_orientations(robot)
     )
 
 

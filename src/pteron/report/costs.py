@@ -13,7 +13,7 @@ from functools import partial
 
 import numpy as np
 
-from pteron.kernels import Array, compile
+from pteron.kernels import Array, numeric
 from pteron.kinematics import random_poses
 from pteron.reduction import FORMS, BaseParameters, model_forms
 from pteron.report.dense import DenseModel
@@ -74,7 +74,7 @@ def costs(base: BaseParameters, seed: int = 0) -> tuple[Cost, ...]:
     state = pose, rng.normal(size=pose.shape), rng.normal(size=pose.shape)
     kernels = model_forms(base)
     runs: dict[tuple[str, str], Callable[[], object]] = {}
-    terms = compile(base.robot, "paper_terms")(*state)
+    terms = numeric(base.robot, "paper_terms")(*state)
     operations = {}
     for name, reduced in (("complete", False), ("reduced", True)):
         model = DenseModel.of(base, reduced)

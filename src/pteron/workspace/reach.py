@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pteron.conventions import PoseLike
 from pteron.errors import DataError
-from pteron.kernels import Array, compile
+from pteron.kernels import Array, numeric
 from pteron.kinematics import inverse_kinematics
 from pteron.kinematics.poses import finite
 from pteron.manipulator import Manipulator
@@ -120,7 +120,7 @@ def reach_slice(
     poses[..., i] = first
     poses[..., j] = second[:, None]
 
-    _, leg_margins, _ = compile(robot, "reach")(poses)
+    _, leg_margins, _ = numeric(robot, "reach")(poses)
     sliders = inverse_kinematics(robot, poses, on_failure="nan")
     missed = np.isnan(sliders).any(axis=-1)
     room = clearances(robot, sliders).min(axis=-1)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pteron.conventions import BatchOfNumbers, BatchOfSliders, PoseLike
-from pteron.kernels import Array, compile
+from pteron.kernels import Array, numeric
 from pteron.manipulator import Manipulator
 
 __all__ = ["Reserve", "clearances", "reserve"]
@@ -59,15 +59,15 @@ def reserve(robot: Manipulator, pose: PoseLike) -> Reserve:
     >>> reserve(pteron.load("quadrupteron"), [0.0, 0.0, 0.0, 0.0]).elbow_sines.round(3)
     array([1.   , 1.   , 0.991, 1.   ])
     """
-    _, margin, sine = compile(robot, "reach")(pose)
+    _, margin, sine = numeric(robot, "reach")(pose)
     spans = np.array([leg.upper_length + leg.lower_length for leg in robot.legs])
     sines = np.where(margin < 0.0, margin / spans, np.nan_to_num(sine))
     regularity = (
-        np.abs(compile(robot, "regularity")(pose))
+        np.abs(numeric(robot, "regularity")(pose))
         if robot.platform.turns
         else np.ones(sines.shape[:-1])
     )
-    metres = clearances(robot, compile(robot, "inverse_kinematics")(pose))
+    metres = clearances(robot, numeric(robot, "inverse_kinematics")(pose))
     half = np.array([_half_range(leg.slider_limits) for leg in robot.legs])
     shares = np.where(np.isinf(metres), 1.0, metres) / half
     smallest = np.minimum(np.minimum(sines, shares).min(axis=-1), regularity)

@@ -9,7 +9,7 @@ from scipy.optimize import minimize  # type: ignore[import-untyped]
 
 from pteron.conventions import PoseLike
 from pteron.errors import DataError, ModelError
-from pteron.kernels import Array, compile
+from pteron.kernels import Array, numeric
 from pteron.kinematics.poses import finite
 from pteron.manipulator import Manipulator
 from pteron.workspace.reserve import clearances
@@ -80,8 +80,8 @@ def bounding_box(robot: Manipulator, pose: PoseLike) -> Array:
     def room(p: Array) -> Array:
         """Return how far inside every bound a position is, m."""
         at = np.concatenate([p, given[3:]])
-        distance, _, _ = compile(robot, "reach")(at)
-        slides = clearances(robot, compile(robot, "inverse_kinematics")(at))
+        distance, _, _ = numeric(robot, "reach")(at)
+        slides = clearances(robot, numeric(robot, "inverse_kinematics")(at))
         return np.concatenate([spans - distance, slides[np.isfinite(slides)]])
 
     start = np.append(given[:3], float(room(given[:3]).min()))
@@ -146,8 +146,8 @@ def reach_volume(
     box = bounding_box(robot, given)
     poses = np.tile(given, (count, 1))
     poses[:, :3] = np.random.default_rng(seed).uniform(box[0], box[1], (count, 3))
-    _, margin, _ = compile(robot, "reach")(poses)
-    slides = clearances(robot, compile(robot, "inverse_kinematics")(poses))
+    _, margin, _ = numeric(robot, "reach")(poses)
+    slides = clearances(robot, numeric(robot, "inverse_kinematics")(poses))
     share = float((np.minimum(margin, slides).min(axis=-1) >= 0.0).mean())
     whole = float(np.prod(box[1] - box[0]))
     return ReachVolume(

@@ -1,0 +1,59 @@
+"""Target `exact`: rational arithmetic, one state at a time, for proofs and for reference."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pteron.errors import DataError
+from pteron.kernels.fields import RationalField, evaluate
+from pteron.kernels.kernel import Array, Kernel
+
+__all__ = ["Exact"]
+
+
+@dataclass(frozen=True)
+class Exact(Kernel):
+    """A kernel in fractions.
+
+    It takes integers, fractions and floats (as the fractions they are), and returns fractions. An
+    angle phi is given as tan(phi / 2), so that its sine and cosine are rational. `NoSquareRoot`
+    says that a root is not rational, `ZeroDivisionError` that a denominator vanishes.
+    """
+
+    @property
+    def source(self) -> str:
+        """The instructions, one a line, as CasADi prints them."""
+        return str(self.function.str(True))
+
+    def __call__(self, *values: ArrayLike) -> Any:
+        """Evaluate the kernel for one state; each value has its port's shape."""
+        ports = [port for port in self.inputs if port.name not in self.fixed]
+        if len(values) != len(ports):
+            names = ", ".join(port.name for port in ports)
+            raise DataError(
+                f"{self.name}: {len(values)} inputs given, {len(ports)} expected ({names})"
+            )
+        given = dict(self.fixed)
+        for port, value in zip(ports, values, strict=True):
+            array = np.asarray(value, dtype=object)
+            if array.shape != port.shape:
+                raise DataError(
+                    f"{port.name}: shape {array.shape} given, {port.shape} expected: one state"
+                )
+            given[port.name] = array
+        inputs = [[Fraction(v) for v in given[port.name].ravel().tolist()] for port in self.inputs]
+        found = evaluate(self.function, RationalField(), inputs)
+        results = tuple(
+            np.array(value, dtype=object).reshape(port.shape)
+            for value, port in zip(found, self.outputs, strict=True)
+        )
+        return results[0] if len(results) == 1 else results
+
+    def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
+        raise NotImplementedError("fractions are not filled into arrays of floats")
