@@ -10,12 +10,11 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import pteron
 from peers import mujoco_peers, pinocchio_peers
 from peers.calls import Calls
 from peers.closure import Array
 from peers.library import Missing, Sweep
-
-import pteron
 
 __all__ = ["Array", "Peer", "peers"]
 

@@ -8,9 +8,9 @@ from __future__ import annotations
 import sys
 
 import numpy as np
-from peers import Array, peers
 
 import pteron
+from peers import Array, peers
 
 _STATES = 1000
 _ROUNDS = 30

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from time import perf_counter
 
 import numpy as np
+
 from peers.closure import Array, Closure
 
 __all__ = ["Calls"]
@@ -43,17 +44,23 @@ class Calls:
         before, follow = self.closure.joints(self.unbounded).buffer()
         after, project = self.closure.forces().buffer()
         rows, found = np.empty(28), np.empty(4)
+        x, dx, ddx = np.empty(4), np.empty(4), np.empty(4)
+        for i, value in enumerate((x, dx, ddx)):
+            before.set_arg(i, value.data)
         for i, value in enumerate((*self.coordinates, rows)):
             before.set_res(i, value.data)
         after.set_arg(0, self.tau.data)
         after.set_arg(1, rows.data)
         after.set_res(0, found.data)
-        given, inverse = before.set_arg, self.inverse
+        inverse = self.inverse
+        buffers = before, after  # their eval functions do not keep them alive
 
-        def call(pose: Array, velocity: Array, acceleration: Array) -> Array:
-            given(0, pose.data)
-            given(1, velocity.data)
-            given(2, acceleration.data)
+        def call(
+            pose: Array, velocity: Array, acceleration: Array, _kept: object = buffers
+        ) -> Array:
+            x[:] = pose  # a quarter of what set_arg costs
+            dx[:] = velocity
+            ddx[:] = acceleration
             follow()
             inverse()
             project()

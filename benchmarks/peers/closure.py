@@ -1,7 +1,8 @@
 """The closed form of four legs that the peers need around their engine, in numbers and in CasADi.
 
 It takes a pose to the joints of the tree in `tree.py`, and the tree's joint forces to actuator
-forces. Written apart from `pteron.equations`: a peer shares no equation with what it is compared to.
+forces. Written apart from `pteron.equations`: a peer shares no equation with what it is compared
+to.
 """
 
 from __future__ import annotations
@@ -97,7 +98,7 @@ class Closure:
 
     @property
     def numbers(self) -> Array:
-        """All of it, (30, 4), in the order of `Closure` in closure.h."""
+        """All of it, (29, 4), in the order of `Closure` in closure.h."""
         lu, ll = self.upper, self.lower
         circles = [
             (lu + ll) ** 2,

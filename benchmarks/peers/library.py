@@ -11,11 +11,13 @@ from ctypes import c_double, c_int64, c_void_p
 from pathlib import Path
 
 import numpy as np
+
 from peers.closure import Array
 
 __all__ = ["Missing", "Sweep", "compiled"]
 
 _FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-DNDEBUG", "-shared", "-fPIC", "-w")
+"""Without errno a root is one instruction; -w because the headers of others warn."""
 
 
 class Missing(Exception):

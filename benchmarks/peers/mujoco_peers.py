@@ -9,13 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+import pteron
 from peers.calls import Calls
 from peers.closure import Closure
 from peers.library import Missing, Sweep, compiled
 from peers.tree import tree
-from scipy.spatial.transform import Rotation
-
-import pteron
 
 __all__ = ["c", "python"]
 
@@ -29,9 +28,11 @@ def _model(robot: pteron.Manipulator) -> Any:
     built: list[Any] = []
     for body in tree(robot):
         parent = spec.worldbody if body.parent < 0 else built[body.parent]
+        quaternion = np.empty(4)
+        mujoco.mju_mat2Quat(quaternion, body.rotation.ravel())
         made = parent.add_body(
             pos=body.offset,
-            quat=Rotation.from_matrix(body.rotation).as_quat(scalar_first=True),
+            quat=quaternion,
             mass=body.mass,
             ipos=body.center,
             inertia=body.inertia,

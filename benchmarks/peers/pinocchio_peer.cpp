@@ -98,6 +98,7 @@ pinocchio::Model built(const Joint *joints, int count, const double *gravity) {
 
 }  // namespace
 
+#pragma GCC visibility push(default)
 extern "C" {
 
 Peer *create(const double *joints, int count, const double *gravity, const double *closure) {

@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from peers.closure import Array, plane
 
 import pteron
+from peers.closure import Array, plane
 
 __all__ = ["Body", "tree"]
 

@@ -75,6 +75,7 @@ _LATER = {
     "base_parameters": "pteron.reduction",
     "base_regressor": "pteron.reduction",
     "cheapest_parameters": "pteron.reduction",
+    "export_c": "pteron.export",
 }
 _LATER_MODULES = ("motion", "plots", "report", "workspace")
 """What would slow the start of those who do not use it (SymPy, SciPy, matplotlib)."""
@@ -109,6 +110,7 @@ __all__ = [
     "compile",
     "coriolis_matrix",
     "direct_kinematics",
+    "export_c",
     "forward_dynamics",
     "gravity_forces",
     "inverse_dynamics",

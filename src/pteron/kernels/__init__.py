@@ -5,7 +5,15 @@ Batching, threads and caching live here and only here.
 
 from pteron.kernels.choice import numeric
 from pteron.kernels.fields import Field, NoSquareRoot, PrimeField, RationalField, evaluate
-from pteron.kernels.functions import FUNCTIONS, Program, general_program, program
+from pteron.kernels.functions import (
+    FUNCTIONS,
+    Columns,
+    Program,
+    general_program,
+    program,
+    specialised,
+)
+from pteron.kernels.graph import Graph, graph_of
 from pteron.kernels.kernel import Array, Kernel, Port, as_array
 from pteron.kernels.operations import count_operations
 from pteron.kernels.targets import TARGETS, compile, same_layout
@@ -14,7 +22,9 @@ __all__ = [
     "FUNCTIONS",
     "TARGETS",
     "Array",
+    "Columns",
     "Field",
+    "Graph",
     "Kernel",
     "NoSquareRoot",
     "Port",
@@ -26,7 +36,9 @@ __all__ = [
     "count_operations",
     "evaluate",
     "general_program",
+    "graph_of",
     "numeric",
     "program",
     "same_layout",
+    "specialised",
 ]
