@@ -188,7 +188,7 @@ def test_the_virtual_machine_is_casadi():
 
 
 INSTRUCTION = re.compile(r"^ *(?:@\d+|output\[\d+\]\[\d+\]) = (.*);$", re.MULTILINE)
-NO_ARITHMETIC = re.compile(r"input\[\d+\]\[\d+\]|@\d+|-?[\d.]+(?:e[+-]?\d+)?")
+NO_ARITHMETIC = re.compile(r"nan|input\[\d+\]\[\d+\]|@\d+|-?[\d.]+(?:e[+-]?\d+)?")
 
 
 def walked(function):

@@ -61,6 +61,7 @@ from pteron.manipulator import (
 
 if TYPE_CHECKING:
     from pteron import motion, plots, report, workspace
+    from pteron.export import export_c, export_st
     from pteron.reduction import (
         BaseParameters,
         base_parameters,
@@ -76,6 +77,7 @@ _LATER = {
     "base_regressor": "pteron.reduction",
     "cheapest_parameters": "pteron.reduction",
     "export_c": "pteron.export",
+    "export_st": "pteron.export",
 }
 _LATER_MODULES = ("motion", "plots", "report", "workspace")
 """What would slow the start of those who do not use it (SymPy, SciPy, matplotlib)."""
@@ -111,6 +113,7 @@ __all__ = [
     "coriolis_matrix",
     "direct_kinematics",
     "export_c",
+    "export_st",
     "forward_dynamics",
     "gravity_forces",
     "inverse_dynamics",

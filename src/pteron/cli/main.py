@@ -13,6 +13,7 @@ from pteron.cli.base import base
 from pteron.cli.catalog import catalog
 from pteron.cli.check import check
 from pteron.cli.direct import direct
+from pteron.cli.export import export
 from pteron.cli.forces import forces
 from pteron.cli.inverse import inverse
 from pteron.cli.numbers import NumbersCommand
@@ -97,6 +98,12 @@ _add(
     base,
     "pteron base quadrupteron --symbols",
     "pteron base quadrupteron --keep I_l1,m_l4 --format latex",
+)
+_add(
+    export,
+    "pteron export quadrupteron --c controller",
+    "pteron export my-robot.toml --c controller --float --function inverse_kinematics",
+    "pteron export quadrupteron --st plc",
 )
 _add(table1, "pteron table1")
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import casadi as ca
 
 from pteron.equations.circles import reach_margin, squared_reach
 from pteron.equations.closure import closure, singularity
-from pteron.equations.geometry import Expression, Geometry
+from pteron.equations.geometry import Expression, Geometry, along
 from pteron.equations.legs import closing_vector, leg_position, slider_coordinate
 from pteron.equations.platforms import PlatformMotion, platform_motion, resting_offset
 
@@ -57,13 +59,14 @@ def reach(geometry: Geometry, pose: Expression) -> tuple[Expression, Expression,
     return ca.vertcat(*distances), ca.vertcat(*margins), ca.vertcat(*sines)
 
 
-def direct_position(geometry: Geometry, sliders: Expression) -> Expression:
+def direct_position(geometry: Geometry, sliders: Expression, *, reached: bool = True) -> Expression:
     """Return every pose that the slider coordinates allow, as columns (m, k).
 
     The closures d_bar . (p + R(phi) s0 - r) = rho are linear in (p, cos phi, sin phi). For 3T they
     give one pose. For 3T1R their left null vector leaves A' cos(phi) + B' sin(phi) = C, with two
     angles: the first column has N . j > 0, the second N . j < 0 (see `closure`), so that each
-    column is one assembly mode throughout. Not real where C^2 > A'^2 + B'^2.
+    column is one assembly mode throughout. NaN where it is not real, C^2 > A'^2 + B'^2, or, with
+    `reached`, where a leg does not reach it.
     """
     c = closure(geometry)
     known = ca.vertcat(
@@ -73,7 +76,8 @@ def direct_position(geometry: Geometry, sliders: Expression) -> Expression:
         )
     )
     if c.null is None:
-        return ca.mtimes(c.right_inverse.T, known)
+        p = ca.mtimes(c.right_inverse.T, known)
+        return p + _nan_beyond_reach(geometry, p, 1, 0) if reached else p
     # The derivative of d_bar . s with respect to phi is j, so that d_bar . s itself is
     # cosines sin(phi) - sines cos(phi); hence A' = -B and B' = A of `singularity`.
     a, b = singularity(geometry)
@@ -85,15 +89,43 @@ def direct_position(geometry: Geometry, sliders: Expression) -> Expression:
     size = ca.dot(ca.fabs(c.null), _sizes(geometry, sliders))
     rest = square - total * total
     slack = _ROUNDING * (square + ca.sqrt(square) * size)
-    root = ca.sqrt(ca.fmax(rest, ca.fmin(rest + slack, 0)))
+    radicand = ca.fmax(rest, ca.fmin(rest + slack, 0))
+    root = ca.sqrt(radicand)
     poses = []
     for branch in (1, -1):
         cosine = (-b * total + branch * a * root) / square
         sine = (a * total + branch * b * root) / square
         offset = c.cosines * sine - c.sines * cosine
         p = ca.mtimes(c.right_inverse.T, known - offset)
-        poses.append(ca.vertcat(p, ca.atan2(sine, cosine)))
+        beyond = _nan_below_zero(radicand)
+        if reached:
+            beyond = beyond + _nan_beyond_reach(geometry, p, cosine, sine)
+        poses.append(ca.vertcat(p, ca.atan2(sine, cosine)) + beyond)
     return ca.horzcat(*poses)
+
+
+def beyond_reach(geometry: Geometry, points: Sequence[Expression]) -> Expression:
+    """Return, for every leg (n, 1), NaN where its links do not reach its point, 0 where they do."""
+    pairs = zip(geometry.legs, points, strict=True)
+    return ca.vertcat(
+        *(_nan_below_zero(squared_reach(leg, closing_vector(leg, point))) for leg, point in pairs)
+    )
+
+
+def _nan_beyond_reach(
+    geometry: Geometry, p: Expression, cosine: Expression, sine: Expression
+) -> Expression:
+    """Return NaN where a leg does not reach the pose, given by cos(phi) and sin(phi); else 0."""
+    points = []
+    for i in range(geometry.freedom):
+        a, b, constant = resting_offset(geometry, i)
+        offset = along(a, cosine) + along(b, sine) if geometry.turns else a
+        points.append(p + offset + constant)
+    return ca.sum1(beyond_reach(geometry, points))
+
+
+def _nan_below_zero(value: Expression) -> Expression:
+    return ca.if_else(value < 0, ca.SX.nan(), 0)
 
 
 def _sizes(geometry: Geometry, sliders: Expression) -> Expression:

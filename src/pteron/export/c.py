@@ -1,6 +1,7 @@
 """C99 for a controller: one header and one source, with a test program and a CMakeLists.txt.
 
-No allocation, no static state, one exit a function, nothing but math.h.
+No allocation, no static state, one exit a function, nothing but math.h. Comparisons are those of
+C99's macros, which are quiet for NaN: a plain `<` sets off the trap for invalid operations.
 """
 
 from __future__ import annotations
@@ -15,9 +16,10 @@ import numpy as np
 
 from pteron import atomic
 from pteron.errors import ModelError
-from pteron.export.functions import FUNCTIONS, Exported, chosen
-from pteron.export.text import banner, port_comment
-from pteron.kernels import Array
+from pteron.export.functions import FUNCTIONS, Exported, Table, chosen
+from pteron.export.text import banner, described
+from pteron.kernels import Array, Port
+from pteron.kernels.c import single_precision
 from pteron.kernels.code import C, c_constant, statements
 from pteron.manipulator import Manipulator
 
@@ -135,8 +137,9 @@ class _Writer:
         parts = []
         for item in self.exported:
             lines = [f"{item.summary}", ""]
-            lines += [port_comment(port, "in", item, "C") for port in item.labelled.program.inputs]
-            lines += [port_comment(port, "out", item, "C") for port in item.outputs]
+            inputs = item.labelled.program.inputs
+            lines += [_argument("in", port, described(port, item)) for port in inputs]
+            lines += [_argument("out", port, described(port, item)) for port in item.outputs]
             lines += ["", f"{item.operations} arithmetic operations."]
             parts.append(_comment(lines) + self._prototype(item) + ";\n")
         tables = "".join(
@@ -180,8 +183,7 @@ class _Writer:
         )
 
     def _tables(self) -> list[Table]:
-        found = {table.name: table for item in self.exported for table in item.tables}
-        return [Table(t.name, t.comment, t.names, t.values) for t in found.values()]
+        return list({table.name: table for item in self.exported for table in item.tables}.values())
 
     def _body(self, item: Exported) -> str:
         graph, p = item.labelled.graph, self.prefix
@@ -195,7 +197,10 @@ class _Writer:
             else:
                 names.append(item.labelled.names[k])
         f = self._suffix
-        printed = {op: re.sub(r"^(\w+)\(", rf"\g<1>{f}(", text) for op, text in C.items()}
+        printed = single_precision(C) if f else dict(C)
+        one, zero = self._number(1.0), self._number(0.0)
+        printed["less"] = f"isless({{0}}, {{1}}) ? {one} : {zero}"
+        printed["select"] = f"({{0}} > {zero}) ? {{1}} : {zero}"
         guarded = printed | {"sqrt": f"{p}_root({{0}})", "div": f"{p}_ratio({{0}}, {{1}})"}
         lines, radicands = [], []
         used: set[int] = set()
@@ -209,7 +214,7 @@ class _Writer:
             )
             table = printed if constant else guarded
             lines += statements(graph, [k], names, table, f"const {self.real} {{0}} = {{1}};")
-            if node.operation == "sqrt" and not node.shared:
+            if node.operation in ("sqrt", "less") and not node.shared:
                 radicands.append(names[node.arguments[0]])
         finite = []
         for port, nodes in zip(item.outputs, graph.outputs, strict=True):
@@ -224,15 +229,27 @@ class _Writer:
         return (
             f"{self._prototype(item)}\n{{\n    int status = {p.upper()}_OK;\n"
             + "".join(f"    {line}\n" for line in lines)
-            + self._status(radicands, finite)
+            + (self._any_status(item) if item.several else self._status(radicands, finite))
             + "    return status;\n}\n"
+        )
+
+    def _any_status(self, item: Exported) -> str:
+        """Return the status of a function with a pose a row: one that is real will do."""
+        (port,) = item.outputs
+        rows, columns = port.shape
+        tests = [
+            f"({self.prefix}_finite({port.name}[{columns * row}]) == 0)" for row in range(rows)
+        ]
+        return (
+            f"    if ({_joined(tests)}) {{\n"
+            f"        status = {self.prefix.upper()}_UNREACHABLE;\n    }}\n"
         )
 
     def _status(self, radicands: Sequence[str], finite: Sequence[str]) -> str:
         upper, zero = self.prefix.upper(), self._number(0.0)
         branches = []
         if radicands:
-            reach = [f"({name} >= {zero})" for name in radicands]
+            reach = [f"(isgreaterequal({name}, {zero}) != 0)" for name in radicands]
             branches.append((f"!({_joined(reach)})", f"{upper}_UNREACHABLE"))
         if finite:
             branches.append(
@@ -299,16 +316,6 @@ class _Writer:
         return f"static const {self.real} {name}[{len(numbers)}] = {{\n    {inner}}};\n"
 
 
-@dataclass(frozen=True)
-class Table:
-    """A constant array of the source."""
-
-    name: str
-    comment: str
-    names: tuple[str, ...]
-    values: Array
-
-
 def _limits(writer: _Writer) -> dict[str, str]:
     largest = 3.4028234e38 if writer.real == "float" else 1.7976931348623157e308
     return {
@@ -316,6 +323,12 @@ def _limits(writer: _Writer) -> dict[str, str]:
         "least": writer._number(1e-30),
         "largest": writer._number(largest),
     }
+
+
+def _argument(direction: str, port: Port, meaning: str) -> str:
+    shape = " x ".join(map(str, port.shape)) or "1"
+    order = ", by rows" if len(port.shape) > 1 else ""
+    return f"{direction:<3} {port.name} ({shape}{order}){': ' if meaning else ''}{meaning}"
 
 
 def _joined(tests: Sequence[str]) -> str:
@@ -334,21 +347,21 @@ _HELPERS: dict[str, str] = {
 /* The square root; NaN below zero, without a trap. */
 static {real} {p}_root({real} value)
 {{
-    return (value >= {zero}) ? sqrt{f}(value) : ({real})NAN;
+    return isgreaterequal(value, {zero}) ? sqrt{f}(value) : ({real})NAN;
 }}
 """,
     "ratio": """\
 /* The quotient; NaN where the divisor vanishes, without a trap. */
 static {real} {p}_ratio({real} dividend, {real} divisor)
 {{
-    return (fabs{f}(divisor) >= {least}) ? (dividend / divisor) : ({real})NAN;
+    return isgreaterequal(fabs{f}(divisor), {least}) ? (dividend / divisor) : ({real})NAN;
 }}
 """,
     "finite": """\
 /* Whether a number is neither infinite nor NaN. */
 static int {p}_finite({real} value)
 {{
-    return (fabs{f}(value) <= {largest}) ? 1 : 0;
+    return islessequal(fabs{f}(value), {largest}) ? 1 : 0;
 }}
 """,
 }

@@ -28,12 +28,16 @@ FUNCTIONS = (
 )
 """What is exported unless a choice is given."""
 
+_TRIALS = 40
+"""Poses among which examples for the test program are looked for."""
+
 _SUMMARIES = {
     "inverse_kinematics": "Slider coordinates of a pose.",
-    "direct_kinematics": "Every pose that slider coordinates allow, one a row.",
+    "direct_kinematics": "Every pose that slider coordinates allow, one a row; NaN where none.",
+    "closure_poses": "Every pose that solves the closures, one a row, in the legs' reach or not.",
     "jacobian": "Jacobian: slider velocities = J velocity.",
     "inverse_dynamics": "Actuator forces of a motion, from the inertial parameters.",
-    "inverse_dynamics_base": "Actuator forces of a motion, from base parameters: fewest operations.",
+    "inverse_dynamics_base": "Actuator forces of a motion, from base parameters alone.",
     "forward_dynamics": "Acceleration of the platform under actuator forces.",
     "regressor": "Regressor: actuator forces = regressor parameters.",
 }
@@ -59,6 +63,11 @@ class Exported:
     outputs: tuple[Port, ...]
     tables: tuple[Table, ...]
     examples: tuple[tuple[tuple[Array, ...], tuple[Array, ...]], ...]
+
+    @property
+    def several(self) -> bool:
+        """Whether it returns a pose a row, of which some may not exist."""
+        return self.name == "direct_kinematics"
 
     @property
     def operations(self) -> int:
@@ -125,16 +134,11 @@ def _table(robot: Manipulator, port: str, values: Array, base: BaseParameters | 
     if base is None:
         comment = "The machine's inertial parameters, in the paper's order; SI units."
         return Table(port, comment, parameter_names(robot), values)
-    comment = (
-        "Base parameters of the machine as inverse_dynamics_base takes them: each a base parameter "
-        "scaled by lengths and gravity."
-    )
-    names = tuple(f"number {k + 1}" for k in range(len(values)))
-    expressions = _meanings(robot, base, values)
-    return Table(port, comment, expressions or names, values)
+    comment = "What inverse_dynamics_base takes: base parameters, scaled by lengths and gravity."
+    return Table(port, comment, _meanings(robot, base), values)
 
 
-def _meanings(robot: Manipulator, base: BaseParameters, values: Array) -> tuple[str, ...]:
+def _meanings(robot: Manipulator, base: BaseParameters) -> tuple[str, ...]:
     """Return each scaled base parameter as a sum of inertial parameters, as text."""
     columns = tuple(tuple(np.flatnonzero(column).tolist()) for column in base.selection.T)
     scale = program(robot, "inverse_dynamics", columns).scale
@@ -151,7 +155,6 @@ def _meanings(robot: Manipulator, base: BaseParameters, values: Array) -> tuple[
             if abs(weight) > 1e-12 * largest
         ]
         meanings.append(" ".join(terms))
-    assert len(meanings) == len(values)
     return tuple(meanings)
 
 
@@ -159,36 +162,42 @@ def _examples(
     robot: Manipulator, found: Labelled
 ) -> list[tuple[tuple[Array, ...], tuple[Array, ...]]]:
     """Return states and results for the test program: two in reach, one out of it."""
-    given = found.program
     rng = np.random.default_rng(1)
-    poses = list(random_poses(robot, 2, seed=rng))
-    far = poses[0].copy()
-    far[:3] += 100.0
-    examples = []
-    for k, pose in enumerate([*poses, far]):
-        values = []
-        for port in given.inputs:
-            if port.name == "pose":
-                values.append(pose)
-            elif port.name == "sliders":
-                sliders = inverse_kinematics(robot, poses[k % 2])
-                values.append(sliders + (0.0 if k < 2 else 100.0 * np.arange(1, len(sliders) + 1)))
-            elif port.name == "parameters":
-                values.append(parameters(robot))
-            elif port.name == "base_parameters":
-                kernel = compile(
-                    robot, "inverse_dynamics", base=cheapest_parameters(robot), grade="parametric"
-                )
-                values.append(kernel.fixed["base_parameters"])
-            else:
-                values.append(rng.normal(size=port.shape))
-        results = tuple(
-            np.array(value).ravel("F") for value in given.function.call([*map(_column, values)])
+    poses = random_poses(robot, _TRIALS, seed=rng)
+    examples: list[tuple[tuple[Array, ...], tuple[Array, ...]]] = []
+    for pose in poses:
+        example = _evaluated(
+            found, [_value(robot, port, pose, rng) for port in found.program.inputs]
         )
-        whole = all(np.isfinite(value).all() for value in results)
-        if whole or k == 2:
-            examples.append((tuple(values), results))
-    return examples
+        # Of two assembly modes one may be out of reach: such a result is not a number throughout.
+        if all(np.isfinite(value).all() for value in example[1]):
+            examples.append(example)
+        if len(examples) == 2:
+            break
+    inputs = [_value(robot, port, poses[0], rng) for port in found.program.inputs]
+    for value, port in zip(inputs, found.program.inputs, strict=True):
+        if port.name in ("pose", "sliders"):
+            value += 100.0 * np.arange(1, len(value) + 1)
+    return [*examples, _evaluated(found, inputs)]
+
+
+def _value(robot: Manipulator, port: Port, pose: Array, rng: np.random.Generator) -> Array:
+    if port.name == "pose":
+        return pose.copy()
+    if port.name == "sliders":
+        return np.array(inverse_kinematics(robot, pose))
+    if port.name == "parameters":
+        return parameters(robot)
+    if port.name == "base_parameters":
+        base = cheapest_parameters(robot)
+        kernel = compile(robot, "inverse_dynamics", base=base, grade="parametric")
+        return np.array(kernel.fixed["base_parameters"])
+    return rng.normal(size=port.shape)
+
+
+def _evaluated(found: Labelled, inputs: list[Array]) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+    results = found.program.function.call([*map(_column, inputs)])
+    return tuple(inputs), tuple(np.array(value).ravel("F") for value in results)
 
 
 def _column(value: Array) -> Array:

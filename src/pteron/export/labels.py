@@ -29,9 +29,9 @@ class Labelled:
 def labelled(robot: Manipulator, given: Program) -> Labelled:
     """Return the graph of a program with names for its nodes.
 
-    Quantities that the equations know are called after them: `u2_x` is a component of leg 2's
-    closing vector in its plane, `c2_z` one of its platform point, and so on. What depends on a
-    single leg of these carries the leg's number; all else is numbered.
+    Quantities that the equations know are called after them: `leg2_u_a` is a component of leg 2's
+    closing vector in the axes of its plane, `c2_z` one of its platform point, and so on. What
+    depends on one leg alone carries the leg's number; all else is numbered.
     """
     symbols = given.function.sx_in()
     inputs = dict(zip((port.name for port in given.inputs), symbols, strict=True))
@@ -63,7 +63,7 @@ def _quantities(g: Geometry, inputs: dict[str, Expression]) -> dict[str, Express
     for i, (leg, point) in enumerate(zip(g.legs, motion.points, strict=True), start=1):
         state = leg_motion(leg, point)
         u = closing_vector(leg, point.position)
-        scalars = {"n2": ca.dot(u, u), "delta": squared_reach(leg, u)}
+        scalars = {"square": ca.dot(u, u), "delta": squared_reach(leg, u)}
         scalars["root"] = ca.sqrt(scalars["delta"])
         if "velocity" in inputs:
             scalars |= {
@@ -89,13 +89,12 @@ def _quantities(g: Geometry, inputs: dict[str, Expression]) -> dict[str, Express
             vectors |= {"dc": point.velocity}
         if "acceleration" in inputs:
             vectors |= {"ddu": state.closing_acceleration, "ddc": point.acceleration}
-        found |= {f"{name}{i}": value for name, value in scalars.items()}
+        found |= {f"leg{i}_{name}": value for name, value in scalars.items()}
         for name, vector in vectors.items():
+            # A platform point's coordinates may serve several legs, in whose plane they lie.
+            title = f"{name}{i}" if name.endswith("c") else f"leg{i}_{name}"
             axes = "xyz" if vector.shape[0] == 3 else "ab"
-            found |= {
-                f"{name}{i}_{axis}": ca.densify(vector)[k]
-                for k, axis in enumerate(axes[: vector.shape[0]])
-            }
+            found |= {f"{title}_{axes[k]}": ca.densify(vector)[k] for k in range(vector.shape[0])}
     return found
 
 
@@ -131,14 +130,10 @@ def _named(graph: Graph, known: dict[int, str], legs: int) -> dict[int, str]:
         if node.operation in ("input", "constant"):
             of_leg.append(frozenset())
             continue
-        own = {int(c) for c in known.get(k, "").split("_")[0] if c.isdigit()}
-        own -= {2} if known.get(k, "").startswith("n2") else set()
-        if known.get(k, "").startswith("n2"):
-            own = {int(known[k][2:])}
         inherited = frozenset().union(*(of_leg[i] for i in node.arguments))
-        # A platform point's component may serve several legs: its number is no mark of one.
-        mark = set() if known.get(k, "c").lstrip("d").startswith("c") else own
-        of_leg.append(inherited | mark)
+        name = known.get(k, "")
+        own = {int(name[3])} if name.startswith("leg") else set()
+        of_leg.append(inherited | own)
         if k in known:
             names[k] = known[k]
         elif len(of_leg[k]) == 1:

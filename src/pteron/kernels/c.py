@@ -11,10 +11,11 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import re
 import shutil
 import subprocess
 import sysconfig
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from importlib.machinery import EXTENSION_SUFFIXES, ExtensionFileLoader
@@ -32,7 +33,12 @@ from pteron.kernels.kernel import Array, Kernel, Port
 
 __all__ = ["Compiled", "compiler"]
 
-_FLAGS = ("-std=c99", "-O3", "-march=native", "-ffp-contract=off", "-fno-math-errno", "-fPIC")
+_FLAGS = (
+    *("-std=c99", "-O3", "-march=native", "-fno-math-errno", "-fPIC"),
+    # gcc 12 makes fused operations of pairs of statements even so (vfmaddsub), unless it is kept
+    # from pairing them; loops, which are what is vectorised here, do not need that.
+    *("-ffp-contract=off", "-fno-tree-slp-vectorize"),
+)
 
 
 @lru_cache(maxsize=1)
@@ -140,9 +146,7 @@ def _source(
     real = "float" if dtype == "float32" else "double"
     printed = C
     if dtype == "float32":
-        printed = {
-            op: text.replace("(", "f(", 1) if "(" in text else text for op, text in C.items()
-        }
+        printed = single_precision(C)
     arguments = ", ".join(
         [f"const real *restrict {port.name}" for port in inputs]
         + [f"real *restrict {port.name}_out" for port in outputs]
@@ -157,6 +161,11 @@ def _source(
         "glue": _glue(inputs, outputs),
     }
     return _TEMPLATE.format(**pieces)
+
+
+def single_precision(printed: Mapping[str, str]) -> dict[str, str]:
+    """Return the operations with math.h's functions for float: sqrtf for sqrt, and so on."""
+    return {op: re.sub(r"^(\w+)\(", r"\1f(", text) for op, text in printed.items()}
 
 
 def _constant(dtype: str) -> Callable[[float], str]:

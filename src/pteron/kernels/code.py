@@ -23,15 +23,19 @@ C = {
     "fabs": "fabs({0})",
     "fmin": "fmin({0}, {1})",
     "fmax": "fmax({0}, {1})",
+    "less": "({0} < {1})",
+    "select": "({0} ? {1} : 0)",
 }
-"""Operations in C."""
+"""Operations in C; `less` is a truth value, by which `select` takes its argument or zero."""
 
-PYTHON = C
+PYTHON = C | {"select": "({1} if {0} else 0.0)"}
 """Operations in Python, for a namespace that has sqrt, sin and so on."""
 
 
 def c_constant(value: float, dtype: str = "float64") -> str:
     """Return a floating-point literal of C, in brackets where it has a sign."""
+    if np.isnan(value):
+        return "NAN"
     text = f"{np.float32(value)!s}" if dtype == "float32" else repr(float(value))
     if not any(sign in text for sign in ".en"):
         text += ".0"

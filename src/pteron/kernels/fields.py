@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import lru_cache
-from math import isqrt
+from math import isnan, isqrt
 from typing import Generic, Protocol, TypeVar
 
 import casadi as ca
@@ -152,12 +152,19 @@ def evaluate(
     }
     work = [zero] * function.sz_w()
     outputs = [[zero] * function.nnz_out(i) for i in range(function.n_out())]
+    if isinstance(field, RationalField):
+        # What is left out of range is NaN in floats; an exact number it is not.
+        binary[ca.OP_LT] = lambda a, b: one if a < b else zero
     tape, constants = _tape(function)
     for op, first, second, target in tape:
         if op in binary:
             work[target] = binary[op](work[first], work[second])
         elif op in unary:
             work[target] = unary[op](work[first])
+        elif op == ca.OP_IF_ELSE_ZERO:
+            if work[first] != zero:
+                raise NoSquareRoot("out of reach")
+            work[target] = zero
         elif op == ca.OP_INPUT:
             work[target] = inputs[first][second]
         elif op == ca.OP_OUTPUT:
@@ -179,6 +186,7 @@ def _tape(function: ca.Function) -> tuple[list[tuple[int, int, int, int]], list[
     exact = {
         *(ca.OP_ADD, ca.OP_SUB, ca.OP_MUL, ca.OP_DIV, ca.OP_SQ, ca.OP_NEG, ca.OP_TWICE),
         *(ca.OP_INV, ca.OP_SQRT, ca.OP_ASSIGN, ca.OP_SIN, ca.OP_COS),
+        *(ca.OP_LT, ca.OP_IF_ELSE_ZERO),
     }
     for k in range(function.n_instructions()):
         op = function.instruction_id(k)
@@ -189,7 +197,8 @@ def _tape(function: ca.Function) -> tuple[list[tuple[int, int, int, int]], list[
             tape.append((op, source[0], source[1], target[0]))
         elif op == ca.OP_CONST:
             tape.append((op, len(constants), 0, target[0]))
-            constants.append(Fraction(function.instruction_constant(k)))
+            value = function.instruction_constant(k)
+            constants.append(Fraction(0 if isnan(value) else value))
         elif op in exact:
             tape.append((op, source[0], source[-1], target[0]))
         else:

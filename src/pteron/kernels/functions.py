@@ -25,6 +25,7 @@ from pteron.equations.lagrangian import (
 )
 from pteron.equations.legs import closing_vector
 from pteron.equations.position import (
+    beyond_reach,
     direct_position,
     inverse_position,
     links,
@@ -69,7 +70,10 @@ def _count(g: Geometry) -> int:
 
 
 def _position(g: Geometry, v: dict[str, Expression]) -> Outputs:
-    return {"sliders": (inverse_position(g, v["pose"]), (g.freedom,))}
+    # The coordinates themselves exist out of reach too; a machine that cannot be there has none.
+    points = [point.position for point in platform_at(g, v["pose"]).points]
+    sliders = inverse_position(g, v["pose"]) + beyond_reach(g, points)
+    return {"sliders": (sliders, (g.freedom,))}
 
 
 def _links(g: Geometry, v: dict[str, Expression]) -> Outputs:
@@ -79,6 +83,11 @@ def _links(g: Geometry, v: dict[str, Expression]) -> Outputs:
 
 def _direct(g: Geometry, v: dict[str, Expression]) -> Outputs:
     poses = direct_position(g, v["sliders"]).T
+    return {"poses": (poses, poses.shape)}
+
+
+def _closures(g: Geometry, v: dict[str, Expression]) -> Outputs:
+    poses = direct_position(g, v["sliders"], reached=False).T
     return {"poses": (poses, poses.shape)}
 
 
@@ -220,6 +229,7 @@ _TABLE: dict[str, _Entry] = {
     "inverse_kinematics": _Entry(("pose",), _position),
     "link_vectors": _Entry(("pose",), _links),
     "direct_kinematics": _Entry(("sliders",), _direct),
+    "closure_poses": _Entry(("sliders",), _closures),
     "reach": _Entry(("pose",), _reach),
     "platform_points": _Entry(("pose",), _platform_points),
     "discriminants": _Entry(("pose",), _discriminants),

@@ -34,6 +34,8 @@ _OPERATIONS = {
     ca.OP_FMAX: "fmax",
     ca.OP_SQ: "sq",
     ca.OP_TWICE: "twice",
+    ca.OP_LT: "less",
+    ca.OP_IF_ELSE_ZERO: "select",
 }
 
 

@@ -20,6 +20,8 @@ from pteron.kernels.kernel import Kernel
 
 __all__ = ["Traced"]
 
+_PRINTED = PYTHON | {"select": "where({0}, {1}, 0.0)"}
+
 
 @dataclass(frozen=True)
 class Traced(Kernel):
@@ -35,7 +37,7 @@ class Traced(Kernel):
         names = names_of(graph, lambda i, j: f"{self.inputs[i].name}[..., {j}]", repr)
         arguments = ", ".join(port.name for port in self.inputs)
         lines = [f"def {self.name}({arguments}):"]
-        lines += statements(graph, graph.operations(), names, PYTHON, "    {0} = {1}")
+        lines += statements(graph, graph.operations(), names, _PRINTED, "    {0} = {1}")
         results = []
         for port, nodes in zip(self.outputs, graph.outputs, strict=True):
             values = ", ".join(names[k] for k in nodes)
@@ -59,7 +61,7 @@ class Traced(Kernel):
         def stack(*values: Any) -> Any:
             return jnp.stack(jnp.broadcast_arrays(*values), axis=-1)
 
-        names = ("sqrt", "sin", "cos", "fmin", "fmax")
+        names = ("sqrt", "sin", "cos", "fmin", "fmax", "where", "nan")
         space: dict[str, Any] = {name: getattr(jnp, name) for name in names}
         space |= {"atan2": jnp.arctan2, "fabs": jnp.abs, "stack": stack}
         exec(self.source, space)

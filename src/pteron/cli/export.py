@@ -1,0 +1,58 @@
+"""`pteron export`: code for a controller."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from rich.markup import escape
+from typer import Option
+
+from pteron.cli.arguments import Elbows, Json, Robot
+from pteron.cli.progress import spinner
+from pteron.cli.robots import load_robot
+from pteron.cli.screen import show, show_json
+from pteron.errors import DataError
+
+__all__ = ["export"]
+
+
+def export(
+    robot: Robot,
+    c: Annotated[str | None, Option("--c", metavar="DIR", help="Write C99 to this folder.")] = None,
+    st: Annotated[
+        str | None, Option("--st", metavar="DIR", help="Write Structured Text to this folder.")
+    ] = None,
+    function: Annotated[
+        list[str] | None,
+        Option("--function", metavar="NAME", help="What to write; again for more."),
+    ] = None,
+    single: Annotated[bool, Option("--float", help="C: float instead of double.")] = False,
+    specialised: Annotated[
+        bool, Option("--specialised", help="C: fold the inertial parameters in.")
+    ] = False,
+    elbows: Elbows = None,
+    json: Json = False,
+) -> None:
+    """Write code for a controller: C99, or Structured Text for a PLC.
+
+    Kinematics, Jacobian, dynamics and regressor, in functions that return a status, without
+    allocation or state; with a test program and a CMakeLists.txt. Function blocks for a PLC are
+    inverse kinematics and inverse dynamics unless others are named.
+    """
+    if c is None and st is None:
+        raise DataError("--c, --st: neither given; say what to write, such as --c controller")
+    machine = load_robot(robot, elbows)
+    files = []
+    with spinner(f"Writing code for {machine.name}"):
+        from pteron.export import BLOCKS, FUNCTIONS, Real, export_c, export_st
+
+        if c is not None:
+            real: Real = "float" if single else "double"
+            chosen = function or FUNCTIONS
+            files += export_c(machine, chosen, c, real=real, specialised=specialised)
+        if st is not None:
+            files += export_st(machine, function or BLOCKS, st)
+    if json:
+        show_json({"robot": machine.name, "files": [str(path) for path in files]})
+        return
+    show(*(f"Written: {escape(str(path))}" for path in files))

@@ -1,0 +1,395 @@
+"""Structured Text against CasADi, on a strict controller; syntax as blark reads it."""
+
+import math
+from itertools import product
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from mechanisms import CATALOG, states
+from structured_text import Block, Trap, parse, read
+
+import pteron
+from pteron.export import structured_text
+from pteron.export.structured_text import function_block
+from pteron.kernels import Port, program, specialised
+from pteron.kernels.graph import Graph, Node, graph_of
+
+FUNCTIONS = (
+    "inverse_kinematics",
+    "inverse_dynamics",
+    "closure_poses",
+    "jacobian",
+    "forward_dynamics",
+)
+
+MACHINES = CATALOG | {
+    f"{name}, working mode {k}": pteron.working_modes(robot)[k]
+    for name, robot in CATALOG.items()
+    for k in (2, 5)
+}
+
+SHORT = (
+    ("quadrupteron", "inverse_kinematics"),
+    ("quadrupteron", "closure_poses"),
+    ("quadrupteron-oblique", "jacobian"),
+    ("tripteron", "inverse_dynamics"),
+    ("tripteron", "jacobian"),
+    ("tripteron-oblique", "closure_poses"),
+)
+"""One of every kind of statement; blark takes 10 ms a line."""
+
+
+def text_of(given, name="FB_Test", **more):
+    graph = graph_of(given.function, given.inputs)
+    return function_block(name, graph, given.inputs, given.outputs, **more)
+
+
+def as_elements(port, values):
+    """Return the elements of an array as the controller holds them, by subscripts."""
+    values = np.asarray(values, dtype=float).ravel()
+    if not port.shape:
+        return float(values[0])
+    places = product(*map(range, port.shape))
+    return dict(zip(places, map(float, values), strict=True))
+
+
+def as_array(port, elements):
+    if not port.shape:
+        return np.array([elements])
+    return np.array([elements[place] for place in product(*map(range, port.shape))])
+
+
+class Runner:
+    """A program twice: as a block that runs, and in CasADi."""
+
+    def __init__(self, given, **more):
+        self.program = given
+        self.text = text_of(given, **more)
+        self.block = Block(read(self.text))
+
+    def __call__(self, values):
+        """Return Valid, Status and the outputs, one vector a port."""
+        ports = self.program.inputs
+        found = self.block(
+            **{p.name: as_elements(p, v) for p, v in zip(ports, values, strict=True)}
+        )
+        outputs = [as_array(port, found[port.name]) for port in self.program.outputs]
+        return SimpleNamespace(valid=found["valid"], status=found["status"], outputs=outputs)
+
+    def casadi(self, values):
+        results = self.program.function.call([np.asarray(value, float) for value in values])
+        return [np.array(result).ravel("F") for result in results]
+
+
+def inputs_of(robot, given, count, seed=0):
+    """Return random inputs at which a program has a result."""
+    poses, velocities, accelerations = states(robot, count, seed)
+    rng = np.random.default_rng(seed)
+    drawn = []
+    for pose, velocity, acceleration in zip(poses, velocities, accelerations, strict=True):
+        known = {
+            "pose": pose,
+            "velocity": velocity,
+            "acceleration": acceleration,
+            "sliders": pteron.inverse_kinematics(robot, pose),
+            "forces": rng.normal(size=len(robot.legs)),
+            "parameters": pteron.parameters(robot),
+        }
+        drawn.append([known[port.name] for port in given.inputs])
+    return drawn
+
+
+RUNNERS = {}
+
+
+def runner(machine, what):
+    if (machine, what) not in RUNNERS:
+        RUNNERS[machine, what] = Runner(program(MACHINES[machine], what))
+    return RUNNERS[machine, what]
+
+
+@pytest.mark.parametrize(("machine", "what"), SHORT)
+def test_blark_reads_blocks_and_sees_the_tree_that_is_run(machine, what):
+    text = runner(machine, what).text
+    assert parse(text) == read(text)
+
+
+LANGUAGE = """
+(* Precedence, (* not nested; comments, one over
+   two lines. *)
+FUNCTION_BLOCK FB_Language
+VAR_INPUT
+    a, b : LREAL;
+    m : ARRAY[0..1, 0..2] OF LREAL; (* a matrix *)
+END_VAR
+VAR_OUTPUT
+    sums : ARRAY[0..5] OF LREAL;
+    Truth : BOOL;
+    Count : UDINT;
+END_VAR
+VAR
+    p, q : BOOL;
+END_VAR
+sums[0] := a - b - 2.5E-1;
+sums[1] := a + b * m[1, 2] / 4.0;
+sums[2] := -a * (-b) - (a - b) * 2.0;
+sums[3] := MAX(MIN(a, b), ABS(-3.5)) + SQRT(16.0) - ATAN2(0.0, 1.0) + SIN(0.0) * COS(a);
+p := NOT (a < b) OR a >= 1.0 AND b <> 0.0;
+q := a = b XOR TRUE;
+IF p AND NOT q THEN
+    sums[4] := 1.0;
+ELSIF a > 100.0 OR FALSE THEN
+    sums[4] := 2.0; sums[5] := 7.0;
+ELSE
+    sums[4] := 3.0;
+    IF Q THEN
+        SUMS[5] := 4.0;
+    END_IF;
+END_IF;
+Truth := p;
+Count := 1;
+END_FUNCTION_BLOCK
+"""
+
+
+def test_language_is_read_as_blark_reads_it():
+    tree = parse(LANGUAGE)
+    assert tree == read(LANGUAGE)
+    matrix = {(i, j): 1.0 + i + j for i in range(2) for j in range(3)}
+    found = Block(tree)(a=1.0, b=3.0, m=matrix)
+    expected = [-2.25, 4.0, 7.0, 7.5, 3.0, 4.0]
+    assert list(found["sums"].values()) == expected
+    assert found["truth"] is True
+    assert found["count"] == 1
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "y := SQRT(x - 2.0);",
+        "y := 1.0 / (x - 1.0);",
+        "y := 1.0E+200 * (x * 1.0E+200);",
+        "y := ATAN2(0.0, x - 1.0);",
+    ],
+)
+def test_controller_of_the_tests_is_strict(statement):
+    text = "FUNCTION_BLOCK F VAR_INPUT x : LREAL; END_VAR VAR_OUTPUT y : LREAL; END_VAR {} {}"
+    block = Block(read(text.format(statement, "END_FUNCTION_BLOCK")))
+    with pytest.raises(Trap):
+        block(x=1.0)
+    block(x=3.0) if "200" not in statement else block(x=1e-200)
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+@pytest.mark.parametrize("what", FUNCTIONS)
+def test_results_are_those_of_casadi(machine, what):
+    run = runner(machine, what)
+    for values in inputs_of(MACHINES[machine], run.program, 3):
+        found = run(values)
+        assert (found.valid, found.status) == (True, 0)
+        for output, expected in zip(found.outputs, run.casadi(values), strict=True):
+            np.testing.assert_allclose(output, expected, rtol=0, atol=1e-13 * abs(expected).max())
+
+
+@pytest.mark.parametrize("machine", CATALOG)
+@pytest.mark.parametrize("what", ["inverse_kinematics", "inverse_dynamics", "forward_dynamics"])
+@pytest.mark.parametrize("far", [1.0, 1e3, 1e6])
+def test_out_of_reach_keeps_the_last_outputs(machine, what, far):
+    run = runner(machine, what)
+    (values,) = inputs_of(CATALOG[machine], run.program, 1)
+    last = run(values)
+    for axis in range(3):
+        pose = values[0].copy()
+        pose[axis] = far
+        assert np.isnan(run.casadi([pose, *values[1:]])[0]).any()
+        found = run([pose, *values[1:]])
+        assert (found.valid, found.status) == (False, 1)
+        np.testing.assert_array_equal(found.outputs[0], last.outputs[0])
+    assert run(values).valid
+
+
+@pytest.mark.parametrize("machine", ["quadrupteron", "quadrupteron-oblique"])
+def test_sliders_that_allow_no_pose_keep_the_last_poses(machine):
+    run = runner(machine, "closure_poses")
+    (values,) = inputs_of(CATALOG[machine], run.program, 1)
+    last = run(values)
+    found = run([values[0] + 10.0 * np.arange(1, 5)])
+    assert (found.valid, found.status) == (False, 1)
+    np.testing.assert_array_equal(found.outputs[0], last.outputs[0])
+
+
+@pytest.mark.parametrize("machine", CATALOG)
+@pytest.mark.parametrize("what", FUNCTIONS)
+def test_inputs_that_are_no_numbers_keep_the_last_outputs(machine, what):
+    run = runner(machine, what)
+    (values,) = inputs_of(CATALOG[machine], run.program, 1)
+    graph = graph_of(run.program.function, run.program.inputs)
+    used = {node.arguments for node in graph.nodes if node.operation == "input"}
+    last = run(values)
+    wrong = (math.nan, math.inf, -math.inf, 1e300, -2e6)
+    for i, port in enumerate(run.program.inputs):
+        for j in range(port.size):
+            given = [np.array(value, float) for value in values]
+            given[i][j] = wrong[j % len(wrong)]
+            found = run(given)
+            assert (found.valid, found.status) == ((False, 3) if (i, j) in used else (True, 0))
+            np.testing.assert_array_equal(found.outputs[0], last.outputs[0])
+
+
+def test_stretched_and_folded_legs_are_singular():
+    run = runner("tripteron", "inverse_dynamics")
+    (values,) = inputs_of(CATALOG["tripteron"], run.program, 1)
+    # The first leg's two lengths are equal: its closing vector can vanish.
+    folded = values[0].copy()
+    folded[0], folded[2] = 0.0, 0.23
+    found = run([folded, *values[1:]])
+    assert (found.valid, found.status) == (False, 2)
+
+
+@pytest.mark.parametrize("machine", ["quadrupteron", "quadrupteron-oblique"])
+def test_singular_orientations_give_status_2_or_numbers(machine):
+    robot = CATALOG[machine]
+    runs = [runner(machine, what) for what in ("inverse_dynamics", "forward_dynamics")]
+    for run, angle in product(runs, pteron.singular_orientations(robot)):
+        for values in inputs_of(robot, run.program, 3):
+            values[0][3] = angle
+            found = run(values)
+            assert found.status in (0, 1, 2)
+            assert np.isfinite(found.outputs[0]).all()
+
+
+EXTREMES = (0.0, -0.0, 5e-324, 1e-160, -1e-20, 1e-9, 0.23, 0.28, math.pi / 2, -1.0, 1e3, -1e6, 1e6)
+
+
+def sweep(run, robot, count):
+    """Return what becomes of inputs some of which are extreme."""
+    rng = np.random.default_rng(3)
+    seen = []
+    for values in inputs_of(robot, run.program, count):
+        for share in (0.1, 0.5, 1.0):
+            given = [
+                np.where(rng.random(value.shape) < share, rng.choice(EXTREMES, value.shape), value)
+                for value in values
+            ]
+            found = run(given)
+            assert found.valid == (found.status == 0)
+            assert all(np.isfinite(output).all() for output in found.outputs)
+            seen.append(found.status)
+    return seen
+
+
+@pytest.mark.parametrize("machine", CATALOG)
+@pytest.mark.parametrize("what", FUNCTIONS)
+def test_extreme_inputs_do_not_trap(machine, what):
+    assert 3 not in sweep(runner(machine, what), CATALOG[machine], 5)
+
+
+def test_smallest_divisors_and_largest_factors_do_not_trap():
+    """A determinant of 2 by 2, its powers and quotients: numbers leave LREAL without guards."""
+    nodes = [Node("input", (0, k)) for k in range(4)]
+    nodes += [Node("mul", (0, 3)), Node("mul", (1, 2)), Node("sub", (4, 5)), Node("div", (0, 6))]
+    for k in range(5):
+        nodes += [Node("mul", (7 + 2 * k, 7 + 2 * k)), Node("div", (8 + 2 * k, 6))]
+    graph = Graph(tuple(nodes), ((len(nodes) - 1,),))
+    ports = [Port("m", (2, 2))], [Port("y", ())]
+    seen = set()
+    block = Block(read(function_block("F", graph, *ports)))
+    sizes = (0.0, 1e-10, 1e-9, 1.0, 1e6)
+    for numbers in product(sizes, repeat=4):
+        found = block(m=as_elements(ports[0][0], numbers))
+        assert math.isfinite(found["y"])
+        seen.add(found["status"])
+    assert seen == {0, 2}
+
+
+def test_guards_of_factors_are_needed(monkeypatch):
+    monkeypatch.setattr(structured_text, "_LREAL", math.inf)
+    nodes = [Node("input", (0, 0))] + [Node("mul", (k, k)) for k in range(6)]
+    text = function_block("F", Graph(tuple(nodes), ((6,),)), [Port("x", ())], [Port("y", ())])
+    with pytest.raises(Trap, match="overflow"):
+        Block(read(text))(x=1e6)
+    monkeypatch.undo()
+    text = function_block("F", Graph(tuple(nodes), ((6,),)), [Port("x", ())], [Port("y", ())])
+    block = Block(read(text))
+    assert block(x=1e6)["status"] == 2
+    assert block(x=2.0) == {"y": 2.0**64, "valid": True, "status": 0}
+
+
+def test_parameters_can_be_numbers_of_the_program():
+    robot = CATALOG["tripteron"]
+    given = specialised(
+        program(robot, "inverse_dynamics"), {"parameters": pteron.parameters(robot)}
+    )
+    run = Runner(given)
+    for values in inputs_of(robot, given, 2):
+        expected = pteron.inverse_dynamics(robot, *values)
+        np.testing.assert_allclose(run(values).outputs[0], expected, rtol=1e-12)
+
+
+def test_text_can_be_read():
+    robot = CATALOG["quadrupteron"]
+    given = program(robot, "inverse_dynamics")
+    graph = graph_of(given.function, given.inputs)
+    first, second, third = graph.operations()[:3]
+    text = text_of(
+        given,
+        comments=["Quadrupteron; SI units.", "Ends *) nothing, opens (* nothing. " + "word " * 50],
+        descriptions={"pose": "x, y, z in m, phi in rad"},
+        labels={first: "leg1_u_x", second: "LEG1_U_X", third: "sin"},
+    )
+    lines = text.splitlines()
+    assert max(map(len, lines)) <= 100
+    assert text.isascii()
+    assert "    pose : ARRAY[0..3] OF LREAL; (* x, y, z in m, phi in rad *)" in lines
+    names = Block(read(text)).names("VAR")
+    assert {"leg1_u_x", "leg1_u_x_2", "sin_2", "t1"} <= set(names)
+
+
+def test_names_that_clash_are_refused():
+    graph = Graph((Node("input", (0, 0)),), ((0,),))
+    for name in ("valid", "SQRT", "two words", "a__b", "1st", "If", ""):
+        with pytest.raises(ValueError, match="in Structured Text"):
+            function_block("F", graph, [Port(name, ())], [Port("y", ())])
+    with pytest.raises(ValueError, match="stands for something else"):
+        function_block("F", graph, [Port("y", ())], [Port("Y", ())])
+    with pytest.raises(ValueError, match="1 values for 2 elements"):
+        function_block("F", graph, [Port("x", ())], [Port("y", (2,))])
+
+
+def test_constants_are_literals():
+    values = (5.0, -1e-5, 1e22, 1.2345678901234567e-300, 0.1)
+    nodes = tuple(Node("constant", value=value) for value in values)
+    graph = Graph(nodes, (tuple(range(len(values))),))
+    text = function_block("F", graph, [Port("x", ())], [Port("y", (len(values),))])
+    assert parse(text) == read(text)
+    found = Block(read(text))(x=math.nan)
+    assert tuple(found["y"].values()) == values
+    assert found["valid"]
+    bad = Graph((Node("constant", value=math.inf),), ((0,),))
+    with pytest.raises(ValueError, match="constant is too large"):
+        function_block("F", bad, [Port("x", ())], [Port("y", ())])
+
+
+def test_selections_are_numbers_or_failures():
+    nodes = (
+        Node("input", (0, 0)),
+        Node("constant", value=2.0),
+        Node("less", (0, 1)),
+        Node("select", (2, 0)),
+        Node("constant", value=math.nan),
+        Node("input", (0, 1)),
+        Node("less", (5, 1)),
+        Node("select", (6, 4)),
+        Node("add", (3, 7)),
+    )
+    ports = [Port("x", (2,))], [Port("y", ())]
+    block = Block(read(function_block("F", Graph(nodes, ((8,),)), *ports)))
+    assert block(x={(0,): 1.5, (1,): 2.0}) == {"y": 1.5, "valid": True, "status": 0}
+    assert block(x={(0,): 3.0, (1,): 9.0}) == {"y": 0.0, "valid": True, "status": 0}
+    assert block(x={(0,): 1.0, (1,): 1.0}) == {"y": 0.0, "valid": False, "status": 1}
+    for wrong in (Node("mul", (0, 4)), Node("neg", (2,)), Node("less", (0, 1))):
+        with pytest.raises(ValueError, match="in a selection"):
+            function_block("F", Graph((*nodes, wrong), ((9,),)), *ports)
+    with pytest.raises(ValueError, match="without a comparison"):
+        function_block("F", Graph((*nodes, Node("select", (0, 1))), ((9,),)), *ports)
