@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import get_args
 
 import numpy as np
@@ -21,6 +22,9 @@ SINGULAR = 1e-9
 from 1/D loses as many digits as the closeness has zeros, so that half of them are left here."""
 
 
+_CHOICES = get_args(OnFailure)
+
+
 def finite(
     robot: Manipulator, value: ArrayLike, name: str, on_failure: OnFailure = "raise"
 ) -> Array:
@@ -29,7 +33,7 @@ def finite(
     Under ``on_failure="nan"`` a row with a number that is not finite becomes NaN as a whole: an
     infinity would make the kernels subtract infinities, where NaN is quiet.
     """
-    if on_failure not in get_args(OnFailure):
+    if on_failure not in _CHOICES:
         raise DataError(f'on_failure: {on_failure!r} is neither "raise" nor "nan"')
     array = as_array(value, name, (robot.freedom,))
     good = np.isfinite(array)
@@ -74,18 +78,18 @@ def usable_poses(
     if reach or bent:
         distance, margin, sine = numeric(robot, "reach")(poses)
         beyond = np.isnan(sine) & ~bad[..., None]
-        # lu and ll are equal where the elbow is undetermined, so that n = 0 is within reach.
-        far = np.abs(poses[..., :3]).sum(axis=-1, keepdims=True) + _guides(robot)
-        coincident = distance <= 1e-12 * _spans(robot) + 1e-15 * far
-        stuck = (sine <= SINGULAR) if bent else coincident
-        if on_failure == "raise" and (beyond.any() or stuck.any()):
-            index = np.argwhere(beyond | stuck)[0]
-            at, leg = tuple(int(i) for i in index[:-1]), int(index[-1])
-            count = int((beyond | stuck).any(axis=-1).sum())
-            if beyond[(*at, leg)]:
-                raise _unreachable(robot, at, leg, distance, margin, count)
-            raise _stretched(at, leg, float(sine[(*at, leg)]), bool(coincident[(*at, leg)]), count)
-        bad = np.asarray(bad | (beyond | stuck).any(axis=-1))
+        coincident = _coincident(robot, poses, distance)
+        failing = beyond | ((sine <= SINGULAR) if bent else coincident)
+        if failing.any():
+            if on_failure == "raise":
+                index = np.argwhere(failing)[0]
+                at, leg = tuple(int(i) for i in index[:-1]), int(index[-1])
+                count = int(failing.any(axis=-1).sum())
+                if beyond[(*at, leg)]:
+                    raise _unreachable(robot, at, leg, distance, margin, count)
+                undetermined = bool(coincident[(*at, leg)])
+                raise _stretched(at, leg, float(sine[(*at, leg)]), undetermined, count)
+            bad = np.asarray(bad | failing.any(axis=-1))
     if held:
         if is_singular_everywhere(robot):
             closeness: Array = np.zeros(poses.shape[:-1])
@@ -96,7 +100,19 @@ def usable_poses(
             at = tuple(int(i) for i in np.argwhere(loose)[0])
             raise _loose(robot, at, poses[at], float(closeness[at]), int(loose.sum()))
         bad = np.asarray(bad | loose)
-    return np.where(bad[..., None], np.nan, poses)
+    return np.where(bad[..., None], np.nan, poses) if bad.any() else poses
+
+
+def _coincident(robot: Manipulator, poses: Array, distance: Array) -> Array:
+    """Return where R1 and R3 of a leg coincide, to rounding: its elbow may be anywhere.
+
+    lu and ll are equal there, so that n = 0 is within reach.
+    """
+    spans = _spans(robot)
+    if not (distance < 1e-6 * spans).any():
+        return np.zeros(distance.shape, dtype=bool)
+    far = np.abs(poses[..., :3]).sum(axis=-1, keepdims=True) + _guides(robot)
+    return np.asarray(distance <= 1e-12 * spans + 1e-15 * far)
 
 
 def blanked(values: Array, *states: Array) -> Array:
@@ -107,14 +123,18 @@ def blanked(values: Array, *states: Array) -> Array:
     lost = np.zeros((), dtype=bool)
     for state in states:
         lost = lost | np.isnan(state[..., 0])
+    if not lost.any():
+        return values
     axes = (1,) * (values.ndim - lost.ndim)
     return np.where(lost.reshape(lost.shape + axes), np.nan, values)
 
 
+@lru_cache(maxsize=64)
 def _spans(robot: Manipulator) -> Array:
     return np.array([leg.upper_length + leg.lower_length for leg in robot.legs])
 
 
+@lru_cache(maxsize=64)
 def _guides(robot: Manipulator) -> Array:
     return np.array([norm(leg.guide_point) for leg in robot.legs])
 
