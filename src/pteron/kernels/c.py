@@ -60,6 +60,8 @@ def _version(compiler: str) -> str:
 class Compiled(Kernel):
     """A kernel in machine code."""
 
+    _strided = True
+
     @cached_property
     def source(self) -> str:
         """The C code."""
@@ -151,7 +153,10 @@ def _source(
         [f"const real *restrict {port.name}" for port in inputs]
         + [f"real *restrict {port.name}_out" for port in outputs]
     )
+    batched = [port.name for port in inputs if not port.shared]
+    strides = "".join(f", const npy_intp *{name}_strides" for name in batched)
     pieces = {
+        "strides": strides,
         "name": name,
         "real": real,
         "npy": "NPY_FLOAT" if dtype == "float32" else "NPY_DOUBLE",
@@ -220,9 +225,15 @@ def _sweep(
         f"real in[{max(rows, 1)}][BLOCK], out[{len(results)}][BLOCK];",
         "for (npy_intp start = 0; start < n; start += BLOCK) {",
         "    const npy_intp count = n - start < BLOCK ? n - start : BLOCK;",
-        "    for (npy_intp k = 0; k < count; k++) {",
+        "    if (packed) for (npy_intp k = 0; k < count; k++) {",
         *(
             f"        in[{row}][k] = {inputs[i].name}[{inputs[i].size} * (start + k) + {j}];"
+            for (i, j), row in place.items()
+        ),
+        "    }",
+        "    else for (npy_intp k = 0; k < count; k++) {",
+        *(
+            f"        in[{row}][k] = {inputs[i].name}[{_place(inputs[i].name, j)}];"
             for (i, j), row in place.items()
         ),
         "    }",
@@ -253,6 +264,10 @@ def _sweep(
     return _lines(lines, 1)
 
 
+def _place(name: str, j: int) -> str:
+    return f"{name}_strides[0] * (start + k) + {name}_strides[1] * {j}"
+
+
 def _glue(inputs: Sequence[Port], outputs: Sequence[Port]) -> str:
     def table(ports: Sequence[Port]) -> str:
         rows = []
@@ -273,6 +288,7 @@ def _glue(inputs: Sequence[Port], outputs: Sequence[Port]) -> str:
         table=table([*inputs, *outputs]),
         values=", ".join(values),
         states=", ".join(states),
+        strides="".join(f", strides[{i}]" for i, p in enumerate(inputs) if not p.shared),
     )
 
 
@@ -294,7 +310,7 @@ static void one({arguments})
 {one}
 }}
 
-static void sweep(npy_intp n, {arguments})
+static void sweep(npy_intp n, int packed, {arguments}{strides})
 {{
 {sweep}
 }}
@@ -306,23 +322,40 @@ enum {{ INPUTS = {inputs}, OUTPUTS = {outputs}, PORTS = INPUTS + OUTPUTS }};
 static const struct {{ int nd; npy_intp shape[4]; int shared; npy_intp size; }} PORT[PORTS] =
     {{{table}}};
 
-/* The array, if it can be read as it lies in memory. */
+/* The array, if its numbers can be read as they lie in memory. */
 static PyArrayObject *plain(PyObject *value)
 {{
     if (!PyArray_CheckExact(value)) return NULL;
     PyArrayObject *array = (PyArrayObject *)value;
-    return PyArray_TYPE(array) == REAL && PyArray_ISCARRAY_RO(array) ? array : NULL;
+    return PyArray_TYPE(array) == REAL && PyArray_ISBEHAVED_RO(array) ? array : NULL;
 }}
 
-static void evaluate(npy_intp n, char **data)
+/* How far apart, in numbers, two states and two elements of an input lie; 0 if that has no answer,
+   2 if the numbers follow one another. */
+static int placed(PyArrayObject *array, int i, npy_intp *strides)
 {{
-    if (n < FEW) {{
+    const int extra = PyArray_NDIM(array) - PORT[i].nd;
+    const npy_intp size = (npy_intp)sizeof(real);
+    strides[0] = PORT[i].size;
+    strides[1] = 1;
+    if (PyArray_IS_C_CONTIGUOUS(array)) return 2;
+    if (PORT[i].shared || extra > 1 || PORT[i].nd > 1) return 0;
+    if (extra) strides[0] = PyArray_STRIDE(array, 0) / size;
+    if (PORT[i].nd) strides[1] = PyArray_STRIDE(array, extra) / size;
+    if (extra && strides[0] * size != PyArray_STRIDE(array, 0)) return 0;
+    return PORT[i].nd && strides[1] * size != PyArray_STRIDE(array, extra) ? 0 : 1;
+}}
+
+static void evaluate(npy_intp n, int packed, npy_intp strides[][2], char **data)
+{{
+    (void)strides;
+    if (n < FEW && packed) {{
         for (npy_intp k = 0; k < n; k++) one({states});
     }} else if (n < 1000) {{
-        sweep(n, {values});
+        sweep(n, packed, {values}{strides});
     }} else {{
         Py_BEGIN_ALLOW_THREADS
-        sweep(n, {values});
+        sweep(n, packed, {values}{strides});
         Py_END_ALLOW_THREADS
     }}
 }}
@@ -331,8 +364,8 @@ static void evaluate(npy_intp n, char **data)
 static PyObject *call(PyObject *self, PyObject *const *args, Py_ssize_t nargs)
 {{
     char *data[PORTS];
-    npy_intp lead[NPY_MAXDIMS], n = 1;
-    int nlead = -1;
+    npy_intp lead[NPY_MAXDIMS], strides[INPUTS][2], n = 1;
+    int nlead = -1, packed = 1;
     (void)self;
     if (nargs != INPUTS) Py_RETURN_NONE;
     for (int i = 0; i < INPUTS; i++) {{
@@ -353,6 +386,9 @@ static PyObject *call(PyObject *self, PyObject *const *args, Py_ssize_t nargs)
                     if (shape[k] != lead[k]) Py_RETURN_NONE;
             }}
         }}
+        const int layout = placed(array, i, strides[i]);
+        if (!layout) Py_RETURN_NONE;
+        packed = packed && layout == 2;
         data[i] = PyArray_BYTES(array);
     }}
     if (nlead < 0 || nlead + 4 > NPY_MAXDIMS) Py_RETURN_NONE;
@@ -366,7 +402,7 @@ static PyObject *call(PyObject *self, PyObject *const *args, Py_ssize_t nargs)
         }}
         data[INPUTS + i] = PyArray_BYTES((PyArrayObject *)out[i]);
     }}
-    if (n > 0) evaluate(n, data);
+    if (n > 0) evaluate(n, packed, strides, data);
     if (OUTPUTS == 1) return out[0];
     PyObject *all = PyTuple_New(OUTPUTS);
     for (int i = 0; i < OUTPUTS; i++) {{
@@ -376,8 +412,8 @@ static PyObject *call(PyObject *self, PyObject *const *args, Py_ssize_t nargs)
     return all;
 }}
 
-/* run(*inputs, *outputs): fill arrays of (n, size), shared ones of (size,), which the caller has
-   checked; outputs may be slices of larger ones. */
+/* run(*inputs, *outputs): fill arrays of (n, size) from arrays of (n, size) in any layout, shared
+   ones of (size,); the caller has checked them. */
 static PyObject *run(PyObject *self, PyObject *const *args, Py_ssize_t nargs)
 {{
     char *data[PORTS];
@@ -386,7 +422,8 @@ static PyObject *run(PyObject *self, PyObject *const *args, Py_ssize_t nargs)
         PyErr_SetString(PyExc_TypeError, "run: as many arrays as ports expected");
         return NULL;
     }}
-    npy_intp n = -1;
+    npy_intp n = -1, strides[PORTS][2];
+    int packed = 1;
     for (int i = 0; i < PORTS; i++) {{
         PyArrayObject *array = plain(args[i]);
         const int nd = PORT[i].shared ? 1 : 2;
@@ -395,13 +432,19 @@ static PyObject *run(PyObject *self, PyObject *const *args, Py_ssize_t nargs)
             fits = n < 0 || PyArray_DIM(array, 0) == n;
             n = PyArray_DIM(array, 0);
         }}
+        if (fits) {{
+            strides[i][0] = nd == 2 ? PyArray_STRIDE(array, 0) / (npy_intp)sizeof(real) : 0;
+            strides[i][1] = PyArray_STRIDE(array, nd - 1) / (npy_intp)sizeof(real);
+            fits = PyArray_IS_C_CONTIGUOUS(array) || (i < INPUTS && nd == 2);
+            packed = packed && PyArray_IS_C_CONTIGUOUS(array);
+        }}
         if (!fits) {{
             PyErr_Format(PyExc_TypeError, "run: array %d does not fit", i);
             return NULL;
         }}
         data[i] = PyArray_BYTES(array);
     }}
-    if (n > 0) evaluate(n, data);
+    if (n > 0) evaluate(n, packed, strides, data);
     Py_RETURN_NONE;
 }}
 

@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import prod
-from typing import Any
+from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
@@ -94,6 +94,9 @@ class Kernel(ABC):
     def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
         """Fill `outputs` (batch, size) from `inputs` (batch, size), or (size,) where shared."""
 
+    _strided: ClassVar[bool] = False
+    """Whether `_run` takes batches as they lie in memory; else their rows follow one another."""
+
     @cached_property
     def _direct(self) -> Callable[..., Any] | None:
         """Evaluates plain calls without checks, and returns None for any other; see `__call__`."""
@@ -153,7 +156,8 @@ class Kernel(ABC):
                 whole = given[port.name]
                 if whole.shape != lead + port.shape:
                     whole = np.broadcast_to(whole, lead + port.shape)
-                inputs.append(np.ascontiguousarray(whole).reshape(batch, port.size))
+                plain = whole if self._strided else np.ascontiguousarray(whole)
+                inputs.append(plain.reshape(batch, port.size))
         outputs = [np.empty((batch, port.size), dtype=self.dtype) for port in self.outputs]
         if self.threads > 1 and batch >= 2 * _SHARE:
             self._split(batch, inputs, outputs)
