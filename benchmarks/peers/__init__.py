@@ -1,7 +1,9 @@
 """Other engines doing our inverse dynamics: platform motion to actuator forces, the whole job.
 
 Each cuts the loops, runs its Newton-Euler algorithm on the tree, and projects the joint forces
-through the closure; what is not the engine's is done in closed form. For machines with four legs.
+through the closure; what is not the engine's is done in closed form. Tuned peers have the best
+flags, buffers and stages that we found; the others are what a good user writes first. For machines
+with four legs.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ from dataclasses import dataclass
 
 import pteron
 from peers import mujoco_peers, pinocchio_peers
-from peers.calls import Calls
+from peers.calls import Call, Calls
 from peers.closure import Array
 from peers.library import Missing, Sweep
 
@@ -32,28 +34,36 @@ class Peer:
     seconds : callable
         From the same to the time of one sweep over the batch, in seconds a state, measured inside:
         by C and C++ around their loops, from Python around calls with one state each.
+    call : callable or None
+        From one state to its forces, for a peer that is called from Python.
     """
 
     name: str
     forces: Callable[[Array, Array, Array], Array]
     seconds: Callable[[Array, Array, Array], float]
+    call: Call | None
 
 
 _BUILDERS: dict[str, Callable[[pteron.Manipulator], Calls | Sweep]] = {
-    "Pinocchio, C++": pinocchio_peers.cpp,
-    "Pinocchio, Python": pinocchio_peers.python,
-    "MuJoCo, C": mujoco_peers.c,
-    "MuJoCo, Python": mujoco_peers.python,
+    "Pinocchio, C++, tuned": pinocchio_peers.cpp_tuned,
+    "Pinocchio, C++, usual flags": pinocchio_peers.cpp_usual,
+    "Pinocchio, Python, tuned": pinocchio_peers.python_tuned,
+    "Pinocchio, Python, usual calls": pinocchio_peers.python_usual,
+    "MuJoCo, C, tuned": mujoco_peers.c_tuned,
+    "MuJoCo, C, loops closed by constraints": mujoco_peers.c_usual,
+    "MuJoCo, Python, tuned": mujoco_peers.python_tuned,
 }
 
 
-def peers(robot: pteron.Manipulator) -> list[Peer]:
+def peers(robot: pteron.Manipulator, *, quick: bool = False) -> list[Peer]:
     """Return the peers that can be built here; what is missing for others is said on stderr.
 
     Parameters
     ----------
     robot : Manipulator
         A 3T1R machine; its sliders may move along any direction.
+    quick : bool
+        Whether to leave out Pinocchio in C++, which may take most of a minute to compile.
 
     Returns
     -------
@@ -68,10 +78,13 @@ def peers(robot: pteron.Manipulator) -> list[Peer]:
         raise ValueError(f"{robot.name}: the peers are written for 3T1R machines, with four legs")
     found = []
     for name, build in _BUILDERS.items():
+        if quick and name.startswith("Pinocchio, C++"):
+            continue
         try:
             peer = build(robot)
         except Missing as missing:
             print(f"{name}: left out, {missing}", file=sys.stderr)
         else:
-            found.append(Peer(name, peer.forces, peer.seconds))
+            call = peer.call if isinstance(peer, Calls) else None
+            found.append(Peer(name, peer.forces, peer.seconds, call))
     return found

@@ -167,6 +167,17 @@ class Closure:
         ]
         return ca.Function("joints", [pose, velocity, acceleration], outputs)
 
+    def joints_and_rates(self, unbounded: bool) -> ca.Function:
+        """Return the same function with dq/dx (16, 4), by rows, in the place of `rows`.
+
+        It is what a projection needs that is written with matrices; J is the sliders' part of it.
+        """
+        joints = self.joints(unbounded)
+        motion = joints.sx_in()
+        q, v, a, _ = joints.call(motion)
+        rates = ca.densify(ca.jacobian(v, motion[1]))
+        return ca.Function("joints_and_rates", motion, [q, v, a, rates.T])
+
     def _links(self, i: int, u: Expression) -> tuple[Expression, Expression, Expression]:
         """Return l_u, l_l and (l_u x l_l) . d from u, by Lemma 1."""
         lu, ll = self.upper[i], self.lower[i]

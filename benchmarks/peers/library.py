@@ -1,11 +1,14 @@
-"""C and C++ sources that lie beside this file, compiled and loaded."""
+"""C and C++ sources that lie beside this file, compiled and loaded.
+
+What is compiled is kept in the cache that Pteron's own kernels use: Pinocchio's templates take most
+of a minute.
+"""
 
 from __future__ import annotations
 
 import ctypes
 import shutil
 import subprocess
-import tempfile
 from collections.abc import Sequence
 from ctypes import c_double, c_int64, c_void_p
 from pathlib import Path
@@ -13,19 +16,20 @@ from pathlib import Path
 import numpy as np
 
 from peers.closure import Array
+from pteron.kernels.cache import digest, entry
 
 __all__ = ["Missing", "Sweep", "compiled"]
 
-_FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-DNDEBUG", "-shared", "-fPIC", "-w")
-"""Without errno a root is one instruction; -w because the headers of others warn."""
+_FLAGS = ("-O3", "-march=native", "-DNDEBUG", "-shared", "-fPIC", "-w")
+"""The usual ones; -w because the headers of others warn."""
 
 
 class Missing(Exception):
     """What a peer needs is not there; the message says what."""
 
 
-def compiled(compiler: str, source: str, options: Sequence[str]) -> ctypes.CDLL:
-    """Compile a source that lies beside this file, and load it.
+def compiled(compiler: str, source: str, options: Sequence[str], version: str = "") -> ctypes.CDLL:
+    """Compile a source that lies beside this file, or find it compiled, and load it.
 
     Parameters
     ----------
@@ -34,7 +38,9 @@ def compiled(compiler: str, source: str, options: Sequence[str]) -> ctypes.CDLL:
     source : str
         The file's name.
     options : sequence of str
-        What goes after the source: include directories and libraries.
+        What goes after the source: flags, include directories and libraries.
+    version : str
+        Of the engine whose headers and libraries the options name.
 
     Returns
     -------
@@ -49,10 +55,15 @@ def compiled(compiler: str, source: str, options: Sequence[str]) -> ctypes.CDLL:
     if command is None:
         raise Missing(f"{compiler}: no such compiler")
     path = Path(__file__).with_name(source)
-    with tempfile.TemporaryDirectory() as folder:
-        library = Path(folder) / f"{path.stem}.so"
+    header = path.with_name("closure.h")
+    banner = subprocess.run([command, "--version"], capture_output=True, text=True, check=False)
+    texts = [path.read_text(encoding="utf-8"), header.read_text(encoding="utf-8")]
+    name = f"peer-{path.stem}-{digest(*texts, banner.stdout, version, *_FLAGS, *options)}"
+    library = f"{path.stem}.so"
+
+    def build(folder: Path) -> None:
         run = subprocess.run(
-            [command, *_FLAGS, str(path), *options, "-o", str(library)],
+            [command, *_FLAGS, str(path), *options, "-o", str(folder / library)],
             capture_output=True,
             text=True,
             check=False,
@@ -60,10 +71,11 @@ def compiled(compiler: str, source: str, options: Sequence[str]) -> ctypes.CDLL:
         if run.returncode:
             errors = [line for line in run.stderr.splitlines() if "error" in line]
             raise Missing(f"{compiler} cannot compile {source}: {(errors or [run.stderr])[0]}")
-        try:
-            return ctypes.CDLL(str(library))
-        except OSError as error:
-            raise Missing(f"{source}: {error}") from None
+
+    try:
+        return ctypes.CDLL(str(entry(name, build) / library))
+    except OSError as error:
+        raise Missing(f"{source}: {error}") from None
 
 
 class Sweep:

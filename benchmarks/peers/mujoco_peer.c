@@ -43,12 +43,17 @@ static void inverse(const Peer *peer, const double *pose, const double *velocity
     memcpy(d->qpos + 12, pose, 4 * sizeof(double));
     memcpy(d->qvel + 12, velocity, 4 * sizeof(double));
     memcpy(d->qacc + 12, acceleration, 4 * sizeof(double));
+#ifdef CLOSED
+    mj_inverse(m, d);
+    const double *found = d->qfrc_inverse;
+#else
     /* What mj_inverse does, less its stages for what the model has not (and the mass matrix). */
+    double found[16];
     mj_kinematics(m, d);
     mj_comPos(m, d);
     mj_comVel(m, d);
-    double found[16];
     mj_rne(m, d, 1, found);
+#endif
     Lanes tau[3];
     for (int i = 0; i < 4; i++)
         for (int k = 0; k < 3; k++) tau[k][i] = found[3 * i + k];

@@ -1,20 +1,23 @@
-"""Pinocchio, from Python and in C++."""
+"""Pinocchio, from Python and in C++: as one usually calls and compiles it, and tuned."""
 
 from __future__ import annotations
 
 from ctypes import c_int, c_void_p
+from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 import pteron
+from peers import compiled_closure
 from peers.calls import Calls
 from peers.closure import Array, Closure
 from peers.library import Missing, Sweep, compiled
 from peers.tree import Body, tree
 
-__all__ = ["cpp", "python"]
+__all__ = ["cpp_tuned", "cpp_usual", "python_tuned", "python_usual"]
 
 _BOOST = (
     "-DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS",
@@ -25,6 +28,7 @@ _BOOST = (
 """What Pinocchio's own CMake files define for those who include it."""
 
 _TUNING = (
+    "-fno-math-errno",
     "-DEIGEN_DONT_VECTORIZE",
     "-fno-tree-slp-vectorize",
     "-fno-semantic-interposition",
@@ -39,8 +43,42 @@ _TUNING = (
 one by one and read as a pair stall, and its small functions are inlined only when pressed."""
 
 
-def python(robot: pteron.Manipulator) -> Calls:
-    """Return the peer that calls `pinocchio.rnea` from Python."""
+def python_tuned(robot: pteron.Manipulator) -> Calls:
+    """Return the peer that calls `pinocchio.rnea` between two calls of compiled closed form."""
+    pin, model = _model(robot)
+    data = model.createData()
+    closure = Closure.of(robot)
+    joints = compiled_closure.joints(closure, unbounded=True)
+    forces = compiled_closure.forces(closure)
+    rnea = pin.rnea
+
+    def call(pose: Array, velocity: Array, acceleration: Array) -> Array:
+        q, v, a, rows = joints(pose, velocity, acceleration)
+        return forces(rnea(model, data, q, v, a), rows)
+
+    return Calls(call)
+
+
+def python_usual(robot: pteron.Manipulator) -> Calls:
+    """Return the peer that calls `pinocchio.rnea` as its manual does, and projects with NumPy.
+
+    The inverse kinematics before it is compiled and in closed form; q, v, a and dq/dx come from it.
+    """
+    pin, model = _model(robot)
+    data = model.createData()
+    joints = compiled_closure.joints_and_rates(Closure.of(robot), unbounded=True)
+    sliders = slice(0, 12, 3)
+
+    def call(pose: Array, velocity: Array, acceleration: Array) -> Array:
+        q, v, a, rates = joints(pose, velocity, acceleration)
+        tau = pin.rnea(model, data, q, v, a)
+        return np.linalg.solve(rates[sliders].T, rates.T @ tau)
+
+    return Calls(call)
+
+
+def _model(robot: pteron.Manipulator) -> tuple[Any, Any]:
+    """Return the module pinocchio and the tree in it."""
     if find_spec("pinocchio") is None:
         raise Missing("the package pin is not installed")
     import pinocchio as pin
@@ -64,19 +102,25 @@ def python(robot: pteron.Manipulator) -> Calls:
         inertia = pin.Inertia(body.mass, body.center, np.diag(body.inertia))
         model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
         ids.append(joint)
-    data = model.createData()
-    q, v, a = np.empty(model.nq), np.empty(model.nv), np.empty(model.nv)
-    rnea = pin.rnea
-    tau = data.tau
-    return Calls(Closure.of(robot), (q, v, a), tau, lambda: rnea(model, data, q, v, a), True)
+    return pin, model
 
 
-def cpp(robot: pteron.Manipulator) -> Sweep:
-    """Return the peer that calls `pinocchio::rnea` in C++."""
+def cpp_tuned(robot: pteron.Manipulator) -> Sweep:
+    """Return the peer that calls `pinocchio::rnea` in C++, with its best flags."""
+    return _cpp(robot, _TUNING)
+
+
+def cpp_usual(robot: pteron.Manipulator) -> Sweep:
+    """Return the peer that calls `pinocchio::rnea` in C++, with -O3 -march=native -DNDEBUG."""
+    return _cpp(robot, ())
+
+
+def _cpp(robot: pteron.Manipulator, flags: tuple[str, ...]) -> Sweep:
     joints = _table(tree(robot))
     gravity = np.array(robot.gravity)
     numbers = Closure.of(robot).numbers
-    library = compiled("g++", "pinocchio_peer.cpp", ["-std=c++17", *_TUNING, *_BOOST, *_includes()])
+    options = ["-std=c++17", *flags, *_BOOST, *_includes()]
+    library = compiled("g++", "pinocchio_peer.cpp", options, version("pin"))
     return Sweep(
         library,
         c_void_p(joints.ctypes.data),

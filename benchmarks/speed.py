@@ -1,0 +1,206 @@
+"""Fastest: the quadrupteron's inverse dynamics against other engines, in one run.
+
+Three contests: one state a call from Python; one state a call in C, each waiting for the last; and
+a batch. The contestants of a contest take turns, round by round, and ratios are of the same round.
+Each has to give the right forces first. Times are of this machine; ratios carry further.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
+from time import perf_counter
+from timeit import Timer
+from typing import Any
+
+import numpy as np
+from measuring import (
+    Array,
+    Contestant,
+    States,
+    contest,
+    print_ratio,
+    print_times,
+    quick,
+    random_states,
+    relative_error,
+)
+from measuring.exported import FORMS, LEVELS, exported
+from peers import Peer, peers
+
+import pteron
+from pteron.export import Real
+from pteron.kernels import Kernel
+from pteron.kernels.c import compiler
+
+_CPP = "Pinocchio, C++, usual flags"
+_CPP_TUNED = "Pinocchio, C++, tuned"
+_PYTHON = "Pinocchio, Python, usual calls"
+_PYTHON_TUNED = "Pinocchio, Python, tuned"
+_MUJOCO = "MuJoCo, Python, tuned"
+_MUJOCO_C = "MuJoCo, C, tuned"
+_MUJOCO_CLOSED = "MuJoCo, C, loops closed by constraints"
+
+_SECONDS = 0.02
+"""Length of a round of single calls from Python."""
+
+
+def main() -> None:
+    """Run the three contests."""
+    robot = pteron.load("quadrupteron")
+    others = peers(robot, quick=quick())
+    if compiler() is None:
+        print("target c and the exported C: left out, no C compiler")
+    single_calls(robot, others)
+    exported_calls(robot)
+    batches(robot, others)
+
+
+def single_calls(robot: pteron.Manipulator, others: list[Peer]) -> None:
+    """One state a call, from Python, NumPy arrays in and out."""
+    states = random_states(robot, 200)
+    expected = reference(robot, states)
+    contestants = []
+    for name, kernel in kernels(robot, ("vm", "numba", "c", "c, base")).items():
+        forces = np.array([kernel(*state) for state in zip(*states, strict=True)])
+        contestants.append(
+            Contestant(name, a_call(kernel, states), relative_error(forces, expected))
+        )
+    for peer in others:
+        if peer.call is not None:
+            error = relative_error(peer.forces(*states), expected)
+            contestants.append(Contestant(peer.name, a_call(peer.call, states), error))
+    times = run("Single calls from Python", contestants, rounds=3 if quick() else 40)
+    for slow in (_PYTHON, _PYTHON_TUNED, _MUJOCO):
+        print_ratio(times, slow, "pteron c")
+
+
+def exported_calls(robot: pteron.Manipulator) -> None:
+    """One state a call in C, every call waiting for the one before: a controller's latency."""
+    command = compiler()
+    if command is None:
+        return
+    states = random_states(robot, 64)
+    expected = reference(robot, states)
+    reals: tuple[Real, ...] = ("double", "float")
+    forms = list(FORMS)[: 1 if quick() else None]
+    levels = LEVELS[: 1 if quick() else None]
+    with tempfile.TemporaryDirectory() as scratch:
+        contestants = []
+        for real in reals:
+            for form in forms:
+                for level in levels:
+                    folder = Path(tempfile.mkdtemp(dir=scratch))
+                    made = exported(robot, command, folder, form, real, level, states, expected)
+                    contestants.append(made)
+        title = "Exported C99, a call that waits for the last"
+        run(title, contestants, rounds=3 if quick() else 40)
+
+
+def batches(robot: pteron.Manipulator, others: list[Peer]) -> None:
+    """Many states; engines without batches loop over them in C or C++."""
+    states = random_states(robot, 2_000 if quick() else 100_000)
+    expected = reference(robot, states)
+    contestants = []
+    options = ("", ", base", ", 2 threads", ", base, 2 threads", ", float32", ", base, float32")
+    names = ("vm", "numba", *(f"c{option}" for option in options))
+    for name, kernel in kernels(robot, names).items():
+        given = [np.ascontiguousarray(value, dtype=kernel.dtype) for value in states]
+        error = relative_error(kernel(*given).astype(float), expected)
+        contestants.append(Contestant(name, a_sweep(kernel, given), error))
+    if find_spec("jax") is None:
+        print("pteron jax: left out, the package jax is not installed")
+    else:
+        contestants.append(jax_sweep(robot, states, expected))
+    for peer in others:
+        if peer.call is None:
+            error = relative_error(peer.forces(*states), expected)
+            contestants.append(Contestant(peer.name, partial(peer.seconds, *states), error))
+    title = f"Batches of {len(expected)} states"
+    times = run(title, contestants, rounds=3 if quick() else 25)
+    for slow in (_CPP, _CPP_TUNED, _MUJOCO_C, _MUJOCO_CLOSED):
+        if not (quick() and slow in (_CPP, _CPP_TUNED)):
+            for fast in ("pteron c", "pteron c, base"):
+                print_ratio(times, slow, fast)
+
+
+def kernels(robot: pteron.Manipulator, names: Sequence[str]) -> dict[str, Kernel]:
+    """Return the kernels that these names ask for; without a C compiler, those that need none."""
+    found = {}
+    for name in names:
+        target, *options = name.split(", ")
+        if target == "c" and compiler() is None:
+            continue
+        found[f"pteron {name}"] = pteron.compile(
+            robot,
+            "inverse_dynamics",
+            target,
+            base=pteron.cheapest_parameters(robot) if "base" in options else None,
+            dtype="float32" if "float32" in options else "float64",
+            threads=2 if "2 threads" in options else 1,
+        )
+    return found
+
+
+def reference(robot: pteron.Manipulator, states: States) -> Array:
+    """Return the forces by the virtual machine, which the peers' own forces then confirm."""
+    forces: Array = pteron.compile(robot, "inverse_dynamics", "vm")(*states)
+    return forces
+
+
+def a_call(function: Callable[..., Any], states: States) -> Callable[[], float]:
+    """Return what times a round of calls with one state."""
+    one = [value[0].copy() for value in states]
+    names = dict(zip(("f", "x", "dx", "ddx"), (function, *one), strict=True))
+    timer = Timer("f(x, dx, ddx)", globals=names)
+    timer.timeit(100)
+    count = max(1, int(_SECONDS / (timer.timeit(100) / 100)))
+    return lambda: timer.timeit(count) / count
+
+
+def a_sweep(kernel: Kernel, given: list[Array]) -> Callable[[], float]:
+    """Return what times one call with the whole batch, its result's memory included."""
+
+    def seconds() -> float:
+        begin = perf_counter()
+        kernel(*given)
+        return (perf_counter() - begin) / len(given[0])
+
+    return seconds
+
+
+def jax_sweep(robot: pteron.Manipulator, states: States, expected: Array) -> Contestant:
+    """Return JAX on the processor, with arrays of its own."""
+    import jax
+
+    kernel = pteron.compile(robot, "inverse_dynamics", "jax")
+    kernel(*(value[:1] for value in states))  # switches JAX to 64 bits
+    given = [jax.device_put(value, jax.devices("cpu")[0]) for value in states]
+
+    def seconds() -> float:
+        begin = perf_counter()
+        kernel(*given).block_until_ready()
+        return (perf_counter() - begin) / len(expected)
+
+    error = relative_error(np.asarray(kernel(*given)), expected)
+    return Contestant("pteron jax, processor, its own threads", seconds, error)
+
+
+def run(title: str, contestants: list[Contestant], rounds: int) -> dict[str, Array]:
+    """Check the forces, then time; print both."""
+    for contestant in contestants:
+        limit = 1e-2 if "float" in contestant.name else 1e-9
+        if not contestant.error < limit:
+            sys.exit(f"{contestant.name}: the forces are wrong, by {contestant.error:.0e}")
+    times = contest(contestants, rounds)
+    print(f"\n{title}: {rounds} rounds taking turns")
+    print_times(contestants, times)
+    return times
+
+
+if __name__ == "__main__":
+    main()
