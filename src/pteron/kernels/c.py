@@ -116,13 +116,16 @@ class Compiled(Kernel):
     def _direct(self) -> Callable[..., Any] | None:
         call: Callable[..., Any] = self._module.call
         given = [port.name in self.fixed for port in self.inputs]
-        if self.threads > 1 or given != sorted(given):
+        if given != sorted(given):
             return None
         fixed = [
             np.ascontiguousarray(self.fixed[port.name], dtype=self.dtype).reshape(port.shape)
             for port in self.inputs
             if port.name in self.fixed
         ]
+        if self.threads > 1:
+            # Threads are for batches: those go through `_checked`, which splits them.
+            return lambda *values: call(*values, *fixed) if values and np.ndim(values[0]) < 2 else None
         return (lambda *values: call(*values, *fixed)) if fixed else call
 
     def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:

@@ -63,7 +63,7 @@ class Jitted(Kernel):
     @cached_property
     def _direct(self) -> Callable[..., Any] | None:
         given = [port.name in self.fixed for port in self.inputs]
-        if len(self.outputs) > 1 or self.threads > 1 or given != sorted(given):
+        if len(self.outputs) > 1 or given != sorted(given):
             return None
         one, empty, count = self._module.one, np.empty, given.count(False)
         size, shape, dtype = self.outputs[0].size, self.outputs[0].shape, np.dtype(self.dtype)
