@@ -69,6 +69,10 @@ def _count(g: Geometry) -> int:
     return 9 * g.freedom + 4
 
 
+def _coordinates(g: Geometry, v: dict[str, Expression]) -> Outputs:
+    return {"sliders": (inverse_position(g, v["pose"]), (g.freedom,))}
+
+
 def _position(g: Geometry, v: dict[str, Expression]) -> Outputs:
     # The coordinates themselves exist out of reach too; a machine that cannot be there has none.
     points = [point.position for point in platform_at(g, v["pose"]).points]
@@ -227,6 +231,7 @@ _REDUCIBLE = ("inverse_dynamics", "inverse_dynamics_loaded", "base_regressor")
 
 _TABLE: dict[str, _Entry] = {
     "inverse_kinematics": _Entry(("pose",), _position),
+    "slider_coordinates": _Entry(("pose",), _coordinates),
     "link_vectors": _Entry(("pose",), _links),
     "direct_kinematics": _Entry(("sliders",), _direct),
     "closure_poses": _Entry(("sliders",), _closures),

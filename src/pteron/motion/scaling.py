@@ -126,7 +126,7 @@ def _keeps(robot: Manipulator, poses: Array, least: float) -> bool:
     good = (sine >= least + _DIP).all()  # NaN, out of reach, compares false
     if robot.platform.turns:
         good &= (np.abs(numeric(robot, "regularity")(poses)) >= least + _DIP).all()
-    sliders = numeric(robot, "inverse_kinematics")(poses)
+    sliders = numeric(robot, "slider_coordinates")(poses)
     for leg, rho in zip(robot.legs, sliders.T, strict=True):
         if leg.slider_limits is not None:
             low, high = leg.slider_limits

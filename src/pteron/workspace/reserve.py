@@ -67,7 +67,7 @@ def reserve(robot: Manipulator, pose: PoseLike) -> Reserve:
         if robot.platform.turns
         else np.ones(sines.shape[:-1])
     )
-    metres = clearances(robot, numeric(robot, "inverse_kinematics")(pose))
+    metres = clearances(robot, numeric(robot, "slider_coordinates")(pose))
     half = np.array([_half_range(leg.slider_limits) for leg in robot.legs])
     shares = np.where(np.isinf(metres), 1.0, metres) / half
     smallest = np.minimum(np.minimum(sines, shares).min(axis=-1), regularity)

@@ -81,7 +81,7 @@ def bounding_box(robot: Manipulator, pose: PoseLike) -> Array:
         """Return how far inside every bound a position is, m."""
         at = np.concatenate([p, given[3:]])
         distance, _, _ = numeric(robot, "reach")(at)
-        slides = clearances(robot, numeric(robot, "inverse_kinematics")(at))
+        slides = clearances(robot, numeric(robot, "slider_coordinates")(at))
         return np.concatenate([spans - distance, slides[np.isfinite(slides)]])
 
     start = np.append(given[:3], float(room(given[:3]).min()))
@@ -147,7 +147,7 @@ def reach_volume(
     poses = np.tile(given, (count, 1))
     poses[:, :3] = np.random.default_rng(seed).uniform(box[0], box[1], (count, 3))
     _, margin, _ = numeric(robot, "reach")(poses)
-    slides = clearances(robot, numeric(robot, "inverse_kinematics")(poses))
+    slides = clearances(robot, numeric(robot, "slider_coordinates")(poses))
     share = float((np.minimum(margin, slides).min(axis=-1) >= 0.0).mean())
     whole = float(np.prod(box[1] - box[0]))
     return ReachVolume(
