@@ -16,11 +16,11 @@ import numpy as np
 
 from pteron import atomic
 from pteron.errors import ModelError
+from pteron.export.c_templates import CHECK, CMAKE, HEADER, HELPERS, TEST
 from pteron.export.functions import FUNCTIONS, Exported, Table, chosen
 from pteron.export.text import banner, described
 from pteron.kernels import Array, Port
-from pteron.kernels.c import single_precision
-from pteron.kernels.code import C, c_constant, statements
+from pteron.kernels.code import C, c_constant, single_precision, statements
 from pteron.manipulator import Manipulator
 
 __all__ = ["Real", "export_c"]
@@ -89,7 +89,7 @@ def export_c(
         f"{name}.h": writer.header(),
         f"{name}.c": writer.source(),
         f"test_{name}.c": writer.test(),
-        "CMakeLists.txt": _CMAKE.format(name=name),
+        "CMakeLists.txt": CMAKE.format(name=name),
     }
     target = atomic.make_folder(folder)
     return [atomic.write_text(target / file, text) for file, text in texts.items()]
@@ -147,7 +147,7 @@ class _Writer:
             f"extern const {self.real} {self.prefix}_{table.name}[{len(table.values)}];\n\n"
             for table in self._tables()
         )
-        return _HEADER.format(
+        return HEADER.format(
             banner=_comment(banner(self.robot, "C99")),
             guard=guard,
             upper=self.prefix.upper(),
@@ -161,7 +161,7 @@ class _Writer:
         text = "".join(bodies)
         helpers = [
             helper.format(real=self.real, f=self._suffix, p=self.prefix, **_limits(self))
-            for name, helper in _HELPERS.items()
+            for name, helper in HELPERS.items()
             if f"{self.prefix}_{name}(" in text
         ]
         tables = []
@@ -292,7 +292,7 @@ class _Writer:
                         block.append(f"(void){port.name};")
                 inner = "".join(f"        {line}\n" for line in block)
                 calls.append(f"    {{\n{inner}    }}\n")
-        return _TEST.format(
+        return TEST.format(
             banner=_comment(banner(self.robot, "C99, its test program")),
             name=self.prefix,
             real=self.real,
@@ -302,7 +302,7 @@ class _Writer:
             zero=self._number(0.0),
             arrays="".join(arrays),
             calls="".join(calls),
-            checks=_CHECK.format(
+            checks=CHECK.format(
                 real=self.real, f=self._suffix, tolerance=tolerance, zero=self._number(0.0)
             )
             if "check(" in "".join(calls)
@@ -340,120 +340,3 @@ def _comment(lines: Sequence[str]) -> str:
         return f"/* {lines[0]} */\n"
     inner = "\n".join(f" * {line}".rstrip() for line in lines)
     return f"/*\n{inner}\n */\n"
-
-
-_HELPERS: dict[str, str] = {
-    "root": """\
-/* The square root; NaN below zero, without a trap. */
-static {real} {p}_root({real} value)
-{{
-    return isgreaterequal(value, {zero}) ? sqrt{f}(value) : ({real})NAN;
-}}
-""",
-    "ratio": """\
-/* The quotient; NaN where the divisor vanishes, without a trap. */
-static {real} {p}_ratio({real} dividend, {real} divisor)
-{{
-    return isgreaterequal(fabs{f}(divisor), {least}) ? (dividend / divisor) : ({real})NAN;
-}}
-""",
-    "finite": """\
-/* Whether a number is neither infinite nor NaN. */
-static int {p}_finite({real} value)
-{{
-    return islessequal(fabs{f}(value), {largest}) ? 1 : 0;
-}}
-""",
-}
-
-_HEADER = """\
-{banner}#ifndef {guard}
-#define {guard}
-
-#ifdef __cplusplus
-#define {upper}_RESTRICT
-extern "C" {{
-#else
-#define {upper}_RESTRICT restrict
-#endif
-
-/* What every function returns; the outputs are defined in each case, NaN where not computable. */
-#define {upper}_OK 0
-#define {upper}_UNREACHABLE 1 /* the links of a leg, or the closures, do not meet */
-#define {upper}_NOT_FINITE 2  /* singular, or an input is not finite */
-
-{tables}{functions}
-#ifdef __cplusplus
-}}
-#endif
-
-#endif
-"""
-
-_CHECK = """\
-static int check(const char *name, const {real} *found, const {real} *expected, int count)
-{{
-    {real} size = {zero}, error = {zero};
-    for (int k = 0; k < count; k++) {{
-        const {real} difference = fabs{f}(found[k] - expected[k]);
-        size = fmax{f}(size, fabs{f}(expected[k]));
-        error = (difference <= error) ? error : difference;
-    }}
-    if (!(error <= {tolerance} * size)) {{
-        printf("%s: off by %g of %g\\n", name, (double)error, (double)size);
-        return 1;
-    }}
-    return 0;
-}}
-
-"""
-
-_TEST = """\
-{banner}#include "{name}.h"
-
-#include <math.h>
-#include <stdio.h>
-
-{arrays}
-static int check_status(const char *name, int status, int expected)
-{{
-    if (status != expected) {{
-        printf("%s: status %d, expected %d\\n", name, status, expected);
-        return 1;
-    }}
-    return 0;
-}}
-
-{checks}int main(void)
-{{
-    int failed = 0;
-{calls}    printf("%s\\n", (failed == 0) ? "all functions agree with the library" : "FAILED");
-    return (failed == 0) ? 0 : 1;
-}}
-"""
-
-_CMAKE = """\
-cmake_minimum_required(VERSION 3.16)
-project({name} LANGUAGES C)
-
-set(CMAKE_C_STANDARD 99)
-set(CMAKE_C_STANDARD_REQUIRED ON)
-if(NOT CMAKE_BUILD_TYPE)
-  set(CMAKE_BUILD_TYPE Release)
-endif()
-
-add_library({name} STATIC {name}.c)
-target_include_directories({name} PUBLIC ${{CMAKE_CURRENT_SOURCE_DIR}})
-target_link_libraries({name} PUBLIC m)
-# gcc pairs neighbouring scalars into vectors here and waits for them: 15 % slower.
-include(CheckCCompilerFlag)
-check_c_compiler_flag(-fno-tree-slp-vectorize HAS_NO_SLP)
-if(HAS_NO_SLP)
-  target_compile_options({name} PRIVATE -fno-tree-slp-vectorize)
-endif()
-
-enable_testing()
-add_executable(test_{name} test_{name}.c)
-target_link_libraries(test_{name} PRIVATE {name})
-add_test(NAME {name} COMMAND test_{name})
-"""

@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from pteron.kernels.graph import CONSTANT, INPUT, Graph
+from pteron.kernels.kernel import Port
 
-__all__ = ["C", "PYTHON", "c_constant", "names_of", "statements", "used_inputs"]
+__all__ = [
+    "C",
+    "PYTHON",
+    "Stages",
+    "c_constant",
+    "names_of",
+    "single_precision",
+    "statements",
+    "used_inputs",
+]
 
 C = {
     "add": "{0} + {1}",
@@ -30,6 +42,11 @@ C = {
 
 PYTHON = C | {"select": "({1} if {0} else 0.0)"}
 """Operations in Python, for a namespace that has sqrt, sin and so on."""
+
+
+def single_precision(printed: Mapping[str, str]) -> dict[str, str]:
+    """Return the operations with math.h's functions for float: sqrtf for sqrt, and so on."""
+    return {op: re.sub(r"^(\w+)\(", r"\1f(", text) for op, text in printed.items()}
 
 
 def c_constant(value: float, dtype: str = "float64") -> str:
@@ -85,3 +102,44 @@ def used_inputs(graph: Graph) -> list[tuple[int, int]]:
     """Return the (port, element) pairs that the graph reads, in order."""
     places = (node.arguments for node in graph.nodes if node.operation == INPUT)
     return sorted((port, element) for port, element in places)
+
+
+@dataclass(frozen=True)
+class Stages:
+    """How a batch is computed: what is done once, what outside the vectorised loop, what inside."""
+
+    shared: list[int]
+    """Nodes that depend on shared inputs alone."""
+    outlying: list[int]
+    """Sines and cosines of inputs."""
+    rest: list[int]
+    rows: dict[tuple[int, int], int]
+    """The row of a block that holds an element of a batched input, by (port, element)."""
+    results: list[tuple[Port, int, int]]
+    """Port, element and node of each number that goes out."""
+
+    @classmethod
+    def of(cls, graph: Graph, inputs: Sequence[Port], outputs: Sequence[Port]) -> Stages:
+        """Sort the nodes of a graph."""
+        nodes, operations = graph.nodes, graph.operations()
+        used = [(i, j) for i, j in used_inputs(graph) if not inputs[i].shared]
+        return cls(
+            [k for k in operations if nodes[k].shared],
+            [k for k in operations if nodes[k].outlying],
+            [k for k in operations if not nodes[k].shared and not nodes[k].outlying],
+            {pair: row for row, pair in enumerate(used)},
+            [
+                (port, j, k)
+                for port, places in zip(outputs, graph.outputs, strict=True)
+                for j, k in enumerate(places)
+            ],
+        )
+
+    def outlying_rows(self) -> list[tuple[int, int]]:
+        """Return the row of a block for each outlying node, behind those of the inputs."""
+        return list(enumerate(self.outlying, len(self.rows)))
+
+    @property
+    def height(self) -> int:
+        """Rows of a block."""
+        return len(self.rows) + len(self.outlying)

@@ -7,7 +7,7 @@ sines and cosines of the inputs leave the loop that a compiler vectorises.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -15,7 +15,7 @@ import casadi as ca
 
 from pteron.kernels.kernel import Port
 
-__all__ = ["CONSTANT", "INPUT", "Graph", "Node", "Printed", "graph_of"]
+__all__ = ["CONSTANT", "INPUT", "Graph", "Node", "graph_of"]
 
 INPUT, CONSTANT = "input", "constant"
 
@@ -64,10 +64,6 @@ class Graph:
     def operations(self) -> list[int]:
         """Return the nodes that compute something, in order."""
         return [k for k, node in enumerate(self.nodes) if node.operation not in (INPUT, CONSTANT)]
-
-
-Printed = Mapping[str, str]
-"""How a language writes each operation: a format string of {0} and {1}."""
 
 
 @lru_cache(maxsize=128)

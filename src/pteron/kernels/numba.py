@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from pteron.kernels.cache import digest, entry, find
-from pteron.kernels.code import PYTHON, names_of, statements, used_inputs
+from pteron.kernels.code import PYTHON, Stages, names_of, statements
 from pteron.kernels.graph import Graph, graph_of
 from pteron.kernels.kernel import Array, Kernel, Port
 
@@ -154,59 +154,44 @@ def _one(graph: Graph, inputs: Sequence[Port], outputs: Sequence[Port]) -> str:
 
 
 def _run(graph: Graph, inputs: Sequence[Port], outputs: Sequence[Port], dtype: str) -> str:
-    used = [(i, j) for i, j in used_inputs(graph) if not inputs[i].shared]
-    place = {pair: row for row, pair in enumerate(used)}
-    operations = graph.operations()
-    outlying = [k for k in operations if graph.nodes[k].outlying]
+    stages = Stages.of(graph, inputs, outputs)
 
     def input_name(i: int, j: int) -> str:
-        return f"{inputs[i].name}[{j}]" if inputs[i].shared else f"i{place[i, j]}"
+        return f"{inputs[i].name}[{j}]" if inputs[i].shared else f"i{stages.rows[i, j]}"
 
     names = names_of(graph, input_name, _constant)
-    shared = [k for k in operations if graph.nodes[k].shared]
-    rest = [k for k in operations if not graph.nodes[k].shared and not graph.nodes[k].outlying]
-    results = [
-        (port, j, k)
-        for port, nodes in zip(outputs, graph.outputs, strict=True)
-        for j, k in enumerate(nodes)
-    ]
-    rows = len(used) + len(outlying)
-    lines = statements(graph, shared, names, PYTHON, "{0} = {1}")
+    rows = [(row, inputs[i], j) for (i, j), row in stages.rows.items()]
+    lines = statements(graph, stages.shared, names, PYTHON, "{0} = {1}")
     lines += [
-        f"block = np.zeros(({max(rows, 1)}, {_BLOCK}), np.{dtype})",
-        f"result = np.empty(({len(results)}, {_BLOCK}), np.{dtype})",
+        f"block = np.zeros(({max(stages.height, 1)}, {_BLOCK}), np.{dtype})",
+        f"result = np.empty(({len(stages.results)}, {_BLOCK}), np.{dtype})",
         f"n = {outputs[0].name}_out.shape[0]",
         f"for start in range(0, n, {_BLOCK}):",
         f"    count = min({_BLOCK}, n - start)",
         "    for k in range(count):",
-        *(
-            f"        block[{row}, k] = {inputs[i].name}[start + k, {j}]"
-            for (i, j), row in place.items()
-        ),
+        *(f"        block[{row}, k] = {port.name}[start + k, {j}]" for row, port, j in rows),
+        *([] if rows else ["        pass"]),
     ]
-    if not used:
-        lines.append("        pass")
-    for row, k in enumerate(outlying, len(used)):
+    body = [f"i{row} = block[{row}, k]" for row, _, _ in rows]
+    for row, k in stages.outlying_rows():
         node = graph.nodes[k]
-        (i, j) = graph.nodes[node.arguments[0]].arguments
-        value = PYTHON[node.operation].format(f"block[{place[i, j]}, k]")
+        i, j = graph.nodes[node.arguments[0]].arguments
+        value = PYTHON[node.operation].format(f"block[{stages.rows[i, j]}, k]")
         lines.append(f"        block[{row}, k] = {value}")
+        body.append(f"{names[k]} = block[{row}, k]")
+    body += statements(graph, stages.rest, names, PYTHON, "{0} = {1}")
+    body += [f"result[{row}, k] = {names[k]}" for row, (_, _, k) in enumerate(stages.results)]
     lines += [
         "    # A block that is not full repeats its last state.",
         f"    for k in range(count, {_BLOCK}):",
         "        block[:, k] = block[:, count - 1]",
         f"    for k in range({_BLOCK}):",
-    ]
-    body = [f"i{row} = block[{row}, k]" for row in range(len(used))]
-    for row, k in enumerate(outlying, len(used)):
-        body.append(f"{names[k]} = block[{row}, k]")
-    body += statements(graph, rest, names, PYTHON, "{0} = {1}")
-    body += [f"result[{row}, k] = {names[k]}" for row, (_, _, k) in enumerate(results)]
-    lines += ["        " + line for line in body]
-    lines.append("    for k in range(count):")
-    lines += [
-        f"        {port.name}_out[start + k, {j}] = result[{row}, k]"
-        for row, (port, j, _) in enumerate(results)
+        *(f"        {line}" for line in body),
+        "    for k in range(count):",
+        *(
+            f"        {port.name}_out[start + k, {j}] = result[{row}, k]"
+            for row, (port, j, _) in enumerate(stages.results)
+        ),
     ]
     return _lines(lines)
 
