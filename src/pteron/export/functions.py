@@ -10,7 +10,7 @@ import numpy as np
 from pteron.errors import ModelError
 from pteron.export.labels import Labelled, labelled
 from pteron.kernels import FUNCTIONS as COMPILED
-from pteron.kernels import Array, Port, compile, program, specialised
+from pteron.kernels import Array, Port, columns_of, compile, program, specialised
 from pteron.kinematics import inverse_kinematics, random_poses
 from pteron.manipulator import Manipulator, parameter_names, parameters
 from pteron.reduction import BaseParameters, cheapest_parameters
@@ -103,10 +103,7 @@ def _exported(robot: Manipulator, name: str, *, folded: bool) -> Exported:
     if name == "inverse_dynamics_base":
         what, base = "inverse_dynamics", cheapest_parameters(robot)
     kernel = compile(robot, what, base=base, grade="parametric")
-    columns = None
-    if base is not None:
-        columns = tuple(tuple(np.flatnonzero(column).tolist()) for column in base.selection.T)
-    given = program(robot, what, columns)
+    given = program(robot, what, None if base is None else columns_of(base))
     tables: tuple[Table, ...] = ()
     if kernel.fixed and folded:
         given = specialised(given, kernel.fixed)
@@ -140,8 +137,7 @@ def _table(robot: Manipulator, port: str, values: Array, base: BaseParameters | 
 
 def _meanings(robot: Manipulator, base: BaseParameters) -> tuple[str, ...]:
     """Return each scaled base parameter as a sum of inertial parameters, as text."""
-    columns = tuple(tuple(np.flatnonzero(column).tolist()) for column in base.selection.T)
-    scale = program(robot, "inverse_dynamics", columns).scale
+    scale = program(robot, "inverse_dynamics", columns_of(base)).scale
     if scale is None:
         return base.expressions()
     total = np.array(scale) @ base.grouping

@@ -16,7 +16,7 @@ from pteron.kernels.functions import (
 from pteron.kernels.graph import Graph, graph_of
 from pteron.kernels.kernel import Array, Kernel, Port, as_array
 from pteron.kernels.operations import count_operations
-from pteron.kernels.targets import TARGETS, compile, same_layout
+from pteron.kernels.targets import TARGETS, columns_of, compile, same_layout
 
 __all__ = [
     "FUNCTIONS",
@@ -32,6 +32,7 @@ __all__ = [
     "Program",
     "RationalField",
     "as_array",
+    "columns_of",
     "compile",
     "count_operations",
     "evaluate",

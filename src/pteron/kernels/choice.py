@@ -10,11 +10,10 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
-import casadi as ca
-
 from pteron.kernels.c import Compiled, compiler
-from pteron.kernels.kernel import Array, Kernel, Port
-from pteron.kernels.targets import Selects, compile
+from pteron.kernels.functions import Columns, bare, program
+from pteron.kernels.kernel import Array, Kernel
+from pteron.kernels.targets import Selects, columns_of, compile
 from pteron.kernels.vm import VirtualMachine
 from pteron.manipulator import Manipulator
 
@@ -46,17 +45,17 @@ def numeric(robot: Manipulator, what: str, *, base: Selects | None = None) -> Ke
     """
     if base is None:
         return _known(robot, what)
-    return _adaptive(compile(robot, what, base=base, grade="parametric"))
+    kernel = compile(robot, what, base=base, grade="parametric")
+    return _adaptive(kernel, _tier(bare(robot), what, columns_of(base)))
 
 
 @lru_cache(maxsize=512)
 def _known(robot: Manipulator, what: str) -> Kernel:
-    return _adaptive(compile(robot, what, grade="parametric"))
+    kernel = compile(robot, what, grade="parametric")
+    return _adaptive(kernel, _tier(bare(robot), what, None))
 
 
-def _adaptive(kernel: Kernel) -> Kernel:
-    """Return the kernel, with the C code that machines of its layout share."""
-    tier = _tier(kernel.name, kernel.function, kernel.inputs, kernel.outputs)
+def _adaptive(kernel: Kernel, tier: _Tier) -> Kernel:
     return Adaptive(
         kernel.name, kernel.function, kernel.inputs, kernel.outputs, kernel.fixed, tier=tier
     )
@@ -96,10 +95,10 @@ class _Tier:
 
 
 @lru_cache(maxsize=512)
-def _tier(
-    name: str, function: ca.Function, inputs: tuple[Port, ...], outputs: tuple[Port, ...]
-) -> _Tier:
-    return _Tier(Compiled(name, function, inputs, outputs))
+def _tier(layout: Manipulator, what: str, columns: Columns | None) -> _Tier:
+    """Return what machines of one layout share; their inertial parameters are left out of it."""
+    built = program(layout, what, columns)
+    return _Tier(Compiled(built.name, built.function, built.inputs, built.outputs))
 
 
 @dataclass(frozen=True)

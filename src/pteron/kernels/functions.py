@@ -41,7 +41,15 @@ from pteron.errors import ModelError
 from pteron.kernels.kernel import Port
 from pteron.manipulator import Manipulator, PlanarInertia
 
-__all__ = ["FUNCTIONS", "Columns", "Program", "general_program", "program", "specialised"]
+__all__ = [
+    "FUNCTIONS",
+    "Columns",
+    "Program",
+    "bare",
+    "general_program",
+    "program",
+    "specialised",
+]
 
 Outputs = dict[str, tuple[Expression, tuple[int, ...]]]
 """Each output's expression and its shape; a matrix is (rows, columns), a stack of them vertical."""
@@ -289,7 +297,7 @@ def program(robot: Manipulator, what: str, columns: Columns | None = None) -> Pr
         raise ModelError('base: missing; "base_regressor" needs base=base_parameters(robot)')
     if what not in _REDUCIBLE and columns is not None:
         raise ModelError(f"base: {what!r} has no use for it; it goes with {', '.join(_REDUCIBLE)}")
-    return _built(_bare(robot), what, columns)
+    return _built(bare(robot), what, columns)
 
 
 def specialised(given: Program, values: dict[str, NDArray[np.float64]]) -> Program:
@@ -312,7 +320,7 @@ def specialised(given: Program, values: dict[str, NDArray[np.float64]]) -> Progr
 
 
 @lru_cache(maxsize=256)
-def _bare(robot: Manipulator) -> Manipulator:
+def bare(robot: Manipulator) -> Manipulator:
     """Return the machine with unit inertia, so that machines of one geometry share programs."""
     unit = PlanarInertia(1.0, (0.0, 0.0), 1.0)
     legs = tuple(replace(leg, slider_mass=1.0, upper=unit, lower=unit) for leg in robot.legs)

@@ -18,7 +18,7 @@ from pteron.kernels.numba import Jitted
 from pteron.kernels.vm import VirtualMachine
 from pteron.manipulator import Manipulator, parameters
 
-__all__ = ["TARGETS", "Grade", "Selects", "compile", "same_layout"]
+__all__ = ["TARGETS", "Grade", "Selects", "columns_of", "compile", "same_layout"]
 
 TARGETS: dict[str, type[Kernel]] = {
     "vm": VirtualMachine,
@@ -128,9 +128,14 @@ def compile(
             f"base: belongs to {base.robot.name}, whose layout or gravity differ from those of "
             f"{robot.name}; ask for base_parameters of this one"
         )
-    columns = tuple(tuple(np.flatnonzero(column).tolist()) for column in base.selection.T)
+    columns = columns_of(base)
     values = tuple(base.values(robot).tolist())
     return _compiled(robot, what, target, columns, values, grade, dtype, threads)
+
+
+def columns_of(base: Selects) -> Columns:
+    """Return, for each base parameter, the inertial parameters whose columns it adds up."""
+    return tuple(tuple(np.flatnonzero(column).tolist()) for column in base.selection.T)
 
 
 @lru_cache(maxsize=512)
