@@ -48,13 +48,14 @@ def link_moments(
     leg: LegGeometry, vector: Expression, length: Expression, link: Inertia
 ) -> tuple[Expression, Expression]:
     """Return h and d x h of a link, each (2, K) in the leg's plane, for its vector and length."""
-    return first_moment(vector, quarter_turn(vector), link.hx / length, link.hy / length)
+    inverse = 1 / length  # a constant's reciprocal is a constant: products cost less than quotients
+    return first_moment(vector, quarter_turn(vector), link.hx * inverse, link.hy * inverse)
 
 
 def resting_moment(geometry: Geometry, platform: Inertia) -> tuple[Expression, Expression]:
     """Return the platform's h and k x h at phi = 0, over `Geometry.unit`, each (3, K)."""
-    unit = geometry.unit
-    return first_moment(geometry.x0, geometry.y0, platform.hx / unit, platform.hy / unit)
+    inverse = 1 / geometry.unit
+    return first_moment(geometry.x0, geometry.y0, platform.hx * inverse, platform.hy * inverse)
 
 
 def first_moment(
