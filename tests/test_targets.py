@@ -7,6 +7,7 @@ import textwrap
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
 
@@ -258,6 +259,24 @@ def test_the_cheapest_base_parameters_give_the_same_forces(name):
     assert relative_error(doubled(*motion), 2 * expected) < 1e-12
 
 
+@pytest.mark.parametrize("size", [1e-3, 1e3])
+def test_the_cheapest_base_parameters_know_no_unit_of_length(size):
+    legs = tuple(
+        replace(
+            leg,
+            guide_point=tuple(size * np.array(leg.guide_point)),
+            platform_point=tuple(size * np.array(leg.platform_point)),
+            upper_length=size * leg.upper_length,
+            lower_length=size * leg.lower_length,
+            slider_limits=None,
+        )
+        for leg in random_machine(11, True).legs
+    )
+    machine = replace(random_machine(11, True), legs=legs)
+    base = pteron.cheapest_parameters(machine)
+    assert base.names == pteron.cheapest_parameters(random_machine(11, True)).names
+
+
 @pytest.mark.parametrize("name", CATALOG)
 def test_any_choice_of_base_parameters_will_do(name):
     robot = CATALOG[name]
@@ -307,6 +326,12 @@ def test_layouts_that_are_not_plain_are_served_all_the_same(target):
         value.setflags(write=False)
     assert_same_bits(kernel(*frozen), expected)
     assert_same_bits(kernel(*(value[0] for value in frozen)), expected[0])
+    raw = np.empty(motion[0].nbytes + 1, np.uint8)
+    unaligned = raw[1:].view(np.float64).reshape(motion[0].shape)
+    unaligned[:] = motion[0]
+    assert not unaligned.flags.aligned
+    assert_same_bits(kernel(unaligned, *motion[1:]), expected)
+    assert_same_bits(kernel(unaligned[0], *(value[0] for value in motion[1:])), expected[0])
     swapped = [value.astype(">f8") for value in motion]
     assert_same_bits(kernel(*swapped), expected)
     assert_same_bits(kernel(np.zeros((0, 4)), np.zeros((0, 4)), np.zeros((0, 4))), np.zeros((0, 4)))
@@ -321,6 +346,10 @@ def test_wrong_shapes_are_refused_as_on_the_virtual_machine(target):
     zero = np.zeros(4)
     with pytest.raises(DataError, match="2 inputs given, 3 expected"):
         kernel(zero, zero)
+    for wrong in ([10**400, 0, 0, 0], np.array(["1", "2", "3", "4"], dtype=object)):
+        if target != "jax":
+            with pytest.raises(DataError, match="velocity: not an array of real numbers"):
+                kernel(zero, wrong, zero)
     for wrong in (np.zeros(3), np.zeros((4, 3)), 0.0):
         with pytest.raises(DataError, match=r"velocity: shape .* given, \(..., 4\) expected"):
             kernel(zero, wrong, zero)

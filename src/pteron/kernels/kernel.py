@@ -187,8 +187,10 @@ def as_array(value: ArrayLike, name: str, shape: tuple[int, ...], dtype: str = "
         given = np.asarray(value)
         if given.dtype.kind not in "biufO":
             raise TypeError
-        array = np.asarray(given, dtype=dtype)
-    except (TypeError, ValueError):
+        if given.dtype.kind == "O" and any(isinstance(v, str | bytes) for v in given.flat):
+            raise TypeError
+        array = np.require(given, dtype, "A")
+    except (TypeError, ValueError, OverflowError):
         raise DataError(f"{name}: not an array of real numbers") from None
     if len(shape) > array.ndim or array.shape[array.ndim - len(shape) :] != shape:
         expected = ", ".join(["...", *map(str, shape)])

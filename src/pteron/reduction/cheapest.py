@@ -15,7 +15,7 @@ from pteron.reduction.result import BaseParameters
 __all__ = ["cheapest_parameters"]
 
 _NONZERO = 1e-9
-"""Pivots of the grouping, whose entries are of order one in lengths of metres, are larger."""
+"""Pivots of the grouping, whose entries are of order one in lengths of a link, are larger."""
 
 _ALWAYS = ("m_p", "I_u", "mgx_u", "mgy_u", "I_l", "mgy_l")
 
@@ -53,7 +53,7 @@ def cheapest_parameters(robot: Manipulator) -> BaseParameters:
     (26, 330)
     """
     names = parameter_names(robot)
-    grouping = base_parameters(robot).grouping
+    grouping = _without_units(robot, base_parameters(robot))
     candidates = [k for k, name in enumerate(names) if not name.startswith(("m_u", "mgx_l"))]
     always = [k for k in candidates if names[k].rstrip("0123456789") in _ALWAYS]
     others = [k for k in candidates if k not in always]
@@ -63,6 +63,14 @@ def cheapest_parameters(robot: Manipulator) -> BaseParameters:
         best = found if best is None or found[0] < best[0] else best
     assert best is not None
     return base_parameters(robot, keep=[names[k] for k in best[1]])
+
+
+def _without_units(robot: Manipulator, base: BaseParameters) -> Array:
+    """Return the grouping with lengths in multiples of a link, so that no entry is extreme."""
+    length = max(leg.upper_length + leg.lower_length for leg in robot.legs)
+    kinds = [{"m": 0, "mgx": 1, "mgy": 1, "I": 2}[name.split("_")[0]] for name in base.columns]
+    powers = length ** np.array(kinds, dtype=float)
+    return np.asarray(base.grouping * powers / powers[list(base.kept), None])
 
 
 def _independent(grouping: Array, order: Sequence[int]) -> tuple[int, ...]:
