@@ -24,6 +24,7 @@ COMPILERS = {
     "clang++": ["clang++", "-x", "c++"],
 }
 WARNINGS = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror"]
+WARNINGS += ["-Wdouble-promotion", "-Wfloat-conversion"]
 
 
 def build(command, folder, sources, output, *flags):

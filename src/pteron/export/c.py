@@ -120,6 +120,8 @@ class _Writer:
         return "f" if self.real == "float" else ""
 
     def _number(self, value: float) -> str:
+        if value != value:
+            return f"(({self.real})NAN)"  # NAN itself is a float
         return c_constant(value, self._dtype)
 
     def _prototype(self, item: Exported) -> str:
