@@ -102,20 +102,22 @@ def exported_calls(robot: pteron.Manipulator) -> None:
 
 
 def batches(robot: pteron.Manipulator, others: list[Peer]) -> None:
-    """Many states; engines without batches loop over them in C or C++."""
+    """Many states; engines without batches loop over them in C or C++.
+
+    What runs on several threads has a contest of its own, after that of one thread: its idle
+    threads go on spinning for a while, on cores that the next contestant would use.
+    """
     states = random_states(robot, 2_000 if quick() else 100_000)
     expected = reference(robot, states)
-    contestants = []
+    contestants: list[Contestant] = []
+    parallel: list[Contestant] = []
     options = ("", ", base", ", 2 threads", ", base, 2 threads", ", float32", ", base, float32")
     names = ("vm", "numba", *(f"c{option}" for option in options))
     for name, kernel in kernels(robot, names).items():
         given = [np.ascontiguousarray(value, dtype=kernel.dtype) for value in states]
         error = relative_error(kernel(*given).astype(float), expected)
-        contestants.append(Contestant(name, a_sweep(kernel, given), error))
-    if find_spec("jax") is None:
-        print("pteron jax: left out, the package jax is not installed")
-    else:
-        contestants.append(jax_sweep(robot, states, expected))
+        contest = parallel if kernel.threads > 1 else contestants
+        contest.append(Contestant(name, a_sweep(kernel, given), error))
     for peer in others:
         if peer.call is None:
             error = relative_error(peer.forces(*states), expected)
@@ -126,6 +128,11 @@ def batches(robot: pteron.Manipulator, others: list[Peer]) -> None:
         if not (quick() and slow in (_CPP, _CPP_TUNED)):
             for fast in ("pteron c", "pteron c, base"):
                 print_ratio(times, slow, fast)
+    if find_spec("jax") is None:
+        print("pteron jax: left out, the package jax is not installed")
+    else:
+        parallel.append(jax_sweep(robot, states, expected))
+    run(f"{title}, on several threads", parallel, rounds=3 if quick() else 25)
 
 
 def kernels(robot: pteron.Manipulator, names: Sequence[str]) -> dict[str, Kernel]:
