@@ -448,6 +448,20 @@ def test_a_damaged_entry_is_built_again(fresh, harm):
 
 
 @needs_compiler
+def test_what_a_killed_process_left_is_removed_in_time(fresh):
+    fresh.mkdir()
+    old, new = fresh / ".c-old-1", fresh / ".c-new-1"
+    for folder in (old, new):
+        folder.mkdir()
+        (folder / "kernel.c").write_text("")
+    day = time.time() - 2 * 24 * 3600
+    os.utime(old, (day, day))
+    another()(POSE)
+    assert not old.exists()
+    assert new.exists()
+
+
+@needs_compiler
 def test_processes_that_compile_at_once_do_not_meet(fresh):
     script = textwrap.dedent("""
         import pteron

@@ -14,6 +14,7 @@ import platform
 import shutil
 import sys
 import tempfile
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from functools import lru_cache
@@ -28,6 +29,9 @@ VARIABLE = "PTERON_CACHE"
 """Environment variable with another directory for compiled code."""
 
 _MANIFEST = "manifest.json"
+
+_STALE = 24 * 3600.0
+"""Seconds after which nobody works on a folder any more."""
 
 
 def directory() -> Path:
@@ -79,6 +83,7 @@ def entry(name: str, build: Callable[[Path], None]) -> Path:
     target = directory() / name
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
+        _swept(target.parent)
         work = Path(tempfile.mkdtemp(prefix=f".{name}-", dir=target.parent))
     except OSError:
         work = Path(tempfile.mkdtemp(prefix="pteron-"))
@@ -92,6 +97,14 @@ def entry(name: str, build: Callable[[Path], None]) -> Path:
         shutil.rmtree(work, ignore_errors=True)
         raise
     return work if target == work else _moved(work, target)
+
+
+def _swept(folder: Path) -> None:
+    """Remove what processes that were killed at work have left behind."""
+    for left in folder.glob(".*-*"):
+        with suppress(OSError):
+            if time.time() - left.stat().st_mtime > _STALE:
+                shutil.rmtree(left, ignore_errors=True)
 
 
 def _moved(work: Path, target: Path) -> Path:
