@@ -41,8 +41,8 @@ extern "C" {{
 
 /* What every function returns; the outputs are defined in each case, NaN where not computable. */
 #define {upper}_OK 0
-#define {upper}_UNREACHABLE 1 /* the links of a leg, or the closures, do not meet */
-#define {upper}_NOT_FINITE 2  /* singular, or an input is not finite */
+#define {upper}_UNREACHABLE 1 /* a leg's links or the closures do not meet, or the pose is NaN */
+#define {upper}_NOT_FINITE 2  /* singular, or another input is not finite */
 
 {tables}{functions}
 #ifdef __cplusplus

@@ -35,7 +35,7 @@ _SUMMARIES = {
     "inverse_kinematics": "Slider coordinates of a pose.",
     "direct_kinematics": "Every pose that slider coordinates allow, one a row; NaN where none.",
     "closure_poses": "Every pose that solves the closures, one a row, in the legs' reach or not.",
-    "jacobian": "Jacobian: slider velocities = J velocity.",
+    "jacobian": "Jacobian: slider velocities = J velocity. It does not ask whether the legs reach.",
     "inverse_dynamics": "Actuator forces of a motion, from the inertial parameters.",
     "inverse_dynamics_base": "Actuator forces of a motion, from base parameters alone.",
     "forward_dynamics": "Acceleration of the platform under actuator forces.",

@@ -125,7 +125,7 @@ class Compiled(Kernel):
         if self.threads > 1:
             # Threads are for batches: those go through `_checked`, which splits them.
             return lambda *values: (
-                call(*values, *fixed) if values and np.ndim(values[0]) < 2 else None
+                call(*values, *fixed) if values and getattr(values[0], "ndim", 2) < 2 else None
             )
         return (lambda *values: call(*values, *fixed)) if fixed else call
 

@@ -7,6 +7,7 @@ build it at once; a manifest of digests tells a damaged one, which is then built
 
 from __future__ import annotations
 
+import atexit
 import hashlib
 import json
 import os
@@ -30,7 +31,7 @@ VARIABLE = "PTERON_CACHE"
 
 _MANIFEST = "manifest.json"
 
-_STALE = 24 * 3600.0
+_STALE = 3600.0
 """Seconds after which nobody works on a folder any more."""
 
 
@@ -87,6 +88,7 @@ def entry(name: str, build: Callable[[Path], None]) -> Path:
         work = Path(tempfile.mkdtemp(prefix=f".{name}-", dir=target.parent))
     except OSError:
         work = Path(tempfile.mkdtemp(prefix="pteron-"))
+        atexit.register(shutil.rmtree, work, ignore_errors=True)
         target = work
     try:
         build(work)
