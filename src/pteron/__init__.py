@@ -60,7 +60,7 @@ from pteron.manipulator import (
 )
 
 if TYPE_CHECKING:
-    from pteron import motion, plots, report, workspace
+    from pteron import identification, motion, plots, report, workspace
     from pteron.export import export_c, export_st
     from pteron.reduction import (
         BaseParameters,
@@ -79,7 +79,7 @@ _LATER = {
     "export_c": "pteron.export",
     "export_st": "pteron.export",
 }
-_LATER_MODULES = ("motion", "plots", "report", "workspace")
+_LATER_MODULES = ("identification", "motion", "plots", "report", "workspace")
 """What would slow the start of those who do not use it (SymPy, SciPy, matplotlib)."""
 
 
@@ -116,6 +116,7 @@ __all__ = [
     "export_st",
     "forward_dynamics",
     "gravity_forces",
+    "identification",
     "inverse_dynamics",
     "inverse_kinematics",
     "is_singular_everywhere",

@@ -1,0 +1,1 @@
+"""From a recorded motion to the parameters of the machine that made it."""
