@@ -13,6 +13,7 @@ from pteron.cli.base import base
 from pteron.cli.catalog import catalog
 from pteron.cli.check import check
 from pteron.cli.direct import direct
+from pteron.cli.excite import excite
 from pteron.cli.export import export
 from pteron.cli.forces import forces
 from pteron.cli.inverse import inverse
@@ -104,6 +105,11 @@ _add(
     "pteron export quadrupteron --c controller",
     "pteron export my-robot.toml --c controller --float --function inverse_kinematics",
     "pteron export quadrupteron --st plc",
+)
+_add(
+    excite,
+    "pteron excite quadrupteron --out exciting.csv",
+    "pteron excite my-robot.toml --out exciting.csv --period 5 --speed 0.5 --force 60",
 )
 _add(table1, "pteron table1")
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pteron.equations.bodies import Inertia
 from pteron.equations.circles import squared_reach
 from pteron.equations.closure import regularity
+from pteron.equations.friction import passive_friction
 from pteron.equations.geometry import Expression, Geometry
 from pteron.equations.jacobians import jacobian, link_jacobians
 from pteron.equations.lagrangian import (
@@ -32,7 +33,7 @@ from pteron.equations.position import (
     platform_at,
     reach,
 )
-from pteron.equations.rates import joint_motion
+from pteron.equations.rates import joint_motion, platform_rates
 from pteron.equations.reduced import ReducedLeg, reduced_dynamics, reduced_inertia
 from pteron.equations.regressor import paper_regressor, terms
 from pteron.equations.screws import joint_screws
@@ -153,6 +154,18 @@ def _accelerations(g: Geometry, v: dict[str, Expression]) -> Outputs:
     return {"accelerations": (accelerations, (g.freedom, 3))}
 
 
+def _platform_motion(g: Geometry, v: dict[str, Expression]) -> Outputs:
+    velocity, acceleration = platform_rates(
+        g, v["pose"], v["slider_rates"], v["slider_accelerations"]
+    )
+    return {"velocity": (velocity, (g.freedom,)), "acceleration": (acceleration, (g.freedom,))}
+
+
+def _passive_friction(g: Geometry, v: dict[str, Expression]) -> Outputs:
+    forces = passive_friction(g, v["pose"], v["velocity"])
+    return {"forces": (forces, forces.shape)}
+
+
 def _inverse_dynamics(g: Geometry, v: dict[str, Expression]) -> Outputs:
     if "reduced" in v:
         legs, platform = v["reduced"]
@@ -252,6 +265,8 @@ _TABLE: dict[str, _Entry] = {
     "joint_screws": _Entry(("pose",), _screws),
     "joint_rates": _Entry(("pose", "velocity"), _rates),
     "joint_accelerations": _Entry(_STATE, _accelerations),
+    "platform_motion": _Entry(("pose", "slider_rates", "slider_accelerations"), _platform_motion),
+    "passive_friction": _Entry(("pose", "velocity"), _passive_friction),
     "inverse_dynamics": _Entry((*_STATE, "parameters"), _inverse_dynamics),
     "inverse_dynamics_loaded": _Entry((*_STATE, "wrench", "parameters"), _inverse_dynamics),
     "forward_dynamics": _Entry(("pose", "velocity", "forces", "parameters"), _forward_dynamics),

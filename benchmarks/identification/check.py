@@ -1,0 +1,130 @@
+"""Show how near the simulated machines are to rigid bodies with dry friction.
+
+Run it as `python benchmarks/identification/check.py`, with `--quick` for 5 s of motion. Pteron's
+forces for MuJoCo's own motion of the sliders, with friction, are compared with the forces applied;
+then the base parameters and the friction are fitted to the noise-free recording, and their errors
+set against the standard deviations that 1 % of noise in the forces would give. Samples of a slider
+slower than 1 mm/s are left out, but for the column "all": it may stick, and sign(v) does not say
+what friction holds it.
+"""
+
+from __future__ import annotations
+
+import sys
+from time import process_time
+
+import numpy as np
+from plant import (
+    Friction,
+    Recording,
+    State,
+    as_built,
+    fourier_reference,
+    platform_state,
+    simulate,
+)
+from plant.model import Array
+
+import pteron
+
+_MACHINES = ("quadrupteron", "quadrupteron-oblique", "tripteron", "tripteron-oblique")
+_COULOMB = (6.0, 7.0, 9.0, 8.0)
+_VISCOUS = (10.0, 12.0, 16.0, 14.0)
+_OFFSET = (-1.0, 1.5, 0.5, 0.0)
+_JOINTS = 0.02
+_NOISE = 0.01
+
+
+def main() -> None:
+    """Print a row for each machine; all times and errors are of this run."""
+    duration = 5.0 if "--quick" in sys.argv[1:] else 20.0
+    print(
+        f"{duration:g} s at 1 kHz. Force errors are over each actuator's root mean square force, "
+        "the\nworst actuator; biases are in standard deviations of the parameters.\n"
+    )
+    print(_row("", "speed", "acc.", "gap", "error", "slow", "bias", "bias", "all", "run"))
+    print(_row("", "m/s", "m/s^2", "m", "force", "samples", "worst", "rms", "worst", "CPU s"))
+    for name in _MACHINES:
+        drawn = pteron.load(name)
+        robot, n = as_built(drawn, seed=1), len(drawn.legs)
+        friction = Friction(_COULOMB[:n], _VISCOUS[:n], _OFFSET[:n], _JOINTS)
+        reference = fourier_reference(drawn, seed=3)
+        begin = process_time()
+        recording = simulate(robot, reference, friction, duration=duration, drawn=drawn)
+        seconds = process_time() - begin
+        error, slow, bias = compared(robot, friction, recording)
+        _, _, bias_of_all = compared(robot, friction, recording, least=0.0)
+        print(
+            _row(
+                name,
+                f"{np.abs(recording.rates).max():.2f}",
+                f"{np.abs(recording.accelerations).max():.1f}",
+                f"{recording.gap:.0e}",
+                f"{error.max():.0e}",
+                f"{slow:.2%}",
+                f"{np.abs(bias).max():.3f}",
+                f"{np.sqrt(np.mean(bias**2)):.3f}",
+                f"{np.abs(bias_of_all).max():.1f}",
+                f"{seconds:.0f}",
+            )
+        )
+
+
+def compared(
+    robot: pteron.Manipulator, friction: Friction, recording: Recording, least: float = 1e-3
+) -> tuple[Array, float, Array]:
+    """Return the force errors, the share of slow samples, and the parameters' biases.
+
+    Samples of a slider that is slower than `least`, m/s, are left out.
+    """
+    rates, n = recording.rates, recording.rates.shape[1]
+    state = platform_state(robot, recording.sliders, rates, recording.accelerations)
+    motion = state.pose, state.velocity, state.acceleration
+    base = pteron.base_parameters(robot)
+    each = np.eye(n)
+    columns = np.concatenate(
+        [
+            pteron.base_regressor(robot, base, *motion),
+            np.sign(rates)[:, :, None] * each,
+            rates[:, :, None] * each,
+            np.broadcast_to(each, (len(rates), n, n)),
+            joint_friction(robot, state)[:, :, None],
+        ],
+        axis=-1,
+    )
+    braking = (friction.coulomb, friction.viscous, friction.offset, (friction.joints,))
+    true = np.concatenate([base.grouping @ pteron.parameters(robot), *braking])
+    taken = np.abs(rates) >= least
+    off = np.where(taken, recording.forces - columns @ true, 0.0)
+    size = np.sqrt(np.mean(recording.forces**2, axis=0))
+    error = np.sqrt(np.mean(off**2, axis=0)) / size
+    sigma = np.broadcast_to(_NOISE * size, off.shape)[taken]
+    rows = columns[taken] / sigma[:, None]
+    scale = np.linalg.norm(rows, axis=0)
+    q, r = np.linalg.qr(rows / scale)
+    inverse = np.linalg.inv(r)
+    # Both are in units of the scaled parameters.
+    bias = inverse @ (q.T @ (off[taken] / sigma)) / np.linalg.norm(inverse, axis=1)
+    return error, float(np.mean(~taken)), bias
+
+
+def joint_friction(robot: pteron.Manipulator, state: State) -> Array:
+    """Return what a unit coefficient in every passive joint asks of the actuators, (T, n).
+
+    By virtual work: J^T F = (dq'/dx')^T q', with the rates q' of all passive joints.
+    """
+    rates = pteron.joint_rates(robot, state.pose, state.velocity).revolute
+    unit = np.eye(robot.freedom)
+    shares = pteron.joint_rates(robot, state.pose[:, None], unit).revolute
+    work = np.einsum("tij,tkij->tk", rates, shares)
+    transposed = pteron.jacobian(robot, state.pose).swapaxes(-1, -2)
+    forces: Array = np.linalg.solve(transposed, work[..., None])[..., 0]
+    return forces
+
+
+def _row(*cells: str) -> str:
+    return f"{cells[0]:<22}" + "".join(f"{cell:>9}" for cell in cells[1:])
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,59 @@
+"""A controller of the sliders: feedforward, and feedback of position and rate."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import pteron
+from plant.friction import Friction
+from plant.inverse import platform_state
+from plant.model import Array
+from plant.reference import Reference
+
+__all__ = ["Controller"]
+
+_BANDWIDTH = 100.0
+"""rad/s; the controller's two poles are there."""
+
+_REVERSAL = 1e-4
+"""Reference speed where the compensation of Coulomb's friction changes sign, m/s."""
+
+
+class Controller:
+    """The controller: a command that depends on time, tabulated, less gains times the sliders."""
+
+    def __init__(
+        self,
+        robot: pteron.Manipulator,
+        drawn: pteron.Manipulator,
+        reference: Reference,
+        friction: Friction,
+        compensation: float,
+        start: float,
+        duration: float,
+        spacing: float,
+    ) -> None:
+        self.start, self.spacing = start, spacing
+        instants = np.arange(round((duration - start) / spacing) + 50, dtype=np.float64)
+        time = start + spacing * instants
+        sliders, rates, accelerations = reference(time)
+        state = platform_state(robot, sliders, rates, accelerations)
+        home: Array = pteron.workspace.home_pose(robot)
+        inverse: Array = np.linalg.inv(pteron.jacobian(robot, home))
+        masses = np.diag(inverse.T @ pteron.mass_matrix(drawn, home) @ inverse)
+        self.position_gain = masses * _BANDWIDTH**2
+        self.rate_gain = 2.0 * masses * _BANDWIDTH
+        needed = pteron.inverse_dynamics(drawn, state.pose, state.velocity, state.acceleration)
+        braking = np.array(friction.coulomb) * np.tanh(rates / _REVERSAL)
+        braking += np.array(friction.viscous) * rates + np.array(friction.offset)
+        pulling = self.position_gain * sliders + self.rate_gain * rates
+        self.command = needed + compensation * braking + pulling
+
+    def forces(self, time: float, sliders: Array, rates: Array) -> Array:
+        """Return the actuator forces (n,); between the table's instants the command is linear."""
+        place = (time - self.start) / self.spacing
+        k = int(place)
+        share = place - k
+        command = (1.0 - share) * self.command[k] + share * self.command[k + 1]
+        forces: Array = command - self.position_gain * sliders - self.rate_gain * rates
+        return forces

@@ -1,0 +1,130 @@
+"""Periodic motions that a machine is made to follow."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+import pteron
+from plant.model import Array
+
+__all__ = ["Fourier", "Reference", "fourier_reference"]
+
+Reference = Callable[[Array], tuple[Array, Array, Array]]
+"""From times (T,) to slider coordinates, rates and accelerations, (T, n) each; it is hashable."""
+
+_ELBOW = 0.25
+_REGULARITY = 0.3
+"""What a motion keeps of the sines of the elbows' angles and of the regularity."""
+
+
+@dataclass(frozen=True)
+class Fourier:
+    """A periodic motion of the platform, as a finite Fourier series about a pose.
+
+    Attributes
+    ----------
+    robot : Manipulator
+        Whose geometry takes the platform's motion to the sliders.
+    center : tuple of float
+        The pose in the middle, m and rad.
+    cosines, sines : tuple of tuple of float
+        Coefficients (m, K), m and rad, of the harmonics 1..K.
+    period : float
+        s.
+    """
+
+    robot: pteron.Manipulator
+    center: tuple[float, ...]
+    cosines: tuple[tuple[float, ...], ...]
+    sines: tuple[tuple[float, ...], ...]
+    period: float
+
+    def platform(self, time: Array) -> tuple[Array, Array, Array]:
+        """Return pose, velocity and acceleration, (T, m) each."""
+        a, b = np.array(self.cosines), np.array(self.sines)
+        rates = 2.0 * np.pi / self.period * np.arange(1, a.shape[1] + 1)
+        angle = np.multiply.outer(time, rates)
+        cosine, sine = np.cos(angle), np.sin(angle)
+        return (
+            np.array(self.center) + cosine @ a.T + sine @ b.T,
+            cosine @ (rates * b).T - sine @ (rates * a).T,
+            -cosine @ (rates**2 * a).T - sine @ (rates**2 * b).T,
+        )
+
+    def __call__(self, time: Array) -> tuple[Array, Array, Array]:
+        """Return slider coordinates, rates and accelerations, (T, n) each."""
+        pose, velocity, acceleration = self.platform(np.asarray(time, dtype=float))
+        rates, accelerations = pteron.joint_rates(self.robot, pose, velocity, acceleration)
+        return pteron.inverse_kinematics(self.robot, pose), rates.sliders, accelerations.sliders
+
+
+def fourier_reference(
+    robot: pteron.Manipulator,
+    seed: int = 0,
+    *,
+    harmonics: int = 10,
+    period: float = 5.0,
+    speed: float = 0.8,
+    acceleration: float = 8.0,
+) -> Fourier:
+    """Return a random lively motion about the home pose.
+
+    All coefficients are scaled alike until the first of these stops them: an elbow whose sine is
+    0.25, a regularity of 0.3, a slider's limit, the greatest speed or acceleration of a slider.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    seed : int
+        Of the random coefficients.
+    harmonics : int
+        Number of harmonics.
+    period : float
+        s.
+    speed, acceleration : float
+        The most that any slider does, m/s and m/s^2.
+
+    Returns
+    -------
+    Fourier
+    """
+    rng = np.random.default_rng(seed)
+    spread = np.ones((robot.freedom, harmonics))
+    if robot.platform.turns:
+        spread[3] *= 6.0  # rad for m
+    a, b = rng.normal(size=(2, *spread.shape)) * spread
+    center = tuple(pteron.workspace.home_pose(robot).tolist())
+    time = np.linspace(0.0, period, 100 * harmonics, endpoint=False)
+
+    def scaled(size: float) -> Fourier:
+        return Fourier(robot, center, _rows(size * a), _rows(size * b), period)
+
+    low, high = 0.0, 1.0
+    for _ in range(30):
+        size = (low + high) / 2.0
+        if _serves(scaled(size), time, speed, acceleration):
+            low = size
+        else:
+            high = size
+    return scaled(low)
+
+
+def _serves(motion: Fourier, time: Array, speed: float, acceleration: float) -> bool:
+    pose, _, _ = motion.platform(time)
+    reserve = pteron.workspace.reserve(motion.robot, pose)
+    if (
+        reserve.elbow_sines.min() < _ELBOW
+        or reserve.regularity.min() < _REGULARITY
+        or reserve.slider_clearances.min() < 0.0
+    ):
+        return False
+    _, rates, accelerations = motion(time)
+    return bool(np.abs(rates).max() <= speed and np.abs(accelerations).max() <= acceleration)
+
+
+def _rows(values: Array) -> tuple[tuple[float, ...], ...]:
+    return tuple(tuple(row) for row in values.tolist())

@@ -1,0 +1,8 @@
+"""Real bodies that reproduce identified base parameters: positive masses, inertias that exist."""
+
+from pteron.identification.consistency.bodies import real_bodies
+from pteron.identification.consistency.bounds import Bounds
+from pteron.identification.consistency.model import consistent_model
+from pteron.identification.consistency.result import Consistency
+
+__all__ = ["Bounds", "Consistency", "consistent_model", "real_bodies"]

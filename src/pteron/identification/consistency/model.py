@@ -1,0 +1,253 @@
+"""`consistent_model`: from identified base parameters to a machine of real bodies."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pteron.errors import ModelError
+from pteron.identification.consistency.bodies import Bodies, bodies_of, parameters_of, real_bodies
+from pteron.identification.consistency.bounds import Bounds, Limits
+from pteron.identification.consistency.cones import RealBodies, closest, nearest, widest
+from pteron.identification.consistency.information import checked_values, square_root
+from pteron.identification.consistency.result import Consistency
+from pteron.identification.consistency.target import Target, cad_target, plain_target
+from pteron.kernels import Array
+from pteron.manipulator import Manipulator, parameter_names, parameters, with_parameters
+from pteron.reduction import BaseParameters
+
+__all__ = ["consistent_model"]
+
+_DEEPEST = 2.0
+"""Twice the margin: there the margin itself leaves room for the search of the nearest model."""
+
+_SHALLOW = 0.02
+"""Values whose bodies are not this much of the margin inside count as not feasible."""
+
+_FORCE = 1e-3
+"""A body or bound whose multiplier is this part of the largest one holds the fit back."""
+
+_TOO_FAR = (
+    "values: too far from those of real bodies for the solver; look at their units, and at the "
+    "covariance, whose deviations may differ by too many orders of magnitude"
+)
+
+_HOLDS = 1e-7
+"""Relative error to which a bound must hold; what the solver's answer is checked against."""
+
+
+def consistent_model(
+    robot: Manipulator,
+    base: BaseParameters,
+    values: ArrayLike,
+    covariance: ArrayLike | None = None,
+    *,
+    cad: Manipulator | ArrayLike | Literal["robot"] | None = "robot",
+    bounds: Bounds | None = None,
+) -> Consistency:
+    """Return real bodies that reproduce identified base parameters.
+
+    First it is decided whether any real bodies within the bounds have the identified values. If
+    none have, the closest ones that do are taken instead: least (K p - b)' S^-1 (K p - b), with b
+    the identified values, S their covariance, K the grouping and p the parameters of real bodies.
+    Then, of all real bodies with these base parameters, those nearest to the CAD model are
+    returned. Each body is kept strictly real: in units of its mass and length, the least
+    eigenvalue of [[m, |h|], [|h|, I]] stays above a margin of at most 0.001.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine, of the geometry of `base.robot`.
+    base : BaseParameters
+        Its base parameters. Where they were made with `shared`, the legs returned share theirs.
+    values : array, shape (rank,)
+        The identified base parameters, in the order of `base.names`, SI units.
+    covariance : array, shape (rank, rank), optional
+        Their covariance. Without it infeasible values are moved in a relative metric.
+    cad : Manipulator, array of shape (N,), "robot" or None
+        The CAD model: a machine, parameters that may belong to no real bodies, `robot` itself (the
+        default), or nothing: then bodies are near uniform rods and a uniform disc. Where legs
+        share parameters, their mean counts.
+    bounds : Bounds, optional
+        Limits of parameters, boxes that hold the bodies, a total mass.
+
+    Returns
+    -------
+    Consistency
+        The machine, whether the values were feasible, and how far they were moved.
+
+    Raises
+    ------
+    ModelError
+        If no real bodies keep the bounds, a name in them is unknown, or cvxpy is missing.
+    DataError
+        If the values or their covariance are of the wrong shape or no numbers.
+
+    Notes
+    -----
+    Sousa, C. D., Cortesao, R.: Physical feasibility of robot base inertial parameter
+    identification: a linear matrix inequality approach. Int. J. Robotics Research 33(6), 2014.
+    For a body in planar motion the linear matrix inequality is a second-order cone.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.identification.consistency import consistent_model
+    >>> robot = pteron.load("tripteron")
+    >>> base = pteron.base_parameters(robot)
+    >>> result = consistent_model(robot, base, 1.05 * base.values())
+    >>> result.feasible, result.distance
+    (True, 0.0)
+    """
+    names = parameter_names(robot)
+    if names != parameter_names(base.robot):
+        raise ModelError(
+            f"base: made for {base.robot.name}, which has other parameters than {robot.name}"
+        )
+    vector = checked_values(values, base.rank)
+    root = None if covariance is None else square_root(covariance, base.rank)
+    bodies = bodies_of(base)
+    limits = (bounds or Bounds()).limits(robot)
+    prior = _prior(robot, cad)
+    target = plain_target(bodies, base, vector) if prior is None else cad_target(bodies, prior)
+    cad_violations: tuple[str, ...] = ()
+    if prior is not None:
+        units = bodies.sharing @ target.scale
+        cad_violations = real_bodies(robot, prior) + limits.violations(
+            prior, _HOLDS * np.abs(limits.matrix) @ units
+        )
+
+    real = _real(bodies, target, limits)
+    grouping = base.grouping @ bodies.sharing * target.scale
+    sizes = np.linalg.norm(grouping, axis=1)
+    inverse, free = _solutions(grouping / sizes[:, None])
+
+    depth = widest(real, inverse @ (vector / sizes), free, _DEEPEST)
+    feasible = depth is not None and depth >= _SHALLOW
+    spread = np.diag(sizes) if root is None else root
+    if feasible:
+        assert depth is not None
+        aim, border, inner = vector, np.zeros(0), 0.5 * depth
+    else:
+        deep = nearest(
+            real, np.zeros(free.shape[0]), np.eye(free.shape[0]), 1.0, target.matrix, target.right
+        )
+        if deep is None:
+            raise ModelError(_nothing_real(limits))
+        least = closest(real, grouping, vector, spread, _SHALLOW)
+        if least is None:
+            raise ModelError(_TOO_FAR)
+        border, forces = _inside(bodies, least[0], deep, _SHALLOW * target.margins), least[1]
+        aim, inner = grouping @ border, 0.5 * _SHALLOW
+    start = inverse @ (aim / sizes)
+    found = nearest(real, start, free, inner, target.matrix, target.right)
+    if not feasible and (found is None or (bodies.least(found) <= 0.0).any()):
+        # The closest model is then the only one, to the solver's accuracy.
+        found = border
+    if found is None:
+        raise ModelError(_TOO_FAR)
+    residual = float(np.abs((grouping @ found - aim) / (sizes * np.linalg.norm(found))).max())
+    answer = bodies.sharing @ (target.scale * found)
+    _certify(robot, bodies, target, limits, answer, found, residual)
+    if feasible:
+        close = bodies.least(found) < 1.01 * target.margins
+        tight = real.matrix @ found > real.right - 1e-6 * np.linalg.norm(found)
+        held = np.concatenate([close, tight])
+    else:
+        held = forces > _FORCE * forces.max()
+    at_border = tuple(np.array([*bodies.names, *limits.names])[held].tolist())
+
+    base_values = base.grouping @ answer
+    moved = np.zeros(base.rank) if feasible else base_values - vector
+    distance = float(np.linalg.norm(np.linalg.solve(spread, moved)))
+    return Consistency(
+        robot=with_parameters(robot, answer),
+        parameters=answer,
+        base_values=base_values,
+        names=base.names,
+        feasible=feasible,
+        distance=distance,
+        p_value=_p_value(distance, base.rank) if root is not None else float("nan"),
+        shifts=moved / np.linalg.norm(spread, axis=1),
+        metric="relative" if root is None else "covariance",
+        at_border=at_border,
+        cad_feasible=not cad_violations,
+        cad_violations=cad_violations,
+        residual=residual,
+        nearest_to=target.kind,
+    )
+
+
+def _prior(robot: Manipulator, cad: Manipulator | ArrayLike | str | None) -> Array | None:
+    if cad is None:
+        return None
+    if isinstance(cad, str):
+        if cad != "robot":
+            raise ModelError(
+                f'cad: {cad!r} is not "robot"; give a machine, its parameters or None, or load '
+                "the file first with pteron.load"
+            )
+        return parameters(robot)
+    return parameters_of(robot, parameters(cad) if isinstance(cad, Manipulator) else cad, "cad")
+
+
+def _real(bodies: Bodies, target: Target, limits: Limits) -> RealBodies:
+    """Return the set of real bodies within the limits, each limit's row of size one."""
+    matrix = limits.matrix @ bodies.sharing * target.scale
+    sizes = np.linalg.norm(matrix, axis=1)
+    return RealBodies(bodies.sliders, target.margins, matrix / sizes[:, None], limits.right / sizes)
+
+
+def _solutions(grouping: Array) -> tuple[Array, Array]:
+    """Return the pseudoinverse (columns, rank), and a basis of what the forces do not show."""
+    left, singular, right = np.linalg.svd(grouping)
+    rank = len(singular)
+    return right[:rank].T / singular @ left.T, right[rank:].T
+
+
+def _certify(
+    robot: Manipulator,
+    bodies: Bodies,
+    target: Target,
+    limits: Limits,
+    answer: Array,
+    found: Array,
+    residual: float,
+) -> None:
+    """Check the answer without the solver: real bodies, the base parameters, the bounds."""
+    failed = list(real_bodies(robot, answer))
+    units = np.maximum(np.abs(answer), bodies.sharing @ target.scale)
+    failed += limits.violations(answer, 10 * _HOLDS * np.abs(limits.matrix) @ units)
+    if residual > _HOLDS:
+        failed.append(f"base parameters: relative error {residual:.1e}")
+    if (bodies.least(found) <= 0.0).any():
+        failed.append("a body has no inertia left")
+    if failed:
+        raise ModelError(f"consistency: the solver's answer does not hold ({'; '.join(failed)})")
+
+
+def _nothing_real(limits: Limits) -> str:
+    return (
+        "bounds: no real bodies keep them all, whatever the identified values are; "
+        f"loosen some of: {', '.join(limits.names)}"
+    )
+
+
+def _inside(bodies: Bodies, point: Array, deep: Array, margins: Array) -> Array:
+    """Return the point, moved towards a deep one as little as its bodies need to be real.
+
+    Values that are thousands of deviations off leave the solver little accuracy at the border.
+    """
+    for part in (0.0, *np.logspace(-12, 0, 37)):
+        moved = (1.0 - part) * point + part * deep
+        if (bodies.least(moved) >= 0.5 * margins).all():
+            break
+    return np.asarray(moved)
+
+
+def _p_value(distance: float, rank: int) -> float:
+    from scipy.stats import chi2  # type: ignore[import-untyped]
+
+    return float(chi2.sf(distance**2, rank))

@@ -1,0 +1,207 @@
+"""The equations of a log, F = W beta, filtered, decimated and stacked: what estimators solve."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.errors import DataError
+from pteron.identification.logs import Log
+from pteron.identification.model import Model
+from pteron.identification.signals import States, Treatment
+from pteron.identification.signals.fourier import fitted_series
+from pteron.identification.signals.parallel import Decimation
+from pteron.identification.signals.samples import samples
+from pteron.kernels import Array
+
+__all__ = ["Equations", "equations_of", "stacked"]
+
+
+@dataclass(frozen=True)
+class Equations:
+    """Rows of F = W beta, after the parallel filter.
+
+    Rows are divided by the filter's gain for white noise: what a fit leaves of the forces has the
+    standard deviation of the noise on the measured samples, whatever the filter.
+
+    Attributes
+    ----------
+    names, units : tuple of str
+        Of the p values.
+    matrix : array, shape (R, n, p)
+        W.
+    forces : array, shape (R, n)
+        F, N.
+    time : array, shape (R,)
+        s.
+    gain : array, shape (R,)
+        What the rows were divided by.
+    payload : array of int, shape (R,)
+        The phase of each row.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    matrix: Array
+    forces: Array
+    time: Array
+    gain: Array
+    payload: NDArray[np.int64]
+
+    @property
+    def rows(self) -> int:
+        """How many equations there are: R n."""
+        return self.forces.size
+
+    @property
+    def actuators(self) -> int:
+        """n."""
+        return self.forces.shape[1]
+
+    def columns(self, keep: Sequence[int]) -> Equations:
+        """Return the equations of some of the values."""
+        return Equations(
+            tuple(self.names[k] for k in keep),
+            tuple(self.units[k] for k in keep),
+            np.ascontiguousarray(self.matrix[..., list(keep)]),
+            self.forces,
+            self.time,
+            self.gain,
+            self.payload,
+        )
+
+    def with_forces(self, forces: Array) -> Equations:
+        """Return the equations for other forces (R, n)."""
+        return Equations(
+            self.names, self.units, self.matrix, forces, self.time, self.gain, self.payload
+        )
+
+
+def equations_of(model: Model, log: Log | Iterable[Log], treatment: Treatment) -> Equations:
+    """Return the equations of a log.
+
+    Parameters
+    ----------
+    model : Model
+        What is identified.
+    log : Log or iterable of Log
+        The log, or its pieces in order, which are not kept.
+    treatment : Treatment
+        How it is treated, from `treatment_of`.
+
+    Returns
+    -------
+    Equations
+
+    Raises
+    ------
+    DataError
+        If a sample has no pose or is next to a singularity, or the log is too short.
+    """
+    if treatment.derivatives == "periodic":
+        assert isinstance(log, Log)  # `treatment_of` takes no other for periodic
+        return stacked([_periodic(model, part, treatment) for part in _phases(log, treatment)])
+    decimation = treatment.decimation
+    found = [
+        _filtered(model, block.states, block.forces, decimation)
+        for block in samples(model.robot, log, treatment, margin=decimation.margin)
+    ]
+    return stacked(found)
+
+
+def stacked(parts: Sequence[Equations]) -> Equations:
+    """Return the equations of several logs, or parts of one, as one."""
+    first = parts[0]
+    if len(parts) == 1:
+        return first
+    return Equations(
+        first.names,
+        first.units,
+        *(
+            np.concatenate([getattr(part, name) for part in parts])
+            for name in ("matrix", "forces", "time", "gain", "payload")
+        ),
+    )
+
+
+def _filtered(
+    model: Model, states: States, forces: Array, decimation: Decimation
+) -> Equations:
+    kept = decimation.centers(len(states))
+    gain = decimation.gain
+    return Equations(
+        model.names,
+        model.units,
+        decimation(model.matrix(states)) / gain,
+        decimation(forces) / gain,
+        states.time[kept],
+        np.full(len(kept), gain),
+        states.payload[kept],
+    )
+
+
+def _phases(log: Log, treatment: Treatment) -> list[Log]:
+    """Return the stretches of a periodic log with one payload that last a period or more."""
+    assert treatment.period is not None
+    edges = [0, log.rows]
+    if log.payload is not None:
+        edges[1:1] = (np.flatnonzero(np.diff(log.payload)) + 1).tolist()
+    parts = [log.part(start, stop) for start, stop in zip(edges[:-1], edges[1:], strict=True)]
+    step = 1.0 / treatment.rate
+    whole = [part for part in parts if part.duration + step >= treatment.period * (1.0 - 1e-3)]
+    if not whole:
+        raise DataError(
+            f"{log.source}: no stretch with one payload lasts its period of {treatment.period:g} "
+            's; record longer, or choose derivatives "central"'
+        )
+    return whole
+
+
+def _periodic(model: Model, log: Log, treatment: Treatment) -> Equations:
+    """Return the equations of one period, with noise averaged over all that were recorded.
+
+    The parallel filter keeps the harmonics up to the band, on both sides, and as many rows as
+    these have coefficients: a projection, so that white noise stays white.
+    """
+    period, rate = treatment.period, treatment.rate
+    assert period is not None
+    periods = int((log.duration + 1.0 / rate) / period + 1e-3)
+    rows = min(round(periods * period * rate), log.rows)
+    log = log.part(0, rows)
+    per_period = round(period * rate)
+    harmonics = max(min(int(treatment.band * period), (per_period - 1) // 2), 1)
+    series = fitted_series(log.time, log.sliders, period, highest=treatment.cutoff)
+    fine = log.time[0] + np.arange(per_period) * (period / per_period)
+    motion = series.at(fine), series.at(fine, 1), series.at(fine, 2)
+    phase = None if log.payload is None else np.full(per_period, log.payload[0])
+    states = States.of_sliders(
+        model.robot,
+        motion,
+        fine,
+        treatment.mode,
+        payload=phase,
+        source=log.source,
+        first_row=log.first_row,
+    )
+    count = 2 * harmonics + 1
+    kept = log.time[0] + np.arange(count) * (period / count)
+    forces = fitted_series(log.time, log.forces, period, highest=harmonics / period).at(kept)
+    gain = float(np.sqrt(count / rows))
+    return Equations(
+        model.names,
+        model.units,
+        _projected(model.matrix(states), count) / gain,
+        forces / gain,
+        kept,
+        np.full(count, gain),
+        np.zeros(count, dtype=np.int64) if phase is None else phase[:1].repeat(count),
+    )
+
+
+def _projected(signal: Array, count: int) -> Array:
+    """Return one period's samples (T, ...) as `count` samples of its lowest harmonics (odd)."""
+    spectrum = np.fft.rfft(signal, axis=0)[: count // 2 + 1]
+    return np.asarray(np.fft.irfft(spectrum, n=count, axis=0) * (count / len(signal)))

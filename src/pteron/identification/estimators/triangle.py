@@ -1,0 +1,138 @@
+"""Least squares through a triangular factor, which is built block by block and holds everything."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_triangular  # type: ignore[import-untyped]
+
+from pteron.errors import DataError
+from pteron.identification.equations import Equations
+from pteron.kernels import Array
+
+__all__ = ["Triangle", "triangle"]
+
+_BLOCK = 1 << 14
+
+_UNSEEN = 1e-10
+"""Singular value, relative to the largest, below which a combination of values is not seen."""
+
+_TAKES_PART = 0.05
+"""Share in an unseen combination that makes a value one of those it concerns."""
+
+
+@dataclass(frozen=True)
+class Triangle:
+    """The triangular factor R of [W F], with the columns of W scaled to unit length.
+
+    Attributes
+    ----------
+    factor : array, shape (p, p)
+        Of the scaled W.
+    image : array, shape (p,)
+        Q^T F.
+    rest : float
+        Sum of the squares that no values explain.
+    scale : array, shape (p,)
+        Lengths of W's columns: values = solution / scale.
+    rows : int
+        Equations that went in.
+    names : tuple of str
+        Of the values.
+    """
+
+    factor: Array
+    image: Array
+    rest: float
+    scale: Array
+    rows: int
+    names: tuple[str, ...]
+
+    @property
+    def condition(self) -> float:
+        """Condition number of W with its columns scaled to unit length."""
+        return float(np.linalg.cond(self.factor))
+
+    @property
+    def degrees(self) -> int:
+        """Equations more than values."""
+        return self.rows - len(self.names)
+
+    def values(self) -> Array:
+        """Return the values of least squares (p,)."""
+        return np.asarray(solve_triangular(self.factor, self.image) / self.scale)
+
+    def inverse(self) -> Array:
+        """Return (W^T W)^-1, (p, p): their covariance for noise of unit variance."""
+        inverse = solve_triangular(self.factor, np.eye(len(self.names)))
+        return np.asarray((inverse @ inverse.T) / np.outer(self.scale, self.scale))
+
+    def check_seen(self, source: str = "the log") -> None:
+        """Refuse equations that do not determine the values.
+
+        Raises
+        ------
+        DataError
+            If there are fewer equations than values, or some combinations of values leave the
+            forces as they are; it names these values.
+        """
+        if self.degrees <= 0:
+            raise DataError(
+                f"{source}: {self.rows} equations are left after filters and edges, more than "
+                f"{len(self.names)} are needed; record longer, or choose a higher band"
+            )
+        _, sizes, directions = np.linalg.svd(self.factor)
+        unseen = directions[sizes <= _UNSEEN * sizes[0]]
+        concerned = (np.abs(unseen) > _TAKES_PART).any(axis=0) | (self.scale == 0.0)
+        if concerned.any():
+            names = [name for name, flag in zip(self.names, concerned, strict=True) if flag]
+            raise DataError(
+                f"{source}: too little motion: {len(names)} of {len(self.names)} values cannot be "
+                f"seen ({', '.join(names)}); move all coordinates at once, such as along a "
+                "trajectory of pteron excite"
+            )
+
+
+def triangle(equations: Equations, weights: Array | None = None) -> Triangle:
+    """Return the triangular factor of equations.
+
+    Parameters
+    ----------
+    equations : Equations
+        R n of them.
+    weights : array, shape (R, n) or (n,), optional
+        Factors on the rows.
+    """
+    p = len(equations.names)
+    squares = np.zeros(p)
+    factor = np.zeros((0, p + 1))
+    # Two passes: lengths first, so that the factor is one of columns of like size.
+    for matrix, _ in _blocks(equations, weights):
+        squares += (matrix**2).sum(axis=0)
+    scale = np.sqrt(squares)
+    divisor = np.where(scale > 0.0, scale, 1.0)
+    for matrix, forces in _blocks(equations, weights):
+        block = np.column_stack([matrix / divisor, forces])
+        factor = np.linalg.qr(np.vstack([factor, block]), mode="r")
+    full = np.zeros((p + 1, p + 1))
+    full[: len(factor)] = factor
+    return Triangle(
+        full[:p, :p],
+        full[:p, p],
+        float(full[p, p] ** 2),
+        scale,
+        equations.rows,
+        equations.names,
+    )
+
+
+def _blocks(equations: Equations, weights: Array | None):  # type: ignore[no-untyped-def]
+    p = len(equations.names)
+    for start in range(0, len(equations.forces), _BLOCK):
+        rows = slice(start, start + _BLOCK)
+        matrix, forces = equations.matrix[rows], equations.forces[rows]
+        if weights is not None:
+            factors = weights if weights.ndim == 1 else weights[rows]
+            matrix, forces = factors[..., None] * matrix, factors * forces
+        yield matrix.reshape(-1, p), forces.reshape(-1)

@@ -1,0 +1,146 @@
+"""How well a motion shows the base parameters: condition numbers of the stacked base regressor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pteron.identification.excitation.fourier import FourierMotion, states
+from pteron.kernels import Array, numeric
+from pteron.reduction import BaseParameters
+
+__all__ = ["Conditioning", "conditioning", "scaled_condition", "stacked_regressor"]
+
+
+_ROWS = 100
+"""Rows of a matrix that are decomposed at a time."""
+
+
+@dataclass(frozen=True)
+class Conditioning:
+    """How well the base parameters can be told apart from the forces of a motion.
+
+    Attributes
+    ----------
+    scaled : float
+        2-norm condition number of the stacked base regressor with columns of length 1 (see
+        `scaled_condition`): without units.
+    unscaled : float
+        That of the regressor as it is, in SI units.
+    nominal : float
+        That with every column times the machine's own value of its base parameter, so that all
+        columns are forces; infinite if a value is 0.
+    logdet : float
+        log det of the information matrix of one sample on average, W^T W / T; the larger the
+        smaller the volume of the confidence ellipsoid. Other units only add a constant.
+    """
+
+    scaled: float
+    unscaled: float
+    nominal: float
+    logdet: float
+
+
+def scaled_condition(matrix: Array) -> float:
+    """Return the 2-norm condition number of a matrix with its columns divided by their lengths.
+
+    The entries of a regressor have as many units as there are parameters; to compare them, each
+    column (R,) is divided by its Euclidean norm. Of all scalings of the columns this one has a
+    condition number within sqrt(p) of the least.
+
+    Parameters
+    ----------
+    matrix : array, shape (R, p)
+        At least as many rows as columns.
+
+    Returns
+    -------
+    float
+        1 at best; infinite if a column is zero, or the columns are dependent.
+
+    References
+    ----------
+    A. van der Sluis, Condition numbers and equilibration of matrices, Numer. Math. 14, 1969.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from pteron.identification.excitation import scaled_condition
+    >>> round(scaled_condition(np.array([[1.0, 0.0], [0.0, 1000.0]])), 12)
+    1.0
+    """
+    lengths = np.linalg.norm(matrix, axis=0)
+    if not lengths.all():
+        return float("inf")
+    return _condition(matrix / lengths)
+
+
+def conditioning(
+    motion: FourierMotion, base: BaseParameters, samples: int | None = None
+) -> Conditioning:
+    """Return the condition numbers of a motion.
+
+    Parameters
+    ----------
+    motion : FourierMotion
+        The motion.
+    base : BaseParameters
+        Of its machine.
+    samples : int, optional
+        Instants, evenly over one period; by default 40 in a period of the highest harmonic.
+
+    Returns
+    -------
+    Conditioning
+
+    Raises
+    ------
+    ModelError
+        If `base` belongs to a machine of another layout.
+    """
+    count = samples or 40 * motion.harmonics
+    matrix = stacked_regressor(motion, base, motion.uniform_times(count))
+    if not np.isfinite(matrix).all():
+        worst = float("inf")
+        return Conditioning(worst, worst, worst, -worst)
+    # Scaling columns commutes with it: R of W = Q R has the condition numbers of W.
+    triangle = _triangle(matrix)
+    lengths = np.linalg.norm(triangle, axis=0)
+    scaled = scaled_condition(triangle)
+    logdet = -float("inf")
+    if np.isfinite(scaled):
+        # Equilibrated first: the columns' sizes differ by more than the digits would bear.
+        values = np.linalg.svd(triangle / lengths, compute_uv=False)
+        logdet = float(2.0 * (np.log(values).sum() + np.log(lengths / np.sqrt(count)).sum()))
+    nominal = triangle * base.values(motion.robot)
+    return Conditioning(scaled, _condition(triangle), _condition(nominal), logdet)
+
+
+def stacked_regressor(motion: FourierMotion, base: BaseParameters, times: Array) -> Array:
+    """Return the base regressors at times (T,) below one another, (T n, rank)."""
+    state = states(motion, times)
+    kernel = numeric(motion.robot, "base_regressor", base=base)
+    found: Array = kernel(state.pose, state.velocity, state.acceleration)
+    return found.reshape(-1, base.rank)
+
+
+def _triangle(matrix: Array) -> Array:
+    """Return R of the QR decomposition, some rows at a time.
+
+    On blocks so small the linear algebra library stays in one thread; several, on a machine that is
+    busy, can take a hundred times as long.
+    """
+    p = matrix.shape[1]
+    triangle: Array = np.zeros((p, p))
+    for start in range(0, len(matrix), _ROWS):
+        rows = np.vstack([triangle, matrix[start : start + _ROWS]])
+        triangle = np.asarray(np.linalg.qr(rows, mode="r"))
+    return triangle
+
+
+def _condition(matrix: Array) -> float:
+    values = np.linalg.svd(matrix, compute_uv=False)
+    if len(matrix) < matrix.shape[1] or values[-1] <= np.finfo(float).eps * values[0]:
+        return float("inf")
+    return float(values[0] / values[-1])

@@ -1,0 +1,190 @@
+"""Random Fourier motions, each as large as the limits allow: what optimised ones must beat."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pteron.errors import DataError, ModelError
+from pteron.identification.excitation.fourier import FourierMotion, Space, home
+from pteron.identification.excitation.limits import Limits
+from pteron.identification.excitation.margins import check_rest, relative_margins
+from pteron.kernels import Array, numeric
+from pteron.manipulator import Manipulator
+
+__all__ = ["CLEAR", "FINE", "is_clear", "random_excitation", "sizes", "within_limits"]
+
+FINE = 800
+"""Samples in a period of the highest harmonic at which the limits are checked."""
+
+CLEAR = 2e-4
+"""By what share of its size every limit is kept clear at those samples: more than a margin can dip
+between two of them."""
+
+_COARSE = 50
+"""Samples in a period of the highest harmonic while the scale is sought."""
+
+_COARSE_CLEAR = 2e-3
+"""By what share limits are kept clear there, so that the finer look seldom finds fault."""
+
+_SPREAD = 0.2
+"""How far random centers are from home, as a share of the working space's size."""
+
+_HALVINGS = 12
+_BISECTIONS = 14
+_DOUBLINGS = 12
+
+
+def random_excitation(
+    robot: Manipulator,
+    *,
+    space: Space = "platform",
+    harmonics: int = 5,
+    period: float = 10.0,
+    limits: Limits | None = None,
+    seed: int | np.random.Generator = 0,
+) -> FourierMotion:
+    """Return a random Fourier motion about the home pose, as large as the limits allow.
+
+    Its coefficients are normal, of equal variance in all harmonics; its center is drawn near the
+    home pose. The scale about the center is found by bisection.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    space : {"platform", "sliders"}
+        Whose coordinates the series are of.
+    harmonics : int
+        How many, 1 or more.
+    period : float
+        s.
+    limits : Limits, optional
+        What the motion keeps at every instant.
+    seed : int or numpy Generator
+        Where the randomness comes from.
+
+    Returns
+    -------
+    FourierMotion
+
+    Raises
+    ------
+    ModelError
+        If the machine does not even keep the limits at rest; the message names the limit.
+    DataError
+        If a number is not what it should be.
+    SingularPose
+        If the machine is singular at every pose.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.identification.excitation import random_excitation
+    >>> motion = random_excitation(pteron.load("tripteron"), harmonics=3, seed=7)
+    >>> motion.coefficients.shape
+    (7, 3)
+    """
+    limits = limits or Limits()
+    if harmonics < 1:
+        raise DataError(f"harmonics: {harmonics} given, 1 or more expected")
+    rng = np.random.default_rng(seed)
+    middle = np.array(home(robot))
+    check_rest(robot, middle, limits)
+    size = sizes(robot, "platform")
+    n = robot.freedom
+    offset = _SPREAD * size * rng.uniform(-1.0, 1.0, n)
+    shape = rng.normal(size=(2 * harmonics, n)) * sizes(robot, space)
+    for _ in range(_HALVINGS):
+        center = _center(robot, space, middle + offset)
+        still = _motion(robot, space, period, center, 0.0 * shape)
+        if is_clear(still, limits, 2, _COARSE_CLEAR):
+            break
+        offset = 0.5 * offset
+    else:
+        still = _motion(robot, space, period, _center(robot, space, middle), 0.0 * shape)
+    return _largest(still, shape, limits)
+
+
+def sizes(robot: Manipulator, space: Space) -> Array:
+    """Return the size (n,) of motions in each coordinate, m and rad, before they are scaled."""
+    span = np.mean([leg.upper_length + leg.lower_length for leg in robot.legs])
+    metres = 0.25 * float(span)
+    size = np.full(robot.freedom, metres)
+    if robot.platform.turns and space == "platform":
+        size[3] = 1.0
+    return size
+
+
+def is_clear(motion: FourierMotion, limits: Limits, samples: int, clear: float = CLEAR) -> bool:
+    """Say whether all limits are kept at so many samples, and how clearly is given."""
+    found = relative_margins(motion, limits, motion.uniform_times(samples))
+    return all(float(values.min()) >= clear for values in found.values())
+
+
+def within_limits(
+    motion: FourierMotion, limits: Limits, least: float = 0.0
+) -> FourierMotion | None:
+    """Return the motion shrunk about its center, as little as it takes to keep the limits.
+
+    They are then kept between samples too. None if it would have to shrink below the scale `least`.
+    """
+    samples = FINE * motion.harmonics
+    if is_clear(motion, limits, samples):
+        return motion
+    low, high = least, 1.0
+    if not is_clear(_scaled(motion, low), limits, samples):
+        return None
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        if is_clear(_scaled(motion, middle), limits, samples):
+            low = middle
+        else:
+            high = middle
+    return _scaled(motion, low)
+
+
+def _largest(still: FourierMotion, shape: Array, limits: Limits) -> FourierMotion:
+    """Return the motion of that shape about a center, as large as it can be."""
+    center = still.center
+    samples = _COARSE * still.harmonics
+
+    def sized(scale: float) -> FourierMotion:
+        return still.with_coefficients(np.vstack([center, scale * shape]))
+
+    high = 1.0
+    for _ in range(_DOUBLINGS):
+        if not is_clear(sized(high), limits, samples, _COARSE_CLEAR):
+            break
+        high *= 2.0
+    low = 0.0
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        if is_clear(sized(middle), limits, samples, _COARSE_CLEAR):
+            low = middle
+        else:
+            high = middle
+    found = within_limits(sized(low), limits)
+    if found is None or low == 0.0:
+        raise ModelError(
+            f"limits: no motion of {still.robot.name} about its home pose keeps them all; loosen "
+            "those that it barely keeps at rest"
+        )
+    return found
+
+
+def _scaled(motion: FourierMotion, scale: float) -> FourierMotion:
+    coefficients = motion.coefficients
+    coefficients[1:] *= scale
+    return motion.with_coefficients(coefficients)
+
+
+def _center(robot: Manipulator, space: Space, pose: Array) -> Array:
+    center: Array = pose if space == "platform" else numeric(robot, "slider_coordinates")(pose)
+    return center
+
+
+def _motion(
+    robot: Manipulator, space: Space, period: float, center: Array, shape: Array
+) -> FourierMotion:
+    half = len(shape) // 2
+    return FourierMotion(robot, space, period, center, shape[:half], shape[half:])

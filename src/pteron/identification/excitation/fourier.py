@@ -1,0 +1,215 @@
+"""Periodic motions as finite Fourier series, with exact derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import Literal, NamedTuple, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pteron.errors import DataError, UnreachablePose
+from pteron.kernels import Array, as_array, numeric
+from pteron.manipulator import Manipulator
+from pteron.motion import Motion
+from pteron.workspace import home_pose
+
+__all__ = ["FourierMotion", "Space", "State", "assembly_mode", "basis", "home", "states"]
+
+Space = Literal["platform", "sliders"]
+"""Whose coordinates the series are of: the platform's pose, or the sliders'."""
+
+
+@dataclass(frozen=True, eq=False)
+class FourierMotion:
+    """A periodic motion, q(t) = center + sum over h of a_h cos(h w t) + b_h sin(h w t).
+
+    w = 2 pi / period. It is the finite Fourier series of Swevers et al. (1997), whose coefficients
+    are those of the velocity: theirs are h w times these.
+
+    Attributes
+    ----------
+    robot : Manipulator
+        The machine.
+    space : {"platform", "sliders"}
+        Whether q is the pose (x, y, z, phi) or the slider coordinates.
+    period : float
+        s.
+    center : array, shape (n,)
+        m and, for a platform that turns, rad.
+    cosines, sines : array, shape (H, n)
+        The coefficients a_h and b_h of the harmonics h = 1 ... H, in the units of `center`.
+    mode : int
+        The assembly mode of `direct_kinematics` that the sliders' motion is of, counted from 0;
+        that of the home pose unless given.
+
+    Raises
+    ------
+    DataError
+        If the period is not above 0, or the shapes do not fit.
+
+    Examples
+    --------
+    >>> import numpy as np, pteron
+    >>> from pteron.identification.excitation import FourierMotion
+    >>> robot = pteron.load("quadrupteron")
+    >>> swing = FourierMotion(
+    ...     robot, "platform", 2.0, np.zeros(4), [[0.05, 0, 0, 0]], [[0, 0.05, 0, 0]])
+    >>> swing.at(np.array([0.0, 0.5])).pose.round(12)
+    array([[0.05, 0.  , 0.  , 0.  ],
+           [0.  , 0.05, 0.  , 0.  ]])
+    """
+
+    robot: Manipulator
+    space: Space
+    period: float
+    center: Array = field(repr=False)
+    cosines: Array = field(repr=False)
+    sines: Array = field(repr=False)
+    mode: int = -1
+
+    def __post_init__(self) -> None:
+        if self.space not in get_args(Space):
+            raise DataError(f'space: {self.space!r} is neither "platform" nor "sliders"')
+        if not 0.0 < self.period < np.inf:
+            raise DataError(f"period: {self.period} s given, a number above 0 expected")
+        n = self.robot.freedom
+        for name in ("center", "cosines", "sines"):
+            object.__setattr__(self, name, as_array(getattr(self, name), name, (n,)).copy())
+        if self.center.shape != (n,) or self.cosines.ndim != 2:
+            raise DataError(f"center, cosines: shapes ({n},) and (H, {n}) expected")
+        if self.cosines.shape != self.sines.shape or not len(self.cosines):
+            raise DataError(
+                f"cosines, sines: shapes {self.cosines.shape} and {self.sines.shape} given, the "
+                "same number of harmonics expected, at least one"
+            )
+        if self.mode < 0:
+            object.__setattr__(self, "mode", assembly_mode(self.robot))
+
+    @property
+    def harmonics(self) -> int:
+        """How many harmonics there are, H."""
+        return len(self.cosines)
+
+    @property
+    def coefficients(self) -> Array:
+        """Center, cosines and sines as one array (2 H + 1, n)."""
+        return np.vstack([self.center, self.cosines, self.sines])
+
+    def with_coefficients(self, coefficients: Array) -> FourierMotion:
+        """Return the motion with other coefficients (2 H + 1, n)."""
+        h = self.harmonics
+        return replace(
+            self,
+            center=coefficients[0],
+            cosines=coefficients[1 : h + 1],
+            sines=coefficients[h + 1 :],
+        )
+
+    def at(self, time: ArrayLike) -> Motion:
+        """Return the platform's motion at times (T,), s.
+
+        Raises
+        ------
+        UnreachablePose
+            If a motion of the sliders leaves what the machine can do.
+        """
+        times = _times(time)
+        found = states(self, times)
+        lost = ~np.isfinite(found.pose).all(axis=-1)
+        if lost.any():
+            k = int(np.argmax(lost))
+            raise UnreachablePose(
+                f"time {times[k]:g} s: no pose has the slider coordinates "
+                f"{found.sliders[k].tolist()} m; make the motion smaller",
+                leg=0,
+                shortfall=float("nan"),
+                index=(k,),
+            )
+        return Motion(times, found.pose, found.velocity, found.acceleration)
+
+    def sliders(self, time: ArrayLike) -> tuple[Array, Array, Array]:
+        """Return the sliders' coordinates, rates and accelerations, (T, n) each, at times (T,)."""
+        found = states(self, _times(time))
+        return found.sliders, found.rates, found.accelerations
+
+    def uniform_times(self, count: int) -> Array:
+        """Return so many times (count,) evenly over one period, without its end."""
+        return np.asarray(np.arange(count) * (self.period / count), dtype=np.float64)
+
+
+class State(NamedTuple):
+    """Motion of platform and sliders, (T, n) each; NaN where the sliders have no pose."""
+
+    pose: Array
+    velocity: Array
+    acceleration: Array
+    sliders: Array
+    rates: Array
+    accelerations: Array
+
+
+def states(motion: FourierMotion, times: Array) -> State:
+    """Return the motion of platform and sliders at times (T,)."""
+    robot = motion.robot
+    q, dq, ddq = (
+        rows @ motion.coefficients for rows in basis(times, motion.harmonics, motion.period)
+    )
+    if motion.space == "platform":
+        return State(q, dq, ddq, *_sliders(robot, q, dq, ddq))
+    poses = numeric(robot, "closure_poses")(q)
+    pose: Array = poses[:, motion.mode, :].copy()
+    if robot.platform.turns:
+        # Within a mode phi stays on one side of the singular orientations, half a turn at most.
+        pose[:, 3] = _nearest_turn(pose[:, 3], home(robot)[3])
+    velocity, acceleration = numeric(robot, "platform_motion")(pose, dq, ddq)
+    return State(pose, velocity, acceleration, q, dq, ddq)
+
+
+def basis(times: Array, harmonics: int, period: float) -> tuple[Array, Array, Array]:
+    """Return what takes coefficients (2 H + 1, n) to q, q' and q'' (T, n): (T, 2 H + 1) each."""
+    w = 2.0 * np.pi / period * np.arange(1, harmonics + 1)
+    cosines, sines = np.cos(np.outer(times, w)), np.sin(np.outer(times, w))
+    one, zero = np.ones((len(times), 1)), np.zeros((len(times), 1))
+    return (
+        np.hstack([one, cosines, sines]),
+        np.hstack([zero, -w * sines, w * cosines]),
+        np.hstack([zero, -w * w * cosines, -w * w * sines]),
+    )
+
+
+@lru_cache(maxsize=64)
+def home(robot: Manipulator) -> tuple[float, ...]:
+    """Return the home pose, which takes a search the first time."""
+    return tuple(home_pose(robot).tolist())
+
+
+def assembly_mode(robot: Manipulator) -> int:
+    """Return the assembly mode of the home pose: the row of `direct_kinematics`, from 0."""
+    if not robot.platform.turns:
+        return 0
+    return 0 if float(numeric(robot, "regularity")(np.array(home(robot)))) > 0.0 else 1
+
+
+def _nearest_turn(angle: Array, around: float) -> Array:
+    """Return angles, by whole turns, within half a turn of another."""
+    turned: Array = around + (angle - around + np.pi) % (2.0 * np.pi) - np.pi
+    return turned
+
+
+def _sliders(robot: Manipulator, pose: Array, rate: Array, second: Array) -> Sequence[Array]:
+    # The sliders' columns are finite out of the legs' reach too; those of the links are not.
+    return (
+        numeric(robot, "slider_coordinates")(pose),
+        numeric(robot, "joint_rates")(pose, rate)[..., 0],
+        numeric(robot, "joint_accelerations")(pose, rate, second)[..., 0],
+    )
+
+
+def _times(time: ArrayLike) -> Array:
+    times = as_array(time, "time", ())
+    if times.ndim != 1 or not np.isfinite(times).all():
+        raise DataError(f"time: shape {times.shape} given, finite numbers of shape (T,) expected")
+    return times

@@ -1,0 +1,186 @@
+"""The nonlinear program behind an exciting trajectory: IPOPT with CasADi's exact gradients."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from pteron.equations.geometry import Expression
+from pteron.identification.excitation.draws import sizes
+from pteron.identification.excitation.fourier import Space, assembly_mode, basis
+from pteron.identification.excitation.limits import Limits, per_slider, slider_sizes
+from pteron.identification.excitation.spectrum import Criterion, measure
+from pteron.kernels import Array, Columns, program
+from pteron.manipulator import Manipulator, parameters
+
+__all__ = ["Setting", "minimised"]
+
+_SAMPLES = 20
+"""Samples in a period of the highest harmonic. The limits are kept where the regressor is taken:
+anywhere else a leg could come close to being stretched, which the regressor would reward."""
+
+_BACK_OFF = 1e-3
+"""By what share of its size the program keeps every limit clear at its samples."""
+
+_ITERATIONS = 200
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What is optimised: all that does not depend on where the search starts."""
+
+    robot: Manipulator
+    columns: Columns
+    space: Space
+    harmonics: int
+    period: float
+    limits: Limits
+    criterion: Criterion
+
+
+@dataclass(frozen=True)
+class _Path:
+    """The limits as one function of a state of the coordinates, with bounds (g,) on its values."""
+
+    function: ca.Function
+    low: Array
+    high: Array
+
+
+def minimised(
+    setting: Setting,
+    start: Array,
+    doublings: int,
+    watched: tuple[str, ...],
+    extra: Array,
+    seconds: float,
+) -> Array | None:
+    """Return coefficients (2 H + 1, n) from a start that is better, but need not keep the limits.
+
+    Parameters
+    ----------
+    setting : Setting
+        What is optimised.
+    start : array, shape (2 H + 1, n)
+        Coefficients of a motion that keeps the limits.
+    doublings : int
+        Sharpness of the measure (see `measure`).
+    watched : tuple of str
+        The limits that are kept, by name; the fewer, the faster.
+    extra : array, shape (E,)
+        Instants beside the regular ones at which the limits are kept, s.
+    seconds : float
+        After which the solver stops where it is.
+
+    Returns
+    -------
+    array or None
+        None if the solver could not begin.
+    """
+    n, rows = setting.robot.freedom, 2 * setting.harmonics + 1
+    count = max(_SAMPLES * setting.harmonics, 3 * _SAMPLES)
+    times: Array = np.linspace(0.0, setting.period, count, endpoint=False)
+    z = ca.MX.sym("z", rows * n)
+    size = sizes(setting.robot, setting.space)
+    coefficients = ca.mtimes(ca.reshape(z, rows, n), ca.diag(ca.DM(size)))
+    guarded = np.concatenate([times, extra])
+    path = _path(setting, watched)
+    bounded = path.function.map(len(guarded))(*_along(setting, coefficients, guarded))
+    blocks = _regressor(setting).map(count)(*_along(setting, coefficients, times))
+    information = ca.mtimes(blocks, blocks.T) / count
+    nlp = {"x": z, "f": measure(information, setting.criterion, doublings), "g": ca.vec(bounded)}
+    solver = ca.nlpsol("excitation", "ipopt", nlp, _options(seconds))
+    try:
+        found = solver(
+            x0=ca.vec(ca.DM(start / size)),
+            lbg=np.tile(path.low, len(guarded)),
+            ubg=np.tile(path.high, len(guarded)),
+        )
+    except RuntimeError:
+        return None
+    result: Array = np.array(ca.reshape(found["x"], rows, n)) * size
+    return result if np.isfinite(result).all() else None
+
+
+def _options(seconds: float) -> dict[str, Any]:
+    return {
+        "print_time": False,
+        "show_eval_warnings": False,  # a step out of reach is NaN, which the line search rejects
+        "error_on_fail": False,
+        "ipopt": {
+            "print_level": 0,
+            "sb": "yes",
+            "hessian_approximation": "limited-memory",
+            "limited_memory_max_history": 6,
+            "mu_strategy": "adaptive",
+            "tol": 1e-3,
+            "acceptable_tol": 1e-2,
+            "acceptable_iter": 10,
+            "max_iter": _ITERATIONS,
+            "max_wall_time": max(seconds, 1e-2),
+        },
+    }
+
+
+def _along(setting: Setting, coefficients: Expression, times: Array) -> list[Expression]:
+    """Return q, q' and q'' at times (T,), (n, T) each."""
+    rows = basis(times, setting.harmonics, setting.period)
+    return [ca.mtimes(ca.DM(row), coefficients).T for row in rows]
+
+
+@lru_cache(maxsize=16)
+def _regressor(setting: Setting) -> ca.Function:
+    """Return the base regressor's transpose (rank, n) as a function of q, q' and q''."""
+    q, state = _state(setting)
+    built = program(setting.robot, "base_regressor", setting.columns)
+    return ca.Function("regressor", q, [built.function(*state)], {"cse": True})
+
+
+@lru_cache(maxsize=32)
+def _path(setting: Setting, watched: tuple[str, ...]) -> _Path:
+    """Return the limits: squared sines, which stay finite and smooth out of reach, and the rest."""
+    robot, limits = setting.robot, setting.limits
+    q, state = _state(setting)
+    pose, velocity, _ = state
+    found: dict[str, tuple[Expression, float | Array, float | Array]] = {}
+    lengths = [2.0 * leg.upper_length * leg.lower_length for leg in robot.legs]
+    deltas = program(robot, "discriminants").function(pose).T
+    least = (limits.elbow_sine + _BACK_OFF) ** 2
+    found["elbow_sine"] = deltas / np.square(lengths), least, np.inf
+    sign = 1.0 if assembly_mode(robot) == 0 else -1.0
+    regularity = sign * program(robot, "regularity").function(pose)
+    found["regularity"] = regularity, limits.regularity + _BACK_OFF, np.inf
+    if setting.space == "sliders":
+        sliders, rates, seconds = q
+    else:
+        sliders = program(robot, "slider_coordinates").function(pose).T
+        rates = program(robot, "joint_rates").function(pose, velocity)[0, :].T
+        seconds = program(robot, "joint_accelerations").function(*state)[0, :].T
+    ranges = np.array([leg.slider_limits or (-np.inf, np.inf) for leg in robot.legs])
+    clearance = limits.slider_clearance + _BACK_OFF * slider_sizes(robot)
+    found["slider_clearance"] = sliders, ranges[:, 0] + clearance, ranges[:, 1] - clearance
+    forces = program(robot, "inverse_dynamics").function(*state, ca.DM(parameters(robot))).T
+    for name, value in (("speed", rates), ("acceleration", seconds), ("force", forces)):
+        found[name] = value / per_slider(limits, name, robot), _BACK_OFF - 1.0, 1.0 - _BACK_OFF
+    values, low, high = zip(*(found[name] for name in watched), strict=True)
+    function = ca.Function("path", q, [ca.densify(ca.vertcat(*values))], {"cse": True})
+    bounds = [
+        np.concatenate([np.broadcast_to(b, v.shape[0]) for v, b in zip(values, side, strict=True)])
+        for side in (low, high)
+    ]
+    return _Path(function, bounds[0], bounds[1])
+
+
+def _state(setting: Setting) -> tuple[list[Expression], list[Expression]]:
+    """Return symbols of q, q' and q'', and the platform's motion as expressions of them."""
+    robot, n = setting.robot, setting.robot.freedom
+    q = [ca.SX.sym(name, n) for name in ("q", "dq", "ddq")]
+    if setting.space == "platform":
+        return q, q
+    poses = program(robot, "closure_poses").function(q[0])
+    pose = poses[:, assembly_mode(robot)]
+    return q, [pose, *(rate.T for rate in program(robot, "platform_motion").function(pose, *q[1:]))]

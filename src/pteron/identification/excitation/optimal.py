@@ -1,0 +1,287 @@
+"""`optimal_excitation`: random motions, the best of them improved, the best of those returned."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass, field, replace
+from typing import get_args
+
+import numpy as np
+
+from pteron.errors import DataError
+from pteron.identification.excitation.conditioning import Conditioning, conditioning
+from pteron.identification.excitation.draws import random_excitation
+from pteron.identification.excitation.fourier import FourierMotion, Space
+from pteron.identification.excitation.improvement import ROUNDS, Round, Stage
+from pteron.identification.excitation.limits import Limits
+from pteron.identification.excitation.margins import margins
+from pteron.identification.excitation.nonlinear_program import Setting
+from pteron.identification.excitation.result import Excitation, Start
+from pteron.identification.excitation.spectrum import Criterion
+from pteron.identification.excitation.worker import Task, here, in_processes
+from pteron.kernels import columns_of
+from pteron.manipulator import Manipulator
+from pteron.reduction import BaseParameters, base_parameters
+
+__all__ = ["optimal_excitation"]
+
+_MOST_WORKERS = 4
+
+_DRAWING = 0.3
+"""The share of the time after which no more random motions are drawn."""
+
+_FIRST = 0.6
+"""The share of the time left that the first round may take."""
+
+_ONE_OF = 3
+"""One of so many starts, the best after the first round, goes on to the second."""
+
+_SEEN = 0.1
+"""The share of the progress that the random motions are."""
+
+
+def optimal_excitation(
+    robot: Manipulator,
+    *,
+    base: BaseParameters | None = None,
+    space: Space = "platform",
+    harmonics: int = 5,
+    period: float = 10.0,
+    limits: Limits | None = None,
+    criterion: Criterion = "condition",
+    starts: int = 12,
+    draws: int = 100,
+    seed: int = 0,
+    seconds: float = 60.0,
+    workers: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Excitation:
+    """Return a periodic trajectory from whose forces the base parameters are seen best.
+
+    Of random Fourier motions, each as large as the limits allow, the best are improved by IPOPT
+    with exact gradients. The limits hold at samples, and where they are then violated between these
+    the worst instants join the samples; in the end the motion is shrunk about its center, if need
+    be, until all limits are kept throughout the period.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    base : BaseParameters, optional
+        What is to be seen; `base_parameters(robot)` unless given.
+    space : {"platform", "sliders"}
+        Whose coordinates the Fourier series are of.
+    harmonics : int
+        How many, 1 or more.
+    period : float
+        s.
+    limits : Limits, optional
+        What the trajectory keeps at every instant.
+    criterion : {"condition", "logdet"}
+        What is made small: the condition number of the base regressor with columns of length 1
+        (see `scaled_condition`), or the volume of the confidence ellipsoid, -log det.
+    starts : int
+        How many of the random motions, the best ones, are improved: all of them roughly, then the
+        best third thoroughly.
+    draws : int
+        How many random motions there are.
+    seed : int
+        Of the random motions.
+    seconds : float
+        After which the best until then is returned. It holds for the search as a whole; what
+        comes before, such as the base parameters, is not counted.
+    workers : int, optional
+        Processes that improve starts at the same time; 1 keeps to this one. By default as many as
+        there are processors, four at most.
+    progress : callable, optional
+        Called with the share of the work that is done, from 0 to 1.
+
+    Returns
+    -------
+    Excitation
+        The trajectory, how good it is, the best random motion to compare with, and its margins.
+
+    Raises
+    ------
+    ModelError
+        If the machine does not even keep the limits at rest; the message names the limit.
+    DataError
+        If an argument is not what it should be, or the base parameters cannot be told apart by so
+        few harmonics.
+    SingularPose
+        If the machine is singular at every pose.
+
+    Notes
+    -----
+    The same arguments give the same result as long as the time does not cut the search short. An
+    interrupt from the keyboard ends it, and returns the best until then, as soon as there is any.
+
+    References
+    ----------
+    J. Swevers, C. Ganseman, D. B. Tukel, J. De Schutter, H. Van Brussel, Optimal robot excitation
+    and identification, IEEE Trans. Robotics and Automation 13(5), 1997.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.identification.excitation import optimal_excitation
+    >>> robot = pteron.load("tripteron")
+    >>> found = optimal_excitation(robot, harmonics=2, starts=1, draws=5, workers=1)
+    >>> found.margins.kept, found.gain > 2.0
+    (True, True)
+    """
+    begin = time.monotonic()
+    limits = limits or Limits()
+    _check(criterion, starts, draws, seconds, workers)
+    base = base or base_parameters(robot)
+    search = _Search(criterion, base, progress or (lambda share: None))
+    interrupted = False
+    try:
+        begin = time.monotonic()
+        for k, seeds in enumerate(np.random.SeedSequence(seed).spawn(draws)):
+            search.add(
+                random_excitation(
+                    robot,
+                    space=space,
+                    harmonics=harmonics,
+                    period=period,
+                    limits=limits,
+                    seed=np.random.default_rng(seeds),
+                )
+            )
+            search.report(_SEEN * (k + 1) / draws)
+            if time.monotonic() - begin > _DRAWING * seconds:
+                break
+        setting = Setting(robot, columns_of(base), space, harmonics, period, limits, criterion)
+        processes = min(starts, workers or min(os.cpu_count() or 1, _MOST_WORKERS))
+        search.choose(setting, starts)
+        deadline = begin + seconds
+        first, second = ROUNDS[criterion]
+        search.improve(setting, first, _FIRST * (deadline - time.monotonic()), processes)
+        search.keep(math.ceil(starts / _ONE_OF))
+        search.improve(setting, second, deadline - time.monotonic(), processes)
+    except KeyboardInterrupt:
+        if not search.drawn:
+            raise
+        interrupted = True
+    return search.result(limits, seed, time.monotonic() - begin, interrupted)
+
+
+@dataclass
+class _Candidate:
+    motion: FourierMotion
+    conditioning: Conditioning
+
+
+@dataclass
+class _Search:
+    """What is known so far."""
+
+    criterion: Criterion
+    base: BaseParameters
+    progress: Callable[[float], None]
+    drawn: list[_Candidate] = field(default_factory=list)
+    starts: list[Start] = field(default_factory=list)
+    best: list[_Candidate] = field(default_factory=list)
+    """For each start."""
+    running: list[int] = field(default_factory=list)
+    """The starts that are still worked on."""
+    seen: float = 0.0
+    """The share of the work that is done."""
+
+    def add(self, motion: FourierMotion) -> None:
+        self.drawn.append(self.judged(motion))
+
+    def judged(self, motion: FourierMotion) -> _Candidate:
+        return _Candidate(motion, conditioning(motion, self.base))
+
+    def cost(self, found: Conditioning) -> float:
+        return found.scaled if self.criterion == "condition" else -found.logdet
+
+    def choose(self, setting: Setting, starts: int) -> None:
+        """Choose the best random motions as starts."""
+        costs = [self.cost(candidate.conditioning) for candidate in self.drawn]
+        order = [int(k) for k in np.argsort(costs, kind="stable")[:starts]]
+        if not math.isfinite(costs[order[0]]):
+            raise DataError(
+                f"harmonics: {setting.harmonics} given, too few to tell {self.base.rank} base "
+                f"parameters of {setting.robot.name} apart; take more"
+            )
+        self.best = [self.drawn[k] for k in order]
+        self.starts = [
+            Start(k, self.drawn[k].conditioning, self.drawn[k].conditioning, False) for k in order
+        ]
+        self.running = list(range(len(order)))
+
+    def keep(self, count: int) -> None:
+        """Go on with the best starts only."""
+        self.running.sort(key=lambda k: self.cost(self.best[k].conditioning))
+        self.running = self.running[:count]
+
+    def improve(self, setting: Setting, plan: Round, seconds: float, workers: int) -> None:
+        """Do a round on the running starts, in so many seconds."""
+        workers = min(workers, len(self.running))
+        each = seconds / math.ceil(len(self.running) / workers)
+        if each <= 0.0:
+            return
+        tasks = [Task(k, setting, self.best[k].motion, plan, each) for k in self.running]
+        reports = here(tasks) if workers == 1 else in_processes(tasks, workers)
+        seen = self.seen
+        share = {task.number: 0.0 for task in tasks}
+        weight = (1.0 - seen) if plan.exchanges else _FIRST * (1.0 - seen)
+        with closing(reports):
+            for number, stage in reports:
+                if stage is None:
+                    share[number] = 1.0
+                else:
+                    share[number] += 1.0 / (plan.stages + 1)
+                    self.take(number, stage, plan)
+                self.report(seen + weight * sum(share.values()) / len(share))
+
+    def report(self, share: float) -> None:
+        self.seen = share
+        self.progress(share)
+
+    def take(self, number: int, stage: Stage, plan: Round) -> None:
+        if stage.last and plan.exchanges:
+            self.starts[number] = replace(self.starts[number], finished=True)
+        if stage.coefficients is None:
+            return
+        found = self.judged(self.best[number].motion.with_coefficients(stage.coefficients))
+        if self.cost(found.conditioning) < self.cost(self.best[number].conditioning):
+            self.best[number] = found
+            self.starts[number] = replace(self.starts[number], after=found.conditioning)
+
+    def result(self, limits: Limits, seed: int, seconds: float, interrupted: bool) -> Excitation:
+        def least(candidates: list[_Candidate]) -> _Candidate:
+            return min(candidates, key=lambda candidate: self.cost(candidate.conditioning))
+
+        random = least(self.drawn)
+        best = least([*self.best, random])
+        return Excitation(
+            best.motion,
+            limits,
+            self.criterion,
+            best.conditioning,
+            random.conditioning,
+            margins(best.motion, limits),
+            tuple(self.starts),
+            len(self.drawn),
+            seed,
+            seconds,
+            interrupted,
+        )
+
+
+def _check(criterion: str, starts: int, draws: int, seconds: float, workers: int | None) -> None:
+    if criterion not in get_args(Criterion):
+        raise DataError(f'criterion: {criterion!r} is neither "condition" nor "logdet"')
+    for name, value in (("starts", starts), ("draws", draws), ("workers", workers)):
+        if value is not None and value < 1:
+            raise DataError(f"{name}: {value} given, 1 or more expected")
+    if not 0.0 < seconds < math.inf:
+        raise DataError(f"seconds: {seconds} given, a number above 0 expected")

@@ -1,0 +1,31 @@
+"""Logs: recorded motions of a machine, read from CSV and Parquet files and checked.
+
+Nothing is repaired: what cannot be a motion of the machine is refused, with its row and column, and
+what looks odd is stated as a finding.
+"""
+
+from pteron.identification.logs.description import Description, KnownPayload
+from pteron.identification.logs.description_files import (
+    find_description,
+    read_description,
+    write_description,
+)
+from pteron.identification.logs.finding import Finding
+from pteron.identification.logs.log import Log
+from pteron.identification.logs.log_file import LogFile
+from pteron.identification.logs.read import open_log, read_log
+from pteron.identification.logs.write import write_log
+
+__all__ = [
+    "Description",
+    "Finding",
+    "KnownPayload",
+    "Log",
+    "LogFile",
+    "find_description",
+    "open_log",
+    "read_description",
+    "read_log",
+    "write_description",
+    "write_log",
+]

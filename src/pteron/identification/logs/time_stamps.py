@@ -1,0 +1,106 @@
+"""The time stamps of a log, checked piece by piece: they must rise; gaps and jitter are said."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.errors import DataError
+from pteron.identification.logs.finding import Finding
+
+__all__ = ["GAP", "TimeStamps"]
+
+GAP = 1.5
+"""A step longer than this many usual ones is a gap: at least one sample is missing."""
+_JITTER = 0.01
+"""Steps that differ from the usual one by more than this part of it are uneven."""
+
+
+class TimeStamps:
+    """What has been seen of a log's time stamps.
+
+    Parameters
+    ----------
+    step : float
+        The usual step, s.
+    column : str
+        What the file calls the column.
+    source : str
+        What messages call the file.
+    """
+
+    def __init__(self, step: float, column: str, source: str) -> None:
+        self._step = step
+        self._column = column
+        self._source = source
+        self._last: float | None = None
+        self._rows = 0
+        self._gaps = 0
+        self._missing = 0
+        self._first_gap = (0, 0.0, 0.0)
+        self._uneven = 0
+        self._worst = (0.0, 0)
+
+    def take(self, time: NDArray[np.float64]) -> None:
+        """Check the next piece, in seconds.
+
+        Raises
+        ------
+        DataError
+            If a time stamp is repeated or runs backward.
+        """
+        before = time[:1] if self._last is None else np.array([self._last])
+        steps = np.diff(time, prepend=before)
+        if self._last is None:
+            steps[:1] = self._step
+        if (steps <= 0.0).any():
+            i = int(np.argmax(steps <= 0.0))
+            earlier = float(time[i - 1] if i else before[0])
+            raise DataError(self._fault(self._rows + i, earlier, float(time[i])))
+        gaps = steps > GAP * self._step
+        if gaps.any():
+            if not self._gaps:
+                i = int(np.argmax(gaps))
+                self._first_gap = (self._rows + i, float(time[i] - steps[i]), float(steps[i]))
+            self._gaps += int(gaps.sum())
+            self._missing += int(self._lost(steps[gaps]).sum())
+        deviations = np.where(gaps, 0.0, np.abs(steps - self._step))
+        self._uneven += int((deviations > _JITTER * self._step).sum())
+        worst = int(np.argmax(deviations))
+        if deviations[worst] > self._worst[0]:
+            self._worst = (float(deviations[worst]), self._rows + worst)
+        self._last = float(time[-1])
+        self._rows += len(time)
+
+    def findings(self) -> tuple[Finding, ...]:
+        """Return what was found in the pieces taken so far."""
+        found = []
+        if self._gaps:
+            row, start, step = self._first_gap
+            lost = int(self._lost(np.array([step]))[0])
+            gaps = "1 gap" if self._gaps == 1 else f"{self._gaps} gaps"
+            message = (
+                f"{self._source}: {gaps}, {self._missing} samples missing in all; the first is "
+                f"before row {row + 1}, behind t = {start:.9g} s: {lost} missing (a step of "
+                f"{step:.6g} s where {self._step:.6g} s is usual)"
+            )
+            found.append(Finding("gap", message, row + 1, self._column, self._gaps))
+        if self._uneven:
+            worst, row = self._worst
+            message = (
+                f"{self._source}: {self._uneven} time steps differ from the usual "
+                f"{self._step:.6g} s by over {_JITTER:.0%}; the worst, at row {row + 1}, by "
+                f"{worst / self._step:.1%} ({worst:.3g} s)"
+            )
+            found.append(Finding("jitter", message, row + 1, self._column, self._uneven))
+        return tuple(found)
+
+    def _lost(self, steps: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.maximum(np.rint(steps / self._step) - 1.0, 1.0)
+
+    def _fault(self, row: int, earlier: float, later: float) -> str:
+        what = "is repeated" if later == earlier else "runs backward"
+        return (
+            f"{self._source}: row {row + 1}, column {self._column}: time {what} ({later:.12g} s "
+            f"behind {earlier:.12g} s); put the rows in order, each with its own time"
+        )

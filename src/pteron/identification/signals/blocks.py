@@ -1,0 +1,78 @@
+"""A log cut into overlapping blocks, so that filters run through it in bounded memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from pteron.identification.logs import Log
+
+__all__ = ["blocks"]
+
+_GAP = 1.5
+"""Steps of time between two samples that miss none; beyond it a new stretch begins."""
+
+
+def blocks(pieces: Iterable[Log], margin: int, size: int, rate: float) -> Iterator[Log]:
+    """Yield overlapping blocks of a log, of at most `size` + 2 `margin` rows.
+
+    Without their margins they tile each stretch of the log that has no gap and one payload, except
+    its first and last `margin` rows: a filter's edges are dropped, never bridged. Shorter stretches
+    yield nothing.
+
+    Parameters
+    ----------
+    pieces : iterable of Log
+        The log, or its parts in order.
+    margin, size : int
+        Rows.
+    rate : float
+        Samples per second.
+    """
+    held: Log | None = None
+    for piece in pieces:
+        for stretch in _stretches(piece):
+            if held is not None and not _continues(held, stretch, rate):
+                yield from _rest(held, margin)
+                held = None
+            held = stretch if held is None else _joined(held, stretch)
+            while held.rows >= size + 2 * margin:
+                yield held.part(0, size + 2 * margin)
+                held = held.part(size, held.rows)
+    if held is not None:
+        yield from _rest(held, margin)
+
+
+def _rest(held: Log, margin: int) -> Iterator[Log]:
+    if held.rows > 2 * margin:
+        yield held
+
+
+def _stretches(piece: Log) -> Iterator[Log]:
+    """Yield the parts of a piece between gaps and changes of the payload."""
+    for segment in piece.segments:
+        edges = [segment.start, segment.stop]
+        if piece.payload is not None:
+            changes = np.flatnonzero(np.diff(piece.payload[segment])) + 1 + segment.start
+            edges[1:1] = changes.tolist()
+        for start, stop in zip(edges[:-1], edges[1:], strict=True):
+            yield piece.part(start, stop)
+
+
+def _continues(held: Log, following: Log, rate: float) -> bool:
+    step = float(following.time[0] - held.time[-1])
+    same = held.payload is None or (
+        following.payload is not None and held.payload[-1] == following.payload[0]
+    )
+    return same and step * rate <= _GAP
+
+
+def _joined(first: Log, second: Log) -> Log:
+    def both(name: str) -> np.ndarray | None:
+        one, other = getattr(first, name), getattr(second, name)
+        return None if one is None or other is None else np.concatenate([one, other])
+
+    names = ("time", "sliders", "forces", "pose", "payload")
+    return replace(first, **{name: both(name) for name in names})

@@ -1,0 +1,131 @@
+"""States of the machine at the samples of a log."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.errors import DataError
+from pteron.kernels import Array, numeric
+from pteron.kinematics import direct_kinematics
+from pteron.manipulator import Manipulator
+
+__all__ = ["States"]
+
+_LEAST_SINE = 1e-3
+_LEAST_REGULARITY = 1e-3
+"""Next to a singularity the regressor grows without bound, and with it every error."""
+
+
+@dataclass(frozen=True)
+class States:
+    """States at R samples: of the sliders, where they were measured, and of the platform.
+
+    Attributes
+    ----------
+    time : array, shape (R,)
+        s.
+    sliders, slider_rates, slider_accelerations : array, shape (R, n)
+        m and s.
+    pose, velocity, acceleration : array, shape (R, m)
+        m, rad and s.
+    payload : array of int, shape (R,)
+        The phase: 0 without payload.
+    """
+
+    time: Array
+    sliders: Array
+    slider_rates: Array
+    slider_accelerations: Array
+    pose: Array
+    velocity: Array
+    acceleration: Array
+    payload: NDArray[np.int64]
+
+    @classmethod
+    def of_sliders(
+        cls,
+        robot: Manipulator,
+        motion: tuple[Array, Array, Array],
+        time: Array,
+        mode: int,
+        *,
+        payload: NDArray[np.int64] | None = None,
+        source: str = "sliders",
+        first_row: int = 0,
+    ) -> States:
+        """Return the states of sliders that move so: rho = J x inverted, and differentiated twice.
+
+        Parameters
+        ----------
+        robot : Manipulator
+            The machine.
+        motion : tuple of array, shape (R, n)
+            Slider coordinates, rates and accelerations.
+        time : array, shape (R,)
+            s.
+        mode : int
+            The assembly mode, from 0.
+        payload : array of int, shape (R,), optional
+            The phase.
+        source : str
+            What messages call the log.
+        first_row : int
+            The row of the first sample in it, from 0.
+
+        Raises
+        ------
+        DataError
+            If no pose has the sliders of a sample, or if it is next to a singularity; the message
+            names the row.
+        """
+        sliders, rates, accelerations = motion
+        pose = np.ascontiguousarray(direct_kinematics(robot, sliders)[:, mode])
+        lost = np.isnan(pose).any(axis=-1)
+        if lost.any():
+            raise DataError(_no_pose(robot, sliders, lost, mode, source, first_row))
+        _check_regular(robot, pose, source, first_row)
+        velocity, acceleration = numeric(robot, "platform_motion")(pose, rates, accelerations)
+        phases = np.zeros(len(time), dtype=np.int64) if payload is None else payload
+        return cls(time, sliders, rates, accelerations, pose, velocity, acceleration, phases)
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def part(self, rows: slice) -> States:
+        """Return some of the samples."""
+        return replace(self, **{name: value[rows] for name, value in vars(self).items()})
+
+
+def _no_pose(
+    robot: Manipulator, sliders: Array, lost: Array, mode: int, source: str, first_row: int
+) -> str:
+    row = int(np.argmax(lost))
+    count = int(lost.sum())
+    values = ", ".join(f"{value:.4f}" for value in sliders[row])
+    others = direct_kinematics(robot, sliders[lost])
+    hint = "is it the log of another machine, or are its sliders counted from other zeros?"
+    if others.shape[-2] > 1 and not np.isnan(others[:, 1 - mode]).any():
+        hint = f"assembly mode {2 - mode} has one: declare it in the log's description"
+    more = f", nor those of {count - 1} more rows" if count > 1 else ""
+    return (
+        f"{source}: row {first_row + row + 1}: no pose of {robot.name} has the sliders "
+        f"({values}) m{more}; {hint}"
+    )
+
+
+def _check_regular(robot: Manipulator, pose: Array, source: str, first_row: int) -> None:
+    _, _, sine = numeric(robot, "reach")(pose)
+    found = [("a leg is all but stretched or folded", sine.min(axis=-1), _LEAST_SINE)]
+    if robot.platform.turns:
+        regularity = np.abs(numeric(robot, "regularity")(pose))
+        found.append(("the orientation is all but singular", regularity, _LEAST_REGULARITY))
+    for what, size, least in found:
+        if (size < least).any():
+            row = int(np.argmax(size < least))
+            raise DataError(
+                f"{source}: row {first_row + row + 1}: {what} ({size[row]:.1e} of 1, at least "
+                f"{least:g} is needed); cut this part out of the log"
+            )

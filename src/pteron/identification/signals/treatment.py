@@ -1,0 +1,221 @@
+"""How a log is treated: what the user asked for, and what the data made of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+
+from pteron.errors import DataError
+from pteron.identification.logs import Log
+from pteron.identification.signals.assembly import assembly_mode
+from pteron.identification.signals.differences import central_differences
+from pteron.identification.signals.fourier import fitted_series
+from pteron.identification.signals.lowpass import cutoff_of, smoothed
+from pteron.identification.signals.noise import white_noise
+from pteron.identification.signals.parallel import Decimation
+from pteron.identification.signals.uniform import uniform
+from pteron.kernels import Array
+from pteron.manipulator import Manipulator
+
+__all__ = ["Derivatives", "Processing", "Treatment", "treatment_of"]
+
+Derivatives = Literal["periodic", "central", "spline"]
+
+_LARGEST_PERIODIC = 4_000_000
+"""Rows up to which a periodic log is fitted in one piece."""
+
+_LOOK = 120_000
+"""Samples from which cut-offs are found."""
+
+_POWER = 0.9999
+"""Share of the accelerations' power that says how fast a motion is."""
+
+_PRODUCTS = 10.0
+"""Forces are products of positions and accelerations, and friction has steps: they are faster than
+the motion. More rows than needed cost little."""
+
+
+@dataclass(frozen=True)
+class Processing:
+    """What a user may choose about the treatment of a log; by default the data decide.
+
+    Parameters
+    ----------
+    derivatives : {"periodic", "central", "spline"}, optional
+        Fourier series over the periods (the default where the period is known), low-pass filter and
+        central differences (the default else), or a smoothing spline (the default where positions
+        have no noise but rounding: it makes least of that).
+    cutoff : float, optional
+        Of the positions' filter, Hz. By default twice what leaves white noise only.
+    band : float, optional
+        Of the parallel filter on forces and regressor, Hz. By default ten times the motion's.
+    period : float, optional
+        Of the motion, s; by default what the log's description says.
+    """
+
+    derivatives: Derivatives | None = None
+    cutoff: float | None = None
+    band: float | None = None
+    period: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.derivatives is not None and self.derivatives not in get_args(Derivatives):
+            raise DataError(
+                f"derivatives: {self.derivatives!r} is not one of "
+                f"{', '.join(get_args(Derivatives))}"
+            )
+        for name in ("cutoff", "band", "period"):
+            value = getattr(self, name)
+            if value is not None and not (np.isfinite(value) and value > 0.0):
+                raise DataError(f"{name}: {value} given, a number above 0 expected")
+
+
+@dataclass(frozen=True)
+class Treatment:
+    """How a log is treated.
+
+    Attributes
+    ----------
+    derivatives : {"periodic", "central", "spline"}
+        See `Processing`.
+    mode : int
+        The assembly mode, from 0.
+    rate : float
+        Samples per second.
+    cutoff : float or None
+        Of the positions' filter, Hz; None where they need none.
+    band : float
+        Of the parallel filter, Hz.
+    period : float or None
+        s.
+    slider_noise, force_noise : array, shape (n,)
+        Standard deviation of the white noise on sliders (m) and forces (N).
+    """
+
+    derivatives: Derivatives
+    mode: int
+    rate: float
+    cutoff: float | None
+    band: float
+    period: float | None
+    slider_noise: Array
+    force_noise: Array
+
+    @property
+    def decimation(self) -> Decimation:
+        """The parallel filter of a log that is not treated as periodic."""
+        return Decimation.to_band(self.rate, self.band)
+
+
+def treatment_of(
+    robot: Manipulator, log: Log, processing: Processing | None = None, *, rows: int | None = None
+) -> Treatment:
+    """Return how a log is to be treated.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    log : Log
+        The log, or its first part.
+    processing : Processing, optional
+        What the user wants.
+    rows : int, optional
+        Of the whole log, where `log` is only a part.
+
+    Returns
+    -------
+    Treatment
+
+    Raises
+    ------
+    DataError
+        If a frequency is beyond what the sampling allows, or there is less than one period.
+    """
+    wanted = processing or Processing()
+    head = log.part(*_longest(log))
+    # Noise and cut-offs concern samples as they came: uneven steps are noise to them.
+    time, values = uniform(head.time, np.hstack([head.sliders, head.forces]))
+    rate = (len(time) - 1) / float(time[-1] - time[0])
+    n = head.sliders.shape[1]
+    sliders, forces = values[:, :n], values[:, n:]
+    period = wanted.period or log.description.period
+    derivatives = wanted.derivatives or _derivatives(period, rows or log.rows)
+    if derivatives == "periodic":
+        _check_period(log, period)
+    _check_frequencies(wanted, rate)
+    cutoff = wanted.cutoff or cutoff_of(sliders, rate)
+    if wanted.derivatives is None and derivatives == "central" and cutoff is None:
+        derivatives = "spline"
+    if derivatives == "periodic" and period is not None:
+        series = fitted_series(log.time, log.sliders, period)
+        power = (np.arange(1, series.harmonics + 1) ** 4)[:, None] * (
+            series.coefficients[1::2] ** 2 + series.coefficients[2::2] ** 2
+        )
+        frequencies = np.arange(1, series.harmonics + 1) / period
+        cutoff = float(frequencies[-1])
+    else:
+        frequencies, power = _acceleration_power(sliders, rate, cutoff)
+    band = wanted.band or min(_PRODUCTS * _edge(frequencies, power), rate / 2.0)
+    if wanted.band is None and cutoff is not None and derivatives != "periodic":
+        band = min(band, cutoff)
+    return Treatment(
+        derivatives=derivatives,
+        mode=assembly_mode(robot, log),
+        rate=rate,
+        cutoff=cutoff,
+        band=float(band),
+        period=period,
+        slider_noise=white_noise(sliders),
+        force_noise=white_noise(forces),
+    )
+
+
+def _derivatives(period: float | None, rows: int) -> Derivatives:
+    return "periodic" if period is not None and rows <= _LARGEST_PERIODIC else "central"
+
+
+def _longest(log: Log) -> tuple[int, int]:
+    """Return where the longest part without a gap begins and ends, cut to a usual length."""
+    longest = max(log.segments, key=lambda part: part.stop - part.start)
+    return longest.start, min(longest.stop, longest.start + _LOOK)
+
+
+def _check_period(log: Log, period: float | None) -> None:
+    if period is None:
+        raise DataError(
+            f'{log.source}: derivatives "periodic" needs the period; declare it under [motion] in '
+            "the log's description, or give period"
+        )
+    if log.duration < period * (1.0 - 1e-3):
+        raise DataError(
+            f"{log.source}: lasts {log.duration:g} s, less than its period of {period:g} s; "
+            'record a whole period, or choose derivatives "central"'
+        )
+
+
+def _check_frequencies(wanted: Processing, rate: float) -> None:
+    for name in ("cutoff", "band"):
+        value = getattr(wanted, name)
+        if value is not None and value >= rate / 2.0:
+            raise DataError(
+                f"{name}: {value:g} Hz given; the log has {rate:g} samples a second, so that it "
+                f"must be below {rate / 2.0:g} Hz"
+            )
+
+
+def _acceleration_power(sliders: Array, rate: float, cutoff: float | None) -> tuple[Array, Array]:
+    smooth = sliders if cutoff is None else smoothed(sliders, rate, cutoff)
+    _, accelerations = central_differences(smooth, rate)
+    window = np.hanning(len(accelerations))[:, None]
+    power = np.abs(np.fft.rfft(window * accelerations, axis=0)) ** 2
+    return np.fft.rfftfreq(len(accelerations), 1.0 / rate), power
+
+
+def _edge(frequencies: Array, power: Array) -> float:
+    """Return the frequency below which nearly all the power of every slider is."""
+    share = np.cumsum(power, axis=0) / np.maximum(power.sum(axis=0), np.finfo(float).tiny)
+    last = int((share < _POWER).sum(axis=0).max())
+    return float(frequencies[min(last, len(frequencies) - 1)])

@@ -1,0 +1,514 @@
+"""Exciting trajectories: the motions, their limits, the search, and what is written."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import polars as pl
+import pytest
+from mechanisms import CATALOG, random_machine, with_elbows
+from typer.testing import CliRunner
+
+import pteron
+from pteron.cli.main import app
+from pteron.identification.excitation import (
+    Conditioning,
+    FourierMotion,
+    Limits,
+    conditioning,
+    margins,
+    optimal_excitation,
+    random_excitation,
+    scaled_condition,
+    stacked_regressor,
+)
+from pteron.identification.excitation.draws import within_limits
+from pteron.identification.excitation.limits import UNITS
+from pteron.identification.excitation.spectrum import measure
+from pteron.workspace import home_pose
+
+MACHINES = {
+    **CATALOG,
+    "quadrupteron +-+-": with_elbows(CATALOG["quadrupteron"], "+-+-"),
+    "random 3T1R": random_machine(0, True),
+    "random 3T": random_machine(0, False),
+}
+PLAIN = {"COLUMNS": "100", "NO_COLOR": "1", "FORCE_COLOR": None, "TTY_COMPATIBLE": None}
+
+each_machine = pytest.mark.parametrize("name", MACHINES)
+each_space = pytest.mark.parametrize("space", ["platform", "sliders"])
+
+
+@lru_cache(maxsize=64)
+def drawn(name: str, space: str, seed: int = 1) -> FourierMotion:
+    return random_excitation(MACHINES[name], space=space, harmonics=2, period=4.0, seed=seed)
+
+
+@lru_cache(maxsize=8)
+def small(criterion: str = "condition", space: str = "platform", robot: str = "tripteron"):
+    """Return a search small enough for a test."""
+    return optimal_excitation(
+        CATALOG[robot],
+        space=space,
+        harmonics=2,
+        period=4.0,
+        criterion=criterion,
+        starts=2,
+        draws=6,
+        workers=1,
+    )
+
+
+# The motions
+
+
+@each_space
+@each_machine
+def test_derivatives_are_those_of_finite_differences(name: str, space: str):
+    motion = drawn(name, space)
+    time = np.linspace(0.1, 3.7, 9)
+    step = 1e-4
+    before, now, after = (motion.at(time + k * step) for k in (-1, 0, 1))
+    for value, rate in (("pose", "velocity"), ("velocity", "acceleration")):
+        found = (getattr(after, value) - getattr(before, value)) / (2.0 * step)
+        assert found == pytest.approx(getattr(now, rate), abs=1e-5)
+    sliders = [motion.sliders(time + k * step) for k in (-1, 0, 1)]
+    for k in (0, 1):
+        found = (sliders[2][k] - sliders[0][k]) / (2.0 * step)
+        assert found == pytest.approx(sliders[1][k + 1], abs=1e-5)
+
+
+@each_space
+@each_machine
+def test_platform_and_sliders_are_one_motion(name: str, space: str):
+    robot, motion = MACHINES[name], drawn(name, space)
+    time = np.linspace(0.0, 4.0, 23)
+    state, (rho, drho, ddrho) = motion.at(time), motion.sliders(time)
+    assert pteron.inverse_kinematics(robot, state.pose) == pytest.approx(rho, abs=1e-12)
+    rates, seconds = pteron.joint_rates(robot, state.pose, state.velocity, state.acceleration)
+    assert rates.sliders == pytest.approx(drho, abs=1e-11)
+    assert seconds.sliders == pytest.approx(ddrho, abs=1e-10)
+
+
+@each_space
+def test_the_motion_is_periodic(space: str):
+    motion = drawn("quadrupteron", space)
+    one, next_one = motion.at(np.array([0.3, 1.0])), motion.at(np.array([4.3, 13.0]))
+    assert one.pose == pytest.approx(next_one.pose, abs=1e-12)
+    assert one.acceleration == pytest.approx(next_one.acceleration, abs=1e-11)
+
+
+def test_the_other_assembly_mode_is_another_motion_of_the_same_sliders():
+    motion = drawn("quadrupteron", "sliders")
+    other = replace(motion, mode=1 - motion.mode)
+    time = np.array([0.2, 1.4])
+    assert motion.sliders(time)[0] == pytest.approx(other.sliders(time)[0])
+    assert np.abs(motion.at(time).pose - other.at(time).pose).max() > 1.0
+
+
+def test_the_angle_does_not_jump_where_home_is_at_half_a_turn():
+    robot = CATALOG["quadrupteron"]
+    legs = tuple(
+        replace(leg, platform_point=tuple(-x for x in leg.platform_point)) for leg in robot.legs
+    )
+    robot = replace(robot, legs=legs)
+    assert abs(home_pose(robot)[3]) == pytest.approx(np.pi)
+    motion = random_excitation(robot, space="sliders", harmonics=2, seed=3)
+    angle = motion.at(motion.uniform_times(2000)).pose[:, 3]
+    assert np.abs(np.diff(angle)).max() < 0.05
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"space": "joints"}, "space: 'joints'"),
+        ({"period": 0.0}, "period: 0.0 s"),
+        ({"sines": np.zeros((2, 3))}, "same number of harmonics"),
+        ({"center": np.zeros(4)}, "center"),
+        ({"cosines": np.zeros((0, 3)), "sines": np.zeros((0, 3))}, "at least one"),
+    ],
+)
+def test_a_motion_that_is_none_is_refused(changes: dict, words: str):
+    good = {
+        "robot": CATALOG["tripteron"],
+        "space": "platform",
+        "period": 1.0,
+        "center": np.zeros(3),
+        "cosines": np.zeros((1, 3)),
+        "sines": np.zeros((1, 3)),
+    }
+    with pytest.raises(pteron.DataError, match=words):
+        FourierMotion(**(good | changes))
+
+
+def test_sliders_without_a_pose_are_refused_with_the_time():
+    motion = drawn("quadrupteron", "sliders")
+    wild = motion.with_coefficients(100.0 * motion.coefficients)
+    with pytest.raises(pteron.UnreachablePose, match=r"time .* s: no pose"):
+        wild.at(np.linspace(0.0, 4.0, 50))
+
+
+# The limits
+
+
+@each_space
+@each_machine
+def test_random_motions_keep_the_limits_and_are_as_large_as_they_allow(name: str, space: str):
+    motion = drawn(name, space)
+    limits = Limits()
+    found = margins(motion, limits, 20_000)
+    assert found.kept
+    coefficients = motion.coefficients
+    coefficients[1:] *= 1.05
+    assert not margins(motion.with_coefficients(coefficients), limits).kept
+
+
+@each_space
+def test_margins_are_those_of_the_public_functions(space: str):
+    robot, motion = CATALOG["quadrupteron"], drawn("quadrupteron", space)
+    limits = Limits(speed=(0.5, 1.0, 1.5, 2.0), force=200.0)
+    found = margins(motion, limits)
+    assert [m.limit for m in found] == [
+        *("elbow_sine", "regularity", "slider_clearance", "speed", "acceleration", "force")
+    ]
+    state = motion.at(motion.uniform_times(4000))
+    forces = np.abs(pteron.inverse_dynamics(robot, state.pose, state.velocity, state.acceleration))
+    assert found["force"].least == pytest.approx(200.0 - forces.max(), abs=0.05)
+    speeds = np.abs(motion.sliders(state.time)[1])
+    assert found["speed"].least == pytest.approx((np.array(limits.speed) - speeds).min(), abs=1e-4)
+    force = found["force"]
+    at = motion.at(np.array([force.time]))
+    there = pteron.inverse_dynamics(robot, at.pose, at.velocity, at.acceleration)[0]
+    assert abs(there[force.leg - 1]) == pytest.approx(200.0 - force.least)
+
+
+@pytest.mark.parametrize(
+    "limits",
+    [
+        Limits(speed=0.05),
+        Limits(acceleration=(0.3, 0.2, 0.1, 0.3)),
+        Limits(elbow_sine=0.9),
+        Limits(regularity=0.97),
+        Limits(slider_clearance=0.28),
+        Limits(force=33.0),
+    ],
+)
+@each_space
+def test_every_limit_binds_when_it_is_the_tight_one(limits: Limits, space: str):
+    robot = CATALOG["quadrupteron"]
+    motion = random_excitation(robot, space=space, harmonics=2, period=4.0, limits=limits)
+    found = margins(motion, limits, 20_000)
+    tight = next(name for name in UNITS if getattr(limits, name) != getattr(Limits(), name))
+    assert found.kept
+    size = {"slider_clearance": 0.3}.get(tight, 1.0)
+    scale = getattr(limits, tight) if tight in ("speed", "force") else size
+    assert found[tight].least < 0.01 * scale
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"elbow_sine": 0.999}, "limits: elbow_sine of at least 0.999 is impossible: leg 3"),
+        ({"slider_clearance": 0.4}, "limits: slider_clearance of at least 0.4 m is impossible"),
+        ({"force": 20.0}, r"limits: force of at most 20.0 N is impossible: leg 1 .* 31.08"),
+    ],
+)
+def test_limits_that_the_machine_cannot_keep_at_rest_are_named(given: dict, words: str):
+    for search in (random_excitation, optimal_excitation):
+        with pytest.raises(pteron.ModelError, match=words) as caught:
+            search(CATALOG["quadrupteron"], limits=Limits(**given))
+        assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"speed": 0.0}, "speed 0.0 given"),
+        ({"speed": [1.0, -1.0, 1.0]}, "speed"),
+        ({"acceleration": "fast"}, "acceleration 'fast'"),
+        ({"force": float("nan")}, "force nan"),
+        ({"elbow_sine": 1.0}, "elbow_sine 1 given"),
+        ({"regularity": -0.1}, "regularity -0.1"),
+        ({"slider_clearance": -1.0}, "slider_clearance -1"),
+    ],
+)
+def test_limits_that_are_none_are_refused(given: dict, words: str):
+    with pytest.raises(pteron.DataError, match=words):
+        Limits(**given)
+
+
+def test_limits_for_another_number_of_sliders_are_refused():
+    with pytest.raises(pteron.DataError, match="3 numbers for speed, one expected or 4"):
+        random_excitation(CATALOG["quadrupteron"], limits=Limits(speed=(1.0, 1.0, 1.0)))
+
+
+def test_a_motion_beyond_its_limits_is_shrunk_about_its_center_until_it_keeps_them():
+    motion = drawn("tripteron", "platform")
+    coefficients = motion.coefficients
+    coefficients[1:] *= 1.5
+    found = within_limits(motion.with_coefficients(coefficients), Limits())
+    assert found.center == pytest.approx(motion.center)
+    assert found.coefficients[1:] == pytest.approx(motion.coefficients[1:], rel=0.02)
+    assert margins(found, Limits(), 20_000).kept
+
+
+# How good a motion is
+
+
+def test_the_scaled_condition_number_does_not_depend_on_units():
+    matrix = np.random.default_rng(0).normal(size=(40, 5))
+    assert scaled_condition(matrix * 10.0 ** np.arange(5)) == pytest.approx(
+        scaled_condition(matrix)
+    )
+    assert scaled_condition(np.eye(4)) == 1.0
+    assert scaled_condition(np.ones((4, 2))) == np.inf
+    assert scaled_condition(np.diag([1.0, 0.0])) == np.inf
+
+
+def test_conditioning_is_that_of_the_stacked_regressor():
+    motion = drawn("quadrupteron", "sliders")
+    base = pteron.base_parameters(motion.robot)
+    found = conditioning(motion, base, 120)
+    matrix = stacked_regressor(motion, base, motion.uniform_times(120))
+    state = motion.at(motion.uniform_times(120))
+    forces = pteron.inverse_dynamics(motion.robot, state.pose, state.velocity, state.acceleration)
+    assert matrix @ base.values() == pytest.approx(forces.ravel(), abs=1e-9)
+    assert found.scaled == pytest.approx(scaled_condition(matrix), rel=1e-8)
+    assert found.unscaled == pytest.approx(np.linalg.cond(matrix), rel=1e-8)
+    assert found.nominal == pytest.approx(np.linalg.cond(matrix * base.values()), rel=1e-8)
+    information = matrix.T @ matrix / 120
+    assert found.logdet == pytest.approx(np.linalg.slogdet(information)[1], abs=1e-6)
+
+
+@pytest.mark.parametrize("doublings", [0, 2, 4])
+def test_the_measure_is_above_the_condition_number_by_no_more_than_it_says(doublings: int):
+    matrix = np.random.default_rng(1).normal(size=(30, 6)) * 10.0 ** np.arange(6)
+    symbol = ca.MX.sym("M", 6, 6)
+    value = measure(symbol, "condition", doublings)
+    function = ca.Function("f", [symbol], [value, ca.gradient(value, symbol)])
+    found, gradient = (np.array(x) for x in function(matrix.T @ matrix))
+    exact = np.log(scaled_condition(matrix))
+    assert exact <= found.item() <= exact + np.log(6) / 2**doublings
+    step = 1e-6 * matrix.T @ matrix * np.random.default_rng(2).normal(size=(6, 6))
+    step = step + step.T
+    both = [float(function(matrix.T @ matrix + s * step)[0]) for s in (1.0, -1.0)]
+    assert 0.5 * (both[0] - both[1]) == pytest.approx((gradient * step).sum(), rel=1e-5)
+
+
+def test_the_measure_of_the_volume_is_the_log_det():
+    matrix = np.random.default_rng(1).normal(size=(30, 6)) * 10.0 ** np.arange(6)
+    found = ca.evalf(measure(ca.MX(ca.DM(matrix.T @ matrix)), "logdet", 0))
+    assert float(found) == pytest.approx(-np.linalg.slogdet(matrix.T @ matrix)[1] / 6)
+
+
+# The search
+
+
+@pytest.mark.parametrize(
+    ("robot", "space", "gain"),
+    [("tripteron", "platform", 2.0), ("tripteron", "sliders", 2.0), ("quadrupteron", "sliders", 3)],
+)
+def test_the_search_finds_better_than_random_and_keeps_every_limit(robot, space, gain):
+    found = small("condition", space, robot)
+    assert found.gain > gain
+    assert found.margins.kept
+    assert margins(found.motion, found.limits, 40_000).kept
+    assert found.conditioning == conditioning(found.motion, pteron.base_parameters(CATALOG[robot]))
+    assert found.draws == 6
+    for start in found.starts:
+        assert start.after.scaled <= start.before.scaled
+    assert min(s.after.scaled for s in found.starts) == found.conditioning.scaled
+    assert any(start.finished for start in found.starts)
+
+
+def test_the_other_criterion_makes_the_volume_smaller():
+    found = small("logdet")
+    assert found.conditioning.logdet > found.random.logdet + 1.0
+    assert found.conditioning.logdet >= small().conditioning.logdet
+    assert found.margins.kept
+
+
+def test_a_search_with_force_and_slider_limits_keeps_them():
+    limits = Limits(speed=0.3, acceleration=1.5, force=(60.0, 20.0, 20.0, 20.0))
+    found = optimal_excitation(
+        CATALOG["quadrupteron"],
+        harmonics=2,
+        period=4.0,
+        limits=limits,
+        starts=1,
+        draws=3,
+        workers=1,
+    )
+    assert found.gain > 1.2
+    assert margins(found.motion, limits, 40_000).kept
+
+
+def test_processes_find_the_same_as_this_one_and_so_does_the_seed_again():
+    again = optimal_excitation(
+        CATALOG["tripteron"], harmonics=2, period=4.0, starts=2, draws=6, workers=2
+    )
+    assert again.motion.coefficients == pytest.approx(small().motion.coefficients, abs=1e-9)
+    assert [s.draw for s in again.starts] == [s.draw for s in small().starts]
+    other = random_excitation(CATALOG["tripteron"], harmonics=2, seed=1)
+    same = random_excitation(CATALOG["tripteron"], harmonics=2, seed=1)
+    assert (other.coefficients == same.coefficients).all()
+
+
+@pytest.mark.parametrize("share", [0.02, 0.3, 0.8])
+def test_an_interrupt_keeps_the_best_until_then(share: float):
+    seen = []
+
+    def progress(done: float) -> None:
+        seen.append(done)
+        if done >= share:
+            raise KeyboardInterrupt
+
+    found = optimal_excitation(
+        CATALOG["tripteron"],
+        harmonics=2,
+        period=4.0,
+        starts=2,
+        draws=6,
+        workers=1,
+        progress=progress,
+    )
+    assert found.interrupted
+    assert found.margins.kept
+    assert found.conditioning.scaled <= found.random.scaled
+    assert (found.gain > 1.5) == (share > 0.1)
+    assert seen == sorted(seen)
+
+
+def test_time_cuts_the_search_and_a_result_is_there_all_the_same():
+    found = optimal_excitation(CATALOG["quadrupteron"], seconds=0.5, draws=50, workers=1)
+    assert found.seconds < 10.0
+    assert 1 <= found.draws <= 50
+    assert found.margins.kept
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"criterion": "trace"}, "criterion: 'trace'"),
+        ({"starts": 0}, "starts: 0"),
+        ({"draws": 0}, "draws: 0"),
+        ({"workers": 0}, "workers: 0"),
+        ({"seconds": -1.0}, "seconds: -1"),
+        ({"harmonics": 0}, "harmonics: 0"),
+        ({"space": "joints"}, "space: 'joints'"),
+    ],
+)
+def test_what_the_search_cannot_do_is_refused(given: dict, words: str):
+    with pytest.raises(pteron.DataError, match=words):
+        optimal_excitation(CATALOG["tripteron"], **given)
+
+
+# What is written
+
+
+def test_the_table_for_the_controller(tmp_path: Path):
+    found = small("condition", "sliders", "quadrupteron")
+    robot = found.motion.robot
+    path = found.write_csv(tmp_path / "motion.csv", rate=50.0, periods=2)
+    frame = pl.read_csv(path)
+    legs, pose = range(1, 5), robot.coordinates
+    assert frame.columns == [
+        "t",
+        *(f"rho{i}" for i in legs),
+        *pose,
+        *(f"drho{i}" for i in legs),
+        *(f"ddrho{i}" for i in legs),
+        *(f"d{c}" for c in pose),
+        *(f"dd{c}" for c in pose),
+        *(f"force{i}" for i in legs),
+    ]
+    assert len(frame) == 400
+    assert frame["t"].to_numpy() == pytest.approx(np.arange(400) / 50.0)
+    state = [frame.select([f"{d}{c}" for c in pose]).to_numpy() for d in ("", "d", "dd")]
+    forces = frame.select([f"force{i}" for i in legs]).to_numpy()
+    assert pteron.inverse_dynamics(robot, *state) == pytest.approx(forces)
+    rho = frame.select([f"rho{i}" for i in legs]).to_numpy()
+    assert pteron.inverse_kinematics(robot, state[0]) == pytest.approx(rho)
+    assert rho[:200] == pytest.approx(rho[200:])
+    text = tomllib.loads(found.write_toml(tmp_path / "motion.toml").read_text())
+    assert text["motion"] == {"period": 4.0, "harmonics": 2, "assembly_mode": 1}
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [({"rate": 0.0}, "rate: 0"), ({"periods": 0}, "periods: 0"), ({"rate": 0.01}, "0 samples")],
+)
+def test_a_table_without_samples_is_refused(given: dict, words: str, tmp_path: Path):
+    with pytest.raises(pteron.DataError, match=words):
+        small().write_csv(tmp_path / "motion.csv", **given)
+    assert not list(tmp_path.iterdir())
+
+
+def run(line: str):
+    return CliRunner(env=PLAIN).invoke(app, line.split())
+
+
+QUICK = "--harmonics 2 --period 4 --starts 1 --draws 4 --workers 1"
+
+
+def test_the_command_writes_both_files_and_a_table(tmp_path: Path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = run(f"excite tripteron {QUICK} --out motion.csv --rate 100")
+    assert (result.exit_code, result.stderr) == (0, "")
+    for words in ("best of 4 random", "of length 1", "elbow sine", "speed (m/s)", "motion.toml"):
+        assert words in result.stdout
+    assert len(pl.read_csv("motion.csv")) == 400
+    assert tomllib.loads(Path("motion.toml").read_text())["motion"]["period"] == 4.0
+
+
+def test_the_command_prints_json(tmp_path: Path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = run(f"excite quadrupteron {QUICK} --space sliders --seconds 2 --elbows +-+- --json")
+    assert (result.exit_code, result.stderr) == (0, "")
+    found = json.loads(result.stdout)
+    assert found["conditioning"]["scaled"] <= found["random"]["scaled"]
+    assert np.shape(found["motion"]["cosines"]) == (2, 4)
+    assert found["limits"]["elbow_sine"] == 0.25
+    assert all(margin["least"] >= 0.0 for margin in found["margins"])
+    assert found["files"] == []
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("excite tripteron --out there/motion.csv", "no folder there"),
+        ("excite tripteron --out motion.txt", "unknown ending"),
+        ("excite tripteron --elbow-sine 0.9999", "elbow_sine of at least 0.9999 is impossible"),
+        ("excite tripteron --speed -1", "speed -1"),
+        ("excite tripteron --rate 0", "rate: 0"),
+        ("excite tripteron --space joints", "'joints' is not one of"),
+    ],
+)
+def test_the_command_refuses_in_one_line(line: str, words: str, tmp_path: Path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = run(line)
+    assert result.exit_code == 2
+    assert words in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_help_has_an_example_in_60_columns():
+    result = CliRunner(env=PLAIN | {"COLUMNS": "60"}).invoke(app, ["excite", "--help"])
+    assert "pteron excite quadrupteron --out exciting.csv" in result.stdout
+    assert max(map(len, result.stdout.splitlines())) <= 60
+
+
+def test_worst_is_the_answer_where_the_machine_cannot_be():
+    motion = drawn("quadrupteron", "sliders")
+    wild = motion.with_coefficients(100.0 * motion.coefficients)
+    base = pteron.base_parameters(motion.robot)
+    assert conditioning(wild, base) == Conditioning(np.inf, np.inf, np.inf, -np.inf)
+    assert not margins(wild, Limits()).kept

@@ -1,0 +1,596 @@
+"""Logs of motions: what is read, what is refused, what is found, whole and in pieces."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+from mechanisms import CATALOG
+
+from pteron.errors import DataError, OutputError
+from pteron.identification.logs import (
+    Description,
+    KnownPayload,
+    Log,
+    find_description,
+    open_log,
+    read_description,
+    read_log,
+    write_description,
+    write_log,
+)
+
+QUADRUPTERON = CATALOG["quadrupteron"]
+TRIPTERON = CATALOG["tripteron"]
+STEP = 1e-3
+
+
+def motion(robot=QUADRUPTERON, rows=500, seed=0, *, pose=True, payload=True) -> Log:
+    """Return a log whose numbers have all their digits."""
+    rng = np.random.default_rng(seed)
+    n = robot.freedom
+    time = np.arange(rows) * STEP
+    wave = np.sin(np.outer(time, rng.uniform(40.0, 90.0, n)) + rng.uniform(0, 6, n))
+    return Log(
+        "made",
+        time,
+        0.06 * wave + 1e-6 * rng.normal(size=(rows, n)),
+        20.0 * wave + rng.normal(size=(rows, n)),
+        pose=rng.uniform(-0.1, 0.1, (rows, n)) if pose else None,
+        payload=(np.arange(rows) >= rows // 2).astype(np.int64) if payload else None,
+    )
+
+
+def columns(log: Log) -> dict[str, np.ndarray]:
+    n = log.sliders.shape[1]
+    return (
+        {"t": log.time.copy()}
+        | {f"rho{j + 1}": log.sliders[:, j].copy() for j in range(n)}
+        | {f"force{j + 1}": log.forces[:, j].copy() for j in range(n)}
+    )
+
+
+def saved(folder: Path, given: dict[str, object], name: str = "motion.csv", toml: str = "") -> Path:
+    path = folder / name
+    frame = pl.DataFrame(given)
+    frame.write_csv(path) if path.suffix == ".csv" else frame.write_parquet(path)
+    if toml:
+        path.with_suffix(".toml").write_text(toml, encoding="utf-8")
+    return path
+
+
+def renamed(given: dict[str, np.ndarray], names: dict[str, str]) -> dict[str, np.ndarray]:
+    return {names.get(key, key): value for key, value in given.items()}
+
+
+def assert_same(one: Log, other: Log) -> None:
+    for key in ("time", "sliders", "forces", "pose", "payload"):
+        a, b = getattr(one, key), getattr(other, key)
+        assert (a is None) == (b is None), key
+        if a is not None:
+            np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize("ending", [".csv", ".parquet"])
+@pytest.mark.parametrize("robot", [QUADRUPTERON, TRIPTERON], ids=["quadrupteron", "tripteron"])
+@pytest.mark.parametrize("extras", [True, False], ids=["pose and payload", "bare"])
+def test_a_log_written_is_read_back_bit_for_bit(tmp_path, ending, robot, extras):
+    log = motion(robot, pose=extras, payload=extras)
+    path = write_log(log, tmp_path / f"motion{ending}")
+    back = read_log(path, robot)
+    assert_same(log, back)
+    assert back.findings == ()
+    assert back.source == str(path)
+    assert back.rate == pytest.approx(1000.0)
+    assert back.duration == log.time[-1]
+    assert back.payload is None or back.payload.dtype == np.int64
+
+
+@pytest.mark.parametrize("unit", ["A", "V", "%"])
+def test_forces_in_a_drives_unit_are_written_with_it(tmp_path, unit):
+    log = replace(motion(), description=Description(column_force_unit=unit))
+    back = read_log(write_log(log, tmp_path / "motion.csv"), QUADRUPTERON)
+    assert_same(log, back)
+    assert back.description.force_unit == unit
+
+
+def test_a_log_in_a_missing_folder_is_not_written(tmp_path):
+    with pytest.raises(OutputError, match="no folder"):
+        write_log(motion(), tmp_path / "nowhere" / "motion.csv")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda text: text.replace("\n", "\r\n"),
+        lambda text: text.replace("\n", "\r"),
+        lambda text: "\ufeff" + text,
+        lambda text: text.replace("\n", "\n\n"),
+        lambda text: "\n \n" + text,
+        lambda text: text.replace(",", " , "),
+        lambda text: text.rstrip("\n"),
+        lambda text: re.sub(r"([^,\n]+)", r'"\1"', text),
+        lambda text: text.replace("\n", ",a note\n"),
+    ],
+    ids=["crlf", "cr", "mark", "blank lines", "blank head", "blanks", "no end", "quotes", "extra"],
+)
+def test_a_csv_file_is_read_however_it_was_written(tmp_path, change):
+    log = motion()
+    path = write_log(log, tmp_path / "motion.csv")
+    path.write_bytes(change(path.read_text(encoding="utf-8")).encode())
+    assert_same(log, read_log(path, QUADRUPTERON))
+
+
+@pytest.mark.parametrize("ending", [".csv", ".parquet"])
+@pytest.mark.parametrize("rows", [1, 7, 100, 499, 500, 10_000])
+def test_pieces_together_are_the_whole(tmp_path, ending, rows):
+    path = write_log(motion(), tmp_path / f"motion{ending}")
+    whole = read_log(path, QUADRUPTERON)
+    done: list[int] = []
+    file = open_log(path, QUADRUPTERON)
+    pieces = list(file.pieces(rows, done.append))
+    assert sum(done) == 500
+    assert [p.first_row for p in pieces] == list(range(0, 500, rows))
+    assert file.rows_estimate == pytest.approx(500, rel=0.05)
+    for key in ("time", "sliders", "forces", "pose", "payload"):
+        together = np.concatenate([getattr(p, key) for p in pieces])
+        np.testing.assert_array_equal(together, getattr(whole, key))
+    assert pieces[-1].place(0) == whole.place(pieces[-1].first_row)
+
+
+def test_blocks_of_a_file_larger_than_one_are_joined(tmp_path, monkeypatch):
+    monkeypatch.setattr("pteron.identification.logs.csv_rows._BLOCK", 1000)
+    log = motion()
+    path = write_log(log, tmp_path / "motion.csv")
+    assert_same(log, read_log(path, QUADRUPTERON))
+    lines = path.read_text().splitlines()
+    lines[400] = lines[400].replace(lines[400].split(",")[2], "oops")
+    path.write_text("\n".join(lines))
+    message = r"row 400 \(line 401\), column rho2: 'oops' given, a number expected"
+    with pytest.raises(DataError, match=message):
+        read_log(path, QUADRUPTERON)
+
+
+def test_a_part_knows_its_rows():
+    log = motion()
+    part = log.part(100, 200).part(10, 20)
+    assert (part.rows, len(part), part.first_row) == (10, 10, 110)
+    assert part.place(0) == "made: row 111"
+    np.testing.assert_array_equal(part.forces, log.forces[110:120])
+    assert part.segments == (slice(0, 10),)
+
+
+CELLS = [("", "empty"), ("nan", "finite number expected"), ("-inf", "finite number expected")]
+
+
+@pytest.mark.parametrize(
+    ("cell", "words"), [*CELLS, ("fast", "a number expected"), ("1_0", "a nu")]
+)
+@pytest.mark.parametrize("column", ["t", "rho3", "force4"])
+def test_a_bad_cell_is_refused_with_row_line_and_column(tmp_path, cell, words, column):
+    given = columns(motion())
+    given = {key: [repr(float(v)) for v in values] for key, values in given.items()}
+    given[column][17] = cell
+    path = saved(tmp_path, given)
+    message = rf"motion\.csv: row 18 \(line 19\), column {column}: .*{words}"
+    with pytest.raises(DataError, match=message):
+        read_log(path, QUADRUPTERON)
+
+
+@pytest.mark.parametrize("value", [None, np.nan, np.inf])
+def test_a_bad_cell_of_a_parquet_file_is_refused(tmp_path, value):
+    given = columns(motion())
+    given["rho3"] = pl.Series([*given["rho3"][:17], value, *given["rho3"][18:]])
+    path = saved(tmp_path, given, "motion.parquet")
+    with pytest.raises(DataError, match=r"motion\.parquet: row 18, column rho3: "):
+        read_log(path, QUADRUPTERON)
+
+
+def test_text_in_a_parquet_file_is_refused(tmp_path):
+    given = columns(motion()) | {"rho3": ["far"] * 500}
+    path = saved(tmp_path, given, "motion.parquet")
+    with pytest.raises(DataError, match="column rho3 holds String; numbers were expected"):
+        read_log(path, QUADRUPTERON)
+
+
+def test_a_ragged_row_is_refused_though_its_end_is_not_needed(tmp_path):
+    path = saved(tmp_path, columns(motion()) | {"v": np.zeros(500), "w": np.zeros(500)})
+    lines = path.read_text().splitlines()
+    lines[30] = lines[30].partition(",")[2]
+    path.write_text("\n".join(lines))
+    with pytest.raises(
+        DataError, match=r"row 30 \(line 31\) has 10 cells, but the header names 11"
+    ):
+        read_log(path, QUADRUPTERON)
+
+
+@pytest.mark.parametrize("ending", [".csv", ".parquet"])
+@pytest.mark.parametrize("rows", [0, 3, 49])
+def test_too_few_rows_are_refused(tmp_path, ending, rows):
+    path = write_log(motion(rows=rows), tmp_path / f"motion{ending}")
+    with pytest.raises(DataError, match=f"{rows} rows given, at least 50 expected"):
+        read_log(path, QUADRUPTERON)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"t": "when"}, r"no columns for the time \(found: when, rho1.*\[time\] column"),
+        ({"rho2": "spot"}, r"the columns rho1, rho3, rho4 are for 3 sliders, but .* 4 legs"),
+        ({f"rho{j}": f"spot{j}" for j in range(1, 5)}, r"no columns for the sliders .*\[sliders\]"),
+        ({f"force{j}": f"x{j}" for j in range(1, 5)}, r"no columns for the forces .*\[forces\]"),
+        ({"force4": "effort"}, "3 forces, but the machine has 4 legs.*another machine"),
+    ],
+)
+def test_missing_columns_are_refused(tmp_path, change, words):
+    path = saved(tmp_path, renamed(columns(motion()), change))
+    with pytest.raises(DataError, match=words):
+        open_log(path, QUADRUPTERON)
+
+
+@pytest.mark.parametrize(("robot", "other"), [(QUADRUPTERON, TRIPTERON), (TRIPTERON, QUADRUPTERON)])
+def test_the_log_of_another_machine_is_refused(tmp_path, robot, other):
+    path = write_log(motion(robot), tmp_path / "motion.csv")
+    with pytest.raises(DataError, match="perhaps it is the log of another machine"):
+        open_log(path, other)
+
+
+def test_ambiguous_and_duplicate_columns_are_refused(tmp_path):
+    given = columns(motion())
+    path = saved(tmp_path, given)
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text(lines[0].replace("force4", "rho1") + "".join(lines[1:]))
+    with pytest.raises(DataError, match="two columns are called 'rho1'"):
+        open_log(path, QUADRUPTERON)
+    names = {f"rho{j}": f"q{j}" for j in range(1, 5)}
+    both = renamed(given, names) | {f"s{j}": given[f"rho{j}"] for j in range(1, 5)}
+    with pytest.raises(DataError, match="q1, s1 could each be meant for the sliders"):
+        open_log(saved(tmp_path, both), QUADRUPTERON)
+
+
+@pytest.mark.parametrize(("change", "what"), [(0.0, "is repeated"), (-0.5, "runs backward")])
+@pytest.mark.parametrize("rows", [100, 262_144])
+def test_time_that_does_not_rise_is_refused(tmp_path, change, what, rows):
+    given = columns(motion())
+    given["t"][200] = given["t"][199] + change * STEP
+    file = saved(tmp_path, given)
+    message = rf"row 201, column t: time {what} \({given['t'][200]:.12g} s behind 0\.199 s"
+    with pytest.raises(DataError, match=message):
+        list(open_log(file, QUADRUPTERON).pieces(rows))
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1e3, "mm"), (1e6, "um")])
+def test_sliders_in_another_unit_are_refused_until_it_is_declared(tmp_path, factor, unit):
+    log = motion()
+    given = columns(log)
+    for j in range(1, 5):
+        given[f"rho{j}"] *= factor
+    path = saved(tmp_path, given)
+    with pytest.raises(DataError, match=rf'row 1, column rho1: .*\[sliders\] unit = "{unit}"'):
+        read_log(path, QUADRUPTERON)
+    path.with_suffix(".toml").write_text(f'[sliders]\nunit = "{unit}"\n')
+    back = read_log(path, QUADRUPTERON)
+    np.testing.assert_allclose(back.sliders, log.sliders, rtol=1e-15)
+    assert back.findings == ()
+
+
+def test_metres_declared_to_be_millimetres_are_said(tmp_path):
+    path = saved(tmp_path, columns(motion()), toml='[sliders]\nunit = "mm"\n')
+    (finding,) = read_log(path, QUADRUPTERON).findings
+    assert finding.kind == "units"
+    assert "read as mm, travel at most" in finding.message
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1e3, "ms"), (1e6, "us")])
+def test_time_in_another_unit_is_refused_until_it_is_declared(tmp_path, factor, unit):
+    log = motion()
+    path = saved(tmp_path, columns(log) | {"t": log.time * factor})
+    with pytest.raises(DataError, match=rf'median step is .*\[time\] unit = "{unit}"'):
+        read_log(path, QUADRUPTERON)
+    path.with_suffix(".toml").write_text(f'[time]\nunit = "{unit}"\n')
+    np.testing.assert_allclose(read_log(path, QUADRUPTERON).time, log.time, rtol=1e-15)
+    path.with_suffix(".toml").write_text('[time]\nunit = "s"\n')
+    np.testing.assert_array_equal(read_log(path, QUADRUPTERON).time, log.time * factor)
+
+
+@pytest.mark.parametrize(("coordinate", "factor"), [("x", 1e3), ("phi", 180 / np.pi)])
+def test_poses_in_another_unit_are_refused(tmp_path, coordinate, factor):
+    log = motion()
+    assert log.pose is not None
+    pose = dict(zip(["x", "y", "z", "phi"], 5.0 * log.pose.T, strict=True))
+    pose[coordinate] = pose[coordinate] * factor
+    path = saved(tmp_path, columns(log) | pose)
+    with pytest.raises(DataError, match=rf"row \d+, column {coordinate}: .*\[pose\] "):
+        read_log(path, QUADRUPTERON)
+    path.with_suffix(".toml").write_text('[pose]\nlength_unit = "mm"\nangle_unit = "deg"\n')
+    back = read_log(path, QUADRUPTERON).pose
+    assert back is not None
+    scale = [1e-3, 1e-3, 1e-3, np.pi / 180]
+    np.testing.assert_allclose(back, np.column_stack(list(pose.values())) * scale, rtol=1e-14)
+
+
+@pytest.mark.parametrize("column", ["rho2", "force3"])
+@pytest.mark.parametrize("rows", [60, 262_144])
+def test_a_dead_channel_is_refused(tmp_path, column, rows):
+    path = saved(tmp_path, columns(motion()) | {column: np.full(500, 0.1)})
+    message = rf"motion\.csv: column {column} holds 0\.1 in all 500 rows: dead channel"
+    with pytest.raises(DataError, match=message):
+        list(open_log(path, QUADRUPTERON).pieces(rows))
+
+
+def test_a_phase_that_is_neither_0_nor_1_is_refused(tmp_path):
+    given = columns(motion()) | {"payload": np.r_[np.zeros(400), np.full(100, 2.0)]}
+    with pytest.raises(DataError, match=r"row 401, column payload: 2 given; 0 .*or 1"):
+        read_log(saved(tmp_path, given), QUADRUPTERON)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("motion.csv", None, "no such file"),
+        ("motion.txt", b"", "unknown ending '.txt'; a log's file ends in .csv or .parquet"),
+        ("motion.csv", b"", "is empty"),
+        ("motion.csv", b"t;rho1\n1;2\n", "separate the cells with commas"),
+        ("motion.csv", b"\xff\xfet\n", "not UTF-8"),
+        ("motion.parquet", b"t,rho1\n", "not a Parquet file"),
+    ],
+)
+def test_what_is_no_log_is_refused(tmp_path, name, content, words):
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(DataError, match=words):
+        read_log(tmp_path / name, QUADRUPTERON)
+
+
+DECLARED = """
+[time]
+column = "zeit"
+unit = "ms"
+[sliders]
+columns = ["a", "b", "c", "d"]
+unit = "mm"
+[forces]
+columns = ["e", "f", "g", "h"]
+unit = "A"
+gains = [10.0, -20, 30.0, 40.0]
+limits = [-1000.0, 1000.0]
+[pose]
+columns = ["u", "v", "w", "r"]
+length_unit = "mm"
+angle_unit = "deg"
+[payload]
+column = "load"
+mass = 0.5
+center_of_mass = [0.02, -0.01]
+inertia = 0.001
+[motion]
+period = 0.25
+assembly_mode = 2
+[drives]
+rotor_inertia = [1e-5, 1e-5, 2e-5, 2e-5]
+ratio = [300.0, 300.0, -300.0, 300.0]
+"""
+
+
+def test_declared_columns_units_and_gains_are_taken(tmp_path):
+    log = motion()
+    assert log.pose is not None
+    given = {"zeit": log.time * 1e3, "note": ["text"] * 500, "load": log.payload}
+    given |= dict(zip("abcd", 1e3 * log.sliders.T, strict=True))
+    given |= dict(zip("efgh", log.forces.T, strict=True))
+    given |= dict(zip("uvwr", (log.pose * [1e3, 1e3, 1e3, 180 / np.pi]).T, strict=True))
+    path = saved(tmp_path, given, toml=DECLARED)
+    assert find_description(path) == path.with_suffix(".toml")
+    back = read_log(path, QUADRUPTERON)
+    for key in ("time", "sliders", "pose", "payload"):
+        np.testing.assert_allclose(getattr(back, key), getattr(log, key), rtol=1e-14)
+    np.testing.assert_array_equal(back.forces, log.forces * [10.0, -20.0, 30.0, 40.0])
+    about = back.description
+    assert (about.force_unit, about.period, about.assembly_mode) == ("N", 0.25, 2)
+    assert about.payload == KnownPayload(0.5, (0.01, -0.005), 0.001)
+    assert about.ratio == (300.0, 300.0, -300.0, 300.0)
+    assert back.findings == ()
+
+
+def test_a_description_is_written_and_read_back(tmp_path):
+    path = tmp_path / "motion.toml"
+    path.write_text(DECLARED)
+    given = read_description(path)
+    assert read_description(write_description(given, tmp_path / "copy.toml")) == given
+    empty = write_description(Description(), tmp_path / "empty.toml")
+    assert read_description(empty) == Description()
+    limits = Description(limits=((-1.0, 1.0), (-2.0, 3.0)), payload=KnownPayload(1.5))
+    assert read_description(write_description(limits, path)) == limits
+
+
+def test_a_description_is_given_by_value_or_path(tmp_path):
+    log = motion()
+    path = write_log(log, tmp_path / "motion.csv")
+    other = write_description(Description(gains=(2.0,) * 4), tmp_path / "other.toml")
+    assert find_description(path) is None
+    for description in (other, str(other), read_description(other)):
+        back = read_log(path, QUADRUPTERON, description=description)
+        np.testing.assert_array_equal(back.forces, 2.0 * log.forces)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[force]\n", "force: unknown key; the valid ones there are time, sliders, forces, pose,"),
+        ("[forces]\nunits = 'N'\n", "forces.units: unknown key; .* columns, unit, gains, limits"),
+        ("[sliders]\nunit = 'cm'\n", "sliders.unit: 'cm' given; .*'m', 'mm' or 'um'"),
+        ("[forces]\ngains = [1, 'x', 1, 1]\n", r"forces.gains\[1\]: 'x' given"),
+        ("[forces]\ngains = [1, 0, 1, 1]\n", "forces.gains: one is 0"),
+        ("[forces]\ngains = [1, 2]\n", "forces.gains: 2 given, but the machine has 4 legs"),
+        ("[forces]\nlimits = [1, -1]\n", "forces.limits: 1 is not below -1"),
+        ("[forces]\nlimits = [[-1, 1], [-1, 1]]\n", "forces.limits: 2 pairs given"),
+        ("[pose]\ncolumns = ['x']\n", "pose.columns: 1 given, .*4 pose coordinates"),
+        ("[sliders]\ncolumns = ['a','b','c','d']\n", r"no column a, b, c, d, which .*\[sliders\]"),
+        ("[time]\ncolumn = 'a'\n[payload]\ncolumn = 'a'\n", "columns: 'a' is named twice"),
+        ("[motion]\nperiod = 0\n", "motion.period: 0 s given"),
+        ("[motion]\nassembly_mode = 3\n", "motion.assembly_mode: 3 given"),
+        ("[drives]\nrotor_inertia = [-1, 1, 1, 1]\n", "drives.rotor_inertia: one is below 0"),
+        ("[payload]\ninertia = 1\n", "payload.mass: missing"),
+        ("[payload]\nmass = 1\n", "only its mass is given, but the machine turns"),
+        ("[payload]\nmass = 1\ninertia = 1\n", "neither it and first_moment given"),
+        ("[payload]\nmass = 1\nfirst_moment = [1, 0]\n", "payload.inertia: missing"),
+        ("[payload]\nmass = 1\nfirst_moment = [1, 0]\ninertia = 0.5\n", "no real body"),
+        ("[payload\n", "not a TOML file"),
+    ],
+)
+def test_a_wrong_description_is_refused_with_its_key(tmp_path, text, words):
+    path = saved(tmp_path, columns(motion()), toml=text)
+    with pytest.raises(DataError, match=words) as caught:
+        open_log(path, QUADRUPTERON)
+    assert "motion.toml" in str(caught.value) or "description's" in str(caught.value)
+    assert "\n" not in str(caught.value) or "not a TOML" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("time", "slider", "force", "scales", "unit"),
+    [
+        ("time", "q{}", "F{}", (1.0, 1.0), "N"),
+        ("T", "Rho{}", "Force_{}", (1.0, 1.0), "N"),
+        ("t_ms", "rho{}_mm", "tau{}", (1e3, 1e3), "N"),
+        ("time (us)", "rho{} (um)", "I{}", (1e6, 1e6), "A"),
+        ("Time [s]", "s{} [mm]", "force{} (%)", (1.0, 1e3), "%"),
+    ],
+)
+def test_usual_variants_of_names_are_guessed_and_said(tmp_path, time, slider, force, scales, unit):
+    log = motion()
+    given = {time: log.time * scales[0]}
+    given |= {slider.format(j + 1): log.sliders[:, j] * scales[1] for j in range(4)}
+    given |= {force.format(j + 1): log.forces[:, j] for j in range(4)}
+    back = read_log(saved(tmp_path, given), QUADRUPTERON)
+    np.testing.assert_allclose(back.time, log.time, rtol=1e-15)
+    np.testing.assert_allclose(back.sliders, log.sliders, rtol=1e-15)
+    np.testing.assert_array_equal(back.forces, log.forces)
+    assert back.description.force_unit == unit
+    assert [finding.kind for finding in back.findings] == ["guessed"] * 3
+    assert slider.format(1) in back.findings[1].message
+
+
+def test_documented_currents_need_no_guess(tmp_path):
+    names = {f"force{j}": f"current{j}" for j in range(1, 5)}
+    log = read_log(saved(tmp_path, renamed(columns(motion()), names)), QUADRUPTERON)
+    assert log.description.force_unit == "A"
+    assert log.findings == ()
+
+
+def test_a_unit_declared_against_a_name_is_said(tmp_path):
+    names = {f"rho{j}": f"rho{j}_mm" for j in range(1, 5)}
+    path = saved(tmp_path, renamed(columns(motion()), names), toml='[sliders]\nunit = "m"\n')
+    kinds = [finding.kind for finding in read_log(path, QUADRUPTERON).findings]
+    assert kinds == ["guessed", "units"]
+
+
+def test_a_guessed_name_is_said_with_the_unit_declared(tmp_path):
+    log = motion()
+    names = {f"rho{j}": f"q{j}" for j in range(1, 5)}
+    given = renamed(columns(log), names)
+    given |= {name: 1e3 * given[name] for name in names.values()}
+    path = saved(tmp_path, given, toml='[sliders]\nunit = "mm"\n')
+    back = read_log(path, QUADRUPTERON)
+    np.testing.assert_allclose(back.sliders, log.sliders, rtol=1e-15)
+    (finding,) = back.findings
+    assert "q1, q2, q3, q4 taken for the slider coordinates in mm" in finding.message
+
+
+def test_guessed_poses_and_lone_coordinates_are_said(tmp_path):
+    log = motion()
+    assert log.pose is not None
+    names = ["X (mm)", "Y (mm)", "Z (mm)", "phi_deg"]
+    scaled = log.pose * [1e3, 1e3, 1e3, 180 / np.pi]
+    given = columns(log) | dict(zip(names, scaled.T, strict=True))
+    back = read_log(saved(tmp_path, given), QUADRUPTERON)
+    np.testing.assert_allclose(back.pose, log.pose, rtol=1e-14)
+    assert "mm and deg" in back.findings[0].message
+    back = read_log(saved(tmp_path, columns(log) | {"x": log.time}), QUADRUPTERON)
+    assert back.pose is None
+    assert "x alone are no pose" in back.findings[0].message
+
+
+def faulty(rows=6000) -> dict[str, np.ndarray]:
+    """Return a log with gaps, a frozen slider and clipped forces across the pieces' borders."""
+    given = columns(motion(rows=rows))
+    given["rho2"][1500:3200] = given["rho2"][1500]
+    given["rho2"][4000:5500] = given["rho2"][4000]
+    given["force1"] = np.minimum(given["force1"], 15.0)
+    given["force3"] = np.clip(given["force3"], -12.0, None)
+    given["t"][1999:] += 3 * STEP
+    given["t"][4500:] += 1 * STEP
+    given["t"][700] += 0.2 * STEP
+    return given
+
+
+def test_gaps_jitter_frozen_and_clipped_channels_are_found(tmp_path):
+    given = faulty()
+    log = read_log(saved(tmp_path, given), QUADRUPTERON)
+    found = {(finding.kind, finding.column): finding for finding in log.findings}
+    assert set(found) == {
+        ("gap", "t"),
+        ("jitter", "t"),
+        ("frozen", "rho2"),
+        ("clipped", "force1"),
+        ("clipped", "force3"),
+    }
+    gap = found["gap", "t"]
+    assert (gap.row, gap.count) == (2000, 2)
+    assert "2 gaps, 4 samples missing in all; the first is before row 2000" in gap.message
+    assert "3 missing (a step of 0.004 s where 0.001 s is usual)" in gap.message
+    jitter = found["jitter", "t"]
+    assert jitter.count == 2
+    assert jitter.row in (701, 702)
+    assert "20.0%" in jitter.message
+    frozen = found["frozen", "rho2"]
+    assert (frozen.row, frozen.count) == (1501, 2)
+    assert "in rows 1501 to 3200 while" in frozen.message
+    at_limit = given["force1"] == 15.0
+    assert found["clipped", "force1"].count <= at_limit.sum()
+    assert found["clipped", "force1"].count > 0.8 * at_limit.sum()
+    assert log.segments == (slice(0, 1999), slice(1999, 4500), slice(4500, 6000))
+
+
+@pytest.mark.parametrize(
+    ("ending", "rows"),
+    [(".csv", rows) for rows in (1, 2, 3, 97, 1000, 1999, 2000, 3200, 4501)] + [(".parquet", 1700)],
+)
+def test_findings_do_not_depend_on_the_pieces(tmp_path, ending, rows):
+    path = saved(tmp_path, faulty(), f"motion{ending}")
+    file = open_log(path, QUADRUPTERON)
+    list(file.pieces(rows))
+    assert file.findings == read_log(path, QUADRUPTERON).findings
+    assert len(file.findings) == 5
+
+
+def test_declared_limits_decide_what_is_clipped(tmp_path):
+    given = faulty()
+    limits = "[[-100, 15], [-100, 100], [-12, 100], [-100, 100]]"
+    path = saved(tmp_path, given, toml=f"[forces]\nlimits = {limits}\n")
+    found = [f for f in read_log(path, QUADRUPTERON).findings if f.kind == "clipped"]
+    assert [(f.column, f.count, f.row) for f in found] == [
+        (name, int(at.sum()), int(np.argmax(at)) + 1)
+        for name, at in (
+            ("force1", given["force1"] == 15.0),
+            ("force3", given["force3"] == -12.0),
+        )
+    ]
+
+
+def test_a_machine_at_rest_is_not_frozen(tmp_path):
+    given = columns(motion(rows=4000))
+    for j in range(1, 5):
+        given[f"rho{j}"][1000:2500] = given[f"rho{j}"][1000]
+    assert read_log(saved(tmp_path, given), QUADRUPTERON).findings == ()
+
+
+def test_jitter_below_half_a_step_makes_no_gap(tmp_path):
+    given = columns(motion())
+    given["t"] += np.random.default_rng(3).uniform(-0.2, 0.2, 500) * STEP
+    log = read_log(saved(tmp_path, given), QUADRUPTERON)
+    assert [finding.kind for finding in log.findings] == ["jitter"]
+    assert log.segments == (slice(0, 500),)
