@@ -352,3 +352,9 @@ def test_forces_differ_from_the_free_fit_by_little_of_the_residual(name, seed, n
     assert np.linalg.norm(difference) / np.sqrt(variance) == pytest.approx(
         result.distance, rel=1e-6, abs=1e-6
     )
+    if noise < 1.0:
+        assert result.feasible
+    if noise == 100.0 and name == "quadrupteron":
+        # Else the comparison above would hold for nothing.
+        assert not result.feasible
+        assert np.linalg.norm(difference) > 0.0

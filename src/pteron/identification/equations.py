@@ -13,7 +13,6 @@ from pteron.identification.logs import Log
 from pteron.identification.model import Model
 from pteron.identification.signals import States, Treatment
 from pteron.identification.signals.fourier import fitted_series
-from pteron.identification.signals.parallel import Decimation
 from pteron.identification.signals.samples import samples
 from pteron.kernels import Array
 
@@ -106,7 +105,7 @@ def equations_of(model: Model, log: Log | Iterable[Log], treatment: Treatment) -
         return stacked([_periodic(model, part, treatment) for part in _phases(log, treatment)])
     decimation = treatment.decimation
     found = [
-        _filtered(model, block.states, block.forces, decimation)
+        _filtered(model, block.states, block.forces, treatment)
         for block in samples(model.robot, log, treatment, margin=decimation.margin)
     ]
     return stacked(found)
@@ -127,16 +126,24 @@ def stacked(parts: Sequence[Equations]) -> Equations:
     )
 
 
-def _filtered(
-    model: Model, states: States, forces: Array, decimation: Decimation
-) -> Equations:
+def _moving(rates: Array, treatment: Treatment) -> Array:
+    """Return 1 where a slider (R, n) moves, 0 where its friction is not known.
+
+    Both sides are multiplied with it, before the filter: what is left out is out on both.
+    """
+    return (np.abs(rates) >= treatment.slow).astype(float)
+
+
+def _filtered(model: Model, states: States, forces: Array, treatment: Treatment) -> Equations:
+    decimation = treatment.decimation
+    moving = _moving(states.slider_rates, treatment)
     kept = decimation.centers(len(states))
     gain = decimation.gain
     return Equations(
         model.names,
         model.units,
-        decimation(model.matrix(states)) / gain,
-        decimation(forces) / gain,
+        decimation(moving[..., None] * model.matrix(states)) / gain,
+        decimation(moving * forces) / gain,
         states.time[kept],
         np.full(len(kept), gain),
         states.payload[kept],
@@ -188,12 +195,14 @@ def _periodic(model: Model, log: Log, treatment: Treatment) -> Equations:
     )
     count = 2 * harmonics + 1
     kept = log.time[0] + np.arange(count) * (period / count)
-    forces = fitted_series(log.time, log.forces, period, highest=harmonics / period).at(kept)
+    measured = _moving(series.at(log.time, 1), treatment) * log.forces
+    forces = fitted_series(log.time, measured, period, highest=harmonics / period).at(kept)
+    matrix = _moving(motion[1], treatment)[..., None] * model.matrix(states)
     gain = float(np.sqrt(count / rows))
     return Equations(
         model.names,
         model.units,
-        _projected(model.matrix(states), count) / gain,
+        _projected(matrix, count) / gain,
         forces / gain,
         kept,
         np.full(count, gain),

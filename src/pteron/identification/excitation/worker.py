@@ -70,8 +70,9 @@ def in_processes(tasks: Sequence[Task], workers: int) -> Generator[Report, None,
                     reports.put((task, None, True))
         except Empty:
             return
-        except (OSError, EOFError, pickle.PickleError):
-            # Without a process there is nobody to do what is waiting, unless another takes it.
+        except Exception:
+            # Whatever it was, the reader waits for a report. What failed in one process, for want
+            # of memory say, is not tried in the others.
             if task is not None:
                 reports.put((task, None, False))
             with contextlib.suppress(Empty):

@@ -53,12 +53,16 @@ class Processing:
         Of the parallel filter on forces and regressor, Hz. By default ten times the motion's.
     period : float, optional
         Of the motion, s; by default what the log's description says.
+    slow : float
+        Speed, as a share of each slider's root mean square, below which the slider's equation is
+        not used: dry friction holds a slider at rest with any force, and turns in no time.
     """
 
     derivatives: Derivatives | None = None
     cutoff: float | None = None
     band: float | None = None
     period: float | None = None
+    slow: float = 0.02
 
     def __post_init__(self) -> None:
         if self.derivatives is not None and self.derivatives not in get_args(Derivatives):
@@ -70,6 +74,8 @@ class Processing:
             value = getattr(self, name)
             if value is not None and not (np.isfinite(value) and value > 0.0):
                 raise DataError(f"{name}: {value} given, a number above 0 expected")
+        if not 0.0 <= self.slow < 1.0:
+            raise DataError(f"slow: {self.slow} given, a share from 0 to below 1 expected")
 
 
 @dataclass(frozen=True)
@@ -92,6 +98,8 @@ class Treatment:
         s.
     slider_noise, force_noise : array, shape (n,)
         Standard deviation of the white noise on sliders (m) and forces (N).
+    slow : array, shape (n,)
+        Speed of each slider below which its friction is not known, m/s.
     """
 
     derivatives: Derivatives
@@ -102,6 +110,7 @@ class Treatment:
     period: float | None
     slider_noise: Array
     force_noise: Array
+    slow: Array
 
     @property
     def decimation(self) -> Decimation:
@@ -170,6 +179,7 @@ def treatment_of(
         period=period,
         slider_noise=white_noise(sliders),
         force_noise=white_noise(forces),
+        slow=_slow(sliders, rate, cutoff, wanted.slow),
     )
 
 
@@ -212,6 +222,13 @@ def _acceleration_power(sliders: Array, rate: float, cutoff: float | None) -> tu
     window = np.hanning(len(accelerations))[:, None]
     power = np.abs(np.fft.rfft(window * accelerations, axis=0)) ** 2
     return np.fft.rfftfreq(len(accelerations), 1.0 / rate), power
+
+
+def _slow(sliders: Array, rate: float, cutoff: float | None, share: float) -> Array:
+    """Return the speeds (n,) that count as slow."""
+    smooth = sliders if cutoff is None else smoothed(sliders, rate, cutoff)
+    rates, _ = central_differences(smooth, rate)
+    return np.asarray(share * np.sqrt((rates**2).mean(axis=0)))
 
 
 def _edge(frequencies: Array, power: Array) -> float:
