@@ -59,7 +59,7 @@ def small(criterion: str = "condition", space: str = "platform", robot: str = "t
         harmonics=2,
         period=4.0,
         criterion=criterion,
-        starts=2,
+        starts=2 if (criterion, space, robot) == ("condition", "platform", "tripteron") else 1,
         draws=6,
         workers=1,
     )
@@ -390,7 +390,7 @@ def test_an_interrupt_ends_the_processes_too():
     assert found.margins.kept
 
 
-@pytest.mark.parametrize("name", ["random 3T1R", "tripteron-oblique"])
+@pytest.mark.parametrize("name", ["random 3T", "tripteron-oblique"])
 def test_the_search_serves_machines_with_oblique_axes(name: str):
     found = optimal_excitation(
         MACHINES[name], harmonics=2, period=4.0, starts=1, draws=3, workers=1

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import minimum_filter1d  # type: ignore[import-untyped]
 
 from pteron.errors import DataError
 from pteron.identification.logs import Log
@@ -17,6 +19,9 @@ from pteron.identification.signals.samples import samples
 from pteron.kernels import Array
 
 __all__ = ["Equations", "equations_of", "stacked"]
+
+_LEAST_SHARE = 0.3
+"""Noise of an equation, relative to the usual, below which it is made of hardly any samples."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +41,8 @@ class Equations:
         F, N.
     time : array, shape (R,)
         s.
-    gain : array, shape (R,)
-        What the rows were divided by.
+    gain : array, shape (R, n)
+        What they were divided by; 0 for an equation that is not used, whose numbers are 0 too.
     payload : array of int, shape (R,)
         The phase of each row.
     """
@@ -51,9 +56,14 @@ class Equations:
     payload: NDArray[np.int64]
 
     @property
+    def used(self) -> Array:
+        """How many equations of each actuator are used, (n,)."""
+        return np.asarray((self.gain > 0.0).sum(axis=0))
+
+    @property
     def rows(self) -> int:
-        """How many equations there are: R n."""
-        return self.forces.size
+        """How many equations are used."""
+        return int(self.used.sum())
 
     @property
     def actuators(self) -> int:
@@ -126,27 +136,53 @@ def stacked(parts: Sequence[Equations]) -> Equations:
     )
 
 
-def _moving(rates: Array, treatment: Treatment) -> Array:
+def _moving(rates: Array, treatment: Treatment, *, wraps: bool = False) -> Array:
     """Return 1 where a slider (R, n) moves, 0 where its friction is not known.
 
-    Both sides are multiplied with it, before the filter: what is left out is out on both.
+    Dry friction turns with the rate, and acceleration jumps with it; what the filter of the
+    positions has mixed with that is left out too. Both sides are multiplied with the result before
+    the parallel filter: what is left out is out on both.
     """
-    return (np.abs(rates) >= treatment.slow).astype(float)
+    moves = (np.abs(rates) >= treatment.slow).astype(float)
+    size = 2 * treatment.settling + 1
+    return np.asarray(minimum_filter1d(moves, size, axis=0, mode="wrap" if wraps else "nearest"))
 
 
 def _filtered(model: Model, states: States, forces: Array, treatment: Treatment) -> Equations:
     decimation = treatment.decimation
     moving = _moving(states.slider_rates, treatment)
     kept = decimation.centers(len(states))
-    gain = decimation.gain
+    return _assembled(
+        model,
+        decimation(moving[..., None] * model.matrix(states)),
+        decimation(moving * forces),
+        decimation.noise(moving),
+        states.time[kept],
+        states.payload[kept],
+        np.linalg.norm(decimation.taps),
+    )
+
+
+def _assembled(
+    model: Model,
+    matrix: Array,
+    forces: Array,
+    noise: Array,
+    time: Array,
+    payload: NDArray[np.int64],
+    usual: float | np.floating[Any],
+) -> Equations:
+    """Return equations whose noise (R, n) is known, for white noise of unit size on the samples."""
+    gain = np.where(noise >= _LEAST_SHARE * usual, noise, 0.0)
+    factor = np.divide(1.0, gain, out=np.zeros_like(gain), where=gain > 0.0)
     return Equations(
         model.names,
         model.units,
-        decimation(moving[..., None] * model.matrix(states)) / gain,
-        decimation(moving * forces) / gain,
-        states.time[kept],
-        np.full(len(kept), gain),
-        states.payload[kept],
+        factor[..., None] * matrix,
+        factor * forces,
+        time,
+        gain,
+        payload,
     )
 
 
@@ -195,19 +231,28 @@ def _periodic(model: Model, log: Log, treatment: Treatment) -> Equations:
     )
     count = 2 * harmonics + 1
     kept = log.time[0] + np.arange(count) * (period / count)
-    measured = _moving(series.at(log.time, 1), treatment) * log.forces
+    moving = _moving(motion[1], treatment, wraps=True)
+    nearest = np.round((log.time - log.time[0]) * (per_period / period)).astype(int) % per_period
+    measured = moving[nearest] * log.forces
     forces = fitted_series(log.time, measured, period, highest=harmonics / period).at(kept)
-    matrix = _moving(motion[1], treatment)[..., None] * model.matrix(states)
-    gain = float(np.sqrt(count / rows))
-    return Equations(
-        model.names,
-        model.units,
-        _projected(matrix, count) / gain,
-        forces / gain,
-        kept,
-        np.full(count, gain),
-        np.zeros(count, dtype=np.int64) if phase is None else phase[:1].repeat(count),
+    matrix = moving[..., None] * model.matrix(states)
+    noise = _projected_noise(moving, count) * np.sqrt(per_period / rows)
+    payload = np.zeros(count, dtype=np.int64) if phase is None else phase[:1].repeat(count)
+    return _assembled(
+        model, _projected(matrix, count), forces, noise, kept, payload, np.sqrt(count / rows)
     )
+
+
+def _projected_noise(moving: Array, count: int) -> Array:
+    """Return what `_projected` leaves of unit white noise on the samples (T, n) that are 1."""
+    rows = len(moving)
+    pulse = np.zeros(rows)
+    pulse[0] = 1.0
+    response = np.fft.irfft(np.fft.rfft(pulse)[: count // 2 + 1], n=rows)
+    spread = np.fft.rfft(response**2)[:, None] * np.fft.rfft(moving, axis=0)
+    variance = np.fft.irfft(spread, n=rows, axis=0)
+    nearest = np.round(np.arange(count) * (rows / count)).astype(int)
+    return np.asarray(np.sqrt(np.maximum(variance[nearest], 0.0)))
 
 
 def _projected(signal: Array, count: int) -> Array:

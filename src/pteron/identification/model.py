@@ -52,9 +52,7 @@ class Terms:
 
     def __post_init__(self) -> None:
         if self.joints not in get_args(Joints):
-            raise ModelError(
-                f"joints: {self.joints!r} is not one of {', '.join(get_args(Joints))}"
-            )
+            raise ModelError(f"joints: {self.joints!r} is not one of {', '.join(get_args(Joints))}")
 
 
 @dataclass(frozen=True)

@@ -91,9 +91,7 @@ def essential_parameters(
     if not gone:
         return Essential(estimate.names, (), estimate, 1.0, level)
     refit = estimator(equations.columns(left))
-    return Essential(
-        refit.names, tuple(estimate.names[k] for k in gone), refit, p_value, level
-    )
+    return Essential(refit.names, tuple(estimate.names[k] for k in gone), refit, p_value, level)
 
 
 def _wald(values: np.ndarray, covariance: np.ndarray, chosen: list[int]) -> float:

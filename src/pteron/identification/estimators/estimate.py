@@ -161,7 +161,7 @@ def estimate_of(
     """
     rest = residuals_of(equations, values)
     share = factor.degrees / factor.rows
-    noise = np.sqrt((rest**2).mean(axis=0) / share)
+    noise = np.sqrt((rest**2).sum(axis=0) / np.maximum(equations.used, 1) / share)
     test = whiteness(rest)
     if not test.white:
         weighted = weights**2 * rest if scores is None else scores
@@ -185,4 +185,3 @@ def estimate_of(
         iterations,
         rest,
     )
-

@@ -60,7 +60,8 @@ def huber(equations: Equations, *, threshold: float = 1.345) -> Estimate:
     standard = residuals_of(equations, values) / scale
     pull = np.clip(standard, -threshold, threshold)
     # Huber (1981), section 7.6: variance of the pull over the square of its mean slope.
-    slope = float((np.abs(standard) < threshold).mean())
+    used = equations.gain > 0.0
+    slope = float((np.abs(standard)[used] < threshold).mean())
     variance = float((pull**2).sum()) / plain.degrees / slope**2
     return estimate_of(
         "huber",
@@ -76,5 +77,6 @@ def huber(equations: Equations, *, threshold: float = 1.345) -> Estimate:
 
 def _scale(equations: Equations, rest: Array, values: Array) -> Array:
     """Return the robust standard deviation (n,) of residuals."""
-    scale = np.median(np.abs(rest), axis=0) / _NORMAL
+    sizes = np.where(equations.gain > 0.0, np.abs(rest), np.nan)
+    scale = np.nanmedian(sizes, axis=0) / _NORMAL
     return np.where(scale > 0.0, scale, actuator_noise(equations, values))

@@ -141,7 +141,7 @@ def maximum_likelihood(model: Model, log: Log, treatment: Treatment) -> Estimate
         # What is left of the forces, less what the values and the motion took.
         left = (rest - w @ step - s @ motion_step).reshape(weights.shape) * noise
         spent = 1.0 - len(values) / equations.rows
-        noise = np.sqrt((left**2).mean(axis=0) / spent)
+        noise = np.sqrt((left**2).sum(axis=0) / np.maximum(equations.used, 1) / spent)
         if (np.abs(step) <= _SETTLED * np.sqrt(np.diag(inverse))).all():
             break
     moved = _replayed(log, curve, found)
@@ -204,6 +204,8 @@ def _slopes(
     smooth[[k for k, name in enumerate(model.names) if name.startswith("Fc")]] = 0.0
     n = equations.actuators
     rows = len(time)
+    gain = equations.gain
+    inverse = np.divide(1.0, gain, out=np.zeros_like(gain), where=gain > 0.0)
     total = sparse.csr_matrix((rows * n, curve.coefficients.size))
 
     def forces(motion: list[Array]) -> Array:
@@ -224,7 +226,7 @@ def _slopes(
             shift[j] = size
             plus = forces([part + shift if i == k else part for i, part in enumerate(parts)])
             minus = forces([part - shift if i == k else part for i, part in enumerate(parts)])
-            slope = (plus - minus) / (2.0 * size) / equations.gain[:, None]
+            slope = (plus - minus) / (2.0 * size) * inverse
             spread = sparse.kron(basis, sparse.csr_matrix(np.ones((n, 1))), format="csr")
             placed = sparse.diags(slope.ravel()) @ spread
             column = sparse.csr_matrix(([1.0], ([0], [j])), shape=(1, n))

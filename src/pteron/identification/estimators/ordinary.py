@@ -32,6 +32,4 @@ def ordinary(equations: Equations) -> Estimate:
     factor.check_seen()
     covariance = factor.rest / factor.degrees * factor.inverse()
     weights = np.ones(equations.actuators)
-    return estimate_of(
-        "ordinary", equations, factor, factor.values(), covariance, weights=weights
-    )
+    return estimate_of("ordinary", equations, factor, factor.values(), covariance, weights=weights)

@@ -65,8 +65,9 @@ def actuator_noise(equations: Equations, values: Array) -> Array:
     """Return the standard deviation (n,) of each actuator's residuals, N."""
     rest = residuals_of(equations, values)
     spent = len(values) / equations.rows
-    noise = np.sqrt((rest**2).mean(axis=0) / (1.0 - spent))
-    size = np.sqrt((equations.forces**2).mean(axis=0))
+    used = np.maximum(equations.used, 1)
+    noise = np.sqrt((rest**2).sum(axis=0) / used / (1.0 - spent))
+    size = np.sqrt((equations.forces**2).sum(axis=0) / used)
     if (noise <= _NOISELESS * size).all():
         return np.ones_like(noise)
     return np.asarray(np.maximum(noise, 1e-6 * noise.max()))

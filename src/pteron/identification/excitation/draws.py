@@ -29,6 +29,12 @@ _COARSE_CLEAR = 2e-3
 _SPREAD = 0.2
 """How far random centers are from home, as a share of the working space's size."""
 
+_SCALES = (1.0, 0.998, 0.99, 0.97, 0.9, 0.75, 0.5)
+"""Scales to which a motion that violates a limit is shrunk, until it does not."""
+
+_RESOLUTION = 0.1
+"""To what share of the shrinkage the scale is then refined."""
+
 _HALVINGS = 12
 _BISECTIONS = 14
 _DOUBLINGS = 12
@@ -121,20 +127,21 @@ def is_clear(motion: FourierMotion, limits: Limits, samples: int, clear: float =
     return all(float(values.min()) >= clear for values in found.values())
 
 
-def within_limits(
-    motion: FourierMotion, limits: Limits, least: float = 0.0
-) -> FourierMotion | None:
+def within_limits(motion: FourierMotion, limits: Limits) -> FourierMotion | None:
     """Return the motion shrunk about its center, as little as it takes to keep the limits.
 
-    They are then kept between samples too. None if it would have to shrink below the scale `least`.
+    They are then kept between samples too. None if shrinking does not help: a motion around a place
+    that a leg cannot reach would have to cross it.
     """
     samples = FINE * motion.harmonics
-    if is_clear(motion, limits, samples):
-        return motion
-    low, high = least, 1.0
-    if not is_clear(_scaled(motion, low), limits, samples):
+    high = 1.0
+    for low in _SCALES:
+        if is_clear(_scaled(motion, low), limits, samples):
+            break
+        high = low
+    else:
         return None
-    for _ in range(_BISECTIONS):
+    while high - low > _RESOLUTION * (1.0 - low):
         middle = 0.5 * (low + high)
         if is_clear(_scaled(motion, middle), limits, samples):
             low = middle

@@ -27,6 +27,8 @@ class Round:
 
     doublings: tuple[int, ...]
     exchanges: int
+    thorough: bool
+    """Whether exchanges go on when a motion that keeps the limits has been found."""
 
     @property
     def stages(self) -> int:
@@ -35,17 +37,14 @@ class Round:
 
 
 ROUNDS = {
-    "condition": (Round((0,), 0), Round((2, 4), 3)),
-    "logdet": (Round((0,), 0), Round((0,), 3)),
+    "condition": (Round((0,), 2, False), Round((2, 4), 3, True)),
+    "logdet": (Round((0,), 2, False), Round((0,), 3, True)),
 }
 """For each criterion, the round for all starts, and that for the best of them."""
 
 _NEAR = 0.5
 """A limit whose least margin at the start is above that share of its size is not watched, until it
 is violated: it would cost time."""
-
-_LEAST_SCALE = 0.5
-"""A result that would have to shrink further to keep its limits is none."""
 
 _CHECKED = 200
 """Samples in a period of the highest harmonic in which violations are sought."""
@@ -72,7 +71,7 @@ def improvements(
 ) -> Iterator[Stage]:
     """Yield what each stage finds, from a start that keeps the limits, for so many seconds."""
     deadline = time.monotonic() + seconds
-    current = start.coefficients
+    current = safe = start.coefficients
     extra = np.empty(0)
     watched = _near(start, setting)
     for k in range(plan.stages):
@@ -83,17 +82,20 @@ def improvements(
         found = minimised(setting, current, doublings, watched, extra, left)
         last = k == plan.stages - 1 and time.monotonic() < deadline
         if found is None:
+            current = safe
             yield Stage(None, last)
             continue
         motion = start.with_coefficients(found)
-        kept = within_limits(motion, setting.limits, _LEAST_SCALE)
+        kept = within_limits(motion, setting.limits)
         violated, instants = _violations(motion, setting)
-        last = last or (k >= len(plan.doublings) - 1 and not violated)
+        good = not violated or (kept is not None and not plan.thorough)
+        last = last or (k >= len(plan.doublings) - 1 and good)
         yield Stage(None if kept is None else kept.coefficients, last)
         if last:
             return
-        # A motion that violates much is no place to go on from: the machine may not exist there.
-        current = current if kept is None else kept.coefficients
+        # A motion that does not keep the limits yet is still a place to go on from.
+        current = found if kept is None else kept.coefficients
+        safe = safe if kept is None else kept.coefficients
         watched = tuple(dict.fromkeys([*watched, *violated]))
         extra = np.unique(np.concatenate([extra, instants]))
 

@@ -102,6 +102,8 @@ def minimised(
         )
     except RuntimeError:
         return None
+    if solver.stats()["return_status"] == "Invalid_Number_Detected":
+        return None
     result: Array = np.array(ca.reshape(found["x"], rows, n)) * size
     return result if np.isfinite(result).all() else None
 

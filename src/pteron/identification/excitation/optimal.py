@@ -232,7 +232,7 @@ class _Search:
         reports = here(tasks) if workers == 1 else in_processes(tasks, workers)
         seen = self.seen
         share = {task.number: 0.0 for task in tasks}
-        weight = (1.0 - seen) if plan.exchanges else _FIRST * (1.0 - seen)
+        weight = (1.0 - seen) if plan.thorough else _FIRST * (1.0 - seen)
         with closing(reports):
             for number, stage in reports:
                 if stage is None:
@@ -247,7 +247,7 @@ class _Search:
         self.progress(share)
 
     def take(self, number: int, stage: Stage, plan: Round) -> None:
-        if stage.last and plan.exchanges:
+        if stage.last and plan.thorough:
             self.starts[number] = replace(self.starts[number], finished=True)
         if stage.coefficients is None:
             return

@@ -52,13 +52,15 @@ class Decimation:
             return np.ones(1)
         return np.asarray(firwin(2 * self.margin + 1, 1.0 / self.factor, window=("kaiser", 5.0)))
 
-    @property
-    def gain(self) -> float:
-        """What is left of the standard deviation of white noise."""
-        return float(np.linalg.norm(self.taps))
+    def noise(self, used: Array) -> Array:
+        """Return what is left of unit white noise on the samples (T, n) that are 1, not 0."""
+        return np.asarray(np.sqrt(np.maximum(self._filtered(used, self.taps**2), 0.0)))
 
     def __call__(self, signal: Array) -> Array:
         """Return signals (T, ...) filtered and decimated: one row for each of `centers`."""
+        return self._filtered(signal, self.taps)
+
+    def _filtered(self, signal: Array, taps: Array) -> Array:
         if self.factor == 1:
             return signal
         count = len(self.centers(len(signal)))
@@ -67,5 +69,5 @@ class Decimation:
         flat = signal.reshape(len(signal), -1)
         # Sample k of the full convolution belongs to the centre k - margin, and the margin is a
         # multiple of the factor.
-        filtered = upfirdn(self.taps, flat, down=self.factor, axis=0)[2 * _HALF : 2 * _HALF + count]
+        filtered = upfirdn(taps, flat, down=self.factor, axis=0)[2 * _HALF : 2 * _HALF + count]
         return np.asarray(filtered.reshape(count, *signal.shape[1:]))

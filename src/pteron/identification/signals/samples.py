@@ -102,9 +102,7 @@ def _edge(treatment: Treatment) -> int:
     return LOST + ceil(SETTLING * treatment.rate / treatment.cutoff)
 
 
-def _block(
-    robot: Manipulator, block: Log, treatment: Treatment, edge: int, margin: int
-) -> Samples:
+def _block(robot: Manipulator, block: Log, treatment: Treatment, edge: int, margin: int) -> Samples:
     time, forces = block.time, block.forces
     inner = slice(edge, block.rows - edge)
     if treatment.derivatives == "spline":

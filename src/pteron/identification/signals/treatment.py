@@ -29,8 +29,11 @@ _LARGEST_PERIODIC = 4_000_000
 _LOOK = 120_000
 """Samples from which cut-offs are found."""
 
-_POWER = 0.9999
-"""Share of the accelerations' power that says how fast a motion is."""
+_POWER = 0.999
+"""Share of the speed's power that says how fast a motion is."""
+
+_MIXED = 0.5
+"""Half the width of the positions' filter, in periods of its cut-off."""
 
 _PRODUCTS = 10.0
 """Forces are products of positions and accelerations, and friction has steps: they are faster than
@@ -113,6 +116,11 @@ class Treatment:
     slow: Array
 
     @property
+    def settling(self) -> int:
+        """Rows before and after a slow one that the positions' filter has mixed with it."""
+        return 0 if self.cutoff is None else round(_MIXED * self.rate / self.cutoff)
+
+    @property
     def decimation(self) -> Decimation:
         """The parallel filter of a log that is not treated as periodic."""
         return Decimation.to_band(self.rate, self.band)
@@ -160,13 +168,13 @@ def treatment_of(
         derivatives = "spline"
     if derivatives == "periodic" and period is not None:
         series = fitted_series(log.time, log.sliders, period)
-        power = (np.arange(1, series.harmonics + 1) ** 4)[:, None] * (
+        power = (np.arange(1, series.harmonics + 1) ** 2)[:, None] * (
             series.coefficients[1::2] ** 2 + series.coefficients[2::2] ** 2
         )
         frequencies = np.arange(1, series.harmonics + 1) / period
         cutoff = float(frequencies[-1])
     else:
-        frequencies, power = _acceleration_power(sliders, rate, cutoff)
+        frequencies, power = _speed_power(sliders, rate, cutoff)
     band = wanted.band or min(_PRODUCTS * _edge(frequencies, power), rate / 2.0)
     if wanted.band is None and cutoff is not None and derivatives != "periodic":
         band = min(band, cutoff)
@@ -216,12 +224,11 @@ def _check_frequencies(wanted: Processing, rate: float) -> None:
             )
 
 
-def _acceleration_power(sliders: Array, rate: float, cutoff: float | None) -> tuple[Array, Array]:
+def _speed_power(sliders: Array, rate: float, cutoff: float | None) -> tuple[Array, Array]:
     smooth = sliders if cutoff is None else smoothed(sliders, rate, cutoff)
-    _, accelerations = central_differences(smooth, rate)
-    window = np.hanning(len(accelerations))[:, None]
-    power = np.abs(np.fft.rfft(window * accelerations, axis=0)) ** 2
-    return np.fft.rfftfreq(len(accelerations), 1.0 / rate), power
+    rates, _ = central_differences(smooth, rate)
+    power = np.abs(np.fft.rfft(np.hanning(len(rates))[:, None] * rates, axis=0)) ** 2
+    return np.fft.rfftfreq(len(rates), 1.0 / rate), power
 
 
 def _slow(sliders: Array, rate: float, cutoff: float | None, share: float) -> Array:
