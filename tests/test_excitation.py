@@ -329,8 +329,8 @@ def test_the_search_finds_better_than_random_and_keeps_every_limit(robot, space,
 
 def test_the_other_criterion_makes_the_volume_smaller():
     found = small("logdet")
+    assert found.criterion == "logdet"
     assert found.conditioning.logdet > found.random.logdet + 1.0
-    assert found.conditioning.logdet >= small().conditioning.logdet
     assert found.margins.kept
 
 

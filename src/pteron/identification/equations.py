@@ -18,7 +18,7 @@ from pteron.identification.signals.fourier import fitted_series
 from pteron.identification.signals.samples import samples
 from pteron.kernels import Array
 
-__all__ = ["Equations", "equations_of", "stacked"]
+__all__ = ["Equations", "equations_of", "in_motion", "stacked"]
 
 _LEAST_SHARE = 0.3
 """Noise of an equation, relative to the usual, below which it is made of hardly any samples."""
@@ -113,10 +113,11 @@ def equations_of(model: Model, log: Log | Iterable[Log], treatment: Treatment) -
     if treatment.derivatives == "periodic":
         assert isinstance(log, Log)  # `treatment_of` takes no other for periodic
         return stacked([_periodic(model, part, treatment) for part in _phases(log, treatment)])
-    decimation = treatment.decimation
+    # Whether a row counts depends on those around it, in the next block too.
+    margin = treatment.decimation.margin + treatment.settling
     found = [
         _filtered(model, block.states, block.forces, treatment)
-        for block in samples(model.robot, log, treatment, margin=decimation.margin)
+        for block in samples(model.robot, log, treatment, margin=margin)
     ]
     return stacked(found)
 
@@ -136,7 +137,7 @@ def stacked(parts: Sequence[Equations]) -> Equations:
     )
 
 
-def _moving(rates: Array, treatment: Treatment, *, wraps: bool = False) -> Array:
+def in_motion(rates: Array, treatment: Treatment, *, wraps: bool = False) -> Array:
     """Return 1 where a slider (R, n) moves, 0 where its friction is not known.
 
     Dry friction turns with the rate, and acceleration jumps with it; what the filter of the
@@ -150,7 +151,9 @@ def _moving(rates: Array, treatment: Treatment, *, wraps: bool = False) -> Array
 
 def _filtered(model: Model, states: States, forces: Array, treatment: Treatment) -> Equations:
     decimation = treatment.decimation
-    moving = _moving(states.slider_rates, treatment)
+    inner = slice(treatment.settling, len(states) - treatment.settling)
+    moving = in_motion(states.slider_rates, treatment)[inner]
+    states, forces = states.part(inner), forces[inner]
     kept = decimation.centers(len(states))
     return _assembled(
         model,
@@ -231,7 +234,7 @@ def _periodic(model: Model, log: Log, treatment: Treatment) -> Equations:
     )
     count = 2 * harmonics + 1
     kept = log.time[0] + np.arange(count) * (period / count)
-    moving = _moving(motion[1], treatment, wraps=True)
+    moving = in_motion(motion[1], treatment, wraps=True)
     nearest = np.round((log.time - log.time[0]) * (per_period / period)).astype(int) % per_period
     measured = moving[nearest] * log.forces
     forces = fitted_series(log.time, measured, period, highest=harmonics / period).at(kept)

@@ -160,9 +160,10 @@ def estimate_of(
         Of the weighted normal equations, where it is not that of `factor`.
     """
     rest = residuals_of(equations, values)
-    share = factor.degrees / factor.rows
+    # Only a prior lets there be fewer equations than values.
+    share = max(factor.degrees, 1) / max(factor.rows, 1)
     noise = np.sqrt((rest**2).sum(axis=0) / np.maximum(equations.used, 1) / share)
-    test = whiteness(rest)
+    test = whiteness(rest, equations.gain > 0.0)
     if not test.white:
         weighted = weights**2 * rest if scores is None else scores
         rows = np.einsum("rnp,rn->rp", equations.matrix, weighted, optimize=True)

@@ -77,6 +77,8 @@ def huber(equations: Equations, *, threshold: float = 1.345) -> Estimate:
 
 def _scale(equations: Equations, rest: Array, values: Array) -> Array:
     """Return the robust standard deviation (n,) of residuals."""
-    sizes = np.where(equations.gain > 0.0, np.abs(rest), np.nan)
+    used = equations.gain > 0.0
+    # An actuator without equations has none either; the fallback gives it one.
+    sizes = np.where(used | ~used.any(axis=0), np.abs(rest), np.nan)
     scale = np.nanmedian(sizes, axis=0) / _NORMAL
     return np.where(scale > 0.0, scale, actuator_noise(equations, values))

@@ -30,6 +30,9 @@ _SETTLED = 1e-3
 _STEPS = (1e-5, 1e-3, 1e-1)
 """Of the differences by position, rate and acceleration: m and s."""
 
+_LEAST_NOISE = 1e-6
+"""Of an actuator, relative to the largest: one without equations has none."""
+
 _MOST = 20_000
 """Coefficients of the motion that are fitted at once."""
 
@@ -116,7 +119,8 @@ def maximum_likelihood(model: Model, log: Log, treatment: Treatment) -> Estimate
     measured = curve.coefficients
     base = curve.basis(log.time, 0)
     information = sparse.kron(base.T @ base, sparse.diags(1.0 / curve.noise**2), format="csc")
-    values, noise = estimate.values, estimate.noise
+    values = estimate.values
+    noise = np.maximum(estimate.noise, _LEAST_NOISE * estimate.noise.max())
     found = measured.copy()
     for iteration in range(1, _ITERATIONS + 1):
         moved = _replayed(log, curve, found)
@@ -142,6 +146,7 @@ def maximum_likelihood(model: Model, log: Log, treatment: Treatment) -> Estimate
         left = (rest - w @ step - s @ motion_step).reshape(weights.shape) * noise
         spent = 1.0 - len(values) / equations.rows
         noise = np.sqrt((left**2).sum(axis=0) / np.maximum(equations.used, 1) / spent)
+        noise = np.maximum(noise, _LEAST_NOISE * noise.max())
         if (np.abs(step) <= _SETTLED * np.sqrt(np.diag(inverse))).all():
             break
     moved = _replayed(log, curve, found)

@@ -65,9 +65,13 @@ def ridge(equations: Equations, prior: ArrayLike, spread: ArrayLike) -> Ridge:
     expected, width = np.asarray(prior, dtype=float), np.asarray(spread, dtype=float)
     centred = equations.with_forces(equations.forces - equations.matrix @ expected)
     factor = triangle(centred)
-    matrix = factor.factor * factor.scale * width
-    start = np.linalg.lstsq(matrix, factor.image, rcond=1e-10)[0] * width
-    noise = actuator_noise(centred, start)
+    if factor.degrees > 0:
+        matrix = factor.factor * factor.scale * width
+        start = np.linalg.lstsq(matrix, factor.image, rcond=1e-10)[0] * width
+        noise = actuator_noise(centred, start)
+    else:
+        # As few equations leave no residual to tell noise by; it is at most what the prior leaves.
+        noise = actuator_noise(centred, np.zeros(len(width)), fitted=False)
     factor = triangle(centred, 1.0 / noise)
     # In units of the spread the prior is one more row of the identity for each value.
     matrix = np.vstack([factor.factor * factor.scale * width, np.eye(len(width))])

@@ -61,10 +61,13 @@ def weighted(equations: Equations) -> Estimate:
     )
 
 
-def actuator_noise(equations: Equations, values: Array) -> Array:
-    """Return the standard deviation (n,) of each actuator's residuals, N."""
+def actuator_noise(equations: Equations, values: Array, *, fitted: bool = True) -> Array:
+    """Return the standard deviation (n,) of each actuator's residuals, N.
+
+    The values have cost degrees of freedom if they were fitted to these equations.
+    """
     rest = residuals_of(equations, values)
-    spent = len(values) / equations.rows
+    spent = len(values) / equations.rows if fitted else 0.0
     used = np.maximum(equations.used, 1)
     noise = np.sqrt((rest**2).sum(axis=0) / used / (1.0 - spent))
     size = np.sqrt((equations.forces**2).sum(axis=0) / used)

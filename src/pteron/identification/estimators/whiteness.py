@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import chi2  # type: ignore[import-untyped]
 
 from pteron.kernels import Array
@@ -37,18 +38,24 @@ class Whiteness:
         return bool((self.p_values > _LEVEL / len(self.p_values)).all())
 
 
-def whiteness(residuals: Array) -> Whiteness:
-    """Return the test of residuals (R, n), in the order of time."""
-    rows = len(residuals)
-    centred = residuals - residuals.mean(axis=0)
+def whiteness(residuals: Array, used: NDArray[np.bool_] | None = None) -> Whiteness:
+    """Return the test of residuals (R, n), in the order of time.
+
+    Of those that are not used, none takes part: a lag has the pairs of which both are used.
+    """
+    taken = np.ones(residuals.shape, dtype=bool) if used is None else used
+    count = taken.sum(axis=0)
+    mean = np.where(taken, residuals, 0.0).sum(axis=0) / np.maximum(count, 1)
+    centred = np.where(taken, residuals - mean, 0.0)
     power = np.maximum((centred**2).sum(axis=0), np.finfo(float).tiny)
-    lags = range(1, min(_LAGS, rows // 5) + 1)
-    found = np.array([(centred[k:] * centred[:-k]).sum(axis=0) / power for k in lags])
-    if not len(found):
+    lags = range(1, min(_LAGS, len(residuals) // 5) + 1)
+    if not lags:
         return Whiteness(np.zeros(residuals.shape[1]), np.ones(residuals.shape[1]))
-    weights = 1.0 / (rows - np.array(lags, dtype=float))
-    statistic = rows * (rows + 2.0) * (weights[:, None] * found**2).sum(axis=0)
-    return Whiteness(found[0], np.asarray(chi2.sf(statistic, len(found))))
+    found = np.array([(centred[k:] * centred[:-k]).sum(axis=0) / power for k in lags])
+    pairs = np.array([(taken[k:] & taken[:-k]).sum(axis=0) for k in lags])
+    statistic = count * (count + 2.0) * (found**2 / np.maximum(pairs, 1)).sum(axis=0)
+    degrees = np.maximum((pairs > 0).sum(axis=0), 1)
+    return Whiteness(found[0], np.asarray(chi2.sf(statistic, degrees)))
 
 
 def long_run_covariance(scores: Array, inverse: Array, degrees: float) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -33,7 +34,7 @@ def blocks(pieces: Iterable[Log], margin: int, size: int, rate: float) -> Iterat
     """
     held: Log | None = None
     for piece in pieces:
-        for stretch in _stretches(piece):
+        for stretch in _stretches(piece, rate):
             if held is not None and not _continues(held, stretch, rate):
                 yield from _rest(held, margin)
                 held = None
@@ -50,14 +51,15 @@ def _rest(held: Log, margin: int) -> Iterator[Log]:
         yield held
 
 
-def _stretches(piece: Log) -> Iterator[Log]:
+def _stretches(piece: Log, rate: float) -> Iterator[Log]:
     """Yield the parts of a piece between gaps and changes of the payload."""
-    for segment in piece.segments:
-        edges = [segment.start, segment.stop]
-        if piece.payload is not None:
-            changes = np.flatnonzero(np.diff(piece.payload[segment])) + 1 + segment.start
-            edges[1:1] = changes.tolist()
-        for start, stop in zip(edges[:-1], edges[1:], strict=True):
+    # Not `piece.segments`: the usual step of a few rows may be that of a gap.
+    ends = np.diff(piece.time) * rate > _GAP
+    if piece.payload is not None:
+        ends |= np.diff(piece.payload) != 0
+    edges = [0, *(np.flatnonzero(ends) + 1).tolist(), piece.rows]
+    for start, stop in pairwise(edges):
+        if stop > start:
             yield piece.part(start, stop)
 
 

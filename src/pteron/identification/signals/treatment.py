@@ -118,7 +118,11 @@ class Treatment:
     @property
     def settling(self) -> int:
         """Rows before and after a slow one that the positions' filter has mixed with it."""
-        return 0 if self.cutoff is None else round(_MIXED * self.rate / self.cutoff)
+        if self.cutoff is None:
+            return 0
+        # A series ends where noise begins: what a slow motion leaves there mixes nothing.
+        fastest = max(self.cutoff, self.band) if self.derivatives == "periodic" else self.cutoff
+        return round(_MIXED * self.rate / fastest)
 
     @property
     def decimation(self) -> Decimation:

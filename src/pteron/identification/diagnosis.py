@@ -1,0 +1,206 @@
+"""What is wrong with a log whose forces a model cannot explain: flipped signs, swapped columns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import permutations, product
+from typing import Literal
+
+import numpy as np
+
+from pteron.errors import DataError
+from pteron.identification.equations import Equations, equations_of
+from pteron.identification.estimators.weighted import weighted
+from pteron.identification.logs import Log
+from pteron.identification.model import Model
+from pteron.identification.signals import Treatment
+from pteron.kernels import Array, numeric
+from pteron.kinematics import random_poses
+from pteron.manipulator import Manipulator, parameters
+from pteron.reduction import base_regressor
+
+__all__ = ["Fault", "column_fault", "has_negative_inertia", "unseen"]
+
+_DECISIVE = 3.0
+"""Factor by which the error must fall for a fault to be called found."""
+
+_ROWS = 4000
+_PROBES = 50
+
+_Choice = tuple[tuple[int, ...], tuple[int, ...]]
+"""An order of the columns, and their signs."""
+
+_MOST_UNSEEN = 0.5
+"""Share of the base parameters that a motion may leave unseen."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Columns of forces that are not what they are called.
+
+    Attributes
+    ----------
+    kind : {"force", "rho"}
+        Which columns.
+    order : tuple of int
+        Which of them, from 0, belongs to each actuator.
+    signs : tuple of int
+        1, or -1 for a column whose sign is flipped.
+    before, after : float
+        Error of the fit relative to the forces, as it is and when mended.
+    """
+
+    kind: Literal["force", "rho"]
+    order: tuple[int, ...]
+    signs: tuple[int, ...]
+    before: float
+    after: float
+
+    def message(self) -> str:
+        """Return what is wrong and what to do, as part of a sentence."""
+        parts = []
+        n = len(self.order)
+        flipped = [k + 1 for k in range(n) if self.signs[k] < 0]
+        moved = [k + 1 for k in range(n) if self.order[k] != k]
+        if moved:
+            names = _listed([f"{self.kind}{k}" for k in moved])
+            verb = "are swapped" if len(moved) == 2 else "are in another order"
+            parts.append(f"{names} {verb}")
+            if len(moved) > 2:
+                order = ", ".join(f"{self.kind}{k + 1}" for k in self.order)
+                parts[-1] += f" (they should be {order})"
+        if len(flipped) == n:
+            parts.append("the forces have the sign flipped")
+        elif flipped:
+            names = _listed([f"{self.kind}{self.order[k - 1] + 1}" for k in flipped])
+            parts.append(f"{names} {'has' if len(flipped) == 1 else 'have'} the sign flipped")
+        return " and ".join(parts)
+
+
+def column_fault(model: Model, log: Log, treatment: Treatment) -> Fault | None:
+    """Return the exchange of columns, or of signs, that explains the forces far better.
+
+    All n! 2^n orders and signs of the forces are tried, and all orders of the sliders. Signs of all
+    forces at once are settled by the machine's inertia, which is positive.
+
+    Parameters
+    ----------
+    model : Model
+        The model.
+    log : Log
+        Whose forces it explains badly, or with negative inertia.
+    treatment : Treatment
+        How the log is treated.
+
+    Returns
+    -------
+    Fault or None
+        None where nothing makes the error three times smaller, or the inertia positive.
+    """
+    # Without the mask of slow sliders, which belongs to the order that is in question.
+    plain = replace(treatment, slow=np.zeros_like(treatment.slow))
+    equations = equations_of(model, log, plain)
+    n = equations.actuators
+    # A choice of signs and its opposite fit alike.
+    signs = [(1, *rest) for rest in product((1, -1), repeat=n - 1)]
+    choices = [(order, sign) for order in permutations(range(n)) for sign in signs]
+    errors = _errors(equations, choices)
+    before = errors[0]
+    best = int(np.argmin(errors))
+    order, sign = choices[best] if errors[best] * _DECISIVE < before else choices[0]
+    after = min(errors[best], before) if (order, sign) != choices[0] else before
+    swapped = _slider_fault(model, log, plain, before)
+    # Exchanged forces can do some of what exchanged sliders do.
+    if swapped is not None and swapped.after < 0.7 * after:
+        return swapped
+    mended = equations.with_forces(equations.forces[:, list(order)] * np.array(sign))
+    if has_negative_inertia(model, weighted(mended).values):
+        sign = tuple(-s for s in sign)
+    if (order, sign) == choices[0]:
+        return None
+    return Fault("force", tuple(order), sign, before, after)
+
+
+def _errors(equations: Equations, choices: Sequence[_Choice]) -> list[float]:
+    """Return the error of the fit relative to the forces, for each order and signs of these.
+
+    One factorisation serves all: the error is what the projection on the columns leaves.
+    """
+    step = max(len(equations.forces) // _ROWS, 1)
+    matrix, forces = equations.matrix[::step], equations.forces[::step]
+    flat = matrix.reshape(-1, matrix.shape[-1])
+    lengths = np.linalg.norm(flat, axis=0)
+    basis = np.linalg.qr(flat / np.where(lengths > 0.0, lengths, 1.0))[0]
+    found = []
+    for order, signs in choices:
+        given = (forces[:, list(order)] * np.array(signs)).ravel()
+        image = basis.T @ given
+        power = float(given @ given)
+        found.append(float(np.sqrt(max(power - float(image @ image), 0.0) / power)))
+    return found
+
+
+def _slider_fault(model: Model, log: Log, treatment: Treatment, before: float) -> Fault | None:
+    """Return the exchange of sliders that explains the forces far better."""
+    n = log.sliders.shape[1]
+    best: Fault | None = None
+    signs = (1,) * n
+    for order in list(permutations(range(n)))[1:]:
+        other = replace(log, sliders=log.sliders[:, list(order)])
+        try:
+            equations = equations_of(model, other, treatment)
+        except DataError:
+            continue  # no poses in this order
+        (error,) = _errors(equations, [(tuple(range(n)), signs)])
+        if error * _DECISIVE < (before if best is None else best.after * _DECISIVE):
+            best = Fault("rho", order, signs, before, error)
+    return best
+
+
+def has_negative_inertia(model: Model, values: Array) -> bool:
+    """Say whether values give a machine whose kinetic energy is negative.
+
+    x''^T M x'' is the power-like product of accelerations and the forces that they need; it is
+    positive for every real machine, whatever its CAD says.
+    """
+    robot = model.robot
+    rng = np.random.default_rng(0)
+    pose = random_poses(robot, _PROBES, seed=rng, bend=0.3, hold=0.3)
+    acceleration = rng.normal(size=pose.shape)
+    rest = np.zeros_like(pose)
+    base = values[: model.base.rank]
+    needed = base_regressor(robot, model.base, pose, rest, acceleration)
+    still = base_regressor(robot, model.base, pose, rest, rest)
+    forces = (needed - still) @ base
+    jacobians = numeric(robot, "jacobian")(pose)
+    products = np.einsum("rn,rnm,rm->r", forces, jacobians, acceleration)
+    return bool((products < 0.0).mean() > 0.5)
+
+
+def unseen(
+    model: Model, deviations: Array, cad: Manipulator | None = None
+) -> tuple[tuple[str, ...], bool]:
+    """Return the base parameters that a log cannot show, and whether they are too many.
+
+    Those whose standard deviation is larger than what they are usually made of: the sizes of the
+    CAD's parameters, added up as they are grouped.
+
+    Parameters
+    ----------
+    model : Model
+        The model.
+    deviations : array, shape (p,)
+        Standard deviations of its values.
+    cad : Manipulator, optional
+        The machine as it is drawn; by default that of the model.
+    """
+    base = model.base
+    usual = np.abs(base.grouping) @ np.abs(parameters(cad or base.robot))
+    hidden = deviations[: base.rank] > usual
+    names = tuple(name for name, flag in zip(base.names, hidden, strict=True) if flag)
+    return names, bool(hidden.mean() > _MOST_UNSEEN)
+
+
+def _listed(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

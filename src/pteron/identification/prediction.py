@@ -1,0 +1,188 @@
+"""Forces that were measured against forces that a model predicts, sample by sample."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.identification.equations import in_motion
+from pteron.identification.model import Model
+from pteron.identification.recordings import Recording
+from pteron.identification.signals import Treatment
+from pteron.identification.signals.samples import samples
+from pteron.kernels import Array
+
+__all__ = ["Prediction", "predict"]
+
+_KEPT = 6000
+"""Samples that are kept to be looked at."""
+
+_FRICTION = ("Fc", "Fv", "offset")
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """How well a model predicts the forces of a recording, at its own samples.
+
+    Samples of a slider that hardly moves are left out: dry friction may hold it with any force.
+    NRMS is the root mean square of the error over the standard deviation of the measured force, in
+    percent, so that a constant load does not flatter.
+
+    Attributes
+    ----------
+    source : str
+        The recording.
+    samples : int
+        How many.
+    left_out : array, shape (n,)
+        Share of the samples of each actuator that was left out.
+    size : array, shape (n,)
+        Standard deviation of the measured forces, N.
+    error, error_without_friction : array, shape (n,)
+        Root mean square of what the model misses, with all its terms and without friction and
+        offsets, N.
+    error_of_all : array, shape (n,)
+        As `error`, of every sample, N.
+    noise : array, shape (n,)
+        Standard deviation of the white noise on the measured forces, N: no model can do better.
+    time : array, shape (S,)
+        Of some of the samples, evenly spaced, to be looked at, s.
+    measured, predicted, without_friction, speed : array, shape (S, n)
+        Forces, N, and the sliders' rates, m/s.
+    used : array of bool, shape (S, n)
+        Whether they count.
+    """
+
+    source: str
+    samples: int
+    left_out: Array
+    size: Array
+    error: Array
+    error_without_friction: Array
+    error_of_all: Array
+    noise: Array
+    time: Array = field(repr=False)
+    measured: Array = field(repr=False)
+    predicted: Array = field(repr=False)
+    without_friction: Array = field(repr=False)
+    speed: Array = field(repr=False)
+    used: NDArray[np.bool_] = field(repr=False)
+
+    @property
+    def nrms(self) -> Array:
+        """Error in percent (n,)."""
+        return np.asarray(100.0 * self.error / self.size)
+
+    @property
+    def nrms_without_friction(self) -> Array:
+        """Error of the model without friction and offsets in percent (n,)."""
+        return np.asarray(100.0 * self.error_without_friction / self.size)
+
+    @property
+    def floor(self) -> Array:
+        """The noise in percent (n,)."""
+        return np.asarray(100.0 * self.noise / self.size)
+
+    @property
+    def unexplained(self) -> Array:
+        """Error beyond the noise in percent (n,): what the model itself misses."""
+        beyond = np.sqrt(np.maximum(self.error**2 - self.noise**2, 0.0))
+        return np.asarray(100.0 * beyond / self.size)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return everything but the samples as plain data."""
+        return {
+            "source": self.source,
+            "samples": self.samples,
+            "left_out": self.left_out.tolist(),
+            "force_standard_deviation": self.size.tolist(),
+            "rms_error": self.error.tolist(),
+            "rms_error_of_all_samples": self.error_of_all.tolist(),
+            "nrms_percent": self.nrms.tolist(),
+            "nrms_percent_without_friction": self.nrms_without_friction.tolist(),
+            "noise_floor_percent": self.floor.tolist(),
+            "unexplained_percent": self.unexplained.tolist(),
+        }
+
+
+def predict(
+    model: Model,
+    values: Array,
+    recording: Recording,
+    treatment: Treatment,
+    progress: Callable[[int], None] | None = None,
+) -> Prediction:
+    """Return how well values of a model predict a recording.
+
+    Parameters
+    ----------
+    model : Model
+        The model.
+    values : array, shape (p,)
+        Of its parameters.
+    recording : Recording
+        What was recorded.
+    treatment : Treatment
+        How its motion is found from its positions.
+    progress : callable, optional
+        Called with the number of rows just read.
+
+    Returns
+    -------
+    Prediction
+
+    Raises
+    ------
+    DataError
+        If a sample has no pose or is next to a singularity, or the recording is too short.
+    """
+    n = len(model.robot.legs)
+    plain = values.copy()
+    plain[[k for k, name in enumerate(model.names) if name.startswith(_FRICTION)]] = 0.0
+    counts, total = np.zeros(n), 0
+    sums = np.zeros((5, n))
+    shown: list[Array] = []
+    step = max(recording.rows // _KEPT, 1)
+    for block in samples(model.robot, recording.samples(progress), treatment):
+        states, measured = block.states.part(block.fresh), block.forces[block.fresh]
+        matrix = model.matrix(states)
+        predicted, without = matrix @ values, matrix @ plain
+        used = in_motion(states.slider_rates, treatment)
+        error, bare = measured - predicted, measured - without
+        sums += [
+            measured.sum(axis=0),
+            (measured**2).sum(axis=0),
+            (used * error**2).sum(axis=0),
+            (used * bare**2).sum(axis=0),
+            (error**2).sum(axis=0),
+        ]
+        counts += used.sum(axis=0)
+        first = -total % step
+        rows = slice(first, None, step)
+        columns = states.time, measured, predicted, without, states.slider_rates, used
+        shown.append(np.column_stack([column[rows] for column in columns]))
+        total += len(states)
+    kept = np.concatenate(shown)
+    parts = np.split(kept[:, 1:], 5, axis=1)
+    mean = sums[0] / total
+    seen = np.maximum(counts, 1.0)
+    return Prediction(
+        source=recording.source,
+        samples=total,
+        left_out=1.0 - counts / total,
+        size=np.sqrt(np.maximum(sums[1] / total - mean**2, np.finfo(float).tiny)),
+        error=np.sqrt(sums[2] / seen),
+        error_without_friction=np.sqrt(sums[3] / seen),
+        error_of_all=np.sqrt(sums[4] / total),
+        noise=treatment.force_noise,
+        time=kept[:, 0],
+        measured=parts[0],
+        predicted=parts[1],
+        without_friction=parts[2],
+        speed=parts[3],
+        used=parts[4] > 0.0,
+    )

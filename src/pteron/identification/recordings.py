@@ -1,0 +1,125 @@
+"""Recordings: logs in memory, or files that are read in pieces, divided for fit and check."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pteron.errors import DataError
+from pteron.identification.logs import Finding, Log, LogFile
+
+__all__ = ["Recording", "divided", "recording"]
+
+_IN_MEMORY = 2_000_000
+"""Rows up to which a file is read whole: 150 MB for four sliders."""
+
+_PIECE = 1 << 18
+
+_FIT = 0.7
+"""Share of a log that is fitted where nothing else is held out."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A log, or some rows of it, that can be read more than once.
+
+    Attributes
+    ----------
+    log : Log or LogFile
+        Where the samples are.
+    start, stop : int
+        The rows that are meant, from 0; `stop` may lie beyond the last.
+    """
+
+    log: Log | LogFile
+    start: int
+    stop: int
+
+    @property
+    def source(self) -> str:
+        """What messages call it."""
+        return self.log.source
+
+    @property
+    def rows(self) -> int:
+        """How many rows there are, by estimate for a file."""
+        return self.stop - self.start
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What was noticed while it was read."""
+        return self.log.findings
+
+    def head(self) -> Log:
+        """Return the log itself where it is in memory, else its first piece."""
+        if isinstance(self.log, Log):
+            return self.log.part(self.start, self.stop)
+        return next(iter(self.pieces(None)))
+
+    def pieces(self, progress: Callable[[int], None] | None = None) -> Iterator[Log]:
+        """Yield the rows in order, a piece at a time."""
+        if isinstance(self.log, Log):
+            yield self.log.part(self.start, self.stop)
+            if progress is not None:
+                progress(self.rows)
+            return
+        for piece in self.log.pieces(_PIECE, progress):
+            # Pieces outside are read too: only a whole pass checks a whole file.
+            first = max(self.start - piece.first_row, 0)
+            last = min(self.stop - piece.first_row, piece.rows)
+            if first < last:
+                yield piece.part(first, last)
+
+    def samples(self, progress: Callable[[int], None] | None = None) -> Log | Iterator[Log]:
+        """Return what `equations_of` takes: the log where it is in memory, else its pieces."""
+        return self.head() if isinstance(self.log, Log) else self.pieces(progress)
+
+
+def recording(log: Log | LogFile, progress: Callable[[int], None] | None = None) -> Recording:
+    """Return a log as a recording; files of a usual length are read whole."""
+    if isinstance(log, LogFile) and (log.rows_estimate or 0) <= _IN_MEMORY:
+        log = _whole(log, progress)
+    if isinstance(log, Log):
+        return Recording(log, 0, log.rows)
+    # The estimate comes from the size of lines or the file's own count.
+    return Recording(log, 0, max(log.rows_estimate or 0, 1))
+
+
+def divided(whole: Recording, period: float | None) -> tuple[Recording, Recording]:
+    """Return the part of a recording to fit, and the part to hold out: its end.
+
+    At a whole number of periods, where the motion is periodic.
+
+    Raises
+    ------
+    DataError
+        If it is too short to be divided.
+    """
+    cut = whole.start + int(_FIT * whole.rows)
+    if period is not None and isinstance(whole.log, Log):
+        log = whole.log
+        whole_periods = int((log.duration + 1.0 / log.rate) / period + 1e-3)
+        if whole_periods >= 2:
+            share = min(max(round(_FIT * whole_periods), 1), whole_periods - 1)
+            cut = int(np.searchsorted(log.time, log.time[0] + (share * period - 0.5 / log.rate)))
+    if cut - whole.start < 2 or whole.stop - cut < 2:
+        raise DataError(
+            f"{whole.source}: {whole.rows} rows are too few to hold some out; record longer"
+        )
+    stop = whole.stop if isinstance(whole.log, Log) else np.iinfo(np.int64).max
+    return replace(whole, stop=cut), replace(whole, start=cut, stop=int(stop))
+
+
+def _whole(file: LogFile, progress: Callable[[int], None] | None) -> Log:
+    pieces = list(file.pieces(_PIECE, progress))
+    first = pieces[0]
+
+    def joined(name: str) -> np.ndarray | None:
+        parts = [getattr(piece, name) for piece in pieces]
+        return None if parts[0] is None else np.concatenate(parts)
+
+    names = ("time", "sliders", "forces", "pose", "payload")
+    arrays = {name: joined(name) for name in names}
+    return replace(first, **arrays, findings=file.findings)  # type: ignore[arg-type]

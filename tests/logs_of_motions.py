@@ -1,0 +1,98 @@
+"""Synthetic logs: a machine's own dynamics along a motion, with friction, noise and gaps at will."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+import pteron
+from pteron.identification.logs import Description, Log
+from pteron.workspace import home_pose
+
+
+@dataclass(frozen=True)
+class Friction:
+    """Coulomb and viscous friction and offset of n sliders, (n,) each."""
+
+    coulomb: np.ndarray
+    viscous: np.ndarray
+    offset: np.ndarray
+
+    @classmethod
+    def of(cls, n):
+        k = np.arange(n)
+        return cls(2.0 + 0.2 * k, 1.0 + 0.3 * k, 0.3 * k - 0.4)
+
+    @property
+    def values(self):
+        """In the order of the model: (3 n,)."""
+        return np.r_[self.coulomb, self.viscous, self.offset]
+
+    def forces(self, rates):
+        return self.coulomb * np.sign(rates) + self.viscous * rates + self.offset
+
+
+def motion(robot, time, *, seed=0, period=4.0, harmonics=4, size=0.04, turn=0.3):
+    """Return pose, velocity and acceleration of a Fourier motion about the home pose."""
+    rng = np.random.default_rng(seed)
+    home = home_pose(robot)
+    weights = rng.normal(size=(harmonics, 2, len(home)))
+    parts = np.zeros((3, len(time), len(home)))
+    for h, (a, b) in enumerate(weights, start=1):
+        w = 2.0 * np.pi * h / period
+        s, c = np.sin(w * time)[:, None], np.cos(w * time)[:, None]
+        parts[0] += (a * s + b * c) / h
+        parts[1] += w * (a * c - b * s) / h
+        parts[2] -= w * w * (a * s + b * c) / h
+    parts *= np.array([size] * 3 + [turn])[: len(home)] / np.abs(parts[0]).max(axis=0)
+    parts[0] += home
+    return parts
+
+
+def log_of(
+    robot,
+    *,
+    time=None,
+    duration=8.0,
+    rate=500.0,
+    slider_noise=0.0,
+    force_noise=0.0,
+    friction=None,
+    seed=0,
+    noise_seed=0,
+    description=None,
+    **shape,
+):
+    """Return the log of a motion, whose values are `truth(model)`."""
+    if time is None:
+        time = np.arange(round(duration * rate)) / rate
+    pose, velocity, acceleration = motion(robot, time, seed=seed, **shape)
+    sliders = pteron.inverse_kinematics(robot, pose)
+    rates = pteron.joint_rates(robot, pose, velocity).sliders
+    forces = pteron.inverse_dynamics(robot, pose, velocity, acceleration)
+    forces = forces + (friction or Friction.of(len(robot.legs))).forces(rates)
+    rng = np.random.default_rng(noise_seed)
+    sliders = sliders + slider_noise * rng.normal(size=sliders.shape)
+    forces = forces + force_noise * rng.normal(size=forces.shape)
+    return Log("log.csv", time, sliders, forces, description=description or Description())
+
+
+def truth(model):
+    """Return the values that a model of friction and offset has in `log_of`."""
+    robot = model.robot
+    return np.r_[model.base.values(robot), Friction.of(len(robot.legs)).values]
+
+
+def pieces(log, size):
+    """Yield a log in parts of a size, as a reader would."""
+    for start in range(0, log.rows, size):
+        yield log.part(start, start + size)
+
+
+def without(log, start, stop):
+    """Return a log with a gap: rows from start to stop are missing."""
+    kept = np.r_[0:start, stop : log.rows]
+    cut = {
+        name: None if getattr(log, name) is None else getattr(log, name)[kept]
+        for name in ("time", "sliders", "forces", "pose", "payload")
+    }
+    return replace(log, **cut)
