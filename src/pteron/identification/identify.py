@@ -213,7 +213,10 @@ def identify(
         pairs = [divided(one, period) for one, period in zip(whole, periods, strict=True)]
         fit, check = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
     base = base_parameters(robot, shared=shared)
-    model = identification_model(robot, terms, base=base)
+    rotors = _reflected(fit)
+    model = identification_model(
+        robot, replace(terms or Terms(), rotors=True) if rotors else terms, base=base
+    )
     treatments = [_treatment(robot, one, wanted) for one in fit]
     parts = [
         _equations(model, one, treatment, report)
@@ -244,9 +247,13 @@ def identify(
     )
     essential = essential_parameters(equations, estimate, ESTIMATORS.get(estimator, weighted))
     notes: list[str] = []
-    consistency, share = _real_bodies(model, estimate, equations, cad, bounds, notes)
-    if model.left_out:
-        notes.append(f"Left out, as they act as part of others: {', '.join(model.left_out)}.")
+    known = np.zeros(len(model.names))
+    for name, mass in rotors.items():
+        known += model.share_of(name, mass)
+        notes.append(f"{name} = {mass:.6g} kg is known, and no part of the real bodies.")
+    consistency, share = _real_bodies(model, estimate, known, equations, cad, bounds, notes)
+    for name, shares in model.joins.items():
+        notes.append(f"{name} joins {' and '.join(shares) or 'nothing: it does not act'}.")
     advice = _advice(hidden, essential)
     return Identification(
         robot=robot,
@@ -278,6 +285,15 @@ def _reader(report: Stage, task: str) -> Callable[[int], None]:
         report(task, done, done)
 
     return tell
+
+
+def _reflected(fit: Sequence[Recording]) -> dict[str, float]:
+    """Return what the rotors of known drives weigh on the sliders, J r^2 in kg, by name."""
+    description = fit[0].head().description
+    if description.rotor_inertia is None or description.ratio is None:
+        return {}
+    pairs = zip(description.rotor_inertia, description.ratio, strict=True)
+    return {f"J_m{i}": inertia * ratio**2 for i, (inertia, ratio) in enumerate(pairs, start=1)}
 
 
 def _check_forces(one: Recording) -> None:
@@ -379,13 +395,14 @@ def _refuse_faults(model: Model, one: Recording, treatment: Treatment) -> None:
 def _real_bodies(
     model: Model,
     estimate: Estimate,
+    known: Array,
     equations: Equations,
     cad: Manipulator | Literal["robot"] | None,
     bounds: Bounds | None,
     notes: list[str],
 ) -> tuple[Consistency | None, float]:
     base = model.base
-    values = estimate.values[: base.rank]
+    values = (estimate.values - known)[: base.rank]
     covariance = estimate.covariance[: base.rank, : base.rank]
     try:
         found = consistent_model(model.robot, base, values, covariance, cad=cad, bounds=bounds)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal, get_args
 
@@ -38,9 +38,10 @@ class Terms:
     payload : bool
         The platform's four parameters once more, where a payload is carried.
     rotors : bool
-        Whether motors drive the sliders: the inertia of a rotor, reflected through its drive, has
-        the same column as the mass of its slider, m_p. It joins that base parameter; here it is
-        only said in the expressions.
+        The inertia of each slider's motor, reflected through its drive: J_m = J r^2 (kg) with J of
+        the rotor and r in rad/m. Its column is rho'': on a level guide it joins the mass of its
+        slider, m_p; on any other guide, where gravity pulls at m_p but not at a rotor, it joins
+        m_p and the offset. `Model.joins` and the expressions say so.
     """
 
     coulomb: bool = True
@@ -65,13 +66,19 @@ class Model:
         Which inertial parameters, and sums of them, come first among the values.
     terms : Terms
         What follows them.
-    left_out : tuple of str
-        Terms whose columns depend on others at every state: they act as part of these.
+    joins : dict
+        Terms whose columns depend on others at every state, and the share of each that goes with
+        those it joins: they are no values of their own.
     """
 
     base: BaseParameters
     terms: Terms
-    left_out: tuple[str, ...] = ()
+    joins: dict[str, dict[str, float]] = field(default_factory=dict)
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Terms that join others."""
+        return tuple(self.joins)
 
     @property
     def robot(self) -> Manipulator:
@@ -98,13 +105,20 @@ class Model:
     @property
     def expressions(self) -> tuple[str, ...]:
         """What each value is: base parameters as sums, the others by name."""
-        base = list(self.base.expressions())
-        if self.terms.rotors:
-            for k, name in enumerate(self.base.names):
-                if name.startswith("m_p"):
-                    suffix = name.removeprefix("m_p")
-                    base[k] = base[k].replace(name, f"{name} + J_m{suffix} r{suffix}^2", 1)
-        return (*base, *self.names[len(base) :])
+        found = [*self.base.expressions(), *self.names[self.base.rank :]]
+        for name, shares in self.joins.items():
+            for kept, share in shares.items():
+                sign, size = ("-", -share) if share < 0.0 else ("+", share)
+                times = "" if abs(size - 1.0) < 1e-9 else f"{size:.4g} "
+                found[self.names.index(kept)] += f" {sign} {times}{name}"
+        return tuple(found)
+
+    def share_of(self, name: str, value: float) -> Array:
+        """Return what a term that joins others adds to the values (p,), such as a known rotor."""
+        added = np.zeros(len(self.names))
+        for kept, share in self.joins.get(name, {name: 1.0}).items():
+            added[self.names.index(kept)] = share * value
+        return added
 
     def matrix(self, states: States) -> Array:
         """Return the regressor (R, n, p) of states, each column in N per unit of its value."""
@@ -133,6 +147,8 @@ class Model:
             found += [(f"Fv_{kind}", "N m s") for kind in kinds]
         if self.terms.joints != "none" and self.robot.platform.turns:
             found.append(("Fv_R4", "N m s"))
+        if self.terms.rotors:
+            found += [(f"J_m{i}", "kg") for i in legs]
         if self.terms.payload:
             units = ("kg", "kg m", "kg m", "kg m^2")
             found += list(zip((f"{p}_L" for p in BODY_PARAMETERS), units, strict=True))
@@ -155,6 +171,8 @@ class Model:
             if terms.joints == "shared":
                 each = each.reshape(*each.shape[:-1], n, 3).sum(axis=-2)
             parts += [each, joints[..., 3 * n :]]
+        if terms.rotors:
+            parts.append(_diagonal(states.slider_accelerations))
         if terms.payload:
             carried = numeric(robot, "regressor")(*motion)[..., -len(BODY_PARAMETERS) :]
             parts.append(carried * (states.payload != 0)[:, None, None])
@@ -191,16 +209,24 @@ def identification_model(
     model = Model(base or base_parameters(robot), terms or Terms())
     columns = model._everything(_probes(robot))
     flat = columns.reshape(-1, columns.shape[-1])
-    flat = flat / np.linalg.norm(flat, axis=0)
+    lengths = np.linalg.norm(flat, axis=0)
+    lengths = np.where(lengths > 0.0, lengths, 1.0)
     names = model.names
+    factor = np.linalg.qr(flat / lengths, mode="r")
     # The diagonal of R is what is left of each column once those before it are taken out of it.
-    rest = np.abs(np.diag(np.linalg.qr(flat, mode="r")))
-    left_out = tuple(
-        name
-        for name, size in zip(names, rest, strict=True)
-        if size < _DEPENDENT and name not in model.base.names
-    )
-    return Model(model.base, model.terms, left_out)
+    rest = np.abs(np.diag(factor))
+    dependent = [k for k in range(model.base.rank, len(names)) if rest[k] < _DEPENDENT]
+    kept = [k for k in range(len(names)) if k not in dependent]
+    joins = {}
+    for k in dependent:
+        shares = np.linalg.lstsq(factor[:, kept], factor[:, k], rcond=None)[0]
+        scaled = shares * lengths[k] / lengths[kept]
+        joins[names[k]] = {
+            names[j]: float(share)
+            for j, share, size in zip(kept, scaled, shares, strict=True)
+            if abs(size) > _DEPENDENT
+        }
+    return Model(model.base, model.terms, joins)
 
 
 def _probes(robot: Manipulator) -> States:
@@ -209,9 +235,10 @@ def _probes(robot: Manipulator) -> States:
     pose = random_poses(robot, _PROBES, seed=rng)
     velocity, acceleration = rng.normal(size=pose.shape), 10.0 * rng.normal(size=pose.shape)
     rates = numeric(robot, "joint_rates")(pose, velocity)[..., 0]
+    seconds = numeric(robot, "joint_accelerations")(pose, velocity, acceleration)[..., 0]
     # Every other one carries a payload, else its columns would be those of the platform.
     payload = np.arange(_PROBES) % 2
-    return States(np.zeros(_PROBES), rates, rates, rates, pose, velocity, acceleration, payload)
+    return States(np.zeros(_PROBES), rates, rates, seconds, pose, velocity, acceleration, payload)
 
 
 def _diagonal(values: Array) -> Array:

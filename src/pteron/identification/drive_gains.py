@@ -1,0 +1,286 @@
+"""Drive gains, newtons per unit of motor current, from motions with and without a known payload."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from itertools import count
+from typing import Any
+
+import numpy as np
+
+from pteron.errors import DataError
+from pteron.identification.equations import Equations
+from pteron.identification.estimators import Estimate, weighted
+from pteron.identification.estimators.triangle import triangle
+from pteron.identification.logs import Log
+from pteron.identification.logs.description import KnownPayload
+from pteron.identification.model import Model, Terms, identification_model
+from pteron.identification.payload import equations_with_payload
+from pteron.identification.signals import Processing
+from pteron.kernels import Array
+from pteron.manipulator import BODY_PARAMETERS, Manipulator
+from pteron.reduction import BaseParameters
+
+__all__ = ["DriveGains", "identify_drive_gains"]
+
+_UNSEEN = 1e-10
+"""Singular value, relative to the largest, below which gains are not told from inertia."""
+
+_ITERATIONS = 50
+_SETTLED = 1e-4
+"""Largest change of a value, in standard deviations."""
+
+_ROUNDING = 1e-13
+"""Change of what is predicted, relative to the currents, that is rounding."""
+
+
+@dataclass(frozen=True)
+class DriveGains:
+    """Gains g of the drives: force_i = g_i current_i.
+
+    Attributes
+    ----------
+    gains : array, shape (n,)
+        By maximum likelihood, newtons per `unit`; negative for a drive that pushes backwards.
+    deviations : array, shape (n,)
+        Standard deviations, for a payload that is known exactly: its relative error is one of all
+        gains beside these.
+    total_least_squares : array, shape (n,)
+        Where the search for the gains began.
+    unit : str
+        Of the log's force columns: A, V or %.
+    estimate : Estimate
+        Of the gains (``g1`` ..., N per unit) and of the model's values, with payload excluded;
+        its noise and residuals are in `unit`.
+    residual : array, shape (n,)
+        Standard deviation of what is left of each current, in `unit`, before the filter.
+    condition : float
+        Ratio of the largest to the second smallest singular value of the homogeneous equations:
+        how well gains are told from inertia.
+    gap : float
+        Ratio of the smallest to the second smallest: 0 without noise, 1 where noise hides it all.
+    """
+
+    gains: Array
+    deviations: Array
+    total_least_squares: Array
+    unit: str
+    estimate: Estimate = field(repr=False)
+    residual: Array
+    condition: float
+    gap: float
+
+    @property
+    def note(self) -> str:
+        """The line that declares the gains, for [forces] in the log's description."""
+        return f"gains = [{', '.join(f'{value:.10g}' for value in self.gains)}]"
+
+    def summary(self) -> str:
+        """Return what was found, for people, as lines of text."""
+        lines = ["Drive gains:"]
+        triples = zip(self.gains, self.deviations, self.total_least_squares, strict=True)
+        for i, (gain, deviation, start) in enumerate(triples, 1):
+            lines.append(
+                f"  g{i}  {gain:.6g} +- {deviation:.2g} N/{self.unit} "
+                f"(total least squares {start:.6g})"
+            )
+        left = ", ".join(f"{value:.2g}" for value in self.residual)
+        lines.append(f"Left of the currents: {left} {self.unit}.")
+        lines.append(f"Condition number {self.condition:.3g}, gap {self.gap:.2g}.")
+        lines.append("The gains are as exact as the payload's mass and inertia at best.")
+        lines.append(f"In the log's description, under [forces]: {self.note}")
+        return "\n".join(lines)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return everything but the residuals as plain data."""
+        return {
+            "gains": self.gains.tolist(),
+            "standard_deviations": self.deviations.tolist(),
+            "total_least_squares": self.total_least_squares.tolist(),
+            "unit": f"N/{self.unit}",
+            "residual": self.residual.tolist(),
+            "condition_number": self.condition,
+            "gap": self.gap,
+            "estimate": self.estimate.as_dict(),
+        }
+
+
+def identify_drive_gains(
+    robot: Manipulator,
+    log: Log,
+    with_payload: Log | None = None,
+    *,
+    payload: KnownPayload | None = None,
+    terms: Terms | None = None,
+    processing: Processing | None = None,
+    base: BaseParameters | None = None,
+) -> DriveGains:
+    """Return the drive gains of a machine from a log of its motor currents.
+
+    diag(current) g = W beta, + W_L theta_L where a payload of known theta_L is carried: without it
+    gains and inertia could both be doubled. The homogeneous equations in (g, beta, 1) are solved by
+    total least squares, as currents are noisy; then the likelihood is maximised for noise in the
+    currents alone, current_i = (W_i beta + w_i) / g_i, by Gauss's and Newton's steps, each actuator
+    weighted by its noise.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine: its geometry counts, its inertial parameters play no part.
+    log : Log
+        Of currents (A, V or %), whose payload column has both phases, 0 and 1; or a log without
+        payload.
+    with_payload : Log, optional
+        A log of the same machine with the payload, where the first has none.
+    payload : KnownPayload, optional
+        What is carried; by default what the log's description says.
+    terms : Terms, optional
+        Friction, offsets and other terms beside the base parameters.
+    processing : Processing, optional
+        How the logs are treated; by default the data decide.
+    base : BaseParameters, optional
+        Another choice of base parameters, such as that of legs which share theirs.
+
+    Returns
+    -------
+    DriveGains
+
+    Raises
+    ------
+    DataError
+        If the forces are newtons already, the payload is not known, a phase is missing, or the
+        motion does not tell gains from inertia.
+
+    References
+    ----------
+    M. Gautier and S. Briot, "Global identification of joint drive gains and dynamic parameters of
+    robots", Journal of Dynamic Systems, Measurement, and Control 136 (2014).
+    """
+    logs = [log] if with_payload is None else [log, with_payload]
+    unit = _unit(logs)
+    known = payload or logs[-1].description.payload or log.description.payload
+    if known is None:
+        raise DataError(
+            f"{logs[-1].source}: the payload is not known, and without it gains and inertia cannot "
+            "be told apart; declare [payload] in the log's description"
+        )
+    if robot.platform.turns and not known.inertia:
+        raise DataError(
+            f"{logs[-1].source}: only the payload's mass is known, but {robot.name} turns its "
+            "platform; declare its center_of_mass (or first_moment) and inertia about P too"
+        )
+    plain = identification_model(robot, replace(terms or Terms(), payload=False), base=base)
+    # All four columns of the payload: none is solved for, so that none need be independent.
+    model = Model(plain.base, replace(plain.terms, payload=True), plain.left_out)
+    equations = equations_with_payload(model, log, with_payload, processing)
+    carried = equations.matrix[..., -len(BODY_PARAMETERS) :] @ np.array(
+        [known.mass, *known.first_moment, known.inertia]
+    )
+    equations = equations.columns(range(len(plain.names)))
+    start, condition, gap = _total(equations, carried, log.source)
+    estimate = _likely(equations, carried, start, unit, log.source)
+    n = equations.actuators
+    return DriveGains(
+        gains=estimate.values[:n],
+        deviations=estimate.deviations[:n],
+        total_least_squares=start[:n],
+        unit=unit,
+        estimate=estimate,
+        residual=estimate.noise,
+        condition=condition,
+        gap=gap,
+    )
+
+
+def _unit(logs: list[Log]) -> str:
+    for log in logs:
+        if log.description.force_unit == "N":
+            raise DataError(
+                f"{log.source}: its forces are in newtons already, motor currents (A, V or %) are "
+                "expected; declare their unit, and no gains, under [forces] in its description"
+            )
+    units = {log.description.force_unit for log in logs}
+    if len(units) > 1:
+        raise DataError(
+            f"{logs[1].source}: its forces are in {logs[1].description.force_unit}, those of "
+            f"{logs[0].source} in {logs[0].description.force_unit}; give both in one unit"
+        )
+    return units.pop()
+
+
+def _total(equations: Equations, carried: Array, source: str) -> tuple[Array, float, float]:
+    """Return g and beta by total least squares, with the condition number and the gap.
+
+    The columns W are exact, as in the likelihood: noise is in the currents alone. An orthogonal
+    factor takes them out first (Van Huffel and Vandewalle), else the weakest of dozens of inertial
+    parameters would pass for the null vector.
+    """
+    n, p = equations.actuators, len(equations.names)
+    currents = equations.forces[..., None] * np.eye(n)
+    homogeneous = replace(
+        equations,
+        names=(*equations.names, *(f"g{i}" for i in range(1, n + 1))),
+        units=(*equations.units, *("",) * n),
+        matrix=np.concatenate([-equations.matrix, currents], axis=-1),
+        forces=-carried,
+    )
+    factor = triangle(homogeneous)
+    length = np.sqrt(factor.image @ factor.image + factor.rest)
+    if length == 0.0:
+        raise DataError(f"{source}: the actuators do not feel the payload; move it about")
+    # W has to be seen by itself, and its message names what is not.
+    triangle(equations).check_seen(source)
+    scale = np.r_[np.where(factor.scale > 0.0, factor.scale, 1.0), length]
+    whole = np.zeros((p + n + 1, p + n + 1))
+    whole[:-1, :-1] = factor.factor
+    whole[:, -1] = np.r_[factor.image, np.sqrt(factor.rest)] / length
+    _, sizes, directions = np.linalg.svd(whole[p:, p:])
+    last = directions[-1]
+    if sizes[-2] <= _UNSEEN * sizes[0] or abs(last[-1]) <= _UNSEEN:
+        raise DataError(
+            f"{source}: the payload does not tell the gains from the inertia; carry a heavier one, "
+            "and move all coordinates in both phases"
+        )
+    gains = last[:-1] / last[-1]
+    inertia = -np.linalg.solve(whole[:p, :p], whole[:p, p:] @ np.r_[gains, 1.0])
+    start = np.r_[gains, inertia] * length / np.r_[scale[p:-1], scale[:p]]
+    return start, float(sizes[0] / sizes[-2]), float(sizes[-1] / sizes[-2])
+
+
+def _likely(equations: Equations, carried: Array, start: Array, unit: str, source: str) -> Estimate:
+    """Return g and beta of greatest likelihood, the noise being in the currents alone."""
+    n = equations.actuators
+    names = (*(f"g{i}" for i in range(1, n + 1)), *equations.names)
+    units = (*(f"N/{unit}" for _ in range(n)), *equations.units)
+    # In 1 / g the currents are bilinear: what is left out of each step is only a product.
+    values = np.r_[1.0 / start[:n], start[n:]]
+    for iteration in count(1):
+        inverse, inertia = values[:n], values[n:]
+        force = equations.matrix @ inertia + carried
+        tangent = np.concatenate(
+            [force[..., None] * np.eye(n), inverse[:, None] * equations.matrix], axis=-1
+        )
+        # J v = current - f(v0) + J v0, and J v0 = f(v0) + (W beta) / g.
+        images = equations.forces + inverse * (force - carried)
+        estimate = weighted(
+            replace(equations, names=names, units=units, matrix=tangent, forces=images)
+        )
+        step = estimate.values - values
+        values = estimate.values
+        if (np.abs(step) <= _SETTLED * estimate.deviations).all():
+            break
+        change = np.linalg.norm(tangent @ step)
+        if change <= _ROUNDING * np.linalg.norm(equations.forces):
+            break
+        if iteration == _ITERATIONS:
+            raise DataError(
+                f"{source}: the gains do not settle; record longer, or carry a heavier payload"
+            )
+    slopes = np.r_[-1.0 / values[:n] ** 2, np.ones(len(values) - n)]
+    return replace(
+        estimate,
+        method="likelihood",
+        values=np.r_[1.0 / values[:n], values[n:]],
+        covariance=estimate.covariance * np.outer(slopes, slopes),
+        iterations=iteration,
+    )

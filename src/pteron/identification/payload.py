@@ -1,0 +1,238 @@
+"""The payload's inertia, from the same machine with and without it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from pteron.errors import DataError
+from pteron.identification.equations import Equations, equations_of, stacked
+from pteron.identification.estimators import Estimate, weighted
+from pteron.identification.logs import Log
+from pteron.identification.model import Model, Terms, identification_model
+from pteron.identification.signals import Processing, treatment_of
+from pteron.kernels import Array
+from pteron.manipulator import BODY_PARAMETERS, Manipulator
+from pteron.reduction import BaseParameters
+
+__all__ = ["Payload", "equations_with_payload", "identify_payload"]
+
+_NAMES = tuple(f"{name}_L" for name in BODY_PARAMETERS)
+
+
+@dataclass(frozen=True)
+class Payload:
+    """What a payload adds to the platform's inertia, about P and in the platform's frame.
+
+    Attributes
+    ----------
+    mass : float or None
+        kg. None, here and below, where the forces do not show it.
+    first_moment : tuple of float or None
+        Mass times the position of the centre of mass, kg m; a 3T platform does not feel it.
+    inertia : float or None
+        About the platform's axis through P, kg m^2; a 3T platform does not feel it.
+    names : tuple of str
+        Of the k values that the forces show: ``m_L, mgx_L, mgy_L, I_L``, or some of them.
+    covariance : array, shape (k, k)
+        Of these values, SI units.
+    estimate : Estimate
+        Of everything: base parameters, friction and offsets first, the payload last.
+    residual : array, shape (n,)
+        Standard deviation of what is left of each actuator's forces, N, before the filter.
+    """
+
+    mass: float | None
+    first_moment: tuple[float, float] | None
+    inertia: float | None
+    names: tuple[str, ...]
+    covariance: Array = field(repr=False)
+    estimate: Estimate = field(repr=False)
+    residual: Array
+
+    @property
+    def values(self) -> Array:
+        """The values that the forces show (k,)."""
+        return np.array([self.estimate.value(name) for name in self.names])
+
+    @property
+    def deviations(self) -> Array:
+        """Standard deviations (k,) of these values."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+    @property
+    def center_of_mass(self) -> tuple[float, float] | None:
+        """Position of the centre of mass in the platform's frame, m."""
+        if not self.mass or self.first_moment is None:
+            return None
+        return self.first_moment[0] / self.mass, self.first_moment[1] / self.mass
+
+    @property
+    def real(self) -> bool:
+        """Whether a real body has these values: m > 0 and I m >= (m gamma)^2."""
+        if self.mass is None or not self.mass > 0.0:
+            return False
+        if self.first_moment is None or self.inertia is None:
+            return True
+        hx, hy = self.first_moment
+        return self.inertia * self.mass >= hx * hx + hy * hy
+
+    def summary(self) -> str:
+        """Return what was found, for people, as lines of text."""
+        lines = ["Payload, about P in the platform's frame:"]
+        for name, value, deviation in zip(self.names, self.values, self.deviations, strict=True):
+            unit = self.estimate.units[self.estimate.names.index(name)]
+            lines.append(f"  {name:<6} {value:+.5g} +- {deviation:.2g} {unit}")
+        if self.center_of_mass is not None:
+            x, y = self.center_of_mass
+            lines.append(f"Centre of mass: ({x:+.5g}, {y:+.5g}) m.")
+        hidden = [name for name in _NAMES if name not in self.names]
+        if hidden:
+            lines.append(f"Not felt by the actuators: {', '.join(hidden)}.")
+        lines.append(
+            "A real body has these values."
+            if self.real
+            else "No real body has these values: record longer, or faster."
+        )
+        left = ", ".join(f"{value:.2g}" for value in self.residual)
+        lines.append(f"Left of the actuator forces: {left} N.")
+        return "\n".join(lines)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return everything but the other values as plain data."""
+        center = self.center_of_mass
+        return {
+            "mass": self.mass,
+            "first_moment": None if self.first_moment is None else list(self.first_moment),
+            "inertia": self.inertia,
+            "center_of_mass": None if center is None else list(center),
+            "names": list(self.names),
+            "standard_deviations": self.deviations.tolist(),
+            "covariance": self.covariance.tolist(),
+            "real": self.real,
+            "residual": self.residual.tolist(),
+        }
+
+
+def identify_payload(
+    robot: Manipulator,
+    without: Log,
+    with_payload: Log | None = None,
+    *,
+    terms: Terms | None = None,
+    processing: Processing | None = None,
+    estimator: Callable[[Equations], Estimate] = weighted,
+    base: BaseParameters | None = None,
+) -> Payload:
+    """Return a payload's inertia from motions with and without it.
+
+    F = W beta without payload and F = W beta + W_L theta_L with it, W_L being the platform's four
+    columns of the regressor, are solved as one: friction and base parameters are the same in both,
+    so that the machine's own parameters need not be known.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine: its geometry counts, its inertial parameters play no part.
+    without : Log
+        A log without payload; or one whose payload column has both phases, 0 and 1.
+    with_payload : Log, optional
+        A log of the same machine with the payload, where the first has none.
+    terms : Terms, optional
+        Friction, offsets and other terms beside base parameters and payload.
+    processing : Processing, optional
+        How the logs are treated; by default the data decide.
+    estimator : callable
+        What solves the equations.
+    base : BaseParameters, optional
+        Another choice of base parameters, such as that of legs which share theirs.
+
+    Returns
+    -------
+    Payload
+
+    Raises
+    ------
+    DataError
+        If a phase is missing, the forces are not in newtons, or the motion does not show the
+        values.
+
+    References
+    ----------
+    W. Khalil, M. Gautier and P. Lemoine, "Identification of the payload inertial parameters of
+    industrial manipulators", ICRA 2007: the log with payload and the one without, solved as one.
+    """
+    for log in (without, with_payload):
+        if log is not None and log.description.force_unit != "N":
+            unit = log.description.force_unit
+            raise DataError(
+                f"{log.source}: its forces are in {unit}, newtons are expected; declare gains "
+                f"(N per {unit}) in its description"
+            )
+    model = identification_model(robot, replace(terms or Terms(), payload=True), base=base)
+    estimate = estimator(equations_with_payload(model, without, with_payload, processing))
+    names = tuple(name for name in estimate.names if name in _NAMES)
+    chosen = [estimate.names.index(name) for name in names]
+    found = dict(zip(names, (float(value) for value in estimate.values[chosen]), strict=True))
+    mass, hx, hy, inertia = (found.get(name) for name in _NAMES)
+    return Payload(
+        mass=mass,
+        first_moment=None if hx is None or hy is None else (hx, hy),
+        inertia=inertia,
+        names=names,
+        covariance=estimate.covariance[np.ix_(chosen, chosen)],
+        estimate=estimate,
+        residual=estimate.noise,
+    )
+
+
+def equations_with_payload(
+    model: Model, without: Log, with_payload: Log | None, processing: Processing | None
+) -> Equations:
+    """Return the equations of a log with both phases, or of two logs, as one.
+
+    Raises
+    ------
+    DataError
+        If a phase is missing, or nothing of it is left between the filters' edges.
+    """
+    if with_payload is None:
+        logs = [without]
+        phases = np.unique(without.payload) if without.payload is not None else np.zeros(1)
+        if len(phases) < 2:
+            which = "one where a payload is carried" if not phases.any() else "one without payload"
+            raise DataError(
+                f"{without.source}: its payload column has phase {phases[0]:g} only, 0 and 1 are "
+                f"expected; add {which}, or give two logs"
+                if without.payload is not None
+                else f"{without.source}: no payload column; declare one that is 0 without payload "
+                "and 1 with it, or give two logs"
+            )
+    else:
+        logs = [_in_phase(without, 0), _in_phase(with_payload, 1)]
+    equations = stacked(
+        [equations_of(model, log, treatment_of(model.robot, log, processing)) for log in logs]
+    )
+    seen = (equations.gain > 0.0).any(axis=1)
+    for phase, called in ((0, "without payload"), (1, "with payload")):
+        if not (seen & ((equations.payload != 0) == phase)).any():
+            raise DataError(
+                f"{logs[phase * (len(logs) - 1)].source}: no samples {called} are left between the "
+                "filters' edges; record that phase longer"
+            )
+    return equations
+
+
+def _in_phase(log: Log, phase: int) -> Log:
+    """Return a log as one phase throughout."""
+    if log.payload is not None and ((log.payload != 0) != phase).any():
+        row = int(np.argmax((log.payload != 0) != phase))
+        raise DataError(
+            f"{log.place(row)}: payload {log.payload[row]} in the log "
+            f"{'with' if phase else 'without'} payload, {phase} expected throughout; give first "
+            "the log without payload, then the one with it, or one log with both phases alone"
+        )
+    return replace(log, payload=np.full(log.rows, phase, dtype=np.int64))
