@@ -36,14 +36,20 @@ def motion(robot, time, *, seed=0, period=4.0, harmonics=4, size=0.04, turn=0.3)
     rng = np.random.default_rng(seed)
     home = home_pose(robot)
     weights = rng.normal(size=(harmonics, 2, len(home)))
-    parts = np.zeros((3, len(time), len(home)))
-    for h, (a, b) in enumerate(weights, start=1):
-        w = 2.0 * np.pi * h / period
-        s, c = np.sin(w * time)[:, None], np.cos(w * time)[:, None]
-        parts[0] += (a * s + b * c) / h
-        parts[1] += w * (a * c - b * s) / h
-        parts[2] -= w * w * (a * s + b * c) / h
-    parts *= np.array([size] * 3 + [turn])[: len(home)] / np.abs(parts[0]).max(axis=0)
+
+    def series(instants):
+        parts = np.zeros((3, len(instants), len(home)))
+        for h, (a, b) in enumerate(weights, start=1):
+            w = 2.0 * np.pi * h / period
+            s, c = np.sin(w * instants)[:, None], np.cos(w * instants)[:, None]
+            parts[0] += (a * s + b * c) / h
+            parts[1] += w * (a * c - b * s) / h
+            parts[2] -= w * w * (a * s + b * c) / h
+        return parts
+
+    # The same motion, whatever the instants are at which it is asked for.
+    largest = np.abs(series(np.linspace(0.0, period, 1000))[0]).max(axis=0)
+    parts = series(time) * np.array([size] * 3 + [turn])[: len(home)] / largest
     parts[0] += home
     return parts
 

@@ -16,6 +16,7 @@ from pteron.cli.direct import direct
 from pteron.cli.excite import excite
 from pteron.cli.export import export
 from pteron.cli.forces import forces
+from pteron.cli.identify import identify
 from pteron.cli.inverse import inverse
 from pteron.cli.numbers import NumbersCommand
 from pteron.cli.program import Program
@@ -110,6 +111,11 @@ _add(
     excite,
     "pteron excite quadrupteron --out exciting.csv",
     "pteron excite my-robot.toml --out exciting.csv --period 5 --speed 0.5 --force 60",
+)
+_add(
+    identify,
+    "pteron identify log.csv --robot quadrupteron --out identified",
+    "pteron identify a.csv b.csv --held-out c.csv --robot my-robot.toml --out identified",
 )
 _add(table1, "pteron table1")
 

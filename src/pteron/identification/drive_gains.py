@@ -171,7 +171,7 @@ def identify_drive_gains(
         )
     plain = identification_model(robot, replace(terms or Terms(), payload=False), base=base)
     # All four columns of the payload: none is solved for, so that none need be independent.
-    model = Model(plain.base, replace(plain.terms, payload=True), plain.left_out)
+    model = Model(plain.base, replace(plain.terms, payload=True), plain.joins)
     equations = equations_with_payload(model, log, with_payload, processing)
     carried = equations.matrix[..., -len(BODY_PARAMETERS) :] @ np.array(
         [known.mass, *known.first_moment, known.inertia]
@@ -229,7 +229,7 @@ def _total(equations: Equations, carried: Array, source: str) -> tuple[Array, fl
     if length == 0.0:
         raise DataError(f"{source}: the actuators do not feel the payload; move it about")
     # W has to be seen by itself, and its message names what is not.
-    triangle(equations).check_seen(source)
+    triangle(equations).check_seen()
     scale = np.r_[np.where(factor.scale > 0.0, factor.scale, 1.0), length]
     whole = np.zeros((p + n + 1, p + n + 1))
     whole[:-1, :-1] = factor.factor

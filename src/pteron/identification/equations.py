@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,8 @@ from pteron.errors import DataError
 from pteron.identification.logs import Log
 from pteron.identification.model import Model
 from pteron.identification.signals import States, Treatment
-from pteron.identification.signals.fourier import fitted_series
+from pteron.identification.signals.fourier import fitted_series, most_harmonics
+from pteron.identification.signals.projection import Projection, fourier_basis
 from pteron.identification.signals.samples import samples
 from pteron.kernels import Array
 
@@ -22,6 +23,9 @@ __all__ = ["Equations", "equations_of", "in_motion", "stacked"]
 
 _LEAST_SHARE = 0.3
 """Noise of an equation, relative to the usual, below which it is made of hardly any samples."""
+
+_EVEN = 1e-3
+"""Deviation from even steps, in steps, that is a matter of how stamps were written."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +49,8 @@ class Equations:
         What they were divided by; 0 for an equation that is not used, whose numbers are 0 too.
     payload : array of int, shape (R,)
         The phase of each row.
+    source : str
+        What messages call them: the log they come from.
     """
 
     names: tuple[str, ...]
@@ -54,6 +60,7 @@ class Equations:
     time: Array
     gain: Array
     payload: NDArray[np.int64]
+    source: str = "the log"
 
     @property
     def used(self) -> Array:
@@ -72,21 +79,16 @@ class Equations:
 
     def columns(self, keep: Sequence[int]) -> Equations:
         """Return the equations of some of the values."""
-        return Equations(
-            tuple(self.names[k] for k in keep),
-            tuple(self.units[k] for k in keep),
-            np.ascontiguousarray(self.matrix[..., list(keep)]),
-            self.forces,
-            self.time,
-            self.gain,
-            self.payload,
+        return replace(
+            self,
+            names=tuple(self.names[k] for k in keep),
+            units=tuple(self.units[k] for k in keep),
+            matrix=np.ascontiguousarray(self.matrix[..., list(keep)]),
         )
 
     def with_forces(self, forces: Array) -> Equations:
         """Return the equations for other forces (R, n)."""
-        return Equations(
-            self.names, self.units, self.matrix, forces, self.time, self.gain, self.payload
-        )
+        return replace(self, forces=forces)
 
 
 def equations_of(model: Model, log: Log | Iterable[Log], treatment: Treatment) -> Equations:
@@ -112,14 +114,15 @@ def equations_of(model: Model, log: Log | Iterable[Log], treatment: Treatment) -
     """
     if treatment.derivatives == "periodic":
         assert isinstance(log, Log)  # `treatment_of` takes no other for periodic
-        return stacked([_periodic(model, part, treatment) for part in _phases(log, treatment)])
+        parts = [_periodic(model, part, treatment) for part in _phases(log, treatment)]
+        return replace(stacked(parts), source=log.source)
     # Whether a row counts depends on those around it, in the next block too.
     margin = treatment.decimation.margin + treatment.settling
-    found = [
-        _filtered(model, block.states, block.forces, treatment)
-        for block in samples(model.robot, log, treatment, margin=margin)
-    ]
-    return stacked(found)
+    found, source = [], "the log"
+    for block in samples(model.robot, log, treatment, margin=margin):
+        found.append(_filtered(model, block.states, block.forces, treatment))
+        source = block.source
+    return replace(stacked(found), source=source)
 
 
 def stacked(parts: Sequence[Equations]) -> Equations:
@@ -127,14 +130,9 @@ def stacked(parts: Sequence[Equations]) -> Equations:
     first = parts[0]
     if len(parts) == 1:
         return first
-    return Equations(
-        first.names,
-        first.units,
-        *(
-            np.concatenate([getattr(part, name) for part in parts])
-            for name in ("matrix", "forces", "time", "gain", "payload")
-        ),
-    )
+    names = ("matrix", "forces", "time", "gain", "payload")
+    joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    return replace(first, **joined)
 
 
 def in_motion(rates: Array, treatment: Treatment, *, wraps: bool = False) -> Array:
@@ -214,36 +212,51 @@ def _periodic(model: Model, log: Log, treatment: Treatment) -> Equations:
     """
     period, rate = treatment.period, treatment.rate
     assert period is not None
+    start = float(log.time[0])
     periods = int((log.duration + 1.0 / rate) / period + 1e-3)
-    rows = min(round(periods * period * rate), log.rows)
-    log = log.part(0, rows)
+    log = log.part(0, int(np.searchsorted(log.time, start + periods * period - 0.5 / rate)))
     per_period = round(period * rate)
-    harmonics = max(min(int(treatment.band * period), (per_period - 1) // 2), 1)
+    harmonics = max(min(int(treatment.band * period), most_harmonics(log.time, period)), 1)
     series = fitted_series(log.time, log.sliders, period, highest=treatment.cutoff)
-    fine = log.time[0] + np.arange(per_period) * (period / per_period)
-    motion = series.at(fine), series.at(fine, 1), series.at(fine, 2)
-    phase = None if log.payload is None else np.full(per_period, log.payload[0])
-    states = States.of_sliders(
-        model.robot,
-        motion,
-        fine,
-        treatment.mode,
-        payload=phase,
-        source=log.source,
-        first_row=log.first_row,
-    )
+    fine = start + np.arange(per_period) * (period / per_period)
+    moving = in_motion(series.at(fine, 1), treatment, wraps=True)
     count = 2 * harmonics + 1
-    kept = log.time[0] + np.arange(count) * (period / count)
-    moving = in_motion(motion[1], treatment, wraps=True)
-    nearest = np.round((log.time - log.time[0]) * (per_period / period)).astype(int) % per_period
-    measured = moving[nearest] * log.forces
-    forces = fitted_series(log.time, measured, period, highest=harmonics / period).at(kept)
-    matrix = moving[..., None] * model.matrix(states)
-    noise = _projected_noise(moving, count) * np.sqrt(per_period / rows)
-    payload = np.zeros(count, dtype=np.int64) if phase is None else phase[:1].repeat(count)
-    return _assembled(
-        model, _projected(matrix, count), forces, noise, kept, payload, np.sqrt(count / rows)
-    )
+    kept = start + np.arange(count) * (period / count)
+
+    def regressor(time: Array, used: Array, first_row: int) -> Array:
+        states = States.of_sliders(
+            model.robot,
+            (series.at(time), series.at(time, 1), series.at(time, 2)),
+            time,
+            treatment.mode,
+            payload=None if log.payload is None else np.full(len(time), log.payload[0]),
+            source=log.source,
+            first_row=first_row,
+        )
+        return np.asarray(used[..., None] * model.matrix(states))
+
+    places = (log.time - start) * (per_period / period)
+    used = moving[np.round(places).astype(int) % per_period]
+    if log.rows == periods * per_period and np.abs(places - np.arange(log.rows)).max() <= _EVEN:
+        # All periods have their samples at the same instants: one stands for all.
+        matrix = _projected(regressor(fine, moving, log.first_row), count)
+        forces = fitted_series(log.time, used * log.forces, period, highest=harmonics / period)
+        rows = forces.at(kept)
+        noise = _projected_noise(moving, count) * np.sqrt(per_period / log.rows)
+    else:
+        projection = Projection.of(log.time, period, harmonics)
+        basis = fourier_basis(kept, period, harmonics)
+        n, p = used.shape[1], len(model.names)
+
+        def sampled(part: slice) -> Array:
+            found = regressor(log.time[part], used[part], log.first_row + part.start)
+            return found.reshape(len(found), n * p)
+
+        matrix = (basis @ projection.coefficients(sampled, n * p)).reshape(count, n, p)
+        rows = basis @ projection.coefficients(lambda part: used[part] * log.forces[part], n)
+        noise = projection.noise(used, kept)
+    payload = np.full(count, 0 if log.payload is None else log.payload[0], dtype=np.int64)
+    return _assembled(model, matrix, rows, noise, kept, payload, np.sqrt(count / log.rows))
 
 
 def _projected_noise(moving: Array, count: int) -> Array:

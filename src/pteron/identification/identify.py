@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import permutations
+from itertools import combinations
 from typing import Any, Literal
 
 import numpy as np
@@ -42,11 +42,8 @@ METHODS = (*ESTIMATORS, "likelihood")
 Stage = Callable[[str, int, int], None]
 """Told what is being done, how many rows of it are done, and how many there are."""
 
-_LOOK = 60_000
+_LOOK = 30_000
 """Rows that are tried in other orders."""
-
-_SUSPICIOUS = 0.2
-"""Held-out error relative to the force beyond which columns are tried in other orders."""
 
 
 @dataclass(frozen=True)
@@ -232,8 +229,8 @@ def identify(
         for one in check
     ]
     # What was held out betrays columns that are not what they are called.
-    bad = any((p.nrms > 100.0 * _SUSPICIOUS).any() for p in held)
-    if bad or has_negative_inertia(model, estimate.values):
+    verdict = verdict_of(held, repeats=not others)
+    if verdict.grade != "trustworthy" or has_negative_inertia(model, estimate.values):
         _refuse_faults(model, fit[0], treatments[0])
     if too_many:
         raise DataError(
@@ -265,7 +262,7 @@ def identify(
         fitted=fitted,
         held_out=tuple(held),
         treatments=tuple(treatments),
-        verdict=verdict_of(held, repeats=not others, advice=advice),
+        verdict=replace(verdict, next_steps=(*verdict.next_steps, *advice)),
         unseen=hidden,
         findings=tuple(f for one in (*whole, *others) for f in one.findings),
         notes=tuple(notes),
@@ -342,9 +339,8 @@ def _slider_order(
     head = one.head()
     some = head.sliders[:: max(head.rows // 2000, 1)]
     n = some.shape[1]
-    for order in permutations(range(n)):
-        if sum(k != j for k, j in enumerate(order)) != 2:
-            continue
+    for one, two in combinations(range(n), 2):
+        order = tuple({one: two, two: one}.get(k, k) for k in range(n))
         poses = direct_kinematics(robot, some[:, list(order)])[:, treatment.mode]
         if not np.isnan(poses).any():
             return order
@@ -380,10 +376,7 @@ def _refuse_faults(model: Model, one: Recording, treatment: Treatment) -> None:
     if fault is None:
         return
     if fault.after < fault.before:
-        why = (
-            f": mended so, the error falls from {100.0 * fault.before:.2g} % to "
-            f"{100.0 * fault.after:.2g} % of the filtered forces"
-        )
+        why = f": mended so, the error of the fit falls {fault.before / fault.after:.1f} times"
     else:
         why = ": as they are, the machine would have negative inertia"
     raise DataError(

@@ -50,9 +50,7 @@ class Verdict:
         }
 
 
-def verdict_of(
-    held_out: list[Prediction], *, repeats: bool, advice: tuple[str, ...] = ()
-) -> Verdict:
+def verdict_of(held_out: list[Prediction], *, repeats: bool) -> Verdict:
     """Return the verdict on a model.
 
     Parameters
@@ -61,8 +59,6 @@ def verdict_of(
         Of recordings that were not fitted.
     repeats : bool
         Whether they repeat the motion that was fitted.
-    advice : tuple of str
-        What else is to be done next.
 
     Returns
     -------
@@ -108,6 +104,4 @@ def verdict_of(
         )
         steps.append("Record another motion, such as a pick-and-place cycle, and hold it out.")
     order = ("trustworthy", "usable with care", "not trustworthy")
-    return Verdict(
-        max(grades, key=order.index), tuple(reasons), tuple(dict.fromkeys((*steps, *advice)))
-    )
+    return Verdict(max(grades, key=order.index), tuple(reasons), tuple(dict.fromkeys(steps)))

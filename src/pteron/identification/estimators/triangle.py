@@ -40,6 +40,8 @@ class Triangle:
         Equations that went in.
     names : tuple of str
         Of the values.
+    source : str
+        What messages call the log.
     """
 
     factor: Array
@@ -48,6 +50,7 @@ class Triangle:
     scale: Array
     rows: int
     names: tuple[str, ...]
+    source: str
 
     @property
     def condition(self) -> float:
@@ -68,7 +71,7 @@ class Triangle:
         inverse = solve_triangular(self.factor, np.eye(len(self.names)))
         return np.asarray((inverse @ inverse.T) / np.outer(self.scale, self.scale))
 
-    def check_seen(self, source: str = "the log") -> None:
+    def check_seen(self) -> None:
         """Refuse equations that do not determine the values.
 
         Raises
@@ -79,7 +82,7 @@ class Triangle:
         """
         if self.degrees <= 0:
             raise DataError(
-                f"{source}: {self.rows} equations are left after filters and edges, more than "
+                f"{self.source}: {self.rows} equations are left after filters and edges, more than "
                 f"{len(self.names)} are needed; record longer, or choose a higher band"
             )
         _, sizes, directions = np.linalg.svd(self.factor)
@@ -88,7 +91,7 @@ class Triangle:
         if concerned.any():
             names = [name for name, flag in zip(self.names, concerned, strict=True) if flag]
             raise DataError(
-                f"{source}: too little motion: {len(names)} of {len(self.names)} values cannot be "
+                f"{self.source}: too little motion: {len(names)} of {len(self.names)} values cannot be "
                 f"seen ({', '.join(names)}); move all coordinates at once, such as along a "
                 "trajectory of pteron excite"
             )
@@ -124,6 +127,7 @@ def triangle(equations: Equations, weights: Array | None = None) -> Triangle:
         scale,
         equations.rows,
         equations.names,
+        equations.source,
     )
 
 

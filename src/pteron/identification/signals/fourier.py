@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve  # type: ignore[import-untyped]
 
+from pteron.errors import DataError
+from pteron.identification.signals.projection import Projection, fourier_basis, row_blocks
 from pteron.kernels import Array
 
-__all__ = ["FourierSeries", "fitted_series"]
+__all__ = ["FourierSeries", "fitted_series", "most_harmonics"]
 
 _MOST = 120
 """Harmonics that are looked at."""
@@ -17,6 +18,9 @@ _MOST = 120
 _SIGNIFICANT = 5.0
 """Standard deviations of noise above which a harmonic belongs to the motion: by chance, one in a
 million does."""
+
+_SHARE = 0.4
+"""Harmonics in a period, for each sample in it, that are told from noise."""
 
 _ROUNDING = 1e-15
 """Noise relative to a signal's size that is rounding: harmonics below it are not looked for."""
@@ -50,11 +54,12 @@ class FourierSeries:
 
     def basis(self, time: Array, derivative: int = 0) -> Array:
         """Return the basis functions (T, 2 H + 1) at times, or their derivatives."""
-        return _basis(time, self.period, self.harmonics, derivative)
+        return fourier_basis(time, self.period, self.harmonics, derivative)
 
     def at(self, time: Array, derivative: int = 0) -> Array:
         """Return the signals (T, k) at times, or their derivatives."""
-        return np.asarray(self.basis(time, derivative) @ self.coefficients)
+        parts = (self.basis(time[rows], derivative) for rows in row_blocks(len(time)))
+        return np.concatenate([part @ self.coefficients for part in parts])
 
 
 def fitted_series(
@@ -75,15 +80,24 @@ def fitted_series(
         s.
     highest : float, optional
         Take exactly the harmonics up to this frequency (Hz) instead.
+
+    Raises
+    ------
+    DataError
+        If the samples leave out so much of the period that they do not determine the series.
     """
     rate = (len(time) - 1) / float(time[-1] - time[0])
-    limit = max(int(0.4 * rate * period), 1)
-    most = min(_MOST if highest is None else int(round(highest * period)), limit)
-    # A series that repeats itself needs as many samples in one period as it has coefficients.
-    matrix = _basis(time, period, most)
-    found = _fitted(matrix, signal)
-    rest = signal - matrix @ found
-    noise = np.sqrt((rest**2).sum(axis=0) / max(len(time) - len(found), 1))
+    limit = most_harmonics(time, period)
+    asked = _MOST if highest is None else int(round(highest * period))
+    most = min(asked, limit)
+    if most < 1 or (highest is not None and most < min(asked, int(_SHARE * rate * period))):
+        raise DataError(
+            f"period: the samples leave {_largest_hole(time, period):g} s out of the period of "
+            f"{period:g} s, too much for its harmonics; record whole periods without a gap, or "
+            'choose derivatives "central"'
+        )
+    found, squares = _fitted(time, signal, period, most)
+    noise = np.sqrt(squares / max(len(time) - len(found), 1))
     noise = np.maximum(noise, _ROUNDING * np.abs(signal).max(axis=0))
     if highest is None:
         amplitudes = np.hypot(found[1::2], found[2::2])
@@ -94,29 +108,42 @@ def fitted_series(
         found = found[: 2 * last + 1]
         if last < most:
             # Uneven samples mix harmonics a little: what is kept is fitted by itself.
-            found = _fitted(_basis(time, period, last), signal)
+            found, _ = _fitted(time, signal, period, last)
     return FourierSeries(period, found, noise, len(time))
 
 
-def _fitted(matrix: Array, signal: Array) -> Array:
-    """Return the coefficients of least squares.
+def most_harmonics(time: Array, period: float) -> int:
+    """Return how many harmonics of a period samples at these times can tell apart.
 
-    Over a period and more the basis is nearly orthogonal, so that the normal equations lose
-    nothing; a second step takes out what rounding put in.
+    A series that repeats itself needs as many samples in one period as it has coefficients, and
+    none of its waves may hide where there are no samples in any period.
     """
-    normal = cho_factor(matrix.T @ matrix)
-    found = cho_solve(normal, matrix.T @ signal)
-    return np.asarray(found + cho_solve(normal, matrix.T @ (signal - matrix @ found)))
+    rate = (len(time) - 1) / float(time[-1] - time[0])
+    # A hole of one step counts as even sampling does, whatever its rounding.
+    hole = max(_largest_hole(time, period), (1.0 - 1e-6) / rate)
+    return int(_SHARE * period / hole + 1e-6)
 
 
-def _basis(time: Array, period: float, harmonics: int, derivative: int = 0) -> Array:
-    angle = 2.0 * np.pi / period
-    columns = np.zeros((len(time), 2 * harmonics + 1))
-    columns[:, 0] = float(derivative == 0)
-    phase = np.remainder(time, period) * angle
-    shift = derivative * np.pi / 2.0
-    for h in range(1, harmonics + 1):
-        scale = (h * angle) ** derivative
-        columns[:, 2 * h - 1] = scale * np.sin(h * phase + shift)
-        columns[:, 2 * h] = scale * np.cos(h * phase + shift)
-    return columns
+def _largest_hole(time: Array, period: float) -> float:
+    """Return the longest time (s) of the period that no sample falls in."""
+    phase = np.sort(np.remainder(time - time[0], period))
+    return float(np.diff(phase, append=phase[0] + period).max())
+
+
+def _fitted(time: Array, signal: Array, period: float, harmonics: int) -> tuple[Array, Array]:
+    """Return the coefficients of least squares, and the sum of squares (k,) of what they leave.
+
+    A second step takes out what rounding put in.
+    """
+    projection = Projection.of(time, period, harmonics)
+    size = signal.shape[1]
+    first = projection.coefficients(lambda rows: signal[rows], size)
+
+    def rest(rows: slice) -> Array:
+        return np.asarray(signal[rows] - projection.basis(rows) @ first)
+
+    found = first + projection.coefficients(rest, size)
+    squares = np.zeros(size)
+    for rows in row_blocks(len(time)):
+        squares += ((signal[rows] - projection.basis(rows) @ found) ** 2).sum(axis=0)
+    return found, squares

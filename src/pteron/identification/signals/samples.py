@@ -40,11 +40,14 @@ class Samples:
         As they were measured, N.
     fresh : slice
         The samples that no other block has.
+    source : str
+        What messages call the log.
     """
 
     states: States
     forces: Array
     fresh: slice
+    source: str
 
 
 def samples(
@@ -127,7 +130,7 @@ def _block(robot: Manipulator, block: Log, treatment: Treatment, edge: int, marg
         source=block.source,
         first_row=block.first_row + edge,
     )
-    return Samples(states, forces[inner], slice(margin, len(states) - margin))
+    return Samples(states, forces[inner], slice(margin, len(states) - margin), block.source)
 
 
 def _periodic(robot: Manipulator, log: Log, treatment: Treatment) -> Samples:
@@ -143,4 +146,4 @@ def _periodic(robot: Manipulator, log: Log, treatment: Treatment) -> Samples:
         source=log.source,
         first_row=log.first_row,
     )
-    return Samples(states, log.forces, slice(0, len(states)))
+    return Samples(states, log.forces, slice(0, len(states)), log.source)

@@ -1,0 +1,371 @@
+"""The model's columns, and the equations that a log gives."""
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from logs_of_motions import Friction, log_of, motion, pieces, truth, without
+from mechanisms import CATALOG, MECHANISMS, relative_error, states
+
+import pteron
+from pteron.errors import DataError, ModelError
+from pteron.identification.equations import equations_of, in_motion, stacked
+from pteron.identification.estimators import ordinary
+from pteron.identification.logs import Description
+from pteron.identification.model import Terms, identification_model
+from pteron.identification.signals import Processing, States, treatment_of
+from pteron.identification.signals import samples as samples_module
+
+each_mechanism = pytest.mark.parametrize("name", MECHANISMS)
+
+
+@lru_cache(maxsize=32)
+def model_of(name, terms=Terms()):  # noqa: B008
+    return identification_model(MECHANISMS[name], terms)
+
+
+def states_of(robot, count=60, payload=0):
+    """Return random states as the equations see them."""
+    pose, velocity, acceleration = states(robot, count)
+    rates, accelerations = pteron.joint_rates(robot, pose, velocity, acceleration)
+    sliders = pteron.inverse_kinematics(robot, pose)
+    phases = np.full(count, payload)
+    return States(
+        np.arange(float(count)),
+        sliders,
+        rates.sliders,
+        accelerations.sliders,
+        pose,
+        velocity,
+        acceleration,
+        phases,
+    )
+
+
+# The model
+
+TERMS = {
+    "no friction": Terms(coulomb=False, viscous=False, offset=False),
+    "sliders": Terms(),
+    "joints alike": Terms(joints="shared"),
+    "joints each": Terms(joints="each"),
+    "rotors": Terms(rotors=True),
+    "everything": Terms(joints="each", rotors=True),
+}
+
+
+@pytest.mark.parametrize("name", ["quadrupteron", "quadrupteron-oblique", "tripteron-oblique"])
+@pytest.mark.parametrize("kind", TERMS)
+def test_a_model_names_every_column_once(name, kind):
+    terms = TERMS[kind]
+    model = model_of(name, terms)
+    robot = model.robot
+    n = len(robot.legs)
+    joints = {"none": 0, "shared": 3 + robot.platform.turns, "each": 3 * n + robot.platform.turns}
+    extra = n * (terms.coulomb + terms.viscous + terms.offset) + joints[terms.joints]
+    assert model.left_out == ()
+    assert len(set(model.names)) == len(model.names) == model.base.rank + extra
+    assert len(model.units) == len(model.expressions) == len(model.names)
+    assert model.matrix(states_of(robot)).shape == (60, n, len(model.names))
+    assert model.units[-1] == {"none": "N", "shared": "N m s", "each": "N m s"}[terms.joints] or (
+        not terms.offset
+    )
+
+
+@each_mechanism
+def test_the_columns_add_up_to_the_forces(name):
+    robot = MECHANISMS[name]
+    model = model_of(name)
+    at = states_of(robot)
+    forces = pteron.inverse_dynamics(robot, at.pose, at.velocity, at.acceleration)
+    forces = forces + Friction.of(len(robot.legs)).forces(at.slider_rates)
+    assert relative_error(model.matrix(at) @ truth(model), forces) < 1e-10
+
+
+@each_mechanism
+def test_columns_of_the_base_are_those_of_the_regressor(name):
+    robot = MECHANISMS[name]
+    model = model_of(name)
+    at = states_of(robot)
+    whole = pteron.regressor(robot, at.pose, at.velocity, at.acceleration)
+    values = np.random.default_rng(0).normal(size=whole.shape[-1])
+    base = model.base.grouping @ values
+    found = model.matrix(at)[..., : model.base.rank] @ base
+    assert relative_error(found, whole @ values) < 1e-9
+
+
+@pytest.mark.parametrize("name", ["quadrupteron", "tripteron-oblique"])
+def test_legs_that_share_their_values_have_fewer(name):
+    robot = CATALOG[name]
+    base = pteron.base_parameters(robot, shared=True)
+    model = identification_model(robot, base=base)
+    assert model.base.rank < model_of(name).base.rank
+    alike = replace(
+        robot,
+        legs=tuple(
+            replace(
+                leg,
+                slider_mass=robot.legs[0].slider_mass,
+                upper=robot.legs[0].upper,
+                lower=robot.legs[0].lower,
+            )
+            for leg in robot.legs
+        ),
+    )
+    at = states_of(alike)
+    forces = pteron.inverse_dynamics(alike, at.pose, at.velocity, at.acceleration)
+    values = pteron.base_parameters(alike, shared=True).values(alike)
+    assert relative_error(model.matrix(at)[..., : base.rank] @ values, forces) < 1e-9
+    assert len(model.units) == len(model.names)
+
+
+@pytest.mark.parametrize("name", ["quadrupteron", "quadrupteron-oblique", "tripteron"])
+def test_shared_joints_are_the_sums_of_each(name):
+    n = len(CATALOG[name].legs)
+    at = states_of(CATALOG[name])
+    shared, each = (model_of(name, Terms(joints=kind)) for kind in ("shared", "each"))
+    start = shared.base.rank + 3 * n
+    parts = each.matrix(at)[..., start : start + 3 * n]
+    sums = parts.reshape(60, n, n, 3).sum(axis=-2)
+    assert shared.matrix(at)[..., start : start + 3] == pytest.approx(sums, abs=1e-12)
+    assert shared.names[start : start + 3] == ("Fv_R1", "Fv_R2", "Fv_R3")
+
+
+@pytest.mark.parametrize("name", ["quadrupteron", "quadrupteron-oblique"])
+def test_the_payload_is_a_body_more_on_the_platform(name):
+    robot = CATALOG[name]
+    model = model_of(name, Terms(payload=True))
+    load = np.array([0.7, 0.01, -0.02, 0.003])
+    values = pteron.parameters(robot)
+    values[-4:] += load
+    heavy = pteron.with_parameters(robot, values)
+    at = states_of(robot, payload=1)
+    motion_of = at.pose, at.velocity, at.acceleration
+    weight = pteron.inverse_dynamics(heavy, *motion_of) - pteron.inverse_dynamics(robot, *motion_of)
+    assert relative_error(model.matrix(at)[..., -4:] @ load, weight) < 1e-9
+    assert not model.matrix(states_of(robot, payload=0))[..., -4:].any()
+
+
+def test_a_rotor_is_said_and_adds_no_column():
+    plain, driven = (model_of("quadrupteron", Terms(rotors=flag)) for flag in (False, True))
+    assert plain.names == driven.names
+    changed = [k for k in range(len(plain.names)) if plain.expressions[k] != driven.expressions[k]]
+    assert [plain.names[k] for k in changed] == [f"m_p{i}" for i in range(1, 5)]
+    assert all("J_m" in driven.expressions[k] for k in changed)
+
+
+def test_terms_that_cannot_be_are_refused():
+    with pytest.raises(ModelError, match="none, shared, each"):
+        Terms(joints="all")
+
+
+# Logs without noise
+
+WAYS = {"periodic": 1e-9, "spline": 1e-8, "central": 1e-8}
+SOME = ["quadrupteron", "quadrupteron turned", "tripteron-oblique", "random 3T1R 0"]
+
+
+def equations_and_truth(name, derivatives="central", *, processing=None, **log):
+    """Return the log, its equations and the values that made it."""
+    model = model_of(name)
+    made = log_of(MECHANISMS[name], **log)
+    period = log.get("period", 4.0) if derivatives == "periodic" else None
+    wanted = replace(processing or Processing(), derivatives=derivatives, period=period)
+    treatment = treatment_of(MECHANISMS[name], made, wanted)
+    return made, treatment, equations_of(model, made, treatment), truth(model)
+
+
+@pytest.mark.parametrize("name", SOME)
+@pytest.mark.parametrize("derivatives", WAYS)
+def test_a_log_without_noise_gives_the_values(name, derivatives):
+    _, _, equations, values = equations_and_truth(name, derivatives)
+    estimate = ordinary(equations)
+    size = np.sqrt((equations.matrix**2).sum(axis=(0, 1)) / equations.rows)
+    usual = np.sqrt((equations.forces**2).sum() / equations.rows)
+    error = np.abs(estimate.values - values)
+    assert (error * size).max() < WAYS[derivatives] * usual
+    assert np.abs(equations.forces - equations.matrix @ values).max() < WAYS[derivatives] * usual
+
+
+@pytest.mark.parametrize("name", ["quadrupteron", "tripteron-oblique"])
+@pytest.mark.parametrize("rate", [50.0, 500.0])
+@pytest.mark.parametrize("period", [4.0, 3.7013])
+def test_a_period_need_not_be_a_number_of_samples(name, rate, period):
+    _, _, equations, values = equations_and_truth(name, "periodic", rate=rate, period=period)
+    assert equations.rows > 150
+    assert np.abs(equations.forces - equations.matrix @ values).max() < 1e-9
+
+
+@pytest.mark.parametrize("name", ["quadrupteron", "tripteron"])
+def test_periods_with_uneven_samples_and_a_gap_are_exact(name):
+    model = model_of(name)
+    rng = np.random.default_rng(1)
+    time = np.arange(4000) / 500.0 + rng.uniform(-4e-4, 4e-4, 4000)
+    log = without(log_of(MECHANISMS[name], time=time), 700, 900)
+    treatment = treatment_of(
+        MECHANISMS[name], log, Processing(derivatives="periodic", period=4.0, cutoff=12.0)
+    )
+    equations = equations_of(model, log, treatment)
+    assert equations.rows > 150
+    assert np.abs(equations.forces - equations.matrix @ truth(model)).max() < 1e-7
+
+
+def test_a_gap_that_no_other_period_fills_is_refused():
+    log = without(log_of(CATALOG["quadrupteron"], duration=4.0), 500, 1500)
+    processing = Processing(derivatives="periodic", period=4.0)
+    with pytest.raises(DataError, match="samples leave"):
+        treatment = treatment_of(CATALOG["quadrupteron"], log, processing)
+        equations_of(model_of("quadrupteron"), log, treatment)
+
+
+# What is left out
+
+
+@pytest.mark.parametrize("derivatives", WAYS)
+def test_slow_sliders_are_left_out_on_both_sides(derivatives):
+    # Friction that is wrong only at low speed must not be felt at all.
+    name = "quadrupteron"
+    processing = Processing(slow=0.2)
+    log, treatment, equations, values = equations_and_truth(
+        name, derivatives, processing=processing
+    )
+    pose, velocity, _ = motion(MECHANISMS[name], log.time)
+    rates = pteron.joint_rates(MECHANISMS[name], pose, velocity).sliders
+    stuck = np.abs(rates) < 0.95 * treatment.slow
+    assert stuck.mean() > 0.03
+    spoiled = replace(log, forces=log.forces + 50.0 * stuck)
+    found = equations_of(model_of(name), spoiled, treatment)
+    assert np.array_equal(found.gain, equations.gain)
+    assert found.forces == pytest.approx(equations.forces, abs=1e-9)
+    assert np.abs(found.forces - found.matrix @ values).max() < 1e-7
+    awake = replace(treatment, slow=np.zeros(4))
+    assert np.abs(
+        equations_of(model_of(name), spoiled, awake).forces
+        - equations_of(model_of(name), log, awake).forces
+    ).max() > 1.0
+
+
+def test_equations_that_are_not_used_are_zero():
+    _, _, equations, _ = equations_and_truth("tripteron", processing=Processing(slow=0.5))
+    unused = equations.gain == 0.0
+    assert 0.05 < unused.mean() < 0.95
+    assert not equations.matrix[unused].any()
+    assert not equations.forces[unused].any()
+    assert np.array_equal(equations.used, (~unused).sum(axis=0))
+    assert equations.rows == (~unused).sum()
+
+
+def test_rows_near_a_slow_one_are_left_out_as_far_as_the_filter_reaches():
+    treatment = replace(
+        equations_and_truth("tripteron")[1], cutoff=10.0, rate=100.0, slow=np.full(1, 0.5)
+    )
+    rates = np.ones((50, 1))
+    rates[20] = 0.1
+    rates[0] = 0.0
+    still = np.flatnonzero(in_motion(rates, treatment)[:, 0] == 0.0)
+    assert np.array_equal(still, [0, 1, 2, 3, 4, 5, *range(15, 26)])
+    still = np.flatnonzero(in_motion(rates, treatment, wraps=True)[:, 0] == 0.0)
+    assert np.array_equal(still, [0, 1, 2, 3, 4, 5, *range(15, 26), 45, 46, 47, 48, 49])
+
+
+# Noise
+
+
+@pytest.mark.parametrize("case", ["central", "periodic", "periodic, uneven"])
+def test_what_is_left_of_noise_has_the_size_of_the_noise(case):
+    # Unit noise on the forces, on masked rows and on whole ones.
+    name, draws = "tripteron", 40
+    derivatives = case.split(",")[0]
+    shape = {"rate": 100.0, "duration": 12.0, "period": 3.9007 if "uneven" in case else 4.0}
+    log, treatment, equations, _ = equations_and_truth(
+        name, derivatives, processing=Processing(slow=0.1), **shape
+    )
+    rng = np.random.default_rng(2)
+    squares = np.zeros_like(equations.gain)
+    neighbours = 0.0
+    model = model_of(name)
+    for _ in range(draws):
+        noise = rng.normal(size=log.forces.shape)
+        noisy = equations_of(model, replace(log, forces=log.forces + noise), treatment)
+        rest = noisy.forces - equations.forces
+        squares += rest**2 / draws
+        neighbours += (rest[1:] * rest[:-1]).sum() / (rest**2).sum() / draws
+    used = equations.gain > 0.0
+    assert np.sqrt(squares[used].mean()) == pytest.approx(1.0, abs=0.03)
+    # Each equation, masked in part or not: a chi-square of so many draws.
+    assert squares[used].min() > 0.3
+    assert squares[used].max() < 2.2
+    partial = used & (equations.gain < 0.95 * equations.gain.max())
+    assert partial.sum() > 10
+    assert np.sqrt(squares[partial].mean()) == pytest.approx(1.0, abs=0.1)
+    assert abs(neighbours) < 0.15
+
+
+# Streams
+
+
+@pytest.mark.parametrize("derivatives", ["central", "spline"])
+@pytest.mark.parametrize("size", [57, 1000])
+def test_pieces_give_the_equations_of_the_whole(derivatives, size, monkeypatch):
+    name = "tripteron"
+    log = log_of(CATALOG[name], slider_noise=1e-6 * (derivatives == "central"))
+    log = without(log, 2000, 2050)
+    log = replace(log, payload=(np.arange(log.rows) > 2600).astype(int))
+    wanted = Processing(derivatives=derivatives, cutoff=25.0, slow=0.2)
+    treatment = treatment_of(CATALOG[name], log, wanted)
+    assert treatment.settling > 5
+    whole = equations_of(model_of(name), log, treatment)
+    monkeypatch.setattr(samples_module, "_BLOCK", 400)
+    parts = equations_of(model_of(name), pieces(log, size), treatment)
+    assert parts.time == pytest.approx(whole.time, abs=1e-9)
+    assert np.array_equal(parts.payload, whole.payload)
+    assert len(set(whole.payload)) == 2
+    # A mask that starts a sample sooner or later is the noise of the positions, not of the blocks.
+    same = np.isclose(parts.gain, whole.gain, rtol=1e-9, atol=0.0)
+    assert same.mean() > 0.995
+    scale = np.abs(whole.matrix).max(axis=(0, 1))
+    assert (np.abs(parts.matrix - whole.matrix) / scale)[same].max() < 1e-6
+    assert np.abs(parts.forces - whole.forces)[same].max() < 1e-6 * np.abs(whole.forces).max()
+
+
+def test_stacked_equations_are_those_of_both():
+    _, _, equations, values = equations_and_truth("tripteron")
+    both = stacked([equations, equations])
+    assert both.rows == 2 * equations.rows
+    assert ordinary(both).values == pytest.approx(values, abs=1e-7)
+    some = equations.columns([3, 1])
+    assert some.names == (equations.names[3], equations.names[1])
+    assert np.array_equal(some.matrix, equations.matrix[..., [3, 1]])
+
+
+def test_a_payload_is_found_from_two_phases():
+    robot = CATALOG["quadrupteron"]
+    load = np.array([0.5, 0.004, -0.003, 0.002])
+    values = pteron.parameters(robot)
+    values[-4:] += load
+    heavy = pteron.with_parameters(robot, values)
+    model = model_of("quadrupteron", Terms(payload=True))
+    first, second = log_of(robot), log_of(heavy)
+    log = replace(
+        first,
+        time=np.r_[first.time, 8.0 + second.time],
+        sliders=np.vstack([first.sliders, second.sliders]),
+        forces=np.vstack([first.forces, second.forces]),
+        payload=np.repeat([0, 1], 4000),
+    )
+    for derivatives, period in (("central", None), ("periodic", 4.0)):
+        wanted = Processing(derivatives=derivatives, period=period)
+        treatment = treatment_of(robot, log, wanted)
+        equations = equations_of(model, log, treatment)
+        assert ordinary(equations).values[-4:] == pytest.approx(load, abs=1e-7)
+
+
+def test_the_period_is_taken_from_the_description():
+    robot = CATALOG["tripteron"]
+    log = log_of(robot, description=Description(period=4.0), slider_noise=1e-7)
+    treatment = treatment_of(robot, log)
+    equations = equations_of(model_of("tripteron"), log, treatment)
+    assert treatment.derivatives == "periodic"
+    assert equations.time[-1] < 4.0
+    assert len(equations.time) % 2 == 1

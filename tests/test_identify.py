@@ -1,0 +1,357 @@
+"""The whole way from logs to a verdict: what is found, and what is refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from logs_of_motions import Friction, log_of, truth
+from mechanisms import CATALOG, random_machine
+
+import pteron
+from pteron.identification import (
+    Processing,
+    Terms,
+    identification_model,
+    identify,
+    open_log,
+    write_log,
+)
+from pteron.identification import recordings as recordings_module
+from pteron.identification.diagnosis import Fault, has_negative_inertia
+from pteron.identification.logs import Description
+from pteron.identification.prediction import Prediction
+from pteron.identification.recordings import divided, recording
+from pteron.identification.verdict import verdict_of
+
+QUADRUPTERON = CATALOG["quadrupteron"]
+NOISE = {"slider_noise": 3e-7, "force_noise": 0.1}
+
+
+def as_built(robot, seed=0):
+    """Return a machine whose inertia differs from the drawing: every body denser or lighter."""
+    rng = np.random.default_rng(seed)
+    values = pteron.parameters(robot)
+    n = len(robot.legs)
+    factors = np.r_[rng.uniform(0.8, 1.2, n), rng.uniform(0.8, 1.2, 2 * n + 1).repeat(4)]
+    return pteron.with_parameters(robot, values * factors)
+
+
+def noisy(robot, seed=0, **more):
+    return log_of(robot, duration=12.0, rate=500.0, seed=seed, noise_seed=seed, **NOISE, **more)
+
+
+@pytest.mark.parametrize("name", [*CATALOG, "random"])
+def test_noise_free_logs_give_back_the_machine(name):
+    robot = random_machine(0, True) if name == "random" else CATALOG[name]
+    # Legs of a random machine may be all but stretched a few centimetres from home.
+    size = {"size": 0.015, "turn": 0.1} if name == "random" else {}
+    found = identify(
+        robot, log_of(as_built(robot), **size), held_out=log_of(as_built(robot), **size)
+    )
+    true = truth(identification_model(as_built(robot)))
+    assert np.abs(found.estimate.values - true).max() < 1e-9
+    assert found.verdict.grade == "trustworthy"
+    assert found.consistency.feasible
+    base = found.model.base
+    assert np.allclose(
+        base.values(found.consistency.robot), found.base_values, rtol=1e-9, atol=1e-11
+    )
+
+
+def test_a_noisy_log_is_judged_by_another_motion():
+    built = as_built(QUADRUPTERON)
+    found = identify(QUADRUPTERON, noisy(built, 1), held_out=noisy(built, 2))
+    (held,) = found.held_out
+    assert held.source == "log.csv"
+    assert (held.nrms < 1.2 * held.floor).all()
+    assert (held.nrms_without_friction > 3.0 * held.nrms).all()
+    assert found.verdict.grade == "trustworthy"
+    assert not any("repeats" in reason for reason in found.verdict.reasons)
+    errors = (
+        found.estimate.values - truth(identification_model(built))
+    ) / found.estimate.deviations
+    assert np.abs(errors).max() < 4.0
+    assert set(found.essential.names) | set(found.essential.dropped) == set(found.model.names)
+    assert found.consistency_share < 0.05
+
+
+def test_the_noise_that_is_stated_is_the_noise_that_is_there():
+    found = identify(QUADRUPTERON, noisy(QUADRUPTERON, 3))
+    # A hundred rows or so for each actuator.
+    assert np.allclose(found.estimate.noise, NOISE["force_noise"], rtol=0.25)
+    assert np.allclose(found.treatments[0].force_noise, NOISE["force_noise"], rtol=0.15)
+
+
+def test_without_other_logs_the_end_is_held_out_and_said():
+    found = identify(QUADRUPTERON, noisy(QUADRUPTERON, 1))
+    assert any("repeats the motion" in reason for reason in found.verdict.reasons)
+    assert any("Record another motion" in step for step in found.verdict.next_steps)
+
+
+def test_a_periodic_log_is_divided_at_its_periods():
+    log = noisy(QUADRUPTERON, description=Description(period=4.0))
+    fit, check = divided(recording(log), 4.0)
+    assert (fit.rows, check.rows) == (4000, 2000)
+    found = identify(QUADRUPTERON, log)
+    assert found.treatments[0].derivatives == "periodic"
+    assert found.verdict.grade == "trustworthy"
+
+
+@pytest.mark.parametrize("estimator", ["ordinary", "weighted", "huber", "total", "likelihood"])
+def test_every_estimator_serves(estimator):
+    found = identify(CATALOG["tripteron"], noisy(CATALOG["tripteron"]), estimator=estimator)
+    errors = found.estimate.values - truth(found.model)
+    assert (np.abs(errors) < 5.0 * found.estimate.deviations).all()
+    assert found.estimate.method == {"likelihood": "maximum likelihood"}.get(estimator, estimator)
+
+
+def test_an_unknown_estimator_is_refused_with_the_known_ones():
+    with pytest.raises(pteron.ModelError, match="'best' is not one of ordinary, weighted"):
+        identify(QUADRUPTERON, noisy(QUADRUPTERON), estimator="best")
+
+
+def test_known_rotors_are_no_part_of_the_bodies():
+    inertia, ratio = (2e-5, 1e-5, 1e-5, 1e-5), (200.0,) * 4
+    masses = np.array(inertia) * np.array(ratio) ** 2
+    log = log_of(QUADRUPTERON)
+    pose_log = identify(QUADRUPTERON, log, held_out=log)
+    rates = _slider_accelerations(QUADRUPTERON, log)
+    driven = replace(
+        log,
+        forces=log.forces + masses * rates,
+        description=Description(rotor_inertia=inertia, ratio=ratio),
+    )
+    found = identify(QUADRUPTERON, driven, held_out=driven)
+    # The first guide is vertical: gravity pulls at a slider's mass, not at a rotor.
+    assert found.estimate.value("m_p1") == pytest.approx(
+        pose_log.estimate.value("m_p1") + masses[0], abs=1e-6
+    )
+    assert found.estimate.value("offset1") == pytest.approx(
+        pose_log.estimate.value("offset1") - 9.81 * masses[0], abs=1e-5
+    )
+    assert "J_m1" in found.model.expressions[found.model.names.index("m_p1")]
+    assert np.allclose(
+        pteron.parameters(found.consistency.robot),
+        pteron.parameters(pose_log.consistency.robot),
+        atol=1e-5,
+    )
+
+
+def _slider_accelerations(robot, log):
+    from pteron.identification.signals import spline_motion
+
+    return spline_motion(log.time, log.sliders, None)[2]
+
+
+def test_passive_joints_are_identified():
+    robot = QUADRUPTERON
+    log = log_of(robot)
+    model = identification_model(robot, Terms(joints="each"))
+    from pteron.identification import equations_of, treatment_of
+
+    equations = equations_of(model, log, treatment_of(robot, log))
+    truths = np.r_[truth(identification_model(robot)), np.full(13, 0.05)]
+    found = np.linalg.lstsq(
+        equations.matrix.reshape(-1, len(truths)), (equations.matrix @ truths).ravel(), rcond=None
+    )[0]
+    assert np.abs(found - truths).max() < 1e-8
+
+
+# What is refused -----------------------------------------------------------------------------
+
+
+def refused(log, *words, robot=QUADRUPTERON, **options):
+    with pytest.raises(pteron.DataError) as caught:
+        identify(robot, log, **options)
+    text = str(caught.value)
+    assert "\n" not in text
+    for word in words:
+        assert word in text, text
+
+
+def test_flipped_forces_are_found():
+    log = noisy(QUADRUPTERON)
+    refused(
+        replace(log, forces=-log.forces), "the forces have the sign flipped", "negative inertia"
+    )
+
+
+@pytest.mark.parametrize("actuator", range(4))
+def test_one_flipped_force_is_found(actuator):
+    log = noisy(QUADRUPTERON)
+    signs = np.ones(4)
+    signs[actuator] = -1.0
+    refused(replace(log, forces=signs * log.forces), f"force{actuator + 1} has the sign flipped")
+
+
+@pytest.mark.parametrize("pair", [(0, 1), (1, 2), (1, 3), (2, 3)])
+def test_swapped_forces_are_found(pair):
+    log = noisy(QUADRUPTERON)
+    order = list(range(4))
+    order[pair[0]], order[pair[1]] = order[pair[1]], order[pair[0]]
+    names = f"force{pair[0] + 1} and force{pair[1] + 1} are swapped"
+    refused(replace(log, forces=log.forces[:, order]), names)
+
+
+@pytest.mark.parametrize("pair", [(0, 1), (1, 2), (1, 3)])
+def test_swapped_sliders_are_found(pair):
+    log = noisy(QUADRUPTERON)
+    order = list(range(4))
+    order[pair[0]], order[pair[1]] = order[pair[1]], order[pair[0]]
+    changed = replace(log, sliders=log.sliders[:, order])
+    refused(changed, f"rho{pair[0] + 1} and rho{pair[1] + 1}", "swapped")
+
+
+def test_swaps_are_found_on_three_legs_too():
+    robot = CATALOG["tripteron-oblique"]
+    log = noisy(robot)
+    refused(replace(log, forces=log.forces[:, [0, 2, 1]]), "force2 and force3", robot=robot)
+
+
+def test_a_sound_log_is_not_accused():
+    for robot in (*CATALOG.values(), random_machine(1, False)):
+        size = {"size": 0.03, "turn": 0.2, "period": 1.7}
+        assert identify(robot, noisy(robot, **size)).verdict.grade == "trustworthy"
+
+
+def test_too_little_motion_names_what_is_not_seen():
+    log = noisy(QUADRUPTERON, size=2e-4, turn=1e-3)
+    refused(log, "log.csv: too little motion", "cannot be seen", "mgx_u2")
+
+
+def test_motion_along_one_axis_names_what_is_not_seen():
+    robot = QUADRUPTERON
+    time = np.arange(6000) / 500.0
+    pose = np.zeros((len(time), 4))
+    pose[:, 2] = 0.05 * np.sin(2.0 * time)
+    velocity, acceleration = np.zeros_like(pose), np.zeros_like(pose)
+    velocity[:, 2], acceleration[:, 2] = 0.1 * np.cos(2.0 * time), -0.2 * np.sin(2.0 * time)
+    log = replace(
+        log_of(robot, time=time),
+        sliders=pteron.inverse_kinematics(robot, pose),
+        forces=pteron.inverse_dynamics(robot, pose, velocity, acceleration),
+    )
+    refused(log, "too little motion", "I_u1", processing=Processing(slow=0.0))
+
+
+def test_the_log_of_another_machine_is_refused_by_its_row():
+    log = log_of(QUADRUPTERON)
+    away = replace(log, sliders=log.sliders + np.array([0.0, 0.3, 0.0, -0.3]))
+    refused(away, "no pose of quadrupteron has the sliders", "row", "another machine")
+
+
+def test_a_log_too_short_says_how_much_is_needed():
+    log = noisy(QUADRUPTERON).part(0, 80)
+    refused(log, "rows", "record longer")
+
+
+def test_currents_without_gains_are_refused():
+    log = replace(log_of(QUADRUPTERON), description=Description(column_force_unit="A"))
+    refused(log, "forces are in A", "gains")
+
+
+# Judgement -----------------------------------------------------------------------------------
+
+
+def prediction(error, noise, friction=5.0):
+    size = np.ones(2)
+    empty = np.empty((0, 2))
+    return Prediction(
+        "a.csv",
+        1000,
+        np.zeros(2),
+        size,
+        np.array(error),
+        friction * np.array(error),
+        np.array(error),
+        np.array(noise),
+        np.empty(0),
+        empty,
+        empty,
+        empty,
+        empty,
+        empty > 0,
+    )
+
+
+@pytest.mark.parametrize(
+    ("error", "noise", "grade"),
+    [
+        ((0.011, 0.01), (0.01, 0.01), "trustworthy"),
+        ((0.30, 0.01), (0.25, 0.01), "trustworthy"),  # noise is all there is
+        ((0.04, 0.01), (0.001, 0.01), "trustworthy"),  # little is missed
+        ((0.10, 0.01), (0.001, 0.01), "usable with care"),
+        ((0.01, 0.50), (0.001, 0.01), "not trustworthy"),
+    ],
+)
+def test_the_grade_is_that_of_the_worst_actuator(error, noise, grade):
+    verdict = verdict_of([prediction(error, noise)], repeats=False)
+    assert verdict.grade == grade
+    assert ("worst" in " ".join(verdict.reasons)) == (grade != "trustworthy")
+
+
+def test_the_worst_recording_decides():
+    good, bad = prediction((0.01, 0.01), (0.01, 0.01)), prediction((0.5, 0.5), (0.01, 0.01))
+    assert verdict_of([good, bad, good], repeats=False).grade == "not trustworthy"
+
+
+def test_wrong_geometry_is_not_trusted():
+    built = replace(
+        QUADRUPTERON,
+        legs=tuple(replace(leg, lower_length=1.15 * leg.lower_length) for leg in QUADRUPTERON.legs),
+    )
+    found = identify(
+        QUADRUPTERON,
+        log_of(built, size=0.08, turn=0.6, force_noise=0.01),
+        held_out=log_of(built, size=0.08, turn=0.6, seed=2, force_noise=0.01),
+    )
+    assert found.verdict.grade != "trustworthy"
+
+
+def test_negative_inertia_is_seen_on_every_machine():
+    for robot in CATALOG.values():
+        model = identification_model(robot)
+        values = truth(model)
+        assert not has_negative_inertia(model, values)
+        assert has_negative_inertia(model, -values)
+
+
+def test_a_fault_says_what_is_wrong():
+    fault = Fault("force", (1, 2, 0), (1, 1, -1), 0.5, 0.01)
+    text = fault.message()
+    assert "force1, force2 and force3 are in another order" in text
+    assert "force1 has the sign flipped" in text
+
+
+# Files ---------------------------------------------------------------------------------------
+
+
+def test_a_file_in_pieces_gives_what_the_log_in_memory_gives(tmp_path, monkeypatch):
+    log = noisy(QUADRUPTERON)
+    path = write_log(log, tmp_path / "log.parquet")
+    # Cut-offs from the data would be those of the first piece.
+    pinned = Processing(derivatives="central", cutoff=20.0, band=20.0)
+    whole = identify(QUADRUPTERON, open_log(path, QUADRUPTERON), processing=pinned)
+    monkeypatch.setattr(recordings_module, "_IN_MEMORY", 100)
+    monkeypatch.setattr(recordings_module, "_PIECE", 1700)
+    told = []
+    streamed = identify(
+        QUADRUPTERON,
+        open_log(path, QUADRUPTERON),
+        processing=pinned,
+        progress=lambda task, done, total: told.append(task),
+    )
+    off = np.abs(streamed.estimate.values - whole.estimate.values) / whole.estimate.deviations
+    assert off.max() < 0.1  # what counts as slow is found from the first piece as well
+    assert streamed.verdict.grade == "trustworthy"
+    assert {"Filtering", "Checking"} <= set(told)
+
+
+def test_results_are_plain_data():
+    import json
+
+    found = identify(CATALOG["tripteron"], noisy(CATALOG["tripteron"]))
+    data = json.loads(json.dumps(found.as_dict()))
+    assert data["verdict"]["grade"] == "trustworthy"
+    assert len(data["estimate"]["values"]) == len(found.model.names)
+    assert Friction.of(3).values.shape == (9,)

@@ -1,0 +1,245 @@
+"""The payload from logs of Pteron's own model, with and without it."""
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from mechanisms import MECHANISMS
+
+import pteron
+from pteron.errors import DataError
+from pteron.identification.estimators import huber
+from pteron.identification.logs import Log
+from pteron.identification.logs.description import Description
+from pteron.identification.model import Terms
+from pteron.identification.payload import identify_payload
+from pteron.identification.signals import Processing
+from pteron.kernels import numeric
+from pteron.workspace import home_pose
+
+MACHINES = ["quadrupteron", "quadrupteron-oblique", "tripteron", "tripteron-oblique"]
+RANDOM = ["random 3T1R 0", "random 3T 0"]
+CENTRAL = Processing(derivatives="central")
+
+LOAD = pteron.PlanarInertia(0.35, (0.006, -0.009), 0.0011)
+NOISE = (1e-6, 0.01)
+"""Counts of an encoder, m, and noise of the forces relative to their size."""
+
+PERIOD, RATE = 3.0, 500.0
+
+
+@lru_cache
+def base_of(name):
+    return pteron.base_parameters(MECHANISMS[name])
+
+
+@lru_cache
+def motion(name, seed):
+    """Return two periods of a smooth motion about the home pose: time, and three derivatives."""
+    robot = MECHANISMS[name]
+    rng = np.random.default_rng(seed)
+    time = np.arange(round(2 * PERIOD * RATE)) / RATE
+    m = 4 if robot.platform.turns else 3
+    q = np.zeros((3, len(time), m))
+    for h in range(1, 6):
+        w = 2.0 * np.pi * h / PERIOD
+        a, b = rng.normal(size=(2, m)) / h
+        s, c = np.sin(w * time)[:, None], np.cos(w * time)[:, None]
+        q += [a * s + b * c, w * (a * c - b * s), -w * w * (a * s + b * c)]
+    q *= np.array([0.05, 0.05, 0.05, 0.3])[:m] / np.abs(q[0]).max(axis=0)
+    q[0] += home_pose(robot)
+    return time, q
+
+
+def laden(robot, load=LOAD):
+    """Return the machine with a body fixed to its platform."""
+    values = np.add(robot.platform.inertia.values, load.values)
+    inertia = pteron.PlanarInertia(values[0], (values[1], values[2]), values[3])
+    return replace(robot, platform=replace(robot.platform, inertia=inertia))
+
+
+@lru_cache
+def clean(name, seed, load):
+    """Return time, sliders, forces without noise, phase (the second half laden) and mode."""
+    robot = MECHANISMS[name]
+    time, q = motion(name, seed)
+    phase = (np.arange(len(time)) >= len(time) // 2).astype(int)
+    empty, full = (pteron.inverse_dynamics(r, *q) for r in (robot, laden(robot, load)))
+    rates = pteron.joint_rates(robot, q[0], q[1]).sliders
+    legs = np.arange(len(robot.legs))
+    forces = np.where(phase[:, None] == 1, full, empty)
+    forces += 2.0 * (1.0 + 0.1 * legs) * np.sign(rates) + (1.0 + 0.2 * legs) * rates + 0.3 * legs
+    sliders = pteron.inverse_kinematics(robot, q[0])
+    mode = None
+    if robot.platform.turns:
+        mode = 1 + int(numeric(robot, "regularity")(q[0, 0]) < 0.0)
+    return time, sliders, forces, phase, mode
+
+
+def make_log(name, seed=1, noise=(0.0, 0.0), draw=0, load=LOAD):
+    time, sliders, forces, phase, mode = clean(name, seed, load)
+    counts, share = noise
+    if counts:
+        sliders = np.round(sliders / counts) * counts
+    size = np.sqrt((forces**2).mean(axis=0))
+    forces = forces + share * size * np.random.default_rng(draw).normal(size=forces.shape)
+    about = Description(period=PERIOD, assembly_mode=mode)
+    return Log("log.csv", time, sliders, forces, payload=phase, description=about)
+
+
+def halves(log):
+    """Return the phases of a log as two logs that do not tell theirs."""
+    middle = log.rows // 2
+    parts = log.part(0, middle), log.part(middle, log.rows)
+    return [replace(part, payload=None) for part in parts]
+
+
+def expected(payload):
+    return np.array(LOAD.values)[: len(payload.names)]
+
+
+@pytest.mark.parametrize(
+    ("name", "processing"),
+    [
+        *((name, None) for name in [*MACHINES, *RANDOM]),
+        *((name, CENTRAL) for name in MACHINES[1:3]),
+    ],
+)
+def test_it_is_exact_without_noise(name, processing):
+    found = identify_payload(
+        MECHANISMS[name], make_log(name), processing=processing, base=base_of(name)
+    )
+    np.testing.assert_allclose(found.values, expected(found), rtol=1e-9)
+    assert found.real
+    # All else in the same fit is what the machine was given.
+    rank = base_of(name).rank
+    np.testing.assert_allclose(
+        found.estimate.values[:rank], base_of(name).values(), rtol=1e-6, atol=1e-9
+    )
+    size = np.sqrt((make_log(name).forces ** 2).mean(axis=0))
+    assert (found.residual < 1e-8 * size).all()
+
+
+def test_a_turning_platform_feels_all_four_values():
+    found = identify_payload(
+        MECHANISMS["quadrupteron"], make_log("quadrupteron"), base=base_of("quadrupteron")
+    )
+    assert found.names == ("m_L", "mgx_L", "mgy_L", "I_L")
+    assert (found.mass, *found.first_moment, found.inertia) == tuple(found.values)
+    np.testing.assert_allclose(found.center_of_mass, LOAD.center_of_mass, rtol=1e-9)
+    assert "Centre of mass" in found.summary()
+    assert found.as_dict()["center_of_mass"] == list(found.center_of_mass)
+
+
+def test_a_platform_that_does_not_turn_feels_the_mass_alone():
+    found = identify_payload(
+        MECHANISMS["tripteron"], make_log("tripteron"), base=base_of("tripteron")
+    )
+    assert found.names == ("m_L",)
+    assert found.mass == pytest.approx(LOAD.mass, rel=1e-9)
+    assert found.first_moment is None
+    assert found.inertia is None
+    assert found.center_of_mass is None
+    assert found.covariance.shape == (1, 1)
+    assert "Not felt by the actuators: mgx_L, mgy_L, I_L." in found.summary()
+
+
+@pytest.mark.parametrize("name", ["quadrupteron", "tripteron-oblique"])
+def test_two_logs_say_what_one_with_both_phases_says(name):
+    log = make_log(name, noise=NOISE)
+    arguments = {"processing": CENTRAL, "base": base_of(name)}
+    both = identify_payload(MECHANISMS[name], log, **arguments)
+    two = identify_payload(MECHANISMS[name], *halves(log), **arguments)
+    # Each of two logs finds its own cut-offs, no more.
+    assert (np.abs(two.values - both.values) < 1.5 * both.deviations).all()
+    np.testing.assert_allclose(two.deviations, both.deviations, rtol=0.6)
+
+
+@pytest.mark.parametrize("name", ["quadrupteron", "tripteron-oblique", *RANDOM])
+def test_standard_deviations_cover_the_error(name):
+    errors = []
+    for draw in range(3):
+        log = make_log(name, seed=2, noise=NOISE, draw=draw)
+        found = identify_payload(MECHANISMS[name], log, base=base_of(name))
+        errors.append((found.values - expected(found)) / found.deviations)
+        assert found.deviations[0] < 0.03 * LOAD.mass
+    assert np.abs(errors).max() < 4.0
+    assert 0.2 < np.sqrt(np.square(errors).mean()) < 2.0
+
+
+def test_another_estimator_forgives_outliers():
+    log = make_log("tripteron", noise=NOISE)
+    forces = log.forces.copy()
+    forces[::97] += 200.0
+    log = replace(log, forces=forces)
+    arguments = {
+        "processing": Processing(derivatives="central", band=240.0, cutoff=40.0),
+        "base": base_of("tripteron"),
+    }
+    robust = identify_payload(MECHANISMS["tripteron"], log, estimator=huber, **arguments)
+    plain = identify_payload(MECHANISMS["tripteron"], log, **arguments)
+    assert robust.estimate.method == "huber"
+    assert robust.deviations[0] < 0.5 * plain.deviations[0]
+    assert abs(robust.mass - LOAD.mass) < 4.0 * robust.deviations[0]
+
+
+def test_values_of_no_real_body_are_told():
+    # As much taken off one side of the platform as the moment of inertia allows.
+    log = make_log("quadrupteron", load=LOAD)
+    less = replace(log, payload=1 - log.payload)
+    found = identify_payload(MECHANISMS["quadrupteron"], less, base=base_of("quadrupteron"))
+    assert found.mass == pytest.approx(-LOAD.mass, rel=1e-9)
+    assert not found.real
+    assert "No real body" in found.summary()
+
+
+def test_terms_may_be_left_out():
+    found = identify_payload(
+        MECHANISMS["tripteron"],
+        make_log("tripteron"),
+        terms=Terms(offset=False),
+        base=base_of("tripteron"),
+    )
+    assert not any(name.startswith("offset") for name in found.estimate.names)
+
+
+def without_column(log):
+    return (replace(log, payload=None),)
+
+
+def one_phase(log):
+    return (replace(log, payload=np.ones_like(log.payload)),)
+
+
+def wrong_order(log):
+    first, second = halves(log)
+    return replace(first, payload=np.ones(first.rows, dtype=int)), second
+
+
+def in_amperes(log):
+    return (replace(log, description=Description(column_force_unit="A")),)
+
+
+def short_phase(log):
+    payload = np.zeros_like(log.payload)
+    payload[-20:] = 1
+    description = replace(log.description, period=None)
+    return (replace(log, payload=payload, description=description),)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (without_column, r"log\.csv: no payload column; declare one that is 0 without"),
+        (one_phase, "phase 1 only, 0 and 1 are expected; add one without payload"),
+        (wrong_order, r"row 1: payload 1 in the log without payload, 0 expected throughout"),
+        (in_amperes, r"its forces are in A, newtons are expected; declare gains \(N per A\)"),
+        (short_phase, "no samples with payload are left between the filters' edges"),
+    ],
+)
+def test_logs_that_do_not_show_a_payload_are_refused(change, message):
+    logs = change(make_log("tripteron"))
+    with pytest.raises(DataError, match=message) as caught:
+        identify_payload(MECHANISMS["tripteron"], *logs, base=base_of("tripteron"))
+    assert "\n" not in str(caught.value)
