@@ -23,7 +23,10 @@ from pteron.cli.numbers import regrouped
 PROGRAM = [sys.executable, "-c", "from pteron.cli.main import main; main()"]
 PLAIN = {"COLUMNS": "60", "NO_COLOR": "1", "FORCE_COLOR": None, "TTY_COMPATIBLE": None}
 POSES = "x,y,z,phi\n0.01,0.02,-0.03,0.1\n0.02,-0.01,0.03,-0.2\n"
-COMMANDS = ("catalog", "check", "report", "inverse", "direct", "forces", "base", "table1")
+COMMANDS = (
+    *("catalog", "check", "report", "inverse", "direct", "forces", "base", "excite", "identify"),
+    "table1",
+)
 
 
 @pytest.fixture(autouse=True)

@@ -63,7 +63,7 @@ def test_they_are_exact_without_noise(name, processing):
     assert found.gap < 1e-8
 
 
-@pytest.mark.parametrize("name", ["quadrupteron", "tripteron-oblique", *RANDOM])
+@pytest.mark.parametrize("name", ["quadrupteron", *RANDOM[1:]])
 def test_standard_deviations_cover_the_error(name):
     errors, start, relative = [], [], []
     for draw in range(3):

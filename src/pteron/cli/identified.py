@@ -35,6 +35,8 @@ def show_identification(result: Identification, files: Written) -> None:
 
 
 def _errors(result: Identification) -> Table:
+    from pteron.report.digits import significant
+
     headings = ("held-out NRMS (%)", "no friction", "noise")
     made = table("actuator", *headings, numbers=headings)
     several = len(result.held_out) > 1
@@ -42,24 +44,27 @@ def _errors(result: Identification) -> Table:
         columns = prediction.nrms, prediction.nrms_without_friction, prediction.floor
         for i, values in enumerate(zip(*columns, strict=True), start=1):
             where = f" in {prediction.source}" if several else ""
-            made.add_row(escape(f"{i}{where}"), *(f"{value:.3g}" for value in values))
+            made.add_row(escape(f"{i}{where}"), *(significant(value) for value in values))
     return made
 
 
 def _values(result: Identification) -> Table:
+    from pteron.report.digits import significant
     from pteron.report.identification import measured, parameter_rows
 
     headings = ("value", "+- 95 %", "rel. (%)")
     made = table("parameter", *headings, "unit", "", numbers=headings)
     for row in parameter_rows(result):
-        value, half = (text.replace("\u2212", "-") for text in measured(row.value, row.half))
+        value, half = map(_plain, measured(row.value, row.half))
+        relative = ">999" if row.relative >= 9.995 else _plain(significant(100.0 * row.relative, 2))
         mark = "" if not row.weak else "[yellow]unseen[/]" if row.unseen else "[yellow]weak[/]"
-        made.add_row(escape(row.name), value, half, _percent(row.relative), row.unit, mark)
+        made.add_row(escape(row.name), value, half, relative, row.unit, mark)
     return made
 
 
-def _percent(share: float) -> str:
-    return ">999" if share >= 9.995 else f"{100.0 * share:.2g}"
+def _plain(number: str) -> str:
+    """Return a number with the minus that every terminal has."""
+    return number.replace("\u2212", "-").replace("\u221e", "inf")
 
 
 def _bodies(result: Identification) -> tuple[str, ...]:

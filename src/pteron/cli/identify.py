@@ -122,8 +122,9 @@ def identify(
 
         terms = _terms(without, joints, rotors=rotors, payload=payload)
         bounds = _bounds(boxes or (), machine)
-        how = None if derivatives is None else derivatives.value
-        processing = Processing(how, cutoff, band, period)
+        processing = Processing(
+            None if derivatives is None else derivatives.value, cutoff, band, period
+        )
         fit, check = (
             [open_log(path, machine, description=description) for path in paths]
             for paths in (logs, held_out or [])

@@ -1,8 +1,8 @@
 """From a recorded motion to the parameters of the machine that made it, and how far to trust them.
 
-`identify` does all of it; its parts can be used by themselves: `logs` reads, `signals` turns samples
-into states, `equations_of` stacks the regressor, `estimators` solve, `consistency` finds real bodies,
-`excitation` makes the motions worth recording.
+`identify` does all of it. Its parts can be used by themselves: `logs` reads, `signals` turns
+samples into states, `equations_of` stacks the regressor, `estimators` solve, `consistency` finds
+real bodies, `excitation` makes the motions worth recording.
 """
 
 from pteron.identification.consistency import Bounds, Consistency, consistent_model

@@ -20,7 +20,7 @@ from pteron.kinematics import random_poses
 from pteron.manipulator import Manipulator, parameters
 from pteron.reduction import base_regressor
 
-__all__ = ["Fault", "column_fault", "has_negative_inertia", "unseen"]
+__all__ = ["Fault", "column_fault", "exchanged_sliders", "has_negative_inertia", "unseen"]
 
 _DECISIVE = 3.0
 """Factor by which the error must fall for a fault to be called found."""
@@ -110,7 +110,7 @@ def column_fault(model: Model, log: Log, treatment: Treatment) -> Fault | None:
     best = int(np.argmin(errors))
     order, sign = choices[best] if errors[best] * _DECISIVE < before else choices[0]
     after = min(errors[best], before) if (order, sign) != choices[0] else before
-    swapped = _slider_fault(model, log, plain, before)
+    swapped = exchanged_sliders(model, log, plain, before)
     # Exchanged forces can do some of what exchanged sliders do.
     if swapped is not None and swapped.after < 0.7 * after:
         return swapped
@@ -141,13 +141,27 @@ def _errors(equations: Equations, choices: Sequence[_Choice]) -> list[float]:
     return found
 
 
-def _slider_fault(model: Model, log: Log, treatment: Treatment, before: float) -> Fault | None:
-    """Return the exchange of two sliders that explains the forces far better."""
+def exchanged_sliders(
+    model: Model, log: Log, treatment: Treatment, before: float = np.inf
+) -> Fault | None:
+    """Return the exchange of two sliders that explains the forces best, and far better.
+
+    Parameters
+    ----------
+    model : Model
+        The model.
+    log : Log
+        The log.
+    treatment : Treatment
+        How it is treated.
+    before : float
+        Error of the fit relative to the forces as they are; infinite where there is no pose.
+    """
     n = log.sliders.shape[1]
     best: Fault | None = None
     signs = (1,) * n
-    for one, two in combinations(range(n), 2):
-        order = tuple({one: two, two: one}.get(k, k) for k in range(n))
+    for i, j in combinations(range(n), 2):
+        order = tuple({i: j, j: i}.get(k, k) for k in range(n))
         other = replace(log, sliders=log.sliders[:, list(order)])
         try:
             equations = equations_of(model, other, treatment)

@@ -12,6 +12,7 @@ from pteron.errors import DataError
 from pteron.identification.equations import Equations
 from pteron.identification.estimators import Estimate, weighted
 from pteron.identification.estimators.triangle import triangle
+from pteron.identification.estimators.weighted import actuator_noise
 from pteron.identification.logs import Log
 from pteron.identification.logs.description import KnownPayload
 from pteron.identification.model import Model, Terms, identification_model
@@ -27,8 +28,8 @@ _UNSEEN = 1e-10
 """Singular value, relative to the largest, below which gains are not told from inertia."""
 
 _ITERATIONS = 50
-_SETTLED = 1e-4
-"""Largest change of a value, in standard deviations."""
+_SETTLED = 1e-3
+"""Change of what is predicted, relative to what is left over, that no longer matters."""
 
 _ROUNDING = 1e-13
 """Change of what is predicted, relative to the currents, that is rounding."""
@@ -262,20 +263,20 @@ def _likely(equations: Equations, carried: Array, start: Array, unit: str, sourc
         )
         # J v = current - f(v0) + J v0, and J v0 = f(v0) + (W beta) / g.
         images = equations.forces + inverse * (force - carried)
-        estimate = weighted(
-            replace(equations, names=names, units=units, matrix=tangent, forces=images)
-        )
-        step = estimate.values - values
-        values = estimate.values
-        if (np.abs(step) <= _SETTLED * estimate.deviations).all():
-            break
+        linear = replace(equations, names=names, units=units, matrix=tangent, forces=images)
+        noise = actuator_noise(linear, values)
+        step = triangle(linear, 1.0 / noise).values() - values
+        values = values + step
         change = np.linalg.norm(tangent @ step)
-        if change <= _ROUNDING * np.linalg.norm(equations.forces):
+        rest = np.linalg.norm(equations.forces - inverse * force)
+        if change <= max(_SETTLED * rest, _ROUNDING * np.linalg.norm(equations.forces)):
             break
         if iteration == _ITERATIONS:
             raise DataError(
                 f"{source}: the gains do not settle; record longer, or carry a heavier payload"
             )
+    estimate = weighted(linear)
+    values = estimate.values
     slopes = np.r_[-1.0 / values[:n] ** 2, np.ones(len(values) - n)]
     return replace(
         estimate,

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
 from typing import Any, Literal
 
 import numpy as np
 
 from pteron.errors import DataError, ModelError
 from pteron.identification.consistency import Bounds, Consistency, consistent_model
-from pteron.identification.diagnosis import column_fault, has_negative_inertia, unseen
+from pteron.identification.diagnosis import (
+    column_fault,
+    exchanged_sliders,
+    has_negative_inertia,
+    unseen,
+)
 from pteron.identification.equations import Equations, equations_of, stacked
 from pteron.identification.estimators import (
     ESTIMATORS,
@@ -321,30 +325,11 @@ def _equations(model: Model, one: Recording, treatment: Treatment, report: Stage
     except DataError as error:
         if "no pose" not in str(error):
             raise
-        swap = _slider_order(model.robot, one, treatment)
+        head = one.head()
+        swap = exchanged_sliders(model, head.part(0, min(head.rows, _LOOK)), treatment)
         if swap is None:
             raise
-        names = " and ".join(f"rho{k + 1}" for k, j in enumerate(swap) if k != j)
-        raise DataError(
-            f"{error}; with {names} exchanged every row has a pose: are these columns swapped?"
-        ) from None
-
-
-def _slider_order(
-    robot: Manipulator, one: Recording, treatment: Treatment
-) -> tuple[int, ...] | None:
-    """Return the exchange of two sliders with which every sample has a pose."""
-    from pteron.kinematics import direct_kinematics
-
-    head = one.head()
-    some = head.sliders[:: max(head.rows // 2000, 1)]
-    n = some.shape[1]
-    for one, two in combinations(range(n), 2):
-        order = tuple({one: two, two: one}.get(k, k) for k in range(n))
-        poses = direct_kinematics(robot, some[:, list(order)])[:, treatment.mode]
-        if not np.isnan(poses).any():
-            return order
-    return None
+        raise DataError(f"{error}; or {swap.message()}: then every row has a pose") from None
 
 
 def _estimated(

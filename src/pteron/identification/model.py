@@ -212,7 +212,7 @@ def identification_model(
     lengths = np.linalg.norm(flat, axis=0)
     lengths = np.where(lengths > 0.0, lengths, 1.0)
     names = model.names
-    factor = np.linalg.qr(flat / lengths, mode="r")
+    factor: Array = np.linalg.qr(flat / lengths)[1]
     # The diagonal of R is what is left of each column once those before it are taken out of it.
     rest = np.abs(np.diag(factor))
     dependent = [k for k in range(model.base.rank, len(names)) if rest[k] < _DEPENDENT]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -69,10 +67,9 @@ def comparison_figure(
 def _shade(axes: Axes, time: Array, where: NDArray[np.bool_]) -> None:
     edges = np.flatnonzero(np.diff(np.r_[False, where, False].astype(int)))
     last = len(time) - 1
-    for k, (start, stop) in enumerate(pairwise(edges)):
-        if k % 2 == 0:
-            low, high = float(time[start]), float(time[min(stop, last)])
-            axes.axvspan(low, high, color=GRID, alpha=0.75, linewidth=0.0, zorder=0.5)
+    for start, stop in edges.reshape(-1, 2).tolist():
+        low, high = float(time[start]), float(time[min(stop, last)])
+        axes.axvspan(low, high, color=GRID, alpha=0.75, linewidth=0.0, zorder=0.5)
 
 
 def errors_figure(errors: Array, without_friction: Array, floor: Array) -> Figure:

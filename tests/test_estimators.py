@@ -1,0 +1,550 @@
+"""Estimators on equations made by hand: values, what they say of their errors, what they refuse."""
+
+from dataclasses import replace
+from functools import lru_cache
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from logs_of_motions import log_of, truth
+from mechanisms import CATALOG
+from scipy.stats import binom
+
+from pteron.errors import DataError
+from pteron.identification.equations import Equations, equations_of
+from pteron.identification.estimators import (
+    ESTIMATORS,
+    essential_parameters,
+    huber,
+    ordinary,
+    ridge,
+    total,
+    weighted,
+)
+from pteron.identification.estimators.column_errors import column_errors
+from pteron.identification.estimators.likelihood import maximum_likelihood
+from pteron.identification.estimators.triangle import triangle
+from pteron.identification.estimators.whiteness import whiteness
+from pteron.identification.model import identification_model
+from pteron.identification.signals import Processing, treatment_of
+
+P = 6
+TRUE = np.array([2.0, -1.0, 0.5, 3.0, 0.3, -0.2])
+NAMES = ("a", "b", "c", "d", "Fc1", "offset1")
+DRAWS = 150
+
+each_estimator = pytest.mark.parametrize("estimator", list(ESTIMATORS.values()), ids=ESTIMATORS)
+
+
+def made(matrix, forces, *, names=NAMES, used=None):
+    """Return equations; those that are not used are zero, as `equations_of` leaves them."""
+    gain = np.ones(forces.shape) if used is None else used.astype(float)
+    rows = len(forces)
+    return Equations(
+        tuple(names[: matrix.shape[-1]]),
+        ("N",) * matrix.shape[-1],
+        matrix * gain[..., None],
+        forces * gain,
+        np.arange(rows) / 10.0,
+        gain,
+        np.zeros(rows, dtype=np.int64),
+    )
+
+
+def regressor(rows=120, n=3, seed=0):
+    """Return a regressor whose columns differ in size and hang together a little."""
+    rng = np.random.default_rng(seed)
+    matrix = rng.normal(size=(rows, n, P)) * [1.0, 20.0, 0.3, 2.0, 1.0, 1.0]
+    matrix[..., 2] += 0.2 * matrix[..., 0]
+    matrix[..., 4] = np.sign(matrix[..., 4])
+    matrix[..., 5] = 1.0
+    return matrix
+
+
+def drawn(seed, noise=0.3, **shape):
+    """Return equations with white noise of a size, one or one for each actuator."""
+    matrix = regressor(**shape)
+    forces = matrix @ TRUE
+    return made(matrix, forces + noise * np.random.default_rng(seed).normal(size=forces.shape))
+
+
+def standard_errors(estimator, equations):
+    """Return the errors of many draws in standard deviations, (draws, p)."""
+    found = []
+    for seed in range(DRAWS):
+        estimate = estimator(equations(seed))
+        found.append((estimate.values - TRUE) / estimate.deviations)
+    return np.array(found)
+
+
+def check_coverage(errors):
+    """Check that 95 % intervals hold the truth as often as they say, and errors average out."""
+    held = (np.abs(errors) < 1.959964).sum()
+    low, high = binom.interval(0.9999, errors.size // 2, 0.95)  # columns hang together a little
+    assert 2.0 * low < held + 0.006 * errors.size
+    assert held - 0.006 * errors.size < 2.0 * high
+    assert np.abs(errors.mean(axis=0)).max() < 4.0 / np.sqrt(len(errors))
+
+
+# Values
+
+
+def test_ordinary_is_that_of_numpy():
+    equations = drawn(1)
+    flat, forces = equations.matrix.reshape(-1, P), equations.forces.ravel()
+    expected, rest, _, _ = np.linalg.lstsq(flat, forces, rcond=None)
+    estimate = ordinary(equations)
+    assert estimate.values == pytest.approx(expected, rel=1e-11)
+    covariance = rest[0] / (len(flat) - P) * np.linalg.inv(flat.T @ flat)
+    assert estimate.covariance == pytest.approx(covariance, rel=1e-9)
+    assert estimate.condition == pytest.approx(np.linalg.cond(flat / np.linalg.norm(flat, axis=0)))
+    assert estimate.residuals == pytest.approx(equations.forces - equations.matrix @ expected)
+
+
+def test_weighted_is_that_of_numpy_with_rows_scaled():
+    equations = drawn(2, noise=np.array([0.1, 1.0, 5.0]))
+    estimate = weighted(equations)
+    assert estimate.noise == pytest.approx([0.1, 1.0, 5.0], rel=0.2)
+    scaled = equations.matrix / estimate.noise[:, None]
+    expected = np.linalg.lstsq(
+        scaled.reshape(-1, P), (equations.forces / estimate.noise).ravel(), rcond=None
+    )[0]
+    # Weights settle to a thousandth.
+    assert (np.abs(estimate.values - expected) < 0.01 * estimate.deviations).all()
+
+
+def test_a_triangle_holds_all_that_its_blocks_do(monkeypatch):
+    equations = drawn(3, rows=200)
+    weights = np.random.default_rng(0).uniform(0.5, 2.0, equations.forces.shape)
+    whole = triangle(equations, weights)
+    monkeypatch.setattr("pteron.identification.estimators.triangle._BLOCK", 7)
+    parts = triangle(equations, weights)
+    assert parts.values() == pytest.approx(whole.values(), rel=1e-12)
+    assert parts.inverse() == pytest.approx(whole.inverse(), rel=1e-10)
+    assert parts.rest == pytest.approx(whole.rest, rel=1e-10)
+
+
+@each_estimator
+def test_noise_free_equations_give_the_values(estimator):
+    estimate = estimator(drawn(0, noise=0.0))
+    assert estimate.values == pytest.approx(TRUE, abs=1e-10)
+    assert (estimate.deviations < 1e-9).all()
+
+
+@each_estimator
+def test_an_estimate_carries_its_diagnosis(estimator):
+    estimate = estimator(drawn(4))
+    assert estimate.names == NAMES
+    assert estimate.deviations == pytest.approx(np.sqrt(np.diag(estimate.covariance)))
+    assert estimate.relative_deviations == pytest.approx(
+        estimate.deviations / np.abs(estimate.values)
+    )
+    assert np.diag(estimate.correlation) == pytest.approx(1.0)
+    assert np.abs(estimate.correlation).max() < 1.0 + 1e-12
+    assert estimate.whiteness.white
+    assert not estimate.correlated
+    assert estimate.rows == 360
+    assert estimate.noise == pytest.approx(0.3, rel=0.25)
+    low, high = estimate.intervals(0.5)
+    assert high - low == pytest.approx(2.0 * 0.6744897 * estimate.deviations)
+    assert estimate.value("c") == estimate.values[2]
+    assert estimate.as_dict()["equations"] == 360
+
+
+@each_estimator
+def test_rows_that_are_not_used_count_for_nothing(estimator):
+    whole = drawn(5, rows=100)
+    spread = np.arange(150) % 3 != 2
+    matrix, forces = regressor(150), np.zeros((150, 3))
+    matrix[spread], forces[spread] = whole.matrix, whole.forces
+    holed = made(matrix, forces, used=np.tile(spread[:, None], (1, 3)))
+    one, other = estimator(whole), estimator(holed)
+    assert other.rows == one.rows == 300
+    assert other.values == pytest.approx(one.values, rel=1e-9)
+    assert other.covariance == pytest.approx(one.covariance, rel=1e-7)
+    assert other.noise == pytest.approx(one.noise, rel=1e-9)
+
+
+@each_estimator
+def test_an_actuator_without_equations_is_no_matter(estimator):
+    equations = drawn(6)
+    used = np.ones((120, 3), dtype=bool)
+    used[:, 1] = False
+    estimate = estimator(made(equations.matrix, equations.forces, used=used))
+    rest = np.ascontiguousarray(equations.matrix[:, ::2]), equations.forces[:, ::2]
+    expected = estimator(made(*rest))
+    assert estimate.rows == 240
+    assert estimate.values == pytest.approx(expected.values, rel=1e-8)
+    assert estimate.deviations == pytest.approx(expected.deviations, rel=1e-6)
+    assert estimate.noise[1] == 0.0
+    assert estimate.whiteness.p_values[1] == 1.0
+
+
+@each_estimator
+def test_one_equation_more_than_values_is_enough(estimator):
+    equations = drawn(7, rows=7, n=1)
+    estimate = estimator(equations)
+    assert np.isfinite(estimate.values).all()
+    assert (estimate.deviations > 0.0).all()
+
+
+# Errors
+
+
+@pytest.mark.parametrize("estimator", [ordinary, weighted, huber])
+def test_intervals_hold_the_truth(estimator):
+    check_coverage(standard_errors(estimator, drawn))
+
+
+@pytest.mark.parametrize("estimator", [weighted, huber])
+def test_intervals_hold_the_truth_where_actuators_differ(estimator):
+    noise = np.array([0.05, 0.5, 3.0])
+    check_coverage(standard_errors(estimator, lambda seed: drawn(seed, noise)))
+
+
+def test_weights_are_worth_their_while():
+    noise = np.array([0.05, 0.5, 3.0])
+    errors = {
+        name: np.mean(
+            [(ESTIMATORS[name](drawn(seed, noise)).values - TRUE) ** 2 for seed in range(30)],
+            axis=0,
+        )
+        for name in ("ordinary", "weighted")
+    }
+    assert (errors["weighted"] < 0.1 * errors["ordinary"]).all()
+
+
+def with_outliers(seed, share=0.05):
+    rng = np.random.default_rng(seed + 1000)
+    equations = drawn(seed)
+    hit = rng.uniform(size=equations.forces.shape) < share
+    return equations.with_forces(equations.forces + hit * rng.normal(20.0, 20.0, hit.shape))
+
+
+def test_huber_forgives_outliers():
+    errors = standard_errors(huber, with_outliers)
+    # One-sided outliers pull at the offset, and at nothing else.
+    check_coverage(errors[:, :5])
+    plain, robust = (
+        np.mean([(f(with_outliers(seed)).values - TRUE) ** 2 for seed in range(40)], axis=0)
+        for f in (ordinary, huber)
+    )
+    assert (robust < 0.05 * plain).all()
+
+
+def test_huber_takes_half_of_the_equations_being_exact():
+    # The median is zero then, and with it the scale.
+    equations = drawn(0, noise=0.0)
+    forces = equations.forces.copy()
+    forces[::3] += np.random.default_rng(1).normal(size=forces[::3].shape)
+    assert huber(equations.with_forces(forces)).values == pytest.approx(TRUE, abs=0.2)
+
+
+def coloured(seed, memory=0.8):
+    rng = np.random.default_rng(seed)
+    noise = rng.normal(size=(400, 3))
+    for k in range(1, len(noise)):
+        noise[k] += memory * noise[k - 1]
+    slow = np.sin(0.02 * np.arange(400)[:, None, None] * np.arange(1, 4)[None, :, None])
+    matrix = regressor(400)
+    matrix[..., 5:] *= slow + 1.5
+    return made(matrix, matrix @ TRUE + 0.3 * noise)
+
+
+@pytest.mark.parametrize("estimator", [ordinary, weighted, huber])
+def test_coloured_noise_is_seen_and_allowed_for(estimator):
+    estimates = [estimator(coloured(seed)) for seed in range(80)]
+    assert not any(estimate.whiteness.white for estimate in estimates)
+    assert all(estimate.correlated for estimate in estimates)
+    assert estimates[0].whiteness.autocorrelation == pytest.approx(0.8, abs=0.1)
+    errors = np.array([(e.values - TRUE) / e.deviations for e in estimates])
+    # The offset feels it most; what white noise would say of it holds not even two times in three.
+    assert (np.abs(errors[:, 5]) < 1.96).mean() > 0.85
+    assert (np.abs(errors) < 1.96).mean() > 0.92
+
+
+def test_white_noise_is_called_white_as_often_as_it_should():
+    rng = np.random.default_rng(2)
+    white = [whiteness(rng.normal(size=(300, 4))).white for _ in range(400)]
+    assert np.mean(white) == pytest.approx(0.99, abs=0.012)
+
+
+def test_stretches_that_are_left_out_do_not_colour_noise():
+    rng = np.random.default_rng(3)
+    used = np.tile((np.arange(900)[:, None] // 100) % 3 == 0, (1, 4))
+    white = [whiteness(5.0 * used + rng.normal(size=(900, 4)) * used, used) for _ in range(300)]
+    assert np.mean([test.white for test in white]) == pytest.approx(0.99, abs=0.015)
+
+
+# Total least squares
+
+
+ERRORS = np.array([0.15, 2.0, 0.05, 0.3, 0.0, 0.0])
+
+
+def noisy_columns(seed, noise):
+    rng = np.random.default_rng(seed)
+    matrix = regressor(400)
+    forces = matrix @ TRUE + noise * rng.normal(size=(400, 3))
+    return made(matrix + ERRORS * rng.normal(size=matrix.shape), forces)
+
+
+@pytest.mark.parametrize("noise", [0.1, 2.0, np.array([0.3, 1.0, 3.0])], ids=str)
+def test_total_takes_out_the_bias_of_noisy_columns(noise):
+    plain, found, errors = [], [], []
+    for seed in range(DRAWS):
+        equations = noisy_columns(seed, noise)
+        estimate = total(equations, ERRORS)
+        plain.append(ordinary(equations).values - TRUE)
+        found.append(estimate.values - TRUE)
+        errors.append(found[-1] / estimate.deviations)
+    bias, left = np.mean(plain, axis=0), np.mean(found, axis=0)
+    assert np.abs(bias[:2] / TRUE[:2]).min() > 0.008
+    assert (np.abs(left[:2]) < 0.25 * np.abs(bias[:2])).all()
+    assert np.abs(np.mean(errors, axis=0)).max() < 0.4
+    assert (np.abs(errors) < 1.96).mean() > 0.9
+
+
+def test_total_is_that_of_the_singular_vector():
+    # All columns noisy, each relative to its size as the forces: the textbook's solution.
+    names = tuple("abcdef")
+    equations = replace(noisy_columns(0, 0.5), names=names)
+    flat = equations.matrix.reshape(-1, P)
+    estimate = total(equations)
+    start = np.linalg.lstsq(flat, equations.forces.ravel(), rcond=None)[0]
+    noise = np.sqrt(((equations.forces - equations.matrix @ start) ** 2).sum(axis=0) / 400)
+    rows = equations.matrix / noise[:, None]
+    forces = (equations.forces / noise).ravel()
+    rows = rows.reshape(-1, P)
+    size = np.linalg.norm(rows, axis=0) / np.linalg.norm(forces)
+    last = np.linalg.svd(np.column_stack([rows / size, forces]))[2][-1]
+    assert estimate.values == pytest.approx(-last[:-1] / last[-1] / size, rel=1e-6)
+
+
+def test_exact_columns_are_left_as_they_are():
+    equations = drawn(8)
+    exact = total(equations, np.zeros(P))
+    assert exact.values == pytest.approx(weighted(equations).values, rel=1e-2)
+    noise = np.sqrt(
+        ((equations.forces - equations.matrix @ ordinary(equations).values) ** 2).mean(axis=0)
+    )
+    expected = np.linalg.lstsq(
+        (equations.matrix / noise[:, None]).reshape(-1, P),
+        (equations.forces / noise).ravel(),
+        rcond=None,
+    )[0]
+    assert exact.values == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_log_of_noise_alone_is_refused_or_says_so():
+    rng = np.random.default_rng(9)
+    equations = made(rng.normal(size=(100, 2, P)), rng.normal(size=(100, 2)))
+    try:
+        estimate = total(equations, np.ones(P))
+    except DataError as error:
+        assert "livelier" in str(error)
+    else:
+        assert (np.abs(estimate.values) < 5.0 * estimate.deviations).all()
+
+
+# Ridge
+
+
+def poor(rows=60):
+    """Return equations that hardly move the third value and leave out the fourth."""
+    matrix = regressor(rows)
+    matrix[..., 2] *= 1e-3
+    matrix[..., 3] = 0.0
+    rng = np.random.default_rng(10)
+    return made(matrix, matrix @ TRUE + 0.3 * rng.normal(size=(rows, 3)))
+
+
+def test_ridge_names_what_the_data_hardly_touch():
+    prior, spread = np.full(P, 0.7), np.full(P, 2.0)
+    found = ridge(poor(), prior, spread)
+    assert found.poorly_excited == ("c", "d")
+    assert found.estimate.values[3] == pytest.approx(0.7, abs=1e-12)
+    assert found.estimate.deviations[3] == pytest.approx(2.0)
+    assert found.from_data[[0, 1, 4, 5]] == pytest.approx(1.0, abs=1e-2)
+    assert found.from_data[3] == pytest.approx(0.0, abs=1e-12)
+    seen = [0, 1, 4, 5]
+    error = (found.estimate.values - TRUE)[seen] / found.estimate.deviations[seen]
+    assert np.abs(error).max() < 4.0
+
+
+def test_a_wide_prior_leaves_the_data_alone():
+    equations = drawn(11)
+    found = ridge(equations, np.zeros(P), np.full(P, 1e6))
+    assert found.estimate.values == pytest.approx(weighted(equations).values, rel=1e-2)
+    assert found.poorly_excited == ()
+
+
+@pytest.mark.parametrize("rows", [1, 2, 3])
+def test_ridge_answers_with_hardly_any_equations(rows):
+    found = ridge(drawn(12, rows=rows, n=2), TRUE + 0.1, np.full(P, 0.5))
+    assert np.isfinite(found.estimate.values).all()
+    assert np.isfinite(found.estimate.noise).all()
+    assert (found.estimate.deviations <= 0.5 * (1.0 + 1e-9)).all()
+    assert np.abs(found.estimate.values - TRUE).max() < 2.0
+
+
+# Refusals
+
+
+@each_estimator
+def test_a_value_that_is_not_seen_is_named(estimator):
+    equations = drawn(13)
+    matrix = equations.matrix.copy()
+    matrix[..., 3] = 0.0
+    with pytest.raises(DataError, match=r"1 of 6 values cannot be seen \(d\)"):
+        estimator(made(matrix, equations.forces))
+    matrix = equations.matrix.copy()
+    matrix[..., 0] = 3.0 * matrix[..., 1]
+    with pytest.raises(DataError, match=r"2 of 6 values cannot be seen \(a, b\)"):
+        estimator(made(matrix, equations.forces))
+
+
+@each_estimator
+def test_too_few_rows_are_refused(estimator):
+    with pytest.raises(DataError, match="6 equations are left"):
+        estimator(drawn(14, rows=2))
+    with pytest.raises(DataError, match="0 equations are left"):
+        estimator(made(regressor(), np.zeros((120, 3)), used=np.zeros((120, 3), dtype=bool)))
+
+
+@pytest.mark.parametrize("threshold", [0.0, -1.0, float("nan")])
+def test_a_threshold_that_cannot_be_is_refused(threshold):
+    with pytest.raises(DataError, match="threshold"):
+        huber(drawn(15), threshold=threshold)
+
+
+# Essential parameters
+
+
+def test_values_of_zero_are_dropped_and_others_kept():
+    zero = np.array([True, False, False, False, True, False])
+    values = np.where(zero, 0.0, TRUE)
+    matrix = regressor()
+    dropped = []
+    for seed in range(60):
+        noise = 0.3 * np.random.default_rng(seed).normal(size=(120, 3))
+        equations = made(matrix, matrix @ values + noise)
+        found = essential_parameters(equations, weighted(equations), weighted)
+        assert found.names == tuple(n for n in NAMES if n not in found.dropped)
+        assert set(found.dropped) <= {"a", "Fc1"}
+        assert found.estimate.names == found.names
+        dropped.append(len(found.dropped) == 2)
+        if found.dropped:
+            assert found.p_value >= found.level == 0.05
+    # All zeros together are rejected once in twenty.
+    assert binom.cdf(sum(dropped), 60, 0.95) > 1e-4
+
+
+def test_a_pair_that_only_shows_together_is_kept():
+    rng = np.random.default_rng(16)
+    matrix = rng.normal(size=(150, 2, 3))
+    matrix[..., 1] = matrix[..., 0] + 1e-3 * matrix[..., 1]
+    equations = made(matrix, matrix @ [0.5, 0.5, 0.0] + 0.3 * rng.normal(size=(150, 2)))
+    estimate = ordinary(equations)
+    # Each for itself is lost in its deviation.
+    assert (np.abs(estimate.values[:2]) < 2.0 * estimate.deviations[:2]).all()
+    found = essential_parameters(equations, estimate, ordinary)
+    assert len(set(found.names) & {"a", "b"}) == 1
+    kept = next(iter(set(found.names) & {"a", "b"}))
+    assert found.estimate.value(kept) == pytest.approx(1.0, abs=0.1)
+
+
+def test_nothing_is_dropped_where_all_is_significant():
+    equations = drawn(17, noise=1e-3)
+    estimate = weighted(equations)
+    found = essential_parameters(equations, estimate, weighted)
+    assert (found.names, found.dropped) == (NAMES, ())
+    assert found.estimate is estimate
+
+
+# With logs
+
+
+@lru_cache(maxsize=8)
+def experiment(slider_noise, seed=0, derivatives="periodic"):
+    """Return the model, log, treatment, equations and true values of a noisy log."""
+    robot = CATALOG["tripteron"]
+    model = identification_model(robot)
+    log = log_of(
+        robot,
+        rate=250.0,
+        slider_noise=slider_noise,
+        force_noise=0.2,
+        noise_seed=seed,
+        harmonics=3,
+        period=2.0,
+        seed=2,
+    )
+    period = 2.0 if derivatives == "periodic" else None
+    treatment = treatment_of(robot, log, Processing(derivatives=derivatives, period=period))
+    return SimpleNamespace(
+        model=model,
+        log=log,
+        treatment=treatment,
+        equations=equations_of(model, log, treatment),
+        truth=truth(model),
+    )
+
+
+def test_errors_of_columns_grow_with_the_noise():
+    made_by = experiment(1e-5)
+    small = column_errors(made_by.model, made_by.log, made_by.treatment)
+    ten = replace(made_by.treatment, slider_noise=10.0 * made_by.treatment.slider_noise)
+    large = column_errors(made_by.model, made_by.log, ten)
+    names = made_by.model.names
+    noisy = [k for k, name in enumerate(names) if not name.startswith(("Fc", "offset"))]
+    moved = np.array([k for k in noisy if small[k] > 0.0])
+    assert len(moved) > 0.5 * len(noisy)
+    assert np.median(large[moved] / small[moved]) == pytest.approx(10.0, rel=0.15)
+    offsets = [k for k, name in enumerate(names) if name.startswith("offset")]
+    assert not small[offsets].any()
+    assert not large[offsets].any()
+
+
+def test_likelihood_agrees_with_weights_where_positions_are_good():
+    made_by = experiment(1e-8)
+    one = weighted(made_by.equations)
+    other = maximum_likelihood(made_by.model, made_by.log, made_by.treatment)
+    assert other.names == one.names
+    assert (np.abs(other.values - one.values) < 0.3 * one.deviations).all()
+    assert other.deviations == pytest.approx(one.deviations, rel=0.3)
+    assert (np.abs(other.values - made_by.truth) < 4.5 * other.deviations).all()
+
+
+def test_likelihood_is_better_where_positions_are_noisy():
+    worse = []
+    for seed in range(4):
+        made_by = experiment(1e-3, seed, "central")
+        size = np.sqrt((made_by.equations.matrix**2).sum(axis=(0, 1)))
+        likely = maximum_likelihood(made_by.model, made_by.log, made_by.treatment)
+        plain = weighted(made_by.equations)
+        worse.append(
+            np.linalg.norm(size * (plain.values - made_by.truth))
+            / np.linalg.norm(size * (likely.values - made_by.truth))
+        )
+    assert np.exp(np.mean(np.log(worse))) > 1.2
+
+
+def test_likelihood_refuses_what_it_cannot_fit():
+    made_by = experiment(1e-5)
+    payload = (np.arange(made_by.log.rows) > 1000).astype(int)
+    with pytest.raises(DataError, match="payload changes"):
+        maximum_likelihood(
+            made_by.model, replace(made_by.log, payload=payload), made_by.treatment
+        )
+
+
+def test_motion_along_one_axis_names_what_it_cannot_see():
+    robot = CATALOG["tripteron"]
+    model = identification_model(robot)
+    log = log_of(robot, size=np.array(0.0), turn=0.0)
+    wave = 0.04 * np.sin(2.0 * np.pi * 0.5 * log.time)
+    sliders = log.sliders + np.outer(wave, [leg.direction[2] for leg in robot.legs])
+    treatment = treatment_of(robot, replace(log, sliders=sliders), Processing(band=10.0))
+    with pytest.raises(DataError, match="too little motion: .* values cannot be seen"):
+        weighted(equations_of(model, replace(log, sliders=sliders), treatment))
