@@ -11,8 +11,9 @@ demo: $(VENV)/.runtime
 	$(BIN)/pteron report quadrupteron --out demo
 	$(BIN)/pteron table1
 
+# One thread of linear algebra a process: the tests share the cores among themselves.
 test: lint
-	$(BIN)/python -m pytest --numprocesses auto
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check

@@ -1,4 +1,4 @@
-"""Synthetic logs: a machine's own dynamics along a motion, with friction, noise and gaps at will."""
+"""Synthetic logs: a machine's own dynamics along a motion, friction, noise and gaps at will."""
 
 from dataclasses import dataclass, replace
 

@@ -17,7 +17,14 @@ from pteron.identification.model import Terms, identification_model
 from pteron.identification.signals import Processing, States, treatment_of
 from pteron.identification.signals import samples as samples_module
 
-each_mechanism = pytest.mark.parametrize("name", MECHANISMS)
+KINDS = [
+    "quadrupteron",
+    "quadrupteron turned",
+    "tripteron-oblique --+",
+    "random 3T1R 0",
+    "random 3T 0",
+]
+each_kind = pytest.mark.parametrize("name", KINDS)
 
 
 @lru_cache(maxsize=32)
@@ -55,7 +62,7 @@ TERMS = {
 }
 
 
-@pytest.mark.parametrize("name", ["quadrupteron", "quadrupteron-oblique", "tripteron-oblique"])
+@pytest.mark.parametrize("name", ["quadrupteron", "tripteron-oblique"])
 @pytest.mark.parametrize("kind", TERMS)
 def test_a_model_names_every_column_once(name, kind):
     terms = TERMS[kind]
@@ -64,7 +71,7 @@ def test_a_model_names_every_column_once(name, kind):
     n = len(robot.legs)
     joints = {"none": 0, "shared": 3 + robot.platform.turns, "each": 3 * n + robot.platform.turns}
     extra = n * (terms.coulomb + terms.viscous + terms.offset) + joints[terms.joints]
-    assert model.left_out == ()
+    assert model.left_out == tuple(f"J_m{i + 1}" for i in range(n) if terms.rotors)
     assert len(set(model.names)) == len(model.names) == model.base.rank + extra
     assert len(model.units) == len(model.expressions) == len(model.names)
     assert model.matrix(states_of(robot)).shape == (60, n, len(model.names))
@@ -73,7 +80,7 @@ def test_a_model_names_every_column_once(name, kind):
     )
 
 
-@each_mechanism
+@each_kind
 def test_the_columns_add_up_to_the_forces(name):
     robot = MECHANISMS[name]
     model = model_of(name)
@@ -83,7 +90,7 @@ def test_the_columns_add_up_to_the_forces(name):
     assert relative_error(model.matrix(at) @ truth(model), forces) < 1e-10
 
 
-@each_mechanism
+@each_kind
 def test_columns_of_the_base_are_those_of_the_regressor(name):
     robot = MECHANISMS[name]
     model = model_of(name)
@@ -120,7 +127,7 @@ def test_legs_that_share_their_values_have_fewer(name):
     assert len(model.units) == len(model.names)
 
 
-@pytest.mark.parametrize("name", ["quadrupteron", "quadrupteron-oblique", "tripteron"])
+@pytest.mark.parametrize("name", ["quadrupteron", "tripteron"])
 def test_shared_joints_are_the_sums_of_each(name):
     n = len(CATALOG[name].legs)
     at = states_of(CATALOG[name])
@@ -147,12 +154,24 @@ def test_the_payload_is_a_body_more_on_the_platform(name):
     assert not model.matrix(states_of(robot, payload=0))[..., -4:].any()
 
 
-def test_a_rotor_is_said_and_adds_no_column():
-    plain, driven = (model_of("quadrupteron", Terms(rotors=flag)) for flag in (False, True))
+@pytest.mark.parametrize("name", ["quadrupteron", "tripteron-oblique", "random 3T 0"])
+def test_a_rotor_joins_what_acts_like_it(name):
+    plain, driven = (model_of(name, Terms(rotors=flag)) for flag in (False, True))
     assert plain.names == driven.names
-    changed = [k for k in range(len(plain.names)) if plain.expressions[k] != driven.expressions[k]]
-    assert [plain.names[k] for k in changed] == [f"m_p{i}" for i in range(1, 5)]
-    assert all("J_m" in driven.expressions[k] for k in changed)
+    at = states_of(MECHANISMS[name])
+    for i in range(len(driven.robot.legs)):
+        rotor = f"J_m{i + 1}"
+        assert any(rotor in expression for expression in driven.expressions)
+        felt = driven.matrix(at) @ driven.share_of(rotor, 0.7)
+        expected = np.zeros_like(felt)
+        expected[:, i] = 0.7 * at.slider_accelerations[:, i]
+        assert np.abs(felt - expected).max() < 1e-9 * np.abs(expected).max()
+
+
+def test_a_payload_shows_its_mass_only_where_the_platform_does_not_turn():
+    model = model_of("tripteron", Terms(payload=True))
+    assert len(model.left_out) == 3
+    assert model.matrix(states_of(model.robot, payload=1)).any(axis=(0, 1)).all()
 
 
 def test_terms_that_cannot_be_are_refused():
@@ -163,7 +182,7 @@ def test_terms_that_cannot_be_are_refused():
 # Logs without noise
 
 WAYS = {"periodic": 1e-9, "spline": 1e-8, "central": 1e-8}
-SOME = ["quadrupteron", "quadrupteron turned", "tripteron-oblique", "random 3T1R 0"]
+SOME = ["quadrupteron", "tripteron-oblique --+"]
 
 
 def equations_and_truth(name, derivatives="central", *, processing=None, **log):
@@ -188,7 +207,7 @@ def test_a_log_without_noise_gives_the_values(name, derivatives):
     assert np.abs(equations.forces - equations.matrix @ values).max() < WAYS[derivatives] * usual
 
 
-@pytest.mark.parametrize("name", ["quadrupteron", "tripteron-oblique"])
+@pytest.mark.parametrize("name", ["tripteron-oblique --+"])
 @pytest.mark.parametrize("rate", [50.0, 500.0])
 @pytest.mark.parametrize("period", [4.0, 3.7013])
 def test_a_period_need_not_be_a_number_of_samples(name, rate, period):
@@ -197,7 +216,7 @@ def test_a_period_need_not_be_a_number_of_samples(name, rate, period):
     assert np.abs(equations.forces - equations.matrix @ values).max() < 1e-9
 
 
-@pytest.mark.parametrize("name", ["quadrupteron", "tripteron"])
+@pytest.mark.parametrize("name", ["tripteron"])
 def test_periods_with_uneven_samples_and_a_gap_are_exact(name):
     model = model_of(name)
     rng = np.random.default_rng(1)
@@ -215,8 +234,7 @@ def test_a_gap_that_no_other_period_fills_is_refused():
     log = without(log_of(CATALOG["quadrupteron"], duration=4.0), 500, 1500)
     processing = Processing(derivatives="periodic", period=4.0)
     with pytest.raises(DataError, match="samples leave"):
-        treatment = treatment_of(CATALOG["quadrupteron"], log, processing)
-        equations_of(model_of("quadrupteron"), log, treatment)
+        treatment_of(CATALOG["quadrupteron"], log, processing)
 
 
 # What is left out
@@ -225,7 +243,7 @@ def test_a_gap_that_no_other_period_fills_is_refused():
 @pytest.mark.parametrize("derivatives", WAYS)
 def test_slow_sliders_are_left_out_on_both_sides(derivatives):
     # Friction that is wrong only at low speed must not be felt at all.
-    name = "quadrupteron"
+    name = "tripteron-oblique --+"
     processing = Processing(slow=0.2)
     log, treatment, equations, values = equations_and_truth(
         name, derivatives, processing=processing
@@ -239,11 +257,14 @@ def test_slow_sliders_are_left_out_on_both_sides(derivatives):
     assert np.array_equal(found.gain, equations.gain)
     assert found.forces == pytest.approx(equations.forces, abs=1e-9)
     assert np.abs(found.forces - found.matrix @ values).max() < 1e-7
-    awake = replace(treatment, slow=np.zeros(4))
-    assert np.abs(
-        equations_of(model_of(name), spoiled, awake).forces
-        - equations_of(model_of(name), log, awake).forces
-    ).max() > 1.0
+    awake = replace(treatment, slow=np.zeros(3))
+    assert (
+        np.abs(
+            equations_of(model_of(name), spoiled, awake).forces
+            - equations_of(model_of(name), log, awake).forces
+        ).max()
+        > 1.0
+    )
 
 
 def test_equations_that_are_not_used_are_zero():
@@ -275,7 +296,7 @@ def test_rows_near_a_slow_one_are_left_out_as_far_as_the_filter_reaches():
 @pytest.mark.parametrize("case", ["central", "periodic", "periodic, uneven"])
 def test_what_is_left_of_noise_has_the_size_of_the_noise(case):
     # Unit noise on the forces, on masked rows and on whole ones.
-    name, draws = "tripteron", 40
+    name, draws = "tripteron", 30
     derivatives = case.split(",")[0]
     shape = {"rate": 100.0, "duration": 12.0, "period": 3.9007 if "uneven" in case else 4.0}
     log, treatment, equations, _ = equations_and_truth(
@@ -292,10 +313,10 @@ def test_what_is_left_of_noise_has_the_size_of_the_noise(case):
         squares += rest**2 / draws
         neighbours += (rest[1:] * rest[:-1]).sum() / (rest**2).sum() / draws
     used = equations.gain > 0.0
-    assert np.sqrt(squares[used].mean()) == pytest.approx(1.0, abs=0.03)
+    assert np.sqrt(squares[used].mean()) == pytest.approx(1.0, abs=0.04)
     # Each equation, masked in part or not: a chi-square of so many draws.
-    assert squares[used].min() > 0.3
-    assert squares[used].max() < 2.2
+    assert squares[used].min() > 0.2
+    assert squares[used].max() < 2.5
     partial = used & (equations.gain < 0.95 * equations.gain.max())
     assert partial.sum() > 10
     assert np.sqrt(squares[partial].mean()) == pytest.approx(1.0, abs=0.1)

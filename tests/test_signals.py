@@ -272,7 +272,7 @@ def test_no_band_is_no_decimation():
 
 
 def counted(rows, *, gaps=(), payload=None, rate=100.0, first_row=0):
-    """Return a log whose sliders are the numbers of its rows; after each gap 5 steps are missing."""
+    """Return a log whose sliders are the numbers of its rows; at each gap 5 steps are missing."""
     index = np.arange(rows)
     time = (index + 5 * np.searchsorted(gaps, index, side="right")) / rate
     numbers = np.tile(index[:, None].astype(float), (1, 3))
@@ -320,10 +320,12 @@ def test_short_stretches_yield_nothing():
 # States
 
 
-each_mechanism = pytest.mark.parametrize("name", MECHANISMS)
+each_kind = pytest.mark.parametrize(
+    "name", ["quadrupteron", "quadrupteron ----", "tripteron on a wall", "random 3T1R 1"]
+)
 
 
-@each_mechanism
+@each_kind
 def test_states_are_those_of_the_motion(name):
     robot = MECHANISMS[name]
     pose, velocity, acceleration = motion(robot, np.linspace(0.0, 4.0, 200))
@@ -352,16 +354,16 @@ def in_mode(robot, mode):
     return Log("log.csv", np.arange(float(len(pose))), sliders, sliders, pose=pose)
 
 
-@pytest.mark.parametrize("name", ["quadrupteron", "quadrupteron-oblique", "random 3T1R 1"])
+@pytest.mark.parametrize("name", ["quadrupteron", "random 3T1R 1"])
 @pytest.mark.parametrize("mode", [0, 1])
 def test_a_measured_pose_says_the_assembly_mode(name, mode):
     robot = MECHANISMS[name]
     log = in_mode(robot, mode)
-    turned = replace(log, pose=log.pose + [0.0, 0.0, 0.0, 2.0 * np.pi])
+    turned = replace(log, pose=log.pose + 2.0 * np.pi * np.eye(4)[3])
     assert assembly_mode(robot, log) == assembly_mode(robot, turned) == mode
 
 
-@pytest.mark.parametrize("name", ["quadrupteron", "quadrupteron-oblique", "random 3T1R 1"])
+@pytest.mark.parametrize("name", ["quadrupteron", "random 3T1R 1"])
 def test_a_declared_mode_comes_first_and_that_of_home_last(name):
     robot = MECHANISMS[name]
     log = in_mode(robot, 0)
@@ -417,14 +419,12 @@ def test_a_singular_sample_is_named():
     motion_of = [sliders, rates.sliders, accelerations.sliders]
     _, margin, _ = numeric(robot, "reach")(pose[17:18])
     leg = robot.legs[0]
-    # Along a slider the foot of leg 1 does not move; across it, until that leg is all but stretched.
+    # Across the direction of leg 1, until the first leg is all but stretched.
     across = np.eye(3)[int(np.argmin(np.abs(leg.direction)))]
     low, high = 0.0, 1.0
     for _ in range(60):
         middle = 0.5 * (low + high)
-        trial = pteron.inverse_kinematics(
-            robot, pose[17] + middle * across, on_failure="nan"
-        )
+        trial = pteron.inverse_kinematics(robot, pose[17] + middle * across, on_failure="nan")
         low, high = (low, middle) if np.isnan(trial).any() else (middle, high)
     assert margin.min() > 0.0
     sliders[17] = pteron.inverse_kinematics(robot, pose[17] + low * across)
@@ -444,7 +444,12 @@ def test_fresh_samples_of_blocks_tile_a_log(derivatives, margin, monkeypatch):
     monkeypatch.setattr(samples_module, "_BLOCK", 300)
     found = list(samples(robot, pieces(log, 123), treatment, margin=margin))
     assert len(found) > 3
-    for name, least in (("time", 1e-12), ("pose", 1e-8), ("velocity", 1e-6), ("acceleration", 1e-4)):
+    for name, least in (
+        ("time", 1e-12),
+        ("pose", 1e-8),
+        ("velocity", 1e-6),
+        ("acceleration", 1e-4),
+    ):
         joined = np.concatenate([getattr(part.states, name)[part.fresh] for part in found])
         expected = getattr(whole[0].states, name)[whole[0].fresh]
         assert joined.shape == expected.shape

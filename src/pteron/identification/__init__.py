@@ -6,6 +6,7 @@ real bodies, `excitation` makes the motions worth recording.
 """
 
 from pteron.identification.consistency import Bounds, Consistency, consistent_model
+from pteron.identification.drive_gains import DriveGains, identify_drive_gains
 from pteron.identification.equations import Equations, equations_of, stacked
 from pteron.identification.estimators import (
     Essential,
@@ -30,6 +31,7 @@ from pteron.identification.excitation import (
 from pteron.identification.identify import METHODS, Identification, identify
 from pteron.identification.logs import Log, open_log, read_log, write_log
 from pteron.identification.model import Model, Terms, identification_model
+from pteron.identification.payload import Payload, identify_payload
 from pteron.identification.prediction import Prediction
 from pteron.identification.signals import Processing, States, Treatment, treatment_of
 from pteron.identification.verdict import Verdict
@@ -38,6 +40,7 @@ __all__ = [
     "METHODS",
     "Bounds",
     "Consistency",
+    "DriveGains",
     "Equations",
     "Essential",
     "Estimate",
@@ -47,6 +50,7 @@ __all__ = [
     "Limits",
     "Log",
     "Model",
+    "Payload",
     "Prediction",
     "Processing",
     "Ridge",
@@ -61,6 +65,8 @@ __all__ = [
     "huber",
     "identification_model",
     "identify",
+    "identify_drive_gains",
+    "identify_payload",
     "maximum_likelihood",
     "open_log",
     "optimal_excitation",

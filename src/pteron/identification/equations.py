@@ -75,7 +75,7 @@ class Equations:
     @property
     def actuators(self) -> int:
         """n."""
-        return self.forces.shape[1]
+        return int(self.forces.shape[1])
 
     def columns(self, keep: Sequence[int]) -> Equations:
         """Return the equations of some of the values."""
@@ -131,7 +131,9 @@ def stacked(parts: Sequence[Equations]) -> Equations:
     if len(parts) == 1:
         return first
     names = ("matrix", "forces", "time", "gain", "payload")
-    joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    joined: dict[str, Any] = {
+        name: np.concatenate([getattr(part, name) for part in parts]) for name in names
+    }
     return replace(first, **joined)
 
 
@@ -218,10 +220,10 @@ def _periodic(model: Model, log: Log, treatment: Treatment) -> Equations:
     per_period = round(period * rate)
     harmonics = max(min(int(treatment.band * period), most_harmonics(log.time, period)), 1)
     series = fitted_series(log.time, log.sliders, period, highest=treatment.cutoff)
-    fine = start + np.arange(per_period) * (period / per_period)
+    fine = np.linspace(start, start + period, per_period, endpoint=False)
     moving = in_motion(series.at(fine, 1), treatment, wraps=True)
     count = 2 * harmonics + 1
-    kept = start + np.arange(count) * (period / count)
+    kept = np.linspace(start, start + period, count, endpoint=False)
 
     def regressor(time: Array, used: Array, first_row: int) -> Array:
         states = States.of_sliders(

@@ -120,7 +120,11 @@ def maximum_likelihood(model: Model, log: Log, treatment: Treatment) -> Estimate
     base = curve.basis(log.time, 0)
     information = sparse.kron(base.T @ base, sparse.diags(1.0 / curve.noise**2), format="csc")
     values = estimate.values
-    noise = np.maximum(estimate.noise, _LEAST_NOISE * estimate.noise.max())
+    noise = estimate.noise
+    # The motion can be bent until it explains nearly all of the forces: what is noise on them is
+    # known without a model, and they are not to be followed closer than that.
+    least = np.maximum(treatment.force_noise, _LEAST_NOISE * noise.max())
+    noise = np.maximum(noise, least)
     found = measured.copy()
     for iteration in range(1, _ITERATIONS + 1):
         moved = _replayed(log, curve, found)
@@ -146,7 +150,7 @@ def maximum_likelihood(model: Model, log: Log, treatment: Treatment) -> Estimate
         left = (rest - w @ step - s @ motion_step).reshape(weights.shape) * noise
         spent = 1.0 - len(values) / equations.rows
         noise = np.sqrt((left**2).sum(axis=0) / np.maximum(equations.used, 1) / spent)
-        noise = np.maximum(noise, _LEAST_NOISE * noise.max())
+        noise = np.maximum(noise, least)
         if (np.abs(step) <= _SETTLED * np.sqrt(np.diag(inverse))).all():
             break
     moved = _replayed(log, curve, found)

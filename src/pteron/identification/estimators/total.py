@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pteron.errors import DataError
 from pteron.identification.equations import Equations
@@ -65,7 +66,7 @@ def total(equations: Equations, errors: Array | None = None) -> Estimate:
     # Exact columns first: what an orthogonal factor leaves below them does not know them.
     stack = np.column_stack([factor.factor * factor.scale, factor.image])
     stack = np.vstack([stack, np.r_[np.zeros(p), np.sqrt(factor.rest)]])
-    ordered = np.linalg.qr(stack[:, [*exact, *noisy, p]], mode="r")
+    ordered = np.asarray(np.linalg.qr(stack[:, [*exact, *noisy, p]], mode="r"))
     forces = 1.0
     for _ in range(_ITERATIONS):
         values, least = _smallest_corrections(ordered, exact, noisy, errors, forces)
@@ -92,7 +93,7 @@ def total(equations: Equations, errors: Array | None = None) -> Estimate:
 
 
 def _smallest_corrections(
-    ordered: Array, exact: Array, noisy: Array, errors: Array, forces: float
+    ordered: Array, exact: NDArray[np.intp], noisy: NDArray[np.intp], errors: Array, forces: float
 ) -> tuple[Array, float]:
     """Return the values (p,), and the sum of squares of the corrections, in units of the noise.
 

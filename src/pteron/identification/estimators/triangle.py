@@ -117,7 +117,7 @@ def triangle(equations: Equations, weights: Array | None = None) -> Triangle:
     divisor = np.where(scale > 0.0, scale, 1.0)
     for matrix, forces in _blocks(equations, weights):
         block = np.column_stack([matrix / divisor, forces])
-        factor = np.linalg.qr(np.vstack([factor, block]), mode="r")
+        factor = np.asarray(np.linalg.qr(np.vstack([factor, block]), mode="r"))
     full = np.zeros((p + 1, p + 1))
     full[: len(factor)] = factor
     return Triangle(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from pteron.errors import DataError
@@ -40,6 +42,11 @@ def assembly_mode(robot: Manipulator, log: Log) -> int:
         step = max(log.rows // _LOOK, 1)
         poses = direct_kinematics(robot, log.sliders[::step])
         return int(np.argmin(_distances(poses, log.pose[::step])))
+    return _home_mode(robot)
+
+
+@lru_cache(maxsize=64)
+def _home_mode(robot: Manipulator) -> int:
     # The first mode has the positive determinant; see `pteron.direct_kinematics`.
     return int(numeric(robot, "regularity")(home_pose(robot)) < 0.0)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -77,4 +78,5 @@ def _joined(first: Log, second: Log) -> Log:
         return None if one is None or other is None else np.concatenate([one, other])
 
     names = ("time", "sliders", "forces", "pose", "payload")
-    return replace(first, **{name: both(name) for name in names})
+    joined: dict[str, Any] = {name: both(name) for name in names}
+    return replace(first, **joined)

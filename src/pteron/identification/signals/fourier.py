@@ -88,7 +88,7 @@ def fitted_series(
     """
     rate = (len(time) - 1) / float(time[-1] - time[0])
     limit = most_harmonics(time, period)
-    asked = _MOST if highest is None else int(round(highest * period))
+    asked = _MOST if highest is None else round(highest * period)
     most = min(asked, limit)
     if most < 1 or (highest is not None and most < min(asked, int(_SHARE * rate * period))):
         raise DataError(

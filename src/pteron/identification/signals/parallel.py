@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import firwin, upfirdn  # type: ignore[import-untyped]
 
 from pteron.kernels import Array
@@ -41,9 +42,9 @@ class Decimation:
         """Samples at each end that are lost."""
         return 0 if self.factor == 1 else _HALF * self.factor
 
-    def centers(self, rows: int) -> Array:
+    def centers(self, rows: int) -> NDArray[np.int64]:
         """Return the indices of the samples kept, of so many."""
-        return np.arange(self.margin, rows - self.margin, self.factor)
+        return np.arange(self.margin, rows - self.margin, self.factor, dtype=np.int64)
 
     @cached_property
     def taps(self) -> Array:

@@ -232,7 +232,7 @@ def _speed_power(sliders: Array, rate: float, cutoff: float | None) -> tuple[Arr
     smooth = sliders if cutoff is None else smoothed(sliders, rate, cutoff)
     rates, _ = central_differences(smooth, rate)
     power = np.abs(np.fft.rfft(np.hanning(len(rates))[:, None] * rates, axis=0)) ** 2
-    return np.fft.rfftfreq(len(rates), 1.0 / rate), power
+    return np.asarray(np.fft.rfftfreq(len(rates), 1.0 / rate), dtype=float), power
 
 
 def _slow(sliders: Array, rate: float, cutoff: float | None, share: float) -> Array:

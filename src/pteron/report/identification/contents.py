@@ -64,7 +64,7 @@ class Contents:
     held_out, fitted : tuple of Shown
         Every recording.
     drawn : tuple of Shown
-        Those held out that are drawn.
+        Those held out that are drawn, the worst first.
     repeats : bool
         Whether what was held out is the end of what was fitted.
     parameters : tuple of Parameter
@@ -132,10 +132,7 @@ def contents(result: Identification) -> Contents:
         notes=tuple(shortened(text, names) for text in result.notes),
         held_out=held,
         fitted=fitted,
-        # The worst first: they say most.
-        drawn=tuple(sorted(held, key=lambda one: -float(one.prediction.nrms.max())))[
-            :_MOST_PICTURES
-        ],
+        drawn=_drawn(held),
         repeats={one.name for one in held} <= {one.name for one in fitted},
         parameters=parameter_rows(result),
         bodies=body_rows(result),
@@ -153,6 +150,13 @@ def contents(result: Identification) -> Contents:
         correlations=correlations,
         bound=bound,
     )
+
+
+def _drawn(held: tuple[Shown, ...]) -> tuple[Shown, ...]:
+    # Of a single sample there is nothing to draw.
+    several = [one for one in held if len(one.prediction.time) > 1]
+    several.sort(key=lambda one: -float(one.prediction.nrms.max()))
+    return tuple(several[:_MOST_PICTURES])
 
 
 def _shown(prediction: Prediction, names: dict[str, str]) -> Shown:

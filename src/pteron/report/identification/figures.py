@@ -26,7 +26,7 @@ __all__ = ["Figures", "Panels", "figures"]
 
 @dataclass(frozen=True)
 class Panels:
-    """The pictures of one recording."""
+    """The pictures of one recording; those over speed only where they are asked for."""
 
     shown: Shown
     errors: Markup
@@ -70,8 +70,10 @@ def figures(found: Contents) -> Figures:
             "Autocorrelation of the residuals",
         )
     return Figures(
-        held_out=tuple(_panels(one, f"held{k}") for k, one in enumerate(found.drawn, start=1)),
-        fitted=_panels(found.fitted[0], "fitted"),
+        held_out=tuple(
+            _panels(one, f"held{k}", speed=k == 1) for k, one in enumerate(found.drawn, start=1)
+        ),
+        fitted=_panels(found.fitted[0], "fitted", speed=not found.drawn),
         histogram=histogram,
         autocorrelation=autocorrelation,
         certainty=_inline(certainty, "certainty", "Size of each value over its standard deviation"),
@@ -83,7 +85,7 @@ def figures(found: Contents) -> Figures:
     )
 
 
-def _panels(shown: Shown, name: str) -> Panels:
+def _panels(shown: Shown, name: str, *, speed: bool) -> Panels:
     p, part = shown.prediction, shown.stretch
     legs = range(p.measured.shape[1])
     rest = p.measured - p.predicted
@@ -102,13 +104,13 @@ def _panels(shown: Shown, name: str) -> Panels:
         )
         for i in legs
     )
-    speed = (
+    over_speed = (
         _inline(
             residual_speed_figure(p.speed[:, i], rest[:, i], p.used[:, i], leg=i),
             f"{name}speed{i + 1}",
             f"Residual of actuator {i + 1} over its slider's speed in {shown.name}",
         )
-        for i in legs
+        for i in (legs if speed else ())
     )
     return Panels(
         shown,
@@ -123,7 +125,7 @@ def _panels(shown: Shown, name: str) -> Panels:
             f"{name}time",
             f"Residuals of all actuators over time in {shown.name}",
         ),
-        tuple(speed),
+        tuple(over_speed),
     )
 
 
