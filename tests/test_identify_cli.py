@@ -49,7 +49,11 @@ QUICK = pytest.mark.usefixtures("_drawn_quickly")
 
 
 @pytest.mark.parametrize("robot", ["quadrupteron", "tripteron"])
-def test_the_files_agree_with_each_other_and_with_the_terminal(robot: str):
+def test_the_files_agree_with_each_other_and_with_the_terminal(
+    robot: str, request: pytest.FixtureRequest
+):
+    if robot == "quadrupteron":  # one page is enough
+        request.getfixturevalue("_drawn_quickly")
     write_log(log(robot), "fit.csv")
     write_log(log(robot, 5, 3.0), "other.parquet")
     text = done(f"identify fit.csv --held-out other.parquet --robot {robot} --out a/b")
@@ -71,10 +75,11 @@ def test_the_files_agree_with_each_other_and_with_the_terminal(robot: str):
     assert weak
     assert marked == weak
 
-    page = Reader((folder / "identification.html").read_text(encoding="utf-8"))
-    assert page.faults == page.open == page.sources == []
-    assert grade.capitalize() in page.text
-    assert f"{robot}.toml" in page.text
+    if robot == "tripteron":
+        page = Reader((folder / "identification.html").read_text(encoding="utf-8"))
+        assert page.faults == page.open == page.sources == []
+        assert grade.capitalize() in page.text
+        assert f"{robot}.toml" in page.text
 
     machine = pteron.load(folder / f"{robot}.toml")
     np.testing.assert_allclose(pteron.parameters(machine), data["real_bodies"]["parameters"])

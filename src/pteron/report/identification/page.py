@@ -10,6 +10,7 @@ from markupsafe import Markup, escape
 
 import pteron
 from pteron.identification import Identification
+from pteron.identification.verdict import AT_THE_FLOOR, LARGE, SMALL
 from pteron.report.digits import compact, fixed, significant
 from pteron.report.identification.contents import contents
 from pteron.report.identification.figures import figures
@@ -59,6 +60,7 @@ def page(result: Identification, model_file: str | None = None) -> str:
         estimate=result.estimate,
         bodies=result.consistency,
         legs=range(len(result.robot.legs)),
+        limits=(AT_THE_FLOOR, SMALL, LARGE),
         figures=figures(found),
         model_file=model_file,
         version=pteron.__version__,
