@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse  # type: ignore[import-untyped]
@@ -22,6 +22,8 @@ from pteron.identification.signals.spline import fitted_spline
 from pteron.kernels import Array
 
 __all__ = ["maximum_likelihood"]
+
+_NAME = "maximum likelihood"
 
 _ITERATIONS = 15
 _SETTLED = 1e-3
@@ -105,10 +107,13 @@ def maximum_likelihood(model: Model, log: Log, treatment: Treatment) -> Estimate
     DataError
         If the log has gaps, is too long to be fitted at once, or does not determine the values.
     """
+    if treatment.derivatives == "central":
+        # The same smoothness, as a curve: filtered again it would not be the curve it was.
+        treatment = replace(treatment, derivatives="spline")
     start = equations_of(model, log, treatment)
     estimate = weighted(start)
     if treatment.cutoff is None:
-        return _named(estimate)  # positions carry no noise
+        return replace(estimate, method=_NAME)  # positions carry no noise
     _check(log)
     curve = _Motion.fitted(log, treatment)
     if curve.coefficients.size > _MOST:
@@ -118,7 +123,7 @@ def maximum_likelihood(model: Model, log: Log, treatment: Treatment) -> Estimate
         )
     measured = curve.coefficients
     base = curve.basis(log.time, 0)
-    information = sparse.kron(base.T @ base, sparse.diags(1.0 / curve.noise**2), format="csc")
+    information = sparse.kron(base.T @ base, sparse.diags(1.0 / treatment.slider_noise**2), format="csc")
     values = estimate.values
     noise = estimate.noise
     # The motion can be bent until it explains nearly all of the forces: what is noise on them is
@@ -129,7 +134,8 @@ def maximum_likelihood(model: Model, log: Log, treatment: Treatment) -> Estimate
     for iteration in range(1, _ITERATIONS + 1):
         moved = _replayed(log, curve, found)
         equations = equations_of(model, moved, treatment)
-        slopes = _slopes(model, values, moved, curve, equations, treatment)
+        at = replace(curve, coefficients=found)
+        slopes = _slopes(model, values, moved, at, equations, treatment)
         weights = np.tile(1.0 / (noise[None, :]), (len(equations.time), 1))
         w = (weights[..., None] * equations.matrix).reshape(-1, len(values))
         s = sparse.diags(weights.ravel()) @ slopes
@@ -156,7 +162,7 @@ def maximum_likelihood(model: Model, log: Log, treatment: Treatment) -> Estimate
     moved = _replayed(log, curve, found)
     equations = equations_of(model, moved, treatment)
     return estimate_of(
-        "maximum likelihood",
+        _NAME,
         equations,
         triangle(equations, 1.0 / noise),
         values,
@@ -180,16 +186,8 @@ def _check(log: Log) -> None:
         )
 
 
-def _named(estimate: Estimate) -> Estimate:
-    from dataclasses import replace
-
-    return replace(estimate, method="maximum likelihood")
-
-
 def _replayed(log: Log, curve: _Motion, coefficients: Array) -> Log:
     """Return the log with the positions of a motion."""
-    from dataclasses import replace
-
     return replace(log, sliders=np.asarray(curve.basis(log.time, 0) @ coefficients))
 
 

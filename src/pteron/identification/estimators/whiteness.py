@@ -13,6 +13,9 @@ from pteron.kernels import Array
 __all__ = ["Whiteness", "long_run_covariance", "whiteness"]
 
 _LAGS = 20
+_MOST_LAGS = 100
+"""Rows, of a parallel filter's, beyond which noise has forgotten itself in any case."""
+
 _LEVEL = 0.01
 """Chance at which white residuals would be called coloured."""
 
@@ -76,7 +79,7 @@ def long_run_covariance(scores: Array, inverse: Array, degrees: float) -> Array:
         The sandwich of Newey and West, with Bartlett's weights.
     """
     rows = len(scores)
-    lags = int(np.ceil(1.3 * np.sqrt(rows)))
+    lags = min(int(np.ceil(1.3 * np.sqrt(rows))), _MOST_LAGS)
     middle = scores.T @ scores
     for lag in range(1, min(lags, rows - 1) + 1):
         shifted = scores[lag:].T @ scores[:-lag]
