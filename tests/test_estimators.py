@@ -505,11 +505,14 @@ def test_errors_of_columns_grow_with_the_noise():
 
 def test_likelihood_agrees_with_weights_where_positions_are_good():
     made_by = experiment(1e-8)
-    one = weighted(made_by.equations)
+    # Likelihood uses every sample, as the others do without a parallel filter.
+    plain = replace(made_by.treatment, band=0.45 * made_by.treatment.rate)
+    one = weighted(equations_of(made_by.model, made_by.log, plain))
     other = maximum_likelihood(made_by.model, made_by.log, made_by.treatment)
     assert other.names == one.names
-    assert (np.abs(other.values - one.values) < 0.3 * one.deviations).all()
-    assert other.deviations == pytest.approx(one.deviations, rel=0.3)
+    # Not the same samples: the narrower band leaves out more of them around each reversal.
+    assert (np.abs(other.values - one.values) < 2.0 * one.deviations).all()
+    assert other.deviations == pytest.approx(one.deviations, rel=0.5)
     assert (np.abs(other.values - made_by.truth) < 4.5 * other.deviations).all()
 
 

@@ -1,7 +1,6 @@
 """Ten million rows are identified in bounded memory: time and peak memory, for CSV and Parquet.
 
-    python benchmarks/identification/big_log.py            10 million rows (1.6 GB of disk, 15 min)
-    python benchmarks/identification/big_log.py --quick    3 million rows
+Writes 1.4 GB to a temporary folder and takes some 15 minutes; `--quick` has three million rows.
 """
 
 from __future__ import annotations

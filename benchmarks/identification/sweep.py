@@ -6,8 +6,7 @@ truth is known. Printed, and written to RESULTS.md beside this file: the error o
 the held-out error over the noise floor on another motion, and how often the stated 95 % intervals
 hold the truth, in repetitions with other noise.
 
-    python benchmarks/identification/sweep.py            about 25 minutes
-    python benchmarks/identification/sweep.py --quick    3 minutes, prints and writes nothing
+It takes about 20 minutes; `--quick` takes three, prints and writes nothing.
 """
 
 from __future__ import annotations
@@ -65,7 +64,7 @@ JITTER = 1e-5
 """Of the sampling, s; the log has the nominal times."""
 
 REPETITIONS = 20 if _QUICK else 200
-SWEPT = 5 if _QUICK else 25
+SWEPT = 3 if _QUICK else 10
 COMPENSATION = 0.8
 """Share of the friction that the machine's controller knows: the rest shakes it at reversals."""
 
@@ -231,9 +230,7 @@ def swept(benches: dict[str, Bench]) -> tuple[list[str], dict[str, list[Score]]]
         cells = []
         for estimator, one in found.items():
             scores[estimator].append(one)
-            cells.append(
-                f"{one.error:.3g} / {100 * one.coverage:.0f} % / {one.held_out.max():.2f}"
-            )
+            cells.append(f"{one.error:.3g} / {100 * one.coverage:.0f} % / {one.held_out.max():.2f}")
         lines.append(f"| {1e6 * noise[0]:g} | {100 * noise[1]:g} % | " + " | ".join(cells) + " |")
         print(lines[-1], file=sys.stderr, flush=True)
     return lines, scores

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -74,7 +75,7 @@ class Equations:
 
     @property
     def actuators(self) -> int:
-        """n."""
+        """How many actuators there are, n."""
         return int(self.forces.shape[1])
 
     def columns(self, keep: Sequence[int]) -> Equations:
@@ -195,7 +196,7 @@ def _phases(log: Log, treatment: Treatment) -> list[Log]:
     edges = [0, log.rows]
     if log.payload is not None:
         edges[1:1] = (np.flatnonzero(np.diff(log.payload)) + 1).tolist()
-    parts = [log.part(start, stop) for start, stop in zip(edges[:-1], edges[1:], strict=True)]
+    parts = [log.part(start, stop) for start, stop in pairwise(edges)]
     step = 1.0 / treatment.rate
     whole = [part for part in parts if part.duration + step >= treatment.period * (1.0 - 1e-3)]
     if not whole:

@@ -45,7 +45,8 @@ class Recording:
     @property
     def rows(self) -> int:
         """How many rows there are, by estimate for a file."""
-        return self.stop - self.start
+        known = self.log.rows if isinstance(self.log, Log) else self.log.rows_estimate or 0
+        return max(min(self.stop, known) - self.start, 1)
 
     @property
     def findings(self) -> tuple[Finding, ...]:

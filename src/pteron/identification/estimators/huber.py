@@ -47,7 +47,7 @@ def huber(equations: Equations, *, threshold: float = 1.345) -> Estimate:
     factor = triangle(equations)
     factor.check_seen()
     values = factor.values()
-    for iteration in range(1, _ITERATIONS + 1):
+    for iteration in range(1, _ITERATIONS + 1):  # noqa: B007 (told in the result)
         rest = residuals_of(equations, values)
         scale = _scale(equations, rest, values)
         reduction = np.minimum(1.0, threshold / np.maximum(np.abs(rest) / scale, 1e-300))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import ceil
 
 import numpy as np
 from scipy import sparse  # type: ignore[import-untyped]
@@ -10,7 +11,7 @@ from scipy.interpolate import BSpline  # type: ignore[import-untyped]
 from scipy.sparse.linalg import splu  # type: ignore[import-untyped]
 
 from pteron.errors import DataError
-from pteron.identification.equations import Equations, equations_of
+from pteron.identification.equations import Equations, equations_of, in_motion
 from pteron.identification.estimators.estimate import Estimate, estimate_of
 from pteron.identification.estimators.triangle import triangle
 from pteron.identification.estimators.weighted import weighted
@@ -26,7 +27,13 @@ __all__ = ["maximum_likelihood"]
 _NAME = "maximum likelihood"
 
 _ITERATIONS = 15
-_SETTLED = 1e-3
+_RENEWED = 2
+"""Iterations that compute the forces' slopes anew: they change with the motion only a little."""
+
+_ENDS = 2.0
+"""Knots at each end of a spline whose samples are left out: few samples hold it there."""
+
+_SETTLED = 1e-2
 """Largest change of a value, in standard deviations."""
 
 _STEPS = (1e-5, 1e-3, 1e-1)
@@ -61,6 +68,10 @@ class _Motion:
         rest = log.sliders - spline(log.time)
         degrees = max(len(rest) - len(spline.c), 1)
         return cls(spline.c, np.sqrt((rest**2).sum(axis=0) / degrees), spline, 0.0)
+
+    def at(self, time: Array, derivative: int) -> Array:
+        """Return the sliders (T, n) at times, or their derivatives."""
+        return np.asarray(self.basis(time, derivative) @ self.coefficients)
 
     def basis(self, time: Array, derivative: int) -> sparse.csr_matrix:
         """Return the basis functions (T, C), or their derivatives."""
@@ -107,11 +118,7 @@ def maximum_likelihood(model: Model, log: Log, treatment: Treatment) -> Estimate
     DataError
         If the log has gaps, is too long to be fitted at once, or does not determine the values.
     """
-    if treatment.derivatives == "central":
-        # The same smoothness, as a curve: filtered again it would not be the curve it was.
-        treatment = replace(treatment, derivatives="spline")
-    start = equations_of(model, log, treatment)
-    estimate = weighted(start)
+    estimate = weighted(equations_of(model, log, treatment))
     if treatment.cutoff is None:
         return replace(estimate, method=_NAME)  # positions carry no noise
     _check(log)
@@ -123,7 +130,8 @@ def maximum_likelihood(model: Model, log: Log, treatment: Treatment) -> Estimate
         )
     measured = curve.coefficients
     base = curve.basis(log.time, 0)
-    information = sparse.kron(base.T @ base, sparse.diags(1.0 / treatment.slider_noise**2), format="csc")
+    precision = sparse.diags(1.0 / treatment.slider_noise**2)
+    information = sparse.kron(base.T @ base, precision, format="csc")
     values = estimate.values
     noise = estimate.noise
     # The motion can be bent until it explains nearly all of the forces: what is noise on them is
@@ -132,10 +140,10 @@ def maximum_likelihood(model: Model, log: Log, treatment: Treatment) -> Estimate
     noise = np.maximum(noise, least)
     found = measured.copy()
     for iteration in range(1, _ITERATIONS + 1):
-        moved = _replayed(log, curve, found)
-        equations = equations_of(model, moved, treatment)
         at = replace(curve, coefficients=found)
-        slopes = _slopes(model, values, moved, at, equations, treatment)
+        equations = _sampled(model, log, at, treatment)
+        if iteration <= _RENEWED:
+            slopes = _slopes(model, values, at, equations, treatment)
         weights = np.tile(1.0 / (noise[None, :]), (len(equations.time), 1))
         w = (weights[..., None] * equations.matrix).reshape(-1, len(values))
         s = sparse.diags(weights.ravel()) @ slopes
@@ -159,8 +167,7 @@ def maximum_likelihood(model: Model, log: Log, treatment: Treatment) -> Estimate
         noise = np.maximum(noise, least)
         if (np.abs(step) <= _SETTLED * np.sqrt(np.diag(inverse))).all():
             break
-    moved = _replayed(log, curve, found)
-    equations = equations_of(model, moved, treatment)
+    equations = _sampled(model, log, replace(curve, coefficients=found), treatment)
     return estimate_of(
         _NAME,
         equations,
@@ -186,33 +193,49 @@ def _check(log: Log) -> None:
         )
 
 
-def _replayed(log: Log, curve: _Motion, coefficients: Array) -> Log:
-    """Return the log with the positions of a motion."""
-    return replace(log, sliders=np.asarray(curve.basis(log.time, 0) @ coefficients))
+def _states(model: Model, curve: _Motion, log: Log, treatment: Treatment) -> States:
+    time = log.time
+    return States.of_sliders(
+        model.robot,
+        (curve.at(time, 0), curve.at(time, 1), curve.at(time, 2)),
+        time,
+        treatment.mode,
+        payload=log.payload,
+        source=log.source,
+        first_row=log.first_row,
+    )
+
+
+def _sampled(model: Model, log: Log, curve: _Motion, treatment: Treatment) -> Equations:
+    """Return the equations of a motion at the log's own samples, which no filter has touched."""
+    states = _states(model, curve, log, treatment)
+    used = in_motion(states.slider_rates, treatment)
+    if curve.spline is not None:
+        ends = ceil(_ENDS * treatment.rate / (2.0 * treatment.cutoff)) if treatment.cutoff else 0
+        used[:ends] = used[len(used) - ends :] = 0.0
+    return Equations(
+        model.names,
+        model.units,
+        used[..., None] * model.matrix(states),
+        used * log.forces,
+        log.time,
+        used,
+        states.payload,
+        log.source,
+    )
 
 
 def _slopes(
-    model: Model,
-    values: Array,
-    log: Log,
-    curve: _Motion,
-    equations: Equations,
-    treatment: Treatment,
+    model: Model, values: Array, curve: _Motion, equations: Equations, treatment: Treatment
 ) -> sparse.csr_matrix:
-    """Return the derivatives (R n, C n) of the forces by the motion's coefficients.
-
-    At the rows' instants: what the parallel filter does to derivatives is left out, as the motion
-    lies within its band. It only steers the steps.
-    """
+    """Return the derivatives (T n, C n) of the forces by the motion's coefficients."""
     time = equations.time
-    parts = [np.asarray(curve.basis(time, k) @ curve.coefficients) for k in range(3)]
+    parts = [curve.at(time, k) for k in range(3)]
     smooth = values.copy()
     # Coulomb friction has no slope, but where the rate changes its sign.
     smooth[[k for k, name in enumerate(model.names) if name.startswith("Fc")]] = 0.0
     n = equations.actuators
     rows = len(time)
-    gain = equations.gain
-    inverse = np.divide(1.0, gain, out=np.zeros_like(gain), where=gain > 0.0)
     total = sparse.csr_matrix((rows * n, curve.coefficients.size))
 
     def forces(motion: list[Array]) -> Array:
@@ -222,7 +245,7 @@ def _slopes(
             time,
             treatment.mode,
             payload=equations.payload,
-            source=log.source,
+            source=equations.source,
         )
         return np.asarray(model.matrix(states) @ smooth)
 
@@ -233,7 +256,7 @@ def _slopes(
             shift[j] = size
             plus = forces([part + shift if i == k else part for i, part in enumerate(parts)])
             minus = forces([part - shift if i == k else part for i, part in enumerate(parts)])
-            slope = (plus - minus) / (2.0 * size) * inverse
+            slope = (plus - minus) / (2.0 * size) * equations.gain
             spread = sparse.kron(basis, sparse.csr_matrix(np.ones((n, 1))), format="csr")
             placed = sparse.diags(slope.ravel()) @ spread
             column = sparse.csr_matrix(([1.0], ([0], [j])), shape=(1, n))

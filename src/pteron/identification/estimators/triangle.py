@@ -91,9 +91,9 @@ class Triangle:
         if concerned.any():
             names = [name for name, flag in zip(self.names, concerned, strict=True) if flag]
             raise DataError(
-                f"{self.source}: too little motion: {len(names)} of {len(self.names)} values cannot be "
-                f"seen ({', '.join(names)}); move all coordinates at once, such as along a "
-                "trajectory of pteron excite"
+                f"{self.source}: too little motion: {len(names)} of {len(self.names)} values "
+                f"cannot be seen ({', '.join(names)}); move all coordinates at once, such as along "
+                "a trajectory of pteron excite"
             )
 
 

@@ -42,7 +42,7 @@ def weighted(equations: Equations) -> Estimate:
     factor = triangle(equations)
     factor.check_seen()
     noise = actuator_noise(equations, factor.values())
-    for iteration in range(1, _ITERATIONS + 1):
+    for iteration in range(1, _ITERATIONS + 1):  # noqa: B007 (told in the result)
         factor = triangle(equations, 1.0 / noise)
         values = factor.values()
         before, noise = noise, actuator_noise(equations, values)
