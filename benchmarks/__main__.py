@@ -25,6 +25,7 @@ _SCRIPTS = {
     "Second start": "startup.py",
     "Memory traffic": "memory_traffic.py",
     "The paper's 41 %": "paper_claim.py",
+    "Excitation": "excitation.py",
 }
 _PACKAGES = ("pteron", "numpy", "casadi", "numba", "jax", "pin", "mujoco")
 

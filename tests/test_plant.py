@@ -1,0 +1,67 @@
+"""The benchmark's machine in MuJoCo, for two seconds: it is accurate, and it can be identified."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pteron
+from pteron.identification import (
+    Log,
+    Processing,
+    equations_of,
+    identification_model,
+    treatment_of,
+    weighted,
+)
+
+FOLDER = Path(__file__).parent.parent / "benchmarks" / "identification"
+
+
+@pytest.fixture(scope="module")
+def recorded():
+    pytest.importorskip("mujoco")
+    sys.path.insert(0, str(FOLDER))
+    try:
+        import plant
+    finally:
+        sys.path.remove(str(FOLDER))
+    robot = pteron.load("tripteron")
+    built = plant.as_built(robot)
+    friction = plant.Friction((6.0, 7.0, 8.0), (4.0, 5.0, 6.0), (0.1, 0.2, 0.3))
+    recording = plant.simulate(
+        built, plant.fourier_reference(robot, 0), friction, duration=2.5, drawn=robot
+    )
+    return robot, built, friction, recording
+
+
+def test_its_forces_are_those_of_the_model(recorded):
+    _, built, friction, recording = recorded
+    poses = pteron.direct_kinematics(built, recording.sliders)[:, 0]
+    jacobian = pteron.jacobian(built, poses)
+    velocity = np.linalg.solve(jacobian, recording.rates[..., None])[..., 0]
+    acceleration = np.linalg.solve(jacobian, recording.accelerations[..., None])[..., 0]
+    forces = pteron.inverse_dynamics(built, poses, velocity, acceleration)
+    rates = recording.rates
+    forces = forces + friction.coulomb * np.sign(rates) + np.array(friction.viscous) * rates
+    moving = np.abs(rates) > 1e-3
+    off = np.abs(forces + np.array(friction.offset) - recording.forces)[moving]
+    assert np.sqrt((off**2).mean()) < 1e-4 * np.sqrt((recording.forces**2).mean())
+
+
+def test_it_is_identified_through_its_sensors(recorded):
+    import plant
+
+    robot, built, friction, recording = recorded
+    seen = plant.measured(recording, encoder=1e-6, force=0.01, jitter=1e-5, seed=0)
+    log = Log("plant", seen.time, seen.sliders, seen.forces)
+    model = identification_model(robot)
+    treatment = treatment_of(robot, log, Processing(derivatives="central"))
+    found = weighted(equations_of(model, log, treatment))
+    truth = np.r_[
+        model.base.values(built), friction.coulomb, friction.viscous, friction.offset
+    ]
+    errors = (found.values - truth) / found.deviations
+    assert np.abs(errors).max() < 4.5
+    assert np.sqrt((errors**2).mean()) < 1.6
