@@ -278,9 +278,10 @@ def test_equations_that_are_not_used_are_zero():
 
 
 def test_rows_near_a_slow_one_are_left_out_as_far_as_the_filter_reaches():
-    treatment = replace(
-        equations_and_truth("tripteron")[1], cutoff=10.0, rate=100.0, slow=np.full(1, 0.5)
-    )
+    found = equations_and_truth("tripteron")[1]
+    treatment = replace(found, cutoff=30.0, rate=100.0, slow=np.full(1, 0.5), stroke=10.0)
+    assert replace(treatment, stroke=0.2).settling == 3  # a share of the stroke at most
+    assert treatment.settling == 5
     rates = np.ones((50, 1))
     rates[20] = 0.1
     rates[0] = 0.0

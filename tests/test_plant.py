@@ -59,9 +59,7 @@ def test_it_is_identified_through_its_sensors(recorded):
     model = identification_model(robot)
     treatment = treatment_of(robot, log, Processing(derivatives="central"))
     found = weighted(equations_of(model, log, treatment))
-    truth = np.r_[
-        model.base.values(built), friction.coulomb, friction.viscous, friction.offset
-    ]
+    truth = np.r_[model.base.values(built), friction.coulomb, friction.viscous, friction.offset]
     errors = (found.values - truth) / found.deviations
     assert np.abs(errors).max() < 4.5
     assert np.sqrt((errors**2).mean()) < 1.6

@@ -32,8 +32,14 @@ _LOOK = 120_000
 _POWER = 0.999
 """Share of the speed's power that says how fast a motion is."""
 
-_MIXED = 0.5
-"""Half the width of the positions' filter, in periods of its cut-off."""
+_MIXED = 1.5
+"""How far the positions' filter reaches, its ringing included, in periods of its cut-off."""
+
+_MENTIONED = 0.1
+"""Speed, as a share of a slider's root mean square, from which its sign counts."""
+
+_SPARED = 0.15
+"""Share of the time between two reversals of a slider that is left out, at most, on each side."""
 
 _PRODUCTS = 10.0
 """Forces are products of positions and accelerations, and friction has steps: they are faster than
@@ -103,6 +109,8 @@ class Treatment:
         Standard deviation of the white noise on sliders (m) and forces (N).
     slow : array, shape (n,)
         Speed of each slider below which its friction is not known, m/s.
+    stroke : float
+        Mean time between two reversals of the slider that reverses most, s.
     """
 
     derivatives: Derivatives
@@ -114,6 +122,7 @@ class Treatment:
     slider_noise: Array
     force_noise: Array
     slow: Array
+    stroke: float
 
     @property
     def settling(self) -> int:
@@ -122,7 +131,7 @@ class Treatment:
             return 0
         # A series ends where noise begins: what a slow motion leaves there mixes nothing.
         fastest = max(self.cutoff, self.band) if self.derivatives == "periodic" else self.cutoff
-        return round(_MIXED * self.rate / fastest)
+        return round(min(_MIXED / fastest, _SPARED * self.stroke) * self.rate)
 
     @property
     def decimation(self) -> Decimation:
@@ -182,6 +191,8 @@ def treatment_of(
     band = wanted.band or min(_PRODUCTS * _edge(frequencies, power), rate / 2.0)
     if wanted.band is None and cutoff is not None and derivatives != "periodic":
         band = min(band, cutoff)
+    smooth = sliders if cutoff is None else smoothed(sliders, rate, cutoff)
+    rates, _ = central_differences(smooth, rate)
     return Treatment(
         derivatives=derivatives,
         mode=assembly_mode(robot, log),
@@ -191,7 +202,8 @@ def treatment_of(
         period=period,
         slider_noise=white_noise(sliders),
         force_noise=white_noise(forces),
-        slow=_slow(sliders, rate, cutoff, wanted.slow),
+        slow=wanted.slow * np.sqrt((rates**2).mean(axis=0)),
+        stroke=_stroke(rates, rate),
     )
 
 
@@ -235,11 +247,17 @@ def _speed_power(sliders: Array, rate: float, cutoff: float | None) -> tuple[Arr
     return np.asarray(np.fft.rfftfreq(len(rates), 1.0 / rate), dtype=float), power
 
 
-def _slow(sliders: Array, rate: float, cutoff: float | None, share: float) -> Array:
-    """Return the speeds (n,) that count as slow."""
-    smooth = sliders if cutoff is None else smoothed(sliders, rate, cutoff)
-    rates, _ = central_differences(smooth, rate)
-    return np.asarray(share * np.sqrt((rates**2).mean(axis=0)))
+def _stroke(rates: Array, rate: float) -> float:
+    """Return the mean time between two reversals of the slider that reverses most, s.
+
+    A change of sign counts once the speed is worth mentioning: noise at rest is none.
+    """
+    fewest = np.inf
+    for speed in rates.T:
+        signs = np.sign(speed[np.abs(speed) > _MENTIONED * np.sqrt((speed**2).mean())])
+        reversals = int((np.diff(signs) != 0.0).sum())
+        fewest = min(fewest, len(rates) / rate / (reversals + 1))
+    return float(fewest)
 
 
 def _edge(frequencies: Array, power: Array) -> float:
