@@ -81,7 +81,7 @@ def residual_speed_figure(
     speed, residuals : array, shape (T,)
         m/s and N.
     used : array of bool, shape (T,)
-        Whether a sample counts; others are grey.
+        Whether a sample counts; others are grey, and may lie outside.
     leg : int
         Which actuator, from 0, for its colour.
 
@@ -99,8 +99,10 @@ def residual_speed_figure(
     middle, mean = _means(speed[used], residuals[used])
     axes.plot(middle, mean, color=PAPER, linewidth=4.2, solid_capstyle="round", zorder=4)
     axes.plot(middle, mean, color=INK, linewidth=1.8, solid_capstyle="round", zorder=5)
-    size = float(np.quantile(np.abs(residuals), 0.998)) or 1.0
-    axes.set_ylim(-1.25 * size, 1.25 * size)
+    # What does not count may lie outside: a stuck slider would make the rest a line.
+    counted = residuals[used] if used.any() else residuals
+    size = float(np.quantile(np.abs(counted), 0.998)) or 1.0
+    axes.set_ylim(-2.0 * size, 2.0 * size)
     reach = 1.04 * float(np.abs(speed).max()) or 1.0
     axes.set_xlim(-reach, reach)
     return figure
