@@ -243,7 +243,7 @@ def identify(
             "their usual size; move faster and along all coordinates, as pteron excite proposes"
         )
     fitted = tuple(
-        predict(model, estimate.values, one, treatment, _reader(report, "Predicting"))
+        predict(model, estimate.values, one.beginning(), treatment, _reader(report, "Predicting"))
         for one, treatment in zip(fit, treatments, strict=True)
     )
     essential = essential_parameters(equations, estimate, ESTIMATORS.get(estimator, weighted))

@@ -17,6 +17,12 @@ _IN_MEMORY = 2_000_000
 
 _PIECE = 1 << 18
 
+_LOOKED_AT = 2_000_000
+"""Rows of a file read in pieces that tell how well a fit describes what it was fitted to."""
+
+_END = int(np.iinfo(np.int64).max)
+"""Beyond the last row of every file: how many it has is known for certain when it has been read."""
+
 _FIT = 0.7
 """Share of a log that is fitted where nothing else is held out."""
 
@@ -67,11 +73,18 @@ class Recording:
                 progress(self.rows)
             return
         for piece in self.log.pieces(_PIECE, progress):
-            # Pieces outside are read too: only a whole pass checks a whole file.
+            if piece.first_row >= self.stop:
+                return
             first = max(self.start - piece.first_row, 0)
             last = min(self.stop - piece.first_row, piece.rows)
             if first < last:
                 yield piece.part(first, last)
+
+    def beginning(self) -> Recording:
+        """Return what of a large file is enough to look at; a log in memory is returned whole."""
+        if isinstance(self.log, Log):
+            return self
+        return replace(self, stop=min(self.stop, self.start + _LOOKED_AT))
 
     def samples(self, progress: Callable[[int], None] | None = None) -> Log | Iterator[Log]:
         """Return what `equations_of` takes: the log where it is in memory, else its pieces."""
@@ -84,8 +97,7 @@ def recording(log: Log | LogFile, progress: Callable[[int], None] | None = None)
         log = _whole(log, progress)
     if isinstance(log, Log):
         return Recording(log, 0, log.rows)
-    # The estimate comes from the size of lines or the file's own count.
-    return Recording(log, 0, max(log.rows_estimate or 0, 1))
+    return Recording(log, 0, _END)
 
 
 def divided(whole: Recording, period: float | None) -> tuple[Recording, Recording]:
@@ -105,12 +117,11 @@ def divided(whole: Recording, period: float | None) -> tuple[Recording, Recordin
         if whole_periods >= 2:
             share = min(max(round(_FIT * whole_periods), 1), whole_periods - 1)
             cut = int(np.searchsorted(log.time, log.time[0] + (share * period - 0.5 / log.rate)))
-    if cut - whole.start < 2 or whole.stop - cut < 2:
+    if cut - whole.start < 2 or whole.start + whole.rows - cut < 2:
         raise DataError(
             f"{whole.source}: {whole.rows} rows are too few to hold some out; record longer"
         )
-    stop = whole.stop if isinstance(whole.log, Log) else np.iinfo(np.int64).max
-    return replace(whole, stop=cut), replace(whole, start=cut, stop=int(stop))
+    return replace(whole, stop=cut), replace(whole, start=cut)
 
 
 def _whole(file: LogFile, progress: Callable[[int], None] | None) -> Log:
