@@ -28,11 +28,13 @@ from pteron.identification.excitation import (
     optimal_excitation,
     random_excitation,
 )
-from pteron.identification.identify import METHODS, Identification, identify
+from pteron.identification.fitting import METHODS
+from pteron.identification.identify import identify
 from pteron.identification.logs import Log, open_log, read_log, write_log
 from pteron.identification.model import Model, Terms, identification_model
 from pteron.identification.payload import Payload, identify_payload
 from pteron.identification.prediction import Prediction
+from pteron.identification.result import Identification
 from pteron.identification.signals import Processing, States, Treatment, treatment_of
 from pteron.identification.verdict import Verdict
 

@@ -1,0 +1,113 @@
+"""The steps of a fit: how a recording is treated, its equations, and the estimate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from pteron.errors import DataError
+from pteron.identification.diagnosis import column_fault, exchanged_sliders
+from pteron.identification.equations import Equations, equations_of
+from pteron.identification.estimators import ESTIMATORS, Estimate
+from pteron.identification.estimators.column_errors import column_errors
+from pteron.identification.estimators.likelihood import maximum_likelihood
+from pteron.identification.estimators.total import total
+from pteron.identification.logs import Log
+from pteron.identification.model import Model
+from pteron.identification.recordings import Recording
+from pteron.identification.signals import Processing, Treatment, treatment_of
+from pteron.manipulator import Manipulator
+
+__all__ = [
+    "METHODS",
+    "check_columns",
+    "check_forces",
+    "estimated",
+    "fit_equations",
+    "treatment_for",
+]
+
+METHODS = (*ESTIMATORS, "likelihood")
+"""Names of the estimators that `identify` knows."""
+
+_LOOK = 30_000
+"""Rows that are tried in other orders."""
+
+
+def check_forces(one: Recording) -> None:
+    """Refuse a recording of currents whose gains are not known."""
+    unit = one.head().description.force_unit
+    if unit != "N":
+        raise DataError(
+            f"{one.source}: its forces are in {unit}; declare gains (N per {unit}) in its "
+            "description, or find them with identify_drive_gains"
+        )
+
+
+def treatment_for(robot: Manipulator, one: Recording, wanted: Processing) -> Treatment:
+    """Return how a recording is to be treated, from its beginning."""
+    head = one.head()
+    rows = one.rows
+    period = wanted.period or head.description.period
+    # What lasts less than a period is no periodic log.
+    if wanted.derivatives is None and period is not None and head.duration < 0.999 * period:
+        head = replace(head, description=replace(head.description, period=None))
+        wanted = replace(wanted, period=None)
+    if not isinstance(one.log, Log):
+        rows = max(rows, 1 << 30)  # a file that is read in pieces is never fitted in one
+    return treatment_of(robot, head, wanted, rows=rows)
+
+
+def fit_equations(
+    model: Model, one: Recording, treatment: Treatment, progress: Callable[[int], None]
+) -> Equations:
+    """Return a recording's equations; where it has no poses, say whether sliders are swapped."""
+    try:
+        return equations_of(model, one.samples(progress), treatment)
+    except DataError as error:
+        if "no pose" not in str(error):
+            raise
+        head = one.head()
+        swap = exchanged_sliders(model, head.part(0, min(head.rows, _LOOK)), treatment)
+        if swap is None:
+            raise
+        raise DataError(f"{error}; or {swap.message()}: then every row has a pose") from None
+
+
+def estimated(
+    name: str,
+    model: Model,
+    fit: Sequence[Recording],
+    treatments: Sequence[Treatment],
+    equations: Equations,
+) -> Estimate:
+    """Return what the estimator of that name makes of the equations, or of their recording."""
+    if name in ("likelihood", "total"):
+        one = fit[0]
+        if len(fit) > 1 or not isinstance(one.log, Log):
+            raise DataError(
+                f"estimator: {name} takes one log of at most some million rows; choose weighted, "
+                "or give one log"
+            )
+        log = one.head()
+        if name == "likelihood":
+            return maximum_likelihood(model, log, treatments[0])
+        return total(equations, column_errors(model, log, treatments[0]))
+    return ESTIMATORS[name](equations)
+
+
+def check_columns(model: Model, one: Recording, treatment: Treatment) -> None:
+    """Refuse a log whose columns, exchanged or with other signs, would be explained far better."""
+    head = one.head()
+    head = head.part(0, min(head.rows, _LOOK))
+    fault = column_fault(model, head, treatment)
+    if fault is None:
+        return
+    if fault.after < fault.before:
+        why = f": mended so, the error of the fit falls {fault.before / fault.after:.1f} times"
+    else:
+        why = ": as they are, the machine would have negative inertia"
+    raise DataError(
+        f"{one.source}: {fault.message()}{why}; correct the columns, or declare their order and "
+        "gains in the log's description"
+    )
