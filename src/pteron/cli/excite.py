@@ -45,7 +45,7 @@ def excite(
         _Space, Option("--space", help="Whose coordinates the Fourier series are of.")
     ] = _Space.PLATFORM,
     harmonics: Annotated[int, Option("--harmonics", help="How many.")] = 5,
-    period: Annotated[float, Option("--period", help="In s.")] = 10.0,
+    period: Annotated[float, Option("--period", help="In s.")] = 5.0,
     speed: Annotated[float, Option("--speed", help="The sliders' limit, m/s.")] = 1.0,
     acceleration: Annotated[
         float, Option("--acceleration", help="The sliders' limit, m/s^2.")

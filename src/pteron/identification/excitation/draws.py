@@ -45,7 +45,7 @@ def random_excitation(
     *,
     space: Space = "platform",
     harmonics: int = 5,
-    period: float = 10.0,
+    period: float = 5.0,
     limits: Limits | None = None,
     seed: int | np.random.Generator = 0,
 ) -> FourierMotion:

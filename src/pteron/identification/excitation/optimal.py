@@ -50,7 +50,7 @@ def optimal_excitation(
     base: BaseParameters | None = None,
     space: Space = "platform",
     harmonics: int = 5,
-    period: float = 10.0,
+    period: float = 5.0,
     limits: Limits | None = None,
     criterion: Criterion = "condition",
     starts: int = 12,
