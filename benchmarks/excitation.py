@@ -45,7 +45,8 @@ def _excited(name: str, seconds: float) -> tuple[Excitation, float]:
 def _print(name: str, found: Excitation, seconds: float) -> None:
     best, random = found.conditioning, found.random
     print(
-        f"\n{name}: {seconds:.0f} s, {found.motion.harmonics} harmonics in {found.motion.period:g} s",
+        f"\n{name}: {seconds:.0f} s, {found.motion.harmonics} harmonics in "
+        f"{found.motion.period:g} s",
         end="",
     )
     print(f"\n{'condition number, columns':<28}{'optimised':>12}{'random':>12}{'ratio':>8}")

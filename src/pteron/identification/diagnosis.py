@@ -71,7 +71,7 @@ class Fault:
                 order = ", ".join(f"{self.kind}{k + 1}" for k in self.order)
                 parts[-1] += f" (they should be {order})"
         if len(flipped) == n:
-            parts.append("the forces have the sign flipped")
+            parts.append("the forces, or all sliders, have the sign flipped")
         elif flipped:
             names = _listed([f"{self.kind}{self.order[k - 1] + 1}" for k in flipped])
             parts.append(f"{names} {'has' if len(flipped) == 1 else 'have'} the sign flipped")
@@ -81,7 +81,8 @@ class Fault:
 def column_fault(model: Model, log: Log, treatment: Treatment) -> Fault | None:
     """Return the exchange of columns, or of signs, that explains the forces far better.
 
-    All n! 2^n orders and signs of the forces are tried, and the sliders two by two. Signs of all
+    All n! 2^n orders and signs of the forces are tried, the sliders two by two, and their signs one
+    by one. Signs of all
     forces at once are settled by the machine's inertia, which is positive.
 
     Parameters
@@ -141,10 +142,8 @@ def _errors(equations: Equations, choices: Sequence[_Choice]) -> list[float]:
     return found
 
 
-def exchanged_sliders(
-    model: Model, log: Log, treatment: Treatment, before: float = np.inf
-) -> Fault | None:
-    """Return the exchange of two sliders that explains the forces best, and far better.
+def exchanged_sliders(model: Model, log: Log, treatment: Treatment, before: float) -> Fault | None:
+    """Return the exchange of two sliders, or the sign of one, that explains the forces far better.
 
     Parameters
     ----------
@@ -155,19 +154,21 @@ def exchanged_sliders(
     treatment : Treatment
         How it is treated.
     before : float
-        Error of the fit relative to the forces as they are; infinite where there is no pose.
+        Error of the fit relative to the forces as they are.
     """
     n = log.sliders.shape[1]
     best: Fault | None = None
-    signs = (1,) * n
+    usual, upright = tuple(range(n)), (1,) * n
+    choices = [(usual, tuple(-1 if k == i else 1 for k in range(n))) for i in range(n)]
     for i, j in combinations(range(n), 2):
-        order = tuple({i: j, j: i}.get(k, k) for k in range(n))
-        other = replace(log, sliders=log.sliders[:, list(order)])
+        choices.append((tuple({i: j, j: i}.get(k, k) for k in range(n)), upright))
+    for order, signs in choices:
+        other = replace(log, sliders=log.sliders[:, list(order)] * np.array(signs))
         try:
             equations = equations_of(model, other, treatment)
         except DataError:
             continue  # no poses in this order
-        (error,) = _errors(equations, [(tuple(range(n)), signs)])
+        (error,) = _errors(equations, [(usual, upright)])
         if error * _DECISIVE < (before if best is None else best.after * _DECISIVE):
             best = Fault("rho", order, signs, before, error)
     return best

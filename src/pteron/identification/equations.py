@@ -17,7 +17,7 @@ from pteron.identification.model import Model
 from pteron.identification.signals import States, Treatment
 from pteron.identification.signals.fourier import fitted_series, most_harmonics
 from pteron.identification.signals.projection import Projection, fourier_basis
-from pteron.identification.signals.samples import samples
+from pteron.identification.signals.samples import Samples, samples
 from pteron.kernels import Array
 
 __all__ = ["Equations", "equations_of", "in_motion", "stacked"]
@@ -121,7 +121,7 @@ def equations_of(model: Model, log: Log | Iterable[Log], treatment: Treatment) -
     margin = treatment.decimation.margin + treatment.settling
     found, source = [], "the log"
     for block in samples(model.robot, log, treatment, margin=margin):
-        found.append(_filtered(model, block.states, block.forces, treatment))
+        found.append(_filtered(model, block, treatment))
         source = block.source
     return replace(stacked(found), source=source)
 
@@ -150,10 +150,12 @@ def in_motion(rates: Array, treatment: Treatment, *, wraps: bool = False) -> Arr
     return np.asarray(minimum_filter1d(moves, size, axis=0, mode="wrap" if wraps else "nearest"))
 
 
-def _filtered(model: Model, states: States, forces: Array, treatment: Treatment) -> Equations:
+def _filtered(model: Model, block: Samples, treatment: Treatment) -> Equations:
     decimation = treatment.decimation
+    states, forces = block.states, block.forces
     inner = slice(treatment.settling, len(states) - treatment.settling)
-    moving = in_motion(states.slider_rates, treatment)[inner]
+    moving = in_motion(states.slider_rates, treatment) * block.smooth[:, None]
+    moving = moving[inner]
     states, forces = states.part(inner), forces[inner]
     kept = decimation.centers(len(states))
     return _assembled(

@@ -30,6 +30,10 @@ __all__ = [
 METHODS = (*ESTIMATORS, "likelihood")
 """Names of the estimators that `identify` knows."""
 
+_EXPLAINED = 0.2
+"""Error relative to the forces, three times smaller than which sliders without a pose must make it
+to be called mended."""
+
 _LOOK = 30_000
 """Rows that are tried in other orders."""
 
@@ -68,7 +72,8 @@ def fit_equations(
         if "no pose" not in str(error):
             raise
         head = one.head()
-        swap = exchanged_sliders(model, head.part(0, min(head.rows, _LOOK)), treatment)
+        some = head.part(0, min(head.rows, _LOOK))
+        swap = exchanged_sliders(model, some, treatment, _EXPLAINED)
         if swap is None:
             raise
         raise DataError(f"{error}; or {swap.message()}: then every row has a pose") from None

@@ -125,7 +125,10 @@ def identify(
         for one, treatment in zip(fit, treatments, strict=True)
     ]
     equations = stacked(parts)
-    estimate = estimated(estimator, model, fit, treatments, equations)
+    try:
+        estimate = estimated(estimator, model, fit, treatments, equations)
+    except DataError as error:
+        raise DataError(f"{error}{_noticed(whole)}") from None
     hidden, too_many = unseen(model, estimate.deviations)
     held = [
         predict(
@@ -146,6 +149,7 @@ def identify(
             f"{fit[0].source}: too little motion: {len(hidden)} of {base.rank} base parameters "
             f"cannot be seen ({', '.join(hidden)}), their standard deviations are larger than "
             "their usual size; move faster and along all coordinates, as pteron excite proposes"
+            f"{_noticed(whole)}"
         )
     fitted = tuple(
         predict(model, estimate.values, one.beginning(), treatment, _reader(report, "Predicting"))
@@ -180,6 +184,12 @@ def identify(
 
 def _sequence(logs: Log | LogFile | Sequence[Log | LogFile]) -> list[Log | LogFile]:
     return [logs] if isinstance(logs, Log | LogFile) else list(logs)
+
+
+def _noticed(whole: Sequence[Recording]) -> str:
+    """Return what was noticed in the logs, to stand behind an error that it may explain."""
+    findings = [finding.message for one in whole for finding in one.findings]
+    return f" (noticed before: {'; '.join(findings[:3])})" if findings else ""
 
 
 def _reader(report: Stage, task: str) -> Callable[[int], None]:

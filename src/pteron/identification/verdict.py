@@ -16,6 +16,9 @@ Grade = Literal["trustworthy", "usable with care", "not trustworthy"]
 AT_THE_FLOOR = 1.5
 """Held-out error over the noise floor up to which noise is all there is."""
 
+DROWNED = 50.0
+"""Held-out error in percent beyond which nothing has been explained, whatever the noise."""
+
 SMALL = 5.0
 LARGE = 15.0
 """Percent of a force's standard deviation that the model misses beyond the noise."""
@@ -30,7 +33,7 @@ class Verdict:
     grade : {"trustworthy", "usable with care", "not trustworthy"}
         Of its worst actuator: trustworthy where the held-out error is at most 1.5 times the noise
         floor, or what is missed beyond the noise is at most 5 % of the force; not trustworthy where
-        that is more than 15 %.
+        that is more than 15 %, or where the error is more than half of the force.
     reasons : tuple of str
         What speaks for it and against it, in sentences.
     next_steps : tuple of str
@@ -73,7 +76,15 @@ def verdict_of(held_out: list[Prediction], *, repeats: bool) -> Verdict:
         # The worst actuator is the one farthest beyond both limits.
         worst = int(np.argmax(np.where(ratio <= AT_THE_FLOOR, 0.0, missed)))
         grade: Grade = "trustworthy"
-        if ratio[worst] > AT_THE_FLOOR and missed[worst] > SMALL:
+        drowned = int(np.argmax(prediction.nrms))
+        if prediction.nrms[drowned] > DROWNED:
+            grades.append("not trustworthy")
+            reasons.append(
+                f"The forces of actuator {drowned + 1} are not explained: what is left of them is "
+                f"{prediction.nrms[drowned]:.0f} % of what was measured."
+            )
+            steps.append("Look for what else acts on the forces, or move faster than their noise.")
+        elif ratio[worst] > AT_THE_FLOOR and missed[worst] > SMALL:
             grade = "usable with care" if missed[worst] <= LARGE else "not trustworthy"
         grades.append(grade)
         errors = ", ".join(f"{value:.2f}" for value in prediction.nrms)

@@ -6,6 +6,10 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from math import ceil
 
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d  # type: ignore[import-untyped]
+
 from pteron.errors import DataError
 from pteron.identification.logs import Log
 from pteron.identification.signals.blocks import blocks
@@ -20,6 +24,13 @@ from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 
 __all__ = ["Samples", "samples"]
+
+_AGREES = 1e-7
+"""Relative difference of two second derivatives that is their error on a smooth motion."""
+
+_ROUNDING = 1e-14
+_SMEARED = 24
+"""Samples to each side of a jump that a spline of degree 7 spreads it over, to 1e-7 of it."""
 
 _BLOCK = 1 << 15
 """Rows of a block: a regressor of 40 columns takes 40 MB of it."""
@@ -42,12 +53,15 @@ class Samples:
         The samples that no other block has.
     source : str
         What messages call the log.
+    smooth : array of bool, shape (R,)
+        False where positions without noise have a jump in a derivative, which a spline smears.
     """
 
     states: States
     forces: Array
     fresh: slice
     source: str
+    smooth: NDArray[np.bool_]
 
 
 def samples(
@@ -108,8 +122,11 @@ def _edge(treatment: Treatment) -> int:
 def _block(robot: Manipulator, block: Log, treatment: Treatment, edge: int, margin: int) -> Samples:
     time, forces = block.time, block.forces
     inner = slice(edge, block.rows - edge)
+    smooth = np.ones(block.rows - 2 * edge, dtype=bool)
     if treatment.derivatives == "spline":
         motion = spline_motion(time, block.sliders, treatment.cutoff)
+        if treatment.cutoff is None:
+            smooth = _smooth(time, block.sliders, motion[2])[inner]
         motion = motion[0][inner], motion[1][inner], motion[2][inner]
     else:
         time, sliders = uniform(time, block.sliders)
@@ -130,7 +147,22 @@ def _block(robot: Manipulator, block: Log, treatment: Treatment, edge: int, marg
         source=block.source,
         first_row=block.first_row + edge,
     )
-    return Samples(states, forces[inner], slice(margin, len(states) - margin), block.source)
+    return Samples(states, forces[inner], slice(margin, len(states) - margin), block.source, smooth)
+
+
+def _smooth(time: Array, sliders: Array, accelerations: Array) -> NDArray[np.bool_]:
+    """Return where a spline through samples without noise agrees with central differences.
+
+    They err in different ways next to a jump in a derivative, as at the ends of a rest.
+    """
+    even, values = uniform(time, sliders)
+    rate = (len(even) - 1) / float(even[-1] - even[0])
+    _, second = central_differences(values, rate)
+    rounding = _ROUNDING * np.abs(sliders).max() * rate**2
+    least = _AGREES * np.abs(second).max(axis=0) + rounding
+    apart = (np.abs(accelerations[LOST:-LOST] - second) > least).any(axis=1)
+    apart = maximum_filter1d(np.pad(apart, LOST).astype(int), 2 * _SMEARED + 1) > 0
+    return np.asarray(~apart)
 
 
 def _periodic(robot: Manipulator, log: Log, treatment: Treatment) -> Samples:
@@ -146,4 +178,6 @@ def _periodic(robot: Manipulator, log: Log, treatment: Treatment) -> Samples:
         source=log.source,
         first_row=log.first_row,
     )
-    return Samples(states, log.forces, slice(0, len(states)), log.source)
+    return Samples(
+        states, log.forces, slice(0, len(states)), log.source, np.ones(len(states), dtype=bool)
+    )

@@ -11,7 +11,7 @@ from pteron.errors import DataError
 from pteron.identification.logs import Log
 from pteron.identification.signals.assembly import assembly_mode
 from pteron.identification.signals.differences import central_differences
-from pteron.identification.signals.fourier import fitted_series
+from pteron.identification.signals.fourier import FourierSeries, fitted_series
 from pteron.identification.signals.lowpass import cutoff_of, smoothed
 from pteron.identification.signals.noise import white_noise
 from pteron.identification.signals.parallel import Decimation
@@ -31,6 +31,12 @@ _LOOK = 120_000
 
 _POWER = 0.999
 """Share of the speed's power that says how fast a motion is."""
+
+_REPEATS = 0.02
+"""What a series may leave of a motion, as a share of its span, where it is said to repeat."""
+
+_ROUNDING = 1e-13
+"""What it leaves by rounding."""
 
 _MIXED = 1.5
 """How far the positions' filter reaches, its ringing included, in periods of its cut-off."""
@@ -179,12 +185,17 @@ def treatment_of(
     cutoff = wanted.cutoff or cutoff_of(sliders, rate)
     if wanted.derivatives is None and derivatives == "central" and cutoff is None:
         derivatives = "spline"
+    series = None
     if derivatives == "periodic" and period is not None:
         series = fitted_series(log.time, log.sliders, period)
+        _check_repeats(log, series, period)
+        if wanted.derivatives is None and not _is_series(series, sliders):
+            derivatives, series = "central" if cutoff is not None else "spline", None
+    if series is not None:
         power = (np.arange(1, series.harmonics + 1) ** 2)[:, None] * (
             series.coefficients[1::2] ** 2 + series.coefficients[2::2] ** 2
         )
-        frequencies = np.arange(1, series.harmonics + 1) / period
+        frequencies = np.arange(1, series.harmonics + 1) / series.period
         cutoff = float(frequencies[-1])
     else:
         frequencies, power = _speed_power(sliders, rate, cutoff)
@@ -228,6 +239,24 @@ def _check_period(log: Log, period: float | None) -> None:
             f"{log.source}: lasts {log.duration:g} s, less than its period of {period:g} s; "
             'record a whole period, or choose derivatives "central"'
         )
+
+
+def _check_repeats(log: Log, series: FourierSeries, period: float) -> None:
+    """Refuse a period that is not that of the motion."""
+    span = np.ptp(log.sliders, axis=0)
+    worst = int(np.argmax(series.noise / span))
+    if series.noise[worst] > _REPEATS * span[worst]:
+        raise DataError(
+            f"{log.source}: does not repeat after its period of {period:g} s: rho{worst + 1} is "
+            f"{series.noise[worst]:.2g} m (rms) off; correct the period in the log's description, "
+            "or leave it out"
+        )
+
+
+def _is_series(series: FourierSeries, sliders: Array) -> bool:
+    """Say whether a Fourier series leaves noise alone: jumps of acceleration take more terms."""
+    least = _ROUNDING * np.ptp(sliders, axis=0)
+    return bool((series.noise <= np.maximum(3.0 * white_noise(sliders), least)).all())
 
 
 def _check_frequencies(wanted: Processing, rate: float) -> None:
