@@ -56,7 +56,8 @@ def result(name):
         )
         return replace(found, consistency=consistency, consistency_share=0.43)
     robot = CATALOG["quadrupteron" if name == "quadrupteron" else "tripteron"]
-    fit = replace(log_of(robot, **NOISE, seed=3), source="/home/someone/logs/a.csv")
+    shape = NOISE if name != "tripteron" else NOISE | {"duration": 12.0}
+    fit = replace(log_of(robot, **shape, seed=3), source="/home/someone/logs/a.csv")
     if name == "quadrupteron":
         other = log_of(robot, **NOISE, seed=5, noise_seed=1, period=3.0)
         return identify(robot, fit, held_out=replace(other, source="/home/someone/logs/b.csv"))

@@ -77,6 +77,8 @@ def values_for(robot, kernel, lead=()):
         "forces": acceleration,
         "wrench": velocity,
         "sliders": pteron.inverse_kinematics(robot, pose),
+        "slider_rates": velocity,
+        "slider_accelerations": acceleration,
     }
     names = [port.name for port in kernel.inputs if port.name not in kernel.fixed]
     return [known[name].reshape(*lead, robot.freedom) for name in names]

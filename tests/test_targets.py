@@ -51,6 +51,8 @@ def values_of(robot, what, count=131):
         "forces": acceleration,
         "wrench": velocity,
         "sliders": sliders,
+        "slider_rates": velocity,
+        "slider_accelerations": acceleration,
     }
     kernel = compiled(robot, what, "vm")
     return tuple(known[port.name] for port in kernel.inputs if port.name not in kernel.fixed)
