@@ -527,6 +527,7 @@ def test_the_command_prints_json(tmp_path: Path, monkeypatch):
         ("excite tripteron --elbow-sine 0.9999", "elbow_sine of at least 0.9999 is impossible"),
         ("excite tripteron --speed -1", "speed -1"),
         ("excite tripteron --rate 0", "rate: 0"),
+        ("excite tripteron --period -1", "period: -1"),
         ("excite tripteron --space joints", "'joints' is not one of"),
     ],
 )

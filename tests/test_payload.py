@@ -190,8 +190,19 @@ def test_values_of_no_real_body_are_told():
     less = replace(log, payload=1 - log.payload)
     found = identify_payload(MECHANISMS["quadrupteron"], less, base=base_of("quadrupteron"))
     assert found.mass == pytest.approx(-LOAD.mass, rel=1e-9)
+    assert found.felt
     assert not found.real
-    assert "No real body" in found.summary()
+    assert "is what was called with payload the one without it?" in found.summary()
+
+
+@pytest.mark.parametrize("name", ["quadrupteron", "tripteron-oblique"])
+def test_a_payload_that_was_not_there_is_not_felt(name):
+    nothing = pteron.PlanarInertia(1e-9, (0.0, 0.0), 1e-12)
+    log = make_log(name, load=nothing, noise=NOISE)
+    found = identify_payload(MECHANISMS[name], *halves(log), base=base_of(name))
+    assert not found.felt
+    assert "No payload is felt" in found.summary()
+    assert identify_payload(MECHANISMS[name], make_log(name, noise=NOISE), base=base_of(name)).felt
 
 
 def test_terms_may_be_left_out():

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from scipy.stats import chi2  # type: ignore[import-untyped]
 
 from pteron.errors import DataError
 from pteron.identification.equations import Equations, equations_of, stacked
@@ -21,6 +22,9 @@ from pteron.reduction import BaseParameters
 __all__ = ["Payload", "equations_with_payload", "identify_payload"]
 
 _NAMES = tuple(f"{name}_L" for name in BODY_PARAMETERS)
+
+_CHANCE = 1e-3
+"""Probability at which values are still taken for those of no payload."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +84,14 @@ class Payload:
         hx, hy = self.first_moment
         return self.inertia * self.mass >= hx * hx + hy * hy
 
+    @property
+    def felt(self) -> bool:
+        """Whether the values differ from those of no payload by more than chance (Wald, 0.1 %)."""
+        deviations = self.deviations
+        correlation = self.covariance / np.outer(deviations, deviations)
+        scaled = self.values / deviations
+        return bool(scaled @ np.linalg.solve(correlation, scaled) > chi2.isf(_CHANCE, len(scaled)))
+
     def summary(self) -> str:
         """Return what was found, for people, as lines of text."""
         lines = ["Payload, about P in the platform's frame:"]
@@ -92,14 +104,19 @@ class Payload:
         hidden = [name for name in _NAMES if name not in self.names]
         if hidden:
             lines.append(f"Not felt by the actuators: {', '.join(hidden)}.")
-        lines.append(
-            "A real body has these values."
-            if self.real
-            else "No real body has these values: record longer, or faster."
-        )
+        lines.append(self._opinion())
         left = ", ".join(f"{value:.2g}" for value in self.residual)
         lines.append(f"Left of the actuator forces: {left} N.")
         return "\n".join(lines)
+
+    def _opinion(self) -> str:
+        if not self.felt:
+            return "No payload is felt: the values are zero within their certainty."
+        if self.real:
+            return "A real body has these values."
+        if self.mass is not None and self.mass < -3.0 * self.deviations[0]:
+            return "The mass is negative: is what was called with payload the one without it?"
+        return "No real body has these values: record longer, or faster."
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything but the other values as plain data."""
@@ -112,6 +129,7 @@ class Payload:
             "names": list(self.names),
             "standard_deviations": self.deviations.tolist(),
             "covariance": self.covariance.tolist(),
+            "felt": self.felt,
             "real": self.real,
             "residual": self.residual.tolist(),
         }

@@ -176,7 +176,9 @@ class Excitation:
 
 
 def check_sampling(period: float, rate: float, periods: int) -> None:
-    """Refuse, before any work, samples a second and periods that give no table."""
+    """Refuse, before any work, a period and samples a second that give no table."""
+    if not 0.0 < period < np.inf:
+        raise DataError(f"period: {period} s given, a number above 0 expected")
     if not 0.0 < rate < np.inf:
         raise DataError(f"rate: {rate} given, samples a second above 0 expected")
     if periods < 1:
