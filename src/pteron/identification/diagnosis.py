@@ -82,8 +82,7 @@ def column_fault(model: Model, log: Log, treatment: Treatment) -> Fault | None:
     """Return the exchange of columns, or of signs, that explains the forces far better.
 
     All n! 2^n orders and signs of the forces are tried, the sliders two by two, and their signs one
-    by one. Signs of all
-    forces at once are settled by the machine's inertia, which is positive.
+    by one. Signs of all forces at once are settled by the machine's inertia, which is positive.
 
     Parameters
     ----------
