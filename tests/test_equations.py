@@ -282,12 +282,13 @@ def test_rows_near_a_slow_one_are_left_out_as_far_as_the_filter_reaches():
     treatment = replace(found, cutoff=30.0, rate=100.0, slow=np.full(1, 0.5), stroke=10.0)
     assert replace(treatment, stroke=0.2).settling == 3  # a share of the stroke at most
     assert treatment.settling == 5
+    assert replace(treatment, cutoff=10.0).turning == 1  # less, where the way it moves counts alone
     rates = np.ones((50, 1))
     rates[20] = 0.1
     rates[0] = 0.0
-    still = np.flatnonzero(in_motion(rates, treatment)[:, 0] == 0.0)
+    still = np.flatnonzero(in_motion(rates, treatment.slow, 5)[:, 0] == 0.0)
     assert np.array_equal(still, [0, 1, 2, 3, 4, 5, *range(15, 26)])
-    still = np.flatnonzero(in_motion(rates, treatment, wraps=True)[:, 0] == 0.0)
+    still = np.flatnonzero(in_motion(rates, treatment.slow, 5, wraps=True)[:, 0] == 0.0)
     assert np.array_equal(still, [0, 1, 2, 3, 4, 5, *range(15, 26), 45, 46, 47, 48, 49])
 
 

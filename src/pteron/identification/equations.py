@@ -138,24 +138,24 @@ def stacked(parts: Sequence[Equations]) -> Equations:
     return replace(first, **joined)
 
 
-def in_motion(rates: Array, treatment: Treatment, *, wraps: bool = False) -> Array:
+def in_motion(rates: Array, slow: Array, rows: int, *, wraps: bool = False) -> Array:
     """Return 1 where a slider (R, n) moves, 0 where its friction is not known.
 
-    Dry friction turns with the rate, and acceleration jumps with it; what the filter of the
-    positions has mixed with that is left out too. Both sides are multiplied with the result before
-    the parallel filter: what is left out is out on both.
+    Dry friction turns with the rate, and acceleration jumps with it: what is slow is left out, and
+    the rows before and after it. Both sides are multiplied with the result before the parallel
+    filter: what is left out is out on both.
     """
-    moves = (np.abs(rates) >= treatment.slow).astype(float)
-    size = 2 * treatment.settling + 1
-    return np.asarray(minimum_filter1d(moves, size, axis=0, mode="wrap" if wraps else "nearest"))
+    moves = (np.abs(rates) >= slow).astype(float)
+    size, mode = 2 * rows + 1, "wrap" if wraps else "nearest"
+    return np.asarray(minimum_filter1d(moves, size, axis=0, mode=mode))
 
 
 def _filtered(model: Model, block: Samples, treatment: Treatment) -> Equations:
     decimation = treatment.decimation
     states, forces = block.states, block.forces
     inner = slice(treatment.settling, len(states) - treatment.settling)
-    moving = in_motion(states.slider_rates, treatment) * block.smooth[:, None]
-    moving = moving[inner]
+    moving = in_motion(states.slider_rates, treatment.slow, treatment.settling)
+    moving = (moving * block.smooth[:, None])[inner]
     states, forces = states.part(inner), forces[inner]
     kept = decimation.centers(len(states))
     return _assembled(
@@ -224,7 +224,7 @@ def _periodic(model: Model, log: Log, treatment: Treatment) -> Equations:
     harmonics = max(min(int(treatment.band * period), most_harmonics(log.time, period)), 1)
     series = fitted_series(log.time, log.sliders, period, highest=treatment.cutoff)
     fine = np.linspace(start, start + period, per_period, endpoint=False)
-    moving = in_motion(series.at(fine, 1), treatment, wraps=True)
+    moving = in_motion(series.at(fine, 1), treatment.slow, treatment.settling, wraps=True)
     count = 2 * harmonics + 1
     kept = np.linspace(start, start + period, count, endpoint=False)
 

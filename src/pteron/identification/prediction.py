@@ -28,7 +28,8 @@ _FRICTION = ("Fc", "Fv", "offset")
 class Prediction:
     """How well a model predicts the forces of a recording, at its own samples.
 
-    Samples of a slider that hardly moves are left out: dry friction may hold it with any force.
+    Samples of a slider that hardly moves are left out, and those next to them in which the way it
+    moves is not certain: dry friction may hold it with any force.
     NRMS is the root mean square of the error over the standard deviation of the measured force, in
     percent, so that a constant load does not flatter.
 
@@ -151,7 +152,7 @@ def predict(
         states, measured = block.states.part(block.fresh), block.forces[block.fresh]
         matrix = model.matrix(states)
         predicted, without = matrix @ values, matrix @ plain
-        used = in_motion(states.slider_rates, treatment)
+        used = in_motion(states.slider_rates, treatment.slow, treatment.turning)
         error, bare = measured - predicted, measured - without
         sums += [
             measured.sum(axis=0),

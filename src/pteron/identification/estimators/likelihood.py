@@ -209,7 +209,7 @@ def _states(model: Model, curve: _Motion, log: Log, treatment: Treatment) -> Sta
 def _sampled(model: Model, log: Log, curve: _Motion, treatment: Treatment) -> Equations:
     """Return the equations of a motion at the log's own samples, which no filter has touched."""
     states = _states(model, curve, log, treatment)
-    used = in_motion(states.slider_rates, treatment)
+    used = in_motion(states.slider_rates, treatment.slow, treatment.settling)
     if curve.spline is not None:
         ends = ceil(_ENDS * treatment.rate / (2.0 * treatment.cutoff)) if treatment.cutoff else 0
         used[:ends] = used[len(used) - ends :] = 0.0

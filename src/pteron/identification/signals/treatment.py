@@ -41,6 +41,9 @@ _ROUNDING = 1e-13
 _MIXED = 1.5
 """How far the positions' filter reaches, its ringing included, in periods of its cut-off."""
 
+_UNSURE = 0.1
+"""Within which the smoothed rate may have the wrong sign, likewise."""
+
 _MENTIONED = 0.1
 """Speed, as a share of a slider's root mean square, from which its sign counts."""
 
@@ -133,11 +136,19 @@ class Treatment:
     @property
     def settling(self) -> int:
         """Rows before and after a slow one that the positions' filter has mixed with it."""
+        return self._rows(_MIXED)
+
+    @property
+    def turning(self) -> int:
+        """Rows before and after a slow one in which the way a slider moves may not be known."""
+        return self._rows(_UNSURE)
+
+    def _rows(self, periods: float) -> int:
         if self.cutoff is None:
             return 0
         # A series ends where noise begins: what a slow motion leaves there mixes nothing.
         fastest = max(self.cutoff, self.band) if self.derivatives == "periodic" else self.cutoff
-        return round(min(_MIXED / fastest, _SPARED * self.stroke) * self.rate)
+        return round(min(periods / fastest, _SPARED * self.stroke) * self.rate)
 
     @property
     def decimation(self) -> Decimation:

@@ -26,8 +26,8 @@ class TreatedLog:
     name : str
     steps : tuple of (str, str, str)
         What, how much, and a sentence on why.
-    slider_noise, force_noise, slow, left_out : array, shape (n,)
-        µm, N, mm/s and percent.
+    slider_noise, force_noise, slow : array, shape (n,)
+        µm, N and mm/s.
     """
 
     name: str
@@ -35,7 +35,6 @@ class TreatedLog:
     slider_noise: Array
     force_noise: Array
     slow: Array
-    left_out: Array
 
 
 def treated_logs(result: Identification, names: Mapping[str, str]) -> tuple[TreatedLog, ...]:
@@ -48,7 +47,6 @@ def treated_logs(result: Identification, names: Mapping[str, str]) -> tuple[Trea
             1e6 * treatment.slider_noise,
             np.asarray(treatment.force_noise),
             _SLOW * treatment.slow,
-            100.0 * prediction.left_out,
         )
         for prediction, treatment in zip(result.fitted, result.treatments, strict=True)
     )
@@ -87,6 +85,14 @@ def _steps(treatment: Treatment, modes: int) -> tuple[tuple[str, str, str], ...]
             if modes == 1
             else "Poses follow from the sliders by direct kinematics; of its two solutions the "
             "machine was in this one.",
+        ),
+        (
+            "Left out",
+            f"{fixed(1e3 * treatment.settling / treatment.rate, 0)} ms",
+            "An actuator's equation is not fitted where its slider is slower than the speed below, "
+            "nor so long before and after that: the positions' filter mixes it with the reversal. "
+            "Errors of predicted forces leave out "
+            f"{fixed(1e3 * treatment.turning / treatment.rate, 0)} ms.",
         ),
     )
 
