@@ -26,7 +26,7 @@ bench: $(VENV)/.dev
 
 $(VENV)/.runtime: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(PIP) install --editable .
+	$(PIP) install --editable '.[consistency]'
 	touch $@
 
 $(VENV)/.dev: pyproject.toml

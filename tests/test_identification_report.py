@@ -68,9 +68,10 @@ def result(name):
     # A force that no term of the model makes.
     wrong = other.forces + 14.0 * np.sin(9.0 * other.time)[:, None]
     terms = Terms(joints="each", rotors=True)
+    again = log_of(robot, **shape, seed=3, noise_seed=2)
     return identify(
         replace(robot, name=HOSTILE),
-        [replace(fit, source=f"{HOSTILE}1.csv"), replace(fit, source="x/2.csv")],
+        [replace(fit, source=f"{HOSTILE}1.csv"), replace(again, source="x/2.csv")],
         held_out=[replace(other, source=s, forces=wrong) for s in ("x/1.csv", "y/1.csv")],
         terms=terms,
     )

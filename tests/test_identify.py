@@ -47,9 +47,8 @@ def test_noise_free_logs_give_back_the_machine(name):
     robot = random_machine(0, True) if name == "random" else CATALOG[name]
     # Legs of a random machine may be all but stretched a few centimetres from home.
     size = {"size": 0.015, "turn": 0.1} if name == "random" else {}
-    found = identify(
-        robot, log_of(as_built(robot), **size), held_out=log_of(as_built(robot), **size)
-    )
+    other = log_of(as_built(robot), **size, period=5.0)
+    found = identify(robot, log_of(as_built(robot), **size), held_out=other)
     true = truth(identification_model(as_built(robot)))
     assert np.abs(found.estimate.values - true).max() < 1e-9
     assert found.verdict.grade == "trustworthy"
@@ -84,10 +83,10 @@ def test_the_noise_that_is_stated_is_the_noise_that_is_there():
     assert np.allclose(found.treatments[0].force_noise, NOISE["force_noise"], rtol=0.15)
 
 
-def resting(robot, *, rate=1000.0):
+def resting(robot, *, seed=3, rate=1000.0):
     """Return a log of quintic moves with rests between them: acceleration has kinks."""
     time = np.arange(round(12.0 * rate)) / rate
-    corners = np.random.default_rng(3).uniform(-1.0, 1.0, (24, robot.freedom))
+    corners = np.random.default_rng(seed).uniform(-1.0, 1.0, (24, robot.freedom))
     corners *= np.array([0.05, 0.05, 0.05, 0.4])[: robot.freedom]
     tau = np.clip(np.remainder(time, 0.5) / 0.35, 0.0, 1.0)
     start = (time // 0.5).astype(int) % 24
@@ -109,12 +108,32 @@ def resting(robot, *, rate=1000.0):
 
 @pytest.mark.parametrize("period", [None, 12.0])
 def test_kinks_of_a_motion_without_noise_do_no_harm(period):
-    log = replace(resting(QUADRUPTERON), description=Description(period=period))
-    found = identify(QUADRUPTERON, log, held_out=log)
+    log, other = (
+        replace(resting(QUADRUPTERON, seed=seed), description=Description(period=period))
+        for seed in (3, 4)
+    )
+    found = identify(QUADRUPTERON, log, held_out=other)
     assert np.abs(found.estimate.values - truth(found.model)).max() < 1e-9
 
 
+@pytest.mark.parametrize("period", [None, 4.0])
+@pytest.mark.parametrize("start", [0.0, 1e6, 1.7e9])
+def test_stamps_far_from_zero_do_no_harm(start, period):
+    log = log_of(QUADRUPTERON, description=Description(period=period))
+    found = identify(QUADRUPTERON, replace(log, time=log.time + start))
+    assert np.abs(found.estimate.values - truth(found.model)).max() < 1e-9
+
+
+@pytest.mark.parametrize("share", [0.01, 0.3])
+def test_uneven_steps_do_no_harm_where_there_is_no_noise(share):
+    steps = 1.0 + share * np.random.default_rng(0).uniform(-1.0, 1.0, 8000)
+    found = identify(QUADRUPTERON, log_of(QUADRUPTERON, time=np.cumsum(steps) / 1000.0))
+    rank = found.model.base.rank
+    assert np.abs(found.estimate.values - truth(found.model))[:rank].max() < 1e-9
+
+
 def test_a_wrong_period_is_named():
+    refused(noisy(QUADRUPTERON), "period: 30 s given, but", processing=Processing(period=30.0))
     log = noisy(QUADRUPTERON, description=Description(period=2.7))
     refused(log, "does not repeat after its period of 2.7 s")
 
@@ -168,14 +187,14 @@ def test_known_rotors_are_no_part_of_the_bodies():
     inertia, ratio = (2e-5, 1e-5, 1e-5, 1e-5), (200.0,) * 4
     masses = np.array(inertia) * np.array(ratio) ** 2
     log = log_of(QUADRUPTERON)
-    pose_log = identify(QUADRUPTERON, log, held_out=log)
+    pose_log = identify(QUADRUPTERON, log)
     rates = _slider_accelerations(QUADRUPTERON, log)
     driven = replace(
         log,
         forces=log.forces + masses * rates,
         description=Description(rotor_inertia=inertia, ratio=ratio),
     )
-    found = identify(QUADRUPTERON, driven, held_out=driven)
+    found = identify(QUADRUPTERON, driven)
     # The first guide is vertical: gravity pulls at a slider's mass, not at a rotor.
     assert found.estimate.value("m_p1") == pytest.approx(
         pose_log.estimate.value("m_p1") + masses[0], abs=1e-6
@@ -297,12 +316,67 @@ def test_a_log_too_short_says_how_much_is_needed():
     refused(log, "rows", "record longer")
 
 
+def test_what_is_no_force_is_refused_by_row():
+    log = noisy(QUADRUPTERON)
+    for value in (1e200, np.nan, np.inf):
+        forces = log.forces.copy()
+        forces[5500, 1] = value
+        refused(replace(log, forces=forces), "row 5501, column force2", "is no force")
+
+
+def test_what_is_fitted_is_not_held_out():
+    log = noisy(QUADRUPTERON)
+    with pytest.raises(pteron.DataError, match="is held out, but the same samples are fitted"):
+        identify(QUADRUPTERON, log, held_out=[noisy(QUADRUPTERON, 1), log])
+    with pytest.raises(pteron.DataError, match="the same samples as log"):
+        identify(QUADRUPTERON, [log, replace(log, source="copy.csv")])
+
+
+def test_a_payload_needs_its_column():
+    refused(noisy(QUADRUPTERON), "no payload column", terms=Terms(payload=True))
+
+
+def test_a_model_that_leaves_too_much_is_named_beside_too_little_motion():
+    terms = Terms(coulomb=False, viscous=False, offset=False)
+    refused(noisy(QUADRUPTERON), "times the noise", "friction is left out", terms=terms)
+
+
+def test_sliders_in_any_order_are_found():
+    log = noisy(QUADRUPTERON)
+    refused(replace(log, sliders=log.sliders[:, [0, 2, 3, 1]]), "rho", "in another order")
+
+
+def test_one_wild_force_is_no_flipped_sign():
+    log = noisy(QUADRUPTERON)
+    forces = log.forces.copy()
+    forces[3100, 1] = 1e9
+    with pytest.raises(pteron.DataError) as caught:
+        identify(QUADRUPTERON, replace(log, forces=forces))
+    assert "sign" not in str(caught.value)
+
+
+def test_values_far_from_the_drawing_are_doubted():
+    legs = [
+        replace(leg, elbow=-leg.elbow) if i == 2 else leg for i, leg in enumerate(QUADRUPTERON.legs)
+    ]
+    other = replace(QUADRUPTERON, legs=tuple(legs))
+    found = identify(other, noisy(QUADRUPTERON))
+    assert any("Far from the drawn machine" in step for step in found.verdict.next_steps)
+    found = identify(QUADRUPTERON, noisy(as_built(QUADRUPTERON)))
+    assert not any("Far from" in step for step in found.verdict.next_steps)
+
+
 def test_currents_without_gains_are_refused():
     log = replace(log_of(QUADRUPTERON), description=Description(column_force_unit="A"))
     refused(log, "forces are in A", "gains")
 
 
 # Judgement -----------------------------------------------------------------------------------
+
+
+def test_what_is_no_number_is_not_trusted():
+    judged = prediction((0.01, np.nan), (0.01, 0.01))
+    assert verdict_of([judged], repeats=False).grade == "not trustworthy"
 
 
 def prediction(error, noise, friction=5.0):

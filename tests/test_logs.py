@@ -581,6 +581,23 @@ def test_declared_limits_decide_what_is_clipped(tmp_path):
     ]
 
 
+def test_single_samples_that_stand_out_are_found(tmp_path):
+    given = columns(motion(rows=4000))
+    rng = np.random.default_rng(0)
+    for j in range(1, 5):
+        given[f"force{j}"] += 0.05 * np.ptp(given[f"force{j}"]) * rng.normal(size=4000)
+        given[f"rho{j}"] = np.round(given[f"rho{j}"], 6)
+    assert read_log(saved(tmp_path, given), QUADRUPTERON).findings == ()
+    given["rho2"][1200] += 0.3 * np.ptp(given["rho2"])
+    given["force3"][[700, 3000]] += 5.0 * np.ptp(given["force3"])
+    found = read_log(saved(tmp_path, given), QUADRUPTERON).findings
+    assert [(f.kind, f.column, f.row, f.count) for f in found] == [
+        ("spike", "rho2", 1201, 1),
+        ("spike", "force3", 701, 2),
+    ]
+    assert "stands out from its neighbours: spike (2 such samples in all)" in found[1].message
+
+
 def test_a_machine_at_rest_is_not_frozen(tmp_path):
     given = columns(motion(rows=4000))
     for j in range(1, 5):

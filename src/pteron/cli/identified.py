@@ -54,6 +54,7 @@ def _values(result: Identification) -> Table:
 
     headings = ("value", "+- 95 %", "rel. (%)")
     made = table("parameter", *headings, "unit", "", numbers=headings)
+    made.caption = "Base parameters are sums, named by one term; the page has them in full."
     for row in parameter_rows(result):
         value, half = map(_plain, measured(row.value, row.half))
         relative = ">999" if row.relative >= 9.995 else _plain(significant(100.0 * row.relative, 2))

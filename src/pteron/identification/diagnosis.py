@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, permutations, product
+from itertools import permutations, product
 from typing import Literal
 
 import numpy as np
@@ -24,6 +24,9 @@ __all__ = ["Fault", "column_fault", "exchanged_sliders", "has_negative_inertia",
 
 _DECISIVE = 3.0
 """Factor by which the error must fall for a fault to be called found."""
+
+_EXPLAINED = 0.3
+"""Error relative to the forces below which a fit explains them."""
 
 _ROWS = 4000
 _PROBES = 50
@@ -81,8 +84,8 @@ class Fault:
 def column_fault(model: Model, log: Log, treatment: Treatment) -> Fault | None:
     """Return the exchange of columns, or of signs, that explains the forces far better.
 
-    All n! 2^n orders and signs of the forces are tried, the sliders two by two, and their signs one
-    by one. Signs of all forces at once are settled by the machine's inertia, which is positive.
+    All n! 2^n orders and signs of the forces are tried, all orders of the sliders, and their signs
+    one by one. Signs of all forces at once are settled by the machine's inertia, which is positive.
 
     Parameters
     ----------
@@ -115,7 +118,8 @@ def column_fault(model: Model, log: Log, treatment: Treatment) -> Fault | None:
     if swapped is not None and swapped.after < 0.7 * after:
         return swapped
     mended = equations.with_forces(equations.forces[:, list(order)] * np.array(sign))
-    if has_negative_inertia(model, weighted(mended).values):
+    # Where nothing explains the forces, the sign of what is left says nothing.
+    if after < _EXPLAINED and has_negative_inertia(model, weighted(mended).values):
         sign = tuple(-s for s in sign)
     if (order, sign) == choices[0]:
         return None
@@ -142,7 +146,7 @@ def _errors(equations: Equations, choices: Sequence[_Choice]) -> list[float]:
 
 
 def exchanged_sliders(model: Model, log: Log, treatment: Treatment, before: float) -> Fault | None:
-    """Return the exchange of two sliders, or the sign of one, that explains the forces far better.
+    """Return the order of the sliders, or the sign of one, that explains the forces far better.
 
     Parameters
     ----------
@@ -159,8 +163,9 @@ def exchanged_sliders(model: Model, log: Log, treatment: Treatment, before: floa
     best: Fault | None = None
     usual, upright = tuple(range(n)), (1,) * n
     choices = [(usual, tuple(-1 if k == i else 1 for k in range(n))) for i in range(n)]
-    for i, j in combinations(range(n), 2):
-        choices.append((tuple({i: j, j: i}.get(k, k) for k in range(n)), upright))
+    # Few exchanges first: of two orders that do as well, the simpler one is meant.
+    orders = sorted(permutations(range(n)), key=lambda order: sum(map(int.__ne__, order, usual)))
+    choices += [(order, upright) for order in orders[1:]]
     for order, signs in choices:
         other = replace(log, sliders=log.sliders[:, list(order)] * np.array(signs))
         try:

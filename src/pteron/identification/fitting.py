@@ -13,15 +13,17 @@ from pteron.identification.estimators.column_errors import column_errors
 from pteron.identification.estimators.likelihood import maximum_likelihood
 from pteron.identification.estimators.total import total
 from pteron.identification.logs import Log
+from pteron.identification.logs.sizes import check_forces as check_strength
 from pteron.identification.model import Model
-from pteron.identification.recordings import Recording
+from pteron.identification.recordings import Recording, same
 from pteron.identification.signals import Processing, Treatment, treatment_of
 from pteron.manipulator import Manipulator
 
 __all__ = [
     "METHODS",
     "check_columns",
-    "check_forces",
+    "check_payload",
+    "check_recordings",
     "estimated",
     "fit_equations",
     "treatment_for",
@@ -38,13 +40,23 @@ _LOOK = 30_000
 """Rows that are tried in other orders."""
 
 
-def check_forces(one: Recording) -> None:
-    """Refuse a recording of currents whose gains are not known."""
-    unit = one.head().description.force_unit
-    if unit != "N":
+def check_recordings(
+    whole: Sequence[Recording], others: Sequence[Recording], wanted: Processing
+) -> None:
+    """Refuse recordings of currents, of values that are no forces, and what is given twice."""
+    for one in (*whole, *others):
+        _check_forces(one)
+    _check_apart(whole, others)
+    _check_period(whole, wanted.period)
+
+
+def check_payload(fit: Sequence[Recording]) -> None:
+    """Refuse recordings that do not tell when a payload is carried."""
+    heads = [one.head() for one in fit]
+    if all(head.payload is None for head in heads):
         raise DataError(
-            f"{one.source}: its forces are in {unit}; declare gains (N per {unit}) in its "
-            "description, or find them with identify_drive_gains"
+            f"{fit[0].source}: no payload column; declare one that is 0 without payload and 1 with "
+            "it, or identify without the payload"
         )
 
 
@@ -116,3 +128,42 @@ def check_columns(model: Model, one: Recording, treatment: Treatment) -> None:
         f"{one.source}: {fault.message()}{why}; correct the columns, or declare their order and "
         "gains in the log's description"
     )
+
+
+def _check_forces(one: Recording) -> None:
+    """Refuse a recording of currents whose gains are not known, or of values that are no forces."""
+    if isinstance(one.log, Log):
+        names = tuple(f"force{k + 1}" for k in range(one.log.forces.shape[1]))
+        check_strength(one.log.forces, names, one.source, one.log.first_row)
+    unit = one.head().description.force_unit
+    if unit != "N":
+        raise DataError(
+            f"{one.source}: its forces are in {unit}; declare gains (N per {unit}) in its "
+            "description, or find them with identify_drive_gains"
+        )
+
+
+def _check_apart(whole: Sequence[Recording], others: Sequence[Recording]) -> None:
+    """Refuse a recording that is given twice: what was fitted is no evidence."""
+    for i, one in enumerate(whole):
+        for other in whole[i + 1 :]:
+            if same(one, other):
+                raise DataError(f"{other.source}: the same samples as {one.source}; give them once")
+        for other in others:
+            if same(one, other):
+                raise DataError(
+                    f"{other.source}: is held out, but the same samples are fitted; hold out "
+                    "another motion, or nothing: then the end of each log is"
+                )
+
+
+def _check_period(whole: Sequence[Recording], period: float | None) -> None:
+    for one in whole:
+        head = one.head()
+        if period is None or not isinstance(one.log, Log):
+            continue
+        if head.duration < period * (1.0 - 1e-3):
+            raise DataError(
+                f"{one.source}: period: {period:g} s given, but it lasts {head.duration:g} s; "
+                "give the time after which the motion repeats, or none"
+            )

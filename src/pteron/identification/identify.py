@@ -11,6 +11,7 @@ import numpy as np
 from pteron.errors import DataError, ModelError
 from pteron.identification.consistency import Bounds, Consistency, consistent_model
 from pteron.identification.diagnosis import has_negative_inertia, unseen
+from pteron.identification.doubts import doubts, left_over
 from pteron.identification.equations import Equations, stacked
 from pteron.identification.estimators import (
     ESTIMATORS,
@@ -22,7 +23,8 @@ from pteron.identification.estimators import (
 from pteron.identification.fitting import (
     METHODS,
     check_columns,
-    check_forces,
+    check_payload,
+    check_recordings,
     estimated,
     fit_equations,
     treatment_for,
@@ -106,9 +108,8 @@ def identify(
     read = _reader(report, "Reading")
     whole = [recording(log, read) for log in _sequence(logs)]
     others = [recording(log, read) for log in _sequence(held_out)]
-    for one in (*whole, *others):
-        check_forces(one)
     wanted = processing or Processing()
+    check_recordings(whole, others, wanted)
     fit, check = list(whole), others
     if not others:
         periods = [wanted.period or one.head().description.period for one in whole]
@@ -119,6 +120,8 @@ def identify(
     model = identification_model(
         robot, replace(terms or Terms(), rotors=True) if rotors else terms, base=base
     )
+    if model.terms.payload:
+        check_payload(fit)
     treatments = [treatment_for(robot, one, wanted) for one in fit]
     parts = [
         fit_equations(model, one, treatment, _reader(report, "Filtering"))
@@ -149,7 +152,7 @@ def identify(
             f"{fit[0].source}: too little motion: {len(hidden)} of {base.rank} base parameters "
             f"cannot be seen ({', '.join(hidden)}), their standard deviations are larger than "
             "their usual size; move faster and along all coordinates, as pteron excite proposes"
-            f"{_noticed(whole)}"
+            f"{left_over(estimate, treatments)}{_noticed(whole)}"
         )
     fitted = tuple(
         predict(model, estimate.values, one.beginning(), treatment, _reader(report, "Predicting"))
@@ -164,7 +167,7 @@ def identify(
     consistency, share = _real_bodies(model, estimate, known, equations, cad, bounds, notes)
     for name, shares in model.joins.items():
         notes.append(f"{name} joins {' and '.join(shares) or 'nothing: it does not act'}.")
-    advice = _advice(hidden, essential)
+    advice = [*_advice(hidden, essential), *doubts(model, estimate, known, consistency, cad)]
     return Identification(
         robot=robot,
         model=model,

@@ -9,8 +9,9 @@ import numpy as np
 
 from pteron.errors import DataError
 from pteron.identification.logs import Finding, Log, LogFile
+from pteron.kernels import Array
 
-__all__ = ["Recording", "divided", "recording"]
+__all__ = ["Recording", "divided", "recording", "same"]
 
 _IN_MEMORY = 2_000_000
 """Rows up to which a file is read whole: 150 MB for four sliders."""
@@ -22,6 +23,9 @@ _LOOKED_AT = 2_000_000
 
 _END = int(np.iinfo(np.int64).max)
 """Beyond the last row of every file: how many it has is known for certain when it has been read."""
+
+_ROUNDINGS = 2.0
+"""How far stamps may be off their clock's ticks, in the spacing of floats."""
 
 _FIT = 0.7
 """Share of a log that is fitted where nothing else is held out."""
@@ -96,8 +100,39 @@ def recording(log: Log | LogFile, progress: Callable[[int], None] | None = None)
     if isinstance(log, LogFile) and (log.rows_estimate or 0) <= _IN_MEMORY:
         log = _whole(log, progress)
     if isinstance(log, Log):
-        return Recording(log, 0, log.rows)
+        return Recording(replace(log, time=_since(log.time)), 0, log.rows)
     return Recording(log, 0, _END)
+
+
+def same(one: Recording, other: Recording) -> bool:
+    """Say whether two recordings hold the same samples."""
+    first, second = one.head(), other.head()
+    return np.array_equal(first.forces, second.forces) and np.array_equal(
+        first.sliders, second.sliders
+    )
+
+
+def _since(time: Array) -> Array:
+    """Return times from the first on: far from zero, stamps are rounded.
+
+    Those of a steady clock are put on its ticks again, with the roundest step that fits them.
+    """
+    if len(time) == 0:
+        return time
+    since: Array = time - time[0]
+    rounding = float(np.spacing(np.abs(time).max(initial=0.0)))
+    steps = np.diff(since)
+    if len(steps) == 0 or not steps.min() > 0.0:
+        return since
+    ticks = np.r_[0.0, np.cumsum(np.round(steps / np.median(steps)))]
+    step = float(since[-1] / ticks[-1])
+    for digits in range(1, 17):
+        rounded = float(f"{step:.{digits}g}")
+        if abs(rounded - step) * ticks[-1] <= rounding:
+            step = rounded
+            break
+    steady: Array = ticks * step
+    return steady if np.abs(since - steady).max() <= _ROUNDINGS * rounding else since
 
 
 def divided(whole: Recording, period: float | None) -> tuple[Recording, Recording]:

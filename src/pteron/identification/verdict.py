@@ -77,7 +77,7 @@ def verdict_of(held_out: list[Prediction], *, repeats: bool) -> Verdict:
         worst = int(np.argmax(np.where(ratio <= AT_THE_FLOOR, 0.0, missed)))
         grade: Grade = "trustworthy"
         drowned = int(np.argmax(prediction.nrms))
-        if prediction.nrms[drowned] > DROWNED:
+        if not (prediction.nrms <= DROWNED).all():
             grades.append("not trustworthy")
             reasons.append(
                 f"The forces of actuator {drowned + 1} are not explained: what is left of them is "

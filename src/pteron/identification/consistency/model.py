@@ -190,6 +190,11 @@ def _prior(robot: Manipulator, cad: Manipulator | ArrayLike | str | None) -> Arr
                 "the file first with pteron.load"
             )
         return parameters(robot)
+    if isinstance(cad, Manipulator) and len(cad.legs) != len(robot.legs):
+        raise ModelError(
+            f"cad: {cad.name} has {len(cad.legs)} legs, {robot.name} has {len(robot.legs)}; give "
+            "a model of the same machine"
+        )
     return parameters_of(robot, parameters(cad) if isinstance(cad, Manipulator) else cad, "cad")
 
 

@@ -140,12 +140,7 @@ class Excitation:
     def write_toml(self, path: str | Path) -> Path:
         """Write what an evaluation of the log needs: period and assembly mode (from 1)."""
         motion = self.motion
-        text = (
-            "[motion]\n"
-            f"period = {motion.period!r}\n"
-            f"harmonics = {motion.harmonics}\n"
-            f"assembly_mode = {motion.mode + 1}\n"
-        )
+        text = f"[motion]\nperiod = {motion.period!r}\nassembly_mode = {motion.mode + 1}\n"
         return write_text(path, text)
 
     def as_dict(self) -> dict[str, Any]:

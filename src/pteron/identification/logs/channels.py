@@ -1,4 +1,4 @@
-"""Channels that stop: dead ones are refused; clipped and frozen ones are said, piece by piece."""
+"""Channels that stop or jump: dead ones are refused; clipped or frozen ones and spikes are said."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from pteron.errors import DataError
 from pteron.identification.logs.finding import Finding
+from pteron.identification.logs.spikes import Spikes
 
 __all__ = ["Channel"]
 
@@ -20,6 +21,8 @@ _MOVED = 0.01
 """A channel is frozen that stays for over so many rows while another slider moves this part of the
 machine's size."""
 _ROUNDING = 1e-9
+_FORCES, _SLIDERS = 0.5, 0.05
+"""Share of a channel's span by which a spike stands out; friction makes forces jump."""
 
 Values = NDArray[np.float64]
 
@@ -92,9 +95,11 @@ class Channel:
         self._first_frozen = (0, 0, 0.0)
         self._beyond = 0
         self._first_beyond = 0
+        self._spikes = Spikes(column, source, _FORCES if slider is None else _SLIDERS)
 
     def take(self, values: Values, sliders: Values) -> None:
         """Look at the next piece: this channel, shape (rows,), and all sliders, (rows, n), in m."""
+        self._spikes.take(values)
         self._high.raise_to(float(values.max()))
         self._low.raise_to(float(-values.min()))
         if self._limits is not None:
@@ -158,6 +163,7 @@ class Channel:
             found.append(Finding("frozen", message, start + 1, self._column, self._frozen))
         if self._slider is None:
             found += self._clipped()
+        found += self._spikes.findings()
         return tuple(found)
 
     def _compare(self, values: Values, low: float, high: float) -> None:

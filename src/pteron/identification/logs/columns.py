@@ -271,11 +271,14 @@ class _Search:
         if not others:
             return self.missing(table, "columns = [...]")
         names = [others[0][i] for i in sorted(others[0])]
+        stem = names[0].removesuffix("1")
+        absent = [f"{stem}{i}" for i in self.numbers() if i not in others[0]]
+        fault = f"without {', '.join(absent)}, or " if absent else ""
         return DataError(
             f"{self.source}: the columns {', '.join(names)} are for {len(names)} {table}, but the "
-            f"machine has {self.legs} legs (needed: {', '.join(self.needed)}); perhaps it is the "
-            f"log of another machine; else declare the columns in a TOML file beside it: "
-            f"[{table}] columns = [...]"
+            f"machine has {self.legs} legs (needed: {', '.join(self.needed)}); {fault}"
+            "perhaps it is the log of another machine; else declare the columns in a TOML file "
+            f"beside it: [{table}] columns = [...]"
         )
 
     def ambiguous(self, table: str, names: Sequence[str]) -> DataError:

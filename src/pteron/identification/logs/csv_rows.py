@@ -67,7 +67,7 @@ class CsvRows:
         self.rows_estimate = round(size * rows / len(sample)) if rows else None
         self.hint = "the first line must name the columns"
         if len(self.columns) == 1 and any(sign in header for sign in ";\t"):
-            self.hint = "separate the cells with commas"
+            self.hint = "separate the cells with commas and decimals with points"
 
     def blocks(self, columns: Sequence[int]) -> Iterator[Values]:
         """Yield the finite numbers in some columns, shape (rows, len(columns)), in order.

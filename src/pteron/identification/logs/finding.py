@@ -7,8 +7,9 @@ from typing import Literal
 
 __all__ = ["Finding", "Kind"]
 
-Kind = Literal["gap", "jitter", "clipped", "frozen", "guessed", "units"]
-"""Missing samples, uneven steps, saturated forces, a channel that stops, a name or a unit guessed,
+Kind = Literal["gap", "jitter", "clipped", "frozen", "spike", "guessed", "units"]
+"""Missing samples, uneven steps, saturated forces, a channel that stops, single samples
+that stand out, a name or a unit guessed,
 a unit that looks wrong."""
 
 
@@ -27,7 +28,7 @@ class Finding:
     column : str or None
         The column, as the file calls it.
     count : int
-        How often it occurs: gaps, uneven steps, clipped rows, frozen stretches or columns.
+        How often it occurs: gaps, uneven steps, clipped rows, frozen stretches, spikes or columns.
     """
 
     kind: Kind

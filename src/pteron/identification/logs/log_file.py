@@ -18,6 +18,7 @@ from pteron.identification.logs.description import Description, ForceUnit
 from pteron.identification.logs.log import Log
 from pteron.identification.logs.parquet_rows import ParquetRows
 from pteron.identification.logs.sizes import (
+    check_forces,
     check_pose,
     check_sliders,
     check_step,
@@ -140,6 +141,7 @@ class LogFile:
         forces = np.ascontiguousarray(values[:, 1 + n : 1 + 2 * n])
         if self.description.gains is not None:
             forces = forces * np.array(self.description.gains)
+        check_forces(forces, self._force_names, self.source, first)
         pose = None
         if c.pose:
             pose = np.array(values[:, 1 + 2 * n : 1 + 2 * n + len(c.pose)], order="C")

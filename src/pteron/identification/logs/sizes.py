@@ -11,11 +11,13 @@ from pteron.errors import DataError
 from pteron.identification.logs.finding import Finding
 from pteron.manipulator import Manipulator
 
-__all__ = ["check_pose", "check_sliders", "check_step", "size_of", "standstill"]
+__all__ = ["check_forces", "check_pose", "check_sliders", "check_step", "size_of", "standstill"]
 
 _BEYOND = 3.0
 """How far beyond the machine's size a coordinate may lie; encoders have their own zero."""
 _TURNS = 4.0 * math.pi
+_STRONGEST = 1e9
+"""Force that no actuator has, N."""
 _LONGEST_STEP = 0.2
 _STANDSTILL = 1e-3
 _SMALLER = ((1e3, "mm"), (1e6, "um"))
@@ -60,6 +62,19 @@ def check_sliders(
                 f"{sliders[i, j]:g} m, read as {unit}, but the slider of this machine travels "
                 f"about {travel:.2g} m; {_advice('sliders', 'unit', unit, peak, travel)}"
             )
+
+
+def check_forces(
+    forces: NDArray[np.float64], columns: tuple[str, ...], source: str, first_row: int
+) -> None:
+    """Raise a `DataError` where forces, (rows, n), are larger than any actuator's."""
+    beyond = ~(np.abs(forces) <= _STRONGEST)
+    if beyond.any():
+        i, j = (int(k) for k in np.argwhere(beyond)[0])
+        raise DataError(
+            f"{source}: row {first_row + i + 1}, column {columns[j]}: {forces[i, j]:g} is no "
+            f"force; up to {_STRONGEST:g} is expected; correct the value, or leave the row out"
+        )
 
 
 def check_pose(

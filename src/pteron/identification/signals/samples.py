@@ -16,7 +16,7 @@ from pteron.identification.signals.blocks import blocks
 from pteron.identification.signals.differences import LOST, central_differences
 from pteron.identification.signals.fourier import fitted_series
 from pteron.identification.signals.lowpass import SETTLING, smoothed
-from pteron.identification.signals.spline import spline_motion
+from pteron.identification.signals.spline import fitted_spline, spline_motion
 from pteron.identification.signals.states import States
 from pteron.identification.signals.treatment import Treatment
 from pteron.identification.signals.uniform import uniform
@@ -28,6 +28,7 @@ __all__ = ["Samples", "samples"]
 _AGREES = 1e-7
 """Relative difference of two second derivatives that is their error on a smooth motion."""
 
+_FEW = 0.5
 _ROUNDING = 1e-14
 _SMEARED = 24
 """Samples to each side of a jump that a spline of degree 7 spreads it over, to 1e-7 of it."""
@@ -126,7 +127,7 @@ def _block(robot: Manipulator, block: Log, treatment: Treatment, edge: int, marg
     if treatment.derivatives == "spline":
         motion = spline_motion(time, block.sliders, treatment.cutoff)
         if treatment.cutoff is None:
-            smooth = _smooth(time, block.sliders, motion[2])[inner]
+            smooth = _smooth(time, block.sliders)[inner]
         motion = motion[0][inner], motion[1][inner], motion[2][inner]
     else:
         time, sliders = uniform(time, block.sliders)
@@ -150,17 +151,21 @@ def _block(robot: Manipulator, block: Log, treatment: Treatment, edge: int, marg
     return Samples(states, forces[inner], slice(margin, len(states) - margin), block.source, smooth)
 
 
-def _smooth(time: Array, sliders: Array, accelerations: Array) -> NDArray[np.bool_]:
+def _smooth(time: Array, sliders: Array) -> NDArray[np.bool_]:
     """Return where a spline through samples without noise agrees with central differences.
 
-    They err in different ways next to a jump in a derivative, as at the ends of a rest.
+    They err in different ways next to a jump in a derivative, as at the ends of a rest. Jumps are
+    few: where most samples are apart it is for another reason, such as the rounding of the stamps.
     """
-    even, values = uniform(time, sliders)
+    spline = fitted_spline(time, sliders, None)
+    even = np.linspace(time[0], time[-1], len(time))
     rate = (len(even) - 1) / float(even[-1] - even[0])
-    _, second = central_differences(values, rate)
+    _, second = central_differences(spline(even), rate)
     rounding = _ROUNDING * np.abs(sliders).max() * rate**2
     least = _AGREES * np.abs(second).max(axis=0) + rounding
-    apart = (np.abs(accelerations[LOST:-LOST] - second) > least).any(axis=1)
+    apart = (np.abs(spline(even[LOST:-LOST], 2) - second) > least).any(axis=1)
+    if apart.mean() > _FEW:
+        return np.ones(len(time), dtype=bool)
     apart = maximum_filter1d(np.pad(apart, LOST).astype(int), 2 * _SMEARED + 1) > 0
     return np.asarray(~apart)
 

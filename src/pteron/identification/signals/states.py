@@ -106,7 +106,7 @@ def _no_pose(
     count = int(lost.sum())
     values = ", ".join(f"{value:.4f}" for value in sliders[row])
     others = direct_kinematics(robot, sliders[lost])
-    hint = "is it the log of another machine, or are its sliders counted from other zeros?"
+    hint = "perhaps it is the log of another machine, or its sliders have other zeros"
     if others.shape[-2] > 1 and not np.isnan(others[:, 1 - mode]).any():
         hint = f"assembly mode {2 - mode} has one: declare it in the log's description"
     more = f", nor those of {count - 1} more rows" if count > 1 else ""

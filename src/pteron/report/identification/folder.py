@@ -7,6 +7,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from pteron.atomic import make_folder
+from pteron.errors import OutputError
 
 __all__ = ["prepared_folder"]
 
@@ -20,6 +21,8 @@ def prepared_folder(path: str | Path) -> Iterator[Path]:
     OutputError
         If it cannot be made or written.
     """
+    if str(path) == "":
+        raise OutputError("the folder's name is empty; name one")
     target = Path(path)
     missing = [folder for folder in (target, *target.parents) if not folder.exists()]
     try:

@@ -1,0 +1,90 @@
+"""What held-out forces do not show: values may be right for another machine than the one drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+
+from pteron.identification.consistency import Consistency
+from pteron.identification.diagnosis import has_negative_inertia
+from pteron.identification.estimators import Estimate
+from pteron.identification.model import Model
+from pteron.identification.signals import Treatment
+from pteron.kernels import Array
+from pteron.manipulator import Manipulator, parameters
+
+__all__ = ["doubts", "left_over"]
+
+_FAR_ABOVE = 5.0
+"""What a fit leaves of the forces, over their noise, where the model is not the machine's."""
+
+_FAR = 0.5
+"""Difference from the drawn machine, as a share of what a parameter is made of, that is doubted."""
+
+_CHANCE = 1e-3
+"""Probability below which infeasible values are not chance."""
+
+
+def doubts(
+    model: Model,
+    estimate: Estimate,
+    known: Array,
+    consistency: Consistency | None,
+    cad: Manipulator | Literal["robot"] | None,
+) -> list[str]:
+    """Return what held-out forces cannot show: they may be right for the wrong machine.
+
+    Parameters
+    ----------
+    model : Model
+        The model.
+    estimate : Estimate
+        Its values.
+    known : array, shape (p,)
+        What of them is no part of the bodies, such as rotors.
+    consistency : Consistency or None
+        The real bodies that were found.
+    cad : Manipulator, "robot" or None
+        The machine as it is drawn.
+    """
+    found = []
+    if has_negative_inertia(model, estimate.values):
+        found.append("With these values the machine has negative inertia: forces do not belong.")
+    if consistency is not None and consistency.p_value < _CHANCE:
+        found.append(
+            f"No real bodies have these values: they are {consistency.distance:.2g} standard "
+            "deviations away. Look at what the model takes for granted: geometry, working mode, "
+            "units, legs that share parameters."
+        )
+    if cad is not None:
+        drawn = parameters(model.robot if cad == "robot" else cad)
+        base = model.base
+        usual = np.abs(base.grouping) @ np.abs(drawn)
+        values = (estimate.values - known)[: base.rank]
+        off = np.abs(values - base.grouping @ drawn)
+        far = (off > _FAR * usual) & (off > 5.0 * estimate.deviations[: base.rank])
+        worst = [k for k in np.argsort(-off / np.maximum(usual, 1e-300)) if far[k]][:3]
+        if worst:
+            names = ", ".join(
+                f"{base.names[k]} ({values[k]:.3g}, drawn {base.grouping[k] @ drawn:.3g})"
+                for k in worst
+            )
+            found.append(
+                f"Far from the drawn machine: {names}. If the bodies are not that different, look "
+                "at geometry, working mode and units: other ones can explain forces as well."
+            )
+    return found
+
+
+def left_over(estimate: Estimate, treatments: Sequence[Treatment]) -> str:
+    """Return what may explain a fit that leaves far more of the forces than their noise."""
+    noise = np.max([treatment.force_noise for treatment in treatments], axis=0)
+    ratio = float((estimate.noise / np.maximum(noise, np.finfo(float).tiny)).max())
+    if ratio < _FAR_ABOVE:
+        return ""
+    return (
+        f"; or the model is another: it leaves {ratio:.0f} times the noise of the forces, as where "
+        "friction is left out, a force stands out, or it is the log of another machine"
+    )
