@@ -96,7 +96,12 @@ def test_ordinary_is_that_of_numpy():
     estimate = ordinary(equations)
     assert estimate.values == pytest.approx(expected, rel=1e-11)
     covariance = rest[0] / (len(flat) - P) * np.linalg.inv(flat.T @ flat)
-    assert estimate.covariance == pytest.approx(covariance, rel=1e-9)
+    # Only ever enlarged, for correlation in time, and one value as the other.
+    larger = estimate.deviations / np.sqrt(np.diag(covariance))
+    assert (larger > 1.0 - 1e-9).all()
+    assert larger.max() < 1.5
+    assert larger.min() < 1.0 + 1e-9
+    assert estimate.covariance == pytest.approx(covariance * np.outer(larger, larger), rel=1e-9)
     assert estimate.condition == pytest.approx(np.linalg.cond(flat / np.linalg.norm(flat, axis=0)))
     assert estimate.residuals == pytest.approx(equations.forces - equations.matrix @ expected)
 
@@ -161,7 +166,9 @@ def test_rows_that_are_not_used_count_for_nothing(estimator):
     one, other = estimator(whole), estimator(holed)
     assert other.rows == one.rows == 300
     assert other.values == pytest.approx(one.values, rel=1e-9)
-    assert other.covariance == pytest.approx(one.covariance, rel=1e-7)
+    assert other.correlation == pytest.approx(one.correlation, rel=1e-7)
+    # Holes move rows apart in time, where their correlation is looked for.
+    assert other.deviations == pytest.approx(one.deviations, rel=0.3)
     assert other.noise == pytest.approx(one.noise, rel=1e-9)
 
 

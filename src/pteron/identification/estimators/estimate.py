@@ -41,7 +41,8 @@ class Estimate:
     whiteness : Whiteness
         Whether the residuals are white.
     correlated : bool
-        Whether the covariance allows for residuals that are not (Newey and West).
+        Whether the test says that they are not; the covariance allows for correlation in any case
+        (Newey and West).
     condition : float
         Condition number of the regressor with its columns scaled to unit length.
     rows : int
@@ -108,7 +109,7 @@ class Estimate:
                 "white": self.whiteness.white,
                 "autocorrelation": self.whiteness.autocorrelation.tolist(),
                 "p_values": self.whiteness.p_values.tolist(),
-                "allowed_for": self.correlated,
+                "correlated": self.correlated,
             },
             "condition_number": self.condition,
             "equations": self.rows,
@@ -164,14 +165,14 @@ def estimate_of(
     share = max(factor.degrees, 1) / max(factor.rows, 1)
     noise = np.sqrt((rest**2).sum(axis=0) / np.maximum(equations.used, 1) / share)
     test = whiteness(rest, equations.gain > 0.0)
-    if not test.white:
-        weighted = weights**2 * rest if scores is None else scores
-        rows = np.einsum("rnp,rn->rp", equations.matrix, weighted, optimize=True)
-        bread = factor.inverse() if inverse is None else inverse
-        allowed = long_run_covariance(rows, bread, share)
-        # Correlation that happens to help is not counted on.
-        worse = np.sqrt(np.maximum(np.diag(allowed) / np.diag(covariance), 1.0))
-        covariance = covariance * np.outer(worse, worse)
+    # Whatever the test says: in a short log it does not see all correlation that matters.
+    weighted = weights**2 * rest if scores is None else scores
+    rows = np.einsum("rnp,rn->rp", equations.matrix, weighted, optimize=True)
+    bread = factor.inverse() if inverse is None else inverse
+    allowed = long_run_covariance(rows, bread, share)
+    # Correlation that happens to help is not counted on.
+    worse = np.sqrt(np.maximum(np.diag(allowed) / np.diag(covariance), 1.0))
+    covariance = covariance * np.outer(worse, worse)
     return Estimate(
         method,
         equations.names,

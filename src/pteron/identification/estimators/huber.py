@@ -59,10 +59,12 @@ def huber(equations: Equations, *, threshold: float = 1.345) -> Estimate:
     plain = triangle(equations, 1.0 / scale)
     standard = residuals_of(equations, values) / scale
     pull = np.clip(standard, -threshold, threshold)
-    # Huber (1981), section 7.6: variance of the pull over the square of its mean slope.
+    # Huber (1981), section 7.6: variance of the pull over the square of its mean slope, with the
+    # correction for the values that few equations have been spent on.
     used = equations.gain > 0.0
     slope = float((np.abs(standard)[used] < threshold).mean())
-    variance = float((pull**2).sum()) / plain.degrees / slope**2
+    spent = 1.0 + len(values) / equations.rows * (1.0 - slope) / slope
+    variance = spent**2 * float((pull**2).sum()) / plain.degrees / slope**2
     return estimate_of(
         "huber",
         equations,
@@ -71,7 +73,7 @@ def huber(equations: Equations, *, threshold: float = 1.345) -> Estimate:
         variance * plain.inverse(),
         weights=1.0 / scale,
         iterations=iteration,
-        scores=pull / scale / slope,
+        scores=spent * pull / scale / slope,
     )
 
 
