@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from shutil import get_terminal_size
 from typing import TYPE_CHECKING
 
 from rich.markup import escape
@@ -14,6 +15,9 @@ if TYPE_CHECKING:
     from pteron.report.identification import Written
 
 __all__ = ["show_identification"]
+
+_NARROW = 56
+"""Width of a terminal below which tables leave out what the page has anyway."""
 
 _COLORS = {"trustworthy": "green", "usable with care": "yellow", "not trustworthy": "red"}
 
@@ -37,12 +41,12 @@ def show_identification(result: Identification, files: Written) -> None:
 def _errors(result: Identification) -> Table:
     from pteron.report.digits import significant
 
-    headings = ("held-out NRMS (%)", "no friction", "noise")
+    headings = ("held-out NRMS (%)", "noise", "no friction")[: 2 if _narrow() else 3]
     made = table("actuator", *headings, numbers=headings)
     several = len(result.held_out) > 1
     for prediction in result.held_out:
-        columns = prediction.nrms, prediction.nrms_without_friction, prediction.floor
-        for i, values in enumerate(zip(*columns, strict=True), start=1):
+        columns = prediction.nrms, prediction.floor, prediction.nrms_without_friction
+        for i, values in enumerate(zip(*columns[: len(headings)], strict=True), start=1):
             where = f" in {prediction.source}" if several else ""
             made.add_row(escape(f"{i}{where}"), *(significant(value) for value in values))
     return made
@@ -53,14 +57,20 @@ def _values(result: Identification) -> Table:
     from pteron.report.identification import measured, parameter_rows
 
     headings = ("value", "+- 95 %", "rel. (%)")
-    made = table("parameter", *headings, "unit", "", numbers=headings)
+    numbers = headings[: 2 if _narrow() else 3]
+    made = table("parameter", *numbers, *(() if _narrow() else ("unit",)), "", numbers=numbers)
     made.caption = "Base parameters are sums, named by one term; the page has them in full."
     for row in parameter_rows(result):
         value, half = map(_plain, measured(row.value, row.half))
         relative = ">999" if row.relative >= 9.995 else _plain(significant(100.0 * row.relative, 2))
         mark = "" if not row.weak else "[yellow]unseen[/]" if row.unseen else "[yellow]weak[/]"
-        made.add_row(escape(row.name), value, half, relative, row.unit, mark)
+        rest = () if _narrow() else (relative, row.unit)
+        made.add_row(escape(row.name), value, half, *rest, mark)
     return made
+
+
+def _narrow() -> bool:
+    return get_terminal_size().columns < _NARROW
 
 
 def _plain(number: str) -> str:

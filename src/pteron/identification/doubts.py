@@ -85,6 +85,6 @@ def left_over(estimate: Estimate, treatments: Sequence[Treatment]) -> str:
     if ratio < _FAR_ABOVE:
         return ""
     return (
-        f"; or the model is another: it leaves {ratio:.0f} times the noise of the forces, as where "
-        "friction is left out, a force stands out, or it is the log of another machine"
+        f"the model leaves {ratio:.0f} times the noise of the forces, as where friction is left "
+        "out, a force stands out, or it is the log of another machine"
     )

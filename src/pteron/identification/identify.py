@@ -148,11 +148,13 @@ def identify(
     if verdict.grade != "trustworthy" or has_negative_inertia(model, estimate.values):
         check_columns(model, fit[0], treatments[0])
     if too_many:
+        names = ", ".join(hidden) if len(hidden) < base.rank else "all"
+        cause = left_over(estimate, treatments)
         raise DataError(
-            f"{fit[0].source}: too little motion: {len(hidden)} of {base.rank} base parameters "
-            f"cannot be seen ({', '.join(hidden)}), their standard deviations are larger than "
-            "their usual size; move faster and along all coordinates, as pteron excite proposes"
-            f"{left_over(estimate, treatments)}{_noticed(whole)}"
+            f"{fit[0].source}: {cause or 'too little motion'}: {len(hidden)} of {base.rank} base "
+            f"parameters cannot be seen ({names}), their standard deviations are larger than their "
+            f"usual size; {'mend that, or ' if cause else ''}move faster and along all "
+            f"coordinates, as pteron excite proposes{_noticed(whole)}"
         )
     fitted = tuple(
         predict(model, estimate.values, one.beginning(), treatment, _reader(report, "Predicting"))
