@@ -81,9 +81,10 @@ def excite(
 ) -> None:
     """Find a periodic trajectory from whose forces the base parameters are seen best.
 
-    It keeps every limit throughout the period, and does not begin at rest. The file has the columns t rho1 ... x y z phi and
-    their rates (d..., dd...), and force1 ... by the machine's nominal inertia. The period and the
-    assembly mode go to a TOML file beside it, for the evaluation of the log.
+    It keeps every limit throughout the period, and does not begin at rest. The file has the columns
+    t rho1 ... x y z phi and their rates (d..., dd...), and force1 ... by the machine's nominal
+    inertia. The period and the assembly mode go to a TOML file beside it, for the evaluation of the
+    log.
 
     Ctrl-C ends the search and keeps the best until then.
     """
