@@ -16,7 +16,7 @@ from pteron.identification.logs import Log
 from pteron.identification.logs.sizes import check_forces as check_strength
 from pteron.identification.model import Model
 from pteron.identification.recordings import Recording, same
-from pteron.identification.signals import Processing, Treatment, treatment_of
+from pteron.identification.signals import NoPose, Processing, Treatment, treatment_of
 from pteron.manipulator import Manipulator
 
 __all__ = [
@@ -80,9 +80,7 @@ def fit_equations(
     """Return a recording's equations; where it has no poses, say whether sliders are swapped."""
     try:
         return equations_of(model, one.samples(progress), treatment)
-    except DataError as error:
-        if "no pose" not in str(error):
-            raise
+    except NoPose as error:
         head = one.head()
         some = head.part(0, min(head.rows, _LOOK))
         swap = exchanged_sliders(model, some, treatment, _EXPLAINED)

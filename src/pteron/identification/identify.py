@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from pteron.errors import DataError, ModelError
-from pteron.identification.consistency import Bounds, Consistency, consistent_model
+from pteron.identification.consistency import Bounds, Consistency, MissingSolver, consistent_model
 from pteron.identification.diagnosis import has_negative_inertia, unseen
 from pteron.identification.doubts import doubts, left_over
 from pteron.identification.equations import Equations, stacked
@@ -231,9 +231,7 @@ def _real_bodies(
     covariance = estimate.covariance[: base.rank, : base.rank]
     try:
         found = consistent_model(model.robot, base, values, covariance, cad=cad, bounds=bounds)
-    except ModelError as error:
-        if "pteron[consistency]" not in str(error):
-            raise
+    except MissingSolver as error:
         notes.append(f"No model of real bodies: {error}")
         return None, float("nan")
     shift = np.zeros(len(estimate.values))

@@ -28,7 +28,7 @@ from pteron.errors import ModelError
 from pteron.kernels.c_module import module_source
 from pteron.kernels.cache import digest, entry, find
 from pteron.kernels.graph import graph_of
-from pteron.kernels.kernel import Array, Kernel
+from pteron.kernels.kernel import Array, ArrayKernel
 
 __all__ = ["Compiled", "compiler"]
 
@@ -56,7 +56,7 @@ def _version(compiler: str) -> str:
 
 
 @dataclass(frozen=True)
-class Compiled(Kernel):
+class Compiled(ArrayKernel):
     """A kernel in machine code."""
 
     _strided = True

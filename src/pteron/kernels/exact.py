@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -12,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from pteron.errors import DataError
 from pteron.kernels.fields import RationalField, evaluate
-from pteron.kernels.kernel import Array, Kernel
+from pteron.kernels.kernel import Kernel
 
 __all__ = ["Exact"]
 
@@ -33,12 +32,7 @@ class Exact(Kernel):
 
     def __call__(self, *values: ArrayLike) -> Any:
         """Evaluate the kernel for one state; each value has its port's shape."""
-        ports = [port for port in self.inputs if port.name not in self.fixed]
-        if len(values) != len(ports):
-            names = ", ".join(port.name for port in ports)
-            raise DataError(
-                f"{self.name}: {len(values)} inputs given, {len(ports)} expected ({names})"
-            )
+        ports = self._asked(values)
         given = dict(self.fixed)
         for port, value in zip(ports, values, strict=True):
             array = np.asarray(value, dtype=object)
@@ -54,6 +48,3 @@ class Exact(Kernel):
             for value, port in zip(found, self.outputs, strict=True)
         )
         return results[0] if len(results) == 1 else results
-
-    def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
-        raise NotImplementedError("fractions are not filled into arrays of floats")

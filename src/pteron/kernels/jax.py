@@ -103,18 +103,10 @@ class Traced(Kernel):
         ModelError
             If JAX is not installed.
         """
-        ports = [port for port in self.inputs if port.name not in self.fixed]
-        if len(values) != len(ports):
-            names = ", ".join(port.name for port in ports)
-            raise DataError(
-                f"{self.name}: {len(values)} inputs given, {len(ports)} expected ({names})"
-            )
+        ports = self._asked(values)
         for value, port in zip(values, ports, strict=True):
             shape = np.shape(value)
             if shape[len(shape) - len(port.shape) :] != port.shape:
                 expected = ", ".join(["...", *map(str, port.shape)])
                 raise DataError(f"{port.name}: shape {shape} given, ({expected}) expected")
         return self._evaluate(*values)
-
-    def _run(self, batch: int, inputs: Any, outputs: Any) -> None:
-        raise NotImplementedError("JAX arrays are not filled in place")

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from pteron.errors import DataError
 from pteron.kernels.operations import count_operations
 
-__all__ = ["Array", "Kernel", "Port"]
+__all__ = ["Array", "ArrayKernel", "Kernel", "Port"]
 
 Array = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ class Port:
 class Kernel(ABC):
     """Something that can be called with batches of states.
 
-    A target subclasses it and gives `source` and `_run`; see `pteron.kernels.targets`.
+    A target subclasses it; see `pteron.kernels.targets`.
 
     Parameters
     ----------
@@ -89,6 +89,25 @@ class Kernel(ABC):
     @abstractmethod
     def source(self) -> str:
         """The code that runs, as text."""
+
+    @abstractmethod
+    def __call__(self, *values: Any) -> Any:
+        """Evaluate the kernel: the inputs that are not fixed, in order."""
+
+    def _asked(self, values: Sequence[Any]) -> list[Port]:
+        """Return the inputs that are not fixed, of which as many values must be given."""
+        ports = [port for port in self.inputs if port.name not in self.fixed]
+        if len(values) != len(ports):
+            names = ", ".join(port.name for port in ports)
+            raise DataError(
+                f"{self.name}: {len(values)} inputs given, {len(ports)} expected ({names})"
+            )
+        return ports
+
+
+@dataclass(frozen=True)
+class ArrayKernel(Kernel):
+    """A kernel that fills arrays of floats with batches of states; a target gives `_run`."""
 
     @abstractmethod
     def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
@@ -129,12 +148,7 @@ class Kernel(ABC):
 
     def _checked(self, values: Sequence[ArrayLike]) -> Any:
         """Evaluate what may need checking, converting and broadcasting first."""
-        ports = [port for port in self.inputs if port.name not in self.fixed]
-        if len(values) != len(ports):
-            names = ", ".join(port.name for port in ports)
-            raise DataError(
-                f"{self.name}: {len(values)} inputs given, {len(ports)} expected ({names})"
-            )
+        ports = self._asked(values)
         given = {
             port.name: as_array(value, port.name, port.shape, self.dtype)
             for port, value in zip(ports, values, strict=True)

@@ -22,7 +22,7 @@ import numpy as np
 from pteron.kernels.cache import digest, entry, find
 from pteron.kernels.code import PYTHON, Stages, names_of, statements
 from pteron.kernels.graph import Graph, graph_of
-from pteron.kernels.kernel import Array, Kernel, Port
+from pteron.kernels.kernel import Array, ArrayKernel, Port
 
 __all__ = ["Jitted"]
 
@@ -30,7 +30,7 @@ _BLOCK = 64
 
 
 @dataclass(frozen=True)
-class Jitted(Kernel):
+class Jitted(ArrayKernel):
     """A kernel that Numba compiles."""
 
     @cached_property

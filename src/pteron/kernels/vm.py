@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import casadi as ca
 
-from pteron.kernels.kernel import Array, Kernel
+from pteron.kernels.kernel import Array, ArrayKernel
 
 __all__ = ["VirtualMachine"]
 
@@ -18,7 +18,7 @@ place (about 1 us a call), where a call with matrices takes 40 us."""
 
 
 @dataclass(frozen=True)
-class VirtualMachine(Kernel):
+class VirtualMachine(ArrayKernel):
     """A kernel that CasADi's virtual machine executes."""
 
     @property

@@ -6,14 +6,14 @@ import json
 from importlib.resources import files
 from typing import Any
 
-import jinja2
 import numpy as np
 from markupsafe import Markup, escape
 
 import pteron
 from pteron.manipulator import parameter_names, parameter_units
 from pteron.report.contents import Report
-from pteron.report.digits import compact, expression, fixed, significant, symbol, triple
+from pteron.report.digits import expression, fixed, symbol, triple
+from pteron.report.environment import environment
 from pteron.report.figures import figures
 from pteron.report.scene import scene
 from pteron.report.symbols import in_symbols
@@ -34,29 +34,19 @@ def page(report: Report) -> str:
     str
         HTML without any reference to another file or address.
     """
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("pteron", "report"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
+    templates = environment(
+        "report",
+        degrees=lambda angle, places=1: fixed(float(np.degrees(angle)), places),
+        expression=expression,
+        mm=lambda metres, places=1: fixed(1e3 * float(metres), places),
+        symbol=symbol,
+        triple=triple,
+        typeset=lambda text: escape(text).replace("J^-T", Markup("<b>J</b><sup>\u2212T</sup>")),
+        zip=zip,
     )
-    environment.filters |= {
-        "compact": compact,
-        "degrees": lambda angle, places=1: fixed(float(np.degrees(angle)), places),
-        "expression": expression,
-        "fixed": fixed,
-        "mm": lambda metres, places=1: fixed(1e3 * float(metres), places),
-        "significant": significant,
-        "symbol": symbol,
-        "triple": triple,
-        "typeset": lambda text: escape(text).replace("J^-T", Markup("<b>J</b><sup>\u2212T</sup>")),
-        "unit": lambda text: text.replace(" ", "\u202f").replace("^2", "²"),
-        "zip": zip,
-    }
     robot = report.robot
     units = dict(zip(parameter_names(robot), parameter_units(robot), strict=True))
-    return environment.get_template("page.html.j2").render(
+    return templates.get_template("page.html.j2").render(
         report=report,
         robot=robot,
         cycle=report.cycle,

@@ -15,7 +15,7 @@ import numpy as np
 from pteron.errors import ModelError
 from pteron.kernels import Array
 
-__all__ = ["RealBodies", "closest", "nearest", "widest"]
+__all__ = ["MissingSolver", "RealBodies", "closest", "nearest", "widest"]
 
 _TOLERANCE = 1e-10
 _SOLVED = ("optimal", "optimal_inaccurate")
@@ -108,12 +108,16 @@ def _solve(cp: Any, problem: Any) -> bool:
     return problem.status in _SOLVED
 
 
+class MissingSolver(ModelError):
+    """The packages that find real bodies are not installed."""
+
+
 def _cvxpy() -> Any:
     try:
         import clarabel  # type: ignore[import-untyped]  # noqa: F401
         import cvxpy
     except ImportError:
-        raise ModelError(
+        raise MissingSolver(
             "consistency needs cvxpy and Clarabel, which are not installed; "
             'pip install "pteron[consistency]"'
         ) from None

@@ -11,12 +11,13 @@ from pteron.identification.signals.lowpass import cutoff_of, smoothed
 from pteron.identification.signals.noise import white_noise
 from pteron.identification.signals.parallel import Decimation
 from pteron.identification.signals.spline import spline_motion
-from pteron.identification.signals.states import States
+from pteron.identification.signals.states import NoPose, States
 from pteron.identification.signals.treatment import Processing, Treatment, treatment_of
 
 __all__ = [
     "Decimation",
     "FourierSeries",
+    "NoPose",
     "Processing",
     "States",
     "Treatment",

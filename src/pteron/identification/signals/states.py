@@ -12,11 +12,15 @@ from pteron.kernels import Array, numeric
 from pteron.kinematics import direct_kinematics
 from pteron.manipulator import Manipulator
 
-__all__ = ["States"]
+__all__ = ["NoPose", "States"]
 
 _LEAST_SINE = 1e-3
 _LEAST_REGULARITY = 1e-3
 """Next to a singularity the regressor grows without bound, and with it every error."""
+
+
+class NoPose(DataError):
+    """Sliders of a sample have no pose in the machine's assembly mode."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +89,7 @@ class States:
         pose = np.ascontiguousarray(direct_kinematics(robot, sliders)[:, mode])
         lost = np.isnan(pose).any(axis=-1)
         if lost.any():
-            raise DataError(_no_pose(robot, sliders, lost, mode, source, first_row))
+            raise NoPose(_no_pose(robot, sliders, lost, mode, source, first_row))
         _check_regular(robot, pose, source, first_row)
         velocity, acceleration = numeric(robot, "platform_motion")(pose, rates, accelerations)
         phases = np.zeros(len(time), dtype=np.int64) if payload is None else payload

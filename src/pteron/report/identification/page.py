@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 from importlib.resources import files
 
-import jinja2
 from markupsafe import Markup, escape
 
 import pteron
 from pteron.identification import Identification
 from pteron.identification.verdict import AT_THE_FLOOR, LARGE, SMALL
-from pteron.report.digits import compact, fixed, significant
+from pteron.report.digits import significant
+from pteron.report.environment import environment
 from pteron.report.identification.contents import contents
 from pteron.report.identification.figures import figures
 from pteron.report.identification.names import typeset
@@ -35,25 +35,15 @@ def page(result: Identification, model_file: str | None = None) -> str:
     str
         HTML without any reference to another file or address.
     """
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("pteron", "report/identification"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
+    templates = environment(
+        "report/identification",
+        measured=lambda row: measured(row.value, row.half),
+        percent=_percent,
+        prose=_prose,
+        typeset=typeset,
     )
-    environment.filters |= {
-        "compact": compact,
-        "fixed": fixed,
-        "measured": lambda row: measured(row.value, row.half),
-        "percent": _percent,
-        "significant": significant,
-        "prose": _prose,
-        "typeset": typeset,
-        "unit": lambda text: text.replace(" ", "\u202f").replace("^2", "²"),
-    }
     found = contents(result)
-    return environment.get_template("page.html.j2").render(
+    return templates.get_template("page.html.j2").render(
         found=found,
         result=result,
         robot=result.robot,
