@@ -11,6 +11,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from pteron.bodies.inertia import PlanarInertia, RodInertia
+from pteron.bodies.parameters import Parameter
 from pteron.dynamics import (
     bias_forces,
     coriolis_matrix,
@@ -37,6 +39,7 @@ from pteron.kinematics import (
     inverse_kinematics,
     is_singular_everywhere,
     jacobian,
+    joint_accelerations,
     joint_rates,
     joint_screws,
     link_jacobians,
@@ -44,20 +47,22 @@ from pteron.kinematics import (
     random_poses,
     singular_orientations,
 )
+from pteron.legs import PRRR, RSS
+from pteron.legs import PRRR as Leg
 from pteron.manipulator import (
-    Leg,
     Manipulator,
-    PlanarInertia,
-    Platform,
     catalog,
     load,
+    parameter_data,
     parameter_names,
+    parameter_units,
     parameters,
     save,
     turned,
     with_parameters,
     working_modes,
 )
+from pteron.platforms import Platform
 
 if TYPE_CHECKING:
     from pteron import identification, motion, plots, report, workspace
@@ -83,6 +88,10 @@ _LATER_MODULES = ("identification", "motion", "plots", "report", "workspace")
 """What would slow the start of those who do not use it (SymPy, SciPy, matplotlib)."""
 
 
+def __dir__() -> list[str]:
+    return sorted([*__all__, "__version__"])
+
+
 def __getattr__(name: str) -> Any:
     if name in _LATER:
         return getattr(import_module(_LATER[name]), name)
@@ -92,6 +101,13 @@ def __getattr__(name: str) -> Any:
 
 
 __all__ = [
+    "parameter_units",
+    "parameter_data",
+    "joint_accelerations",
+    "RodInertia",
+    "RSS",
+    "PRRR",
+    "Parameter",
     "BaseParameters",
     "DataError",
     "JointMotion",

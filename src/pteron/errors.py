@@ -2,16 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = [
-    "DataError",
-    "ModelError",
-    "OutputError",
-    "PteronError",
-    "SingularPose",
-    "UnreachablePose",
-]
-
-
 class PteronError(ValueError):
     """Root of every error that Pteron raises for something the user can mend."""
 
@@ -34,9 +24,9 @@ class UnreachablePose(PteronError):
     Attributes
     ----------
     leg : int
-        The leg that fails, counted from 1 as in the paper.
+        The leg that fails, counted from 1 as in the paper; 0 where no single leg does.
     shortfall : float
-        By how many metres its links miss the platform point.
+        By how many metres it misses the platform point.
     index : tuple of int
         Which element of the batch; empty for a single pose.
     """
@@ -54,19 +44,22 @@ class SingularPose(PteronError):
     Attributes
     ----------
     kind : str
-        ``"I"`` (a leg stretched or folded), ``"II"`` (the sliders do not hold the platform) or
-        ``"elbow"`` (R1 and R3 of a leg coincide, so that its elbow may be anywhere).
-    closeness : float
-        A number without unit that is 0 at the singularity: the sine of the elbow's angle for
-        kind I, the ratio abs(det J) to its largest value over all orientations for kind II.
+        ``"I"`` (a leg stretched or folded), ``"II"`` (the actuators do not hold the platform) or
+        ``"elbow"`` (the two ends of a leg coincide, so that its elbow may be anywhere).
+    measure : float
+        The type-I measure of the leg, or the type-II measure of the machine: a number without unit
+        that is 0 at the singularity and 1 at best.
     index : tuple of int
         Which element of the batch; empty for a single pose.
+    leg : int
+        The leg, counted from 1; 0 for kind II.
     """
 
     def __init__(
-        self, message: str, *, kind: str, closeness: float, index: tuple[int, ...]
+        self, message: str, *, kind: str, measure: float, index: tuple[int, ...], leg: int = 0
     ) -> None:
         super().__init__(message)
         self.kind = kind
-        self.closeness = closeness
+        self.measure = measure
         self.index = index
+        self.leg = leg

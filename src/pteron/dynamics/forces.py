@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from pteron.conventions import BatchOfPoses, BatchOfSliders, OnFailure, PoseLike, SliderLike
-from pteron.kernels import numeric
-from pteron.kinematics.poses import blanked, finite, usable_poses
+from pteron.kinematics.evaluate import evaluated
 from pteron.manipulator import Manipulator
-
-__all__ = ["forward_dynamics", "inverse_dynamics"]
+from pteron.shapes import JointsLike, OnFailure, PerCoordinate, PerJoint, PoseLike
 
 
 def inverse_dynamics(
@@ -18,7 +15,7 @@ def inverse_dynamics(
     wrench: PoseLike | None = None,
     *,
     on_failure: OnFailure = "raise",
-) -> BatchOfSliders:
+) -> PerJoint:
     """Return the actuator forces of a motion, by virtual work, Eqs. (13) and (14).
 
     F_a = - F_p - J^-T (sum J_u^T F_u + sum J_l^T F_l + F_e), without friction.
@@ -37,14 +34,14 @@ def inverse_dynamics(
     Returns
     -------
     array, shape (..., n)
-        Forces on the sliders, N, positive along +e.
+        N at a slider, N m at a crank; positive along +q.
 
     Raises
     ------
     UnreachablePose
-        If a leg's links do not reach a pose.
+        If a leg does not reach a pose.
     SingularPose
-        If a leg is stretched or folded (type I), or the sliders do not hold the platform (type II).
+        If a leg is stretched or folded (type I), or the actuators do not hold the platform (type II).
 
     Examples
     --------
@@ -55,25 +52,22 @@ def inverse_dynamics(
     >>> forces.round(3)
     array([31.082, -1.881,  2.566,  0.685])
     """
-    poses = usable_poses(robot, pose, bent=True, held=True, on_failure=on_failure)
-    rate = finite(robot, velocity, "velocity", on_failure)
-    second = finite(robot, acceleration, "acceleration", on_failure)
-    if wrench is None:
-        return blanked(numeric(robot, "inverse_dynamics")(poses, rate, second), poses, rate, second)
-    load = finite(robot, wrench, "wrench", on_failure)
-    forces = numeric(robot, "inverse_dynamics_loaded")(poses, rate, second, load)
-    return blanked(forces, poses, rate, second, load)
+    motion = pose, velocity, acceleration
+    loaded = wrench is not None
+    values = (*motion, wrench) if loaded else motion
+    forces: PerJoint = evaluated(robot, "inverse_dynamics", on_failure, *values, wrench=loaded)
+    return forces
 
 
 def forward_dynamics(
     robot: Manipulator,
     pose: PoseLike,
     velocity: PoseLike,
-    forces: SliderLike,
+    forces: JointsLike,
     wrench: PoseLike | None = None,
     *,
     on_failure: OnFailure = "raise",
-) -> BatchOfPoses:
+) -> PerCoordinate:
     """Return the platform's acceleration under actuator forces: M x'' = J^T F + wrench - h.
 
     It needs no J^-1, so that it is defined at type-II singularities too.
@@ -85,7 +79,7 @@ def forward_dynamics(
     pose, velocity : array, shape (..., m)
         The platform's state; m, rad and s.
     forces : array, shape (..., n)
-        Forces on the sliders, N, positive along +e.
+        N at a slider, N m at a crank; positive along +q.
     wrench : array, shape (..., m), optional
         What acts on the platform at P: a force in N and, for 3T1R, a moment about k in N m.
     on_failure : {"raise", "nan"}
@@ -99,7 +93,7 @@ def forward_dynamics(
     Raises
     ------
     UnreachablePose
-        If a leg's links do not reach a pose.
+        If a leg does not reach a pose.
     SingularPose
         If a leg is stretched or folded (type I).
 
@@ -112,11 +106,8 @@ def forward_dynamics(
     >>> np.abs(pteron.forward_dynamics(robot, rest, rest, holding)).max() < 1e-12
     np.True_
     """
-    poses = usable_poses(robot, pose, bent=True, on_failure=on_failure)
-    rate = finite(robot, velocity, "velocity", on_failure)
-    push = finite(robot, forces, "forces", on_failure)
-    if wrench is None:
-        return blanked(numeric(robot, "forward_dynamics")(poses, rate, push), poses, rate, push)
-    load = finite(robot, wrench, "wrench", on_failure)
-    acceleration = numeric(robot, "forward_dynamics_loaded")(poses, rate, push, load)
-    return blanked(acceleration, poses, rate, push, load)
+    state = pose, velocity, forces
+    loaded = wrench is not None
+    values = (*state, wrench) if loaded else state
+    found: PerCoordinate = evaluated(robot, "forward_dynamics", on_failure, *values, wrench=loaded)
+    return found

@@ -2,24 +2,14 @@
 
 from __future__ import annotations
 
-from pteron.conventions import BatchOfMatrices, BatchOfNumbers, BatchOfPoses, OnFailure, PoseLike
-from pteron.kernels import numeric
-from pteron.kinematics.poses import blanked, finite, usable_poses
+from pteron.kinematics.evaluate import evaluated
 from pteron.manipulator import Manipulator
-
-__all__ = [
-    "bias_forces",
-    "coriolis_matrix",
-    "gravity_forces",
-    "kinetic_energy",
-    "mass_matrix",
-    "potential_energy",
-]
+from pteron.shapes import Matrices, Numbers, OnFailure, PerCoordinate, PoseLike
 
 
 def mass_matrix(
     robot: Manipulator, pose: PoseLike, *, on_failure: OnFailure = "raise"
-) -> BatchOfMatrices:
+) -> Matrices:
     """Return the mass matrix M of M x'' + h = J^T F, in platform coordinates.
 
     Parameters
@@ -39,7 +29,7 @@ def mass_matrix(
     Raises
     ------
     UnreachablePose
-        If a leg's links do not reach a pose.
+        If a leg does not reach a pose.
     SingularPose
         If a leg is stretched or folded (type I).
 
@@ -50,13 +40,13 @@ def mass_matrix(
     >>> np.allclose(M, M.T), np.linalg.eigvalsh(M).min() > 0
     (True, np.True_)
     """
-    poses = usable_poses(robot, pose, bent=True, on_failure=on_failure)
-    return blanked(numeric(robot, "mass_matrix")(poses), poses)
+    found: Matrices = evaluated(robot, "mass_matrix", on_failure, pose)
+    return found
 
 
 def coriolis_matrix(
     robot: Manipulator, pose: PoseLike, velocity: PoseLike, *, on_failure: OnFailure = "raise"
-) -> BatchOfMatrices:
+) -> Matrices:
     """Return C of M x'' + C x' + g = J^T F, from Christoffel's symbols of M.
 
     With this C, dM/dt - 2 C is skew-symmetric.
@@ -77,18 +67,17 @@ def coriolis_matrix(
     Raises
     ------
     UnreachablePose
-        If a leg's links do not reach a pose.
+        If a leg does not reach a pose.
     SingularPose
         If a leg is stretched or folded (type I).
     """
-    poses = usable_poses(robot, pose, bent=True, on_failure=on_failure)
-    rate = finite(robot, velocity, "velocity", on_failure)
-    return blanked(numeric(robot, "coriolis_matrix")(poses, rate), poses, rate)
+    found: Matrices = evaluated(robot, "coriolis_matrix", on_failure, pose, velocity)
+    return found
 
 
 def bias_forces(
     robot: Manipulator, pose: PoseLike, velocity: PoseLike, *, on_failure: OnFailure = "raise"
-) -> BatchOfPoses:
+) -> PerCoordinate:
     """Return h = C x' + g of M x'' + h = J^T F: Coriolis, centrifugal and gravity forces.
 
     Parameters
@@ -108,18 +97,17 @@ def bias_forces(
     Raises
     ------
     UnreachablePose
-        If a leg's links do not reach a pose.
+        If a leg does not reach a pose.
     SingularPose
         If a leg is stretched or folded (type I).
     """
-    poses = usable_poses(robot, pose, bent=True, on_failure=on_failure)
-    rate = finite(robot, velocity, "velocity", on_failure)
-    return blanked(numeric(robot, "bias_forces")(poses, rate), poses, rate)
+    found: PerCoordinate = evaluated(robot, "bias_forces", on_failure, pose, velocity)
+    return found
 
 
 def gravity_forces(
     robot: Manipulator, pose: PoseLike, *, on_failure: OnFailure = "raise"
-) -> BatchOfPoses:
+) -> PerCoordinate:
     """Return g of M x'' + C x' + g = J^T F: the gradient of the potential energy.
 
     Parameters
@@ -139,17 +127,17 @@ def gravity_forces(
     Raises
     ------
     UnreachablePose
-        If a leg's links do not reach a pose.
+        If a leg does not reach a pose.
     SingularPose
         If a leg is stretched or folded (type I).
     """
-    poses = usable_poses(robot, pose, bent=True, on_failure=on_failure)
-    return blanked(numeric(robot, "gravity_forces")(poses), poses)
+    found: PerCoordinate = evaluated(robot, "gravity_forces", on_failure, pose)
+    return found
 
 
 def kinetic_energy(
     robot: Manipulator, pose: PoseLike, velocity: PoseLike, *, on_failure: OnFailure = "raise"
-) -> BatchOfNumbers:
+) -> Numbers:
     """Return the kinetic energy T = x'^T M x' / 2.
 
     Parameters
@@ -169,18 +157,17 @@ def kinetic_energy(
     Raises
     ------
     UnreachablePose
-        If a leg's links do not reach a pose.
+        If a leg does not reach a pose.
     SingularPose
         If a leg is stretched or folded (type I).
     """
-    poses = usable_poses(robot, pose, bent=True, on_failure=on_failure)
-    rate = finite(robot, velocity, "velocity", on_failure)
-    return blanked(numeric(robot, "kinetic_energy")(poses, rate), poses, rate)
+    found: Numbers = evaluated(robot, "kinetic_energy", on_failure, pose, velocity)
+    return found
 
 
 def potential_energy(
     robot: Manipulator, pose: PoseLike, *, on_failure: OnFailure = "raise"
-) -> BatchOfNumbers:
+) -> Numbers:
     """Return the potential energy of gravity, zero with every mass at the base frame's origin.
 
     Parameters
@@ -200,9 +187,9 @@ def potential_energy(
     Raises
     ------
     UnreachablePose
-        If a leg's links do not reach a pose.
+        If a leg does not reach a pose.
     SingularPose
-        If R1 and R3 of a leg coincide, so that its elbow is undetermined.
+        If the two ends of a leg coincide, so that its elbow is undetermined.
     """
-    poses = usable_poses(robot, pose, reach=True, on_failure=on_failure)
-    return blanked(numeric(robot, "potential_energy")(poses), poses)
+    found: Numbers = evaluated(robot, "potential_energy", on_failure, pose)
+    return found

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from pteron.conventions import BatchOfRegressors, OnFailure, PoseLike
-from pteron.kernels import numeric
-from pteron.kinematics.poses import blanked, finite, usable_poses
+from pteron.kinematics.evaluate import evaluated
 from pteron.manipulator import Manipulator
-
-__all__ = ["regressor"]
+from pteron.shapes import OnFailure, PoseLike, Regressors
 
 
 def regressor(
@@ -17,7 +14,7 @@ def regressor(
     acceleration: PoseLike,
     *,
     on_failure: OnFailure = "raise",
-) -> BatchOfRegressors:
+) -> Regressors:
     """Return the dynamic matrix D of Eq. (15): D @ parameters(robot) = inverse_dynamics(...).
 
     Parameters
@@ -32,14 +29,14 @@ def regressor(
     Returns
     -------
     array, shape (..., n, N)
-        Newtons per unit of each parameter, in the order of `parameter_names`.
+        N or N m per unit of each parameter, in the order of `parameter_names`.
 
     Raises
     ------
     UnreachablePose
-        If a leg's links do not reach a pose.
+        If a leg does not reach a pose.
     SingularPose
-        If a leg is stretched or folded (type I), or the sliders do not hold the platform (type II).
+        If a leg is stretched or folded (type I), or the actuators do not hold the platform (type II).
 
     Examples
     --------
@@ -50,8 +47,6 @@ def regressor(
     >>> D.shape, np.allclose(D @ pteron.parameters(robot), pteron.inverse_dynamics(robot, *state))
     ((4, 40), True)
     """
-    poses = usable_poses(robot, pose, bent=True, held=True, on_failure=on_failure)
-    rate = finite(robot, velocity, "velocity", on_failure)
-    second = finite(robot, acceleration, "acceleration", on_failure)
-    matrices: BatchOfRegressors = numeric(robot, "regressor")(poses, rate, second)
-    return blanked(matrices, poses, rate, second)
+    motion = pose, velocity, acceleration
+    matrices: Regressors = evaluated(robot, "regressor", on_failure, *motion)
+    return matrices

@@ -4,48 +4,25 @@ from __future__ import annotations
 
 import casadi as ca
 
-from pteron.equations.closure import Load, actuator_forces
-from pteron.equations.geometry import Expression, Geometry
-from pteron.equations.legs import leg_motion, point_rows
-from pteron.equations.platforms import platform_motion
-
-_PARALLEL = 1.0 - 1e-12
-"""Cosine between d and k above which R3 and R4 of a leg are one joint."""
+from pteron.bodies.motion import Expression
+from pteron.equations.machine import Machine, State
 
 
-def passive_friction(geometry: Geometry, pose: Expression, velocity: Expression) -> Expression:
-    """Return, for a unit coefficient in each passive joint, the actuator forces (n, 3 n + 1).
+def passive_friction(machine: Machine, state: State) -> Expression:
+    """Return, for a unit coefficient in each passive joint, the actuator forces (n, columns).
 
     By virtual work: a joint at the rate q' with the coefficient c needs J^T F = c (dq'/dx')^T q'.
-    Columns are R1, R2 and R3 of leg 1, of leg 2, ...; for 3T1R one more follows, for all R4: they
-    turn alike, at phi', so that only the sum of their coefficients acts. Where d is parallel to k,
-    R3 and R4 are one joint, at the column of R3.
+    Columns are the passive joints of leg 1 that turn by the motion of its point, of leg 2, ...;
+    under a platform that turns one more follows, for all joints about its axis: they turn alike, at
+    phi', so that only the sum of their coefficients acts.
     """
-    motion = platform_motion(geometry, pose, velocity, ca.SX.zeros(geometry.freedom))
-    turn_rate = velocity[3] if geometry.turns else ca.SX(0)
     columns = []
-    for i, (leg, point) in enumerate(zip(geometry.legs, motion.points, strict=True)):
-        state = leg_motion(leg, point)
-        _, upper, lower = point_rows(leg, state.position)
-        along = ca.dot(leg.d, geometry.k)
-        sense = ca.if_else(ca.fabs(along) > _PARALLEL, along, 0) if geometry.turns else ca.SX(0)
-        joints = (
-            (state.upper_rate, upper, 0),
-            (state.lower_rate - state.upper_rate, lower - upper, 0),
-            (sense * turn_rate - state.lower_rate, -lower, sense),
-        )
-        for rate, row, share in joints:
-            load = Load.at_point(geometry, i, row * rate)
-            columns.append(load + _moment(geometry, share * rate))
-    if geometry.turns:
-        columns.append(_moment(geometry, turn_rate))
-    forces = (actuator_forces(geometry, load, motion.turn) for load in columns)
+    for i, leg in enumerate(state.legs):
+        for joint in leg.chain[1:]:
+            if not joint.row[:3].is_zero():
+                columns.append(machine.platform.load(i, ca.mtimes(joint.row.T, joint.rate)))
+    if state.platform.angle is not None:
+        about = ca.vertcat(ca.SX(3, 1), state.platform.angle.rate)
+        columns.append(machine.platform.given(about))
+    forces = [machine.closure.forces(load, state.platform, state.legs) for load in columns]
     return ca.horzcat(*forces)
-
-
-def _moment(geometry: Geometry, moment: Expression) -> Load:
-    """Return the load of a moment about k."""
-    wrench = ca.SX.zeros(geometry.freedom)
-    if geometry.turns:
-        wrench[3] = moment
-    return Load.of(wrench)

@@ -10,12 +10,10 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from pteron.equations.bodies import Inertia, first_moment, moment, turning_force
-from pteron.equations.closure import Load, actuator_forces
-from pteron.equations.geometry import Expression, Geometry
-from pteron.equations.jacobians import jacobian, link_jacobians
-from pteron.equations.legs import leg_motion
-from pteron.equations.platforms import platform_motion
+from pteron.bodies.motion import Expression, wrench_matrix
+from pteron.bodies.parameters import LEG_BODIES
+from pteron.equations.kinematics import body_jacobian, jacobian
+from pteron.equations.machine import Machine, State
 
 
 @dataclass(frozen=True)
@@ -25,98 +23,55 @@ class Terms:
     jacobian: Expression
     """J (n, m)."""
     sliders: Expression
-    """Om_p (n, n)."""
+    """Om_p (n, n): for each slider the force on it, per unit of its mass; zero without one."""
     link_jacobians: tuple[Expression, ...]
     """J_u1..J_un, J_l1..J_ln, each (6, m)."""
     links: tuple[Expression, ...]
-    """Om_u1..Om_un, Om_l1..Om_ln, each (6, 4)."""
+    """Om_u1..Om_un, Om_l1..Om_ln, each (6, 4), or (6, 3) for rods."""
     platform: Expression
     """Om_e (m, 4)."""
 
 
-def body_matrix(
-    x: Expression,
-    z: Expression,
-    g_a: Expression,
-    rate: Expression,
-    ddtheta: Expression,
-) -> Expression:
-    """Return Om (6, 4) of a body: the wrench at its reference point, per unit of m, mgx, mgy, I.
-
-    `x` and `z` are the body's axes, `g_a` is g - a, `rate` and `ddtheta` its motion about z.
-    """
-    unit = Inertia.rows(ca.SX.eye(4))
-    h, dh = first_moment(x, ca.cross(z, x), unit.hx, unit.hy)
-    force = ca.mtimes(g_a, unit.m) - turning_force(h, dh, rate * rate, ddtheta)
-    return ca.vertcat(force, ca.mtimes(z, -moment(dh, unit.i, -g_a, ddtheta)))
-
-
-def terms(
-    geometry: Geometry, pose: Expression, velocity: Expression, acceleration: Expression
-) -> Terms:
+def terms(machine: Machine, state: State) -> Terms:
     """Return the factors of Eq. (15)."""
-    motion = platform_motion(geometry, pose, velocity, acceleration)
-    g = geometry.gravity
-    diagonal, upper, lower = [], [], []
-    for leg, point in zip(geometry.legs, motion.points, strict=True):
-        state = leg_motion(leg, point)
-        at = state.position
-        diagonal.append(ca.dot(leg.e, g) - state.slider_acceleration)
-        upper.append(
-            body_matrix(
-                ca.mtimes(leg.plane, at.l_u) / leg.lu,
-                leg.d,
-                g - state.slider_acceleration * leg.e,
-                state.upper_rate,
-                state.upper_acceleration,
-            )
-        )
-        lower.append(
-            body_matrix(
-                ca.mtimes(leg.plane, at.l_l) / leg.ll,
-                leg.d,
-                g - point.acceleration,
-                state.lower_rate,
-                state.lower_acceleration,
-            )
-        )
-    upper_jacobians, lower_jacobians = link_jacobians(geometry, pose)
+    slider, *links = LEG_BODIES
+    n = machine.freedom
+    diagonal = []
+    for leg in state.legs:
+        body = leg.bodies.get(slider)
+        force = ca.SX(1, 1)
+        if body is not None:
+            force = ca.dot(leg.chain[0].axis, machine.gravity - body.acceleration)
+        diagonal.append(force)
+    places = [(i, link) for link in links for i in range(n) if link in state.legs[i].bodies]
+    jacobians = [body_jacobian(state, i, link) for i, link in places]
+    matrices = [wrench_matrix(state.legs[i].bodies[link], machine.gravity) for i, link in places]
+    body = state.platform.body
+    rows = ca.mtimes(ca.vertcat(body.velocity_row, body.turning_row), state.platform.matrix)
     return Terms(
-        jacobian(geometry, pose),
+        jacobian(state),
         ca.diag(ca.vertcat(*diagonal)),
-        (*upper_jacobians, *lower_jacobians),
-        (*upper, *lower),
-        _platform_matrix(geometry, pose, velocity, acceleration),
+        tuple(jacobians),
+        tuple(matrices),
+        ca.mtimes(rows.T, wrench_matrix(body, machine.gravity)),
     )
 
 
-def _platform_matrix(
-    geometry: Geometry, pose: Expression, velocity: Expression, acceleration: Expression
-) -> Expression:
-    g_p = geometry.gravity - acceleration[0:3]
-    if not geometry.turns:
-        still = ca.SX(0)
-        return body_matrix(geometry.x0, geometry.k, g_p, still, still)[0:3, :]
-    x = geometry.x0 * ca.cos(pose[3]) + geometry.y0 * ca.sin(pose[3])
-    matrix = body_matrix(x, geometry.k, g_p, velocity[3], acceleration[3])
-    return ca.vertcat(matrix[0:3, :], ca.mtimes(geometry.k.T, matrix[3:6, :]))
-
-
-def generalized_regressor(parts: Terms) -> Expression:
+def generalized_regressor(machine: Machine, state: State) -> Expression:
     """Return the bracket of Eq. (15), (m, N)."""
+    parts = terms(machine, state)
+    with_slider = [i for i, leg in enumerate(state.legs) if LEG_BODIES[0] in leg.bodies]
     links = (
         ca.mtimes(jac.T, body) for jac, body in zip(parts.link_jacobians, parts.links, strict=True)
     )
-    return ca.horzcat(ca.mtimes(parts.jacobian.T, parts.sliders), *links, parts.platform)
+    sliders = ca.mtimes(parts.jacobian.T, parts.sliders[:, with_slider])
+    return ca.horzcat(sliders, *links, parts.platform)
 
 
-def paper_regressor(
-    geometry: Geometry, pose: Expression, velocity: Expression, acceleration: Expression
-) -> Expression:
+def paper_regressor(machine: Machine, state: State) -> Expression:
     """Return the dynamic matrix D (n, N) of Eq. (15): F_a = D P.
 
     Omega holds what acts on the bodies, so that the forces which balance it carry a minus sign.
     """
-    bracket = generalized_regressor(terms(geometry, pose, velocity, acceleration))
-    turn = platform_motion(geometry, pose, velocity, acceleration).turn
-    return -actuator_forces(geometry, Load.of(bracket), turn)
+    load = machine.platform.given(generalized_regressor(machine, state))
+    return -machine.closure.forces(load, state.platform, state.legs)

@@ -10,16 +10,27 @@ from pteron.kernels.functions import (
     Columns,
     Program,
     general_program,
+    needs_of,
     program,
     specialised,
 )
 from pteron.kernels.graph import Graph, graph_of
 from pteron.kernels.kernel import Array, Kernel, Port, as_array
 from pteron.kernels.operations import count_operations
-from pteron.kernels.targets import TARGETS, columns_of, compile, same_layout
+from pteron.kernels.targets import (
+    OTHER_LAYOUT,
+    TARGETS,
+    Selects,
+    columns_of,
+    compile,
+    same_layout,
+)
 
 __all__ = [
     "FUNCTIONS",
+    "OTHER_LAYOUT",
+    "Selects",
+    "needs_of",
     "TARGETS",
     "Array",
     "Columns",

@@ -13,9 +13,9 @@ from typing import Any
 from pteron.kernels.c import Compiled, compiler
 from pteron.kernels.functions import Columns, bare, program
 from pteron.kernels.kernel import Array, Kernel
-from pteron.kernels.targets import Selects, columns_of, compile
+from pteron.kernels.targets import Selects, columns_of
 from pteron.kernels.vm import VirtualMachine
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, parameters
 
 __all__ = ["VARIABLE", "Adaptive", "numeric"]
 
@@ -32,7 +32,9 @@ _AT_WORK = threading.Semaphore(1)
 """One compilation at a time; who comes meanwhile asks again later."""
 
 
-def numeric(robot: Manipulator, what: str, *, base: Selects | None = None) -> Kernel:
+def numeric(
+    robot: Manipulator, what: str, *, base: Selects | None = None, wrench: bool = False
+) -> Kernel:
     """Return what evaluates a function for the public functions, by this policy.
 
     A first call runs at once, on CasADi's virtual machine: about 1 us a state, nothing to compile.
@@ -43,22 +45,15 @@ def numeric(robot: Manipulator, what: str, *, base: Selects | None = None) -> Ke
     it was asked for. Nothing is compiled at import. `PTERON_KERNELS=vm` in the environment keeps to
     the virtual machine; `compile` gives a kernel of any target, compiled when asked.
     """
-    if base is None:
-        return _known(robot, what)
-    kernel = compile(robot, what, base=base, grade="parametric")
-    return _adaptive(kernel, _tier(bare(robot), what, columns_of(base)))
+    return _known(robot, what, None if base is None else columns_of(base), wrench)
 
 
 @lru_cache(maxsize=512)
-def _known(robot: Manipulator, what: str) -> Kernel:
-    kernel = compile(robot, what, grade="parametric")
-    return _adaptive(kernel, _tier(bare(robot), what, None))
-
-
-def _adaptive(kernel: Kernel, tier: _Tier) -> Kernel:
-    return Adaptive(
-        kernel.name, kernel.function, kernel.inputs, kernel.outputs, kernel.fixed, tier=tier
-    )
+def _known(robot: Manipulator, what: str, columns: Columns | None, wrench: bool) -> Kernel:
+    built = program(robot, what, columns, wrench=wrench, guarded=True)
+    fixed = {port.name: parameters(robot) for port in built.inputs if port.name == "parameters"}
+    tier = _tier(bare(robot), what, columns, wrench)
+    return Adaptive(built.name, built.function, built.inputs, built.outputs, fixed, tier=tier)
 
 
 class _Tier:
@@ -95,9 +90,9 @@ class _Tier:
 
 
 @lru_cache(maxsize=512)
-def _tier(layout: Manipulator, what: str, columns: Columns | None) -> _Tier:
+def _tier(layout: Manipulator, what: str, columns: Columns | None, wrench: bool) -> _Tier:
     """Return what machines of one layout share; their inertial parameters are left out of it."""
-    built = program(layout, what, columns)
+    built = program(layout, what, columns, wrench=wrench, guarded=True)
     return _Tier(Compiled(built.name, built.function, built.inputs, built.outputs))
 
 

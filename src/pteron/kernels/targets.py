@@ -7,7 +7,7 @@ from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
 
-from pteron.equations.geometry import geometry_values
+from pteron.equations.machine import numbers
 from pteron.errors import ModelError
 from pteron.kernels.c import Compiled
 from pteron.kernels.exact import Exact
@@ -17,8 +17,6 @@ from pteron.kernels.kernel import Array, Kernel
 from pteron.kernels.numba import Jitted
 from pteron.kernels.vm import VirtualMachine
 from pteron.manipulator import Manipulator, parameters
-
-__all__ = ["TARGETS", "Grade", "Selects", "columns_of", "compile", "same_layout"]
 
 TARGETS: dict[str, type[Kernel]] = {
     "vm": VirtualMachine,
@@ -55,6 +53,7 @@ def compile(
     target: str = "vm",
     *,
     base: Selects | None = None,
+    wrench: bool = False,
     grade: Grade = "specialised",
     dtype: str = "float64",
     threads: int = 1,
@@ -74,6 +73,9 @@ def compile(
     base : BaseParameters, optional
         For `"inverse_dynamics"`: compute from these base parameters alone, in the cheapest form
         that they allow (see `pteron.cheapest_parameters`). For `"base_regressor"`: whose columns.
+    wrench : bool
+        For `"inverse_dynamics"` and `"forward_dynamics"`: whether a wrench on the platform is an
+        input too, after the state.
     grade : {"specialised", "parametric", "general"}
         What is folded into the code: all of the machine's numbers, for fewest operations; its
         geometry and gravity, so that inertial parameters are an input; or nothing, so that one
@@ -120,17 +122,20 @@ def compile(
     if threads < 1:
         raise ModelError(f"threads: {threads} given, 1 or more expected")
     if base is None:
-        return _compiled(robot, what, target, None, None, grade, dtype, threads)
+        return _compiled(robot, what, target, None, None, wrench, grade, dtype, threads)
     if grade == "general":
         raise ModelError('base: a choice for one machine; use grade "specialised" or "parametric"')
     if not same_layout(base.robot, robot):
-        raise ModelError(
-            f"base: belongs to {base.robot.name}, whose layout or gravity differ from those of "
-            f"{robot.name}; ask for base_parameters of this one"
-        )
+        raise ModelError(OTHER_LAYOUT.format(base.robot.name, robot.name))
     columns = columns_of(base)
     values = tuple(base.values(robot).tolist())
-    return _compiled(robot, what, target, columns, values, grade, dtype, threads)
+    return _compiled(robot, what, target, columns, values, wrench, grade, dtype, threads)
+
+
+OTHER_LAYOUT = (
+    "base: belongs to {}, whose layout or gravity differ from those of {}; ask for base_parameters "
+    "of this one"
+)
 
 
 def columns_of(base: Selects) -> Columns:
@@ -145,23 +150,25 @@ def _compiled(
     target: str,
     columns: Columns | None,
     base_values: tuple[float, ...] | None,
+    wrench: bool,
     grade: Grade,
     dtype: str,
     threads: int,
 ) -> Kernel:
-    built = program(robot, what, columns)
+    built = program(robot, what, columns, wrench=wrench)
     fixed: dict[str, Array] = {}
     for port in built.inputs:
         if port.name == "parameters":
             fixed[port.name] = parameters(robot)
         elif port.name == "base_parameters":
-            values = np.array(base_values)
-            fixed[port.name] = values if built.scale is None else np.array(built.scale) @ values
+            fixed[port.name] = np.array(base_values)
     if grade == "specialised" and fixed:
         built, fixed = specialised(built, fixed), {}
     elif grade == "general":
-        built = general_program(len(robot.legs), robot.platform.turns, what)
-        fixed["geometry"] = np.array(geometry_values(robot))
+        if wrench:
+            raise ModelError('wrench: not with grade "general"; use "specialised" or "parametric"')
+        built = general_program(robot, what)
+        fixed["geometry"] = np.array(numbers(robot))
     for value in fixed.values():
         value.setflags(write=False)  # the kernel is shared by all who ask for it
     return _made(TARGETS[target], built, fixed, dtype, threads)
@@ -195,7 +202,11 @@ def same_layout(one: Manipulator, other: Manipulator) -> bool:
 def _layout(robot: Manipulator) -> tuple[Any, ...]:
     """Return what base parameters depend on: neither inertia, nor guide points, nor elbows."""
     legs = [
-        (leg.direction, leg.e, leg.platform_point, leg.upper_length, leg.lower_length)
+        (
+            leg.type,
+            leg.platform_point,
+            *(tuple(q.value) for q in leg.quantities if q.role in ("direction", "length")),
+        )
         for leg in robot.legs
     ]
     return (robot.platform.motion, robot.platform.frame, robot.gravity, *legs)

@@ -1,29 +1,32 @@
 """Kinematics in numbers: batched, validated, documented."""
 
-from pteron.kinematics.poses import SINGULAR, usable_poses
-from pteron.kinematics.position import direct_kinematics, inverse_kinematics, link_vectors
-from pteron.kinematics.sampling import random_poses
-from pteron.kinematics.singularities import is_singular_everywhere, singular_orientations
-from pteron.kinematics.velocity import (
+from pteron.kinematics.joints import (
     JointMotion,
-    jacobian,
+    joint_accelerations,
     joint_rates,
     joint_screws,
-    link_jacobians,
 )
+from pteron.kinematics.position import (
+    direct_kinematics,
+    inverse_kinematics,
+    jacobian,
+    link_jacobians,
+    link_vectors,
+)
+from pteron.kinematics.sampling import random_poses
+from pteron.kinematics.singularities import is_singular_everywhere, singular_orientations
 
 __all__ = [
-    "SINGULAR",
     "JointMotion",
     "direct_kinematics",
     "inverse_kinematics",
     "is_singular_everywhere",
     "jacobian",
+    "joint_accelerations",
     "joint_rates",
     "joint_screws",
     "link_jacobians",
     "link_vectors",
     "random_poses",
     "singular_orientations",
-    "usable_poses",
 ]

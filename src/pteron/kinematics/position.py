@@ -1,37 +1,42 @@
-"""Poses to slider coordinates and back."""
+"""Poses to joint coordinates and back, and the Jacobians."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from pteron.conventions import (
-    BatchOfMatrices,
-    BatchOfSliders,
-    BatchOfVectors,
-    OnFailure,
-    PoseLike,
-    SliderLike,
-)
+from pteron.equations.machine import closure_of
 from pteron.errors import SingularPose, UnreachablePose
-from pteron.kernels import numeric
-from pteron.kinematics.poses import blanked, finite, usable_poses
+from pteron.kernels import Array, numeric
+from pteron.kinematics.evaluate import checked, evaluated
 from pteron.kinematics.singularities import EVERYWHERE, is_singular_everywhere
 from pteron.manipulator import Manipulator
+from pteron.shapes import (
+    JointsLike,
+    Matrices,
+    OnFailure,
+    PoseLike,
+    Poses,
+    PerJoint,
+    Vectors,
+)
 
-__all__ = ["direct_kinematics", "inverse_kinematics", "link_vectors"]
+_SAME_JOINT = 1e-6
+"""m or rad within which a pose gives the joints back: far above rounding, even near a singularity,
+where the other branch, which it is to tell apart, is no other."""
 
 
 def inverse_kinematics(
     robot: Manipulator, pose: PoseLike, *, on_failure: OnFailure = "raise"
-) -> BatchOfSliders:
-    """Return the slider coordinates of poses: rho = d . (p + s - r), Eq. (4).
+) -> PerJoint:
+    """Return the joint coordinates of poses, Eq. (4): rho of a slider, theta of a crank.
 
-    They do not depend on the elbows; `slider_limits` are not applied.
+    A crank's angle is the one nearest to the middle of its limits, or in (-pi, pi]. The limits
+    themselves are not applied.
 
     Parameters
     ----------
     robot : Manipulator
-        The machine.
+        The machine; its elbows choose the branch.
     pose : array, shape (..., m)
         (x, y, z, phi), or (x, y, z) for 3T; m and rad.
     on_failure : {"raise", "nan"}
@@ -40,12 +45,12 @@ def inverse_kinematics(
     Returns
     -------
     array, shape (..., n)
-        m.
+        m for a slider, rad for a crank.
 
     Raises
     ------
     UnreachablePose
-        If a leg's links do not reach a pose.
+        If a leg does not reach a pose.
 
     Examples
     --------
@@ -53,15 +58,16 @@ def inverse_kinematics(
     >>> pteron.inverse_kinematics(pteron.load("quadrupteron"), [0.01, 0.02, 0.03, 0.0])
     array([0.03, 0.02, 0.01, 0.02])
     """
-    poses = usable_poses(robot, pose, reach=True, on_failure=on_failure)
-    sliders: BatchOfSliders = numeric(robot, "inverse_kinematics")(poses)
-    return blanked(sliders, poses)
+    joints: PerJoint = evaluated(robot, "inverse_kinematics", on_failure, pose)
+    return joints
 
 
 def link_vectors(
     robot: Manipulator, pose: PoseLike, *, on_failure: OnFailure = "raise"
-) -> tuple[BatchOfVectors, BatchOfVectors]:
-    """Return the vectors of the upper and lower links, Eqs. (6) and (7).
+) -> tuple[Vectors, Vectors]:
+    """Return the vectors of the upper links or cranks, and of the lower links or rods.
+
+    For P-R-R-R legs these are Eqs. (6) and (7).
 
     Parameters
     ----------
@@ -75,51 +81,127 @@ def link_vectors(
     Returns
     -------
     l_u, l_l : array, shape (..., n, 3)
-        From R1 to R2 and from R2 to R3, in the base frame, m.
+        Towards the platform, in the base frame, m; NaN for a link that a leg has not.
 
     Raises
     ------
     UnreachablePose
-        If a leg's links do not reach a pose.
+        If a leg does not reach a pose.
     SingularPose
-        If R1 and R3 of a leg coincide, so that its elbow is undetermined.
+        If the two ends of a leg coincide, so that its elbow is undetermined.
     """
-    poses = usable_poses(robot, pose, reach=True, on_failure=on_failure)
-    l_u, l_l = numeric(robot, "link_vectors")(poses)
-    return blanked(l_u, poses), blanked(l_l, poses)
+    l_u, l_l = evaluated(robot, "link_vectors", on_failure, pose)
+    return l_u, l_l
 
 
-def direct_kinematics(
-    robot: Manipulator, sliders: SliderLike, *, on_failure: OnFailure = "nan"
-) -> BatchOfMatrices:
-    """Return every pose with the given slider coordinates: all assembly modes, in closed form.
-
-    The closures are linear in (p, cos phi, sin phi), so that a Quadrupteron has at most two poses
-    and a Tripteron one. Each column stands for one assembly mode throughout: the two modes of a
-    Quadrupteron are separated by its singular orientations.
+def jacobian(robot: Manipulator, pose: PoseLike, *, on_failure: OnFailure = "raise") -> Matrices:
+    """Return the input-output Jacobian J, with joint rates = J @ velocity, Eq. (10).
 
     Parameters
     ----------
     robot : Manipulator
         The machine.
-    sliders : array, shape (..., n)
-        Slider coordinates, m.
+    pose : array, shape (..., m)
+        The poses, m and rad.
+    on_failure : {"raise", "nan"}
+        Whether a pose that fails raises, or gives NaN.
+
+    Returns
+    -------
+    array, shape (..., n, m)
+        Row i is [dq/dc | dq/dphi] d(c, phi)/dx; for a P-R-R-R leg [ d^T | (d x k) . s ] / (d . e),
+        which does not involve the links and is also given where they do not reach.
+
+    Raises
+    ------
+    UnreachablePose
+        If a leg whose row depends on the pose does not reach it.
+    SingularPose
+        If such a leg is stretched or folded (type I).
+
+    Examples
+    --------
+    >>> import pteron
+    >>> pteron.jacobian(pteron.load("tripteron"), [0.0, 0.0, 0.0])
+    array([[1., 0., 0.],
+           [0., 1., 0.],
+           [0., 0., 1.]])
+    """
+    matrices: Matrices = evaluated(robot, "jacobian", on_failure, pose)
+    return matrices
+
+
+def link_jacobians(
+    robot: Manipulator, pose: PoseLike, *, on_failure: OnFailure = "raise"
+) -> tuple[Array, Array]:
+    """Return the link Jacobians J_u and J_l, Eqs. (11) and (12).
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    pose : array, shape (..., m)
+        The poses, m and rad.
+    on_failure : {"raise", "nan"}
+        Whether a pose that fails raises, or gives NaN.
+
+    Returns
+    -------
+    upper, lower : array, shape (..., n, 6, m)
+        Rows v, then omega: the velocity of the link's reference point (upper: at the base end;
+        lower: at the platform's end) and its angular velocity, per unit of the platform's
+        velocity. NaN for a link that a leg has not.
+
+    Raises
+    ------
+    UnreachablePose
+        If a leg does not reach a pose.
+    SingularPose
+        If a leg is stretched or folded (type I).
+    """
+    upper, lower = evaluated(robot, "link_jacobians", on_failure, pose)
+    return upper, lower
+
+
+def direct_kinematics(
+    robot: Manipulator,
+    joints: JointsLike,
+    *,
+    all_branches: bool = False,
+    on_failure: OnFailure = "nan",
+) -> Poses:
+    """Return every pose with the given joint coordinates: all assembly modes, in closed form.
+
+    P-R-R-R legs close linearly in (p, cos phi, sin phi), so that a Quadrupteron has at most two
+    poses and a Tripteron one; each column stands for one assembly mode throughout. Rods keep their
+    ends on spheres: a Delta has at most two poses, in the order of z, y and x.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    joints : array, shape (..., n)
+        Joint coordinates, m or rad.
+    all_branches : bool
+        Rods close with either side of an elbow. By default only poses of the robot's own working
+        mode are returned; True returns those of the others as well.
     on_failure : {"nan", "raise"}
         A mode that is not real is NaN: that is an answer, not a failure, hence the default. With
-        "raise", sliders that no pose has raise.
+        "raise", joints that no pose has raise.
 
     Returns
     -------
     array, shape (..., k, m)
-        k = 2 for 3T1R, 1 for 3T. A row is NaN where the closures have no real solution, or where
-        a leg's links do not reach the pose that solves them. phi lies in (-pi, pi].
+        k = 2, or 1 for P-R-R-R legs under a 3T platform. A row is NaN where the closures have no
+        real solution, or where a leg does not reach the pose that solves them. phi lies in
+        (-pi, pi].
 
     Raises
     ------
     SingularPose
         If the machine is singular at every pose.
     UnreachablePose
-        With ``on_failure="raise"``, if sliders have no pose.
+        With ``on_failure="raise"``, if joints have no pose.
 
     Examples
     --------
@@ -131,18 +213,29 @@ def direct_kinematics(
            [0.01      , 0.02      , 0.03      , 3.14159265]])
     """
     if is_singular_everywhere(robot):
-        raise SingularPose(EVERYWHERE.format(name=robot.name), kind="II", closeness=0.0, index=())
-    given = finite(robot, sliders, "sliders", on_failure)
-    found = numeric(robot, "direct_kinematics")(given)
+        raise SingularPose(EVERYWHERE.format(name=robot.name), kind="II", measure=0.0, index=())
+    given = checked(robot, joints, "joints", on_failure)
+    poses: Poses = evaluated(robot, "direct_kinematics", "nan", given)
     if robot.platform.turns:
-        found[..., 3] = np.where(found[..., 3] <= -np.pi, np.pi, found[..., 3])
-    poses = usable_poses(robot, found, reach=True, on_failure="nan")
+        poses[..., 3] = np.where(poses[..., 3] <= -np.pi, np.pi, poses[..., 3])
+    closure = closure_of(robot)
+    back = evaluated(robot, "inverse_kinematics", "nan", poses)
+    if not closure.keeps_modes and not all_branches:
+        apart = np.abs(back - given[..., None, :])
+        cranks = np.array([leg.joint.unit == "rad" for leg in robot.legs])
+        turn = 2.0 * np.pi
+        apart = np.where(cranks, np.abs((apart + np.pi) % turn - np.pi), apart)
+        back = np.where((apart <= _SAME_JOINT).all(axis=-1, keepdims=True), back, np.nan)
+    poses[np.isnan(back).any(axis=-1)] = np.nan
+    if not closure.keeps_modes:
+        order = np.lexsort(tuple(np.moveaxis(poses, -1, 0)))
+        poses = np.take_along_axis(poses, order[..., None], axis=-2)
     lost = np.isnan(poses).all(axis=(-2, -1))
     if on_failure == "raise" and lost.any():
         index = tuple(int(i) for i in np.argwhere(lost)[0])
-        where = f"sliders[{', '.join(map(str, index))}]" if index else "sliders"
+        where = f"joints[{', '.join(map(str, index))}]" if index else "joints"
         raise UnreachablePose(
-            f"{where}: no pose has these slider coordinates {given[index].tolist()} m",
+            f"{where}: no pose has these joint coordinates {given[index].tolist()}",
             leg=0,
             shortfall=float("nan"),
             index=index,

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pteron.conventions import BatchOfPoses
-from pteron.errors import ModelError
+from pteron.errors import DataError, ModelError
 from pteron.kernels import Array, numeric
-from pteron.kinematics.singularities import is_singular_everywhere
 from pteron.manipulator import Manipulator
-
-__all__ = ["random_poses"]
+from pteron.shapes import Poses
 
 _BATCH = 4096
 _ATTEMPTS = 250
@@ -22,9 +19,9 @@ def random_poses(
     count: int,
     *,
     seed: int | np.random.Generator = 0,
-    bend: float = 0.1,
-    hold: float = 0.1,
-) -> BatchOfPoses:
+    type_i: float = 0.1,
+    type_ii: float = 0.1,
+) -> Poses:
     """Return poses drawn at random from those in reach and away from singularities.
 
     Uniformly in position and orientation, within a box that holds all but the rarest corners.
@@ -37,10 +34,10 @@ def random_poses(
         How many poses.
     seed : int or numpy Generator
         Where the randomness comes from.
-    bend : float
-        Least sine of every elbow's angle (0 at a type-I singularity).
-    hold : float
-        Least ratio of abs(det J) to its largest value over all orientations (type II).
+    type_i : float
+        Least type-I measure of every leg: 0 where it is singular, 1 at best.
+    type_ii : float
+        Least type-II measure of the machine.
 
     Returns
     -------
@@ -49,6 +46,8 @@ def random_poses(
 
     Raises
     ------
+    DataError
+        If the count is negative.
     ModelError
         If the legs have next to no common reach.
 
@@ -58,17 +57,19 @@ def random_poses(
     >>> pteron.random_poses(pteron.load("quadrupteron"), 5).shape
     (5, 4)
     """
+    if count < 0:
+        raise DataError(f"count: {count} given, 0 or more expected")
     rng = np.random.default_rng(seed)
     center, radius = _search_ball(robot)
     low, high = center - radius, center + radius
-    coarse = _drawn(robot, low, high, min(count, _SCOUTS), rng, bend, hold)
+    coarse = _drawn(robot, low, high, min(count, _SCOUTS), rng, type_i, type_ii)
     if len(coarse) >= count:
         return coarse[:count]
     # The ball is generous: with scouts in, their bounding box, widened, serves the rest.
     least, most = coarse[:, :3].min(axis=0), coarse[:, :3].max(axis=0)
     margin = 0.25 * (most - least)
     low, high = np.maximum(least - margin, low), np.minimum(most + margin, high)
-    return _drawn(robot, low, high, count, rng, bend, hold)[:count]
+    return _drawn(robot, low, high, count, rng, type_i, type_ii)[:count]
 
 
 def _drawn(
@@ -77,11 +78,10 @@ def _drawn(
     high: Array,
     count: int,
     rng: np.random.Generator,
-    bend: float,
-    hold: float,
+    type_i: float,
+    type_ii: float,
 ) -> Array:
     """Return at least `count` usable poses with positions drawn from a box."""
-    held = 0.0 if is_singular_everywhere(robot) else hold
     found: list[Array] = []
     total = 0
     for _ in range(_ATTEMPTS + count // 16):
@@ -89,10 +89,12 @@ def _drawn(
         poses[:, :3] = 0.5 * (low + high) + 0.5 * (high - low) * poses[:, :3]
         if robot.platform.turns:
             poses[:, 3] *= np.pi
-        _, _, sine = numeric(robot, "reach")(poses)
-        good = (sine >= bend).all(axis=-1)
-        if held:
-            good &= np.abs(numeric(robot, "regularity")(poses)) >= held
+        _, measures, _, _ = numeric(robot, "reach")(poses)
+        good = (measures >= type_i).all(axis=-1)
+        if type_ii:
+            # Of a machine that is singular everywhere the measure is 0 or NaN: all poses count.
+            measure = np.abs(numeric(robot, "type_ii")(poses)[0])
+            good &= (measure >= type_ii) | ~(measure > 0.0).any()
         found.append(poses[good])
         total += int(good.sum())
         if total >= count:
@@ -106,18 +108,17 @@ def _drawn(
 def _search_ball(robot: Manipulator) -> tuple[Array, float]:
     """Return a centre and a radius about it that hold every pose in reach.
 
-    Leg i reaches c only within lu + ll of its guide line, measured perpendicular to d along e: at
-    most (lu + ll) / abs(d . e) away. The centre is the point nearest to all the lines.
+    Each leg reaches only what is within a radius of a line or a point; the centre is the point
+    nearest to all of them.
     """
     normal, right = np.zeros((3, 3)), np.zeros(3)
     reach = 0.0
     for leg in robot.legs:
-        e, r = np.array(leg.e), np.array(leg.guide_point)
-        across = np.eye(3) - np.outer(e, e)
+        bound = leg.reach_bound
+        line = np.zeros(3) if bound.line is None else np.array(bound.line)
+        across = np.eye(3) - np.outer(line, line)
         normal += across
-        right += across @ r
-        s = float(np.linalg.norm(leg.platform_point))
-        slant = abs(float(np.dot(leg.direction, leg.e)))
-        reach = max(reach, s + (leg.upper_length + leg.lower_length) / slant)
+        right += across @ np.array(bound.point)
+        reach = max(reach, float(np.linalg.norm(leg.platform_point)) + bound.radius)
     center = np.linalg.lstsq(normal, right, rcond=None)[0]
     return np.asarray(center, dtype=float), 1.5 * reach

@@ -1,31 +1,26 @@
-"""Type-II singularities: where the sliders, held still, no longer hold the platform."""
+"""Type-II singularities: where the actuators, held still, no longer hold the platform."""
 
 from __future__ import annotations
 
 from functools import lru_cache
 
-import casadi as ca
 import numpy as np
 
-from pteron.equations.closure import closure, singularity
-from pteron.equations.geometry import Geometry
-from pteron.errors import SingularPose
-from pteron.kernels import Array
+from pteron.equations.machine import closure_of
+from pteron.errors import ModelError, SingularPose
+from pteron.kernels import Array, numeric
 from pteron.manipulator import Manipulator
 
-__all__ = ["is_singular_everywhere", "singular_orientations"]
-
 _VANISHING = 1e-10
-"""Relative size below which the coefficients of det J count as zero: far above their rounding
-(1e-16) and far below what any layout meant to work would have."""
+_SAMPLES = 64
 
 
 @lru_cache(maxsize=256)
 def is_singular_everywhere(robot: Manipulator) -> bool:
     """Say whether det J vanishes at every pose.
 
-    So it does where all slider directions lie in a plane, and for layouts with fourfold symmetry
-    about k.
+    So it does, for one, where the rows of all legs lie in a plane, and for P-R-R-R layouts with
+    fourfold symmetry about k.
 
     Parameters
     ----------
@@ -36,27 +31,23 @@ def is_singular_everywhere(robot: Manipulator) -> bool:
     -------
     bool
     """
-    geometry = Geometry.of(robot)
-    c = closure(geometry)
-    rows = np.array([[float(x) for x in leg.direction] for leg in robot.legs])
-    sizes = np.linalg.svd(rows, compute_uv=False)
-    if sizes[-1] <= _VANISHING * sizes[0]:
-        return True
-    if c.null is None:
-        return False
-    a, b = (float(value) for value in singularity(geometry))
-    # Of what cannot vanish by cancellation, else noise would be measured against noise.
-    null = np.abs(np.array(ca.evalf(c.null))).max()
-    bars = np.linalg.norm(np.array(ca.evalf(c.rows)), axis=1)
-    offsets = np.linalg.norm([leg.platform_point for leg in robot.legs], axis=1)
-    return bool(np.hypot(a, b) <= _VANISHING * null * bars.max() * offsets.max())
+    known = closure_of(robot).vanishes()
+    if known is not None:
+        return known
+    from pteron.kinematics.sampling import random_poses
+
+    try:
+        poses = random_poses(robot, _SAMPLES, type_i=1e-3, type_ii=0.0)
+    except ModelError:
+        return False  # nowhere in reach, which is told where a pose is used
+    return bool((np.abs(numeric(robot, "type_ii")(poses)[0]) <= _VANISHING).all())
 
 
 def singular_orientations(robot: Manipulator) -> Array:
-    """Return the orientations of the platform that are singular (type II).
+    """Return the orientations of the platform that are singular (type II) whatever the position.
 
-    det J of a 3T1R manipulator depends on phi only and is a multiple of A cos(phi) + B sin(phi), so
-    that there are two singular orientations, 180 degrees apart, whatever the position.
+    For P-R-R-R legs under a 3T1R platform det J is a multiple of A cos(phi) + B sin(phi): there are
+    two singular orientations, 180 degrees apart.
 
     Parameters
     ----------
@@ -66,7 +57,8 @@ def singular_orientations(robot: Manipulator) -> Array:
     Returns
     -------
     array, shape (2,) or (0,)
-        The angles in rad, ascending, in (-pi, pi]; none for 3T, whose Jacobian is constant.
+        The angles in rad, ascending, in (-pi, pi]; none where the platform does not turn, or where
+        singularity depends on the position.
 
     Raises
     ------
@@ -80,17 +72,18 @@ def singular_orientations(robot: Manipulator) -> Array:
     array([-90.,  90.])
     """
     if is_singular_everywhere(robot):
-        raise SingularPose(EVERYWHERE.format(name=robot.name), kind="II", closeness=0.0, index=())
-    if not robot.platform.turns:
+        raise SingularPose(EVERYWHERE.format(name=robot.name), kind="II", measure=0.0, index=())
+    orientation = closure_of(robot).orientation
+    if orientation is None:
         return np.empty(0)
-    a, b = (float(value) for value in singularity(Geometry.of(robot)))
+    a, b = (float(value) for value in orientation)
     one = np.arctan2(b, a) + np.pi / 2
     wrapped = np.pi - (np.pi - np.array([one, one - np.pi])) % (2 * np.pi)
     return np.sort(wrapped)
 
 
 EVERYWHERE = (
-    "{name}: singular at every pose (type II): with the sliders held still the platform can move; "
-    "change a leg's direction or platform point"
+    "{name}: singular at every pose (type II): with the actuators held still the platform can "
+    "move; change a leg's direction or platform point"
 )
 """What is said of such a machine, here and where a pose of it is used."""

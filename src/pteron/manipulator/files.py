@@ -3,29 +3,25 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from errno import ENOENT
-from functools import partial
+from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 from pteron.atomic import write_text
+from pteron.bodies.inertia import Inertia, PointMass
 from pteron.errors import ModelError
-from pteron.manipulator.inertia import PlanarInertia
-from pteron.manipulator.leg import Leg
-from pteron.manipulator.manipulator import Manipulator
-from pteron.manipulator.platform import Platform
-
-if TYPE_CHECKING:
-    from pydantic import ValidationError
-
-    from pteron.manipulator.schema import BodyTable, LegTable, ManipulatorTable
-
-__all__ = ["catalog", "load", "save"]
+from pteron.legs import KINDS, LegKind
+from pteron.manipulator.manipulator import STANDARD_GRAVITY, Manipulator
+from pteron.platforms import EQUATIONS, Platform
 
 _Built = TypeVar("_Built")
+
+_DEFAULT_KIND = "PRRR"
 
 
 def catalog() -> tuple[str, ...]:
@@ -40,7 +36,7 @@ def load(name_or_path: str | Path) -> Manipulator:
     Parameters
     ----------
     name_or_path : str or path
-        A catalog name (``"quadrupteron"``, ``"tripteron"``, ...) or the path of a file.
+        A catalog name (``"quadrupteron"``, ``"delta"``, ...) or the path of a file.
 
     Returns
     -------
@@ -50,8 +46,8 @@ def load(name_or_path: str | Path) -> Manipulator:
     Raises
     ------
     ModelError
-        If there is no such name or file, or if the file is not TOML, lacks a key, has an unknown
-        one, or describes a machine that cannot be; the message names the key.
+        If there is no such name or file, or if the file is not TOML, lacks keys, has unknown ones,
+        or describes a machine that cannot be; the message names every fault, by its key.
 
     Examples
     --------
@@ -64,7 +60,7 @@ def load(name_or_path: str | Path) -> Manipulator:
         return _parse(resource.read_text(encoding="utf-8"), str(name_or_path))
     path = Path(name_or_path)
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError:
         raise ModelError(f"{path}: not a TOML file (it is not UTF-8 text)") from None
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
@@ -85,77 +81,117 @@ def _parse(text: str, source: str) -> Manipulator:
         document = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ModelError(f"{source}: not a TOML file ({error})") from None
-    from pydantic import ValidationError
+    reading = _Reading()
+    machine = reading.table(_machine_table(), document, "")
+    platform = machine and reading.built("platform.", lambda: _platform(machine.platform))
+    legs = [reading.leg(i, given) for i, given in enumerate(document.get("legs") or [], start=1)]
+    if not reading.faults and machine is not None and platform is not None:
+        robot = reading.built(
+            "", lambda: Manipulator(machine.name, platform, tuple(legs), machine.gravity)
+        )
+        if robot is not None:
+            return robot
+    raise ModelError(f"{source}: {'; '.join(reading.faults)}")
 
-    from pteron.manipulator.schema import ManipulatorTable
 
-    try:
-        table = ManipulatorTable.model_validate(document)
-    except ValidationError as error:
-        raise ModelError(f"{source}: {_first_fault(error)}") from None
-    try:
-        return _manipulator(table)
-    except ModelError as error:
-        raise ModelError(f"{source}: {error}") from None
+@dataclass
+class _Reading:
+    """The faults that were found so far: a file is told all of them at once."""
+
+    faults: list[str] = field(default_factory=list)
+
+    def table(self, model: Any, given: object, prefix: str) -> Any:
+        """Return a table as its model holds it, or None with the faults noted."""
+        from pydantic import ValidationError
+
+        try:
+            return model.model_validate(given)
+        except ValidationError as error:
+            for fault in error.errors(include_url=False):
+                self.faults.append(prefix + _fault(fault))
+            return None
+
+    def built(self, prefix: str, build: Callable[[], _Built]) -> _Built | None:
+        """Return what `build` makes, or None with its fault noted under the key it names."""
+        try:
+            return build()
+        except ModelError as error:
+            self.faults.append(f"{prefix}{error}")
+            return None
+
+    def leg(self, i: int, given: object) -> Any:
+        """Return leg i, from 1, or None."""
+        prefix = f"leg {i}: "
+        if not isinstance(given, dict):
+            self.faults.append(f"{prefix}{given!r} given, a table [[legs]] expected")
+            return None
+        name = given.get("type", _DEFAULT_KIND)
+        kind = KINDS.get(name) if isinstance(name, str) else None
+        if kind is None:
+            self.faults.append(f"{prefix}type: {name!r} is not one of {', '.join(KINDS)}")
+            return None
+        table = self.table(_leg_table(kind.type), given, prefix)
+        return table and self.built(prefix, lambda: kind.of_table(table))
 
 
-def _first_fault(error: ValidationError) -> str:
-    """Return the first fault on one line: the key, what was given and what was expected."""
-    faults = error.errors(include_url=False)
-    fault = faults[0]
+def _fault(fault: Any) -> str:
+    """Return one of pydantic's faults: the key, what was given and what was expected."""
     key = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in fault["loc"]).lstrip(".")
     kind, given = fault["type"], fault["input"]
     if kind == "missing":
-        line = f"{key}: missing; the file must give it"
-    elif kind == "extra_forbidden":
-        line = f"{key}: unknown key (value {given!r}); check its spelling or remove it"
-    else:
-        line = f"{key}: {given!r} given; {fault['msg'][0].lower()}{fault['msg'][1:]}"
-    more = len(faults) - 1
-    return line + (f" (and {more} more {'fault' if more == 1 else 'faults'})" if more else "")
+        return f"{key}: missing; the file must give it"
+    if kind == "extra_forbidden":
+        return f"{key}: unknown key (value {given!r}); check its spelling or remove it"
+    if kind == "tuple_type":
+        return f"{key}: {given!r} given, a list of numbers in brackets expected"
+    return f"{key}: {given!r} given; {fault['msg'][0].lower()}{fault['msg'][1:]}"
 
 
-def _manipulator(table: ManipulatorTable) -> Manipulator:
-    p = table.platform
-    platform = _under(
-        "platform", lambda: Platform(p.motion, _body(p), axis=p.axis, x_axis=p.x_axis)
+@lru_cache(maxsize=1)
+def _machine_table() -> Any:
+    """Return what a file may hold; each of `legs` is read by its own kind."""
+    from pydantic import create_model
+
+    from pteron.bodies import tables
+
+    platform = create_model(
+        "PlatformTable",
+        __base__=tables.PlanarBody,
+        motion=(Literal[tuple(EQUATIONS)], ...),
+        axis=(tables.Three, (0.0, 0.0, 1.0)),
+        x_axis=(tables.Three | None, None),
     )
-    legs = tuple(_under(f"legs[{i}]", partial(_leg, leg)) for i, leg in enumerate(table.legs))
-    return Manipulator(table.name, platform, legs, table.gravity)
-
-
-def _leg(table: LegTable) -> Leg:
-    return Leg(
-        guide_point=table.guide_point,
-        direction=table.direction,
-        platform_point=table.platform_point,
-        upper_length=table.upper_length,
-        lower_length=table.lower_length,
-        slider_mass=table.slider.mass,
-        upper=_under("upper", partial(_body, table.upper)),
-        lower=_under("lower", partial(_body, table.lower)),
-        slider_direction=table.slider_direction,
-        elbow=table.elbow,
-        slider_limits=table.slider_limits,
+    return create_model(
+        "MachineTable",
+        __base__=tables.Table,
+        name=(str, ...),
+        gravity=(tables.Three, STANDARD_GRAVITY),
+        platform=(platform, ...),
+        legs=(list[Any], ...),
     )
 
 
-def _body(table: BodyTable) -> PlanarInertia:
-    if (table.center_of_mass is None) == (table.first_moment is None):
-        given = "neither" if table.first_moment is None else "both"
-        raise ModelError(f"center_of_mass: {given} it and first_moment given; give one of the two")
-    if table.first_moment is not None:
-        return PlanarInertia(table.mass, table.first_moment, table.inertia)
-    assert table.center_of_mass is not None
-    return PlanarInertia.of_body(table.mass, table.center_of_mass, table.inertia)
+@lru_cache(maxsize=16)
+def _leg_table(kind: str) -> Any:
+    """Return what a table of `[[legs]]` may hold, for a kind of leg."""
+    from pydantic import AliasChoices, Field, create_model
+
+    from pteron.bodies import tables
+
+    limits = Field(None, validation_alias=AliasChoices("limits", "slider_limits"))
+    keys: dict[str, Any] = {
+        "type": (str, kind),
+        "guide_point": (tables.Three, ...),
+        "platform_point": (tables.Three, ...),
+        "elbow": (Literal[1, -1], 1),
+        "limits": (tables.Two | None, limits),
+    }
+    return create_model(f"{kind}Table", __base__=tables.Table, **keys, **KINDS[kind].table())
 
 
-def _under(key: str, build: Callable[[], _Built]) -> _Built:
-    """Return what `build` makes, with `key` put before the key that its error names."""
-    try:
-        return build()
-    except ModelError as error:
-        raise ModelError(f"{key}.{error}") from None
+def _platform(table: Any) -> Platform:
+    inertia = table.inertia_of("")
+    return Platform(table.motion, inertia, axis=table.axis, x_axis=table.x_axis)
 
 
 def save(robot: Manipulator, path: str | Path) -> Path:
@@ -186,60 +222,40 @@ def save(robot: Manipulator, path: str | Path) -> Path:
     )
     document.add("name", tomlkit.item(robot.name))
     document.add("gravity", tomlkit.item(list(robot.gravity)))
-    platform = tomlkit.table()
-    for key, value in _platform_items(robot.platform):
-        platform.add(key, value)
-    document.add("platform", platform)
+    x, _, axis = robot.platform.frame
+    platform = {"motion": robot.platform.motion, "axis": axis, "x_axis": x}
+    document.add("platform", _table(platform | _body(robot.platform.inertia)))
     legs = tomlkit.aot()
     for leg in robot.legs:
-        table = tomlkit.table()
-        for key, value in _leg_items(leg):
-            table.add(key, _inline(value) if isinstance(value, dict) else value)
-        legs.append(table)
+        legs.append(_table(_leg_items(leg)))
     document.add("legs", legs)
     return write_text(path, tomlkit.dumps(document))
 
 
-def _inline(items: dict[str, Any]) -> Any:
+def _leg_items(leg: LegKind) -> dict[str, Any]:
+    own = leg.as_table()
+    common = {"platform_point": leg.platform_point, "elbow": leg.elbow, "limits": leg.limits}
+    return {"type": leg.type, "guide_point": leg.guide_point} | common | own
+
+
+def _table(items: dict[str, Any]) -> Any:
+    """Return a TOML table; what is None is left out, a body becomes an inline table."""
     import tomlkit
 
-    table = tomlkit.inline_table()
-    table.update(items)
+    table = tomlkit.table()
+    for key, value in items.items():
+        if isinstance(value, PointMass) or hasattr(value, "first_moment"):
+            inline = tomlkit.inline_table()
+            inline.update(_body(value))
+            table.add(key, inline)
+        elif isinstance(value, Sequence) and not isinstance(value, str):
+            table.add(key, list(value))
+        elif value is not None:
+            table.add(key, value)
     return table
 
 
-def _platform_items(platform: Platform) -> list[tuple[str, Any]]:
-    x, _, axis = platform.frame
-    return [
-        ("motion", platform.motion),
-        ("axis", list(axis)),
-        ("x_axis", list(x)),
-        *_body_items(platform.inertia).items(),
-    ]
-
-
-def _leg_items(leg: Leg) -> list[tuple[str, Any]]:
-    items: list[tuple[str, Any]] = [
-        ("guide_point", list(leg.guide_point)),
-        ("direction", list(leg.direction)),
-    ]
-    if leg.slider_direction is not None:
-        items.append(("slider_direction", list(leg.slider_direction)))
-    items += [
-        ("platform_point", list(leg.platform_point)),
-        ("upper_length", leg.upper_length),
-        ("lower_length", leg.lower_length),
-        ("elbow", leg.elbow),
-    ]
-    if leg.slider_limits is not None:
-        items.append(("slider_limits", list(leg.slider_limits)))
-    return [
-        *items,
-        ("slider", {"mass": leg.slider_mass}),
-        ("upper", _body_items(leg.upper)),
-        ("lower", _body_items(leg.lower)),
-    ]
-
-
-def _body_items(body: PlanarInertia) -> dict[str, Any]:
+def _body(body: Inertia | Any) -> dict[str, Any]:
+    if isinstance(body, PointMass):
+        return {"mass": body.mass}
     return {"mass": body.mass, "first_moment": list(body.first_moment), "inertia": body.inertia}

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 from typing import Any
 
-from pteron.errors import ModelError
-from pteron.manipulator.leg import Leg
-from pteron.manipulator.platform import Platform
-from pteron.manipulator.vectors import Vector, cross, parallel, vector
+import numpy as np
+from numpy.typing import NDArray
 
-__all__ = ["STANDARD_GRAVITY", "Manipulator", "working_modes"]
+from pteron.bodies.vectors import Vector, vector
+from pteron.errors import ModelError
+from pteron.legs import LegKind
+from pteron.platforms import Platform
+
+_VANISHING = 1e-9
+"""Singular value of unit vectors below which they do not span another direction."""
 
 STANDARD_GRAVITY: Vector = (0.0, 0.0, -9.81)
 """Acceleration of gravity where a file does not say it, m/s^2."""
@@ -30,8 +35,8 @@ class Manipulator:
         What the machine is called.
     platform : Platform
         The moving platform; its motion fixes how many legs there are (3T: 3, 3T1R: 4).
-    legs : tuple of Leg
-        The legs, in the order of the slider coordinates.
+    legs : tuple of legs
+        Of any kind in `pteron.legs`, in the order of the joint coordinates.
     gravity : vector
         Acceleration of gravity in the base frame, m/s^2.
 
@@ -44,7 +49,7 @@ class Manipulator:
 
     name: str
     platform: Platform
-    legs: tuple[Leg, ...]
+    legs: tuple[LegKind, ...]
     gravity: Vector = STANDARD_GRAVITY
 
     def __hash__(self) -> int:
@@ -69,6 +74,9 @@ class Manipulator:
                 f"legs: {len(legs)} given, but a {self.platform.motion} platform has {freedom} "
                 f"freedoms and needs {freedom} legs"
             )
+        for i, leg in enumerate(legs):
+            if not isinstance(leg, LegKind):
+                raise ModelError(f"legs[{i}]: {type(leg).__name__} given, a leg expected")
         _check_constraints(self.platform, legs)
         object.__setattr__(self, "legs", legs)
         object.__setattr__(self, "gravity", vector(self.gravity, "gravity"))
@@ -84,34 +92,33 @@ class Manipulator:
         return self.platform.coordinates
 
 
-def _check_constraints(platform: Platform, legs: tuple[Leg, ...]) -> None:
+def _check_constraints(platform: Platform, legs: tuple[LegKind, ...]) -> None:
     """Refuse legs that leave the platform a rotation which its motion does not have.
 
-    A leg without R4 withholds every rotation that is not about d; a leg with R4 (3T1R, d not
-    parallel to k) withholds the one about d x k.
+    What one leg withholds is perpendicular to the axes about which it lets the platform turn.
     """
-    if not platform.turns:
-        if all(parallel(leg.direction, legs[0].direction) for leg in legs):
-            raise ModelError(
-                "legs: all directions are parallel, so that the platform is free to turn about "
-                "them; a 3T platform needs two legs that are not parallel"
-            )
-        return
-    withheld = [cross(leg.direction, platform.axis) for leg in legs]
-    without_universal_joint = any(parallel(leg.direction, platform.axis) for leg in legs)
-    spread = any(
-        abs(_triple(a, b, platform.axis)) > 1e-9 for a in withheld for b in withheld if a is not b
-    )
-    if not (without_universal_joint or spread):
+    axis = platform.axis if platform.turns else None
+    withheld = np.vstack([_complement(leg.free_axes(axis)) for leg in legs])
+    sizes = np.linalg.svd(withheld, compute_uv=False) if len(withheld) else np.zeros(3)
+    rank = int((sizes > _VANISHING).sum())
+    if axis is None and rank < 3:
+        raise ModelError(
+            "legs: all directions are parallel, or rods single, so that the platform is free to "
+            "turn; a 3T platform needs two legs that are not parallel"
+        )
+    if axis is not None and rank < 2:
         raise ModelError(
             "legs: all directions lie in one plane with the platform's axis, so that the platform "
             "is free to tilt; turn one leg's direction out of that plane"
         )
 
 
-def _triple(a: Vector, b: Vector, c: Vector) -> float:
-    n = cross(a, b)
-    return n[0] * c[0] + n[1] * c[1] + n[2] * c[2]
+def _complement(axes: Sequence[Vector]) -> NDArray[np.float64]:
+    """Return rows that span what is perpendicular to given vectors."""
+    matrix = np.array(axes, dtype=float).reshape(-1, 3)
+    _, sizes, rows = np.linalg.svd(matrix) if len(matrix) else (None, np.zeros(0), np.eye(3))
+    complement: NDArray[np.float64] = rows[int((sizes > _VANISHING).sum()) :]
+    return complement
 
 
 def working_modes(robot: Manipulator) -> tuple[Manipulator, ...]:

@@ -1,27 +1,53 @@
-"""The inertial parameters as one vector, in the paper's order (Eq. 16), stated here once.
-
-Sliders m_p1..m_pn; for each upper link m, m gamma_x, m gamma_y, I; for each lower link the same;
-the platform the same: N = 9 n + 4, which is 40 for the Quadrupteron and 31 for the Tripteron.
-"""
+"""The inertial parameters of a machine as one vector, in the paper's order (Eq. 16)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pteron.bodies.parameters import PLATFORM, Parameter, parameter_list
 from pteron.errors import ModelError
-from pteron.manipulator.inertia import PlanarInertia
 from pteron.manipulator.manipulator import Manipulator
 
-__all__ = ["BODY_PARAMETERS", "parameter_names", "parameter_units", "parameters", "with_parameters"]
 
-BODY_PARAMETERS = ("m", "mgx", "mgy", "I")
-"""The four parameters of a body in planar motion: mass, first moments, moment of inertia."""
+def parameter_data(
+    robot: Manipulator, groups: Sequence[tuple[int, ...]] | None = None
+) -> tuple[Parameter, ...]:
+    """Return the inertial parameters as data: kind, body, legs and unit of each.
 
-_UNITS = {"m": "kg", "mgx": "kg m", "mgy": "kg m", "I": "kg m^2"}
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    groups : sequence of tuple of int, optional
+        Legs, counted from 1, that share one parameter set; every leg in one group. By default each
+        leg has its own.
+
+    Returns
+    -------
+    tuple of Parameter
+
+    Examples
+    --------
+    >>> import pteron
+    >>> p = pteron.parameter_data(pteron.load("quadrupteron"))[5]
+    >>> p.kind, p.body, p.legs, p.unit, p.name
+    ('mgx', 'u', (1,), 'kg m', 'mgx_u1')
+    """
+    kinds = tuple(tuple((b, i.kinds) for b, i in leg.bodies.items()) for leg in robot.legs)
+    return _listed(kinds, None if groups is None else tuple(groups))
+
+
+@lru_cache(maxsize=64)
+def _listed(
+    kinds: tuple[tuple[tuple[str, tuple[str, ...]], ...], ...],
+    groups: tuple[tuple[int, ...], ...] | None,
+) -> tuple[Parameter, ...]:
+    return parameter_list([dict(bodies) for bodies in kinds], groups)
 
 
 def parameter_names(robot: Manipulator) -> tuple[str, ...]:
@@ -36,7 +62,8 @@ def parameter_names(robot: Manipulator) -> tuple[str, ...]:
     -------
     tuple of str
         ``m_p1`` ..., ``m_u1, mgx_u1, mgy_u1, I_u1`` ..., ``m_l1`` ..., ``m_e, mgx_e, mgy_e, I_e``:
-        slider (p), upper (u) and lower (l) link of each leg, platform (e). ``mgx`` is m gamma_x.
+        slider (p), upper link or crank (u) and lower link or rod (l) of each leg, platform (e).
+        ``mgx`` is m gamma_x; a body that a leg has not is left out.
 
     Examples
     --------
@@ -45,15 +72,12 @@ def parameter_names(robot: Manipulator) -> tuple[str, ...]:
     >>> len(names), names[4:8]
     (40, ('m_u1', 'mgx_u1', 'mgy_u1', 'I_u1'))
     """
-    legs = range(1, len(robot.legs) + 1)
-    sliders = [f"m_p{i}" for i in legs]
-    links = [f"{p}_{link}{i}" for link in "ul" for i in legs for p in BODY_PARAMETERS]
-    return (*sliders, *links, *(f"{p}_e" for p in BODY_PARAMETERS))
+    return tuple(parameter.name for parameter in parameter_data(robot))
 
 
 def parameter_units(robot: Manipulator) -> tuple[str, ...]:
     """Return the SI unit of each parameter, in the order of `parameter_names`."""
-    return tuple(_UNITS[name.split("_")[0]] for name in parameter_names(robot))
+    return tuple(parameter.unit for parameter in parameter_data(robot))
 
 
 def parameters(robot: Manipulator) -> NDArray[np.float64]:
@@ -69,12 +93,11 @@ def parameters(robot: Manipulator) -> NDArray[np.float64]:
     array, shape (N,)
         kg, kg m and kg m^2.
     """
-    values = [leg.slider_mass for leg in robot.legs]
-    for leg in robot.legs:
-        values.extend(leg.upper.values)
-    for leg in robot.legs:
-        values.extend(leg.lower.values)
-    values.extend(robot.platform.inertia.values)
+    values = []
+    bodies = [leg.bodies for leg in robot.legs]
+    for p in parameter_data(robot):
+        body = bodies[p.legs[0] - 1][p.body] if p.legs else robot.platform.inertia
+        values.append(body.values[body.kinds.index(p.kind)])
     return np.array(values)
 
 
@@ -99,29 +122,23 @@ def with_parameters(robot: Manipulator, values: ArrayLike) -> Manipulator:
         If their number is wrong, or if they belong to no real bodies.
     """
     vector = np.asarray(values, dtype=float)
-    names = parameter_names(robot)
-    if vector.shape != (len(names),):
-        raise ModelError(f"parameters: shape {vector.shape} given, ({len(names)},) expected")
-    n = len(robot.legs)
-    sliders, bodies = vector[:n].tolist(), vector[n:].reshape(-1, 4).tolist()
-    inertias = [
-        _inertia(body, names[n + 4 * b].removeprefix("m_")) for b, body in enumerate(bodies)
-    ]
-    legs = []
-    for i, leg in enumerate(robot.legs):
+    listed = parameter_data(robot)
+    if vector.shape != (len(listed),):
+        raise ModelError(f"parameters: shape {vector.shape} given, ({len(listed)},) expected")
+    blocks: dict[tuple[str, tuple[int, ...]], list[float]] = {}
+    for p, value in zip(listed, vector.tolist(), strict=True):
+        blocks.setdefault((p.body, p.legs), []).append(value)
+    bodies = {}
+    for (body, legs), block in blocks.items():
+        old = robot.legs[legs[0] - 1].bodies[body] if legs else robot.platform.inertia
         try:
-            legs.append(
-                replace(leg, slider_mass=sliders[i], upper=inertias[i], lower=inertias[n + i])
-            )
+            bodies[body, legs] = old.of_values(block)
         except ModelError as error:
-            raise ModelError(f"parameters of leg {i + 1}: {error}") from None
-    platform = replace(robot.platform, inertia=inertias[-1])
-    return replace(robot, legs=tuple(legs), platform=platform)
-
-
-def _inertia(values: Sequence[float], body: str) -> PlanarInertia:
-    mass, hx, hy, inertia = values
-    try:
-        return PlanarInertia(mass, (hx, hy), inertia)
-    except ModelError as error:
-        raise ModelError(f"parameters of body {body}: {error}") from None
+            name = body + "".join(map(str, legs))
+            raise ModelError(f"parameters of body {name}: {error}") from None
+    legs = tuple(
+        leg.with_bodies({body: bodies[body, (i,)] for body in leg.bodies})
+        for i, leg in enumerate(robot.legs, start=1)
+    )
+    platform = replace(robot.platform, inertia=bodies[PLATFORM, ()])
+    return replace(robot, legs=legs, platform=platform)

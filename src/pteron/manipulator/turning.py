@@ -7,11 +7,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pteron.bodies.vectors import Vector, vector
 from pteron.errors import ModelError
 from pteron.manipulator.manipulator import Manipulator
-from pteron.manipulator.vectors import Vector, vector
-
-__all__ = ["turned"]
 
 _TOLERANCE = 1e-9
 
@@ -52,14 +50,6 @@ def turned(robot: Manipulator, rotation: ArrayLike, *, gravity: bool = True) -> 
     return replace(
         robot,
         platform=replace(robot.platform, axis=turn(axis), x_axis=turn(x)),
-        legs=tuple(
-            replace(
-                leg,
-                guide_point=turn(leg.guide_point),
-                direction=turn(leg.direction),
-                slider_direction=leg.slider_direction and turn(leg.slider_direction),
-            )
-            for leg in robot.legs
-        ),
+        legs=tuple(leg.turned(turn) for leg in robot.legs),
         gravity=turn(robot.gravity) if gravity else robot.gravity,
     )

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from pteron.conventions import BatchOfRegressors, OnFailure, PoseLike
-from pteron.kernels import numeric
-from pteron.kinematics.poses import blanked, finite, usable_poses
+from pteron.errors import ModelError
+from pteron.kernels import OTHER_LAYOUT, same_layout
+from pteron.kinematics.evaluate import evaluated
 from pteron.manipulator import Manipulator
 from pteron.reduction.result import BaseParameters
-
-__all__ = ["base_regressor"]
+from pteron.shapes import OnFailure, PoseLike, Regressors
 
 
 def base_regressor(
@@ -19,7 +18,7 @@ def base_regressor(
     acceleration: PoseLike,
     *,
     on_failure: OnFailure = "raise",
-) -> BatchOfRegressors:
+) -> Regressors:
     """Return the reduced dynamic matrix: base_regressor @ base.values(robot) = inverse_dynamics.
 
     Parameters
@@ -36,16 +35,16 @@ def base_regressor(
     Returns
     -------
     array, shape (..., n, rank)
-        Newtons per unit of each base parameter.
+        N or N m per unit of each base parameter.
 
     Raises
     ------
     ModelError
         If `base` belongs to a machine of another layout, or with other gravity.
     UnreachablePose
-        If a leg's links do not reach a pose.
+        If a leg does not reach a pose.
     SingularPose
-        If a leg is stretched or folded (type I), or the sliders do not hold the platform (type II).
+        If a leg is stretched or folded (type I), or the actuators do not hold the platform (type II).
 
     Examples
     --------
@@ -57,9 +56,8 @@ def base_regressor(
     >>> np.allclose(forces, pteron.inverse_dynamics(robot, *state))
     True
     """
-    evaluate = numeric(robot, "base_regressor", base=base)
-    poses = usable_poses(robot, pose, bent=True, held=True, on_failure=on_failure)
-    rate = finite(robot, velocity, "velocity", on_failure)
-    second = finite(robot, acceleration, "acceleration", on_failure)
-    matrices: BatchOfRegressors = evaluate(poses, rate, second)
-    return blanked(matrices, poses, rate, second)
+    if base.robot is not robot and not same_layout(base.robot, robot):
+        raise ModelError(OTHER_LAYOUT.format(base.robot.name, robot.name))
+    motion = pose, velocity, acceleration
+    matrices: Regressors = evaluated(robot, "base_regressor", on_failure, *motion, base=base)
+    return matrices

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from pteron.manipulator import Manipulator
-from pteron.manipulator.vectors import norm, parallel, scaled
+from pteron.bodies.vectors import norm, parallel, scaled
 from pteron.reduction.sharing import suffix
 
 __all__ = ["Monomial", "Polynomial", "Transfer", "transfers"]

@@ -16,6 +16,7 @@ PARALLEL_TOLERANCE = 1e-9
 """Sine of the angle under which two unit vectors count as parallel."""
 
 _ROUNDING = 4 * math.ulp(1.0)
+_UPRIGHT = 1e-15
 
 
 def number(value: object, key: str) -> float:
@@ -72,6 +73,17 @@ def unit_vector(values: Sequence[object], key: str) -> Vector:
     if abs(length - 1.0) <= _ROUNDING:
         return given
     return scaled(given, 1.0 / length)
+
+
+def perpendicular(v: Vector, axis: Vector, key: str, other: str) -> Vector:
+    """Return the unit vector v, perpendicular to another but for rounding, made so to rounding."""
+    lean = dot(v, axis)
+    if abs(lean) > UNIT_TOLERANCE:
+        raise ModelError(f"{key}: {list(v)} is not perpendicular to {other} {list(axis)}")
+    if abs(lean) <= _UPRIGHT:
+        return v
+    upright = (v[0] - lean * axis[0], v[1] - lean * axis[1], v[2] - lean * axis[2])
+    return scaled(upright, 1.0 / norm(upright))
 
 
 def dot(a: Vector, b: Vector) -> float:

@@ -6,16 +6,12 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from pteron.errors import ModelError
-from pteron.manipulator.inertia import PlanarInertia
-from pteron.manipulator.vectors import Vector, cross, dot, norm, scaled, unit_vector
-
-__all__ = ["Motion", "Platform"]
+from pteron.bodies.inertia import PlanarInertia
+from pteron.bodies.vectors import Vector, cross, perpendicular, unit_vector
 
 Motion = Literal["3T", "3T1R"]
 """3T: the platform only translates. 3T1R: it also turns about its axis (Schoenflies motion)."""
 
-_RIGHT_ANGLE_TOLERANCE = 1e-6
-_ROUNDING = 1e-15
 _BASE_Z: Vector = (0.0, 0.0, 1.0)
 
 
@@ -48,12 +44,7 @@ class Platform:
         axis = unit_vector(self.axis, "axis")
         if self.x_axis is not None:
             x = unit_vector(self.x_axis, "x_axis")
-            lean = dot(x, axis)
-            if abs(lean) > _RIGHT_ANGLE_TOLERANCE:
-                raise ModelError(f"x_axis: {list(x)} is not perpendicular to axis {list(axis)}")
-            if abs(lean) > _ROUNDING:
-                upright = (x[0] - lean * axis[0], x[1] - lean * axis[1], x[2] - lean * axis[2])
-                x = scaled(upright, 1.0 / norm(upright))
+            x = perpendicular(x, axis, "x_axis", "axis")
         elif axis == _BASE_Z:
             x = (1.0, 0.0, 0.0)
         else:

@@ -12,29 +12,18 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-__all__ = [
-    "BatchOfMatrices",
-    "BatchOfNumbers",
-    "BatchOfPoses",
-    "BatchOfRegressors",
-    "BatchOfSliders",
-    "BatchOfVectors",
-    "OnFailure",
-    "PoseLike",
-    "SliderLike",
-]
-
 OnFailure = Literal["raise", "nan"]
 """What a batch function does with a pose it cannot serve: raise the error, or return NaN there."""
 
 PoseLike = ArrayLike
 """(..., m): poses, velocities, accelerations or wrenches, as given."""
-SliderLike = ArrayLike
-"""(..., n): slider coordinates or actuator forces, as given."""
+JointsLike = ArrayLike
+"""(..., n): joint coordinates or actuator forces, as given."""
 
-BatchOfPoses = Float[np.ndarray, "*batch m"]
-BatchOfSliders = Float[np.ndarray, "*batch n"]
-BatchOfNumbers = Float[np.ndarray, "*batch"]
-BatchOfVectors = Float[np.ndarray, "*batch n 3"]
-BatchOfMatrices = Float[np.ndarray, "*batch n m"]
-BatchOfRegressors = Float[np.ndarray, "*batch n N"]
+PerCoordinate = Float[np.ndarray, "*batch m"]
+PerJoint = Float[np.ndarray, "*batch n"]
+Numbers = Float[np.ndarray, "*batch"]
+Vectors = Float[np.ndarray, "*batch n 3"]
+Matrices = Float[np.ndarray, "*batch n m"]
+Poses = Float[np.ndarray, "*batch k m"]
+Regressors = Float[np.ndarray, "*batch n N"]

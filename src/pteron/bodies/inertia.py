@@ -1,0 +1,188 @@
+"""The inertia of a body about its reference point: of a slider, of a rod, of a body in a plane."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Protocol, Self
+
+from pteron.bodies.vectors import number, numbers, positive
+from pteron.errors import ModelError
+
+_ROUNDING = 1e-12
+
+
+class Inertia(Protocol):
+    """What a body's inertia tells of itself: the kinds of its parameters, and their values."""
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """The kinds of its parameters, in order: some of "m", "mgx", "mgy" and "I"."""
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """Their values; kg, kg m and kg m^2."""
+
+    @classmethod
+    def of_values(cls, values: Sequence[float]) -> Self:
+        """Build the inertia from the values of its parameters.
+
+        Raises
+        ------
+        ModelError
+            If no real body has them.
+        """
+
+
+@dataclass(frozen=True)
+class PointMass:
+    """The inertia of a slider, which does not turn: its mass in kg."""
+
+    mass: float
+
+    kinds: ClassVar = ("m",)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mass", positive(self.mass, "mass", "kg"))
+
+    @classmethod
+    def of_values(cls, values: Sequence[float]) -> PointMass:
+        """Build it from (m,)."""
+        return cls(*values)
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """(m,)."""
+        return (self.mass,)
+
+
+@dataclass(frozen=True)
+class RodInertia:
+    """The inertia of a rod between two ball joints, about its **platform end**.
+
+    x points from the tip of the actuated body to the platform point, so that a usual rod has a
+    negative first moment. A rod's spin about its own axis has no inertia. Parallel rods that move
+    alike are one rod with the sum of their inertias.
+
+    Parameters
+    ----------
+    mass : float
+        Mass m, kg.
+    first_moment : tuple of float
+        (m gamma_x,), kg m: mass times the position of the centre of mass along the rod.
+    inertia : float
+        Moment of inertia I across the rod **through the platform end**, kg m^2.
+
+    Raises
+    ------
+    ModelError
+        If no real rod has this inertia: the mass must be positive and I m >= (m gamma_x)^2.
+    """
+
+    mass: float
+    first_moment: tuple[float]
+    inertia: float
+
+    kinds: ClassVar = ("m", "mgx", "I")
+
+    def __post_init__(self) -> None:
+        _check(self, 1)
+
+    @classmethod
+    def of_body(cls, mass: float, center_of_mass: Sequence[float], inertia: float) -> RodInertia:
+        """Build the inertia from the centre of mass (m) instead of the first moment (kg m)."""
+        mass = positive(mass, "mass", "kg")
+        (x,) = numbers(center_of_mass, "center_of_mass", 1)
+        return cls(mass, (mass * x,), inertia)
+
+    @classmethod
+    def of_values(cls, values: Sequence[float]) -> RodInertia:
+        """Build it from (m, m gamma_x, I)."""
+        mass, hx, inertia = values
+        return cls(mass, (hx,), inertia)
+
+    @property
+    def center_of_mass(self) -> tuple[float]:
+        """Position of the centre of mass along the rod, m."""
+        return (self.first_moment[0] / self.mass,)
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """(m, m gamma_x, I)."""
+        return (self.mass, *self.first_moment, self.inertia)
+
+
+@dataclass(frozen=True)
+class PlanarInertia:
+    """The inertia of a link or of the platform about its reference point, in its own frame.
+
+    The reference point of an upper link or a crank is on R1, with x along the link; that of a
+    **lower link is on R3, the platform's end**, with x pointing from R2 to R3, so that a usual
+    lower link has a negative first moment along x; that of the platform is P.
+
+    Parameters
+    ----------
+    mass : float
+        Mass m, kg.
+    first_moment : tuple of float
+        (m gamma_x, m gamma_y), kg m: mass times the position of the centre of mass.
+    inertia : float
+        Moment of inertia I about the rotation axis **through the reference point**, kg m^2.
+
+    Raises
+    ------
+    ModelError
+        If no real body has this inertia: the mass must be positive and I m >= (m gamma)^2.
+
+    Examples
+    --------
+    >>> link = PlanarInertia.of_body(0.32, (0.0847, 0.01), 0.003099648)
+    >>> link.first_moment
+    (0.027104, 0.0032)
+    """
+
+    mass: float
+    first_moment: tuple[float, float]
+    inertia: float
+
+    kinds: ClassVar = ("m", "mgx", "mgy", "I")
+
+    def __post_init__(self) -> None:
+        _check(self, 2)
+
+    @classmethod
+    def of_body(cls, mass: float, center_of_mass: Sequence[float], inertia: float) -> PlanarInertia:
+        """Build the inertia from the centre of mass (m) instead of the first moment (kg m)."""
+        mass = positive(mass, "mass", "kg")
+        x, y = numbers(center_of_mass, "center_of_mass", 2)
+        return cls(mass, (mass * x, mass * y), inertia)
+
+    @classmethod
+    def of_values(cls, values: Sequence[float]) -> PlanarInertia:
+        """Build it from (m, m gamma_x, m gamma_y, I)."""
+        mass, hx, hy, inertia = values
+        return cls(mass, (hx, hy), inertia)
+
+    @property
+    def center_of_mass(self) -> tuple[float, float]:
+        """Position of the centre of mass in the body's frame, m."""
+        return (self.first_moment[0] / self.mass, self.first_moment[1] / self.mass)
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """(m, m gamma_x, m gamma_y, I), the order of the paper's Eq. (16)."""
+        return (self.mass, *self.first_moment, self.inertia)
+
+
+def _check(body: RodInertia | PlanarInertia, axes: int) -> None:
+    mass = positive(body.mass, "mass", "kg")
+    moment = numbers(body.first_moment, "first_moment", axes)
+    inertia = number(body.inertia, "inertia")
+    least = sum(h * h for h in moment) / mass
+    if inertia < least * (1.0 - _ROUNDING) or inertia <= 0.0:
+        raise ModelError(
+            f"inertia: {inertia:g} kg m^2 belongs to no real body; with this mass and centre "
+            f"of mass, and about the reference point, it must be above {least:g} kg m^2"
+        )
+    for key, value in (("mass", mass), ("first_moment", moment), ("inertia", inertia)):
+        object.__setattr__(body, key, value)

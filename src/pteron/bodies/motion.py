@@ -1,0 +1,138 @@
+"""A body in motion, and the wrench that its motion needs: CasADi expressions for one state.
+
+Inertial parameters come as rows (1, K) of K columns: one column for the values of a machine, or a
+column for each parameter, which turns every force below into the regressor of that force.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import casadi as ca
+
+Expression = Any
+"""A CasADi SX matrix; CasADi has no types that a checker could read."""
+
+
+class PointMotion(NamedTuple):
+    """The position, velocity and acceleration of a point, each (3, 1), in the base frame."""
+
+    position: Expression
+    velocity: Expression
+    acceleration: Expression
+
+
+class AngleMotion(NamedTuple):
+    """The platform's angle phi about its axis k, to second order."""
+
+    axis: Expression
+    """k, (3, 1)."""
+    angle: Expression
+    rate: Expression
+    acceleration: Expression
+
+
+class Moments(NamedTuple):
+    """m, m gamma_x, m gamma_y and I of a body, each a row (1, K); zero where the body has none."""
+
+    m: Expression
+    hx: Expression
+    hy: Expression
+    i: Expression
+
+
+class BodyMotion(NamedTuple):
+    """A rigid body that moves in a plane, a rod that swings, or a slider: all are written alike.
+
+    A body is its reference point and its axes x and y. A rod has no y, a slider no axes. The rows
+    are the derivatives with respect to (c, phi): the leg's platform point and the platform's angle.
+    """
+
+    position: Expression
+    """Of the reference point, (3, 1)."""
+    velocity_row: Expression
+    """(3, 4): d v / d (c', phi')."""
+    acceleration: Expression
+    """a, of the reference point, (3, 1)."""
+    turning_row: Expression | None = None
+    """(3, 4): d omega / d (c', phi'), omega being the angular velocity."""
+    x: Expression | None = None
+    """The axes x and y, (3, 1), and their second derivatives with respect to time."""
+    y: Expression | None = None
+    ddx: Expression | None = None
+    ddy: Expression | None = None
+    rides: bool = False
+    """Whether the reference point is the platform point: its mass then counts as the platform's."""
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """The kinds of its parameters."""
+        return ("m", *(() if self.x is None else ("mgx",)), *(() if self.y is None else ("mgy",))) + (
+            () if self.x is None else ("I",)
+        )
+
+
+def moments_of(kinds: tuple[str, ...], rows: list[Expression]) -> Moments:
+    """Return the parameters of a body from its rows, which are in the order of its kinds."""
+    given = dict(zip(kinds, rows, strict=True))
+    none = ca.SX(1, rows[0].shape[1])
+    return Moments(*(given.get(kind, none) for kind in ("m", "mgx", "mgy", "I")))
+
+
+def needed_wrench(
+    body: BodyMotion, inertia: Moments, gravity: Expression
+) -> tuple[Expression, Expression]:
+    """Return the force and the moment, each (3, K), that a body needs at its reference point.
+
+    With h = hx x + hy y: force m (a - g) + h'' and moment h x (a - g) + I x x x''. For a body in a
+    plane the last is I theta'' z. The paper's F is what acts on the body, minus this: Eq. (14).
+    """
+    a_g = body.acceleration - gravity
+    force = ca.mtimes(a_g, inertia.m)
+    moment = ca.SX(3, inertia.m.shape[1])
+    if body.x is not None:
+        force = force + ca.mtimes(body.ddx, inertia.hx)
+        moment = ca.mtimes(ca.cross(body.x, a_g), inertia.hx)
+        moment = moment + ca.mtimes(ca.cross(body.x, body.ddx), inertia.i)
+    if body.y is not None:
+        force = force + ca.mtimes(body.ddy, inertia.hy)
+        moment = moment + ca.mtimes(ca.cross(body.y, a_g), inertia.hy)
+    return force, moment
+
+
+def wrench_matrix(body: BodyMotion, gravity: Expression) -> Expression:
+    """Return Om (6, k) of Eq. (15): what acts on a body, per unit of each of its k parameters."""
+    unit = ca.SX.eye(len(body.kinds))
+    inertia = moments_of(body.kinds, ca.vertsplit(unit))
+    return -ca.vertcat(*needed_wrench(body, inertia, gravity))
+
+
+def mass_matrix(body: BodyMotion, inertia: Moments) -> Expression:
+    """Return the mass matrix (4, 4) of a body with respect to (c', phi').
+
+    T = m v.v / 2 + v.h' + I x'.x' / 2, with x' = omega x x.
+    """
+    v = body.velocity_row
+    total = inertia.m * ca.mtimes(v.T, v)
+    if body.x is not None:
+        dx = _turned(body.turning_row, body.x)
+        coupling = inertia.hx * ca.mtimes(v.T, dx)
+        if body.y is not None:
+            coupling = coupling + inertia.hy * ca.mtimes(v.T, _turned(body.turning_row, body.y))
+        total = total + coupling + coupling.T + inertia.i * ca.mtimes(dx.T, dx)
+    return total
+
+
+def mass_moment(body: BodyMotion, inertia: Moments) -> Expression:
+    """Return mass times centre of mass, (3, K), in the base frame: m r + h."""
+    total = ca.mtimes(body.position, inertia.m)
+    if body.x is not None:
+        total = total + ca.mtimes(body.x, inertia.hx)
+    if body.y is not None:
+        total = total + ca.mtimes(body.y, inertia.hy)
+    return total
+
+
+def _turned(turning_row: Expression, axis: Expression) -> Expression:
+    """Return the row (3, 4) of omega x axis."""
+    return -ca.mtimes(ca.skew(axis), turning_row)

@@ -1,0 +1,88 @@
+"""Inertial parameters as data; their names are printed, and nowhere read again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+LENGTH_POWERS = {"m": 0, "mgx": 1, "mgy": 1, "I": 2}
+"""The kinds of inertial parameters, and the power of length in their unit: kg, kg m, kg m^2."""
+
+LEG_BODIES = ("p", "u", "l")
+"""A leg's bodies by letter, in the order of the parameters: slider, upper link or crank, lower."""
+
+PLATFORM = "e"
+"""The letter of the platform."""
+
+PLATFORM_KINDS = ("m", "mgx", "mgy", "I")
+
+_UNITS = ("kg", "kg m", "kg m^2")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One inertial parameter, or one that several legs share.
+
+    Parameters
+    ----------
+    kind : str
+        ``"m"`` (mass), ``"mgx"``, ``"mgy"`` (first moments m gamma_x and m gamma_y) or ``"I"``.
+    body : str
+        ``"p"`` (slider), ``"u"`` (upper link or crank), ``"l"`` (lower link or rod), ``"e"``
+        (platform).
+    legs : tuple of int
+        The legs whose body it belongs to, from 1; empty for the platform.
+    unit : str
+        Its SI unit.
+    everyone : bool
+        Whether all legs share it: its name then has no number.
+    """
+
+    kind: str
+    body: str
+    legs: tuple[int, ...]
+    unit: str
+    everyone: bool = False
+
+    @property
+    def name(self) -> str:
+        """Its name: ``mgx_u1`` is m gamma_x of leg 1's upper link, ``m_l(2,4)`` is shared."""
+        return f"{self.kind}_{self.body}{self.suffix}"
+
+    @property
+    def suffix(self) -> str:
+        """What tells its legs in the name."""
+        if self.everyone or not self.legs:
+            return ""
+        return str(self.legs[0]) if len(self.legs) == 1 else f"({','.join(map(str, self.legs))})"
+
+    @property
+    def length_power(self) -> int:
+        """The power of length in its unit: 0, 1 or 2."""
+        return LENGTH_POWERS[self.kind]
+
+
+def parameter_list(
+    legs: Sequence[Mapping[str, Iterable[str]]], groups: Sequence[tuple[int, ...]] | None = None
+) -> tuple[Parameter, ...]:
+    """Return the inertial parameters in the paper's order, Eq. (16).
+
+    Sliders first, then upper links and cranks, then lower links and rods, then the platform; a body
+    that a leg has not is left out.
+
+    Parameters
+    ----------
+    legs : sequence of mapping
+        For each leg the kinds of parameters of each of its bodies, by letter.
+    groups : sequence of tuple of int, optional
+        Legs, from 1, that share one parameter set; those of a group have the same bodies.
+    """
+    groups = groups or [(i + 1,) for i in range(len(legs))]
+    found = [
+        Parameter(kind, body, group, _UNITS[LENGTH_POWERS[kind]], 1 < len(legs) == len(group))
+        for body in LEG_BODIES
+        for group in groups
+        for kind in legs[group[0] - 1].get(body, ())
+    ]
+    platform = [Parameter(k, PLATFORM, (), _UNITS[LENGTH_POWERS[k]]) for k in PLATFORM_KINDS]
+    return (*found, *platform)

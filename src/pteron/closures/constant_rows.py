@@ -1,0 +1,164 @@
+"""The closure d_bar . (c - r) = rho of legs whose rows are constant, in closed form.
+
+For 3T1R the n = 4 rows d_bar leave one left null vector N (N^T D = 0), and every solution of
+D^T F = w is F = P w + lambda N with D^T P = 1. So the Jacobian, [ D | j ], never needs a numerical
+elimination: its only denominator is N . j, which depends on phi alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import casadi as ca
+import numpy as np
+
+from pteron.bodies.motion import Expression
+from pteron.closures.closure import Closure, adjugate3, det3, nan_below_zero
+from pteron.legs.leg import LegEquations, LegMotion, Plane
+from pteron.platforms.motion import Load, PlatformEquations, PlatformMotion
+
+_VANISHING = 1e-10
+"""Relative size below which the coefficients of det J count as zero: far above their rounding
+(1e-16) and far below what any layout meant to work would have."""
+
+_ROUNDING = 1e-14
+"""What the closures' terms keep, relative to the largest of them."""
+
+
+class ConstantRows(Closure):
+    """Legs that all have a constant row, under a platform that does or does not turn."""
+
+    @classmethod
+    def fits(cls, legs: Sequence[LegEquations], platform: PlatformEquations) -> bool:
+        return all(leg.constant_row is not None for leg in legs)
+
+    def __init__(self, legs: Sequence[LegEquations], platform: PlatformEquations) -> None:
+        super().__init__(legs, platform)
+        self.turns = "phi" in platform.coordinates
+        self.rows = ca.vertcat(*(leg.constant_row.T for leg in legs))  # D
+        if not self.turns:
+            self.right_inverse = adjugate3(self.rows).T / det3(self.rows)  # P
+            return
+        normal = ca.mtimes(self.rows.T, self.rows)
+        self.right_inverse = ca.mtimes(self.rows, adjugate3(normal)) / det3(normal)
+        null = ca.vertcat(*((-1) ** i * det3(_without(self.rows, i)) for i in range(4)))
+        self.null = null / ca.norm_inf(null) if null.is_constant() else null  # N
+        # j = cosines cos(phi) + sines sin(phi) is the Jacobian's fourth column.
+        bars = [leg.constant_row for leg in legs]
+        pairs = list(zip(bars, platform.offsets, strict=True))
+        self.cosines = ca.vertcat(*(ca.dot(d, offset.b) for d, offset in pairs))
+        self.sines = ca.vertcat(*(-ca.dot(d, offset.a) for d, offset in pairs))
+        # N . j = A cos(phi) + B sin(phi); det J is a constant times it.
+        self.orientation = ca.dot(self.null, self.cosines), ca.dot(self.null, self.sines)
+
+    keeps_modes = True
+
+    def vanishes(self) -> bool:
+        """Say so where all rows lie in a plane, and for layouts with fourfold symmetry about k."""
+        sizes = np.linalg.svd(np.array(ca.evalf(self.rows)), compute_uv=False)
+        if sizes[-1] <= _VANISHING * sizes[0] or self.orientation is None:
+            return bool(sizes[-1] <= _VANISHING * sizes[0])
+        # Relative to what cannot vanish by cancellation, else noise is measured against noise.
+        null = np.abs(np.array(ca.evalf(self.null))).max()
+        bars = np.linalg.norm(np.array(ca.evalf(self.rows)), axis=1).max()
+        points = max(float(ca.norm_2(ca.DM(ca.evalf(s)))) for s in self.platform.points)
+        size = np.hypot(*(float(value) for value in self.orientation))
+        return bool(size <= _VANISHING * null * bars * points)
+
+    @property
+    def modes(self) -> int:
+        return 2 if self.turns else 1
+
+    def measure(self, platform: PlatformMotion, legs: Sequence[LegMotion]) -> Expression:
+        """Return N . j over its largest value, the cosine of the angle from the best orientation.
+
+        For 3T it is det D over the product of its rows' lengths.
+        """
+        if self.orientation is None:
+            rows = ca.vertsplit(self.rows)
+            return det3(self.rows) / (ca.norm_2(rows[0]) * ca.norm_2(rows[1]) * ca.norm_2(rows[2]))
+        assert platform.angle is not None
+        (a, b), phi = self.orientation, platform.angle.angle
+        return (a * ca.cos(phi) + b * ca.sin(phi)) / ca.sqrt(a * a + b * b)
+
+    def forces(
+        self, load: Load, platform: PlatformMotion, legs: Sequence[LegMotion]
+    ) -> Expression:
+        """Return P f + lambda N, lambda from the moment that P f leaves unbalanced."""
+        if self.orientation is None:
+            return ca.mtimes(self.right_inverse, load.force)
+        assert platform.angle is not None
+        c, s = ca.cos(platform.angle.angle), ca.sin(platform.angle.angle)
+        inverse = _sparse_inverse(self.rows) if self.rows.is_constant() else self.right_inverse
+        cosine = load.cosine - ca.mtimes(ca.mtimes(self.cosines.T, inverse), load.force)
+        sine = load.sine - ca.mtimes(ca.mtimes(self.sines.T, inverse), load.force)
+        a, b = self.orientation
+        rest = (c * cosine + s * sine + load.moment) / (a * c + b * s)
+        return ca.mtimes(inverse, load.force) + ca.mtimes(self.null, rest)
+
+    def rates(
+        self, joints: Expression, platform: PlatformMotion, legs: Sequence[LegMotion]
+    ) -> Expression:
+        if self.orientation is None:
+            return ca.mtimes(self.right_inverse.T, joints)
+        assert platform.angle is not None
+        (a, b), phi = self.orientation, platform.angle.angle
+        angle = ca.mtimes(self.null.T, joints) / (a * ca.cos(phi) + b * ca.sin(phi))
+        column = self.cosines * ca.cos(phi) + self.sines * ca.sin(phi)
+        return ca.vertcat(
+            ca.mtimes(self.right_inverse.T, joints - ca.mtimes(column, angle)), angle
+        )
+
+    def poses(self, joints: Expression) -> Expression:
+        """Solve the closures, which are linear in (p, cos phi, sin phi).
+
+        For 3T they give one pose. For 3T1R their left null vector leaves A' cos(phi) + B' sin(phi)
+        = C, with two angles: the first column has N . j > 0, the second N . j < 0, so that each
+        column is one assembly mode throughout. NaN where it is not real, C^2 > A'^2 + B'^2.
+        """
+        known, sizes = [], []
+        for leg, offset, q in zip(
+            self.legs, self.platform.offsets, ca.vertsplit(joints), strict=True
+        ):
+            locus = leg.locus(q)
+            assert isinstance(locus, Plane)
+            still = offset.still if self.turns else offset.still + offset.a
+            known.append(locus.offset - ca.dot(locus.normal, still))
+            sizes.append(locus.size)
+        right = ca.vertcat(*known)
+        if self.orientation is None:
+            return ca.mtimes(self.right_inverse.T, right)
+        # The derivative of d_bar . s with respect to phi is j, so that d_bar . s itself is
+        # cosines sin(phi) - sines cos(phi); hence A' = -B and B' = A.
+        a, b = self.orientation
+        total, square = ca.dot(self.null, right), a * a + b * b
+        # At a singular orientation both poses meet and the radicand is all rounding: what is barely
+        # below zero counts as zero, an error of 1e-7 rad there. N . known cancels the sizes of its
+        # terms, but not their rounding.
+        rest = square - total * total
+        size = ca.dot(ca.fabs(self.null), ca.vertcat(*sizes))
+        slack = _ROUNDING * (square + ca.sqrt(square) * size)
+        radicand = ca.fmax(rest, ca.fmin(rest + slack, 0))
+        root = ca.sqrt(radicand)
+        poses = []
+        for branch in (1, -1):
+            cosine = (-b * total + branch * a * root) / square
+            sine = (a * total + branch * b * root) / square
+            p = ca.mtimes(
+                self.right_inverse.T, right - (self.cosines * sine - self.sines * cosine)
+            )
+            poses.append(ca.vertcat(p, ca.atan2(sine, cosine)) + nan_below_zero(radicand))
+        return ca.horzcat(*poses)
+
+
+def _sparse_inverse(rows: Expression) -> Expression:
+    """Return a P with D^T P = 1 that loads three legs only: those that hold a force best."""
+    best = max(range(4), key=lambda i: abs(float(det3(_without(rows, i)))))
+    held = _without(rows, best)
+    inverse = ca.vertsplit(adjugate3(held).T / det3(held))
+    inverse.insert(best, ca.SX.zeros(1, 3))
+    return ca.vertcat(*inverse)
+
+
+def _without(rows: Expression, i: int) -> Expression:
+    return ca.vertcat(*(rows[j, :] for j in range(rows.shape[0]) if j != i))

@@ -1,0 +1,119 @@
+"""Positions, Jacobians and joint motions: Eqs. (4) to (12), and back."""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from pteron.bodies.motion import Expression
+from pteron.closures.closure import nan_below_zero
+from pteron.equations.machine import Machine, State
+from pteron.legs.leg import Reach
+
+
+def inverse_position(machine: Machine, pose: Expression) -> Expression:
+    """Return the joint coordinates (n, 1), Eq. (4)."""
+    return ca.vertcat(*(leg.coordinate for leg in machine.state(pose).legs))
+
+
+def reach(machine: Machine, pose: Expression) -> list[Reach]:
+    """Return whether each leg reaches the pose, how far it is from its edge, and how bent."""
+    points = machine.state(pose).platform.points
+    return [leg.reach(c.position) for leg, c in zip(machine.legs, points, strict=True)]
+
+
+def beyond_reach(machine: Machine, pose: Expression) -> Expression:
+    """Return, for every leg (n, 1), NaN where it does not reach the pose, 0 where it does."""
+    found = reach(machine, pose)
+    return ca.vertcat(*(nan_below_zero(leg.discriminant) for leg in found))
+
+
+def direct_position(machine: Machine, joints: Expression, *, reached: bool = True) -> Expression:
+    """Return every pose that the joint coordinates allow, as columns (m, k).
+
+    NaN where it is not real or, with `reached`, where a leg does not reach it.
+    """
+    poses = machine.closure.poses(joints)
+    if not reached:
+        return poses
+    columns = ca.horzsplit(poses)
+    return ca.horzcat(*(pose + ca.sum1(beyond_reach(machine, pose)) for pose in columns))
+
+
+def jacobian(state: State) -> Expression:
+    """Return J (n, m), Eq. (10): row i is [dq/dc | dq/dphi] d(c, phi)/dx."""
+    pairs = zip(state.legs, state.platform.matrices, strict=True)
+    return ca.vertcat(*(ca.mtimes(leg.row / leg.divisor, matrix) for leg, matrix in pairs))
+
+
+def body_jacobian(state: State, i: int, letter: str) -> Expression | None:
+    """Return J_b (6, m) of a body of a leg: rows v, then omega; Eqs. (11) and (12)."""
+    body = state.legs[i].bodies.get(letter)
+    if body is None:
+        return None
+    turning = ca.SX(3, 4) if body.turning_row is None else body.turning_row
+    return ca.mtimes(ca.vertcat(body.velocity_row, turning), state.platform.matrices[i])
+
+
+def link_jacobians(state: State) -> tuple[list[Expression], list[Expression]]:
+    """Return J_u and J_l of every leg, each (6, m); NaN for a link that a leg has not."""
+    n = len(state.legs)
+    none = ca.SX.nan(6, n)
+    upper, lower = (
+        [none if j is None else j for j in (body_jacobian(state, i, letter) for i in range(n))]
+        for letter in "ul"
+    )
+    return upper, lower
+
+
+def link_vectors(state: State) -> tuple[Expression, Expression]:
+    """Return l_u and l_l of every leg, each (n, 3): Eqs. (6) and (7); NaN where it has none."""
+    none = ca.SX.nan(3, 1)
+    upper, lower = (
+        ca.vertcat(*((none if leg.links[k] is None else leg.links[k]).T for leg in state.legs))
+        for k in range(2)
+    )
+    return upper, lower
+
+
+def link_turning(state: State, order: int) -> Expression:
+    """Return, for every leg (n, 2), the rates of theta_u and theta_l, or their accelerations.
+
+    NaN where these angles do not describe a link's motion. `order` is 0 for rates.
+    """
+    rows = [
+        ca.horzcat(*(ca.SX.nan() if angle is None else angle[order] for angle in leg.turning))
+        for leg in state.legs
+    ]
+    return ca.vertcat(*rows)
+
+
+def chain_motion(state: State, order: int) -> Expression:
+    """Return rates, or accelerations, (n, j) of every leg's joints; NaN for one it has not."""
+    longest = max(len(leg.chain) for leg in state.legs)
+    rows = []
+    for leg in state.legs:
+        values = [(joint.rate, joint.acceleration)[order] for joint in leg.chain]
+        rows.append(ca.horzcat(*values, *[ca.SX.nan()] * (longest - len(values))))
+    return ca.vertcat(*rows)
+
+
+def chain_points(state: State) -> list[Expression]:
+    """Return a point (j, 3) on every leg's joint axes, NaN for one it has not."""
+    longest = max(len(leg.chain) for leg in state.legs)
+    return [
+        ca.vertcat(*(joint.point.T for joint in leg.chain), ca.SX.nan(longest - len(leg.chain), 3))
+        for leg in state.legs
+    ]
+
+
+def platform_rates(
+    machine: Machine, pose: Expression, rates: Expression, accelerations: Expression
+) -> tuple[Expression, Expression]:
+    """Return x' and x'' (m, 1) of joints that move at q' and q'', (n, 1) each.
+
+    J x' = q' and J x'' = q'' - J' x', whose last term is the joints' acceleration at x'' = 0.
+    """
+    at_rest = machine.state(pose)
+    velocity = machine.closure.rates(rates, at_rest.platform, at_rest.legs)
+    drift = ca.vertcat(*(leg.acceleration for leg in machine.state(pose, velocity).legs))
+    return velocity, machine.closure.rates(accelerations - drift, at_rest.platform, at_rest.legs)

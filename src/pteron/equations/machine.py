@@ -1,0 +1,129 @@
+"""A machine as the equations see it: its legs, platform, closure and gravity, in expressions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import casadi as ca
+
+from pteron.bodies.motion import Expression, Moments, moments_of
+from pteron.bodies.parameters import PLATFORM, PLATFORM_KINDS, Parameter, parameter_list
+from pteron.closures import KINDS as CLOSURES
+from pteron.closures import Closure
+from pteron.legs.leg import LegEquations, LegMotion
+from pteron.manipulator import Manipulator
+from pteron.platforms import EQUATIONS, PlatformEquations
+from pteron.platforms.motion import PlatformMotion
+
+
+@dataclass(frozen=True)
+class State:
+    """The platform and its legs in motion."""
+
+    platform: PlatformMotion
+    legs: tuple[LegMotion, ...]
+
+
+@dataclass(frozen=True)
+class Machine:
+    """The equations of a machine's parts."""
+
+    legs: tuple[LegEquations, ...]
+    platform: PlatformEquations
+    closure: Closure
+    gravity: Expression
+
+    @property
+    def freedom(self) -> int:
+        """Number of pose coordinates, m = n."""
+        return len(self.legs)
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The inertial parameters in the paper's order."""
+        return parameter_list([leg.kinds for leg in self.legs])
+
+    @classmethod
+    def of(cls, robot: Manipulator) -> Machine:
+        """Return one machine, in numbers."""
+        legs = tuple(leg.equations() for leg in robot.legs)
+        frame = [ca.SX(list(axis)) for axis in robot.platform.frame]
+        points = [ca.SX(list(leg.platform_point)) for leg in robot.legs]
+        return cls._made(robot, legs, frame, points, ca.SX(list(robot.gravity)))
+
+    @classmethod
+    def symbols(cls, robot: Manipulator) -> tuple[Machine, Expression]:
+        """Return the machines of a robot's topology in symbols, and the symbols as one vector.
+
+        The vector holds the quantities of each leg and its platform point; then x0, y0, k and
+        gravity: the order of `numbers`.
+        """
+        legs, points, vectors = [], [], []
+        for i, leg in enumerate(robot.legs, start=1):
+            parts = {q.name: ca.SX.sym(f"{q.name}{i}", len(q.value)) for q in leg.quantities}
+            points.append(ca.SX.sym(f"platform_point{i}", 3))
+            legs.append(leg.equations(parts))
+            vectors += [*parts.values(), points[-1]]
+        frame = [ca.SX.sym(name, 3) for name in ("x0", "y0", "k")]
+        gravity = ca.SX.sym("gravity", 3)
+        machine = cls._made(robot, tuple(legs), frame, points, gravity)
+        return machine, ca.vertcat(*vectors, *frame, gravity)
+
+    @classmethod
+    def _made(
+        cls,
+        robot: Manipulator,
+        legs: tuple[LegEquations, ...],
+        frame: list[Expression],
+        points: list[Expression],
+        gravity: Expression,
+    ) -> Machine:
+        platform = EQUATIONS[robot.platform.motion](frame, points)
+        closure = next(kind for kind in CLOSURES if kind.fits(legs, platform))
+        return cls(legs, platform, closure(legs, platform), gravity)
+
+    def state(
+        self,
+        pose: Expression,
+        velocity: Expression | None = None,
+        acceleration: Expression | None = None,
+    ) -> State:
+        """Return the machine in motion, or at rest in a pose."""
+        rest = ca.SX.zeros(self.freedom)
+        platform = self.platform.motion(
+            pose,
+            rest if velocity is None else velocity,
+            rest if acceleration is None else acceleration,
+        )
+        pairs = zip(self.legs, platform.points, strict=True)
+        return State(platform, tuple(leg.motion(c, platform.angle) for leg, c in pairs))
+
+    def moments(self, parameters: Expression) -> tuple[list[dict[str, Moments]], Moments]:
+        """Return the legs' inertia, by body, and the platform's from P (N, K)."""
+        blocks: dict[tuple[str, tuple[int, ...]], list[Expression]] = {}
+        for p, row in zip(self.parameters, ca.vertsplit(parameters), strict=True):
+            blocks.setdefault((p.body, p.legs), []).append(row)
+        legs = [
+            {body: moments_of(kinds, blocks[body, (i,)]) for body, kinds in leg.kinds.items()}
+            for i, leg in enumerate(self.legs, start=1)
+        ]
+        return legs, moments_of(PLATFORM_KINDS, blocks[PLATFORM, ()])
+
+
+@lru_cache(maxsize=64)
+def closure_of(robot: Manipulator) -> Closure:
+    """Return the closure of one machine, in numbers."""
+    return Machine.of(robot).closure
+
+
+def numbers(robot: Manipulator) -> list[float]:
+    """Return the numbers of a machine for the vector of `Machine.symbols`."""
+    values: list[float] = []
+    for leg in robot.legs:
+        for quantity in leg.quantities:
+            values += map(float, quantity.value)
+        values += leg.platform_point
+    for vector in (*robot.platform.frame, robot.gravity):
+        values += vector
+    return values

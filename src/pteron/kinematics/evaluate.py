@@ -1,0 +1,162 @@
+"""How a public function is evaluated: one kernel a call, and what is said of a state it refuses.
+
+The kernel returns its values and a status. Nothing else happens as long as the status is good; the
+particulars of a bad state are worked out only then.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pteron.equations.machine import closure_of
+from pteron.errors import DataError, PteronError, SingularPose, UnreachablePose
+from pteron.kernels import Array, Selects, as_array, needs_of, numeric
+from pteron.kernels.functions import TYPE_I, TYPE_II
+from pteron.kinematics.singularities import EVERYWHERE, is_singular_everywhere
+from pteron.manipulator import Manipulator
+from pteron.shapes import OnFailure
+
+_COINCIDENT = 1e-6
+"""Share of a leg's length within which its two ends count as coincident, in messages."""
+
+_MILLIMETRES = 20.0
+"""A pose that misses a leg's reach by so many times its size was perhaps given in millimetres."""
+
+
+def evaluated(
+    robot: Manipulator,
+    what: str,
+    on_failure: OnFailure,
+    *values: ArrayLike,
+    base: Selects | None = None,
+    wrench: bool = False,
+) -> Any:
+    """Return the outputs of a function of the table, or the only one.
+
+    Raises
+    ------
+    DataError, UnreachablePose, SingularPose
+        Under ``on_failure="raise"``, for the first state, in memory order, that does not serve;
+        under ``"nan"`` such states give NaN.
+    """
+    *results, status = numeric(robot, what, base=base, wrench=wrench)(*values)
+    good = status.item() if status.ndim == 0 else status.all()
+    if not good or on_failure != "raise":
+        if on_failure not in ("raise", "nan"):
+            raise DataError(f'on_failure: {on_failure!r} is neither "raise" nor "nan"')
+        if not good:
+            if on_failure == "raise":
+                raise _failure(robot, what, values, status, wrench)
+            for result in results:
+                result[status == 0.0] = np.nan
+    return results[0] if len(results) == 1 else tuple(results)
+
+
+def checked(
+    robot: Manipulator, value: ArrayLike, name: str, on_failure: OnFailure = "raise"
+) -> Array:
+    """Return an array (..., m) of finite numbers, or say which element is not one.
+
+    Under ``on_failure="nan"`` a row with a number that is not finite becomes NaN as a whole.
+    """
+    array = as_array(value, name, (robot.freedom,))
+    good = np.isfinite(array)
+    if good.all():
+        return array
+    if on_failure == "raise":
+        raise _not_finite(name, array, tuple(int(i) for i in np.argwhere(~good)[0]))
+    return np.where(good.all(axis=-1, keepdims=True), array, np.nan)
+
+
+def _not_finite(name: str, array: Array, index: tuple[int, ...]) -> DataError:
+    wanted = "a finite number" if not np.isfinite(array[index]) else "a number of sensible size"
+    return DataError(f"{name}{list(index)}: {array[index]} given, {wanted} expected")
+
+
+def _failure(
+    robot: Manipulator, what: str, values: tuple[ArrayLike, ...], status: Array, wrench: bool
+) -> PteronError:
+    """Return what is wrong with the first state that does not serve."""
+    index = tuple(int(i) for i in np.argwhere(status == 0.0)[0])
+    ports = [p for p in numeric(robot, what, wrench=wrench).inputs if not p.shared]
+    for port, value in zip(ports, values, strict=True):
+        array = np.asarray(value, dtype=float)
+        whole = np.broadcast_to(array, status.shape + port.shape)[index]
+        bad = np.argwhere(~(np.abs(whole) < 1e70))
+        if len(bad):
+            lead = array.ndim - len(port.shape)
+            at = index[len(index) - lead :] if lead else ()
+            at = tuple(i if n > 1 else 0 for i, n in zip(at, array.shape, strict=False))
+            return _not_finite(port.name, array, (*at, *(int(i) for i in bad[0])))
+        if port.name == "pose":
+            pose = whole
+    others = int((status == 0.0).sum()) - 1
+    many = f" ({others + 1} such poses in the batch)" if others else ""
+    where = f"pose[{', '.join(map(str, index))}]" if index else "pose"
+    return _bad_pose(robot, pose, needs_of(what), where, index, many)
+
+
+def _bad_pose(
+    robot: Manipulator,
+    pose: Array,
+    needs: tuple[str, ...],
+    where: str,
+    index: tuple[int, ...],
+    many: str,
+) -> PteronError:
+    margin, type_i, spread, _ = numeric(robot, "reach")(pose)
+    if "rows" in needs:
+        rest = [leg.constant_row is not None for leg in closure_of(robot).legs]
+        type_i[rest] = 1.0
+    if np.isnan(type_i).any():
+        i = int(np.isnan(type_i).argmax())
+        return _unreachable(robot, i, max(-float(margin[i]), 0.0), where, index, many)
+    for i, leg in enumerate(robot.legs):
+        undetermined = bool(spread[i] <= _COINCIDENT * leg.size)
+        if type_i[i] <= TYPE_I and (needs != ("reach",) or undetermined):
+            told = (
+                "its two ends coincide, so that its elbow may be anywhere"
+                if undetermined
+                else f"it is stretched or folded (type I; measure {type_i[i]:.1e}, less than six "
+                f"digits are left below {TYPE_I:.0e})"
+            )
+            return SingularPose(
+                f"{where}: singular for leg {i + 1}: {told}; move away from the edge of its reach"
+                f"{many}",
+                kind="elbow" if undetermined else "I",
+                measure=float(type_i[i]),
+                index=index,
+                leg=i + 1,
+            )
+    if is_singular_everywhere(robot):
+        return SingularPose(
+            EVERYWHERE.format(name=robot.name), kind="II", measure=0.0, index=index
+        )
+    measure = abs(float(numeric(robot, "type_ii")(pose)[0]))
+    return SingularPose(
+        f"{where}: singular (type II; measure {measure:.1e}, less than six digits are left below "
+        f"{TYPE_II:.0e}): the actuators no longer hold the platform; move away from it{many}",
+        kind="II",
+        measure=measure,
+        index=index,
+    )
+
+
+def _unreachable(
+    robot: Manipulator, i: int, shortfall: float, where: str, index: tuple[int, ...], many: str
+) -> UnreachablePose:
+    leg = robot.legs[i]
+    doubt = (
+        "; is it in millimetres? lengths are in metres"
+        if shortfall > _MILLIMETRES * leg.size
+        else "; move the pose towards the legs' reach"
+    )
+    return UnreachablePose(
+        f"{where}: leg {i + 1} misses it by {shortfall:.3g} m: {leg.reach_text}{doubt}{many}",
+        leg=i + 1,
+        shortfall=shortfall,
+        index=index,
+    )

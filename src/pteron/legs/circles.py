@@ -1,0 +1,72 @@
+"""Lemma 1: two links that close a triangle are the intersection of two circles.
+
+Vectors lie in the plane of the links, as two-vectors (2, 1).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from random import Random
+
+import casadi as ca
+
+from pteron.bodies.motion import Expression
+
+
+def squared_reach(lu: Expression, ll: Expression, n2: Expression) -> Expression:
+    """Return Delta, the product under the radical of Eqs. (1) and (2): below 0 out of reach.
+
+    The paper's four factors pair into ((lu + ll)^2 - n^2) (n^2 - (lu - ll)^2): n^2 is enough.
+    """
+    longest, shortest = lu + ll, lu - ll
+    return (longest * longest - n2) * (n2 - shortest * shortest)
+
+
+def quarter_turn(v: Expression) -> Expression:
+    """Return d x v for a vector v of the plane, or for the columns of a matrix (2, K)."""
+    return ca.vertcat(-v[1, :], v[0, :])
+
+
+def links_from_triangle(
+    lu: Expression, ll: Expression, sigma: Expression, u: Expression
+) -> tuple[Expression, Expression, Expression]:
+    """Return l_u, l_l (Eqs. 1 and 2, or 6 and 7) and 1/D with D = (l_u x l_l) . d.
+
+    D = -sigma sqrt(Delta) / 2: twice the area of the links' triangle.
+    """
+    n2 = ca.dot(u, u)
+    root = ca.sqrt(squared_reach(lu, ll, n2))
+    share = 0.5 + (0.5 * (lu * lu - ll * ll)) / n2
+    offset = (0.5 * sigma) * (root / n2)
+    l_u = share * u + offset * quarter_turn(u)
+    return l_u, u - l_u, (-2 * sigma) / root
+
+
+def pole(direction: Sequence[float]) -> tuple[int, int]:
+    """Return the largest component of a unit vector and its sign, which `plane_axis` asks for."""
+    i = max(range(3), key=lambda j: abs(direction[j]))
+    return i, 1 if direction[i] > 0 else -1
+
+
+def plane_axis(d: Expression, i: int, sign: int) -> Expression:
+    """Return a unit vector a perpendicular to d, without a root; d along axis i gives axis i + 1.
+
+    It is the image of axis i + 1 under the reflection that takes axis i to -sign d. `sign` is that
+    of d's component i, so that the denominator is at least 1.
+    """
+    unit = ca.DM.eye(3)
+    v = d + sign * unit[:, i]
+    j = (i + 1) % 3
+    return unit[:, j] - (v[j] / (1 + sign * d[i])) * v
+
+
+def random_direction(length: Fraction, rng: Random) -> tuple[Fraction, Fraction]:
+    """Return a random vector of the plane with this length, rational by its half angle."""
+    t = random_fraction(rng)
+    return length * (1 - t * t) / (1 + t * t), length * 2 * t / (1 + t * t)
+
+
+def random_fraction(rng: Random) -> Fraction:
+    """Return a random fraction, mostly between -10 and 10."""
+    return Fraction(rng.randint(-400, 400), rng.randint(1, 200))

@@ -1,0 +1,448 @@
+"""P-R-R-R legs, the paper's: a slider and two links in a plane perpendicular to the revolute axes.
+
+In a PRRU leg a fourth revolute axis, along the platform's k, meets R3 at the platform point, so that
+the platform may turn against the leg.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from random import Random
+from typing import Any, ClassVar, NamedTuple
+
+import casadi as ca
+
+from pteron.bodies.inertia import Inertia, PlanarInertia, PointMass
+from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, PointMotion
+from pteron.bodies.vectors import (
+    Vector,
+    dot,
+    norm,
+    parallel,
+    positive,
+    scaled,
+    unit_vector,
+    vector,
+)
+from pteron.errors import ModelError
+from pteron.legs.circles import (
+    links_from_triangle,
+    plane_axis,
+    pole,
+    quarter_turn,
+    random_direction,
+    squared_reach,
+)
+from pteron.legs.leg import (
+    SLIDER,
+    Joint,
+    LegEquations,
+    LegKind,
+    LegMotion,
+    Needs,
+    Plane,
+    Quantity,
+    Reach,
+    ReachBound,
+    Transfer,
+    checked_elbow,
+    checked_limits,
+)
+from pteron.legs.two_bar import first_moment, second_derivative, two_bar_needs
+
+_LEAST_SLIDE = 1e-6
+
+_PARALLEL = 1.0 - 1e-12
+"""Cosine between d and k above which R3 and R4 of a leg are one joint."""
+
+
+@dataclass(frozen=True)
+class PRRR(LegKind):
+    """A P-R-R-R leg that carries one point of the platform.
+
+    The slider moves along `slider_direction` through `guide_point`; the revolute axes R1, R2 and R3
+    all have `direction`. Vectors are in the base frame, except `platform_point`.
+
+    Parameters
+    ----------
+    guide_point : vector
+        r, the point of the guide where the slider coordinate is zero, m.
+    direction : unit vector
+        d, of the revolute axes.
+    platform_point : vector
+        s0, from P to the platform point, in the platform frame, m.
+    upper_length, lower_length : float
+        Lengths of the upper link (R1 to R2) and of the lower link (R2 to R3), m.
+    slider_mass : float
+        m_p, kg.
+    upper, lower : PlanarInertia
+        Inertia of the two links; see `PlanarInertia` for their reference points.
+    slider_direction : unit vector, optional
+        e; d where it is not given.
+    elbow : {1, -1}
+        sigma, the side of the elbow.
+    limits : (float, float), optional
+        Least and greatest slider coordinate, m.
+    """
+
+    guide_point: Vector
+    direction: Vector
+    platform_point: Vector
+    upper_length: float
+    lower_length: float
+    slider_mass: float
+    upper: PlanarInertia
+    lower: PlanarInertia
+    slider_direction: Vector | None = None
+    elbow: int = 1
+    limits: tuple[float, float] | None = None
+
+    type = "PRRR"
+    joint = SLIDER
+
+    def __post_init__(self) -> None:
+        direction = unit_vector(self.direction, "direction")
+        e = self.slider_direction
+        if e is not None:
+            e = unit_vector(e, "slider_direction")
+            if abs(dot(direction, e)) < _LEAST_SLIDE:
+                raise ModelError(
+                    f"slider_direction: {list(e)} is perpendicular to direction {list(direction)}, "
+                    "so that the slider cannot move the leg's plane; tilt one against the other"
+                )
+        checked = {
+            "guide_point": vector(self.guide_point, "guide_point"),
+            "direction": direction,
+            "platform_point": vector(self.platform_point, "platform_point"),
+            "upper_length": positive(self.upper_length, "upper_length", "m"),
+            "lower_length": positive(self.lower_length, "lower_length", "m"),
+            "slider_mass": positive(self.slider_mass, "slider.mass", "kg"),
+            "slider_direction": e,
+            "elbow": checked_elbow(self.elbow),
+            "limits": checked_limits(self.limits, "m"),
+        }
+        for key, value in checked.items():
+            object.__setattr__(self, key, value)
+
+    @property
+    def e(self) -> Vector:
+        """The slider's direction, also where it was left to its default."""
+        return self.slider_direction or self.direction
+
+    @property
+    def bodies(self) -> dict[str, Inertia]:
+        return {"p": PointMass(self.slider_mass), "u": self.upper, "l": self.lower}
+
+    def with_bodies(self, bodies: Mapping[str, Any]) -> PRRR:
+        return replace(
+            self, slider_mass=bodies["p"].mass, upper=bodies["u"], lower=bodies["l"]
+        )
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        d = ca.DM(list(self.direction))
+        normal = plane_axis(d, *pole(self.direction))
+        return (
+            Quantity("guide_point", "point", self.guide_point),
+            Quantity("direction", "direction", self.direction),
+            Quantity("slider_direction", "direction", self.e),
+            Quantity("plane_axis", "normal", [float(x) for x in ca.vertsplit(normal)]),
+            Quantity("upper_length", "length", (self.upper_length,), "lu"),
+            Quantity("lower_length", "length", (self.lower_length,), "ll"),
+            Quantity("elbow", "sign", (self.elbow,)),
+        )
+
+    def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
+        return (self.direction,) if axis is None else (self.direction, axis)
+
+    @property
+    def reach_bound(self) -> ReachBound:
+        slant = abs(dot(self.direction, self.e))
+        return ReachBound(self.guide_point, self.e, self.size / slant)
+
+    @property
+    def reach_text(self) -> str:
+        shortest = abs(self.upper_length - self.lower_length)
+        return f"its links span {shortest:.4g} to {self.size:.4g} m across direction"
+
+    @classmethod
+    def table(cls) -> dict[str, Any]:
+        from pteron.bodies import tables
+
+        return {
+            "direction": (tables.Three, ...),
+            "slider_direction": (tables.Three | None, None),
+            "upper_length": (tables.Number, ...),
+            "lower_length": (tables.Number, ...),
+            "slider": (tables.Slider, ...),
+            "upper": (tables.PlanarBody, ...),
+            "lower": (tables.PlanarBody, ...),
+        }
+
+    @classmethod
+    def of_table(cls, table: Any) -> PRRR:
+        return cls(
+            guide_point=table.guide_point,
+            direction=table.direction,
+            platform_point=table.platform_point,
+            upper_length=table.upper_length,
+            lower_length=table.lower_length,
+            slider_mass=table.slider.mass,
+            upper=table.upper.inertia_of("upper"),
+            lower=table.lower.inertia_of("lower"),
+            slider_direction=table.slider_direction,
+            elbow=table.elbow,
+            limits=table.limits,
+        )
+
+    def as_table(self) -> dict[str, Any]:
+        return {
+            "direction": self.direction,
+            "slider_direction": self.slider_direction,
+            "upper_length": self.upper_length,
+            "lower_length": self.lower_length,
+            "slider": PointMass(self.slider_mass),
+            "upper": self.upper,
+            "lower": self.lower,
+        }
+
+    def transfers(self, gravity: Vector) -> tuple[Transfer, ...]:
+        found = [
+            Transfer(
+                "slider and upper link{} move as one along the guide",
+                {("m", "u"): (1, ()), ("m", "p"): (-1, ())},
+            ),
+            Transfer("both links{} carry the elbow R2", ELBOW),
+        ]
+        size = norm(gravity)
+        still = size == 0.0 or parallel(self.direction, scaled(gravity, 1.0 / size))
+        if still and parallel(self.direction, self.e):
+            reason = "no gravity and no slider acceleration acts across the upper link{}"
+            found += [Transfer(reason, {(kind, "u"): (1, ())}) for kind in ("mgx", "mgy")]
+        return tuple(found)
+
+    @classmethod
+    def closing(
+        cls, values: Mapping[str, Sequence[Fraction]], rng: Random
+    ) -> tuple[list[Fraction], int]:
+        """Draw the directions of the links in the leg's plane; the triangle then closes."""
+        d, a = values["direction"], values["plane_axis"]
+        b = [d[1] * a[2] - d[2] * a[1], d[2] * a[0] - d[0] * a[2], d[0] * a[1] - d[1] * a[0]]
+        (ua, ub), (la, lb) = (
+            random_direction(values[key][0], rng) for key in ("upper_length", "lower_length")
+        )
+        u = [(ua + la) * p + (ub + lb) * q for p, q in zip(a, b, strict=True)]
+        # D = (l_u x l_l) . d has the sign of -sigma.
+        return u, -1 if ua * lb - ub * la > 0 else 1
+
+
+ELBOW: Mapping[tuple[str, str], tuple[int, tuple[str, ...]]] = {
+    ("m", "u"): (1, ()),
+    ("mgx", "u"): (1, ("lu",)),
+    ("I", "u"): (1, ("lu", "lu")),
+    ("m", "l"): (-1, ()),
+    ("mgx", "l"): (1, ("ll",)),
+    ("I", "l"): (-1, ("ll", "ll")),
+}
+"""Mass moved from the lower link's end to the upper link's: both carry the joint between them."""
+
+
+class Turning(NamedTuple):
+    """How a link turns about d: d theta / d u (2, 1), theta' and theta''."""
+
+    row: Expression
+    rate: Expression
+    acceleration: Expression
+
+
+class _InPlane(NamedTuple):
+    """The links in the leg's plane, (2, 1), how they turn, and u''."""
+
+    l_u: Expression
+    l_l: Expression
+    upper: Turning
+    lower: Turning
+    ddu: Expression
+
+
+class PRRREquations(LegEquations):
+    """The equations of a P-R-R-R leg.
+
+    The links move in the plane perpendicular to d. Vectors of that plane are written in its axes a
+    and d x a, as two-vectors, wherever that is enough.
+    """
+
+    kinds: ClassVar = {
+        "p": PointMass.kinds,
+        "u": PlanarInertia.kinds,
+        "l": PlanarInertia.kinds,
+    }
+
+    def __init__(
+        self,
+        guide_point: Expression,
+        direction: Expression,
+        slider_direction: Expression,
+        plane_axis: Expression,
+        upper_length: Expression,
+        lower_length: Expression,
+        elbow: Expression,
+    ) -> None:
+        self.r, self.d, self.e = guide_point, direction, slider_direction
+        self.lu, self.ll, self.sigma = upper_length, lower_length, elbow
+        self.plane = ca.horzcat(plane_axis, ca.cross(direction, plane_axis))
+        self.aligned = bool((slider_direction - direction).is_zero())
+        """Whether the slider moves along d, so that the leg's plane does not accelerate."""
+        if self.aligned:
+            self.d_bar, self.e_plane = direction, ca.SX.zeros(2)
+        else:
+            self.d_bar = direction / ca.dot(direction, slider_direction)
+            self.e_plane = ca.mtimes(self.plane.T, slider_direction)
+        self.constant_row = self.d_bar
+        # u = across (c - r): the part of c - r - rho e in the plane, Eq. (5).
+        self.across = self.plane.T - ca.mtimes(self.e_plane, self.d_bar.T)
+
+    def _state(self, point: PointMotion) -> _InPlane:
+        """Return the links and their motion, in the leg's plane.
+
+        theta_u' = l_l . u' / D and theta_l' = -l_u . u' / D. Differentiated, and with l_l . l_l =
+        ll^2, theta_u'' = l_l . v / D and theta_l'' = -l_u . v / D, v = u'' + theta_u'^2 l_u +
+        theta_l'^2 l_l.
+        """
+        u = ca.mtimes(self.across, point.position - self.r)
+        du, ddu = (ca.mtimes(self.across, v) for v in (point.velocity, point.acceleration))
+        l_u, l_l, inverse_d = links_from_triangle(self.lu, self.ll, self.sigma, u)
+        upper_row, lower_row = l_l * inverse_d, -(l_u * inverse_d)
+        upper_rate, lower_rate = ca.dot(upper_row, du), ca.dot(lower_row, du)
+        v = ddu + (upper_rate * upper_rate) * l_u + (lower_rate * lower_rate) * l_l
+        upper = Turning(upper_row, upper_rate, ca.dot(upper_row, v))
+        lower = Turning(lower_row, lower_rate, ca.dot(lower_row, v))
+        return _InPlane(l_u, l_l, upper, lower, ddu)
+
+    def motion(self, point: PointMotion, angle: AngleMotion | None) -> LegMotion:
+        at = self._state(point)
+        rho = ca.dot(self.d_bar, point.position - self.r)  # Eq. (4)
+        rate, sliding = (ca.dot(self.d_bar, v) for v in (point.velocity, point.acceleration))
+        row = ca.horzcat(self.d_bar.T, 0)
+        r1 = self.r + rho * self.e
+        slides = r1, ca.mtimes(self.e, row), sliding * self.e
+        rides = point.position, ca.horzcat(ca.SX.eye(3), ca.SX(3, 1)), point.acceleration
+        bodies = {
+            "p": BodyMotion(*slides),
+            "u": BodyMotion(*slides, *self._axes(at.l_u / self.lu, at.upper)),
+            "l": BodyMotion(*rides, *self._axes(at.l_l / self.ll, at.lower), rides=True),
+        }
+        slider = Joint("P", self.e, self.r, row, rate, sliding)
+        links = ca.mtimes(self.plane, at.l_u), ca.mtimes(self.plane, at.l_l)
+        chain = (slider, *self._revolute(r1, links[0], point, angle, at))
+        angles = tuple((link.rate, link.acceleration) for link in (at.upper, at.lower))
+        return LegMotion(rho, rate, sliding, row, ca.SX(1), bodies, chain, links, angles)
+
+    def _row(self, turning: Turning) -> Expression:
+        """Return the row (1, 4) of a link's angle with respect to (c, phi)."""
+        return ca.horzcat(ca.mtimes(turning.row.T, self.across), 0)
+
+    def _axes(self, x: Expression, turning: Turning) -> tuple[Expression, ...]:
+        """Return a link's turning row, its axes x and y, and their second derivatives."""
+        y = quarter_turn(x)
+        along, square = turning.acceleration, turning.rate * turning.rate
+        vectors = (x, y, along * y - square * x, -along * x - square * y)
+        row = ca.mtimes(self.d, self._row(turning))
+        return (row, *(ca.mtimes(self.plane, vector) for vector in vectors))
+
+    def _revolute(
+        self,
+        r1: Expression,
+        l_u: Expression,
+        point: PointMotion,
+        angle: AngleMotion | None,
+        at: _InPlane,
+    ) -> list[Joint]:
+        """Return R1, R2, R3 and, under a platform that turns, R4.
+
+        Where d is parallel to k, R3 and R4 are one joint: its motion is under R3, and R4 has none.
+        """
+        upper = self._row(at.upper), at.upper.rate, at.upper.acceleration
+        lower = self._row(at.lower), at.lower.rate, at.lower.acceleration
+        knee = tuple(a - b for a, b in zip(lower, upper, strict=True))
+        ankle = tuple(-a for a in lower)
+        c, r2 = point.position, r1 + l_u
+        if angle is None:
+            last = []
+        else:
+            along = ca.dot(self.d, angle.axis)
+            sense = ca.if_else(ca.fabs(along) > _PARALLEL, along, 0)
+            turn = ca.SX([[0, 0, 0, 1]]), angle.rate, angle.acceleration
+            ankle = tuple(a + sense * b for a, b in zip(ankle, turn, strict=True))
+            apart = 1 - sense * sense
+            last = [Joint("R", angle.axis, c, *(apart * b for b in turn))]
+        return [
+            Joint("R", self.d, r1, *upper),
+            Joint("R", self.d, r2, *knee),
+            Joint("R", self.d, c, *ankle),
+            *last,
+        ]
+
+    def reach(self, c: Expression) -> Reach:
+        u = ca.mtimes(self.across, c - self.r)
+        n, delta = ca.sqrt(ca.dot(u, u)), squared_reach(self.lu, self.ll, ca.dot(u, u))
+        margin = ca.fmin(self.lu + self.ll - n, n - ca.fabs(self.lu - self.ll))
+        return Reach(margin, delta, (2 * self.lu * self.ll) ** 2, n)
+
+    def locus(self, q: Expression) -> Plane:
+        size = ca.fabs(q) + ca.dot(ca.fabs(self.d_bar), ca.fabs(self.r))
+        return Plane(self.d_bar, q + ca.dot(self.d_bar, self.r), size)
+
+    def needs(
+        self,
+        point: PointMotion,
+        angle: AngleMotion | None,
+        gravity: Expression,
+        inertia: Mapping[str, Moments],
+    ) -> Needs:
+        """Return the forces that the bodies need, in the leg's plane.
+
+        The moments of the links act through theta_u and theta_l, whose rows with respect to u turn
+        them into a force tau; as u' is the part of c' - e rho' in the plane, tau acts on the point
+        and -e . tau on the slider. What acts along d acts on the slider alone.
+        """
+        slider, upper, lower = (inertia[letter] for letter in self.kinds)
+        sliding = ca.dot(self.d_bar, point.acceleration)
+        # a - g in the leg's plane, on R1 (a = rho'' e) and on R3 (a = c'' = u'' + rho'' e there).
+        on_slider = sliding * self.e_plane - ca.mtimes(self.plane.T, gravity)
+        if lower.hx.is_zero():
+            u = [ca.mtimes(self.across, v) for v in (point.position - self.r, *point[1:])]
+            tau, turning, across = two_bar_needs(
+                self.lu, self.ll, self.sigma, u, on_slider, upper, lower
+            )
+            ddu = u[2]
+        else:
+            at = self._state(point)
+            ddu = at.ddu
+            tau, turning, across = self._link_needs(at, on_slider, upper, lower)
+        on_point = tau + across + ca.mtimes(on_slider + ddu, lower.m)
+        share = ca.dot(self.d, self.e) if not self.aligned else 1
+        along = share * (share * sliding - ca.dot(self.d, gravity))
+        joint = (slider.m + upper.m) * (sliding - ca.dot(self.e, gravity)) + lower.m * along
+        if not self.aligned:
+            joint = joint + ca.mtimes(self.e_plane.T, turning - tau)
+        return Needs(joint, ca.vertcat(ca.mtimes(self.plane, on_point), ca.SX(1, upper.m.shape[1])))
+
+    def _link_needs(
+        self, at: _InPlane, on_slider: Expression, upper: Moments, lower: Moments
+    ) -> tuple[Expression, Expression, Expression]:
+        """Return tau, the upper link's h'' and the lower link's, each (2, K)."""
+        h, dh = first_moment(at.l_u, upper.hx / self.lu, upper.hy / self.lu)
+        turning = second_derivative(h, dh, at.upper.rate**2, at.upper.acceleration)
+        upper_moment = at.upper.acceleration * upper.i + ca.mtimes(on_slider.T, dh)
+        h, dh = first_moment(at.l_l, lower.hx / self.ll, lower.hy / self.ll)
+        across = second_derivative(h, dh, at.lower.rate**2, at.lower.acceleration)
+        on_point = on_slider + at.ddu
+        lower_moment = at.lower.acceleration * lower.i + ca.mtimes(on_point.T, dh)
+        tau = ca.mtimes(at.upper.row, upper_moment) + ca.mtimes(at.lower.row, lower_moment)
+        return tau, turning, across
+
+
+PRRR.equations_class = PRRREquations

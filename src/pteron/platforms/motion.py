@@ -1,0 +1,102 @@
+"""What a kind of platform must supply: read this page before writing another.
+
+A platform maps its pose x and its derivatives to the motion of the points that the legs carry, and
+gathers the forces on these points into the load that the legs must bear. A kind is one file of this
+folder: a class under `PlatformEquations`, named in `platforms.EQUATIONS` by the file's key `motion`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import ClassVar, NamedTuple
+
+from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, PointMotion
+
+
+class Offset(NamedTuple):
+    """s = a cos(phi) + b sin(phi) + still, from P to a platform point; each (3, 1)."""
+
+    a: Expression
+    b: Expression
+    still: Expression
+
+
+class PlatformMotion(NamedTuple):
+    """The platform's state: its legs' points, their matrices, and its own body."""
+
+    points: tuple[PointMotion, ...]
+    matrices: tuple[Expression, ...]
+    """(4, m), one a leg: d (c, phi) / dx."""
+    angle: AngleMotion | None
+    """None where the platform does not turn."""
+    body: BodyMotion
+    """The platform itself, its rows with respect to (p, phi)."""
+    matrix: Expression
+    """(4, m): d (p, phi) / dx."""
+
+
+class Load(NamedTuple):
+    """A wrench on the platform: a force at P, and a moment about k split by how it turns.
+
+    The moment is `cosine` cos(phi) + `sine` sin(phi) + `moment`: a force f on a platform point has
+    the moment (b . f) cos(phi) - (a . f) sin(phi), and only the sums over the legs of the two
+    products meet the angle. Rows have K columns, as the parameters have.
+    """
+
+    force: Expression
+    """(3, K)."""
+    cosine: Expression
+    sine: Expression
+    moment: Expression
+
+    def plus(self, other: Load) -> Load:
+        """Return the sum of two loads."""
+        return Load(*(a + b for a, b in zip(self, other, strict=True)))
+
+
+class PlatformEquations(ABC):
+    """The equations of a platform, for one state."""
+
+    coordinates: ClassVar[tuple[str, ...]]
+    """The pose's coordinates, in order."""
+
+    def __init__(
+        self, frame: Sequence[Expression], platform_points: Sequence[Expression]
+    ) -> None:
+        self.frame, self.points = frame, platform_points
+        x0, y0, k = frame
+        self.offsets = [
+            Offset(x0 * s[0] + y0 * s[1], y0 * s[0] - x0 * s[1], k * s[2]) for s in platform_points
+        ]
+
+    @abstractmethod
+    def motion(
+        self, pose: Expression, velocity: Expression, acceleration: Expression
+    ) -> PlatformMotion:
+        """Return the motion of the platform and of its points."""
+
+    @abstractmethod
+    def load(self, i: int, force: Expression) -> Load:
+        """Return the load of what leg i's bodies need, (4, K); see `legs.leg.Needs`."""
+
+    @abstractmethod
+    def needs(self, motion: PlatformMotion, gravity: Expression, inertia: Moments) -> Load:
+        """Return what the platform itself needs, -F_e."""
+
+    @abstractmethod
+    def given(self, wrench: Expression) -> Load:
+        """Return the load of a wrench (m, K)."""
+
+    @abstractmethod
+    def wrench(self, load: Load, motion: PlatformMotion) -> Expression:
+        """Return a load as a wrench (m, K)."""
+
+    def carrying(self, inertia: Moments, masses: Sequence[Expression]) -> Moments:
+        """Return the platform's inertia with masses (1, K), one a leg, on its points."""
+        m, hx, hy, i = inertia
+        for s, mass in zip(self.points, masses, strict=True):
+            m, hx, hy = m + mass, hx + s[0] * mass, hy + s[1] * mass
+            i = i + (s[0] * s[0] + s[1] * s[1]) * mass
+        return Moments(m, hx, hy, i)
+
