@@ -54,15 +54,23 @@ class BodyMotion(NamedTuple):
     """(3, 4): d v / d (c', phi')."""
     acceleration: Expression
     """a, of the reference point, (3, 1)."""
-    turning_row: Expression | None = None
-    """(3, 4): d omega / d (c', phi'), omega being the angular velocity."""
+    axes: Expression | None = None
+    """(3, k): unit vectors at right angles, about which it turns: z in a plane, all three for a rod,
+    whose angular velocity is perpendicular to x."""
+    rates_row: Expression | None = None
+    """(k, 4): d rates / d (c', phi'), the rates about the axes."""
     x: Expression | None = None
     """The axes x and y, (3, 1), and their second derivatives with respect to time."""
     y: Expression | None = None
     ddx: Expression | None = None
     ddy: Expression | None = None
-    rides: bool = False
-    """Whether the reference point is the platform point: its mass then counts as the platform's."""
+
+    @property
+    def turning_row(self) -> Expression:
+        """(3, 4): d omega / d (c', phi'), omega being the angular velocity."""
+        if self.axes is None:
+            return ca.SX(3, 4)
+        return ca.mtimes(self.axes, self.rates_row)
 
     @property
     def kinds(self) -> tuple[str, ...]:
@@ -110,17 +118,18 @@ def wrench_matrix(body: BodyMotion, gravity: Expression) -> Expression:
 def mass_matrix(body: BodyMotion, inertia: Moments) -> Expression:
     """Return the mass matrix (4, 4) of a body with respect to (c', phi').
 
-    T = m v.v / 2 + v.h' + I x'.x' / 2, with x' = omega x x.
+    T = m v.v / 2 + v.h' + I omega.omega / 2, omega being perpendicular to x.
     """
-    v = body.velocity_row
+    v, rates = body.velocity_row, body.rates_row
     total = inertia.m * ca.mtimes(v.T, v)
-    if body.x is not None:
-        dx = _turned(body.turning_row, body.x)
-        coupling = inertia.hx * ca.mtimes(v.T, dx)
-        if body.y is not None:
-            coupling = coupling + inertia.hy * ca.mtimes(v.T, _turned(body.turning_row, body.y))
-        total = total + coupling + coupling.T + inertia.i * ca.mtimes(dx.T, dx)
-    return total
+    if body.y is not None:
+        turned = ca.mtimes(body.y, inertia.hx) - ca.mtimes(body.x, inertia.hy)  # d h / d theta
+        coupling = ca.mtimes(ca.mtimes(v.T, turned), rates)
+    elif body.x is not None:
+        coupling = inertia.hx * ca.mtimes(v.T, ca.mtimes(-ca.skew(body.x), body.turning_row))
+    else:
+        return total
+    return total + coupling + coupling.T + inertia.i * ca.mtimes(rates.T, rates)
 
 
 def mass_moment(body: BodyMotion, inertia: Moments) -> Expression:
@@ -132,7 +141,3 @@ def mass_moment(body: BodyMotion, inertia: Moments) -> Expression:
         total = total + ca.mtimes(body.y, inertia.hy)
     return total
 
-
-def _turned(turning_row: Expression, axis: Expression) -> Expression:
-    """Return the row (3, 4) of omega x axis."""
-    return -ca.mtimes(ca.skew(axis), turning_row)

@@ -16,6 +16,19 @@ PLATFORM = "e"
 
 PLATFORM_KINDS = ("m", "mgx", "mgy", "I")
 
+PREFERENCE = (
+    *(("m", "p"), ("mgx", "u"), ("mgy", "u"), ("I", "u"), ("mgx", "l"), ("mgy", "l"), ("m", "e")),
+    *(("m", "l"), ("mgx", "e"), ("mgy", "e"), ("I", "e"), ("I", "l"), ("m", "u")),
+)
+"""Kinds and bodies of parameters, those that base parameters keep first in front: Table 1's choice."""
+
+JOINED = (("m", "u"), ("mgx", "l"))
+"""What the cheapest model does without: m_u joins the slider, and m gamma_x of a lower link is
+masses at its ends."""
+
+OWN = (("m", "p"), ("I", "u"), ("mgx", "u"), ("mgy", "u"), ("I", "l"), ("mgy", "l"))
+"""What it always keeps, if it acts at all."""
+
 _UNITS = ("kg", "kg m", "kg m^2")
 
 

@@ -16,7 +16,7 @@ import casadi as ca
 
 from pteron.bodies.motion import Expression
 from pteron.legs.leg import LegEquations, LegMotion
-from pteron.platforms.motion import Load, PlatformEquations, PlatformMotion
+from pteron.platforms.motion import PlatformEquations, PlatformMotion
 
 
 class Closure(ABC):
@@ -37,9 +37,9 @@ class Closure(ABC):
 
     @abstractmethod
     def forces(
-        self, load: Load, platform: PlatformMotion, legs: Sequence[LegMotion]
+        self, wrench: Expression, platform: PlatformMotion, legs: Sequence[LegMotion]
     ) -> Expression:
-        """Return F (n, K) with J^T F = the load."""
+        """Return F (n, K) with J^T F = wrench (m, K)."""
 
     @abstractmethod
     def rates(

@@ -15,7 +15,7 @@ import numpy as np
 from pteron.bodies.motion import Expression
 from pteron.closures.closure import Closure, adjugate3, det3, nan_below_zero
 from pteron.legs.leg import LegEquations, LegMotion, Plane
-from pteron.platforms.motion import Load, PlatformEquations, PlatformMotion
+from pteron.platforms.motion import PlatformEquations, PlatformMotion
 
 _VANISHING = 1e-10
 """Relative size below which the coefficients of det J count as zero: far above their rounding
@@ -82,29 +82,30 @@ class ConstantRows(Closure):
         return (a * ca.cos(phi) + b * ca.sin(phi)) / ca.sqrt(a * a + b * b)
 
     def forces(
-        self, load: Load, platform: PlatformMotion, legs: Sequence[LegMotion]
+        self, wrench: Expression, platform: PlatformMotion, legs: Sequence[LegMotion]
     ) -> Expression:
         """Return P f + lambda N, lambda from the moment that P f leaves unbalanced."""
+        force = wrench[:3, :]
         if self.orientation is None:
-            return ca.mtimes(self.right_inverse, load.force)
-        assert platform.angle is not None
-        c, s = ca.cos(platform.angle.angle), ca.sin(platform.angle.angle)
+            return ca.mtimes(self.right_inverse, force)
         inverse = _sparse_inverse(self.rows) if self.rows.is_constant() else self.right_inverse
-        cosine = load.cosine - ca.mtimes(ca.mtimes(self.cosines.T, inverse), load.force)
-        sine = load.sine - ca.mtimes(ca.mtimes(self.sines.T, inverse), load.force)
-        a, b = self.orientation
-        rest = (c * cosine + s * sine + load.moment) / (a * c + b * s)
-        return ca.mtimes(inverse, load.force) + ca.mtimes(self.null, rest)
+        particular, column = ca.mtimes(inverse, force), self._column(platform)
+        unbalanced = wrench[3, :] - ca.mtimes(column.T, particular)
+        return particular + ca.mtimes(self.null, unbalanced / ca.dot(self.null, column))
+
+    def _column(self, platform: PlatformMotion) -> Expression:
+        """Return j, the Jacobian's fourth column."""
+        assert platform.angle is not None
+        phi = platform.angle.angle
+        return self.cosines * ca.cos(phi) + self.sines * ca.sin(phi)
 
     def rates(
         self, joints: Expression, platform: PlatformMotion, legs: Sequence[LegMotion]
     ) -> Expression:
         if self.orientation is None:
             return ca.mtimes(self.right_inverse.T, joints)
-        assert platform.angle is not None
-        (a, b), phi = self.orientation, platform.angle.angle
-        angle = ca.mtimes(self.null.T, joints) / (a * ca.cos(phi) + b * ca.sin(phi))
-        column = self.cosines * ca.cos(phi) + self.sines * ca.sin(phi)
+        column = self._column(platform)
+        angle = ca.mtimes(self.null.T, joints) / ca.dot(self.null, column)
         return ca.vertcat(
             ca.mtimes(self.right_inverse.T, joints - ca.mtimes(column, angle)), angle
         )

@@ -14,7 +14,7 @@ import casadi as ca
 from pteron.bodies.motion import Expression
 from pteron.closures.closure import Closure, det3, nan_below_zero
 from pteron.legs.leg import LegEquations, LegMotion, Plane, Sphere
-from pteron.platforms.motion import Load, PlatformEquations, PlatformMotion
+from pteron.platforms.motion import PlatformEquations, PlatformMotion
 
 _ROUNDING = 1e-14
 
@@ -35,16 +35,17 @@ class ThreeLoci(Closure):
         return det3(ca.vertcat(*rows)) / (sizes[0] * sizes[1] * sizes[2])
 
     def forces(
-        self, load: Load, platform: PlatformMotion, legs: Sequence[LegMotion]
+        self, wrench: Expression, platform: PlatformMotion, legs: Sequence[LegMotion]
     ) -> Expression:
-        """Return B A^-T w for J = B^-1 A, by Cramer's rule."""
+        """Return B A^-T w for J = B^-1 A, by Cramer's rule, each minor computed once."""
         a, b, c = (leg.row[:, :3].T for leg in legs)
-        across = ca.cross(b, c), ca.cross(c, a), ca.cross(a, b)
-        volume = ca.dot(a, across[0])
+        minor, turned = ca.cross(b, c), ca.mtimes(ca.skew(a), wrench)
+        shares = (minor.T, wrench), (c.T, turned), (-b.T, turned)
+        volume = ca.dot(a, minor)
         return ca.vertcat(
             *(
-                leg.divisor * (ca.mtimes(normal.T, load.force) / volume)
-                for leg, normal in zip(legs, across, strict=True)
+                leg.divisor * (ca.mtimes(row, column) / volume)
+                for leg, (row, column) in zip(legs, shares, strict=True)
             )
         )
 

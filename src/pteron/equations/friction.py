@@ -20,9 +20,9 @@ def passive_friction(machine: Machine, state: State) -> Expression:
     for i, leg in enumerate(state.legs):
         for joint in leg.chain[1:]:
             if not joint.row[:3].is_zero():
-                columns.append(machine.platform.load(i, ca.mtimes(joint.row.T, joint.rate)))
+                row = ca.mtimes(joint.row, state.platform.matrices[i])
+                columns.append(ca.mtimes(row.T, joint.rate))
     if state.platform.angle is not None:
-        about = ca.vertcat(ca.SX(3, 1), state.platform.angle.rate)
-        columns.append(machine.platform.given(about))
+        columns.append(ca.vertcat(ca.SX(3, 1), state.platform.angle.rate))
     forces = [machine.closure.forces(load, state.platform, state.legs) for load in columns]
     return ca.horzcat(*forces)

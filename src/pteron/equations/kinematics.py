@@ -50,8 +50,7 @@ def body_jacobian(state: State, i: int, letter: str) -> Expression | None:
     body = state.legs[i].bodies.get(letter)
     if body is None:
         return None
-    turning = ca.SX(3, 4) if body.turning_row is None else body.turning_row
-    return ca.mtimes(ca.vertcat(body.velocity_row, turning), state.platform.matrices[i])
+    return ca.mtimes(ca.vertcat(body.velocity_row, body.turning_row), state.platform.matrices[i])
 
 
 def link_jacobians(state: State) -> tuple[list[Expression], list[Expression]]:

@@ -16,11 +16,18 @@ from pteron.equations.virtual_work import generalized_forces
 
 
 def mass_matrix(machine: Machine, pose: Expression, parameters: Expression) -> Expression:
-    """Return M (m, m): the sum of J_b^T M_b J_b over the bodies."""
+    """Return M (m, m): the sum of J_b^T M_b J_b over the bodies.
+
+    The mass of a body whose reference point is a platform point is the platform's to carry.
+    """
     legs, inertia = machine.moments(parameters)
     state = machine.state(pose)
-    platform = state.platform
-    at_p = motion.mass_matrix(platform.body, inertia)
+    platform, none = state.platform, ca.SX(1, 1)
+    riding = []
+    for leg, bodies in zip(machine.legs, legs, strict=True):
+        riding.append(sum((bodies[k].m for k in leg.rides), none))
+        bodies |= {k: bodies[k]._replace(m=none) for k in leg.rides}
+    at_p = motion.mass_matrix(platform.body, machine.platform.carrying(inertia, riding))
     total = ca.mtimes(platform.matrix.T, ca.mtimes(at_p, platform.matrix))
     for leg, bodies, matrix in zip(state.legs, legs, platform.matrices, strict=True):
         at_c = sum(motion.mass_matrix(body, bodies[k]) for k, body in leg.bodies.items())

@@ -73,5 +73,5 @@ def paper_regressor(machine: Machine, state: State) -> Expression:
 
     Omega holds what acts on the bodies, so that the forces which balance it carry a minus sign.
     """
-    load = machine.platform.given(generalized_regressor(machine, state))
-    return -machine.closure.forces(load, state.platform, state.legs)
+    bracket = generalized_regressor(machine, state)
+    return -machine.closure.forces(bracket, state.platform, state.legs)

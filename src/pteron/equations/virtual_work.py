@@ -12,26 +12,30 @@ import casadi as ca
 
 from pteron.bodies.motion import Expression
 from pteron.equations.machine import Machine, State
-from pteron.platforms.motion import Load
 
 
 def inverse_dynamics(
-    machine: Machine, state: State, parameters: Expression, wrench: Expression | None = None
+    machine: Machine,
+    state: State,
+    parameters: Expression,
+    wrench: Expression | None = None,
+    *,
+    carried: bool = True,
 ) -> Expression:
     """Return the actuator forces F_a (n, K) for the columns of parameters (N, K), Eq. (13).
 
-    `wrench` (m, K) acts on the platform at P: a force and, for 3T1R, a moment about k.
+    `wrench` (m, K) acts on the platform at P: a force and, for 3T1R, a moment about k. A mass on a
+    platform point moves with leg and platform: with `carried` it counts as the platform's.
     """
-    joints, load = needed_forces(machine, state, parameters)
+    joints, load = needed_forces(machine, state, parameters, carried)
     if wrench is not None:
-        load = load.plus(machine.platform.given(-wrench))
+        load = load - wrench
     return joints + machine.closure.forces(load, state.platform, state.legs)
 
 
 def generalized_forces(machine: Machine, state: State, parameters: Expression) -> Expression:
     """Return M x'' + h (m, K), the forces of the motion in platform coordinates: J^T F_a."""
-    joints, load = needed_forces(machine, state, parameters)
-    total = machine.platform.wrench(load, state.platform)
+    joints, total = needed_forces(machine, state, parameters)
     for leg, matrix, force in zip(
         state.legs, state.platform.matrices, ca.vertsplit(joints), strict=True
     ):
@@ -39,25 +43,25 @@ def generalized_forces(machine: Machine, state: State, parameters: Expression) -
     return total
 
 
-def needed_forces(machine: Machine, state: State, parameters: Expression) -> tuple[Expression, Load]:
-    """Return the forces that motion and gravity need at the joints (n, K), and on the platform.
-
-    The mass of a body whose reference point is a platform point may be given to either side, as it
-    moves with both; the platform has it.
-    """
+def needed_forces(
+    machine: Machine, state: State, parameters: Expression, carried: bool = True
+) -> tuple[Expression, Expression]:
+    """Return what motion and gravity need at the joints (n, K), and of the platform (m, K)."""
     legs, inertia = machine.moments(parameters)
     platform = state.platform
-    masses = []
-    for leg, bodies in zip(state.legs, legs, strict=True):
-        riding = [letter for letter, body in leg.bodies.items() if body.rides]
-        masses.append(sum((bodies[letter].m for letter in riding), ca.SX(1, parameters.shape[1])))
-        for letter in riding:
-            bodies[letter] = bodies[letter]._replace(m=ca.SX(1, parameters.shape[1]))
-    inertia = machine.platform.carrying(inertia, masses)
+    needs = [
+        leg.needs(point, platform.angle, machine.gravity, bodies)
+        for leg, point, bodies in zip(machine.legs, platform.points, legs, strict=True)
+    ]
+    if carried:
+        inertia = machine.platform.carrying(inertia, [leg.mass for leg in needs])
+    else:
+        trios = zip(machine.legs, platform.points, needs, strict=True)
+        needs += [leg.riding(point, machine.gravity, need.mass) for leg, point, need in trios]
     load = machine.platform.needs(platform, machine.gravity, inertia)
-    joints = []
-    for i, (leg, bodies) in enumerate(zip(machine.legs, legs, strict=True)):
-        needs = leg.needs(platform.points[i], platform.angle, machine.gravity, bodies)
-        joints.append(needs.joint)
-        load = load.plus(machine.platform.load(i, needs.point))
-    return ca.vertcat(*joints), load
+    joints = ca.SX(machine.freedom, parameters.shape[1])
+    for k, need in enumerate(needs):
+        i = k % machine.freedom
+        load = load + ca.mtimes(platform.matrices[i].T, need.point)
+        joints[i, :] = joints[i, :] + need.joint
+    return joints, load

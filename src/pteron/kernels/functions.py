@@ -19,6 +19,8 @@ from pteron.equations.screws import joint_screws
 from pteron.equations.virtual_work import generalized_forces, inverse_dynamics
 from pteron.errors import ModelError
 from pteron.kernels.kernel import Port
+from pteron.kernels.operations import count_operations
+from pteron.kernels.passes import optimised
 from pteron.manipulator import Manipulator
 
 Outputs = dict[str, tuple[Expression, tuple[int, ...]]]
@@ -161,7 +163,8 @@ def _passive_friction(m: Machine, v: dict[str, Expression]) -> Outputs:
 
 
 def _inverse_dynamics(m: Machine, v: dict[str, Expression]) -> Outputs:
-    forces = inverse_dynamics(m, _state(m, v), v["parameters"], v.get("wrench"))
+    carried = v.get("carried", True)
+    forces = inverse_dynamics(m, _state(m, v), v["parameters"], v.get("wrench"), carried=carried)
     return {"forces": (forces, (m.freedom,))}
 
 
@@ -360,10 +363,13 @@ def _built(
     if what == "base_regressor":
         return _program(machine, what, constants={"selection": selection}, guarded=guarded)
     base = ca.SX.sym("base_parameters", len(columns))
-    constants = {"parameters": ca.mtimes(selection, base)}
-    return _program(
-        machine, what, constants=constants, extra={"base_parameters": base}, wrench=wrench
-    )
+    # A mass on a platform point may be the leg's or the platform's, whichever costs less.
+    forms = []
+    for carried in (True, False):
+        constants = {"parameters": ca.mtimes(selection, base), "carried": carried}
+        extra = {"base_parameters": base}
+        forms.append(_program(machine, what, constants=constants, extra=extra, wrench=wrench))
+    return min(forms, key=lambda form: count_operations(form.function))
 
 
 def general_program(robot: Manipulator, what: str) -> Program:
@@ -408,6 +414,8 @@ def _program(
     function = ca.Function(
         what, list(symbols.values()), ca.cse(dense), list(symbols), list(outputs)
     )
+    if vector is None:  # exact arithmetic wants the equations as they stand
+        function = optimised(function)
     inputs = tuple(
         Port(name, symbol.shape[:1], shared=name in _SHARED) for name, symbol in symbols.items()
     )

@@ -43,6 +43,24 @@ def links_from_triangle(
     return l_u, u - l_u, (-2 * sigma) / root
 
 
+def first_moment(
+    vector: Expression, hx: Expression, hy: Expression
+) -> tuple[Expression, Expression]:
+    """Return h = vector hx + (d x vector) hy and d x h, each (2, K)."""
+    turned = quarter_turn(vector)
+    return (
+        ca.mtimes(vector, hx) + ca.mtimes(turned, hy),
+        ca.mtimes(turned, hx) - ca.mtimes(vector, hy),
+    )
+
+
+def second_derivative(
+    h: Expression, dh: Expression, rate2: Expression, acceleration: Expression
+) -> Expression:
+    """Return h'' = theta'' d x h - theta'^2 h of a vector h that turns in the plane."""
+    return acceleration * dh - rate2 * h
+
+
 def pole(direction: Sequence[float]) -> tuple[int, int]:
     """Return the largest component of a unit vector and its sign, which `plane_axis` asks for."""
     i = max(range(3), key=lambda j: abs(direction[j]))
@@ -59,6 +77,11 @@ def plane_axis(d: Expression, i: int, sign: int) -> Expression:
     v = d + sign * unit[:, i]
     j = (i + 1) % 3
     return unit[:, j] - (v[j] / (1 + sign * d[i])) * v
+
+
+def perpendicular_to(d: Sequence[float]) -> list[float]:
+    """Return a unit vector of numbers perpendicular to another."""
+    return [float(x) for x in ca.vertsplit(plane_axis(ca.DM(list(d)), *pole(d)))]
 
 
 def random_direction(length: Fraction, rng: Random) -> tuple[Fraction, Fraction]:

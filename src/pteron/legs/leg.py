@@ -69,7 +69,7 @@ class Quantity(NamedTuple):
     role: Role
     value: Sequence[float]
     symbol: str = ""
-    """How a length is written in base parameters: "lu" becomes lu1 for leg 1."""
+    """How a length or a direction is written: "lu" becomes lu1 for leg 1."""
 
 
 class Joint(NamedTuple):
@@ -115,6 +115,8 @@ class Needs(NamedTuple):
     """(1, K): at the actuated joint."""
     point: Expression
     """(4, K): a force on the platform point, and a moment about k on the platform."""
+    mass: Expression
+    """(1, K): a mass that rides on the platform point, left to the platform to carry."""
 
 
 class Reach(NamedTuple):
@@ -182,6 +184,8 @@ class LegEquations(ABC):
 
     kinds: ClassVar[Mapping[str, tuple[str, ...]]]
     """The kinds of parameters of each body, by letter."""
+    rides: ClassVar[tuple[str, ...]] = ()
+    """The bodies whose reference point is the platform point: their mass counts as the platform's."""
     constant_row: Expression | None = None
     """dq/dc, (3, 1), if it does not depend on the pose (and q not on phi); see `closures`."""
 
@@ -206,8 +210,8 @@ class LegEquations(ABC):
     ) -> Needs:
         """Return the forces that the leg's bodies need: Eqs. (13) and (14), J_b^T F_b summed.
 
-        A kind of leg may say it more cheaply, moving what its joint carries to `Needs.joint`; the
-        tests hold that against this.
+        A kind of leg may say it more cheaply, giving what its joint carries to `Needs.joint` and
+        what is a mass on its platform point to `Needs.mass`; the tests hold that against this.
         """
         motion = self.motion(point, angle)
         columns = next(iter(inertia.values())).m.shape[1]
@@ -215,9 +219,15 @@ class LegEquations(ABC):
         for letter, body in motion.bodies.items():
             force, moment = needed_wrench(body, inertia[letter], gravity)
             total = total + ca.mtimes(body.velocity_row.T, force)
-            if body.turning_row is not None:
+            if body.axes is not None:
                 total = total + ca.mtimes(body.turning_row.T, moment)
-        return Needs(ca.SX(1, columns), total)
+        return Needs(ca.SX(1, columns), total, ca.SX(1, columns))
+
+    def riding(self, point: PointMotion, gravity: Expression, mass: Expression) -> Needs:
+        """Return what a mass (1, K) on the platform point needs, where the platform has it not."""
+        none = ca.SX(1, mass.shape[1])
+        force = ca.mtimes(point.acceleration - gravity, mass)
+        return Needs(none, ca.vertcat(force, none), none)
 
 
 class LegKind(ABC):

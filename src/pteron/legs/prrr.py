@@ -28,11 +28,12 @@ from pteron.bodies.vectors import (
 )
 from pteron.errors import ModelError
 from pteron.legs.circles import (
+    first_moment,
     links_from_triangle,
-    plane_axis,
-    pole,
+    perpendicular_to,
     quarter_turn,
     random_direction,
+    second_derivative,
     squared_reach,
 )
 from pteron.legs.leg import (
@@ -50,7 +51,7 @@ from pteron.legs.leg import (
     checked_elbow,
     checked_limits,
 )
-from pteron.legs.two_bar import first_moment, second_derivative, two_bar_needs
+from pteron.legs.two_bar import two_bar_needs
 
 _LEAST_SLIDE = 1e-6
 
@@ -142,13 +143,11 @@ class PRRR(LegKind):
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
-        d = ca.DM(list(self.direction))
-        normal = plane_axis(d, *pole(self.direction))
         return (
             Quantity("guide_point", "point", self.guide_point),
-            Quantity("direction", "direction", self.direction),
-            Quantity("slider_direction", "direction", self.e),
-            Quantity("plane_axis", "normal", [float(x) for x in ca.vertsplit(normal)]),
+            Quantity("direction", "direction", self.direction, "d"),
+            Quantity("slider_direction", "direction", self.e, "e"),
+            Quantity("plane_axis", "normal", perpendicular_to(self.direction)),
             Quantity("upper_length", "length", (self.upper_length,), "lu"),
             Quantity("lower_length", "length", (self.lower_length,), "ll"),
             Quantity("elbow", "sign", (self.elbow,)),
@@ -279,6 +278,7 @@ class PRRREquations(LegEquations):
         "u": PlanarInertia.kinds,
         "l": PlanarInertia.kinds,
     }
+    rides: ClassVar = ("l",)
 
     def __init__(
         self,
@@ -332,7 +332,7 @@ class PRRREquations(LegEquations):
         bodies = {
             "p": BodyMotion(*slides),
             "u": BodyMotion(*slides, *self._axes(at.l_u / self.lu, at.upper)),
-            "l": BodyMotion(*rides, *self._axes(at.l_l / self.ll, at.lower), rides=True),
+            "l": BodyMotion(*rides, *self._axes(at.l_l / self.ll, at.lower)),
         }
         slider = Joint("P", self.e, self.r, row, rate, sliding)
         links = ca.mtimes(self.plane, at.l_u), ca.mtimes(self.plane, at.l_l)
@@ -345,12 +345,12 @@ class PRRREquations(LegEquations):
         return ca.horzcat(ca.mtimes(turning.row.T, self.across), 0)
 
     def _axes(self, x: Expression, turning: Turning) -> tuple[Expression, ...]:
-        """Return a link's turning row, its axes x and y, and their second derivatives."""
+        """Return how a link turns, its axes x and y, and their second derivatives."""
         y = quarter_turn(x)
         along, square = turning.acceleration, turning.rate * turning.rate
         vectors = (x, y, along * y - square * x, -along * x - square * y)
-        row = ca.mtimes(self.d, self._row(turning))
-        return (row, *(ca.mtimes(self.plane, vector) for vector in vectors))
+        row = self._row(turning)
+        return (self.d, row, *(ca.mtimes(self.plane, vector) for vector in vectors))
 
     def _revolute(
         self,
@@ -406,43 +406,44 @@ class PRRREquations(LegEquations):
 
         The moments of the links act through theta_u and theta_l, whose rows with respect to u turn
         them into a force tau; as u' is the part of c' - e rho' in the plane, tau acts on the point
-        and -e . tau on the slider. What acts along d acts on the slider alone.
+        and -e . tau on the slider.
         """
         slider, upper, lower = (inertia[letter] for letter in self.kinds)
         sliding = ca.dot(self.d_bar, point.acceleration)
-        # a - g in the leg's plane, on R1 (a = rho'' e) and on R3 (a = c'' = u'' + rho'' e there).
-        on_slider = sliding * self.e_plane - ca.mtimes(self.plane.T, gravity)
+        weight = ca.mtimes(self.plane.T, gravity)
+        masses = (slider.m + upper.m) * (sliding - ca.dot(self.e, gravity))
         if lower.hx.is_zero():
             u = [ca.mtimes(self.across, v) for v in (point.position - self.r, *point[1:])]
-            tau, turning, across = two_bar_needs(
-                self.lu, self.ll, self.sigma, u, on_slider, upper, lower
-            )
-            ddu = u[2]
+            along, across = two_bar_needs(self, u, sliding, weight, (upper, lower))
         else:
-            at = self._state(point)
-            ddu = at.ddu
-            tau, turning, across = self._link_needs(at, on_slider, upper, lower)
-        on_point = tau + across + ca.mtimes(on_slider + ddu, lower.m)
-        share = ca.dot(self.d, self.e) if not self.aligned else 1
-        along = share * (share * sliding - ca.dot(self.d, gravity))
-        joint = (slider.m + upper.m) * (sliding - ca.dot(self.e, gravity)) + lower.m * along
-        if not self.aligned:
-            joint = joint + ca.mtimes(self.e_plane.T, turning - tau)
-        return Needs(joint, ca.vertcat(ca.mtimes(self.plane, on_point), ca.SX(1, upper.m.shape[1])))
+            at, on_r1 = self._state(point), sliding * self.e_plane - weight
+            along, across = self._link_needs(at, on_r1, upper, lower)
+        none = ca.SX(1, upper.m.shape[1])
+        return Needs(masses + along, ca.vertcat(ca.mtimes(self.plane, across), none), lower.m)
+
+    def riding(self, point: PointMotion, gravity: Expression, mass: Expression) -> Needs:
+        """Return what a mass on the platform point needs: what acts along d, the slider gives."""
+        a_g = point.acceleration - gravity
+        slope = 1 if self.aligned else ca.dot(self.d, self.e)
+        across = ca.mtimes(self.plane, ca.mtimes(ca.mtimes(self.plane.T, a_g), mass))
+        none = ca.SX(1, mass.shape[1])
+        return Needs(slope * ca.dot(self.d, a_g) * mass, ca.vertcat(across, none), none)
 
     def _link_needs(
-        self, at: _InPlane, on_slider: Expression, upper: Moments, lower: Moments
-    ) -> tuple[Expression, Expression, Expression]:
-        """Return tau, the upper link's h'' and the lower link's, each (2, K)."""
+        self, at: _InPlane, on_r1: Expression, upper: Moments, lower: Moments
+    ) -> tuple[Expression, Expression]:
+        """Return what the links need along the slider, (1, K), and across R3, (2, K).
+
+        `on_r1` is a - g in the leg's plane on R1; on R3 it is u'' more.
+        """
         h, dh = first_moment(at.l_u, upper.hx / self.lu, upper.hy / self.lu)
         turning = second_derivative(h, dh, at.upper.rate**2, at.upper.acceleration)
-        upper_moment = at.upper.acceleration * upper.i + ca.mtimes(on_slider.T, dh)
+        upper_moment = at.upper.acceleration * upper.i + ca.mtimes(on_r1.T, dh)
         h, dh = first_moment(at.l_l, lower.hx / self.ll, lower.hy / self.ll)
         across = second_derivative(h, dh, at.lower.rate**2, at.lower.acceleration)
-        on_point = on_slider + at.ddu
-        lower_moment = at.lower.acceleration * lower.i + ca.mtimes(on_point.T, dh)
+        lower_moment = at.lower.acceleration * lower.i + ca.mtimes((on_r1 + at.ddu).T, dh)
         tau = ca.mtimes(at.upper.row, upper_moment) + ca.mtimes(at.lower.row, lower_moment)
-        return tau, turning, across
+        return ca.mtimes(self.e_plane.T, turning - tau), tau + across
 
 
 PRRR.equations_class = PRRREquations

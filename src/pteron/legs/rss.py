@@ -28,7 +28,12 @@ from pteron.bodies.vectors import (
     unit_vector,
     vector,
 )
-from pteron.legs.circles import random_direction, random_fraction
+from pteron.legs.circles import (
+    perpendicular_to,
+    quarter_turn,
+    random_direction,
+    random_fraction,
+)
 from pteron.legs.leg import (
     CRANK,
     Joint,
@@ -130,12 +135,13 @@ class RSS(LegKind):
         c, s = math.cos(middle), math.sin(middle)
         return (
             Quantity("guide_point", "point", self.guide_point),
-            Quantity("direction", "direction", self.direction),
+            Quantity("direction", "direction", self.direction, "d"),
             Quantity(
                 "zero_direction",
                 "normal",
                 a if inside else [c * x + s * y for x, y in zip(a, b, strict=True)],
             ),
+            Quantity("plane_axis", "normal", perpendicular_to(self.direction)),
             Quantity("upper_length", "length", (self.upper_length,), "lu"),
             Quantity("lower_length", "length", (self.lower_length,), "ll"),
             Quantity("middle", "angle", (middle,)),
@@ -225,110 +231,116 @@ class RSS(LegKind):
         return w, -1 if x * ry - y * rx > 0 else 1
 
 
+class _Crank(NamedTuple):
+    """What a leg does: w = c - r, and crank and rod."""
+
+    l_u: Expression
+    """The crank, (2, 1), in its plane; g = d x l_u."""
+    g: Expression
+    b: Expression
+    """The rod, (3, 1)."""
+    divisor: Expression
+    """b . g."""
+    rate: Expression
+    acceleration: Expression
+
+
 class RSSEquations(LegEquations):
-    """The equations of an R-S-S leg, in the base frame."""
+    """The equations of an R-S-S leg.
+
+    The crank moves in the plane perpendicular to d, and is written in its axes, as a two-vector;
+    `plane` (3, 2) takes it to the base frame.
+    """
 
     kinds: ClassVar = {"u": PlanarInertia.kinds, "l": RodInertia.kinds}
+    rides: ClassVar = ("l",)
 
     def __init__(
         self,
         guide_point: Expression,
         direction: Expression,
         zero_direction: Expression,
+        plane_axis: Expression,
         upper_length: Expression,
         lower_length: Expression,
         middle: Expression,
         elbow: Expression,
     ) -> None:
-        self.r, self.d, self.a = guide_point, direction, zero_direction
+        self.r, self.d = guide_point, direction
         self.lu, self.ll, self.middle, self.sigma = upper_length, lower_length, middle, elbow
+        self.plane = ca.horzcat(plane_axis, ca.cross(direction, plane_axis))
+        self.zero = ca.mtimes(self.plane.T, zero_direction)
 
-    def _crank(self, c: Expression) -> tuple[Expression, Expression, Expression]:
-        """Return w = c - r, the crank l_u, and the root of Delta: Lemma 1 across the crank's axis.
+    def _triangle(self, w: Expression) -> tuple[Expression, Expression, Expression]:
+        """Return u, h = l_u . w and lu^2 n^2 - h^2, a quarter of Lemma 1's Delta, of w = c - r.
 
-        l_u = [A w_p + sigma sqrt(Delta) d x w] / (2 n^2) with A = w.w + lu^2 - ll^2 = 2 w.l_u,
-        Delta = 4 n^2 lu^2 - A^2 and w_p the part of w across d, n = |w_p|.
+        w . l_u = (w . w + lu^2 - ll^2) / 2, since |w - l_u| = ll; u is the part of w in the plane
+        and n its length.
         """
-        w = c - self.r
-        height, w2 = ca.dot(w, self.d), ca.dot(w, w)
-        n2 = w2 - height * height
-        twice = w2 + (self.lu * self.lu - self.ll * self.ll)
-        root = ca.sqrt(self._discriminant(w))
-        l_u = (twice * (w - height * self.d) + self.sigma * root * ca.cross(self.d, w)) / (2 * n2)
-        return w, l_u, root
-
-    def _discriminant(self, w: Expression) -> Expression:
-        height, w2 = ca.dot(w, self.d), ca.dot(w, w)
-        twice = w2 + (self.lu * self.lu - self.ll * self.ll)
-        return 4 * (self.lu * self.lu) * (w2 - height * height) - twice * twice
+        u = ca.mtimes(self.plane.T, w)
+        h = 0.5 * ca.dot(w, w) + 0.5 * (self.lu * self.lu - self.ll * self.ll)
+        return u, h, self.lu * self.lu * ca.dot(u, u) - h * h
 
     def _state(self, point: PointMotion) -> _Crank:
-        """Return crank and rod and their motion.
+        """Return crank and rod and how the crank moves.
 
-        b.c'  = (b.g) q' with g = d x l_u; differentiated, (b.g) q'' = b.c'' + b'.b' + q'^2 b.l_u.
+        b . c' = (b . g) q'. Differentiated, (b . g) q'' = b . c'' + b' . b' - q'^2 b . g', whose
+        last two terms are c' . c' + q' (q' h - 2 g . c').
         """
-        w, l_u, root = self._crank(point.position)
-        g, b = ca.cross(self.d, l_u), w - l_u
-        divisor = -0.5 * self.sigma * root  # b.g
+        w = point.position - self.r
+        u, h, quarter = self._triangle(w)
+        n2, root = ca.dot(u, u), ca.sqrt(quarter)
+        l_u = (h / n2) * u + self.sigma * ((root / n2) * quarter_turn(u))
+        g, b = quarter_turn(l_u), w - ca.mtimes(self.plane, l_u)
+        divisor = -self.sigma * root  # b . g
         rate = ca.dot(b, point.velocity) / divisor
-        db = point.velocity - rate * g
-        pull = ca.dot(b, point.acceleration) + ca.dot(db, db) + rate * rate * ca.dot(b, l_u)
-        acceleration = pull / divisor
-        ddb = point.acceleration - (acceleration * g - (rate * rate) * l_u)
-        return _Crank(l_u, g, b, divisor, rate, acceleration, db, ddb)
+        du = ca.mtimes(self.plane.T, point.velocity)
+        pull = ca.dot(b, point.acceleration) + ca.dot(point.velocity, point.velocity)
+        acceleration = (pull + rate * (rate * h - 2 * ca.dot(g, du))) / divisor
+        return _Crank(l_u, g, b, divisor, rate, acceleration)
 
     def motion(self, point: PointMotion, angle: AngleMotion | None) -> LegMotion:
         at = self._state(point)
+        l_u, g = (ca.mtimes(self.plane, v) for v in (at.l_u, at.g))
+        row, square = ca.horzcat(at.b.T, 0) / at.divisor, at.rate * at.rate
+        coordinate = self.middle + ca.atan2(
+            ca.dot(at.l_u, quarter_turn(self.zero)), ca.dot(at.l_u, self.zero)
+        )
+        x, y = l_u / self.lu, g / self.lu
+        ddx, ddy = at.acceleration * y - square * x, -at.acceleration * x - square * y
+        rest = ca.SX(3, 1)
+        crank = BodyMotion(self.r, ca.SX(3, 4), rest, self.d, row, x, y, ddx, ddy)
+
+        rides = ca.horzcat(ca.SX.eye(3), ca.SX(3, 1))
+        swing = (rides - ca.mtimes(g, row)) / self.ll
+        n = at.b / self.ll
+        dn = (point.velocity - at.rate * g) / self.ll
+        ddn = (point.acceleration - at.acceleration * g + square * l_u) / self.ll
         c = point.position
-        row = ca.horzcat(at.b.T, 0)
-        swing = ca.horzcat(ca.SX.eye(3), ca.SX(3, 1)) - ca.mtimes(at.g, row / at.divisor)
-        coordinate = self.middle + ca.atan2(ca.dot(at.l_u, ca.cross(self.d, self.a)), ca.dot(at.l_u, self.a))
-        square = at.rate * at.rate
-        x, y = at.l_u / self.lu, at.g / self.lu
-        n, dn, ddn = at.b / self.ll, at.db / self.ll, at.ddb / self.ll
-        bodies = {
-            "u": BodyMotion(
-                self.r,
-                ca.SX(3, 4),
-                ca.SX(3, 1),
-                ca.mtimes(self.d, row / at.divisor),
-                x,
-                y,
-                at.acceleration * y - square * x,
-                -at.acceleration * x - square * y,
-            ),
-            "l": BodyMotion(
-                c,
-                ca.horzcat(ca.SX.eye(3), ca.SX(3, 1)),
-                point.acceleration,
-                ca.mtimes(ca.skew(n), swing / self.ll),
-                n,
-                ddx=ddn,
-                rides=True,
-            ),
-        }
-        crank = Joint("R", self.d, self.r, row / at.divisor, at.rate, at.acceleration)
-        chain = (crank, *self._universal(crank, at, c, swing / self.ll, (n, dn, ddn)))
-        upper = (at.rate, at.acceleration)
+        omega_row, all_axes = ca.mtimes(ca.skew(n), swing), ca.SX.eye(3)
+        rod = BodyMotion(c, rides, point.acceleration, all_axes, omega_row, n, ddx=ddn)
+
+        joint = Joint("R", self.d, self.r, row, at.rate, at.acceleration)
+        chain = (joint, *self._universal(joint, self.r + l_u, c, swing, (n, dn, ddn)))
         return LegMotion(
             coordinate,
             at.rate,
             at.acceleration,
-            row,
+            ca.horzcat(at.b.T, 0),
             at.divisor,
-            bodies,
+            {"u": crank, "l": rod},
             chain,
-            (at.l_u, at.b),
-            (upper, None),
+            (l_u, at.b),
+            ((at.rate, at.acceleration), None),
         )
 
     def _universal(
         self,
         crank: Joint,
-        at: _Crank,
+        tip: Expression,
         c: Expression,
         swing: Expression,
-        direction: tuple[Expression, Expression, Expression],
+        direction: tuple[Expression, ...],
     ) -> list[Joint]:
         """Return the universal joints at the rod's ends: about d, and about d x n across it.
 
@@ -350,7 +362,7 @@ class RSSEquations(LegEquations):
             beta,
             -ca.dot(ddn, self.d) / size - beta * growth,
         )
-        tip, axis = self.r + at.l_u, across / size
+        axis = across / size
         knee = tuple(a - b for a, b in zip(about_d, crank[3:], strict=True))
         return [
             Joint("R", self.d, tip, *knee),
@@ -361,20 +373,17 @@ class RSSEquations(LegEquations):
 
     def reach(self, c: Expression) -> Reach:
         w = c - self.r
-        height = ca.dot(w, self.d)
-        n = ca.sqrt(ca.dot(w, w) - height * height)
+        u, _, quarter = self._triangle(w)
+        n, height = ca.sqrt(ca.dot(u, u)), ca.dot(w, self.d)
         # The least and greatest distance of c from the crank's circle.
         near, far = (ca.sqrt((n + side * self.lu) ** 2 + height**2) for side in (-1, 1))
-        delta = self._discriminant(w)
         margin = ca.fmin(self.ll - near, far - self.ll)
-        return Reach(margin, delta, (2 * self.lu * self.ll) ** 2, n)
+        return Reach(margin, quarter, (self.lu * self.ll) ** 2, n)
 
     def locus(self, q: Expression) -> Sphere:
         turn = q - self.middle
-        across = ca.cross(self.d, self.a)
-        return Sphere(
-            self.r + self.lu * (ca.cos(turn) * self.a + ca.sin(turn) * across), self.ll
-        )
+        tip = ca.cos(turn) * self.zero + ca.sin(turn) * quarter_turn(self.zero)
+        return Sphere(self.r + self.lu * ca.mtimes(self.plane, tip), self.ll)
 
     def needs(
         self,
@@ -385,35 +394,22 @@ class RSSEquations(LegEquations):
     ) -> Needs:
         """Return the forces that crank and rod need: the rod's at its ends, the tip's on the crank.
 
-        With eta = m gamma_x / ll and mu = I / ll^2 of the rod and b its vector, the platform point
-        needs m (c'' - g) + eta (c'' - g + b'') + mu b'', the tip -eta (c'' - g) - mu b''.
+        With eta = m gamma_x / ll, mu = I / ll^2 and alpha = eta + mu of the rod, b its vector and t
+        the tip, the tip needs -alpha b'' - eta (t'' - g) and the platform point alpha b'' +
+        (m + eta) (c'' - g): a mass m + eta + alpha that rides, and alpha (g - t'').
         """
         at, upper, lower = self._state(point), inertia["u"], inertia["l"]
+        lu2, weight = self.lu * self.lu, ca.mtimes(self.plane.T, gravity)
         eta, mu = lower.hx / self.ll, lower.i / (self.ll * self.ll)
-        a_g = point.acceleration - gravity
-        swing = ca.mtimes(at.ddb, mu) + ca.mtimes(a_g, eta)
-        on_point = ca.mtimes(a_g, lower.m) + swing + ca.mtimes(at.ddb, eta)
-        weight = ca.cross(gravity, self.d) / self.lu
-        torque = (
-            at.acceleration * upper.i
-            - ca.dot(at.l_u, weight) * upper.hx
-            - ca.dot(at.g, weight) * upper.hy
-        )
-        joint = torque - ca.mtimes(at.g.T, swing)
-        return Needs(joint, ca.vertcat(on_point, ca.SX(1, upper.m.shape[1])))
-
-
-class _Crank(NamedTuple):
-    """The crank l_u, g = d x l_u, the rod b, b.g; q', q'', b' and b''."""
-
-    l_u: Expression
-    g: Expression
-    b: Expression
-    divisor: Expression
-    rate: Expression
-    acceleration: Expression
-    db: Expression
-    ddb: Expression
+        alpha = eta + mu
+        # What gravity does to the crank and, through the tip, to the rod: on g = d x l_u.
+        along = ca.mtimes(weight, eta - upper.hx / self.lu)
+        across = ca.mtimes(quarter_turn(weight), upper.hy / self.lu)
+        swing = ca.mtimes(ca.mtimes(self.plane.T, point.acceleration), alpha)
+        joint = at.acceleration * (upper.i + mu * lu2) + ca.mtimes(at.g.T, along + across - swing)
+        tip = ca.mtimes(at.g, at.acceleration * alpha) - ca.mtimes(at.l_u, at.rate**2 * alpha)
+        force = ca.mtimes(gravity, alpha) - ca.mtimes(self.plane, tip)
+        return Needs(joint, ca.vertcat(force, ca.SX(1, alpha.shape[1])), lower.m + eta + alpha)
 
 
 RSS.equations_class = RSSEquations

@@ -18,33 +18,43 @@ The tests hold these forces against those of the bodies in motion.
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import casadi as ca
 
 from pteron.bodies.motion import Expression, Moments
 from pteron.legs.circles import quarter_turn
 
+Inertias = tuple[Moments, Moments]
+"""Of the upper and of the lower link."""
+
+
+class TwoBar(Protocol):
+    """The geometry of the leg; see `prrr.PRRREquations`."""
+
+    lu: Expression
+    ll: Expression
+    sigma: Expression
+    e_plane: Expression
+    aligned: bool
+
 
 def two_bar_needs(
-    lu: Expression,
-    ll: Expression,
-    sigma: Expression,
-    u: list[Expression],
-    on_slider: Expression,
-    upper: Moments,
-    lower: Moments,
-) -> tuple[Expression, Expression, Expression]:
-    """Return tau, the upper and lower link's h'' and what they need across R3, each (2, K).
+    leg: TwoBar, u: list[Expression], sliding: Expression, gravity: Expression, inertia: Inertias
+) -> tuple[Expression, Expression]:
+    """Return what a leg needs along its slider beside its masses, (1, K), and across R3, (2, K).
 
-    `u` is u, u' and u''; `on_slider` is the slider's acceleration less gravity in the plane. The
-    lower link's m gamma_x must be zero; its mass, and the upper link's, are left out.
+    `u` is u, u' and u'', `sliding` is rho'', `gravity` its part in the plane. The lower link's
+    m gamma_x must be zero; its mass, and the upper link's, are left out.
     """
     u, du, ddu = u
-    n2, lu2, ll2 = ca.dot(u, u), lu * lu, ll * ll
+    upper, lower = inertia
+    n2, lu2, ll2 = ca.dot(u, u), leg.lu * leg.lu, leg.ll * leg.ll
     c = 0.5 * n2 - 0.5 * (lu2 + ll2)
     root = ca.sqrt(lu2 * ll2 - c * c)
-    l_u = (0.5 + (0.5 * (lu2 - ll2)) / n2) * u + sigma * ((root / n2) * quarter_turn(u))
+    l_u = (0.5 + (0.5 * (lu2 - ll2)) / n2) * u + leg.sigma * ((root / n2) * quarter_turn(u))
     l_l = u - l_u
-    inverse_d = -sigma / root
+    inverse_d = -leg.sigma / root
 
     # theta_l is counted backwards: its row is then l_u / D, without a sign.
     upper_rate2 = (ca.dot(l_l, du) * inverse_d) ** 2
@@ -54,32 +64,30 @@ def two_bar_needs(
     upper_acceleration = (along_lower + c * upper_rate2) * inverse_d
     lower_acceleration = (along_upper + c * lower_rate2) * inverse_d
 
-    h, dh = first_moment(l_u, upper.hx / lu, upper.hy / lu)
-    eta = lower.hy / ll
+    # Both first moments are h = x l_u + v d x l_u + eta d x u; E and G are what e and gravity do
+    # to its part that turns with the upper link.
+    eta, x = lower.hy / leg.ll, upper.hx / leg.lu
+    v = upper.hy / leg.lu - eta
+    turned = quarter_turn(l_u)
+    along, down = (
+        ca.mtimes(vector, x) - ca.mtimes(quarter_turn(vector), v)
+        for vector in (leg.e_plane, gravity)
+    )
+    along_e, across_e = ca.mtimes(l_u.T, along), ca.mtimes(turned.T, along)
     upper_moment = (
-        ca.mtimes(on_slider.T, dh) + upper.i * upper_acceleration + eta * along_upper
+        upper.i * upper_acceleration
+        + eta * along_upper
+        + sliding * across_e
+        - ca.mtimes(turned.T, down)
     )
-    lower_moment = lower.i * lower_acceleration + eta * (along_lower + ca.dot(on_slider, l_l))
-    tau = ca.mtimes(l_l, upper_moment * inverse_d) + ca.mtimes(l_u, lower_moment * inverse_d)
-    turning = second_derivative(h, dh, upper_rate2, upper_acceleration)
-    h, dh = ca.mtimes(quarter_turn(l_l), eta), -ca.mtimes(l_l, eta)
-    turning = turning + second_derivative(h, dh, lower_rate2, -lower_acceleration)
-    return tau, turning, ca.SX(2, eta.shape[1])
-
-
-def first_moment(
-    vector: Expression, hx: Expression, hy: Expression
-) -> tuple[Expression, Expression]:
-    """Return h = vector hx + (d x vector) hy and d x h, each (2, K)."""
-    turned = quarter_turn(vector)
-    return (
-        ca.mtimes(vector, hx) + ca.mtimes(turned, hy),
-        ca.mtimes(turned, hx) - ca.mtimes(vector, hy),
+    lower_moment = lower.i * lower_acceleration + eta * along_lower
+    tau = (
+        ca.mtimes(l_l, upper_moment * inverse_d)
+        + ca.mtimes(l_u, lower_moment * inverse_d)
+        - ca.mtimes(quarter_turn(sliding * leg.e_plane - gravity), eta)
     )
-
-
-def second_derivative(
-    h: Expression, dh: Expression, rate2: Expression, acceleration: Expression
-) -> Expression:
-    """Return h'' = theta'' d x h - theta'^2 h of a vector h that turns in the plane."""
-    return acceleration * dh - rate2 * h
+    if leg.aligned:
+        return ca.SX(1, eta.shape[1]), tau
+    turning = ca.mtimes(quarter_turn(ddu), eta) - tau
+    swinging = upper_acceleration * across_e - upper_rate2 * along_e
+    return ca.mtimes(leg.e_plane.T, turning) + swinging, tau

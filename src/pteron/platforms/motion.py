@@ -1,8 +1,8 @@
 """What a kind of platform must supply: read this page before writing another.
 
 A platform maps its pose x and its derivatives to the motion of the points that the legs carry, and
-gathers the forces on these points into the load that the legs must bear. A kind is one file of this
-folder: a class under `PlatformEquations`, named in `platforms.EQUATIONS` by the file's key `motion`.
+says what it needs itself. A kind is one file of this folder: a class under `PlatformEquations`,
+named in `platforms.EQUATIONS` by the file's key `motion`.
 """
 
 from __future__ import annotations
@@ -36,25 +36,6 @@ class PlatformMotion(NamedTuple):
     """(4, m): d (p, phi) / dx."""
 
 
-class Load(NamedTuple):
-    """A wrench on the platform: a force at P, and a moment about k split by how it turns.
-
-    The moment is `cosine` cos(phi) + `sine` sin(phi) + `moment`: a force f on a platform point has
-    the moment (b . f) cos(phi) - (a . f) sin(phi), and only the sums over the legs of the two
-    products meet the angle. Rows have K columns, as the parameters have.
-    """
-
-    force: Expression
-    """(3, K)."""
-    cosine: Expression
-    sine: Expression
-    moment: Expression
-
-    def plus(self, other: Load) -> Load:
-        """Return the sum of two loads."""
-        return Load(*(a + b for a, b in zip(self, other, strict=True)))
-
-
 class PlatformEquations(ABC):
     """The equations of a platform, for one state."""
 
@@ -77,20 +58,8 @@ class PlatformEquations(ABC):
         """Return the motion of the platform and of its points."""
 
     @abstractmethod
-    def load(self, i: int, force: Expression) -> Load:
-        """Return the load of what leg i's bodies need, (4, K); see `legs.leg.Needs`."""
-
-    @abstractmethod
-    def needs(self, motion: PlatformMotion, gravity: Expression, inertia: Moments) -> Load:
-        """Return what the platform itself needs, -F_e."""
-
-    @abstractmethod
-    def given(self, wrench: Expression) -> Load:
-        """Return the load of a wrench (m, K)."""
-
-    @abstractmethod
-    def wrench(self, load: Load, motion: PlatformMotion) -> Expression:
-        """Return a load as a wrench (m, K)."""
+    def needs(self, motion: PlatformMotion, gravity: Expression, inertia: Moments) -> Expression:
+        """Return the wrench (m, K) that the platform itself needs at P, -F_e."""
 
     def carrying(self, inertia: Moments, masses: Sequence[Expression]) -> Moments:
         """Return the platform's inertia with masses (1, K), one a leg, on its points."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 
 from pteron.bodies.motion import BodyMotion, Expression, Moments, PointMotion
-from pteron.platforms.motion import Load, PlatformEquations, PlatformMotion
+from pteron.platforms.motion import PlatformEquations, PlatformMotion
 
 
 class Translating(PlatformEquations):
@@ -22,20 +22,10 @@ class Translating(PlatformEquations):
         )
         matrix = ca.vertcat(ca.SX.eye(3), ca.SX(1, 3))
         rest = ca.SX(3, 1)
-        x, y, _ = self.frame
+        x, y, k = self.frame
         row = ca.horzcat(ca.SX.eye(3), ca.SX(3, 1))
-        body = BodyMotion(pose, row, acceleration, ca.SX(3, 4), x, y, rest, rest)
+        body = BodyMotion(pose, row, acceleration, k, ca.SX(1, 4), x, y, rest, rest)
         return PlatformMotion(points, (matrix,) * len(points), None, body, matrix)
 
-    def load(self, i: int, force: Expression) -> Load:
-        return self.given(force[:3, :])
-
-    def needs(self, motion: PlatformMotion, gravity: Expression, inertia: Moments) -> Load:
-        return self.given(ca.mtimes(motion.body.acceleration - gravity, inertia.m))
-
-    def given(self, wrench: Expression) -> Load:
-        none = ca.SX(1, wrench.shape[1])
-        return Load(wrench, none, none, none)
-
-    def wrench(self, load: Load, motion: PlatformMotion) -> Expression:
-        return load.force
+    def needs(self, motion: PlatformMotion, gravity: Expression, inertia: Moments) -> Expression:
+        return ca.mtimes(motion.body.acceleration - gravity, inertia.m)

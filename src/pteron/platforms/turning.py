@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 
 from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, PointMotion
-from pteron.platforms.motion import Load, PlatformEquations, PlatformMotion
+from pteron.platforms.motion import PlatformEquations, PlatformMotion
 
 
 class Turning(PlatformEquations):
@@ -17,67 +17,38 @@ class Turning(PlatformEquations):
         self, pose: Expression, velocity: Expression, acceleration: Expression
     ) -> PlatformMotion:
         p, dp, ddp = pose[:3], velocity[:3], acceleration[:3]
-        rate, second = velocity[3], acceleration[3]
-        c, s = ca.cos(pose[3]), ca.sin(pose[3])
-        # cos(phi) and sin(phi) and their derivatives with respect to time.
-        dc, ds = -(rate * s), rate * c
-        ddc, dds = -(second * s + rate * rate * c), second * c - rate * rate * s
+        angle = AngleMotion(self.frame[2], pose[3], velocity[3], acceleration[3])
         points, matrices = [], []
         for a, b, still in self.offsets:
-            points.append(
-                PointMotion(
-                    p + a * c + b * s + still, dp + a * dc + b * ds, ddp + a * ddc + b * dds
-                )
+            s, lever, dds = _turned(a, b, angle)
+            points.append(PointMotion(p + s + still, dp + lever * angle.rate, ddp + dds))
+            matrices.append(
+                ca.vertcat(ca.horzcat(ca.SX.eye(3), lever), ca.SX([[0, 0, 0, 1]]))
             )
-            lever = b * c - a * s  # k x s
-            matrices.append(_matrix(lever))
         x0, y0, k = self.frame
-        x, y = x0 * c + y0 * s, y0 * c - x0 * s
-        body = BodyMotion(
-            p,
-            ca.horzcat(ca.SX.eye(3), ca.SX(3, 1)),
-            ddp,
-            ca.horzcat(ca.SX(3, 3), k),
-            x,
-            y,
-            x0 * ddc + y0 * dds,
-            y0 * ddc - x0 * dds,
-        )
-        angle = AngleMotion(k, pose[3], rate, second)
+        x, y, ddx = _turned(x0, y0, angle)
+        ddy = _turned(y0, -x0, angle)[2]
+        row = ca.horzcat(ca.SX.eye(3), ca.SX(3, 1))
+        body = BodyMotion(p, row, ddp, k, ca.SX([[0, 0, 0, 1]]), x, y, ddx, ddy)
         return PlatformMotion(tuple(points), tuple(matrices), angle, body, ca.SX.eye(4))
 
-    def load(self, i: int, force: Expression) -> Load:
-        a, b, _ = self.offsets[i]
-        f = force[:3, :]
-        return Load(f, ca.mtimes(b.T, f), -ca.mtimes(a.T, f), force[3, :])
-
-    def needs(self, motion: PlatformMotion, gravity: Expression, inertia: Moments) -> Load:
+    def needs(self, motion: PlatformMotion, gravity: Expression, inertia: Moments) -> Expression:
         body, angle = motion.body, motion.angle
         assert angle is not None
-        x0, y0, _ = self.frame
         a_g = body.acceleration - gravity
-        # h = R(phi) h0, the platform's first moment, and k x h.
+        # The first moment h turns with the platform: h, k x h and h''.
+        x0, y0, _ = self.frame
         h0 = ca.mtimes(x0, inertia.hx) + ca.mtimes(y0, inertia.hy)
         dh0 = ca.mtimes(y0, inertia.hx) - ca.mtimes(x0, inertia.hy)
-        c, s = ca.cos(angle.angle), ca.sin(angle.angle)
-        square = angle.rate * angle.rate
-        ddc, dds = -(angle.acceleration * s + square * c), angle.acceleration * c - square * s
-        return Load(
-            ca.mtimes(a_g, inertia.m) + ddc * h0 + dds * dh0,
-            ca.mtimes(a_g.T, dh0),
-            -ca.mtimes(a_g.T, h0),
-            angle.acceleration * inertia.i,
-        )
-
-    def given(self, wrench: Expression) -> Load:
-        none = ca.SX(1, wrench.shape[1])
-        return Load(wrench[:3, :], none, none, wrench[3, :])
-
-    def wrench(self, load: Load, motion: PlatformMotion) -> Expression:
-        assert motion.angle is not None
-        c, s = ca.cos(motion.angle.angle), ca.sin(motion.angle.angle)
-        return ca.vertcat(load.force, c * load.cosine + s * load.sine + load.moment)
+        _, dh, ddh = _turned(h0, dh0, angle)
+        force = ca.mtimes(a_g, inertia.m) + ddh
+        return ca.vertcat(force, ca.mtimes(a_g.T, dh) + angle.acceleration * inertia.i)
 
 
-def _matrix(lever: Expression) -> Expression:
-    return ca.vertcat(ca.horzcat(ca.SX.eye(3), lever), ca.SX([[0, 0, 0, 1]]))
+def _turned(
+    a: Expression, b: Expression, angle: AngleMotion
+) -> tuple[Expression, Expression, Expression]:
+    """Return s = a cos(phi) + b sin(phi), k x s and s'' = k x s phi'' - s phi'^2, b being k x a."""
+    c, s = ca.cos(angle.angle), ca.sin(angle.angle)
+    turned, lever = a * c + b * s, b * c - a * s
+    return turned, lever, lever * angle.acceleration - turned * (angle.rate * angle.rate)

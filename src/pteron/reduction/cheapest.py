@@ -7,17 +7,15 @@ from functools import lru_cache
 
 import numpy as np
 
+from pteron.bodies.parameters import JOINED, OWN
 from pteron.kernels import Array, count_operations, program
-from pteron.manipulator import Manipulator, parameter_names
+from pteron.manipulator import Manipulator, parameter_data
 from pteron.reduction.find import base_parameters
 from pteron.reduction.result import BaseParameters
 
-__all__ = ["cheapest_parameters"]
 
 _NONZERO = 1e-9
 """Pivots of the grouping, whose entries are of order one in lengths of a link, are larger."""
-
-_ALWAYS = ("m_p", "I_u", "mgx_u", "mgy_u", "I_l", "mgy_l")
 
 
 @lru_cache(maxsize=32)
@@ -52,24 +50,23 @@ def cheapest_parameters(robot: Manipulator) -> BaseParameters:
     >>> base.rank, pteron.compile(robot, "inverse_dynamics", base=base).operations
     (26, 330)
     """
-    names = parameter_names(robot)
+    columns = parameter_data(robot)
     grouping = _without_units(robot, base_parameters(robot))
-    candidates = [k for k, name in enumerate(names) if not name.startswith(("m_u", "mgx_l"))]
-    always = [k for k in candidates if names[k].rstrip("0123456789") in _ALWAYS]
+    candidates = [k for k, p in enumerate(columns) if (p.kind, p.body) not in JOINED]
+    always = [k for k in candidates if (columns[k].kind, columns[k].body) in OWN]
     others = [k for k in candidates if k not in always]
     best: tuple[int, tuple[int, ...]] | None = None
     for order in (others, others[::-1]):
         found = _improved(robot, grouping, _independent(grouping, always + order), candidates)
         best = found if best is None or found[0] < best[0] else best
     assert best is not None
-    return base_parameters(robot, keep=[names[k] for k in best[1]])
+    return base_parameters(robot, keep=[columns[k].name for k in best[1]])
 
 
 def _without_units(robot: Manipulator, base: BaseParameters) -> Array:
     """Return the grouping with lengths in multiples of a link, so that no entry is extreme."""
-    length = max(leg.upper_length + leg.lower_length for leg in robot.legs)
-    kinds = [{"m": 0, "mgx": 1, "mgy": 1, "I": 2}[name.split("_")[0]] for name in base.columns]
-    powers = length ** np.array(kinds, dtype=float)
+    length = max(leg.size for leg in robot.legs)
+    powers = length ** np.array([float(p.length_power) for p in base.parameters])
     return np.asarray(base.grouping * powers / powers[list(base.kept), None])
 
 

@@ -6,9 +6,8 @@ from fractions import Fraction
 from functools import lru_cache
 
 from pteron.kernels import evaluate, general_program
-from pteron.reduction.configurations import Topology
+from pteron.manipulator import Manipulator, parameter_data
 
-__all__ = ["degree_bound"]
 
 Degree = tuple[int, int]
 """Bounds on the degrees of numerator and denominator."""
@@ -36,16 +35,16 @@ class _DegreeField:
 
 
 @lru_cache(maxsize=8)
-def degree_bound(topology: Topology) -> int:
+def degree_bound(topology: Manipulator) -> int:
     """Return a bound on the degree of any combination of a regressor row's entries.
 
     In the pose (phi through the tangent of its half), velocity and acceleration, the geometry
     being constants. Every entry is brought to a denominator of its own, hence generously.
     """
-    program = general_program(topology.legs, topology.turns, "regressor").function
+    program = general_program(topology, "regressor").function
     constants: list[Degree] = [(0, 0)] * program.size1_in(0)
-    state: list[Degree] = [(1, 0)] * topology.legs
+    state: list[Degree] = [(1, 0)] * topology.freedom
     entries = evaluate(program, _DegreeField(), [constants, state, state, state])[0]
-    n = topology.columns
-    rows = [entries[i * n : (i + 1) * n] for i in range(topology.legs)]
+    n = len(parameter_data(topology))
+    rows = [entries[i * n : (i + 1) * n] for i in range(topology.freedom)]
     return max(max(num for num, _ in row) + sum(den for _, den in row) for row in rows)

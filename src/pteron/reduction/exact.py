@@ -16,13 +16,13 @@ from typing import TypeVar
 import numpy as np
 from sympy import factorint, isprime
 
+from pteron.bodies.parameters import Parameter
 from pteron.errors import ModelError, SingularPose
-from pteron.kernels import Array, PrimeField
+from pteron.kernels import Array, PrimeField, bare
 from pteron.kinematics import is_singular_everywhere
 from pteron.manipulator import Manipulator
 from pteron.reduction.certificate import ExactCertificate
 from pteron.reduction.configurations import (
-    Topology,
     is_square,
     modular_rows,
     rational_rows,
@@ -35,7 +35,6 @@ from pteron.reduction.numerical import fitted_shares, numerical_rank
 from pteron.reduction.symbols import algebraic_values, symbolic_shares
 from pteron.reduction.transfers import Transfer
 
-__all__ = ["exact_grouping"]
 
 _BITS = 61
 _MOST_PRIMES = 8
@@ -51,7 +50,7 @@ Relations = dict[int, dict[int, int]]
 
 def exact_grouping(
     robot: Manipulator,
-    names: Sequence[str],
+    columns: Sequence[Parameter],
     order: Sequence[int],
     sharing: Array,
     mass_transfers: Sequence[Transfer],
@@ -69,14 +68,14 @@ def exact_grouping(
             f"{robot.name}: singular at every pose (type II), so that it has no inverse dynamics "
             "and no base parameters",
             kind="II",
-            closeness=0.0,
+            measure=0.0,
             index=(),
         )
     geometry = exact_geometry(robot)
-    topology = Topology(len(robot.legs), robot.platform.turns)
+    topology, n = bare(robot), robot.freedom
     rng = random.Random(seed)
     primes = _primes(geometry, rng)
-    states = -(-len(order) // topology.legs) + _SPARE_STATES
+    states = -(-len(order) // n) + _SPARE_STATES
 
     found: dict[int, tuple[list[int], Relations]] = {}
     shares: dict[int, dict[int, Fraction]] | None = None
@@ -93,7 +92,7 @@ def exact_grouping(
     kept, relations = next(iter(found.values()))
     dropped = [column for column in order if column not in kept]
     by_mass = [
-        _modular(transfer, geometry, names, next(iter(found))) for transfer in mass_transfers
+        _modular(transfer, geometry, columns, next(iter(found))) for transfer in mass_transfers
     ]
     extra = _unexplained(by_mass, relations, dropped, len(order), next(iter(found)))
 
@@ -109,8 +108,8 @@ def exact_grouping(
             for column, terms in shares.items()
         }
         if not geometry.radicands:
-            rational_checks = _RATIONAL_CHECKS
-            exact_rows = rational_rows(topology, geometry, rational_checks, rng)
+            exact_rows = rational_rows(topology, geometry, _RATIONAL_CHECKS, rng)
+            rational_checks = len(exact_rows) // n
             _verify(_shared_rows(exact_rows, sharing), shares, None)
     else:
         new_rows = modular_rows(topology, geometry, fresh, states, rng)
@@ -121,17 +120,17 @@ def exact_grouping(
         else:
             coefficients = "algebraic"
             given = symbolic_shares(
-                names, sorted(kept), mass_transfers, [], algebraic_values(geometry)
+                columns, sorted(kept), mass_transfers, [], algebraic_values(geometry)
             )
     rows = _shared_rows(modular_rows(topology, geometry, fresh, _MODULAR_CHECKS, rng), sharing)
     _verify(rows, residues, fresh)
     for transfer in mass_transfers:
-        _verify(rows, {-1: _modular(transfer, geometry, names, fresh)}, fresh)
+        _verify(rows, {-1: _modular(transfer, geometry, columns, fresh)}, fresh)
 
     degree = degree_bound(topology)
     # A pose is drawn among the 1 in 2^n whose Deltas are squares, and the 2^n choices of their
     # roots multiply the degree.
-    odds = min(1.0, degree * 4.0**topology.legs / fresh) ** _MODULAR_CHECKS
+    odds = min(1.0, degree * 4.0**n / fresh) ** _MODULAR_CHECKS
     certificate = ExactCertificate(
         method="exact",
         rank=len(kept),
@@ -144,7 +143,7 @@ def exact_grouping(
         degree=degree,
         false_acceptance=len(dropped) * odds,
         transfers=len(mass_transfers),
-        unexplained=tuple(names[column] for column in extra),
+        unexplained=tuple(columns[column].name for column in extra),
         coefficients=coefficients,
         recognised=geometry.recognised,
         approximated=geometry.approximated,
@@ -168,7 +167,7 @@ def _numerical_rank(
 
 
 def _modular(
-    transfer: Transfer, geometry: ExactGeometry, names: Sequence[str], prime: int
+    transfer: Transfer, geometry: ExactGeometry, columns: Sequence[Parameter], prime: int
 ) -> dict[int, int]:
     """Return a transfer's null vector modulo a prime, by column."""
     field = PrimeField(prime)
@@ -176,7 +175,7 @@ def _modular(
     entries = transfer.evaluate(
         symbols, lambda n: field.number(Fraction(n)), field.add, field.multiply
     )
-    return {names.index(column): value for column, value in entries.items() if value}
+    return {columns.index(column): value for column, value in entries.items() if value}
 
 
 def _unexplained(

@@ -18,12 +18,10 @@ from typing import TypeVar
 import casadi as ca
 import numpy as np
 
-from pteron.equations.geometry import plane_axis, pole
 from pteron.kernels import Array, Field, evaluate
+from pteron.legs.circles import plane_axis, pole
 from pteron.manipulator import Manipulator
 from pteron.reduction.surds import Surd, direction_cosine, length
-
-__all__ = ["ExactGeometry", "ExactLeg", "exact_geometry"]
 
 Element = TypeVar("Element")
 ExactVector = tuple[Surd, Surd, Surd]
@@ -43,30 +41,44 @@ ZERO = Surd(Fraction(0))
 
 @dataclass(frozen=True)
 class ExactLeg:
-    """A leg's geometry in exact numbers, in the machine's own frame."""
+    """A leg's quantities in exact numbers, in the machine's own frame.
 
-    r: ExactVector
-    d: ExactVector
-    e: ExactVector
-    s0: ExactVector
-    lu: Surd
-    ll: Surd
-    sigma: int
+    Attributes
+    ----------
+    values : dict
+        By name, in the order of the leg's quantities. A unit vector that need only be perpendicular
+        to a direction is empty: no force depends on which one it is, and a field has one.
+    direction : vector of Surd
+        That direction, the first of the leg.
+    lengths : dict
+        The lengths by symbol.
+    platform_point : vector of Surd
+        s0.
+    """
 
+    values: dict[str, tuple[Surd, ...]]
+    direction: ExactVector
+    lengths: dict[str, Surd]
+    platform_point: ExactVector
+
+    @property
     def numbers(self) -> list[Surd]:
-        """Return r, d, e, s0, lu, ll and sigma."""
-        sigma = Surd(Fraction(self.sigma))
-        return [*self.r, *self.d, *self.e, *self.s0, self.lu, self.ll, sigma]
+        """All numbers in one list."""
+        return [number for value in self.values.values() for number in value] + [
+            *self.platform_point
+        ]
 
-    def within(self, field: Field[Element]) -> list[Element]:
-        """Return r, d, e, a, s0, lu, ll and sigma in a field, the order of `Geometry.symbols`."""
-        numbers = [number.within(field) for number in self.numbers()]
-        return [*numbers[:9], *self.plane_axis(field), *numbers[9:]]
-
-    def plane_axis(self, field: Field[Element]) -> list[Element]:
-        """Return a, an axis of the leg's plane, in a field."""
-        program = _plane_axis(*pole([float(c) for c in self.d]))
-        return evaluate(program, field, [[c.within(field) for c in self.d]])[0]
+    def within(self, field: Field[Element]) -> dict[str, list[Element]]:
+        """Return the quantities and the platform point in a field, by name."""
+        d = [c.within(field) for c in self.direction]
+        found = {}
+        for name, value in self.values.items():
+            if value:
+                found[name] = [number.within(field) for number in value]
+            else:
+                program = _plane_axis(*pole([float(c) for c in self.direction]))
+                found[name] = evaluate(program, field, [d])[0]
+        return found | {"platform_point": [number.within(field) for number in self.platform_point]}
 
 
 @dataclass(frozen=True)
@@ -101,23 +113,41 @@ class ExactGeometry:
     @property
     def radicands(self) -> frozenset[int]:
         """The s > 1 of all numbers q sqrt(s)."""
-        numbers = [n for leg in self.legs for n in leg.numbers()] + list(self.gravity)
+        numbers = [n for leg in self.legs for n in leg.numbers] + list(self.gravity)
         return frozenset(n.s for n in numbers if n.s != 1)
 
     def symbols(self) -> dict[str, Surd]:
         """Return the values of the geometric symbols lu1, ll1, s1x, s1y, ... of the transfers."""
         values = {}
         for i, leg in enumerate(self.legs, start=1):
-            values[f"lu{i}"], values[f"ll{i}"] = leg.lu, leg.ll
-            values[f"s{i}x"], values[f"s{i}y"] = leg.s0[:2]
+            values |= {f"{symbol}{i}": value for symbol, value in leg.lengths.items()}
+            values[f"s{i}x"], values[f"s{i}y"] = leg.platform_point[:2]
         return values
 
     def within(self, field: Field[Element]) -> list[Element]:
-        """Return the geometry vector of `Geometry.symbols` in a field."""
+        """Return the geometry vector of `Machine.symbols` in a field."""
         one, zero = field.number(1), field.number(0)
         frame = [one, zero, zero, zero, one, zero, zero, zero, one]
-        numbers = [number for leg in self.legs for number in leg.within(field)]
+        numbers = [
+            number
+            for leg in self.legs
+            for values in leg.within(field).values()
+            for number in values
+        ]
         return numbers + frame + [g.within(field) for g in self.gravity]
+
+    @property
+    def places(self) -> list[dict[str, slice]]:
+        """Where each leg's quantities stand in that vector, by name."""
+        found: list[dict[str, slice]] = []
+        start = 0
+        for leg in self.legs:
+            found.append({})
+            for name, value in leg.values.items():
+                found[-1][name] = slice(start, start + (len(value) or 3))
+                start = found[-1][name].stop
+            start += 3
+        return found
 
 
 @lru_cache(maxsize=6)
@@ -128,45 +158,71 @@ def _plane_axis(i: int, sign: int) -> ca.Function:
 
 def exact_geometry(robot: Manipulator) -> ExactGeometry:
     """Return a machine's geometry in exact numbers."""
-    unit = {f"d{i + 1}": np.array(leg.direction) for i, leg in enumerate(robot.legs)}
-    for i, leg in enumerate(robot.legs):
-        if leg.slider_direction is not None:
-            unit[f"e{i + 1}"] = np.array(leg.slider_direction)
+    unit: dict[str, Array] = {}
+    for i, leg in enumerate(robot.legs, start=1):
+        for q in leg.quantities:
+            if q.role == "direction":
+                unit[f"{q.symbol}{i}"] = np.array(q.value)
     size = float(np.linalg.norm(robot.gravity))
     if size > 0.0:
         unit["gravity"] = np.array(robot.gravity) / size
     frame = _best_frame(robot, list(unit.values()))
     notes = _Notes([], [])
     exact = _exact_directions({name: frame @ v for name, v in unit.items()}, notes)
-    legs = []
-    for i, leg in enumerate(robot.legs):
-        d = exact[f"d{i + 1}"]
-        s0, r = _points(robot, i, frame, notes)
-        legs.append(
-            ExactLeg(
-                r=r,
-                d=d,
-                e=exact.get(f"e{i + 1}", d),
-                s0=s0,
-                lu=notes.length(f"lu{i + 1}", leg.upper_length),
-                ll=notes.length(f"ll{i + 1}", leg.lower_length),
-                sigma=leg.elbow,
-            )
-        )
+    legs = tuple(_exact_leg(robot, i, frame, exact, notes) for i in range(len(robot.legs)))
     gravity: ExactVector = (ZERO, ZERO, ZERO)
     if size > 0.0:
         x, y, z = exact["gravity"]
         scale = Fraction(size).limit_denominator(10**6) or Fraction(size)
         gravity = (x.times(scale), y.times(scale), z.times(scale))
+    distinct = {
+        name: vector
+        for name, vector in unit.items()
+        if not any(n[1:] == name[1:] and n < name and (unit[n] == vector).all() for n in unit)
+    }
     return ExactGeometry(
-        tuple(legs),
+        legs,
         gravity,
         frame,
         tuple(notes.recognised),
         tuple(notes.approximated),
-        tuple(_lost_right_angles(unit, exact)),
-        tuple(_near_relations(unit)),
+        tuple(_lost_right_angles(distinct, exact)),
+        tuple(_near_relations(distinct)),
     )
+
+
+def _exact_leg(
+    robot: Manipulator, i: int, frame: Array, exact: dict[str, ExactVector], notes: _Notes
+) -> ExactLeg:
+    leg = robot.legs[i]
+    shift = np.zeros(3)
+    if robot.platform.turns:
+        x, y = notes.planar(f"s{i + 1}", *leg.platform_point[:2])
+        s0 = (x, y, notes.length(f"s{i + 1}.z", leg.platform_point[2]))
+    else:
+        # For 3T a platform point only shifts what the leg is fixed to.
+        shift = np.array(robot.platform.frame).T @ np.array(leg.platform_point)
+        s0 = (ZERO, ZERO, ZERO)
+    values: dict[str, tuple[Surd, ...]] = {}
+    lengths: dict[str, Surd] = {}
+    directions: list[ExactVector] = []
+    for q in leg.quantities:
+        if q.role == "point":
+            # It enters the regressor only through c - r: no rank hangs on its last digits.
+            at = frame @ (np.array(q.value) - shift)
+            values[q.name] = tuple(
+                Surd(Fraction(float(c)).limit_denominator(10**9)) for c in at
+            )
+        elif q.role == "direction":
+            directions.append(exact[f"{q.symbol}{i + 1}"])
+            values[q.name] = directions[-1]
+        elif q.role == "length":
+            lengths[q.symbol] = notes.length(f"{q.symbol}{i + 1}", q.value[0])
+            values[q.name] = (lengths[q.symbol],)
+        else:
+            plain = () if q.role == "normal" else q.value
+            values[q.name] = tuple(Surd(Fraction(v)) for v in plain)
+    return ExactLeg(values, directions[0], lengths, s0)
 
 
 @dataclass(frozen=True)
@@ -219,23 +275,6 @@ class _Notes:
         error = abs(float(exact) - value)
         if error:
             self.approximated.append(f"{name} (off by {error:.0e})")
-
-
-def _points(
-    robot: Manipulator, i: int, frame: Array, notes: _Notes
-) -> tuple[ExactVector, ExactVector]:
-    """Return s0 and r of a leg. For 3T a platform point only shifts the guide: s0 becomes zero."""
-    leg = robot.legs[i]
-    r = np.array(leg.guide_point)
-    if robot.platform.turns:
-        x, y = notes.planar(f"s{i + 1}", *leg.platform_point[:2])
-        s0 = (x, y, notes.length(f"s{i + 1}.z", leg.platform_point[2]))
-    else:
-        r = r - np.array(robot.platform.frame).T @ np.array(leg.platform_point)
-        s0 = (ZERO, ZERO, ZERO)
-    # A guide point enters the regressor only through u, so that no rank hangs on its last digits.
-    x, y, z = (Surd(Fraction(float(c)).limit_denominator(10**9)) for c in frame @ r)
-    return s0, (x, y, z)
 
 
 def _best_frame(robot: Manipulator, vectors: list[Array]) -> Array:

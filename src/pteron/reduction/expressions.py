@@ -8,9 +8,9 @@ from typing import Any
 
 from sympy import Add, Float, Integer, Mul, Rational, Symbol, factor, latex
 
+from pteron.bodies.parameters import Parameter
 from pteron.reduction.grouping import Share, Shares
 
-__all__ = ["as_latex", "as_sympy", "as_text"]
 
 Terms = Mapping[int, Share]
 
@@ -66,7 +66,7 @@ def as_sympy(names: Sequence[str], terms: Terms) -> Any:
     return Add(*(Mul(_sympified(share), Symbol(names[j])) for j, share in terms.items()))
 
 
-def as_latex(names: Sequence[str], terms: Terms, digits: int) -> str:
+def as_latex(columns: Sequence[Parameter], terms: Terms, digits: int) -> str:
     """Return a base parameter in LaTeX, in the paper's notation."""
     text = ""
     for column, share in terms.items():
@@ -80,7 +80,8 @@ def as_latex(names: Sequence[str], terms: Terms, digits: int) -> str:
             size = "" if rounded == "1" else rounded
             minus = value < 0
         joint = ("- " if minus else "+ ") if text else ("-" if minus else "")
-        body = f"{size}\\, {_latex_name(names[column])}" if size else _latex_name(names[column])
+        name = _latex_name(columns[column])
+        body = f"{size}\\, {name}" if size else name
         text += f" {joint}{body}" if text else f"{joint}{body}"
     return text
 
@@ -93,11 +94,11 @@ def _sympified(share: Share) -> Any:
     return Integer(share) if isinstance(share, int) else share
 
 
-def _latex_name(name: str) -> str:
-    kind, body = name.split("_", 1)
-    if kind.startswith("mg"):
-        return rf"m_{{{body}}}\gamma_{{{body},{kind[-1]}}}"
-    return f"{kind}_{{{body}}}"
+def _latex_name(parameter: Parameter) -> str:
+    body = parameter.body + parameter.suffix
+    if parameter.length_power == 1:
+        return rf"m_{{{body}}}\gamma_{{{body},{parameter.kind[-1]}}}"
+    return f"{parameter.kind}_{{{body}}}"
 
 
 def _geometry_names(share: Any) -> dict[Any, str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Literal, get_args
 
+from pteron.bodies.parameters import Parameter
 from pteron.errors import ModelError
 from pteron.manipulator import Manipulator
 from pteron.reduction.exact import exact_grouping
@@ -14,7 +15,6 @@ from pteron.reduction.result import BaseParameters
 from pteron.reduction.sharing import Sharing, default_order, leg_groups, share
 from pteron.reduction.transfers import transfers
 
-__all__ = ["Method", "base_parameters"]
 
 Method = Literal["exact", "svd", "qr"]
 
@@ -79,14 +79,15 @@ def base_parameters(
     """
     if method not in get_args(Method):
         raise ModelError(f"method: {method!r} is not one of {', '.join(get_args(Method))}")
-    columns, sharing = share(robot, shared)
+    columns, sharing = share(robot, leg_groups(robot, shared))
     order = _order(columns, keep)
-    by_mass = transfers(robot, leg_groups(robot, shared))
+    by_mass = transfers(robot, columns)
     if method == "exact":
         grouping = exact_grouping(robot, columns, order, sharing, by_mass, seed)
     else:
         grouping = _NUMERICAL[method](robot, order, sharing, seed)
-    lost = [name for name in keep or () if columns.index(name) not in grouping.kept]
+    names = [column.name for column in columns]
+    lost = [name for name in keep or () if names.index(name) not in grouping.kept]
     if lost:
         raise ModelError(
             f"keep: {', '.join(lost)} cannot be kept: zero, or dependent on the columns named "
@@ -95,16 +96,17 @@ def base_parameters(
     return BaseParameters.of(robot, columns, sharing, tuple(by_mass), grouping)
 
 
-def _order(columns: Sequence[str], keep: Sequence[str] | None) -> list[int]:
+def _order(columns: Sequence[Parameter], keep: Sequence[str] | None) -> list[int]:
     """Return the columns in order of preference, those of `keep` in front."""
     default = default_order(columns)
     if keep is None:
         return default
-    unknown = [name for name in keep if name not in columns]
+    names = [column.name for column in columns]
+    unknown = [name for name in keep if name not in names]
     if isinstance(keep, str) or unknown:
         given = keep if isinstance(keep, str) else unknown[0]
         raise ModelError(
-            f"keep: {given!r} is no list of parameter names; they are {', '.join(columns)}"
+            f"keep: {given!r} is no list of parameter names; they are {', '.join(names)}"
         )
-    first = [columns.index(name) for name in dict.fromkeys(keep)]
+    first = [names.index(name) for name in dict.fromkeys(keep)]
     return first + [column for column in default if column not in first]

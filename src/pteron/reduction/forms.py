@@ -12,16 +12,14 @@ from collections.abc import Callable
 
 import casadi as ca
 
-from pteron.equations.closure import Load, actuator_forces
-from pteron.equations.geometry import Expression, Geometry
-from pteron.equations.platforms import platform_motion
-from pteron.equations.regressor import generalized_regressor, terms
+from pteron.bodies.motion import Expression
+from pteron.equations.machine import Machine
+from pteron.equations.regressor import generalized_regressor
 from pteron.kernels import TARGETS, Kernel, Port, compile
 from pteron.manipulator import parameters
 from pteron.reduction.cheapest import cheapest_parameters
 from pteron.reduction.result import BaseParameters
 
-__all__ = ["FORMS", "model_forms"]
 
 Form = Callable[[Expression, Expression, Expression, Expression], Expression]
 """Of J^-T (n, m), the bracket of Eq. (15) (m, N), selection (N, K) and parameters (K, 1)."""
@@ -56,18 +54,19 @@ def model_forms(base: BaseParameters) -> dict[tuple[str, str], Kernel]:
         parameters as an input that is fixed.
     """
     robot = base.robot
-    geometry = Geometry.of(robot)
+    machine = Machine.of(robot)
     values = parameters(robot)
     sets = {
         "complete": (ca.SX.eye(len(values)), values),
         "reduced": (ca.sparsify(ca.SX(ca.DM(base.selection))), base.values()),
     }
-    ports = [Port(name, (geometry.freedom,)) for name in ("pose", "velocity", "acceleration")]
+    ports = [Port(name, (machine.freedom,)) for name in ("pose", "velocity", "acceleration")]
     kernels: dict[tuple[str, str], Kernel] = {}
     x, dx, ddx = (ca.SX.sym(port.name, *port.shape) for port in ports)
-    bracket = generalized_regressor(terms(geometry, x, dx, ddx))
-    turn = platform_motion(geometry, x, dx, ddx).turn
-    inverse = -actuator_forces(geometry, Load.of(ca.SX.eye(geometry.freedom)), turn)
+    state = machine.state(x, dx, ddx)
+    bracket = generalized_regressor(machine, state)
+    unit = ca.SX.eye(machine.freedom)
+    inverse = -machine.closure.forces(unit, state.platform, state.legs)
     for form, build in _GRAPHS.items():
         for name, (selection, numbers) in sets.items():
             symbols = ca.SX.sym("parameters", len(numbers))
@@ -77,7 +76,7 @@ def model_forms(base: BaseParameters) -> dict[tuple[str, str], Kernel]:
                 f"{form}, {name}",
                 function,
                 (*ports, Port("parameters", numbers.shape, shared=True)),
-                (Port("forces", (geometry.freedom,)),),
+                (Port("forces", (machine.freedom,)),),
                 {"parameters": numbers},
             )
     cheapest = cheapest_parameters(robot)

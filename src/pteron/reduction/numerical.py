@@ -9,11 +9,10 @@ import numpy as np
 from pteron.dynamics import regressor
 from pteron.kernels import Array
 from pteron.kinematics import random_poses
-from pteron.manipulator import Manipulator, parameter_names
+from pteron.manipulator import Manipulator, parameter_data
 from pteron.reduction.certificate import NumericalCertificate
 from pteron.reduction.grouping import Grouping, Shares
 
-__all__ = ["fitted_shares", "numerical_rank", "qr_grouping", "svd_grouping"]
 
 _TOLERANCE = 1e-10
 """Relative to the largest; columns are scaled to unit length. Rounding leaves 1e-14, and what is
@@ -23,9 +22,6 @@ _STATES_PER_COLUMN = 4
 
 _ACCELERATION = 9.81
 """m/s^2: that of the random motions, so that inertia weighs about as much as gravity."""
-
-_LENGTHS = {"m": 0, "mgx": 1, "mgy": 1, "I": 2}
-"""The power of length in the unit of each kind of parameter."""
 
 
 def svd_grouping(robot: Manipulator, order: Sequence[int], sharing: Array, seed: int) -> Grouping:
@@ -92,9 +88,9 @@ def _scaled_regressor(robot: Manipulator, sharing: Array, seed: int) -> tuple[Ar
     """Return regressors at random states, stacked, columns scaled to length 1; the lengths."""
     rng = np.random.default_rng(seed)
     states = _STATES_PER_COLUMN * sharing.shape[1]
-    poses = random_poses(robot, states, seed=rng, bend=0.2, hold=0.2)
+    poses = random_poses(robot, states, seed=rng, type_i=0.2, type_ii=0.2)
     # In the machine's own units of length and time, so that its size does not matter.
-    size = float(np.mean([leg.upper_length + leg.lower_length for leg in robot.legs]))
+    size = float(np.mean([leg.size for leg in robot.legs]))
     second = np.sqrt(size / _ACCELERATION)
     units = np.where(np.arange(robot.freedom) < 3, size, 1.0)
     velocity = units / second * rng.normal(size=poses.shape)
@@ -104,7 +100,7 @@ def _scaled_regressor(robot: Manipulator, sharing: Array, seed: int) -> tuple[Ar
     scale = np.linalg.norm(stacked, axis=0)
     # A column that does nothing stays zero instead of being blown up to noise; columns of kg,
     # kg m and kg m^2 are compared by what a body of the machine's size would have of them.
-    powers = np.array([_LENGTHS[name.split("_")[0]] for name in parameter_names(robot)])
+    powers = np.array([p.length_power for p in parameter_data(robot)])
     extent = scale * size ** (powers @ sharing / sharing.sum(axis=0))
     scale = np.where(extent > _TOLERANCE * extent.max(), scale, np.inf)
     return stacked / scale, scale, states

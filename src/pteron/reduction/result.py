@@ -10,9 +10,11 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from pteron.bodies.parameters import Parameter
 from pteron.errors import ModelError
 from pteron.kernels import Array
-from pteron.manipulator import Manipulator, parameters
+from pteron.manipulator import Manipulator
+from pteron.manipulator import parameters as values_of
 from pteron.reduction.certificate import Certificate, ExactCertificate
 from pteron.reduction.exact_geometry import exact_geometry
 from pteron.reduction.expressions import as_latex, as_sympy, as_text, terms_of
@@ -20,7 +22,6 @@ from pteron.reduction.grouping import Grouping, Shares
 from pteron.reduction.symbols import named_values, symbolic_shares
 from pteron.reduction.transfers import Transfer
 
-__all__ = ["BaseParameters", "Form"]
 
 Form = Literal["text", "sympy", "latex"]
 
@@ -33,8 +34,8 @@ class BaseParameters:
     ----------
     robot : Manipulator
         The machine they belong to; its inertial parameters play no part.
-    columns : tuple of str
-        The parameters they are made of: `parameter_names`, or fewer where legs share theirs.
+    parameters : tuple of Parameter
+        The columns, which they are sums of: `parameter_data`, or fewer where legs share theirs.
     kept : tuple of int
         Which columns are kept; the others join them.
     grouping : array, shape (rank, N)
@@ -48,7 +49,7 @@ class BaseParameters:
     """
 
     robot: Manipulator
-    columns: tuple[str, ...]
+    parameters: tuple[Parameter, ...]
     kept: tuple[int, ...]
     grouping: Array = field(repr=False, compare=False)
     selection: Array = field(repr=False, compare=False)
@@ -60,7 +61,7 @@ class BaseParameters:
     def of(
         cls,
         robot: Manipulator,
-        columns: tuple[str, ...],
+        columns: tuple[Parameter, ...],
         sharing: Array,
         transfers: tuple[Transfer, ...],
         grouping: Grouping,
@@ -69,7 +70,7 @@ class BaseParameters:
         mean = (sharing / sharing.sum(axis=0)).T
         return cls(
             robot=robot,
-            columns=columns,
+            parameters=columns,
             kept=grouping.kept,
             grouping=grouping.matrix(len(columns)) @ mean,
             selection=sharing[:, list(grouping.kept)],
@@ -84,13 +85,18 @@ class BaseParameters:
         return len(self.kept)
 
     @property
+    def columns(self) -> tuple[str, ...]:
+        """The names of the columns."""
+        return tuple(parameter.name for parameter in self.parameters)
+
+    @property
     def names(self) -> tuple[str, ...]:
         """The kept columns, which name the base parameters."""
         return tuple(self.columns[column] for column in self.kept)
 
     def values(self, robot: Manipulator | None = None) -> Array:
         """Return the base parameters' values (rank,) for a machine of this geometry."""
-        return np.asarray(self.grouping @ parameters(robot or self.robot))
+        return np.asarray(self.grouping @ values_of(robot or self.robot))
 
     @cached_property
     def _symbolic(self) -> Shares:
@@ -111,7 +117,7 @@ class BaseParameters:
             for column in unexplained
         ]
         named = named_values(exact_geometry(self.robot))
-        return symbolic_shares(self.columns, self.kept, self.transfers, extra, named)
+        return symbolic_shares(self.parameters, self.kept, self.transfers, extra, named)
 
     @property
     def geometry_values(self) -> dict[str, float]:
@@ -155,8 +161,9 @@ class BaseParameters:
         sums = [terms_of(column, shares) for column in self.kept]
         if form == "sympy":
             return tuple(as_sympy(self.columns, terms) for terms in sums)
-        write = as_text if form == "text" else as_latex
-        return tuple(write(self.columns, terms, digits) for terms in sums)
+        if form == "latex":
+            return tuple(as_latex(self.parameters, terms, digits) for terms in sums)
+        return tuple(as_text(self.columns, terms, digits) for terms in sums)
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything as plain data, fractions as text."""

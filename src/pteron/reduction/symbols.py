@@ -9,11 +9,11 @@ from typing import Any
 from sympy import Integer, Rational, Symbol, sqrt
 from sympy.polys.matrices import DomainMatrix
 
+from pteron.bodies.parameters import Parameter
 from pteron.reduction.exact_geometry import ExactGeometry
 from pteron.reduction.surds import Surd
 from pteron.reduction.transfers import Transfer
 
-__all__ = ["algebraic_values", "named_values", "symbolic_shares"]
 
 
 def named_values(geometry: ExactGeometry) -> dict[str, Any]:
@@ -44,7 +44,7 @@ def _number(value: Surd) -> Any:
 
 
 def symbolic_shares(
-    names: Sequence[str],
+    columns: Sequence[Parameter],
     kept: Sequence[int],
     found: Sequence[Transfer],
     extra: Sequence[Mapping[int, Any]],
@@ -54,7 +54,7 @@ def symbolic_shares(
 
     Parameters
     ----------
-    names : sequence of str
+    columns : sequence of Parameter
         The columns.
     kept : sequence of int
         The columns kept.
@@ -65,14 +65,14 @@ def symbolic_shares(
     symbols : mapping
         What is put for the geometry: SymPy symbols, or exact numbers.
     """
-    dropped = [j for j in range(len(names)) if j not in kept]
+    dropped = [j for j in range(len(columns)) if j not in kept]
     order = [*dropped, *kept]
     rows = []
     for transfer in found:
         values = transfer.evaluate(
             symbols, lambda n: Rational(n), lambda a, b: a + b, lambda a, b: a * b
         )
-        rows.append([values.get(names[j], Rational(0)) for j in order])
+        rows.append([values.get(columns[j], Rational(0)) for j in order])
     for vector in extra:
         rows.append([_rational(vector.get(j, Fraction(0))) for j in order])
     matrix = DomainMatrix.from_list_sympy(len(rows), len(order), rows, extension=True).to_field()

@@ -7,15 +7,12 @@ base parameters in symbols.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
+from pteron.bodies.parameters import PLATFORM, Parameter
 from pteron.manipulator import Manipulator
-from pteron.bodies.vectors import norm, parallel, scaled
-from pteron.reduction.sharing import suffix
-
-__all__ = ["Monomial", "Polynomial", "Transfer", "transfers"]
 
 Value = TypeVar("Value")
 
@@ -31,7 +28,6 @@ class Monomial:
 Polynomial = tuple[Monomial, ...]
 
 _ONE: Polynomial = (Monomial(1),)
-_LESS: Polynomial = (Monomial(-1),)
 
 
 @dataclass(frozen=True)
@@ -43,11 +39,11 @@ class Transfer:
     reason : str
         Why it is one, for a reader.
     entries : dict
-        By column name, in symbols `lu1`, `ll1`, `s1x`, `s1y`, ... of each leg's geometry.
+        By column, in symbols `lu1`, `ll1`, `s1x`, `s1y`, ... of each leg's geometry.
     """
 
     reason: str
-    entries: Mapping[str, Polynomial]
+    entries: Mapping[Parameter, Polynomial]
 
     def evaluate(
         self,
@@ -55,7 +51,7 @@ class Transfer:
         number: Callable[[int], Value],
         add: Callable[[Value, Value], Value],
         multiply: Callable[[Value, Value], Value],
-    ) -> dict[str, Value]:
+    ) -> dict[Parameter, Value]:
         """Return the entries with values put for the symbols, in any arithmetic."""
         values = {}
         for column, polynomial in self.entries.items():
@@ -69,52 +65,40 @@ class Transfer:
         return values
 
 
-def transfers(robot: Manipulator, groups: list[tuple[int, ...]]) -> list[Transfer]:
-    """Return the transfers of a machine whose legs share parameters in groups."""
+def transfers(robot: Manipulator, columns: Sequence[Parameter]) -> list[Transfer]:
+    """Return the transfers of a machine, for columns that legs may share in groups."""
     found: list[Transfer] = []
-    for group in groups:
-        end = suffix(group, len(robot.legs))
-        found.append(
-            Transfer(
-                f"slider and upper link{end} move as one along the guide",
-                {f"m_u{end}": _ONE, f"m_p{end}": _LESS},
-            )
-        )
+    for group in dict.fromkeys(p.legs for p in columns if p.legs):
+        place = {(p.kind, p.body): p for p in columns if p.legs == group}
+        suffix = next(iter(place.values())).suffix
         legs = [robot.legs[leg - 1] for leg in group]
-        first = group[0]
-        if len({(leg.upper_length, leg.lower_length) for leg in legs}) == 1:
-            lu, ll = f"lu{first}", f"ll{first}"
-            found.append(
-                Transfer(
-                    f"both links{end} carry the elbow R2",
-                    {
-                        f"m_u{end}": _ONE,
-                        f"mgx_u{end}": (Monomial(1, (lu,)),),
-                        f"I_u{end}": (Monomial(1, (lu, lu)),),
-                        f"m_l{end}": _LESS,
-                        f"mgx_l{end}": (Monomial(1, (ll,)),),
-                        f"I_l{end}": (Monomial(-1, (ll, ll)),),
-                    },
-                )
-            )
-        found.append(_platform_point(robot, group, end))
-        if all(_gravity_is_still(robot, leg - 1) for leg in group):
-            found += [
-                Transfer(
-                    f"no gravity and no slider acceleration acts across the upper link{end}",
-                    {f"{kind}_u{end}": _ONE},
-                )
-                for kind in ("mgx", "mgy")
-            ]
+        own = [leg.transfers(robot.gravity) for leg in legs]
+        for transfer in own[0]:
+            # What legs share must hold for each of them, with the same lengths.
+            symbols = {s for _, names in transfer.entries.values() for s in names}
+            sizes = {tuple(q.value for q in leg.quantities if q.symbol in symbols) for leg in legs}
+            if len(sizes) == 1 and all(transfer in others for others in own):
+                entries = {
+                    place[key]: (Monomial(factor, tuple(f"{s}{group[0]}" for s in names)),)
+                    for key, (factor, names) in transfer.entries.items()
+                }
+                found.append(Transfer(transfer.reason.format(suffix), entries))
+        platform = {p.kind: p for p in columns if p.body == PLATFORM}
+        for letter in legs[0].equations_class.rides:
+            found.append(_platform_point(robot, group, place["m", letter], platform))
     if not robot.platform.turns:
-        found += [
-            Transfer("the platform does not turn", {f"{kind}_e": _ONE})
-            for kind in ("mgx", "mgy", "I")
-        ]
+        reason = "the platform does not turn"
+        turning = (p for p in columns if p.body == PLATFORM and p.kind != "m")
+        found += [Transfer(reason, {p: _ONE}) for p in turning]
     return found
 
 
-def _platform_point(robot: Manipulator, group: tuple[int, ...], end: str) -> Transfer:
+def _platform_point(
+    robot: Manipulator,
+    group: tuple[int, ...],
+    mass: Parameter,
+    platform: Mapping[str, Parameter],
+) -> Transfer:
     x: list[Monomial] = []
     y: list[Monomial] = []
     square: list[Monomial] = []
@@ -127,20 +111,12 @@ def _platform_point(robot: Manipulator, group: tuple[int, ...], end: str) -> Tra
                 moment.append(Monomial(-1, (symbol,)))
                 square.append(Monomial(-1, (symbol, symbol)))
     return Transfer(
-        f"lower link{end} and platform carry the platform point R3",
+        f"lower link{mass.suffix} and platform carry the platform point",
         {
-            f"m_l{end}": _ONE,
-            "m_e": (Monomial(-len(group)),),
-            "mgx_e": tuple(x),
-            "mgy_e": tuple(y),
-            "I_e": tuple(square),
+            mass: _ONE,
+            platform["m"]: (Monomial(-len(group)),),
+            platform["mgx"]: tuple(x),
+            platform["mgy"]: tuple(y),
+            platform["I"]: tuple(square),
         },
     )
-
-
-def _gravity_is_still(robot: Manipulator, i: int) -> bool:
-    """Say whether neither gravity nor the slider's acceleration has a part across leg i's d."""
-    leg = robot.legs[i]
-    size = norm(robot.gravity)
-    still = size == 0.0 or parallel(leg.direction, scaled(robot.gravity, 1.0 / size))
-    return still and parallel(leg.direction, leg.e)

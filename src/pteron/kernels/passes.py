@@ -1,0 +1,204 @@
+"""A pass over the graph of a function that saves operations, so that equations can be plain.
+
+An equation says what it means: a lever times a force, a length times a sine, a sum over the legs.
+What a person would do to it by hand to save operations is done here, once, for every equation:
+
+    0.04*a*x - 0.04*b*y        ->  0.04*(a*x - b*y)         a factor of several terms, taken out
+    x + y - z  and  w - y - x  ->  s = x + y; s - z, w - s  a part of two sums (or two products)
+    -(a - b)  and  b - a       ->  b - a                    one difference: signs stand outside
+    a/2.5                      ->  0.4*a                    a number's quotient is a product
+
+Such savings do not show in a graph of pairs, hence the sums of many terms of `terms`. Three steps
+are repeated on them for as long as they save something:
+
+    flatten   a sum that is used once, in a sum, becomes part of it
+    factor    the factor that most terms of a sum have is taken out of them, again and again
+    share     the pair that most sums hold becomes a sum of its own, again and again
+
+Products are flattened and shared like sums. This is the greedy algebraic elimination of common
+subexpressions of A. Hosangadi, F. Fallah and R. Kastner, IEEE Transactions on CAD 25 (2006)
+2012-2022. No product of sums is multiplied out and nothing is divided that was not divided before,
+so that a result differs from the plain one by the rounding of its terms only.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections import Counter, defaultdict
+from collections.abc import Sequence
+from itertools import combinations
+
+import casadi as ca
+
+from pteron.kernels.operations import count_operations
+from pteron.kernels.terms import TermGraph, sign_of
+from pteron.kernels.translation import read, written
+
+
+def optimised(function: ca.Function) -> ca.Function:
+    """Return an SX function of the same inputs, outputs and values with fewer operations.
+
+    Where nothing is saved, or an operation is unknown, it is the function given.
+
+    Examples
+    --------
+    >>> import casadi as ca
+    >>> from pteron.kernels import count_operations
+    >>> a, b, x, y = (ca.SX.sym(name) for name in "abxy")
+    >>> plain = ca.Function("plain", [a, b, x, y], [0.04 * a * x - 0.04 * b * y])
+    >>> count_operations(plain), count_operations(optimised(plain))
+    (5, 4)
+    """
+    given = read(function)
+    if given is None:
+        return function
+    (graph, roots), best, least = given, given, _cost(*given)
+    while True:
+        for step in (_flattened, _factored, _shared):
+            graph, roots = step(graph, roots)
+        cost = _cost(graph, roots)
+        if cost >= least:
+            break
+        best, least = (graph, roots), cost
+    found = written(*best, function)
+    return found if count_operations(found) < count_operations(function) else function
+
+
+def _cost(graph: TermGraph, roots: list[int]) -> int:
+    """Return the operations, but for negations."""
+    cost, alone = 0, {abs(value) for value in roots}
+    order = graph.order(alone)
+    for k in order:
+        kind, operands = graph.nodes[k][0], graph.operands(k)
+        if kind in ("sum", "product"):
+            cost += len(operands) - 1
+        elif operands and kind != "inverse":
+            cost += 1
+        if kind != "product" or all(graph.is_a("inverse", v) for v in operands):
+            alone.update(abs(v) for v in operands)
+    return cost + sum(graph.is_a("inverse", k) for k in order if k in alone)
+
+
+def _flattened(old: TermGraph, roots: list[int]) -> tuple[TermGraph, list[int]]:
+    """Return the graph with sums that are used once, in a sum, as part of it; products likewise."""
+    uses = old.uses(roots)
+
+    def rule(new: TermGraph, k: int, values: list[int]) -> int:
+        kind = old.nodes[k][0]
+        if kind == ca.OP_INV and uses[k] == 1:
+            return new.inverse(values[0])
+        if kind not in ("sum", "product"):
+            return old.copied(new, k, values)
+        parts: list[int] = []
+        for v, value in zip(old.operands(k), values, strict=True):
+            inner = [value]
+            if uses[abs(v)] == 1 and new.is_a(kind, value):
+                inner = list(new.operands(abs(value)))
+                if value < 0 and kind == "sum":
+                    inner = [-part for part in inner]
+                elif value < 0:
+                    inner[0] = -inner[0]
+            parts += inner
+        return new.sum(parts) if kind == "sum" else new.product(parts)
+
+    return old.rebuilt(roots, rule)
+
+
+def _factored(old: TermGraph, roots: list[int]) -> tuple[TermGraph, list[int]]:
+    """Return the graph with the common factors of a sum's terms taken out of them."""
+    uses = old.uses(roots)
+
+    def rule(new: TermGraph, k: int, values: list[int]) -> int:
+        if not old.is_a("sum", k):
+            return old.copied(new, k, values)
+        terms = []
+        for v, value in zip(old.operands(k), values, strict=True):
+            # A product that others use is computed anyhow: taking it apart saves nothing.
+            apart = uses[abs(v)] == 1 and new.is_a("product", value)
+            terms.append((sign_of(value), new.operands(abs(value)) if apart else (abs(value),)))
+        return _sum_of_products(new, terms)
+
+    return old.rebuilt(roots, rule)
+
+
+def _sum_of_products(graph: TermGraph, terms: list[tuple[int, tuple[int, ...]]]) -> int:
+    """Return the sum of terms, each a sign and factors, in factored form."""
+    while True:
+        counts = Counter(f for _, factors in terms if len(factors) > 1 for f in set(factors))
+        if max(counts.values(), default=0) < 2:
+            return graph.sum(sign * graph.product(factors) for sign, factors in terms)
+        best = max(counts, key=lambda f: (counts[f], f))
+        rest, quotients = [], []
+        for sign, factors in terms:
+            if len(factors) > 1 and best in factors:
+                place = factors.index(best)
+                quotients.append((sign, factors[:place] + factors[place + 1 :]))
+            else:
+                rest.append((sign, factors))
+        whole = graph.product([best, _sum_of_products(graph, quotients)])
+        terms = [*rest, (sign_of(whole), (abs(whole),))]
+
+
+def _shared(graph: TermGraph, roots: list[int]) -> tuple[TermGraph, list[int]]:
+    """Return the graph with the pairs that several sums or products hold as nodes of their own."""
+    order = graph.order(roots)
+    for kind in ("sum", "product"):
+        _name_pairs(graph, kind, [k for k in order if graph.is_a(kind, k)])
+    return graph.rebuilt(roots, graph.copied)
+
+
+def _name_pairs(graph: TermGraph, kind: str, owners: Sequence[int]) -> None:
+    """Put a node in the place of each pair that several of the owners hold, most frequent first."""
+    lists = {k: list(graph.operands(k)) for k in owners}
+    holders: dict[tuple[int, int], dict[int, None]] = defaultdict(dict)
+    for k, values in lists.items():
+        for a, b in combinations(values, 2):
+            holders[_pair(a, b)][k] = None
+    heap = [(-len(found), pair) for pair, found in holders.items() if len(found) > 1]
+    heapq.heapify(heap)
+    while heap:
+        count, pair = heapq.heappop(heap)
+        # What the heap says may be out of date: an owner may have lost the pair to another one.
+        signs = {k: sign for k in holders[pair] if (sign := _sign_of(pair, lists[k]))}
+        if len(signs) < -count:
+            holders[pair] = dict.fromkeys(signs)
+            if len(signs) > 1:
+                heapq.heappush(heap, (-len(signs), pair))
+            continue
+        if all(graph.is_a("inverse", v) for v in pair):
+            continue  # 1/(a b) is one more operation than a division by each
+        name = next((k for k in signs if len(lists[k]) == 2), None)
+        if name is None:
+            name = graph.add(kind, *pair)
+            lists[name] = list(pair)
+        own = _sign_of(pair, lists[name])
+        for k, sign in signs.items():
+            if k == name:
+                continue
+            for v in pair:
+                lists[k].remove(sign * v)
+            value = sign * own * name
+            for v in lists[k]:
+                found = holders[_pair(v, value)]
+                found[k] = None
+                if len(found) > 1:
+                    heapq.heappush(heap, (-len(found), _pair(v, value)))
+            lists[k].append(value)
+    for k, values in lists.items():
+        graph.nodes[k] = (kind, *values)
+
+
+def _pair(a: int, b: int) -> tuple[int, int]:
+    """Return two values in a normal form, the same for their negatives."""
+    a, b = (a, b) if abs(a) < abs(b) else (b, a)
+    return (a, b) if a > 0 else (-a, -b)
+
+
+def _sign_of(pair: tuple[int, int], values: list[int]) -> int:
+    """Return the sign with which the values hold a pair, 0 where they do not."""
+    a, b = pair
+    if a == b:
+        return int(values.count(a) > 1)
+    if a in values and b in values:
+        return 1
+    return -1 if -a in values and -b in values else 0

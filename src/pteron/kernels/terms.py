@@ -1,0 +1,160 @@
+"""A function as sums of many terms and products of many factors, instead of pairs of them.
+
+In a graph of pairs, a + (b + c), neither a part that two sums have in common nor a factor that
+several terms have in common can be seen. Here they can: `passes` works on this form.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable
+from math import isfinite
+from typing import Any
+
+import casadi as ca
+
+Node = tuple[Any, ...]
+"""("input", port, element), ("constant", c) with c >= 0, ("sum", *values), ("product", *nodes),
+("inverse", node) or, for every other operation, (its CasADi code, *values)."""
+
+Rule = Callable[["TermGraph", int, list[int]], int]
+"""Makes, in a new graph, the value of a node of an old one from its operands' new values."""
+
+
+class TermGraph:
+    """Nodes, each of them once, numbered from 1. A value is a node's number or minus that.
+
+    Sums and products come in a normal form, by which the same value is the same node: sorted, equal
+    terms and constants collected, the first term of a sum positive, signs out of products.
+    """
+
+    def __init__(self) -> None:
+        self.nodes: list[Node] = [()]
+        self.numbers: dict[Node, int] = {}
+
+    def add(self, *node: Any) -> int:
+        """Return the number of a node, which is new or there already."""
+        number = self.numbers.setdefault(node, len(self.nodes))
+        if number == len(self.nodes):
+            self.nodes.append(node)
+        return number
+
+    def constant(self, c: float) -> int:
+        """Return the value of a number."""
+        return -self.add("constant", -c) if c < 0 else self.add("constant", c)
+
+    def constant_of(self, value: int) -> float | None:
+        """Return the number that a value is, None where it depends on inputs or is not finite."""
+        kind, *rest = self.nodes[abs(value)]
+        if kind != "constant" or not isfinite(rest[0]):
+            return None
+        return float(rest[0] if value > 0 else -rest[0])
+
+    def sum(self, values: Iterable[int]) -> int:
+        """Return the value of a sum."""
+        constant, counts = 0.0, Counter[int]()
+        for value in values:
+            c = self.constant_of(value)
+            if c is None:
+                counts[abs(value)] += sign_of(value)
+            else:
+                constant += c
+        terms = []
+        for k, count in counts.items():
+            if count:
+                many = abs(count) > 1
+                size = self.product([k, self.constant(float(abs(count)))]) if many else k
+                terms.append(size if count > 0 else -size)
+        if constant or not terms:
+            terms.append(self.constant(constant))
+        if len(terms) == 1:
+            return terms[0]
+        terms.sort(key=abs)
+        sign = sign_of(terms[0])
+        return sign * self.add("sum", *(sign * term for term in terms))
+
+    def product(self, values: Iterable[int]) -> int:
+        """Return the value of a product."""
+        constant, factors = 1.0, []
+        for value in values:
+            c = self.constant_of(value)
+            constant *= sign_of(value) if c is None else c
+            if c is None:
+                factors.append(abs(value))
+        sign, size = sign_of(constant), abs(constant)
+        if size == 0.0 or not factors:
+            return self.constant(constant)
+        if size != 1.0:
+            factors.append(self.constant(size))
+        return sign * (factors[0] if len(factors) == 1 else self.add("product", *sorted(factors)))
+
+    def quotient(self, a: int, b: int) -> int:
+        """Return the value of a/b; 1/b becomes an operation that others may use."""
+        c = self.constant_of(a)
+        if c is not None and abs(c) == 1.0:
+            return self.reciprocal(b) * int(c)
+        return self.product([a, self.inverse(b)])
+
+    def reciprocal(self, value: int) -> int:
+        """Return 1/x as an operation of its own."""
+        c = self.constant_of(value)
+        return self.constant(1.0 / c) if c else sign_of(value) * self.add(ca.OP_INV, abs(value))
+
+    def inverse(self, value: int) -> int:
+        """Return 1/x as a factor: the reciprocal where there is one, or else a division."""
+        c = self.constant_of(value)
+        if c:
+            return self.constant(1.0 / c)
+        there = self.numbers.get((ca.OP_INV, abs(value)))
+        return sign_of(value) * (there or self.add("inverse", abs(value)))
+
+    def operands(self, k: int) -> tuple[int, ...]:
+        """Return the values that a node is made of."""
+        node = self.nodes[k]
+        return () if node[0] in ("input", "constant") else node[1:]
+
+    def is_a(self, kind: str, value: int) -> bool:
+        """Return whether a value is a sum, a product, ..., or the negative of one."""
+        return bool(self.nodes[abs(value)][0] == kind)
+
+    def order(self, roots: Iterable[int]) -> list[int]:
+        """Return the nodes that the roots depend on, operands first."""
+        order: dict[int, None] = {}
+        stack = [abs(value) for value in roots]
+        while stack:
+            waiting = [abs(v) for v in self.operands(stack[-1]) if abs(v) not in order]
+            if waiting:
+                stack += waiting
+            else:
+                order[stack.pop()] = None
+        return list(order)
+
+    def uses(self, roots: Iterable[int]) -> Counter[int]:
+        """Return how often each node is an operand or a root."""
+        roots = list(roots)
+        uses = Counter(abs(value) for value in roots)
+        for k in self.order(roots):
+            uses.update(abs(v) for v in self.operands(k))
+        return uses
+
+    def rebuilt(self, roots: Iterable[int], rule: Rule) -> tuple[TermGraph, list[int]]:
+        """Return a graph made from this one by a rule, node by node."""
+        new = TermGraph()
+        values: dict[int, int] = {}
+        for k in self.order(roots):
+            values[k] = rule(new, k, [sign_of(v) * values[abs(v)] for v in self.operands(k)])
+        return new, [sign_of(v) * values[abs(v)] for v in roots]
+
+    def copied(self, new: TermGraph, k: int, values: list[int]) -> int:
+        """Return the value in a new graph that differs in the operands alone: the plainest rule."""
+        kind = self.nodes[k][0]
+        if kind in ("sum", "product"):
+            return new.sum(values) if kind == "sum" else new.product(values)
+        if kind in ("inverse", ca.OP_INV):
+            return new.inverse(values[0]) if kind == "inverse" else new.reciprocal(values[0])
+        return new.add(kind, *values) if values else new.add(*self.nodes[k])
+
+
+def sign_of(value: float) -> int:
+    """Return 1 or -1."""
+    return 1 if value > 0 else -1
