@@ -60,7 +60,7 @@ def random_poses(
     if count < 0:
         raise DataError(f"count: {count} given, 0 or more expected")
     rng = np.random.default_rng(seed)
-    center, radius = _search_ball(robot)
+    center, radius = search_ball(robot)
     low, high = center - radius, center + radius
     coarse = _drawn(robot, low, high, min(count, _SCOUTS), rng, type_i, type_ii)
     if len(coarse) >= count:
@@ -105,7 +105,7 @@ def _drawn(
     )
 
 
-def _search_ball(robot: Manipulator) -> tuple[Array, float]:
+def search_ball(robot: Manipulator) -> tuple[Array, float]:
     """Return a centre and a radius about it that hold every pose in reach.
 
     Each leg reaches only what is within a radius of a line or a point; the centre is the point

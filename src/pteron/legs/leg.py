@@ -279,6 +279,16 @@ class LegKind(ABC):
 
     @property
     @abstractmethod
+    def joint_axis(self) -> Vector:
+        """The unit vector along which the slider moves, or about which the crank turns."""
+
+    @property
+    def lever(self) -> float:
+        """Metres that the actuated body's end moves per unit of the joint: 1 for a slider."""
+        return 1.0
+
+    @property
+    @abstractmethod
     def reach_bound(self) -> ReachBound:
         """A bound on the platform points in reach."""
 

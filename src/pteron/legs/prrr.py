@@ -157,6 +157,10 @@ class PRRR(LegKind):
         return (self.direction,) if axis is None else (self.direction, axis)
 
     @property
+    def joint_axis(self) -> Vector:
+        return self.e
+
+    @property
     def reach_bound(self) -> ReachBound:
         slant = abs(dot(self.direction, self.e))
         return ReachBound(self.guide_point, self.e, self.size / slant)

@@ -153,6 +153,14 @@ class RSS(LegKind):
         return (self.direction,) if self.rods > 1 else ((1, 0, 0), (0, 1, 0), (0, 0, 1))
 
     @property
+    def joint_axis(self) -> Vector:
+        return self.direction
+
+    @property
+    def lever(self) -> float:
+        return self.upper_length
+
+    @property
     def reach_bound(self) -> ReachBound:
         return ReachBound(self.guide_point, None, self.size)
 

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pteron.conventions import BatchOfVectors, PoseLike
 from pteron.kernels import Array
-from pteron.kinematics import inverse_kinematics, link_vectors
+from pteron.kinematics import inverse_kinematics
+from pteron.kinematics.evaluate import evaluated
 from pteron.manipulator import Manipulator
-
-__all__ = ["JointPoints", "joint_points"]
+from pteron.shapes import PerJoint, PoseLike
 
 
 @dataclass(frozen=True)
@@ -20,30 +19,28 @@ class JointPoints:
 
     Attributes
     ----------
-    sliders : array, shape (..., n, 3)
-        R1, on the slider.
-    elbows : array, shape (..., n, 3)
-        R2.
+    chain : array, shape (..., n, j, 3)
+        A point on each joint of each leg, from the base to the platform point; NaN for a joint that
+        a leg has not. Of a P-R-R-R leg: r on the guide, R1 on the slider, the elbow R2, then R3.
     platform_points : array, shape (..., n, 3)
-        R3, where the leg carries the platform.
+        Where the legs carry the platform.
     reference : array, shape (..., 3)
         P.
     axes : array, shape (..., 3, 3)
         The platform frame's x, y and z, one a row.
     coordinates : array, shape (..., n)
-        The slider coordinates.
+        The joint coordinates, m or rad.
     """
 
-    sliders: BatchOfVectors
-    elbows: BatchOfVectors
-    platform_points: BatchOfVectors
+    chain: Array
+    platform_points: Array
     reference: Array
     axes: Array
-    coordinates: Array
+    coordinates: PerJoint
 
 
 def joint_points(robot: Manipulator, pose: PoseLike) -> JointPoints:
-    """Return where the joints are: R1 = r + rho e, R2 = R1 + l_u, R3 = R2 + l_l, Eqs. (3) to (7).
+    """Return where the joints are.
 
     Parameters
     ----------
@@ -59,7 +56,7 @@ def joint_points(robot: Manipulator, pose: PoseLike) -> JointPoints:
     Raises
     ------
     UnreachablePose
-        If a leg's links do not reach a pose.
+        If a leg does not reach a pose.
 
     Examples
     --------
@@ -72,12 +69,9 @@ def joint_points(robot: Manipulator, pose: PoseLike) -> JointPoints:
            [0.05, 0.  , 0.  ]])
     """
     given = np.asarray(pose, dtype=float)
-    rho = inverse_kinematics(robot, given)
-    l_u, l_l = link_vectors(robot, given)
-    guides = np.array([leg.guide_point for leg in robot.legs])
-    directions = np.array([leg.e for leg in robot.legs])
-    sliders = guides + rho[..., None] * directions
-    elbows = sliders + l_u
+    coordinates = inverse_kinematics(robot, given)
+    chain = evaluated(robot, "joint_points", "raise", given)
+    points = evaluated(robot, "platform_points", "raise", given)
     x, y, z = (np.array(axis) for axis in robot.platform.frame)
     angle = (given[..., 3] if robot.platform.turns else np.zeros(given.shape[:-1]))[..., None]
     axes = np.stack(
@@ -88,4 +82,4 @@ def joint_points(robot: Manipulator, pose: PoseLike) -> JointPoints:
         ],
         axis=-2,
     )
-    return JointPoints(sliders, elbows, elbows + l_l, given[..., :3], axes, rho)
+    return JointPoints(chain, points, given[..., :3], axes, coordinates)

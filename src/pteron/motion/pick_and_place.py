@@ -8,16 +8,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import minimize_scalar  # type: ignore[import-untyped]
 
-from pteron.conventions import PoseLike
 from pteron.errors import DataError
 from pteron.kernels import Array
-from pteron.kinematics.poses import finite
+from pteron.kinematics.evaluate import checked
 from pteron.manipulator import Manipulator
 from pteron.motion.cycle import Cycle, across_directions, up
 from pteron.motion.motion import Motion
 from pteron.motion.scaling import LEAST_RESERVE, TURN, scaled_to_reach
-
-__all__ = ["PEAK_ACCELERATION", "PickAndPlace", "pick_and_place"]
+from pteron.shapes import PoseLike
 
 PEAK_ACCELERATION = 10.0
 """Of the platform's reference point, where no duration is given, m/s^2."""
@@ -106,7 +104,7 @@ def pick_and_place(
             raise DataError(f"{name}: {value} given, a number above 0 expected")
     if samples < 2:
         raise DataError(f"samples: {samples} given, at least 2 expected")
-    middle = finite(robot, around, "around")
+    middle = checked(robot, around, "around")
     if scale is None:
         scale, across = scaled_to_reach(robot, middle, direction=direction, turn=turn, least=least)
     else:

@@ -5,17 +5,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pteron.conventions import PoseLike
+from pteron.equations.machine import closure_of
 from pteron.errors import ModelError
 from pteron.kernels import Array, numeric
-from pteron.kinematics.poses import finite
+from pteron.kinematics.evaluate import checked
 from pteron.manipulator import Manipulator
 from pteron.motion.cycle import Cycle, across_directions, up
-
-__all__ = ["LEAST_RESERVE", "TURN", "scaled_to_reach"]
+from pteron.shapes import PoseLike
 
 LEAST_RESERVE = 0.2
-"""Least sine of every elbow's angle, and least regularity, that a cycle keeps."""
+"""Least type-I and type-II measure that a cycle keeps."""
 
 TURN = np.pi / 3.0
 """Turn of the platform on its way across in the full cycle, rad."""
@@ -26,7 +25,7 @@ _SAMPLES = 501
 
 _DIP = 1e-4
 """By how much, in units of the reserve and in metres, a limit is kept clear: more than a reserve
-or a slider can dip between two checked poses."""
+or a joint can dip between two checked poses."""
 
 _STEPS = 1000
 """The scale is a multiple of one thousandth."""
@@ -45,8 +44,8 @@ def scaled_to_reach(
 ) -> tuple[float, Array]:
     """Return the scale of the largest pick-and-place cycle about a pose, and its direction.
 
-    The whole cycle stays in reach, keeps the sine of every elbow's angle and the regularity (see
-    `pteron.workspace.Reserve`) at `least` or above, and the sliders within their limits. The scale
+    The whole cycle stays in reach, keeps the type-I and type-II measures (see
+    `pteron.workspace.Reserve`) at `least` or above, and the joints within their limits. The scale
     is found by bisection: a smaller cycle stays nearer to the pose in its middle.
 
     Parameters
@@ -85,7 +84,7 @@ def scaled_to_reach(
     >>> 0.5 < scale <= 1.0
     True
     """
-    middle = finite(robot, around, "around")
+    middle = checked(robot, around, "around")
     given = None if direction is None else np.asarray(direction, dtype=float)
     scale, best = 0, None
     for across in across_directions(robot, given, _DIRECTIONS):
@@ -95,7 +94,7 @@ def scaled_to_reach(
     if best is None or scale == 0:
         raise ModelError(
             f"{robot.name}: no pick-and-place cycle about pose {middle.tolist()} keeps a reserve "
-            f"of {least:g} to the singularities and the sliders' limits; choose a better pose"
+            f"of {least:g} to the singularities and the joints' limits; choose a better pose"
         )
     return scale / _STEPS, best
 
@@ -121,14 +120,14 @@ def _largest(robot: Manipulator, around: Array, across: Array, turn: float, leas
 
 
 def _keeps(robot: Manipulator, poses: Array, least: float) -> bool:
-    """Say whether all poses keep the reserves and the sliders' limits."""
-    _, _, sine = numeric(robot, "reach")(poses)
-    good = (sine >= least + _DIP).all()  # NaN, out of reach, compares false
-    if robot.platform.turns:
-        good &= (np.abs(numeric(robot, "regularity")(poses)) >= least + _DIP).all()
-    sliders = numeric(robot, "slider_coordinates")(poses)
-    for leg, rho in zip(robot.legs, sliders.T, strict=True):
-        if leg.slider_limits is not None:
-            low, high = leg.slider_limits
-            good &= bool(rho.min() >= low + _DIP and rho.max() <= high - _DIP)
+    """Say whether all poses keep the reserves and the joints' limits."""
+    type_i = numeric(robot, "reach")(poses)[1]
+    good = (type_i >= least + _DIP).all()  # NaN, out of reach, compares false
+    if closure_of(robot).vanishes() is not False or robot.platform.turns:
+        good &= (np.abs(numeric(robot, "type_ii")(poses)[0]) >= least + _DIP).all()
+    joints = numeric(robot, "joint_coordinates")(poses)[0]
+    for leg, q in zip(robot.legs, joints.T, strict=True):
+        if leg.limits is not None:
+            low, high = leg.limits
+            good &= bool(q.min() >= low + _DIP and q.max() <= high - _DIP)
     return bool(good)

@@ -1,9 +1,9 @@
-"""Where a machine can work: its reserves, its home pose, its reach and its sliders' ranges."""
+"""Where a machine can work: its reserves, its home pose, its reach and its joints' ranges."""
 
 from pteron.workspace.home import home_pose
+from pteron.workspace.joints import JointRanges, joint_ranges
 from pteron.workspace.reach import BEYOND_LIMITS, REACHABLE, ReachSlice, reach_slice
 from pteron.workspace.reserve import Reserve, reserve
-from pteron.workspace.sliders import SliderRanges, slider_ranges
 from pteron.workspace.volume import ReachVolume, bounding_box, reach_volume
 
 __all__ = [
@@ -12,11 +12,11 @@ __all__ = [
     "ReachSlice",
     "ReachVolume",
     "Reserve",
-    "SliderRanges",
+    "JointRanges",
     "bounding_box",
     "home_pose",
     "reach_slice",
     "reach_volume",
     "reserve",
-    "slider_ranges",
+    "joint_ranges",
 ]

@@ -11,10 +11,9 @@ from pteron.kinematics import inverse_kinematics, random_poses, singular_orienta
 from pteron.manipulator import Manipulator
 from pteron.workspace.reserve import reserve
 
-__all__ = ["home_pose"]
 
 _SEARCHES = ((0.3, 0.3), (0.02, 0.02), (0.0, 0.0))
-"""Bend and hold that random poses must have: less where the legs have little common reach."""
+"""The measures that random poses must have: less where the legs have little common reach."""
 
 _SAMPLES = 200
 _STARTS = 12
@@ -32,8 +31,8 @@ _WORTH = 0.99
 def home_pose(robot: Manipulator) -> Array:
     """Return the pose with the best reserve, rounded where that costs next to nothing.
 
-    The reserve is the smallest of the sines of the elbows' angles, the regularity and the sliders'
-    clearance (see `Reserve`); a random search with a fixed seed finds it, and Nelder and Mead's
+    The reserve is the smallest of the type-I and type-II measures and of the joints' clearances
+    (see `Reserve`); a random search with a fixed seed finds it, and Nelder and Mead's
     method refines it. The result is always the same for the same machine.
 
     Parameters
@@ -45,12 +44,12 @@ def home_pose(robot: Manipulator) -> Array:
     -------
     array, shape (m,)
         m and rad. Its reserve is at least 98 % of the best one found; of equals, the one whose
-        sliders are nearest to their guide points.
+        sliders are nearest to their guide points, and cranks to their zero.
 
     Raises
     ------
     ModelError
-        If no pose is in reach of all legs and within the sliders' limits.
+        If no pose is in reach of all legs and within the joints' limits.
     SingularPose
         If the machine is singular at every pose.
 
@@ -69,10 +68,10 @@ def home_pose(robot: Manipulator) -> Array:
     most = float(reserves.max())
     if most <= 0.0:
         raise ModelError(
-            f"{robot.name}: no pose in reach of all legs found within the sliders' limits; widen "
-            "slider_limits or move the guide points"
+            f"{robot.name}: no pose in reach of all legs found within the joints' limits; widen "
+            "limits or move the guide points"
         )
-    # The guide points say where the sliders are meant to be, where nothing else tells.
+    # Zero says where the joints are meant to be, where nothing else tells.
     equals = refined[reserves >= _WORTH * most]
     travel = np.abs(inverse_kinematics(robot, equals)).max(axis=-1)
     best: Array = equals[travel.argmin()]
@@ -88,13 +87,13 @@ def home_pose(robot: Manipulator) -> Array:
 
 
 def _random_poses(robot: Manipulator) -> Array:
-    for bend, hold in _SEARCHES:
+    for type_i, type_ii in _SEARCHES:
         try:
-            return random_poses(robot, _SAMPLES, bend=bend, hold=hold)
+            return random_poses(robot, _SAMPLES, type_i=type_i, type_ii=type_ii)
         except ModelError:
             continue
     try:
-        return random_poses(robot, 1, bend=0.0, hold=0.0)
+        return random_poses(robot, 1, type_i=0.0, type_ii=0.0)
     except ModelError:
         raise ModelError(
             f"{robot.name}: no pose is in reach of all legs; bring the guide points nearer or "

@@ -8,22 +8,20 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.conventions import PoseLike
 from pteron.errors import DataError
 from pteron.kernels import Array, numeric
-from pteron.kinematics import inverse_kinematics
-from pteron.kinematics.poses import finite
+from pteron.kinematics.evaluate import checked
 from pteron.manipulator import Manipulator
-from pteron.workspace.reserve import clearances
+from pteron.shapes import PoseLike
+from pteron.workspace.reserve import room_to_limits
 from pteron.workspace.volume import bounding_box
 
-__all__ = ["BEYOND_LIMITS", "REACHABLE", "ReachSlice", "reach_slice"]
 
 REACHABLE = 0
 """Status of a pose that serves."""
 
 BEYOND_LIMITS = -1
-"""Status of a pose that the links reach but a slider's limits forbid."""
+"""Status of a pose that the legs reach but a joint's limits forbid."""
 
 _RIM = 0.08
 """Share of the reach's width that a slice shows around it."""
@@ -46,9 +44,9 @@ class ReachSlice:
     status : array of int, shape (B, A)
         `REACHABLE`; `BEYOND_LIMITS`; or the leg, from 1, that misses the pose by most.
     margin : array, shape (B, A)
-        Metres to the nearest end of a leg's reach or of a slider's way; negative outside.
+        Metres to the nearest end of a leg's reach or of an actuated body's way; negative outside.
     leg_margins : array, shape (B, A, n)
-        Metres within what each leg's links reach: zero on the leg's type-I singularity.
+        Metres within what each leg reaches: zero on the leg's type-I singularity.
     """
 
     plane: Plane
@@ -107,7 +105,7 @@ def reach_slice(
         raise DataError(f'plane: {plane!r} is none of "xy", "xz" and "yz"')
     if points < 2:
         raise DataError(f"points: {points} given, at least 2 expected")
-    pose = finite(robot, center, "center")
+    pose = checked(robot, center, "center")
     i, j = ("xyz".index(letter) for letter in plane)
     if extent is None:
         box = bounding_box(robot, pose)
@@ -120,10 +118,9 @@ def reach_slice(
     poses[..., i] = first
     poses[..., j] = second[:, None]
 
-    _, leg_margins, _ = numeric(robot, "reach")(poses)
-    sliders = inverse_kinematics(robot, poses, on_failure="nan")
-    missed = np.isnan(sliders).any(axis=-1)
-    room = clearances(robot, sliders).min(axis=-1)
+    leg_margins, measures, _, _ = numeric(robot, "reach")(poses)
+    missed = np.isnan(measures).any(axis=-1)
+    room = room_to_limits(robot, poses).min(axis=-1)
     status = np.where(
         missed,
         leg_margins.argmin(axis=-1) + 1,

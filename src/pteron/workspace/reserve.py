@@ -6,11 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pteron.conventions import BatchOfNumbers, BatchOfSliders, PoseLike
+from pteron.equations.machine import closure_of
 from pteron.kernels import Array, numeric
 from pteron.manipulator import Manipulator
-
-__all__ = ["Reserve", "clearances", "reserve"]
+from pteron.shapes import Numbers, PerJoint, PoseLike
 
 
 @dataclass(frozen=True)
@@ -19,23 +18,23 @@ class Reserve:
 
     Attributes
     ----------
-    elbow_sines : array, shape (..., n)
-        The sine of each elbow's angle: 0 where the leg is stretched or folded (type I). Out of
-        reach it is negative: the missing metres over the length of the two links.
-    regularity : array, shape (...)
-        abs(det J) over its largest value: 0 at a type-II singularity. It is 1 for 3T, whose
-        Jacobian is constant.
-    slider_clearances : array, shape (..., n)
-        Distance of each slider from its nearer limit, over half its range; negative beyond it, and
-        1 for a slider without limits.
+    type_i : array, shape (..., n)
+        The type-I measure of each leg: 0 where it is stretched or folded. Out of reach it is
+        negative: the missing metres over the leg's size.
+    type_ii : array, shape (...)
+        The size of the type-II measure: 0 where the actuators do not hold the platform. It is 1 for
+        a machine whose Jacobian is constant.
+    clearances : array, shape (..., n)
+        Distance of each joint from its nearer limit, over half its range; negative beyond it, and 1
+        for a joint without limits.
     smallest : array, shape (...)
         The least of them all, which is what `home_pose` makes as large as it can.
     """
 
-    elbow_sines: BatchOfSliders
-    regularity: BatchOfNumbers
-    slider_clearances: BatchOfSliders
-    smallest: BatchOfNumbers
+    type_i: PerJoint
+    type_ii: Numbers
+    clearances: PerJoint
+    smallest: Numbers
 
 
 def reserve(robot: Manipulator, pose: PoseLike) -> Reserve:
@@ -56,33 +55,42 @@ def reserve(robot: Manipulator, pose: PoseLike) -> Reserve:
     --------
     >>> import pteron
     >>> from pteron.workspace import reserve
-    >>> reserve(pteron.load("quadrupteron"), [0.0, 0.0, 0.0, 0.0]).elbow_sines.round(3)
+    >>> reserve(pteron.load("quadrupteron"), [0.0, 0.0, 0.0, 0.0]).type_i.round(3)
     array([1.   , 1.   , 0.991, 1.   ])
     """
-    _, margin, sine = numeric(robot, "reach")(pose)
-    spans = np.array([leg.upper_length + leg.lower_length for leg in robot.legs])
-    sines = np.where(margin < 0.0, margin / spans, np.nan_to_num(sine))
-    regularity = (
-        np.abs(numeric(robot, "regularity")(pose))
-        if robot.platform.turns
-        else np.ones(sines.shape[:-1])
-    )
-    metres = clearances(robot, numeric(robot, "slider_coordinates")(pose))
-    half = np.array([_half_range(leg.slider_limits) for leg in robot.legs])
-    shares = np.where(np.isinf(metres), 1.0, metres) / half
-    smallest = np.minimum(np.minimum(sines, shares).min(axis=-1), regularity)
-    return Reserve(sines, regularity, shares, smallest)
+    margin, measure, _, _ = numeric(robot, "reach")(pose)
+    sizes = np.array([leg.size for leg in robot.legs])
+    type_i = np.where(margin < 0.0, margin / sizes, np.nan_to_num(measure))
+    if closure_of(robot).vanishes() is False and not robot.platform.turns:
+        type_ii = np.ones(type_i.shape[:-1])
+    else:
+        type_ii = np.nan_to_num(np.abs(numeric(robot, "type_ii")(pose)[0]))
+    room = clearances(robot, numeric(robot, "joint_coordinates")(pose)[0])
+    half = np.array([_half_range(leg.limits) for leg in robot.legs])
+    shares = np.where(np.isinf(room), 1.0, room) / half
+    shares = np.where(np.isnan(shares), np.minimum(type_i, 0.0), shares)
+    smallest = np.minimum(np.minimum(type_i, shares).min(axis=-1), type_ii)
+    return Reserve(type_i, type_ii, shares, smallest)
 
 
-def clearances(robot: Manipulator, sliders: Array) -> Array:
-    """Return the distance (..., n) of sliders from their nearer limit, m.
+def clearances(robot: Manipulator, joints: Array) -> Array:
+    """Return the distance (..., n) of joints from their nearer limit, m or rad.
 
-    It is negative beyond a limit, infinite without limits, and NaN where the slider is.
+    It is negative beyond a limit, infinite without limits, and NaN where the coordinate is.
     """
-    limits = [leg.slider_limits or (-np.inf, np.inf) for leg in robot.legs]
-    low, high = np.array(limits).T
-    distances: Array = np.minimum(sliders - low, high - sliders)
+    low, high = np.array([leg.limits or (-np.inf, np.inf) for leg in robot.legs]).T
+    distances: Array = np.minimum(joints - low, high - joints)
     return distances
+
+
+def room_to_limits(robot: Manipulator, poses: Array) -> Array:
+    """Return how far (..., n) the actuated bodies' ends are from what their limits allow, m.
+
+    Infinite without limits, and out of reach, where a joint may have no coordinate.
+    """
+    levers = np.array([leg.lever for leg in robot.legs])
+    room = clearances(robot, numeric(robot, "joint_coordinates")(poses)[0]) * levers
+    return np.where(np.isnan(room), np.inf, room)
 
 
 def _half_range(limits: tuple[float, float] | None) -> float:

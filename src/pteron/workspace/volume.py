@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import minimize  # type: ignore[import-untyped]
 
-from pteron.conventions import PoseLike
 from pteron.errors import DataError, ModelError
 from pteron.kernels import Array, numeric
-from pteron.kinematics.poses import finite
+from pteron.kinematics.evaluate import checked
+from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator
-from pteron.workspace.reserve import clearances
+from pteron.shapes import PoseLike
+from pteron.workspace.reserve import room_to_limits
 
-__all__ = ["ReachVolume", "bounding_box", "reach_volume"]
+
+_SAMPLES = 20_000
+_STARTS = 5
+
+_FAR = 1e3
+"""What stands for no limit, m: the optimiser wants finite numbers."""
+
+_SLACK = 1e-8
+"""Metres by which the optimiser may overstep a bound."""
 
 _TOUCH = 1e-9
 """Metres by which the legs' reach must overlap to count as common."""
@@ -22,7 +32,7 @@ _TOUCH = 1e-9
 
 @dataclass(frozen=True)
 class ReachVolume:
-    """The set of positions in reach at one orientation, within the sliders' limits.
+    """The set of positions in reach at one orientation, within the joints' limits.
 
     Attributes
     ----------
@@ -45,9 +55,8 @@ class ReachVolume:
 def bounding_box(robot: Manipulator, pose: PoseLike) -> Array:
     """Return the box that bounds all positions in reach at the orientation of a pose.
 
-    At constant orientation each leg's stretched length and each slider's limit bounds a convex set,
-    so that each side of the box is a convex problem. What is too near to a leg with unequal links
-    is not left out.
+    Random positions in reach are moved as far as each side allows; what is too near to a leg whose
+    links differ is left out.
 
     Parameters
     ----------
@@ -74,43 +83,63 @@ def bounding_box(robot: Manipulator, pose: PoseLike) -> Array:
     array([[-0.17, -0.17, -0.17],
            [ 0.3 ,  0.3 ,  0.3 ]])
     """
-    given = finite(robot, pose, "pose")
-    spans = np.array([leg.upper_length + leg.lower_length for leg in robot.legs])
+    given = checked(robot, pose, "pose")
 
     def room(p: Array) -> Array:
-        """Return how far inside every bound a position is, m."""
-        at = np.concatenate([p, given[3:]])
-        distance, _, _ = numeric(robot, "reach")(at)
-        slides = clearances(robot, numeric(robot, "slider_coordinates")(at))
-        return np.concatenate([spans - distance, slides[np.isfinite(slides)]])
+        """Return how far inside every bound positions are, m."""
+        at = np.concatenate([p, np.broadcast_to(given[3:], (*p.shape[:-1], len(given) - 3))], -1)
+        limits = room_to_limits(robot, at)
+        return np.concatenate([numeric(robot, "reach")(at)[0], np.minimum(limits, _FAR)], axis=-1)
 
-    start = np.append(given[:3], float(room(given[:3]).min()))
-    deepest = minimize(
-        lambda v: -v[3],
-        start,
-        method="SLSQP",
-        constraints={"type": "ineq", "fun": lambda v: room(v[:3]) - v[3]},
-        options={"ftol": 1e-10, "maxiter": 200},
-    ).x
-    if room(deepest[:3]).min() < _TOUCH:
-        raise ModelError(
-            f"{robot.name}: no position is in reach of all legs, within the sliders' limits, at "
-            f"the orientation of pose {given.tolist()}"
-        )
+    center, radius = search_ball(robot)
+    rng = np.random.default_rng(0)
+    drawn = center + radius * rng.uniform(-1.0, 1.0, (_SAMPLES, 3))
+    drawn = np.vstack([drawn, given[:3]])
+    inside = room(drawn).min(axis=-1)
+    # Where next to nothing is in reach, the deepest positions are moved inside first.
+    starts = drawn[np.argsort(-inside)[:_STARTS]]
+    if not (inside > _TOUCH).any():
+        starts = np.array([_deepest(room, start) for start in starts])
+        starts = starts[room(starts).min(axis=-1) > _TOUCH]
+        if not len(starts):
+            raise ModelError(
+                f"{robot.name}: no position is in reach of all legs, within the joints' limits, at "
+                f"the orientation of pose {given.tolist()}"
+            )
+    good = np.vstack([drawn[inside > _TOUCH], starts[room(starts).min(axis=-1) > _TOUCH]])
     sides = np.empty((2, 3))
     for axis in range(3):
         for side, sign in enumerate((1.0, -1.0)):
-            objective = sign * np.eye(3)[axis]
-            found = minimize(
-                lambda p, objective=objective: float(objective @ p),
-                deepest[:3],
-                jac=lambda p, objective=objective: objective,
-                method="SLSQP",
-                constraints={"type": "ineq", "fun": room},
-                options={"ftol": 1e-10, "maxiter": 200},
-            )
-            sides[side, axis] = found.x[axis]
+            firsts = good[np.argsort(sign * good[:, axis])[:_STARTS]]
+            sides[side, axis] = sign * min(_furthest(room, p, sign * np.eye(3)[axis]) for p in firsts)
     return sides
+
+
+def _deepest(room: Callable[[Array], Array], start: Array) -> Array:
+    """Return a position that is deeper inside every bound, from one that need not be inside."""
+    found = minimize(
+        lambda v: -v[3],
+        np.append(start, float(room(start).min())),
+        method="SLSQP",
+        constraints={"type": "ineq", "fun": lambda v: room(v[:3]) - v[3]},
+        options={"ftol": 1e-10, "maxiter": 200},
+    )
+    deepest: Array = found.x[:3]
+    return deepest
+
+
+def _furthest(room: Callable[[Array], Array], start: Array, objective: Array) -> float:
+    """Return the least value of objective . p inside every bound, from a position inside."""
+    found = minimize(
+        lambda p: float(objective @ p),
+        start,
+        jac=lambda p: objective,
+        method="SLSQP",
+        constraints={"type": "ineq", "fun": room},
+        options={"ftol": 1e-10, "maxiter": 200},
+    )
+    inside = bool(room(found.x).min() > -_SLACK)
+    return float(objective @ (found.x if inside else start))
 
 
 def reach_volume(
@@ -142,13 +171,12 @@ def reach_volume(
     """
     if count < 1:
         raise DataError(f"count: {count} given, at least 1 expected")
-    given = finite(robot, pose, "pose")
+    given = checked(robot, pose, "pose")
     box = bounding_box(robot, given)
     poses = np.tile(given, (count, 1))
     poses[:, :3] = np.random.default_rng(seed).uniform(box[0], box[1], (count, 3))
-    _, margin, _ = numeric(robot, "reach")(poses)
-    slides = clearances(robot, numeric(robot, "slider_coordinates")(poses))
-    share = float((np.minimum(margin, slides).min(axis=-1) >= 0.0).mean())
+    margin = numeric(robot, "reach")(poses)[0]
+    share = float((np.minimum(margin, room_to_limits(robot, poses)).min(axis=-1) >= 0.0).mean())
     whole = float(np.prod(box[1] - box[0]))
     return ReachVolume(
         share * whole, whole * float(np.sqrt(share * (1.0 - share) / count)), box, count
