@@ -1,22 +1,23 @@
 """Newton-Euler engines on the opened mechanism, projected through its closure.
 
-The loops are cut at the platform points: each leg is a chain slider, R1, R2, and the platform a
-chain of its own. Joint angles come from the engine's tree; that the cut closes is asserted with the
-engine's own kinematics. Rates and accelerations come from its point Jacobians and their drift, and
-the tree's forces T^T tau from the natural orthogonal complement T of those Jacobians.
+The loops are cut at the platform points: each leg is a chain of three joints (slider, R1, R2; or a
+crank and the two hinges of a universal joint), and the platform a chain of its own. Joint angles
+come from triangles; that the cut closes is asserted with the engine's own kinematics. Rates and
+accelerations come from its point Jacobians and their drift, and the tree's forces T^T tau from the
+natural orthogonal complement T of those Jacobians.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-
-import pteron
+from descriptions import describe, leg_angles, platform_points
 
 
 @dataclass(frozen=True)
-class Body:
-    """A body of a chain: its joints to the body before, and its inertia in base axes at rest.
+class Link:
+    """A body of a chain: its joints to the body before, and its inertia, in base axes at rest.
 
+    `axes` are those of the moments of inertia about the centre, as columns.
     Several joints at one place, none of them with a body of its own: MuJoCo wants mass on every
     body that moves, and a mass made up for it would be seen in the forces.
     """
@@ -25,14 +26,15 @@ class Body:
     offset: np.ndarray
     mass: float
     center: np.ndarray
-    inertia: np.ndarray
+    axes: np.ndarray
+    moments: np.ndarray
 
 
 @dataclass(frozen=True)
 class Chain:
     """A chain from the base, and the points of its last body where loops were cut."""
 
-    bodies: list
+    links: list
     points: list
 
 
@@ -44,63 +46,65 @@ def hinge(axis):
     return False, np.array(axis)
 
 
-def plane_axis(leg):
-    a = np.cross(leg.direction, np.eye(3)[np.argmin(np.abs(leg.direction))])
-    return a / np.linalg.norm(a)
-
-
 def planar(body, x, z):
-    """Return mass, centre and a spatial inertia that has the planar one about z, of a real body."""
+    """Return mass, centre, axes and moments of a real body that has the planar moment about z."""
     y = np.cross(z, x)
-    gx, gy = body.center_of_mass
-    about_center = body.inertia - body.mass * (gx**2 + gy**2)
-    axes = np.column_stack([x, y, z])
     # Any Ixx and Iyy will do for the forces; those of a real body satisfy the engines' checks.
-    spatial = axes @ np.diag([0.6 * about_center, 0.7 * about_center, about_center]) @ axes.T
-    return body.mass, gx * x + gy * y, spatial
+    moments = body.about_center * np.array([0.6, 0.7, 1.0])
+    return body.mass, body.x * x + body.y * y, np.column_stack([x, y, z]), moments
 
 
-def chains(robot):
+def rod(body, x, z):
+    """Return the same of a thin rod along x, whose spin has (for MuJoCo next to) no inertia."""
+    mass, center, axes, _ = planar(body, x, z)
+    return mass, center, axes, np.array([2e-15, body.about_center, body.about_center])
+
+
+def chains(machine):
     """Return the legs' chains and the platform's."""
-    found = []
-    for leg in robot.legs:
-        a, d = plane_axis(leg), np.array(leg.direction)
-        turning = [hinge(d)]
-        slider = (leg.slider_mass, np.zeros(3), 1e-6 * np.eye(3))
-        mass, center, spatial = planar(leg.lower, a, d)
-        lower = (mass, center + leg.lower_length * a, spatial)
-        bodies = [
-            Body([slide(leg.e)], np.array(leg.guide_point), *slider),
-            Body(turning, np.zeros(3), *planar(leg.upper, a, d)),
-            Body(turning, leg.upper_length * a, *lower),
-        ]
-        found.append(Chain(bodies, [leg.lower_length * a]))
-    x, y, k = (np.array(axis) for axis in robot.platform.frame)
-    inertia = planar(robot.platform.inertia, x, k)
-    frame = np.column_stack([x, y, k])
-    points = [frame @ leg.platform_point for leg in robot.legs]
-    joints = [slide(axis) for axis in np.eye(3)] + ([hinge(k)] if robot.platform.turns else [])
-    found.append(Chain([Body(joints, np.zeros(3), *inertia)], points))
+    found, ones = [], np.ones(3)
+    for leg in machine.legs:
+        a, d = leg.first, leg.d
+        upper = planar(leg.upper, a, d)
+        mass, center, *inertia = (rod if leg.crank else planar)(leg.lower, a, d)
+        lower = leg.lu * a, mass, center + leg.ll * a, *inertia
+        if leg.crank:
+            links = [
+                Link([hinge(d)], leg.r, *upper),
+                Link([hinge(d), hinge(leg.second)], *lower),
+            ]
+        else:
+            links = [
+                Link([slide(leg.e)], leg.r, leg.slider_mass, np.zeros(3), np.eye(3), 1e-6 * ones),
+                Link([hinge(d)], np.zeros(3), *upper),
+                Link([hinge(d)], *lower),
+            ]
+        found.append(Chain(links, [leg.ll * a]))
+    x, _, k = machine.frame.T
+    points = [machine.frame @ leg.s0 for leg in machine.legs]
+    joints = [slide(axis) for axis in np.eye(3)] + ([hinge(k)] if machine.turns else [])
+    found.append(Chain([Link(joints, np.zeros(3), *planar(machine.platform, x, k))], points))
     return found
 
 
-def tree_position(robot, pose):
-    """Return the tree's coordinates: slider, angle of R1 and of R2 for each leg, then the pose."""
-    sliders = pteron.inverse_kinematics(robot, pose)
-    upper, lower = pteron.link_vectors(robot, pose)
+def tree_position(machine, pose):
+    """Return the tree's coordinates: three of each leg, then the pose."""
     q = []
-    for leg, rho, l_u, l_l in zip(robot.legs, sliders, upper, lower, strict=True):
-        a = plane_axis(leg)
-        b = np.cross(leg.direction, a)
-        theta_u, theta_l = np.arctan2(l_u @ b, l_u @ a), np.arctan2(l_l @ b, l_l @ a)
-        q += [rho, theta_u, theta_l - theta_u]
+    for leg, c in zip(machine.legs, platform_points(machine, pose), strict=True):
+        slide, upper, last = leg_angles(leg, c)
+        lower = np.arctan2(last @ leg.second, last @ leg.first)
+        if leg.crank:
+            q += [upper, lower - upper, -np.arcsin(last @ leg.d / leg.ll)]
+        else:
+            q += [slide, upper, lower - upper]
     return np.array([*q, *pose])
 
 
 def projected_forces(robot, engine, pose, velocity, acceleration):
     """Return the actuator forces, and how far the engine's own closure is from closing."""
-    n = len(robot.legs)
-    q = tree_position(robot, pose)
+    machine = describe(robot)
+    n = len(machine.legs)
+    q = tree_position(machine, pose)
     leg_points, platform_points = engine.points(q)
     closing = np.abs(leg_points - platform_points).max()
     leg_jacobians, platform_jacobians = engine.jacobians(q)
@@ -125,15 +129,17 @@ class Pinocchio:
     def __init__(self, robot):
         import pinocchio as pin
 
+        machine = describe(robot)
+        machine = describe(robot)
         self.pin = pin
         model = pin.Model()
-        model.gravity.linear = np.array(robot.gravity)
+        model.gravity.linear = machine.gravity
         self.frames = []
-        for k, chain in enumerate(chains(robot)):
+        for k, chain in enumerate(chains(machine)):
             parent = 0
-            for j, body in enumerate(chain.bodies):
-                place = pin.SE3(np.eye(3), body.offset)
-                for i, (slides, axis) in enumerate(body.joints):
+            for j, link in enumerate(chain.links):
+                place = pin.SE3(np.eye(3), link.offset)
+                for i, (slides, axis) in enumerate(link.joints):
                     kind = (
                         pin.JointModelPrismaticUnaligned
                         if slides
@@ -141,7 +147,8 @@ class Pinocchio:
                     )
                     parent = model.addJoint(parent, kind(axis), place, f"joint {k} {j} {i}")
                     place = pin.SE3.Identity()
-                inertia = pin.Inertia(body.mass, body.center, body.inertia)
+                inertia = link.axes @ np.diag(link.moments) @ link.axes.T
+                inertia = pin.Inertia(link.mass, link.center, inertia)
                 model.appendBodyToJoint(parent, inertia, pin.SE3.Identity())
             self.frames.append(
                 [
@@ -189,22 +196,27 @@ class MuJoCo:
     def __init__(self, robot):
         import mujoco
 
+        machine = describe(robot)
+        machine = describe(robot)
         self.mujoco = mujoco
         spec = mujoco.MjSpec()
         spec.compiler.degree = False
-        spec.option.gravity = robot.gravity
+        spec.option.gravity = machine.gravity
         self.points_of = []
-        for chain in chains(robot):
+        for chain in chains(machine):
             parent = spec.worldbody
-            for body in chain.bodies:
+            for link in chain.links:
+                quaternion = np.empty(4)
+                mujoco.mju_mat2Quat(quaternion, link.axes.ravel())
                 parent = parent.add_body(
-                    pos=body.offset,
-                    mass=body.mass,
-                    ipos=body.center,
-                    fullinertia=body.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]],
+                    pos=link.offset,
+                    mass=link.mass,
+                    ipos=link.center,
+                    iquat=quaternion,
+                    inertia=link.moments,
                     explicitinertial=True,
                 )
-                for slides, axis in body.joints:
+                for slides, axis in link.joints:
                     kind = mujoco.mjtJoint.mjJNT_SLIDE if slides else mujoco.mjtJoint.mjJNT_HINGE
                     parent.add_joint(type=kind, axis=axis)
             self.points_of.append([parent.add_site(pos=point) for point in chain.points])
