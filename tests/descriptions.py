@@ -5,6 +5,7 @@ Positions are trigonometry of triangles; `crank_angle` finds the same by a searc
 
 import tomllib
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -174,14 +175,16 @@ def crank_angle(leg, c):
     w = c - leg.r
 
     def crank(q):
-        return leg.lu * (np.cos(q) * leg.first + np.sin(q) * leg.second)
+        return leg.lu * (
+            np.multiply.outer(np.cos(q), leg.first) + np.multiply.outer(np.sin(q), leg.second)
+        )
 
     def excess(q):
-        return np.linalg.norm(w - crank(q)) - leg.ll
+        return np.linalg.norm(w - crank(q), axis=-1) - leg.ll
 
     grid = np.linspace(-np.pi, np.pi, 721)
-    signs = np.sign([excess(q) for q in grid])
-    brackets = np.flatnonzero(signs[:-1] * signs[1:] < 0)
+    negative = excess(grid) < 0
+    brackets = np.flatnonzero(negative[:-1] != negative[1:])
     roots = [brentq(excess, grid[i], grid[i + 1], xtol=1e-15, rtol=1e-14) for i in brackets]
     (found,) = [q for q in roots if leg.elbow * (leg.d @ np.cross(w, crank(q))) > 0]
     return found
@@ -216,11 +219,8 @@ def distances_from_singular(machine, pose):
 def states(machine, center, spread, count, seed):
     """Return poses of a box that are far from singular, velocities and accelerations (3T)."""
     rng = np.random.default_rng(seed)
-    poses = []
-    while len(poses) < count:
-        pose = center + spread * rng.uniform(-1, 1, 3)
-        bent, held = distances_from_singular(machine, pose)
-        if bent > 0.2 and held > 0.2:
-            poses.append(pose)
-    shape = (count, 3)
-    return np.array(poses), rng.normal(size=shape), 10.0 * rng.normal(size=shape)
+    drawn = center + spread * rng.uniform(-1, 1, (20 * count, 3))
+    far = (pose for pose in drawn if min(distances_from_singular(machine, pose)) > 0.2)
+    poses = np.array(list(islice(far, count)))
+    assert len(poses) == count, "the box holds too few poses far from singular"
+    return poses, rng.normal(size=poses.shape), 10.0 * rng.normal(size=poses.shape)
