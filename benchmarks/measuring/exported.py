@@ -58,7 +58,7 @@ def exported(
     Parameters
     ----------
     robot : Manipulator
-        A machine of 3T1R motion.
+        The machine.
     compiler : str
         The C compiler.
     folder : path
@@ -78,6 +78,7 @@ def exported(
     source = pteron.export_c(robot, [function], folder, real=real, specialised=specialised)
     name = next(path.stem for path in source if path.suffix == ".h")
     defined = [f'-DHEADER="{name}.h"', f"-DREAL={real}", f"-DFUNCTION={name}_{function}"]
+    defined += [f"-DM={expected.shape[1]}"]
     if not specialised:
         table = "base_parameters" if function == "inverse_dynamics_base" else "parameters"
         defined.append(f"-DTABLE={name}_{table}")
@@ -95,11 +96,11 @@ def exported(
     loaded.latency.argtypes = [c_long, c_long, c_void_p, number, c_void_p]
     loaded.latency.restype = c_double
     given = np.ascontiguousarray(np.concatenate(states, axis=-1), dtype=real_type(real))
-    found = np.zeros_like(given[:, :4], order="C")
+    found = np.zeros_like(expected, dtype=given.dtype)
     for row, forces in zip(given, found, strict=True):
         if loaded.evaluate(row.ctypes.data, forces.ctypes.data) != 0:
             raise ValueError(f"{name}: the exported function does not take a state")
-    last = np.zeros(4, dtype=given.dtype)
+    last = np.zeros_like(found[0])
     kept = partial(_seconds, loaded, given, last)
     return Contestant(
         f"{form}, {real}, {' '.join(level)}", kept, relative_error(found.astype(float), expected)

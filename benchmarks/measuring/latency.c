@@ -1,6 +1,7 @@
 /* A loop in which every call of an exported function waits for the one before it.
 
-   Compiled with HEADER, REAL and FUNCTION, and TABLE where the function takes parameters. */
+   Compiled with HEADER, REAL, FUNCTION and M (of a pose's coordinates), and TABLE where the function
+   takes parameters. */
 
 #define _POSIX_C_SOURCE 199309L
 
@@ -9,9 +10,9 @@
 #include HEADER
 
 #ifdef TABLE
-#define CALL(state, forces) FUNCTION(state, (state) + 4, (state) + 8, TABLE, forces)
+#define CALL(state, forces) FUNCTION(state, (state) + M, (state) + 2 * M, TABLE, forces)
 #else
-#define CALL(state, forces) FUNCTION(state, (state) + 4, (state) + 8, forces)
+#define CALL(state, forces) FUNCTION(state, (state) + M, (state) + 2 * M, forces)
 #endif
 #define EXPORTED __attribute__((visibility("default")))
 
@@ -29,9 +30,9 @@ EXPORTED double latency(long count, long mask, const REAL *states, REAL zero, RE
     struct timespec begin, end;
     clock_gettime(CLOCK_MONOTONIC, &begin);
     for (long i = 0; i < count; i++) {
-        const REAL *given = states + 12 * (i & mask), last = zero * forces[0];
-        REAL state[12];
-        for (int j = 0; j < 12; j++) state[j] = given[j] + last;
+        const REAL *given = states + 3 * M * (i & mask), last = zero * forces[0];
+        REAL state[3 * M];
+        for (int j = 0; j < 3 * M; j++) state[j] = given[j] + last;
         (void)CALL(state, forces);
     }
     clock_gettime(CLOCK_MONOTONIC, &end);

@@ -3,7 +3,7 @@
 Each cuts the loops, runs its Newton-Euler algorithm on the tree, and projects the joint forces
 through the closure; what is not the engine's is done in closed form. Tuned peers have the best
 flags, buffers and stages that we found; the others are what a good user writes first. For machines
-with four legs.
+with four sliders, and for Deltas.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Peer:
     name : str
         The engine and the language it is called from.
     forces : callable
-        From pose, velocity and acceleration, each (B, 4), to the actuator forces (B, 4).
+        From pose, velocity and acceleration, each (B, m), to the actuator forces (B, n).
     seconds : callable
         From the same to the time of one sweep over the batch, in seconds a state, measured inside:
         by C and C++ around their loops, from Python around calls with one state each.
@@ -61,7 +61,7 @@ def peers(robot: pteron.Manipulator, *, quick: bool = False) -> list[Peer]:
     Parameters
     ----------
     robot : Manipulator
-        A 3T1R machine; its sliders may move along any direction.
+        A 3T1R machine of P-R-R-R legs, or a Delta.
     quick : bool
         Whether to leave out Pinocchio in C++, which may take most of a minute to compile.
 
@@ -72,10 +72,11 @@ def peers(robot: pteron.Manipulator, *, quick: bool = False) -> list[Peer]:
     Raises
     ------
     ValueError
-        If the machine has not four legs.
+        If the machine is neither.
     """
-    if not robot.platform.turns:
-        raise ValueError(f"{robot.name}: the peers are written for 3T1R machines, with four legs")
+    kinds = {getattr(leg, "type", "PRRR") for leg in robot.legs}
+    if kinds != ({"PRRR"} if robot.platform.turns else {"RSS"}):
+        raise ValueError(f"{robot.name}: the peers are written for 3T1R machines and for Deltas")
     found = []
     for name, build in _BUILDERS.items():
         if quick and name.startswith("Pinocchio, C++"):

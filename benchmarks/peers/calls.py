@@ -13,7 +13,7 @@ from peers.closure import Array
 __all__ = ["Call", "Calls"]
 
 Call = Callable[[Array, Array, Array], Array]
-"""From pose, velocity and acceleration of one state to its forces; all have shape (4,)."""
+"""From pose, velocity and acceleration of one state to its forces, (m,) to (n,)."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Calls:
     call: Call
 
     def forces(self, pose: Array, velocity: Array, acceleration: Array) -> Array:
-        """Return the actuator forces (B, 4)."""
+        """Return the actuator forces (B, n)."""
         states = zip(*_rows(pose, velocity, acceleration), strict=True)
         return np.array([self.call(*state) for state in states]).reshape(np.shape(pose))
 

@@ -1,8 +1,16 @@
 /* The closed form of four legs at once: one leg in each lane of a vector.
 
-   Both engines' C and C++ peers use it. The numbers are those of closure.py, in the same order. */
+   Both engines' C and C++ peers use it: `before` the engine and `after` it. The numbers are those of
+   closure.py, in the same order. With UNBOUNDED an angle is given as its cosine and sine. */
 
 #include <math.h>
+#include <string.h>
+
+#ifdef UNBOUNDED
+enum { M = 4, NQ = 25, NV = 16 };
+#else
+enum { M = 4, NQ = 16, NV = 16 };
+#endif
 
 typedef double Lanes __attribute__((vector_size(32)));
 
@@ -79,4 +87,41 @@ static inline void project(const Closure *c, const Legs *legs, const Lanes tau[3
     const double share = moment / sum_of(legs->turn[0] * c->null);
     const Lanes found = tau[0] + balance + share * c->null;
     for (int i = 0; i < 4; i++) forces[i] = found[i];
+}
+
+static inline void before(const Closure *c, const double *pose, const double *velocity,
+                          const double *acceleration, double *q, double *v, double *a,
+                          Legs *legs) {
+    const double cosine = cos(pose[3]), sine = sin(pose[3]);
+    follow(c, pose, cosine, sine, velocity, acceleration, legs);
+    for (int i = 0; i < 4; i++) {
+#ifdef UNBOUNDED
+        q[5 * i] = legs->position[i];
+        q[5 * i + 1] = legs->cos_upper[i], q[5 * i + 2] = legs->sin_upper[i];
+        q[5 * i + 3] = legs->cos_elbow[i], q[5 * i + 4] = legs->sin_elbow[i];
+#else
+        q[3 * i] = legs->position[i];
+        q[3 * i + 1] = atan2(legs->sin_upper[i], legs->cos_upper[i]);
+        q[3 * i + 2] = atan2(legs->sin_elbow[i], legs->cos_elbow[i]);
+#endif
+        for (int k = 0; k < 3; k++) {
+            v[3 * i + k] = legs->rate[k][i];
+            a[3 * i + k] = legs->acceleration[k][i];
+        }
+    }
+#ifdef UNBOUNDED
+    memcpy(q + 20, pose, 3 * sizeof(double));
+    q[23] = cosine, q[24] = sine;
+#else
+    memcpy(q + 12, pose, 4 * sizeof(double));
+#endif
+    memcpy(v + 12, velocity, 4 * sizeof(double));
+    memcpy(a + 12, acceleration, 4 * sizeof(double));
+}
+
+static inline void after(const Closure *c, const Legs *legs, const double *found, double *forces) {
+    Lanes tau[3];
+    for (int i = 0; i < 4; i++)
+        for (int k = 0; k < 3; k++) tau[k][i] = found[3 * i + k];
+    project(c, legs, tau, found + 12, forces);
 }

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import casadi as ca
@@ -96,9 +97,11 @@ class Closure:
         """(4,): the forces whose sum d_bar F vanishes, so that they only turn the platform."""
         return np.asarray(np.linalg.svd(self.rows[0])[2][-1], dtype=float)
 
-    @property
-    def numbers(self) -> Array:
-        """All of it, (29, 4), in the order of `Closure` in closure.h."""
+    def in_c(self, unbounded: bool) -> tuple[str, Array]:
+        """Return its header, which knows of `unbounded` by a macro, and its numbers.
+
+        They are all of it, (29, 4), in the order of `Closure` in closure.h.
+        """
         lu, ll = self.upper, self.lower
         circles = [
             (lu + ll) ** 2,
@@ -118,7 +121,8 @@ class Closure:
             self.right,
             self.null[None],
         ]
-        return np.ascontiguousarray(np.concatenate(parts))
+        header = Path(__file__).with_name("closure.h").read_text(encoding="utf-8")
+        return header, np.ascontiguousarray(np.concatenate(parts))
 
     def joints(self, unbounded: bool) -> ca.Function:
         """Return the function from (pose, velocity, acceleration) to (q, v, a, rows).
@@ -166,17 +170,6 @@ class Closure:
             ca.vertcat(*rows),
         ]
         return ca.Function("joints", [pose, velocity, acceleration], outputs)
-
-    def joints_and_rates(self, unbounded: bool) -> ca.Function:
-        """Return the same function with dq/dx (16, 4), by rows, in the place of `rows`.
-
-        It is what a projection needs that is written with matrices; J is the sliders' part of it.
-        """
-        joints = self.joints(unbounded)
-        motion = joints.sx_in()
-        q, v, a, _ = joints.call(motion)
-        rates = ca.densify(ca.jacobian(v, motion[1]))
-        return ca.Function("joints_and_rates", motion, [q, v, a, rates.T])
 
     def _links(self, i: int, u: Expression) -> tuple[Expression, Expression, Expression]:
         """Return l_u, l_l and (l_u x l_l) . d from u, by Lemma 1."""

@@ -10,12 +10,14 @@ from typing import Any
 
 import casadi as ca
 
+import pteron
 from peers.closure import Array, Closure
 from peers.library import Missing
+from peers.rod_closure import RodClosure
 from pteron.kernels import TARGETS, Port
 from pteron.kernels.c import compiler
 
-__all__ = ["Follow", "Project", "forces", "joints", "joints_and_rates"]
+__all__ = ["ClosedForm", "Follow", "Project", "closed_form", "forces", "joints", "joints_and_rates"]
 
 Follow = Callable[[Array, Array, Array], tuple[Array, Array, Array, Array]]
 """From pose, velocity and acceleration to q, v, a and what the projection needs."""
@@ -23,33 +25,44 @@ Follow = Callable[[Array, Array, Array], tuple[Array, Array, Array, Array]]
 Project = Callable[[Array, Array], Array]
 """From the tree's joint forces and `rows` to the actuator forces."""
 
-
-def joints(closure: Closure, unbounded: bool) -> Follow:
-    """Return `Closure.joints`, compiled."""
-    return _follow(closure.joints(unbounded), unbounded, Port("rows", (28,)))
+ClosedForm = Closure | RodClosure
 
 
-def joints_and_rates(closure: Closure, unbounded: bool) -> Follow:
-    """Return `Closure.joints_and_rates`, compiled."""
-    return _follow(closure.joints_and_rates(unbounded), unbounded, Port("rates", (16, 4)))
+def closed_form(robot: pteron.Manipulator) -> ClosedForm:
+    """Return the closed form of a machine with four sliders, or of a Delta."""
+    return Closure.of(robot) if robot.platform.turns else RodClosure.of(robot)
 
 
-def forces(closure: Closure) -> Project:
-    """Return `Closure.forces`, compiled."""
-    given = Port("tau", (16,)), Port("rows", (28,))
-    return _compiled(closure.forces(), given, (Port("forces", (4,)),))
+def joints(closure: ClosedForm, unbounded: bool) -> Follow:
+    """Return the closed form's `joints`, compiled."""
+    return _compiled(closure.joints(unbounded))
 
 
-def _follow(function: ca.Function, unbounded: bool, last: Port) -> Follow:
-    given = tuple(Port(name, (4,)) for name in ("pose", "velocity", "acceleration"))
-    size = 25 if unbounded else 16
-    found = Port("q", (size,)), Port("v", (16,)), Port("a", (16,)), last
-    return _compiled(function, given, found)
+def joints_and_rates(closure: ClosedForm, unbounded: bool) -> Follow:
+    """Return the same function with dq/dx (V, m), by rows, in the place of `rows`.
+
+    It is what a projection needs that is written with matrices; J is the actuators' part of it.
+    """
+    function = closure.joints(unbounded)
+    motion = function.sx_in()
+    q, v, a, _ = function.call(motion)
+    rates = ca.densify(ca.jacobian(v, motion[1]))
+    outputs = [q, v, a, rates.T]
+    shape = rates.shape[0], rates.shape[1]
+    return _compiled(ca.Function("joints_and_rates", motion, outputs), last=shape)
 
 
-def _compiled(
-    function: ca.Function, given: tuple[Port, ...], found: tuple[Port, ...]
-) -> Callable[..., Any]:
+def forces(closure: ClosedForm) -> Project:
+    """Return the closed form's `forces`, compiled."""
+    return _compiled(closure.forces())
+
+
+def _compiled(function: ca.Function, last: tuple[int, ...] | None = None) -> Callable[..., Any]:
+    """Return the function in machine code; `last` is the shape of its last output by rows."""
     if compiler() is None:
         raise Missing("no C compiler for the closed form around it")
-    return TARGETS["c"](function.name(), function, given, found)
+    given = [Port(f"in{i}", (function.size1_in(i),)) for i in range(function.n_in())]
+    found = [Port(f"out{i}", (function.size1_out(i),)) for i in range(function.n_out())]
+    if last is not None:
+        found[-1] = Port(found[-1].name, last)
+    return TARGETS["c"](function.name(), function, tuple(given), tuple(found))

@@ -28,7 +28,13 @@ class Missing(Exception):
     """What a peer needs is not there; the message says what."""
 
 
-def compiled(compiler: str, source: str, options: Sequence[str], version: str = "") -> ctypes.CDLL:
+def compiled(
+    compiler: str,
+    source: str,
+    options: Sequence[str],
+    version: str,
+    closed_form: str,
+) -> ctypes.CDLL:
     """Compile a source that lies beside this file, or find it compiled, and load it.
 
     Parameters
@@ -41,6 +47,8 @@ def compiled(compiler: str, source: str, options: Sequence[str], version: str = 
         What goes after the source: flags, include directories and libraries.
     version : str
         Of the engine whose headers and libraries the options name.
+    closed_form : str
+        The text of the header with the closed form around it.
 
     Returns
     -------
@@ -55,15 +63,17 @@ def compiled(compiler: str, source: str, options: Sequence[str], version: str = 
     if command is None:
         raise Missing(f"{compiler}: no such compiler")
     path = Path(__file__).with_name(source)
-    header = path.with_name("closure.h")
     banner = subprocess.run([command, "--version"], capture_output=True, text=True, check=False)
-    texts = [path.read_text(encoding="utf-8"), header.read_text(encoding="utf-8")]
+    texts = [path.read_text(encoding="utf-8"), closed_form]
     name = f"peer-{path.stem}-{digest(*texts, banner.stdout, version, *_FLAGS, *options)}"
     library = f"{path.stem}.so"
 
     def build(folder: Path) -> None:
+        header = folder / "closed_form.h"
+        header.write_text(closed_form, encoding="utf-8")
+        flags = [*_FLAGS, f'-DCLOSED_FORM="{header}"']
         run = subprocess.run(
-            [command, *_FLAGS, str(path), *options, "-o", str(folder / library)],
+            [command, *flags, str(path), *options, "-o", str(folder / library)],
             capture_output=True,
             text=True,
             check=False,
@@ -105,7 +115,7 @@ class Sweep:
         return found, float(self._sweep(self._peer, len(found), *pointers))
 
     def forces(self, pose: Array, velocity: Array, acceleration: Array) -> Array:
-        """Return the actuator forces (B, 4)."""
+        """Return the actuator forces (B, n)."""
         return self._run(pose, velocity, acceleration)[0]
 
     def seconds(self, pose: Array, velocity: Array, acceleration: Array) -> float:

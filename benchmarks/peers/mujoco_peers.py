@@ -18,7 +18,8 @@ import numpy as np
 import pteron
 from peers import compiled_closure
 from peers.calls import Calls
-from peers.closure import Array, Closure
+from peers.closure import Array
+from peers.compiled_closure import closed_form
 from peers.library import Missing, Sweep, compiled
 from peers.tree import tree
 
@@ -47,7 +48,9 @@ def _model(robot: pteron.Manipulator, closed: bool = False) -> Any:
         )
         for axis in body.slides:
             made.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
-        made.add_joint(type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0])
+        for axis in body.hinges:
+            hinge = [0.0, 0.0, 1.0] if axis == "z" else [0.0, 1.0, 0.0]
+            made.add_joint(type=mujoco.mjtJoint.mjJNT_HINGE, axis=hinge)
         built.append(made)
     for i, leg in enumerate(robot.legs if closed else ()):
         built[2 * i + 1].add_site(name=f"link {i}", pos=[leg.lower_length, 0.0, 0.0])
@@ -73,7 +76,7 @@ def python_tuned(robot: pteron.Manipulator) -> Calls:
     tau = np.empty(model.nv)
     kinematics, rne = mujoco.mj_kinematics, mujoco.mj_rne
     com_position, com_velocity = mujoco.mj_comPos, mujoco.mj_comVel
-    closure = Closure.of(robot)
+    closure = closed_form(robot)
     joints = compiled_closure.joints(closure, unbounded=False)
     forces = compiled_closure.forces(closure)
 
@@ -112,8 +115,8 @@ def _c(robot: pteron.Manipulator, closed: bool) -> Sweep:
     options = ["-std=gnu11", "-fno-math-errno", *(["-DCLOSED"] if closed else [])]
     options += ["-isystem", str(folder / "include"), str(libraries[0]), "-lm"]
     options += [f"-Wl,-rpath,{folder}"]
-    library = compiled("gcc", "mujoco_peer.c", options, version("mujoco"))
-    numbers = Closure.of(robot).numbers
+    header, numbers = closed_form(robot).in_c(unbounded=False)
+    library = compiled("gcc", "mujoco_peer.c", options, version("mujoco"), header)
     with tempfile.TemporaryDirectory() as scratch:
         path = Path(scratch) / "tree.mjb"
         mujoco.mj_saveModel(_model(robot, closed), str(path))

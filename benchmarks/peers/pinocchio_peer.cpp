@@ -1,4 +1,4 @@
-// The tree in Pinocchio, between the closed form of closure.h before it and after it.
+// The tree in Pinocchio, between the closed form before it and after it.
 
 #include <chrono>
 #include <cstdint>
@@ -9,14 +9,16 @@
 #include <pinocchio/algorithm/rnea.hpp>
 #include <pinocchio/multibody.hpp>
 
-#include "closure.h"
+// Unbounded revolute joints take cosine and sine, so that nothing needs an arctangent.
+#define UNBOUNDED
+#include CLOSED_FORM
 
 namespace {
 
 using Vector3 = Eigen::Vector3d;
 using Matrix3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
-enum Kind { slide = 0, turn = 1, translation = 2 };
+enum Kind { slide = 0, turn = 1, translation = 2, turn_y = 3 };
 
 // One joint as tree.py's `table` writes it.
 struct Joint {
@@ -29,9 +31,8 @@ struct Peer {
     Closure closure;
     pinocchio::Model model;
     pinocchio::Data data;
-    // Unbounded revolute joints take cosine and sine, so that nothing needs an arctangent.
-    Eigen::Matrix<double, 25, 1> q;
-    Eigen::Matrix<double, 16, 1> v, a;
+    Eigen::Matrix<double, NQ, 1> q;
+    Eigen::Matrix<double, NV, 1> v, a;
 
     Peer(const pinocchio::Model &tree, const double *numbers) : model(tree), data(tree) {
         std::memcpy(static_cast<void *>(&closure), numbers, sizeof(Closure));
@@ -39,32 +40,9 @@ struct Peer {
 
     void inverse(const double *pose, const double *velocity, const double *acceleration,
                  double *forces) {
-        const double cosine = std::cos(pose[3]), sine = std::sin(pose[3]);
         Legs legs;
-        follow(&closure, pose, cosine, sine, velocity, acceleration, &legs);
-        for (int i = 0; i < 4; i++) {
-            q[5 * i] = legs.position[i];
-            q[5 * i + 1] = legs.cos_upper[i];
-            q[5 * i + 2] = legs.sin_upper[i];
-            q[5 * i + 3] = legs.cos_elbow[i];
-            q[5 * i + 4] = legs.sin_elbow[i];
-            for (int k = 0; k < 3; k++) {
-                v[3 * i + k] = legs.rate[k][i];
-                a[3 * i + k] = legs.acceleration[k][i];
-            }
-        }
-        for (int k = 0; k < 3; k++) q[20 + k] = pose[k];
-        q[23] = cosine;
-        q[24] = sine;
-        for (int k = 0; k < 4; k++) {
-            v[12 + k] = velocity[k];
-            a[12 + k] = acceleration[k];
-        }
-        const auto &found = pinocchio::rnea(model, data, q, v, a);
-        Lanes tau[3];
-        for (int i = 0; i < 4; i++)
-            for (int k = 0; k < 3; k++) tau[k][i] = found[3 * i + k];
-        project(&closure, &legs, tau, found.data() + 12, forces);
+        before(&closure, pose, velocity, acceleration, q.data(), v.data(), a.data(), &legs);
+        after(&closure, &legs, pinocchio::rnea(model, data, q, v, a).data(), forces);
     }
 };
 
@@ -79,6 +57,8 @@ pinocchio::Model built(const Joint *joints, int count, const double *gravity) {
         pinocchio::JointModel kind;
         if (joint.kind == turn)
             kind = pinocchio::JointModelRUBZ();
+        else if (joint.kind == turn_y)
+            kind = pinocchio::JointModelRUBY();
         else if (joint.kind == translation)
             kind = pinocchio::JointModelTranslation();
         else if (axis == Vector3::UnitZ())
@@ -104,7 +84,7 @@ extern "C" {
 Peer *create(const double *joints, int count, const double *gravity, const double *closure) {
     try {
         const auto model = built(reinterpret_cast<const Joint *>(joints), count, gravity);
-        return model.nq == 25 && model.nv == 16 ? new Peer(model, closure) : nullptr;
+        return model.nq == NQ && model.nv == NV ? new Peer(model, closure) : nullptr;
     } catch (const std::exception &) {
         return nullptr;
     }
@@ -114,7 +94,7 @@ Peer *create(const double *joints, int count, const double *gravity, const doubl
 double sweep(Peer *peer, std::int64_t count, const double *pose, const double *velocity,
              const double *acceleration, double *forces) {
     const auto begin = std::chrono::steady_clock::now();
-    for (std::int64_t i = 0; i < 4 * count; i += 4)
+    for (std::int64_t i = 0; i < M * count; i += M)
         peer->inverse(pose + i, velocity + i, acceleration + i, forces + i);
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }

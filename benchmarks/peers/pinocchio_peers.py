@@ -13,7 +13,8 @@ import numpy as np
 import pteron
 from peers import compiled_closure
 from peers.calls import Calls
-from peers.closure import Array, Closure
+from peers.closure import Array
+from peers.compiled_closure import closed_form
 from peers.library import Missing, Sweep, compiled
 from peers.tree import Body, tree
 
@@ -47,7 +48,7 @@ def python_tuned(robot: pteron.Manipulator) -> Calls:
     """Return the peer that calls `pinocchio.rnea` between two calls of compiled closed form."""
     pin, model = _model(robot)
     data = model.createData()
-    closure = Closure.of(robot)
+    closure = closed_form(robot)
     joints = compiled_closure.joints(closure, unbounded=True)
     forces = compiled_closure.forces(closure)
     rnea = pin.rnea
@@ -66,13 +67,13 @@ def python_usual(robot: pteron.Manipulator) -> Calls:
     """
     pin, model = _model(robot)
     data = model.createData()
-    joints = compiled_closure.joints_and_rates(Closure.of(robot), unbounded=True)
-    sliders = slice(0, 12, 3)
+    joints = compiled_closure.joints_and_rates(closed_form(robot), unbounded=True)
+    actuated = slice(0, 3 * len(robot.legs), 3)
 
     def call(pose: Array, velocity: Array, acceleration: Array) -> Array:
         q, v, a, rates = joints(pose, velocity, acceleration)
         tau = pin.rnea(model, data, q, v, a)
-        return np.linalg.solve(rates[sliders].T, rates.T @ tau)
+        return np.linalg.solve(rates[actuated].T, rates.T @ tau)
 
     return Calls(call)
 
@@ -98,7 +99,10 @@ def _model(robot: pteron.Manipulator) -> tuple[Any, Any]:
             kind = pin.JointModelPZ() if along_z else pin.JointModelPrismaticUnaligned(axis)
             joint = model.addJoint(joint, kind, place, f"p{n}")
             place = pin.SE3.Identity()
-        joint = model.addJoint(joint, pin.JointModelRUBZ(), place, f"r{n}")
+        for axis in body.hinges:
+            kind = pin.JointModelRUBZ() if axis == "z" else pin.JointModelRUBY()
+            joint = model.addJoint(joint, kind, place, f"{axis}{n}")
+            place = pin.SE3.Identity()
         inertia = pin.Inertia(body.mass, body.center, np.diag(body.inertia))
         model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
         ids.append(joint)
@@ -118,9 +122,9 @@ def cpp_usual(robot: pteron.Manipulator) -> Sweep:
 def _cpp(robot: pteron.Manipulator, flags: tuple[str, ...]) -> Sweep:
     joints = _table(tree(robot))
     gravity = np.array(robot.gravity)
-    numbers = Closure.of(robot).numbers
+    header, numbers = closed_form(robot).in_c(unbounded=True)
     options = ["-std=c++17", *flags, *_BOOST, *_includes()]
-    library = compiled("g++", "pinocchio_peer.cpp", options, version("pin"))
+    library = compiled("g++", "pinocchio_peer.cpp", options, version("pin"), header)
     return Sweep(
         library,
         c_void_p(joints.ctypes.data),
@@ -152,7 +156,7 @@ def _includes() -> list[str]:
 
 def _table(bodies: list[Body]) -> Array:
     """Return the joints, one a row, as `Joint` in pinocchio_peer.cpp has them."""
-    slide, turn, translation = 0.0, 1.0, 2.0
+    slide, translation, turn = 0.0, 2.0, {"z": 1.0, "y": 3.0}
     nothing, identity = np.zeros(7), np.eye(3).ravel()
     table: list[Array] = []
     ids: list[float] = []
@@ -166,7 +170,9 @@ def _table(bodies: list[Body]) -> Array:
         elif body.slides:
             table.append(np.array([slide, parent, *place, *body.slides[0], *nothing]))
             parent, place = float(len(table)), resting
-        inertia = [body.mass, *body.center, *body.inertia]
-        table.append(np.array([turn, parent, *place, 0.0, 0.0, 1.0, *inertia]))
-        ids.append(float(len(table)))
+        for axis in body.hinges:
+            table.append(np.array([turn[axis], parent, *place, 0.0, 0.0, 1.0, *nothing]))
+            parent, place = float(len(table)), resting
+        table[-1][-7:] = [body.mass, *body.center, *body.inertia]
+        ids.append(parent)
     return np.ascontiguousarray(table)

@@ -1,12 +1,14 @@
 """The mechanism with its loops cut at the platform points: a tree that any engine can carry.
 
 Each leg is a chain of its own, and so is the platform, whose joints are the pose itself. A slider
-does not turn and R1 runs through it, so that its mass may sit in the upper link: one body less.
+does not turn and R1 runs through it, so that its mass may sit in the upper link: one body less. The
+joint between a crank and its rod is two hinges.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
 
@@ -18,7 +20,7 @@ __all__ = ["Body", "tree"]
 
 @dataclass(frozen=True)
 class Body:
-    """A body, with its joints to the body before: it slides along some axes, then turns about z.
+    """A body, with its joints to the body before: it slides along some axes, then turns.
 
     Parameters
     ----------
@@ -28,6 +30,8 @@ class Body:
         Where its frame is in the frame before when all joints are zero.
     slides : tuple of array, shape (3,)
         The axes it slides along, in its own frame.
+    hinges : str
+        The axes of its frame that it turns about, one after the other.
     mass : float
         kg.
     center, inertia : array, shape (3,)
@@ -38,41 +42,56 @@ class Body:
     rotation: Array
     offset: Array
     slides: tuple[Array, ...]
+    hinges: Literal["", "z", "zy"]
     mass: float
     center: Array
     inertia: Array
 
 
 def tree(robot: pteron.Manipulator) -> list[Body]:
-    """Return upper and lower link of each leg, then the platform."""
-    bodies = []
+    """Return upper and lower link of each leg, or crank and rod, then the platform."""
+    turns = robot.platform.turns
+    bodies: list[Body] = []
     for leg in robot.legs:
-        frame = plane(leg)
-        e = frame.T @ np.array(leg.e) if leg.e != leg.direction else np.array([0.0, 0.0, 1.0])
-        mass = leg.upper.mass + leg.slider_mass
-        upper = pteron.PlanarInertia(mass, leg.upper.first_moment, leg.upper.inertia)
-        bodies.append(_body(upper, -1, frame, np.array(leg.guide_point), (e,)))
-        elbow = np.array([leg.upper_length, 0.0, 0.0])
-        bodies.append(
-            _body(leg.lower, len(bodies) - 1, np.eye(3), elbow, (), reach=leg.lower_length)
-        )
+        bodies += _slider_leg(leg, len(bodies)) if turns else _crank_leg(leg, len(bodies))
     frame = np.column_stack(robot.platform.frame)
-    bodies.append(_body(robot.platform.inertia, -1, frame, np.zeros(3), tuple(frame)))
+    inertia = _planar(robot.platform.inertia)
+    bodies.append(Body(-1, frame, np.zeros(3), tuple(frame), "z" if turns else "", *inertia))
     return bodies
 
 
-def _body(
-    planar: pteron.PlanarInertia,
-    parent: int,
-    rotation: Array,
-    offset: Array,
-    slides: tuple[Array, ...],
-    reach: float = 0.0,
-) -> Body:
-    """Return a body whose reference point is at `reach` along x."""
-    gx, gy = planar.center_of_mass
-    about_center = planar.inertia - planar.mass * (gx**2 + gy**2)
+def _slider_leg(leg: Any, count: int) -> list[Body]:
+    frame = plane(leg)
+    e = frame.T @ np.array(leg.e) if leg.e != leg.direction else np.array([0.0, 0.0, 1.0])
+    mass = leg.upper.mass + leg.slider_mass
+    upper = pteron.PlanarInertia(mass, leg.upper.first_moment, leg.upper.inertia)
+    elbow = np.array([leg.upper_length, 0.0, 0.0])
+    lower = _planar(leg.lower, reach=leg.lower_length)
+    return [
+        Body(-1, frame, np.array(leg.guide_point), (e,), "z", *_planar(upper)),
+        Body(count, np.eye(3), elbow, (), "z", *lower),
+    ]
+
+
+def _crank_leg(leg: Any, count: int) -> list[Body]:
+    elbow = np.array([leg.upper_length, 0.0, 0.0])
+    rod = leg.lower
+    (x,) = rod.center_of_mass
+    about_center = rod.inertia - rod.mass * x**2
+    # A rod's spin has no inertia; MuJoCo wants some, and this much is lost in rounding.
+    inertia = np.array([2e-15, about_center, about_center])
+    center = np.array([leg.lower_length + x, 0.0, 0.0])
+    crank = _planar(leg.upper)
+    return [
+        Body(-1, plane(leg), np.array(leg.guide_point), (), "z", *crank),
+        Body(count, np.eye(3), elbow, (), "zy", rod.mass, center, inertia),
+    ]
+
+
+def _planar(body: Any, reach: float = 0.0) -> tuple[float, Array, Array]:
+    """Return mass, centre and moments of a body whose reference point is at `reach` along x."""
+    gx, gy = body.center_of_mass
+    about_center = body.inertia - body.mass * (gx**2 + gy**2)
     # The other two moments do not matter to a body that moves in its plane; these are a real one's.
     inertia = about_center * np.array([0.6, 0.7, 1.0])
-    center = np.array([reach + gx, gy, 0.0])
-    return Body(parent, rotation, offset, slides, planar.mass, center, inertia)
+    return body.mass, np.array([reach + gx, gy, 0.0]), inertia
