@@ -82,7 +82,7 @@ def test_values_stay_exactly(plain, numbers):
 @pytest.mark.parametrize("what", ["inverse_dynamics", "regressor", "inverse_kinematics"])
 def test_programs_keep_their_values_in_fewer_operations(name, what):
     robot = CATALOG[name]
-    plain = program(robot, what)
+    plain = program(robot, what, plain=True)
     found = optimised(plain.function)
     assert count_operations(found) < count_operations(plain.function)
     pose, velocity, acceleration = states(robot, 20)

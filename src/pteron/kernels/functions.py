@@ -291,12 +291,14 @@ def program(
     *,
     wrench: bool = False,
     guarded: bool = False,
+    plain: bool = False,
 ) -> Program:
     """Return the function `what` of a machine's geometry; inertial parameters stay inputs.
 
     With `columns` the dynamics are those of base parameters, which are then the input; with
     `wrench` a wrench on the platform is an input too; with `guarded` a last output, `status`, is 1
-    where the result counts and 0 where the pose, or a number, does not serve.
+    where the result counts and 0 where the pose, or a number, does not serve; with `plain` the
+    equations are as they are written, without the pass that saves operations.
 
     Raises
     ------
@@ -311,7 +313,7 @@ def program(
         raise ModelError(f"base: {what!r} has no use for it; it goes with {', '.join(_REDUCIBLE)}")
     if what not in _LOADED and wrench:
         raise ModelError(f"wrench: {what!r} has no use for it; it goes with {', '.join(_LOADED)}")
-    return _built(bare(robot), what, columns, wrench, guarded)
+    return _built(bare(robot), what, columns, wrench, guarded, plain)
 
 
 def specialised(given: Program, values: dict[str, NDArray[np.float64]]) -> Program:
@@ -351,11 +353,16 @@ def bare(robot: Manipulator) -> Manipulator:
 
 @lru_cache(maxsize=512)
 def _built(
-    robot: Manipulator, what: str, columns: Columns | None, wrench: bool, guarded: bool
+    robot: Manipulator,
+    what: str,
+    columns: Columns | None,
+    wrench: bool,
+    guarded: bool,
+    plain: bool,
 ) -> Program:
     machine = Machine.of(robot)
     if columns is None:
-        return _program(machine, what, wrench=wrench, guarded=guarded)
+        return _program(machine, what, wrench=wrench, guarded=guarded, plain=plain)
     selection = ca.SX(len(machine.parameters), len(columns))
     for k, members in enumerate(columns):
         for j in members:
@@ -383,7 +390,8 @@ def general_program(robot: Manipulator, what: str) -> Program:
 @lru_cache(maxsize=64)
 def _general(robot: Manipulator, what: str) -> Program:
     machine, vector = Machine.symbols(robot)
-    return _program(machine, what, vector)
+    # Exact arithmetic wants the equations as they stand.
+    return _program(machine, what, vector, plain=True)
 
 
 def _program(
@@ -394,6 +402,7 @@ def _program(
     extra: dict[str, Expression] | None = None,
     wrench: bool = False,
     guarded: bool = False,
+    plain: bool = False,
 ) -> Program:
     """Return a function of the table; `constants` stand for inputs, `extra` are more inputs."""
     entry = _TABLE[what]
@@ -414,7 +423,7 @@ def _program(
     function = ca.Function(
         what, list(symbols.values()), ca.cse(dense), list(symbols), list(outputs)
     )
-    if vector is None:  # exact arithmetic wants the equations as they stand
+    if not plain:
         function = optimised(function)
     inputs = tuple(
         Port(name, symbol.shape[:1], shared=name in _SHARED) for name, symbol in symbols.items()
