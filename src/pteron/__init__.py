@@ -48,7 +48,6 @@ from pteron.kinematics import (
     singular_orientations,
 )
 from pteron.legs import PRRR, RSS
-from pteron.legs import PRRR as Leg
 from pteron.manipulator import (
     Manipulator,
     catalog,
@@ -63,6 +62,9 @@ from pteron.manipulator import (
     working_modes,
 )
 from pteron.platforms import Platform
+
+Leg = PRRR
+"""The kind of leg that a file means where it does not say `type`."""
 
 if TYPE_CHECKING:
     from pteron import identification, motion, plots, report, workspace

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+
 class PteronError(ValueError):
     """Root of every error that Pteron raises for something the user can mend."""
 

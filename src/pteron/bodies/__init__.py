@@ -1,1 +1,1 @@
-"""Bodies: three-vectors, inertia, inertial parameters, and a body in motion. Every floor may ask."""
+"""Bodies: three-vectors, inertia, inertial parameters, and a body in motion."""

@@ -55,7 +55,7 @@ class BodyMotion(NamedTuple):
     acceleration: Expression
     """a, of the reference point, (3, 1)."""
     axes: Expression | None = None
-    """(3, k): unit vectors at right angles, about which it turns: z in a plane, all three for a rod,
+    """(3, k): unit vectors at right angles about which it turns: z in a plane, all three for a rod,
     whose angular velocity is perpendicular to x."""
     rates_row: Expression | None = None
     """(k, 4): d rates / d (c', phi'), the rates about the axes."""
@@ -75,9 +75,11 @@ class BodyMotion(NamedTuple):
     @property
     def kinds(self) -> tuple[str, ...]:
         """The kinds of its parameters."""
-        return ("m", *(() if self.x is None else ("mgx",)), *(() if self.y is None else ("mgy",))) + (
-            () if self.x is None else ("I",)
-        )
+        return (
+            "m",
+            *(() if self.x is None else ("mgx",)),
+            *(() if self.y is None else ("mgy",)),
+        ) + (() if self.x is None else ("I",))
 
 
 def moments_of(kinds: tuple[str, ...], rows: list[Expression]) -> Moments:
@@ -122,13 +124,13 @@ def mass_matrix(body: BodyMotion, inertia: Moments) -> Expression:
     """
     v, rates = body.velocity_row, body.rates_row
     total = inertia.m * ca.mtimes(v.T, v)
+    if rates is None:
+        return total
     if body.y is not None:
         turned = ca.mtimes(body.y, inertia.hx) - ca.mtimes(body.x, inertia.hy)  # d h / d theta
         coupling = ca.mtimes(ca.mtimes(v.T, turned), rates)
-    elif body.x is not None:
-        coupling = inertia.hx * ca.mtimes(v.T, ca.mtimes(-ca.skew(body.x), body.turning_row))
     else:
-        return total
+        coupling = inertia.hx * ca.mtimes(v.T, ca.mtimes(-ca.skew(body.x), body.turning_row))
     return total + coupling + coupling.T + inertia.i * ca.mtimes(rates.T, rates)
 
 
@@ -140,4 +142,3 @@ def mass_moment(body: BodyMotion, inertia: Moments) -> Expression:
     if body.y is not None:
         total = total + ca.mtimes(body.y, inertia.hy)
     return total
-

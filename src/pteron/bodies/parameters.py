@@ -20,7 +20,7 @@ PREFERENCE = (
     *(("m", "p"), ("mgx", "u"), ("mgy", "u"), ("I", "u"), ("mgx", "l"), ("mgy", "l"), ("m", "e")),
     *(("m", "l"), ("mgx", "e"), ("mgy", "e"), ("I", "e"), ("I", "l"), ("m", "u")),
 )
-"""Kinds and bodies of parameters, those that base parameters keep first in front: Table 1's choice."""
+"""Kinds and bodies of parameters, those that base parameters keep first in front, as Table 1."""
 
 JOINED = (("m", "u"), ("mgx", "l"))
 """What the cheapest model does without: m_u joins the slider, and m gamma_x of a lower link is

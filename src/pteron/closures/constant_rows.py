@@ -35,7 +35,8 @@ class ConstantRows(Closure):
     def __init__(self, legs: Sequence[LegEquations], platform: PlatformEquations) -> None:
         super().__init__(legs, platform)
         self.turns = "phi" in platform.coordinates
-        self.rows = ca.vertcat(*(leg.constant_row.T for leg in legs))  # D
+        bars: list[Expression] = [leg.constant_row for leg in legs]
+        self.rows = ca.horzcat(*bars).T  # D
         if not self.turns:
             self.right_inverse = adjugate3(self.rows).T / det3(self.rows)  # P
             return
@@ -44,7 +45,6 @@ class ConstantRows(Closure):
         null = ca.vertcat(*((-1) ** i * det3(_without(self.rows, i)) for i in range(4)))
         self.null = null / ca.norm_inf(null) if null.is_constant() else null  # N
         # j = cosines cos(phi) + sines sin(phi) is the Jacobian's fourth column.
-        bars = [leg.constant_row for leg in legs]
         pairs = list(zip(bars, platform.offsets, strict=True))
         self.cosines = ca.vertcat(*(ca.dot(d, offset.b) for d, offset in pairs))
         self.sines = ca.vertcat(*(-ca.dot(d, offset.a) for d, offset in pairs))
@@ -62,7 +62,8 @@ class ConstantRows(Closure):
         null = np.abs(np.array(ca.evalf(self.null))).max()
         bars = np.linalg.norm(np.array(ca.evalf(self.rows)), axis=1).max()
         points = max(float(ca.norm_2(ca.DM(ca.evalf(s)))) for s in self.platform.points)
-        size = np.hypot(*(float(value) for value in self.orientation))
+        a, b = (float(value) for value in self.orientation)
+        size = np.hypot(a, b)
         return bool(size <= _VANISHING * null * bars * points)
 
     @property
@@ -106,9 +107,7 @@ class ConstantRows(Closure):
             return ca.mtimes(self.right_inverse.T, joints)
         column = self._column(platform)
         angle = ca.mtimes(self.null.T, joints) / ca.dot(self.null, column)
-        return ca.vertcat(
-            ca.mtimes(self.right_inverse.T, joints - ca.mtimes(column, angle)), angle
-        )
+        return ca.vertcat(ca.mtimes(self.right_inverse.T, joints - ca.mtimes(column, angle)), angle)
 
     def poses(self, joints: Expression) -> Expression:
         """Solve the closures, which are linear in (p, cos phi, sin phi).
@@ -145,9 +144,7 @@ class ConstantRows(Closure):
         for branch in (1, -1):
             cosine = (-b * total + branch * a * root) / square
             sine = (a * total + branch * b * root) / square
-            p = ca.mtimes(
-                self.right_inverse.T, right - (self.cosines * sine - self.sines * cosine)
-            )
+            p = ca.mtimes(self.right_inverse.T, right - (self.cosines * sine - self.sines * cosine))
             poses.append(ca.vertcat(p, ca.atan2(sine, cosine)) + nan_below_zero(radicand))
         return ca.horzcat(*poses)
 

@@ -55,9 +55,7 @@ class ThreeLoci(Closure):
         a, b, c = (leg.row[:, :3].T for leg in legs)
         across = ca.horzcat(ca.cross(b, c), ca.cross(c, a), ca.cross(a, b))
         divisors = ca.vertcat(*(leg.divisor for leg in legs))
-        right = ca.vertcat(
-            *(divisors[i] * joints[i, :] for i in range(3))
-        )
+        right = ca.vertcat(*(divisors[i] * joints[i, :] for i in range(3)))
         return ca.mtimes(across, right) / ca.dot(a, across[:, 0])
 
     def poses(self, joints: Expression) -> Expression:
@@ -88,9 +86,7 @@ class ThreeLoci(Closure):
         radicand = ca.fmax(rest, ca.fmin(rest + _ROUNDING * (radius2 + distance2), 0))
         step = ca.sqrt(radicand / square)
         beyond = nan_below_zero(radicand)
-        return ca.horzcat(
-            *(first.center + foot + side * step * along + beyond for side in (-1, 1))
-        )
+        return ca.horzcat(*(first.center + foot + side * step * along + beyond for side in (-1, 1)))
 
 
 def _moved(locus: Plane | Sphere, offset: Expression) -> Plane | Sphere:

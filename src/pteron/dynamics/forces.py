@@ -41,7 +41,8 @@ def inverse_dynamics(
     UnreachablePose
         If a leg does not reach a pose.
     SingularPose
-        If a leg is stretched or folded (type I), or the actuators do not hold the platform (type II).
+        If a leg is stretched or folded (type I), or the actuators do not hold the platform
+        (type II).
 
     Examples
     --------

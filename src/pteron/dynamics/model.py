@@ -7,9 +7,7 @@ from pteron.manipulator import Manipulator
 from pteron.shapes import Matrices, Numbers, OnFailure, PerCoordinate, PoseLike
 
 
-def mass_matrix(
-    robot: Manipulator, pose: PoseLike, *, on_failure: OnFailure = "raise"
-) -> Matrices:
+def mass_matrix(robot: Manipulator, pose: PoseLike, *, on_failure: OnFailure = "raise") -> Matrices:
     """Return the mass matrix M of M x'' + h = J^T F, in platform coordinates.
 
     Parameters

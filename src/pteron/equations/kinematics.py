@@ -66,12 +66,12 @@ def link_jacobians(state: State) -> tuple[list[Expression], list[Expression]]:
 
 def link_vectors(state: State) -> tuple[Expression, Expression]:
     """Return l_u and l_l of every leg, each (n, 3): Eqs. (6) and (7); NaN where it has none."""
-    none = ca.SX.nan(3, 1)
-    upper, lower = (
-        ca.vertcat(*((none if leg.links[k] is None else leg.links[k]).T for leg in state.legs))
-        for k in range(2)
-    )
-    return upper, lower
+
+    def rows(k: int) -> Expression:
+        links = (leg.links[k] for leg in state.legs)
+        return ca.horzcat(*(ca.SX.nan(3, 1) if link is None else link for link in links)).T
+
+    return rows(0), rows(1)
 
 
 def link_turning(state: State, order: int) -> Expression:

@@ -24,9 +24,9 @@ def mass_matrix(machine: Machine, pose: Expression, parameters: Expression) -> E
     state = machine.state(pose)
     platform, none = state.platform, ca.SX(1, 1)
     riding = []
-    for leg, bodies in zip(machine.legs, legs, strict=True):
-        riding.append(sum((bodies[k].m for k in leg.rides), none))
-        bodies |= {k: bodies[k]._replace(m=none) for k in leg.rides}
+    for rides, bodies in zip((leg.rides for leg in machine.legs), legs, strict=True):
+        riding.append(sum((bodies[k].m for k in rides), none))
+        bodies |= {k: bodies[k]._replace(m=none) for k in rides}
     at_p = motion.mass_matrix(platform.body, machine.platform.carrying(inertia, riding))
     total = ca.mtimes(platform.matrix.T, ca.mtimes(at_p, platform.matrix))
     for leg, bodies, matrix in zip(state.legs, legs, platform.matrices, strict=True):

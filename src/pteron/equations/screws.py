@@ -29,4 +29,3 @@ def joint_screws(state: State) -> list[Expression]:
                 columns.append(ca.vertcat(joint.axis, ca.cross(joint.point - p, joint.axis)))
         screws.append(ca.horzcat(*columns, ca.SX.nan(6, longest - len(columns))))
     return screws
-

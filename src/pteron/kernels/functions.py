@@ -31,11 +31,11 @@ Need = Literal["rows", "reach", "type I", "type II"]
 of those legs alone whose row [dq/dc | dq/dphi] depends on the pose."""
 
 TYPE_I = 1e-4
-"""The type-I measure of a leg below which what is divided by it is refused. Its relative error is
+"""The type-I measure of a leg below which what is divided by it is refused: the relative error is
 1e-15 to 1e-14 over the measure's square: six digits are left here."""
 
 TYPE_II = 1e-9
-"""The type-II measure below which what is computed from J^-1 is refused: as many digits are left."""
+"""The type-II measure below which what is computed from J^-1 is refused: six digits are left."""
 
 _HUGE = 1e75
 """Inputs or outputs beyond this count as not finite: their squares might overflow."""
@@ -247,14 +247,18 @@ _TABLE: dict[str, _Entry] = {
     "joint_screws": _Entry(_POSE, _screws, _BENT),
     "joint_rates": _Entry(_RATE, _joint_motion(0), _BENT),
     "joint_accelerations": _Entry(_MOTION, _joint_motion(1), _BENT),
-    "platform_motion": _Entry(("pose", "joint_rates", "joint_accelerations"), _platform_motion, _HELD),
+    "platform_motion": _Entry(
+        ("pose", "joint_rates", "joint_accelerations"), _platform_motion, _HELD
+    ),
     "passive_friction": _Entry(_RATE, _passive_friction, _HELD),
     "inverse_dynamics": _Entry((*_MOTION, "parameters"), _inverse_dynamics, _HELD),
     "forward_dynamics": _Entry((*_RATE, "forces", "parameters"), _forward_dynamics, _BENT),
     "mass_matrix": _Entry((*_POSE, "parameters"), _mass_matrix, _BENT),
     "coriolis_matrix": _Entry((*_RATE, "parameters"), _coriolis_matrix, _BENT),
     "bias_forces": _Entry((*_RATE, "parameters"), _forces_without_acceleration("bias"), _BENT),
-    "gravity_forces": _Entry((*_POSE, "parameters"), _forces_without_acceleration("gravity"), _BENT),
+    "gravity_forces": _Entry(
+        (*_POSE, "parameters"), _forces_without_acceleration("gravity"), _BENT
+    ),
     "kinetic_energy": _Entry((*_RATE, "parameters"), _kinetic_energy, _BENT),
     "potential_energy": _Entry((*_POSE, "parameters"), _potential_energy, ("reach",)),
     "regressor": _Entry(_MOTION, _regressor, _HELD),
@@ -439,7 +443,12 @@ def _status(
     states = [symbol for name, symbol in symbols.items() if name not in _SHARED]
     results = [expression for expression, _ in outputs.values()]
     sums = [
-        sum(ca.fabs(v) for group in groups for v in ca.vertsplit(ca.vec(ca.densify(group))) if not _is_nan(v))
+        sum(
+            ca.fabs(v)
+            for group in groups
+            for v in ca.vertsplit(ca.vec(ca.densify(group)))
+            if not _is_nan(v)
+        )
         for groups in (states, results)
     ]
     status = ca.SX(1)
@@ -454,7 +463,7 @@ def _status(
     if "type II" in entry.needs:
         state = machine.state(symbols["pose"])
         measure = machine.closure.measure(state.platform, state.legs)
-        status = ca.if_else(TYPE_II**2 < measure * measure, status, 0)
+        status = ca.if_else(measure * measure > TYPE_II**2, status, 0)
     return status
 
 

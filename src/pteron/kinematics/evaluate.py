@@ -132,9 +132,7 @@ def _bad_pose(
                 leg=i + 1,
             )
     if is_singular_everywhere(robot):
-        return SingularPose(
-            EVERYWHERE.format(name=robot.name), kind="II", measure=0.0, index=index
-        )
+        return SingularPose(EVERYWHERE.format(name=robot.name), kind="II", measure=0.0, index=index)
     measure = abs(float(numeric(robot, "type_ii")(pose)[0]))
     return SingularPose(
         f"{where}: singular (type II; measure {measure:.1e}, less than six digits are left below "

@@ -6,7 +6,7 @@ import numpy as np
 
 from pteron.equations.machine import closure_of
 from pteron.errors import SingularPose, UnreachablePose
-from pteron.kernels import Array, numeric
+from pteron.kernels import Array
 from pteron.kinematics.evaluate import checked, evaluated
 from pteron.kinematics.singularities import EVERYWHERE, is_singular_everywhere
 from pteron.manipulator import Manipulator
@@ -14,9 +14,9 @@ from pteron.shapes import (
     JointsLike,
     Matrices,
     OnFailure,
+    PerJoint,
     PoseLike,
     Poses,
-    PerJoint,
     Vectors,
 )
 

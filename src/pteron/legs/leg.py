@@ -6,13 +6,13 @@ file of this folder:
 
 - a frozen dataclass under `LegKind`: the leg's data, its TOML keys, its bodies, and what of its
   geometry the equations need (`quantities`);
-- a class under `LegEquations`: built from these quantities, in numbers or in symbols, it answers to
-  a motion of c and phi with the motion of its joint and of its bodies (`motion`), says how far it
+- a class under `LegEquations`: built from these quantities, in numbers or in symbols, it answers a
+  motion of c and phi with the motion of its joint and of its bodies (`motion`), says how far it
   reaches (`reach`) and where c lies for a given joint (`locus`).
 
 That is all: Jacobian, dynamics, regressor, energies, limits, drawings, logs, exported code follow.
-`examples/new_leg.py` is a complete kind of leg. `needs` and `transfers` may be overridden: a cheaper
-form of the same forces, and the mass transfers that explain base parameters in symbols.
+`examples/new_leg.py` is a complete kind of leg. `needs` and `transfers` may be overridden: a
+cheaper form of the same forces, and the mass transfers that explain base parameters in symbols.
 
 All vectors are in the base frame, columns (3, 1). An expression has no branch on a value: the side
 of an elbow is a quantity, +1 or -1.
@@ -185,7 +185,7 @@ class LegEquations(ABC):
     kinds: ClassVar[Mapping[str, tuple[str, ...]]]
     """The kinds of parameters of each body, by letter."""
     rides: ClassVar[tuple[str, ...]] = ()
-    """The bodies whose reference point is the platform point: their mass counts as the platform's."""
+    """The bodies whose reference point is the platform point: their mass may be the platform's."""
     constant_row: Expression | None = None
     """dq/dc, (3, 1), if it does not depend on the pose (and q not on phi); see `closures`."""
 
@@ -230,6 +230,9 @@ class LegEquations(ABC):
         return Needs(none, ca.vertcat(force, none), none)
 
 
+_EquationsClass = type[LegEquations]
+
+
 class LegKind(ABC):
     """The data of one leg: a kind of leg is a frozen dataclass with these fields and its own.
 
@@ -254,7 +257,8 @@ class LegKind(ABC):
     type: ClassVar[str]
     """What the file's key `type` says."""
     joint: ClassVar[ActuatedJoint]
-    equations_class: ClassVar[type[LegEquations]]
+    equations_class: ClassVar[_EquationsClass]
+    __dataclass_fields__: ClassVar[dict[str, Any]]
 
     @property
     @abstractmethod
@@ -357,4 +361,4 @@ def checked_elbow(elbow: object) -> int:
     """Return the elbow's side, 1 or -1."""
     if elbow not in (1, -1):
         raise ModelError(f"elbow: {elbow!r} is neither 1 nor -1")
-    return int(elbow)  # type: ignore[call-overload, no-any-return]
+    return 1 if elbow == 1 else -1

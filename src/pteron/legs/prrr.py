@@ -1,7 +1,7 @@
-"""P-R-R-R legs, the paper's: a slider and two links in a plane perpendicular to the revolute axes.
+"""P-R-R-R legs, the paper's: a slider and two links in a plane across the revolute axes.
 
-In a PRRU leg a fourth revolute axis, along the platform's k, meets R3 at the platform point, so that
-the platform may turn against the leg.
+In a PRRU leg a fourth revolute axis, along the platform's k, meets R3 at the platform point, so
+that the platform may turn against the leg.
 """
 
 from __future__ import annotations
@@ -137,9 +137,7 @@ class PRRR(LegKind):
         return {"p": PointMass(self.slider_mass), "u": self.upper, "l": self.lower}
 
     def with_bodies(self, bodies: Mapping[str, Any]) -> PRRR:
-        return replace(
-            self, slider_mass=bodies["p"].mass, upper=bodies["u"], lower=bodies["l"]
-        )
+        return replace(self, slider_mass=bodies["p"].mass, upper=bodies["u"], lower=bodies["l"])
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 from pteron.atomic import write_text
-from pteron.bodies.inertia import Inertia, PointMass
+from pteron.bodies.inertia import PointMass
 from pteron.errors import ModelError
 from pteron.legs import KINDS, LegKind
 from pteron.manipulator.manipulator import STANDARD_GRAVITY, Manipulator
@@ -154,10 +154,11 @@ def _machine_table() -> Any:
 
     from pteron.bodies import tables
 
+    motion: Any = Literal[tuple(EQUATIONS)]
     platform = create_model(
         "PlatformTable",
         __base__=tables.PlanarBody,
-        motion=(Literal[tuple(EQUATIONS)], ...),
+        motion=(motion, ...),
         axis=(tables.Three, (0.0, 0.0, 1.0)),
         x_axis=(tables.Three | None, None),
     )
@@ -255,7 +256,7 @@ def _table(items: dict[str, Any]) -> Any:
     return table
 
 
-def _body(body: Inertia | Any) -> dict[str, Any]:
+def _body(body: Any) -> dict[str, Any]:
     if isinstance(body, PointMass):
         return {"mass": body.mass}
     return {"mass": body.mass, "first_moment": list(body.first_moment), "inertia": body.inertia}

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pteron.bodies.inertia import Inertia
 from pteron.bodies.parameters import PLATFORM, Parameter, parameter_list
 from pteron.errors import ModelError
 from pteron.manipulator.manipulator import Manipulator
@@ -128,13 +130,13 @@ def with_parameters(robot: Manipulator, values: ArrayLike) -> Manipulator:
     blocks: dict[tuple[str, tuple[int, ...]], list[float]] = {}
     for p, value in zip(listed, vector.tolist(), strict=True):
         blocks.setdefault((p.body, p.legs), []).append(value)
-    bodies = {}
-    for (body, legs), block in blocks.items():
-        old = robot.legs[legs[0] - 1].bodies[body] if legs else robot.platform.inertia
+    bodies: dict[tuple[str, tuple[int, ...]], Any] = {}
+    for (body, owner), block in blocks.items():
+        old: Inertia = robot.legs[owner[0] - 1].bodies[body] if owner else robot.platform.inertia
         try:
-            bodies[body, legs] = old.of_values(block)
+            bodies[body, owner] = old.of_values(block)
         except ModelError as error:
-            name = body + "".join(map(str, legs))
+            name = body + "".join(map(str, owner))
             raise ModelError(f"parameters of body {name}: {error}") from None
     legs = tuple(
         leg.with_bodies({body: bodies[body, (i,)] for body in leg.bodies})

@@ -42,9 +42,7 @@ class PlatformEquations(ABC):
     coordinates: ClassVar[tuple[str, ...]]
     """The pose's coordinates, in order."""
 
-    def __init__(
-        self, frame: Sequence[Expression], platform_points: Sequence[Expression]
-    ) -> None:
+    def __init__(self, frame: Sequence[Expression], platform_points: Sequence[Expression]) -> None:
         self.frame, self.points = frame, platform_points
         x0, y0, k = frame
         self.offsets = [
@@ -68,4 +66,3 @@ class PlatformEquations(ABC):
             m, hx, hy = m + mass, hx + s[0] * mass, hy + s[1] * mass
             i = i + (s[0] * s[0] + s[1] * s[1]) * mass
         return Moments(m, hx, hy, i)
-

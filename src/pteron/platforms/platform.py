@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from pteron.errors import ModelError
 from pteron.bodies.inertia import PlanarInertia
 from pteron.bodies.vectors import Vector, cross, perpendicular, unit_vector
+from pteron.errors import ModelError
 
 Motion = Literal["3T", "3T1R"]
 """3T: the platform only translates. 3T1R: it also turns about its axis (Schoenflies motion)."""

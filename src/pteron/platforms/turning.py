@@ -22,9 +22,7 @@ class Turning(PlatformEquations):
         for a, b, still in self.offsets:
             s, lever, dds = _turned(a, b, angle)
             points.append(PointMotion(p + s + still, dp + lever * angle.rate, ddp + dds))
-            matrices.append(
-                ca.vertcat(ca.horzcat(ca.SX.eye(3), lever), ca.SX([[0, 0, 0, 1]]))
-            )
+            matrices.append(ca.vertcat(ca.horzcat(ca.SX.eye(3), lever), ca.SX([[0, 0, 0, 1]])))
         x0, y0, k = self.frame
         x, y, ddx = _turned(x0, y0, angle)
         ddy = _turned(y0, -x0, angle)[2]

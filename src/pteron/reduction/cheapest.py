@@ -13,7 +13,6 @@ from pteron.manipulator import Manipulator, parameter_data
 from pteron.reduction.find import base_parameters
 from pteron.reduction.result import BaseParameters
 
-
 _NONZERO = 1e-9
 """Pivots of the grouping, whose entries are of order one in lengths of a link, are larger."""
 

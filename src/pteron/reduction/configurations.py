@@ -12,7 +12,6 @@ from pteron.legs.circles import random_fraction
 from pteron.manipulator import Manipulator, parameter_data
 from pteron.reduction.exact_geometry import ExactGeometry
 
-
 _ATTEMPTS = 20000
 Element = TypeVar("Element")
 

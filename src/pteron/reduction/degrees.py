@@ -8,7 +8,6 @@ from functools import lru_cache
 from pteron.kernels import evaluate, general_program
 from pteron.manipulator import Manipulator, parameter_data
 
-
 Degree = tuple[int, int]
 """Bounds on the degrees of numerator and denominator."""
 

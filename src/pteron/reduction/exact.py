@@ -35,7 +35,6 @@ from pteron.reduction.numerical import fitted_shares, numerical_rank
 from pteron.reduction.symbols import algebraic_values, symbolic_shares
 from pteron.reduction.transfers import Transfer
 
-
 _BITS = 61
 _MOST_PRIMES = 8
 _ROOTS_PRIMES = 3

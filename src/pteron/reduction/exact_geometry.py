@@ -118,7 +118,7 @@ class ExactGeometry:
 
     def symbols(self) -> dict[str, Surd]:
         """Return the values of the geometric symbols lu1, ll1, s1x, s1y, ... of the transfers."""
-        values = {}
+        values: dict[str, Surd] = {}
         for i, leg in enumerate(self.legs, start=1):
             values |= {f"{symbol}{i}": value for symbol, value in leg.lengths.items()}
             values[f"s{i}x"], values[f"s{i}y"] = leg.platform_point[:2]
@@ -210,9 +210,7 @@ def _exact_leg(
         if q.role == "point":
             # It enters the regressor only through c - r: no rank hangs on its last digits.
             at = frame @ (np.array(q.value) - shift)
-            values[q.name] = tuple(
-                Surd(Fraction(float(c)).limit_denominator(10**9)) for c in at
-            )
+            values[q.name] = tuple(Surd(Fraction(float(c)).limit_denominator(10**9)) for c in at)
         elif q.role == "direction":
             directions.append(exact[f"{q.symbol}{i + 1}"])
             values[q.name] = directions[-1]

@@ -11,7 +11,6 @@ from sympy import Add, Float, Integer, Mul, Rational, Symbol, factor, latex
 from pteron.bodies.parameters import Parameter
 from pteron.reduction.grouping import Share, Shares
 
-
 Terms = Mapping[int, Share]
 
 _FACTORED = 60

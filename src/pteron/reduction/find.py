@@ -15,7 +15,6 @@ from pteron.reduction.result import BaseParameters
 from pteron.reduction.sharing import Sharing, default_order, leg_groups, share
 from pteron.reduction.transfers import transfers
 
-
 Method = Literal["exact", "svd", "qr"]
 
 _NUMERICAL: dict[str, Callable[..., Grouping]] = {"svd": svd_grouping, "qr": qr_grouping}

@@ -20,7 +20,6 @@ from pteron.manipulator import parameters
 from pteron.reduction.cheapest import cheapest_parameters
 from pteron.reduction.result import BaseParameters
 
-
 Form = Callable[[Expression, Expression, Expression, Expression], Expression]
 """Of J^-T (n, m), the bracket of Eq. (15) (m, N), selection (N, K) and parameters (K, 1)."""
 

@@ -13,7 +13,6 @@ from pteron.manipulator import Manipulator, parameter_data
 from pteron.reduction.certificate import NumericalCertificate
 from pteron.reduction.grouping import Grouping, Shares
 
-
 _TOLERANCE = 1e-10
 """Relative to the largest; columns are scaled to unit length. Rounding leaves 1e-14, and what is
 identifiable at all 1e-6 and more: the certificate reports the gap."""

@@ -44,7 +44,8 @@ def base_regressor(
     UnreachablePose
         If a leg does not reach a pose.
     SingularPose
-        If a leg is stretched or folded (type I), or the actuators do not hold the platform (type II).
+        If a leg is stretched or folded (type I), or the actuators do not hold the platform
+        (type II).
 
     Examples
     --------

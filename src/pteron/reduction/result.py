@@ -22,7 +22,6 @@ from pteron.reduction.grouping import Grouping, Shares
 from pteron.reduction.symbols import named_values, symbolic_shares
 from pteron.reduction.transfers import Transfer
 
-
 Form = Literal["text", "sympy", "latex"]
 
 

@@ -15,7 +15,6 @@ from pteron.reduction.surds import Surd
 from pteron.reduction.transfers import Transfer
 
 
-
 def named_values(geometry: ExactGeometry) -> dict[str, Any]:
     """Return what stands for each geometric symbol: a SymPy symbol, minus one, or zero.
 

@@ -11,7 +11,6 @@ from pteron.kinematics import inverse_kinematics, random_poses, singular_orienta
 from pteron.manipulator import Manipulator
 from pteron.workspace.reserve import reserve
 
-
 _SEARCHES = ((0.3, 0.3), (0.02, 0.02), (0.0, 0.0))
 """The measures that random poses must have: less where the legs have little common reach."""
 

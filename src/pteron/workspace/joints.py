@@ -15,7 +15,6 @@ from pteron.shapes import PoseLike
 from pteron.workspace.reserve import clearances
 
 
-
 @dataclass(frozen=True)
 class JointRanges:
     """The part of its range that each joint uses.

@@ -16,7 +16,6 @@ from pteron.shapes import PoseLike
 from pteron.workspace.reserve import room_to_limits
 from pteron.workspace.volume import bounding_box
 
-
 REACHABLE = 0
 """Status of a pose that serves."""
 

@@ -16,7 +16,6 @@ from pteron.manipulator import Manipulator
 from pteron.shapes import PoseLike
 from pteron.workspace.reserve import room_to_limits
 
-
 _SAMPLES = 20_000
 _STARTS = 5
 
@@ -111,7 +110,9 @@ def bounding_box(robot: Manipulator, pose: PoseLike) -> Array:
     for axis in range(3):
         for side, sign in enumerate((1.0, -1.0)):
             firsts = good[np.argsort(sign * good[:, axis])[:_STARTS]]
-            sides[side, axis] = sign * min(_furthest(room, p, sign * np.eye(3)[axis]) for p in firsts)
+            sides[side, axis] = sign * min(
+                _furthest(room, p, sign * np.eye(3)[axis]) for p in firsts
+            )
     return sides
 
 
