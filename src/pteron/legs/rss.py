@@ -149,7 +149,7 @@ class RSS(LegKind):
         )
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
-        """Parallel rods keep the bar at their ends along the crank's axis; a single one does not."""
+        """Parallel rods keep the bar at their ends along the crank's axis; one alone does not."""
         return (self.direction,) if self.rods > 1 else ((1, 0, 0), (0, 1, 0), (0, 0, 1))
 
     @property

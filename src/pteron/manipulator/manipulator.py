@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -80,6 +81,13 @@ class Manipulator:
         _check_constraints(self.platform, legs)
         object.__setattr__(self, "legs", legs)
         object.__setattr__(self, "gravity", vector(self.gravity, "gravity"))
+
+    def __repr__(self) -> str:
+        """Return the machine in a line; `save` writes all of it."""
+        kinds = " + ".join(
+            f"{count} {kind}" for kind, count in Counter(leg.type for leg in self.legs).items()
+        )
+        return f"<Manipulator {self.name!r}: {kinds} under a {self.platform.motion} platform>"
 
     @property
     def freedom(self) -> int:
