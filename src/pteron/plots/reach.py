@@ -55,9 +55,8 @@ def reach_figure(cut: ReachSlice, *, path: Array | None = None) -> Figure:
         fill(cut.margin, REACH, 0.24, float(level))
     for i, margin in enumerate(legs):
         if margin.min() < 0.0 < margin.max():
-            color, dashes = [LEG_COLORS[i]], [_DASHES[i]]
-            edge = axes.contour(first, second, margin, levels=[0.0], colors=color)
-            edge.set(linestyles=dashes, linewidths=1.6)
+            edge = axes.contour(first, second, margin, levels=[0.0], colors=[LEG_COLORS[i]])
+            edge.set(linestyles=[_DASHES[i]], linewidths=1.6)
     i, j = ("xyz".index(letter) for letter in cut.plane)
     if path is not None:
         for color, width in ((PAPER, 3.2), (INK, 1.4)):
