@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from pteron.manipulator import load
 from pteron.reduction import base_parameters
 
-__all__ = ["Row", "rows"]
-
 PRINTED = (
     "m_p1 + m_u1 + 20.11 I_l1",
     "m_p2 + m_u2 + 38.58 I_l2",

@@ -9,25 +9,14 @@ import numpy as np
 
 from pteron.identification import Identification, Treatment
 from pteron.kernels import Array
-from pteron.report.digits import fixed, significant
-
-__all__ = ["TreatedLog", "treated_logs"]
-
-_SLOW = 1e3
-"""mm/s in a m/s."""
+from pteron.report.typeset import fixed, significant
 
 
 @dataclass(frozen=True)
 class TreatedLog:
     """How one recording was treated.
 
-    Attributes
-    ----------
-    name : str
-    steps : tuple of (str, str, str)
-        What, how much, and a sentence on why.
-    slider_noise, force_noise, slow : array, shape (n,)
-        µm, N and mm/s.
+    Steps are what, how much, and a sentence on why; the arrays (n,) are in µm, N and mm/s.
     """
 
     name: str
@@ -46,7 +35,7 @@ def treated_logs(result: Identification, names: Mapping[str, str]) -> tuple[Trea
             _steps(treatment, modes),
             1e6 * treatment.slider_noise,
             np.asarray(treatment.force_noise),
-            _SLOW * treatment.slow,
+            1e3 * treatment.slow,
         )
         for prediction, treatment in zip(result.fitted, result.treatments, strict=True)
     )
