@@ -92,36 +92,57 @@ def _parse(text: str, source: str) -> Manipulator:
     try:
         table = ManipulatorTable.model_validate(document)
     except ValidationError as error:
-        raise ModelError(f"{source}: {_first_fault(error)}") from None
-    try:
-        return _manipulator(table)
-    except ModelError as error:
-        raise ModelError(f"{source}: {error}") from None
+        raise _faulty(source, _faults(error)) from None
+    faults: list[str] = []
+    robot = _manipulator(table, faults)
+    if robot is None:
+        raise _faulty(source, faults)
+    return robot
 
 
-def _first_fault(error: ValidationError) -> str:
-    """Return the first fault on one line: the key, what was given and what was expected."""
-    faults = error.errors(include_url=False)
-    fault = faults[0]
-    key = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in fault["loc"]).lstrip(".")
-    kind, given = fault["type"], fault["input"]
-    if kind == "missing":
-        line = f"{key}: missing; the file must give it"
-    elif kind == "extra_forbidden":
-        line = f"{key}: unknown key (value {given!r}); check its spelling or remove it"
-    else:
-        line = f"{key}: {given!r} given; {fault['msg'][0].lower()}{fault['msg'][1:]}"
+def _faulty(source: str, faults: list[str]) -> ModelError:
+    """Return the error of a file: its message has the first fault, its attribute all of them."""
     more = len(faults) - 1
-    return line + (f" (and {more} more {'fault' if more == 1 else 'faults'})" if more else "")
-
-
-def _manipulator(table: ManipulatorTable) -> Manipulator:
-    p = table.platform
-    platform = _under(
-        "platform", lambda: Platform(p.motion, _body(p), axis=p.axis, x_axis=p.x_axis)
+    others = f" (and {more} more {'fault' if more == 1 else 'faults'})" if more else ""
+    return ModelError(
+        f"{source}: {faults[0]}{others}", faults=tuple(f"{source}: {fault}" for fault in faults)
     )
-    legs = tuple(_under(f"legs[{i}]", partial(_leg, leg)) for i, leg in enumerate(table.legs))
-    return Manipulator(table.name, platform, legs, table.gravity)
+
+
+def _faults(error: ValidationError) -> list[str]:
+    """Return each fault on one line: the key, what was given and what was expected."""
+    lines = []
+    for fault in error.errors(include_url=False):
+        key = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in fault["loc"]).lstrip(".")
+        kind, given = fault["type"], fault["input"]
+        if kind == "missing":
+            lines.append(f"{key}: missing; the file must give it")
+        elif kind == "extra_forbidden":
+            lines.append(f"{key}: unknown key (value {given!r}); check its spelling or remove it")
+        else:
+            lines.append(f"{key}: {given!r} given; {fault['msg'][0].lower()}{fault['msg'][1:]}")
+    return lines
+
+
+def _manipulator(table: ManipulatorTable, faults: list[str]) -> Manipulator | None:
+    """Return the machine; None where its parts have faults, which are added to the list."""
+    p = table.platform
+    parts: list[Any] = []
+    builders: list[tuple[str, Callable[[], Any]]] = [
+        ("platform", lambda: Platform(p.motion, _body(p), axis=p.axis, x_axis=p.x_axis)),
+        *((f"legs[{i}]", partial(_leg, leg)) for i, leg in enumerate(table.legs)),
+    ]
+    for key, build in builders:
+        try:
+            parts.append(_under(key, build))
+        except ModelError as error:
+            faults.append(str(error))
+    if not faults:
+        try:
+            return Manipulator(table.name, parts[0], tuple(parts[1:]), table.gravity)
+        except ModelError as error:
+            faults.append(str(error))
+    return None
 
 
 def _leg(table: LegTable) -> Leg:

@@ -46,10 +46,6 @@ def histogram_figure(residuals: Array) -> Figure:
     ----------
     residuals : array, shape (R, n)
         NaN where there is none.
-
-    Returns
-    -------
-    matplotlib Figure
     """
     figure = blank(5.4, 3.1)
     axes = plain_axes(figure, "residual (standard deviations)", "density")
@@ -82,10 +78,6 @@ def autocorrelation_figure(correlations: Array, bound: Array) -> Figure:
         At lags 1 to L.
     bound : array, shape (n,)
         Size that white noise keeps below, nineteen times in twenty.
-
-    Returns
-    -------
-    matplotlib Figure
     """
     figure = blank(5.4, 3.1)
     axes = plain_axes(figure, "lag (equations)", "autocorrelation")
@@ -120,10 +112,6 @@ def certainty_figure(
         Which of them the data hardly show.
     inertial : int
         How many of them, at the front, are inertial parameters.
-
-    Returns
-    -------
-    matplotlib Figure
     """
     p = len(names)
     figure = blank(5.4, 0.7 + 0.185 * p)
@@ -158,10 +146,6 @@ def correlation_figure(names: Sequence[str], correlation: Array) -> Figure:
         The p values.
     correlation : array, shape (p, p)
         From -1 to 1.
-
-    Returns
-    -------
-    matplotlib Figure
     """
     p = len(names)
     side = max(1.0 + 0.165 * p, 3.0)

@@ -56,10 +56,6 @@ def comparison_figure(
         Whether a sample counts; the others are shaded.
     leg : int
         Which actuator, from 0, for its colour.
-
-    Returns
-    -------
-    matplotlib Figure
     """
     figure = blank(4.4, 3.1)
     color = LEG_COLORS[leg]
@@ -91,10 +87,6 @@ def errors_figure(errors: Array, without_friction: Array, floor: Array) -> Figur
     errors, without_friction, floor : array, shape (n,)
         The whole model, the model without friction and offset, and the noise, in percent of the
         force's standard deviation.
-
-    Returns
-    -------
-    matplotlib Figure
     """
     n = len(errors)
     figure = blank(4.8, 0.75 + 0.34 * n)
@@ -132,10 +124,6 @@ def residual_time_figure(time: Array, residuals: Array, used: NDArray[np.bool_])
         N.
     used : array of bool, shape (T, n)
         Whether a sample counts; others are grey, and may lie outside.
-
-    Returns
-    -------
-    matplotlib Figure
     """
     n = residuals.shape[1]
     figure = blank(4.8, 0.5 + 0.8 * n)
@@ -169,10 +157,6 @@ def residual_speed_figure(
         Whether a sample counts; others are grey, and may lie outside.
     leg : int
         Which actuator, from 0, for its colour.
-
-    Returns
-    -------
-    matplotlib Figure
     """
     figure = blank(3.1, 2.4)
     axes = plain_axes(figure, "slider speed (m/s)", "residual (N)")

@@ -43,10 +43,6 @@ def forces_figure(
         Where the way back begins, s.
     ylabel : str
         What is shown; other quantities of the legs look the same.
-
-    Returns
-    -------
-    matplotlib Figure
     """
     figure = blank(5.4, 3.3)
     axes = plain_axes(figure, "time (s)", ylabel)
@@ -85,10 +81,6 @@ def regularity_figure(
         phi of the home pose, rad.
     used : (float, float), optional
         The least and greatest phi of a motion, rad.
-
-    Returns
-    -------
-    matplotlib Figure
     """
     figure = blank(5.4, 2.9)
     axes = plain_axes(figure, "orientation φ (degrees)", "|det J| / max |det J|")

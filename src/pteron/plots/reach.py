@@ -32,10 +32,6 @@ def reach_figure(cut: ReachSlice, *, path: Array | None = None) -> Figure:
         The slice.
     path : array, shape (T, 3), optional
         Positions of a motion, drawn in projection.
-
-    Returns
-    -------
-    matplotlib Figure
     """
     figure = blank(3.9, 3.9)
     axes = plain_axes(figure, f"{cut.plane[0]} (mm)", f"{cut.plane[1]} (mm)")

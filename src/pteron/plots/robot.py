@@ -38,10 +38,6 @@ def robot_figure(
         Positions of P in a motion.
     angle : str
         The orientation, in words, beside the platform frame's x axis.
-
-    Returns
-    -------
-    matplotlib Figure
     """
     figure = blank(5.6, 4.4)
     space = Space(figure, points.axes[2] if gravity is None else -gravity)

@@ -1,8 +1,8 @@
 """Operations of the dynamic model in each of its forms, complete and reduced.
 
 The paper says that its reduced model is about 41 % faster than the complete one. How much a
-reduction saves depends on the form: all of them stand side by side here. `benchmarks/paper_claim.py`
-measures their times.
+reduction saves depends on the form: all of them stand side by side here, and their times in
+`benchmarks/paper_claim.py`.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Cost:
 def costs(base: BaseParameters) -> tuple[Cost, ...]:
     """Return the cost of every form, the complete one before the reduced one."""
     every = range(base.selection.shape[0])
-    counts = {(key): kernel.operations for key, kernel in model_forms(base).items()}
+    counts = {key: kernel.operations for key, kernel in model_forms(base).items()}
     counts["dense", "complete"] = dense_operations(base, every)
     counts["dense", "reduced"] = dense_operations(base, base.kept)
     found = []
@@ -60,10 +60,10 @@ def dense_operations(base: BaseParameters, kept: Sequence[int]) -> int:
     A product (a, b) (b, c) counts a c (2 b - 1), an elimination with c right sides about
     2 m^3 / 3 + 2 m^2 c. Columns are the sliders', those of the links, and four of the platform.
     """
-    m = base.robot.freedom
+    m: int = base.robot.freedom
     platform = base.selection.shape[0] - 4
     sliders = sum(k < m for k in kept)
     links = sum(m <= k < platform for k in kept)
     products = m * sliders * (2 * m - 1) + m * links * (2 * 6 - 1)
-    elimination = round(2 * m**3 / 3) + 2 * m * m * len(kept)
+    elimination = round(2.0 * m * m * m / 3.0) + 2 * m * m * len(kept)
     return products + elimination + m * (2 * len(kept) - 1)

@@ -41,7 +41,7 @@ def doubts(robot: Manipulator) -> tuple[str, ...]:
     """
     found = []
     if hypot(*robot.gravity) > _PULL:
-        found.append(f"gravity: {hypot(*robot.gravity):g} m/s^2: is that in m/s^2?")
+        found.append(f"gravity: {hypot(*robot.gravity):g} m/s^2: is that mm/s^2?")
     platform = robot.platform.inertia
     radius = max(hypot(*leg.platform_point) for leg in robot.legs)
     if radius > 0.0:
@@ -107,14 +107,15 @@ def value_doubts(robot: Manipulator, columns: Sequence[str], values: Array) -> t
         hypot(*leg.guide_point) + leg.upper_length + leg.lower_length + hypot(*leg.platform_point)
         for leg in robot.legs
     )
+    lengths = [k for k, name in enumerate(columns) if name in "xyz" or name.startswith("rho")]
+    angles = [k for k, name in enumerate(columns) if name == "phi"]
     found = []
-    for kind, far, question in (
-        (lambda name: name in "xyz" or name.startswith("rho"), 10.0 * size, "are these mm? In m"),
-        (lambda name: name == "phi", 2.0 * np.pi, "are these degrees? In rad"),
+    for chosen, far, question in (
+        (lengths, 10.0 * size, "are these mm? m are expected"),
+        (angles, 2.0 * np.pi, "are these degrees? rad are expected"),
     ):
-        chosen = [k for k, name in enumerate(columns) if kind(name)]
-        largest = float(np.nanmax(np.abs(np.asarray(values)[..., chosen]), initial=0.0))
+        largest = float(np.nanmax(np.abs(values[..., chosen]), initial=0.0))
         if largest > far:
             names = ", ".join(columns[k] for k in chosen)
-            found.append(f"{names} up to {largest:g}: {question} they must be")
+            found.append(f"{names} up to {largest:g}: {question}")
     return tuple(found)

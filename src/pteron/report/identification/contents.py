@@ -25,7 +25,7 @@ _LAGS = 40
 
 @dataclass(frozen=True)
 class Shown:
-    """A recording as the page calls it, and the stretch of samples in which the model misses most."""
+    """A recording as the page calls it, and the samples among which the model misses most."""
 
     name: str
     prediction: Prediction

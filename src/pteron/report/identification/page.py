@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup, escape
@@ -66,109 +66,66 @@ def _percent(share: float) -> str:
     return "less than 0.01 %" if 0.0 <= share < 1e-4 else f"{significant(100.0 * share, 2)} %"
 
 
-@dataclass(frozen=True)
-class Panels:
-    """The pictures of one recording; those over speed only where they are asked for."""
-
-    shown: Shown
-    errors: Markup
-    forces: tuple[Markup, ...]
-    time: Markup
-    speed: tuple[Markup, ...]
-
-
-@dataclass(frozen=True)
-class Figures:
-    """The pictures; those of residuals are None where an estimator keeps none."""
-
-    held_out: tuple[Panels, ...]
-    fitted: Panels
-    histogram: Markup | None
-    autocorrelation: Markup | None
-    certainty: Markup
-    correlation: Markup
-
-
-def figures(found: Contents) -> Figures:
-    """Return the pictures of a page."""
-    rows, estimate = found.parameters, found.result.estimate
+def figures(found: Contents) -> dict[str, Any]:
+    """Return the pictures as SVG; those of residuals are None where an estimator keeps none."""
+    rows = found.parameters
     names = [row.name for row in rows]
-    certainty = certainty_figure(
-        names,
-        np.array([row.ratio for row in rows]),
-        np.array([row.weak for row in rows]),
-        found.result.model.base.rank,
-    )
-    histogram = autocorrelation = None
-    if np.isfinite(found.residuals).any():
-        histogram = _inline(
-            histogram_figure(found.residuals),
-            "histogram",
-            "Distribution of the residuals against the normal one",
-        )
-        autocorrelation = _inline(
-            autocorrelation_figure(found.correlations, found.bound),
-            "autocorrelation",
-            "Autocorrelation of the residuals",
-        )
-    return Figures(
-        held_out=tuple(
+    ratios, weak = np.array([row.ratio for row in rows]), np.array([row.weak for row in rows])
+    made: dict[str, Any] = {
+        "held_out": [
             _panels(one, f"held{k}", speed=k == 1) for k, one in enumerate(found.drawn, start=1)
+        ],
+        "fitted": _panels(found.fitted[0], "fitted", speed=not found.drawn),
+        "histogram": None,
+        "autocorrelation": None,
+        "certainty": _inline(
+            certainty_figure(names, ratios, weak, found.result.model.base.rank),
+            "certainty",
+            "Size of each value over its standard deviation",
         ),
-        fitted=_panels(found.fitted[0], "fitted", speed=not found.drawn),
-        histogram=histogram,
-        autocorrelation=autocorrelation,
-        certainty=_inline(certainty, "certainty", "Size of each value over its standard deviation"),
-        correlation=_inline(
-            correlation_figure(names, estimate.correlation),
+        "correlation": _inline(
+            correlation_figure(names, found.result.estimate.correlation),
             "correlation",
             "Correlations of the identified values",
         ),
-    )
+    }
+    if np.isfinite(found.residuals).any():
+        figure = histogram_figure(found.residuals)
+        title = "Distribution of the residuals against the normal one"
+        made["histogram"] = _inline(figure, "histogram", title)
+        figure = autocorrelation_figure(found.correlations, found.bound)
+        made["autocorrelation"] = _inline(
+            figure, "autocorrelation", "Autocorrelation of the residuals"
+        )
+    return made
 
 
-def _panels(shown: Shown, name: str, *, speed: bool) -> Panels:
+def _panels(shown: Shown, name: str, *, speed: bool) -> dict[str, Any]:
+    """Return the pictures of one recording; those over speed only where they are asked for."""
     p, part = shown.prediction, shown.stretch
-    legs = range(p.measured.shape[1])
     rest = p.measured - p.predicted
-    forces = (
-        _inline(
-            comparison_figure(
-                p.time[part],
-                p.measured[part, i],
-                p.predicted[part, i],
-                p.without_friction[part, i],
-                p.used[part, i],
-                leg=i,
-            ),
-            f"{name}forces{i + 1}",
-            f"Measured and predicted force of actuator {i + 1} in {shown.name}",
-        )
-        for i in legs
-    )
-    over_speed = (
-        _inline(
-            residual_speed_figure(p.speed[:, i], rest[:, i], p.used[:, i], leg=i),
-            f"{name}speed{i + 1}",
-            f"Residual of actuator {i + 1} over its slider's speed in {shown.name}",
-        )
-        for i in (legs if speed else ())
-    )
-    return Panels(
-        shown,
-        _inline(
-            errors_figure(p.nrms, p.nrms_without_friction, p.floor),
-            f"{name}errors",
-            f"Errors of the prediction of {shown.name}",
-        ),
-        tuple(forces),
-        _inline(
-            residual_time_figure(p.time, rest, p.used),
-            f"{name}time",
-            f"Residuals of all actuators over time in {shown.name}",
-        ),
-        tuple(over_speed),
-    )
+    series = p.measured[part], p.predicted[part], p.without_friction[part]
+    forces, over_speed = [], []
+    for i in range(p.measured.shape[1]):
+        given, predicted, rigid = (one[:, i] for one in series)
+        used = p.used[part, i]
+        figure = comparison_figure(p.time[part], given, predicted, rigid, used, leg=i)
+        title = f"Measured and predicted force of actuator {i + 1} in {shown.name}"
+        forces.append(_inline(figure, f"{name}forces{i + 1}", title))
+        if speed:
+            figure = residual_speed_figure(p.speed[:, i], rest[:, i], p.used[:, i], leg=i)
+            title = f"Residual of actuator {i + 1} over its slider's speed in {shown.name}"
+            over_speed.append(_inline(figure, f"{name}speed{i + 1}", title))
+    errors = errors_figure(p.nrms, p.nrms_without_friction, p.floor)
+    time = residual_time_figure(p.time, rest, p.used)
+    title = f"Residuals of all actuators over time in {shown.name}"
+    return {
+        "shown": shown,
+        "forces": forces,
+        "speed": over_speed,
+        "errors": _inline(errors, f"{name}errors", f"Errors of the prediction of {shown.name}"),
+        "time": _inline(time, f"{name}time", title),
+    }
 
 
 def _inline(figure: Figure, name: str, title: str) -> Markup:
