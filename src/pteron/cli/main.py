@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from inspect import cleandoc
 from io import StringIO
 from typing import Annotated, Any
 
-from typer import Context, Exit, Option, Typer, echo
+from typer import Abort, Context, Exit, Option, Typer, echo
 from typer.core import TyperGroup
 
 from pteron.cli.arguments import Command, NumbersCommand, without_types
@@ -36,22 +36,14 @@ class Program(TyperGroup):
         """Return the parameters, flags without a type in the help."""
         return without_types(super().get_params(ctx))
 
-    def main(
-        self,
-        args: Sequence[str] | None = None,
-        prog_name: str | None = None,
-        complete_var: str | None = None,
-        standalone_mode: bool = True,
-        windows_expand_args: bool = True,
-        **extra: Any,
-    ) -> Any:
-        """Run a subcommand and exit; `standalone_mode` is always on."""
+    def main(self, *args: Any, **extra: Any) -> Any:
+        """Run a subcommand and exit."""
         _open_closed_streams()
         try:
-            status = super().main(
-                args, prog_name, complete_var, False, windows_expand_args, **extra
-            )
+            status = super().main(*args, **extra | {"standalone_mode": False})
             sys.stdout.flush()
+            if status == _INTERRUPTED:  # Typer has caught it
+                raise KeyboardInterrupt
         except PteronError as error:
             complain(str(error))
             status = _USER_ERROR
@@ -63,7 +55,7 @@ class Program(TyperGroup):
             complain(f"{where}: {error.strerror or error}")
             _close_standard_output()
             status = _USER_ERROR
-        except KeyboardInterrupt:
+        except (Abort, KeyboardInterrupt):
             note("Interrupted")
             status = _INTERRUPTED
         except Exception as error:

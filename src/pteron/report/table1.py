@@ -80,12 +80,13 @@ def rows() -> tuple[Row, ...]:
         zip(PRINTED, exact, base.names, strict=True), start=1
     ):
         shown = base.expressions()[i - 1]
-        agrees = _agree(printed, computed)
+        agrees = agree(printed, computed)
         found.append(Row(f"P_b{i}", name, printed, shown, agrees, i in RESTORED))
     return tuple(found)
 
 
-def _agree(printed: str, computed: str) -> bool:
+def agree(printed: str, computed: str) -> bool:
+    """Say whether two sums have the same terms, computed coefficients rounding to the printed."""
     given, found = _terms(printed), _terms(computed)
     return given.keys() == found.keys() and all(
         round(float(found[name]), _decimals(text)) == float(text) for name, text in given.items()
