@@ -47,12 +47,8 @@ def _drawn_quickly(monkeypatch: pytest.MonkeyPatch) -> None:
 QUICK = pytest.mark.usefixtures("_drawn_quickly")
 
 
-@pytest.mark.parametrize("robot", ["quadrupteron", "tripteron"])
-def test_the_files_agree_with_each_other_and_with_the_terminal(
-    robot: str, request: pytest.FixtureRequest
-):
-    if robot == "quadrupteron":  # one page is enough
-        request.getfixturevalue("_drawn_quickly")
+def test_the_files_agree_with_each_other_and_with_the_terminal():
+    robot = "tripteron"
     write_log(log(robot), "fit.csv")
     write_log(log(robot, 5, 3.0), "other.parquet")
     text = done(f"identify fit.csv --held-out other.parquet --robot {robot} --out a/b")
@@ -74,11 +70,10 @@ def test_the_files_agree_with_each_other_and_with_the_terminal(
     assert weak
     assert marked == weak
 
-    if robot == "tripteron":
-        page = Reader((folder / "identification.html").read_text(encoding="utf-8"))
-        assert page.faults == page.open == page.sources == []
-        assert grade.capitalize() in page.text
-        assert f"{robot}.toml" in page.text
+    page = Reader((folder / "identification.html").read_text(encoding="utf-8"))
+    assert page.faults == page.open == page.sources == []
+    assert grade.capitalize() in page.text
+    assert f"{robot}.toml" in page.text
 
     machine = pteron.load(folder / f"{robot}.toml")
     np.testing.assert_allclose(pteron.parameters(machine), data["real_bodies"]["parameters"])
