@@ -293,9 +293,9 @@ def test_the_condition_number_mixes_no_units():
 def test_symbols_stand_for_their_numbers():
     for base in (report("quadrupteron").base, pteron.base_parameters(CATALOG["tripteron-oblique"])):
         found = in_symbols(base)
-        names = [re.sub("<[^>]*>", "", line) for line, _ in found.lengths]
-        values = {n: v for n, (_, v) in zip(names, found.lengths, strict=True)}
-        for line, expected in zip(found.sums, base.expressions(digits=12), strict=True):
+        names = [re.sub("<[^>]*>", "", line) for line, _ in found["lengths"]]
+        values = {n: v for n, (_, v) in zip(names, found["lengths"], strict=True)}
+        for line, expected in zip(found["sums"], base.expressions(digits=12), strict=True):
             text = re.sub(r"<sup>(\d)</sup>", r"**\1", line)
             text = re.sub("<[^>]*>", "", text).replace("\u2212", "-").replace("\u202f", "*")
             given = [eval(size, {}, values) for size in re.findall(r"\((.*?)\) [mI]", text)]

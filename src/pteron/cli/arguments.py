@@ -120,13 +120,7 @@ def _numeric(word: str) -> bool:
 
 
 def parsed_numbers(words: Sequence[str], names: Sequence[str], what: str) -> list[float]:
-    """Return the numbers in words, apart by blanks or commas; `names` say what each of them is.
-
-    Raises
-    ------
-    DataError
-        If one is not a finite number, or if their count is wrong.
-    """
+    """Return the finite numbers in words, apart by blanks or commas; `names` say what each is."""
     parts = " ".join(words).replace(",", " ").split()
     values = []
     for part in parts:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from shutil import get_terminal_size
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from rich.table import Table
 from typer import Argument
@@ -88,7 +88,8 @@ def identify(
     machine with real bodies as NAME.toml. The exit code is 0 whatever the verdict.
     """
     machine = load_robot(robot, elbows)
-    drawn = _cad(cad)
+    named = {"robot": "robot", "none": None}
+    drawn: Any = named[cad] if cad in named else load_robot(cad)
     with spinner("Opening the logs"):
         from pteron.identification import Processing, open_log
         from pteron.identification import identify as identified
@@ -96,7 +97,7 @@ def identify(
         from pteron.report.write import checked_folder
 
         terms = _terms(without, joints, rotors=rotors, payload=payload)
-        bounds = _bounds(boxes or (), machine)
+        bounds = _bounds(boxes, machine)
         processing = Processing(derivatives, cutoff, band, period)
         fit, check = (
             [open_log(path, machine, description=description) for path in paths]
@@ -135,23 +136,11 @@ def _terms(without: str | None, joints: Joints, *, rotors: bool, payload: bool) 
     for name in left_out:
         if name not in _TERMS:
             raise DataError(f"--without: {name!r} is not one of {', '.join(_TERMS)}")
-    return Terms(
-        coulomb="coulomb" not in left_out,
-        viscous="viscous" not in left_out,
-        offset="offset" not in left_out,
-        joints=joints,
-        payload=payload,
-        rotors=rotors,
-    )
+    friction = {name: name not in left_out for name in _TERMS}
+    return Terms(**friction, joints=joints, payload=payload, rotors=rotors)
 
 
-def _cad(which: str) -> Manipulator | Literal["robot"] | None:
-    if which == "robot":
-        return "robot"
-    return None if which == "none" else load_robot(which)
-
-
-def _bounds(boxes: list[str] | tuple[()], machine: Manipulator) -> Bounds | None:
+def _bounds(boxes: list[str] | None, machine: Manipulator) -> Bounds | None:
     """Return the boxes as bounds, refused before the work if they do not fit the machine."""
     if not boxes:
         return None
@@ -181,13 +170,13 @@ def _show(result: Identification, files: Written) -> None:
     color = _COLORS[verdict.grade]
     show(
         f"[bold {color}]{plain(result.robot.name)}: {verdict.grade}[/bold {color}], "
-        f"held-out error up to {worst:.3g} %"
+        f"held-out error up to {worst:.3g} %",
+        _errors(result),
+        _values(result),
+        *(plain(text) for text in (*verdict.reasons, *verdict.next_steps, *_bodies(result))),
+        *(f"[yellow]Note:[/yellow] {plain(one.message)}" for one in result.findings),
+        *(f"Written: {plain(str(path))}" for path in files.paths),
     )
-    show(_errors(result), _values(result))
-    show(*(plain(text) for text in (*verdict.reasons, *verdict.next_steps, *_bodies(result))))
-    for finding in result.findings:
-        show(f"[yellow]Note:[/yellow] {plain(finding.message)}")
-    show(*(f"Written: {plain(str(path))}" for path in files.paths))
 
 
 def _errors(result: Identification) -> Table:
@@ -213,18 +202,12 @@ def _values(result: Identification) -> Table:
     columns = ["parameter", *numbers, *(() if _narrow() else ("unit",)), ""]
     caption = "Base parameters are sums, named by one term; the page has them in full."
     made = table(*columns, numbers=numbers, caption=caption)
+    marks = {"essential": "", "dropped": "[yellow]weak[/]", "unseen": "[yellow]unseen[/]"}
     for row in parameter_rows(result):
         value, half = map(_ascii, measured(row.value, row.half))
         relative = ">999" if row.relative >= 9.995 else _ascii(significant(100.0 * row.relative, 2))
-        mark = (
-            ""
-            if not row.weak
-            else "[yellow]unseen[/]"
-            if row.status == "unseen"
-            else "[yellow]weak[/]"
-        )
         rest = () if _narrow() else (relative, row.unit)
-        made.add_row(plain(row.name), value, half, *rest, mark)
+        made.add_row(plain(row.name), value, half, *rest, marks[row.status])
     return made
 
 
@@ -242,13 +225,10 @@ def _bodies(result: Identification) -> tuple[str, ...]:
     if found is None:
         return result.notes
     border = f"; at the border: {', '.join(found.at_border)}" if found.at_border else ""
-    if found.feasible:
-        lines = [f"Real bodies have exactly these base parameters{border}."]
-    else:
-        lines = [
-            "No real bodies have exactly these base parameters; the nearest are "
-            f"{found.distance:.2g} standard deviations away{border}."
-        ]
+    lines = [f"Real bodies have exactly these base parameters{border}."]
+    if not found.feasible:
+        away = f"the nearest are {found.distance:.2g} standard deviations away{border}."
+        lines = [f"No real bodies have exactly these base parameters; {away}"]
     if not found.cad_feasible:
         lines.append(f"The CAD model itself is not real: {'; '.join(found.cad_violations)}.")
     return (*lines, *result.notes)

@@ -22,26 +22,24 @@ def catalog(json: Json = False) -> None:
     from pteron.manipulator import catalog as names
     from pteron.manipulator import load
 
-    machines = [load(name) for name in names()]
+    found = [{**_machine(robot), "legs": len(robot.legs)} for robot in map(load, names())]
     if json:
-        show_json(
-            [
-                {
-                    "name": robot.name,
-                    "motion": robot.platform.motion,
-                    "coordinates": list(robot.coordinates),
-                    "legs": len(robot.legs),
-                    "working_mode": signs(robot),
-                }
-                for robot in machines
-            ]
-        )
+        show_json(found)
         return
     made = table("name", "motion", "pose", "legs", "elbows", numbers=("legs",))
-    for robot in machines:
-        pose, legs = " ".join(robot.coordinates), str(len(robot.legs))
-        made.add_row(robot.name, robot.platform.motion, pose, legs, signs(robot))
+    for one in found:
+        pose, legs = " ".join(one["coordinates"]), str(one["legs"])
+        made.add_row(one["name"], one["motion"], pose, legs, one["working_mode"])
     show(made)
+
+
+def _machine(robot: Manipulator) -> dict[str, Any]:
+    return {
+        "name": robot.name,
+        "motion": robot.platform.motion,
+        "coordinates": list(robot.coordinates),
+        "working_mode": signs(robot),
+    }
 
 
 def check(
@@ -84,11 +82,8 @@ def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
 
     home = home_pose(robot)
     return {
-        "name": robot.name,
-        "motion": robot.platform.motion,
-        "coordinates": list(robot.coordinates),
+        **_machine(robot),
         "gravity": list(robot.gravity),
-        "working_mode": signs(robot),
         "legs": [_leg(leg) for leg in robot.legs],
         "singular_orientations": singular_orientations(robot).tolist(),
         "home_pose": home.tolist(),

@@ -99,13 +99,7 @@ class Rows:
 def given_rows(
     file: str | None, typed: Sequence[str] | None, what: str, names: Sequence[str]
 ) -> Rows:
-    """Return the rows of a table's file, or the one that was typed; `names` are its columns.
-
-    Raises
-    ------
-    DataError
-        If there are both or neither, or if the file cannot be read.
-    """
+    """Return the rows of a table's file, or the one that was typed; `names` are its columns."""
     if not typed:
         return rows_of_table(file, what, names)
     if file is not None:
@@ -140,14 +134,8 @@ def check_destination(
 ) -> None:
     """Refuse, before the work begins, a file that cannot be written or would lose data.
 
-    Parameters
-    ----------
-    out, source : str, optional
-        The file to be written and the one that was read.
-    table : Table
-        The rows read.
-    added : sequence of str
-        The columns of the result; those the table has already are replaced.
+    The columns `added` to the table replace those of the same name: it must not be written over the
+    file `source` that it was read from.
     """
     replaced = [name for name in added if name in table.columns]
     columns = f"{'column' if len(replaced) == 1 else 'columns'} {', '.join(replaced)}"
@@ -164,20 +152,10 @@ def check_destination(
 def deliver(
     result: Table, shown: Sequence[str], *, out: str | None, as_json: bool, single: bool = False
 ) -> None:
-    """Write or print a result.
+    """Write a result with all its columns to a file or a program, or show some to a person.
 
-    Parameters
-    ----------
-    result : Table
-        All its columns go to a file or a program.
-    shown : sequence of str
-        The columns a person sees; the last one is empty in a row that failed.
-    out : str, optional
-        The file to be written.
-    as_json : bool
-        Whether a program reads standard output.
-    single : bool
-        Whether the result belongs to numbers that were typed.
+    The last one of those `shown` is empty in a row that failed; a `single` result belongs to
+    numbers that were typed.
     """
     empty = result.frame[shown[-1]].null_count()
     without = f", {empty} of them without a result" if empty else ""

@@ -127,20 +127,9 @@ def svg(figure: Figure, *, name: str, title: str) -> str:
     """Return a figure as one `<svg>` element for an HTML page.
 
     It holds no date, no random identifier and no address, and its colours are CSS variables with
-    the printed colours as defaults. Text stays text, in the page's font.
-
-    Parameters
-    ----------
-    figure : matplotlib Figure
-        The picture.
-    name : str
-        Put before every identifier, which must be unique in a page: letters and digits.
-    title : str
-        What the picture shows, for those who cannot see it.
-
-    Returns
-    -------
-    str
+    the printed colours as defaults. Text stays text, in the page's font. The name, of letters and
+    digits, is put before every identifier, which must be unique in a page; the title says what the
+    picture shows to those who cannot see it.
     """
     buffer = StringIO()
     with mpl.rc_context({"svg.hashsalt": "pteron", "svg.fonttype": "none"}):

@@ -42,10 +42,7 @@ _REACH = 4.5
 def histogram_figure(residuals: Array) -> Figure:
     """Return the distribution of residuals, each in its standard deviation, and the normal one.
 
-    Parameters
-    ----------
-    residuals : array, shape (R, n)
-        NaN where there is none.
+    Residuals have shape (R, n), NaN where there is none.
     """
     figure = blank(5.4, 3.1)
     axes = plain_axes(figure, "residual (standard deviations)", "density")
@@ -72,12 +69,8 @@ def histogram_figure(residuals: Array) -> Figure:
 def autocorrelation_figure(correlations: Array, bound: Array) -> Figure:
     """Return the autocorrelation of residuals, and the band in which white noise stays.
 
-    Parameters
-    ----------
-    correlations : array, shape (L, n)
-        At lags 1 to L.
-    bound : array, shape (n,)
-        Size that white noise keeps below, nineteen times in twenty.
+    Correlations (L, n) are those at lags 1 to L; white noise keeps below the bound (n,) nineteen
+    times in twenty.
     """
     figure = blank(5.4, 3.1)
     axes = plain_axes(figure, "lag (equations)", "autocorrelation")
@@ -102,16 +95,8 @@ def certainty_figure(
 ) -> Figure:
     """Return each value over its standard deviation, on a logarithmic scale.
 
-    Parameters
-    ----------
-    names : sequence of str
-        The p values.
-    ratios : array, shape (p,)
-        Size of each value over its standard deviation.
-    weak : array of bool, shape (p,)
-        Which of them the data hardly show.
-    inertial : int
-        How many of them, at the front, are inertial parameters.
+    The p values have names, ratios (p,) of size to standard deviation, and are `weak` (p,) where
+    the data hardly show them. The first `inertial` of them are inertial parameters.
     """
     p = len(names)
     figure = blank(5.4, 0.7 + 0.185 * p)
@@ -138,15 +123,7 @@ def certainty_figure(
 
 
 def correlation_figure(names: Sequence[str], correlation: Array) -> Figure:
-    """Return a matrix of correlations: blue goes together, orange one for the other.
-
-    Parameters
-    ----------
-    names : sequence of str
-        The p values.
-    correlation : array, shape (p, p)
-        From -1 to 1.
-    """
+    """Return a matrix (p, p) of correlations: blue goes together, orange one for the other."""
     p = len(names)
     side = max(1.0 + 0.165 * p, 3.0)
     figure = blank(side, side)

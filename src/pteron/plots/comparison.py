@@ -46,16 +46,8 @@ def comparison_figure(
 ) -> Figure:
     """Return an actuator's measured and predicted force over time, and their difference below.
 
-    Parameters
-    ----------
-    time : array, shape (T,)
-        s.
-    measured, predicted, without_friction : array, shape (T,)
-        N; the last one is what the model says without friction and offset.
-    used : array of bool, shape (T,)
-        Whether a sample counts; the others are shaded.
-    leg : int
-        Which actuator, from 0, for its colour.
+    Time (T,) is in s, forces (T,) in N, the last one without friction and offset. Samples that are
+    not `used` (T,) do not count and are shaded. `leg`, from 0, gives the colour.
     """
     figure = blank(4.4, 3.1)
     color = LEG_COLORS[leg]
@@ -82,11 +74,8 @@ def comparison_figure(
 def errors_figure(errors: Array, without_friction: Array, floor: Array) -> Figure:
     """Return the errors of a prediction beside the noise, on a logarithmic scale.
 
-    Parameters
-    ----------
-    errors, without_friction, floor : array, shape (n,)
-        The whole model, the model without friction and offset, and the noise, in percent of the
-        force's standard deviation.
+    The errors (n,) of the whole model and of that without friction and offset, and the noise, are
+    in percent of the force's standard deviation.
     """
     n = len(errors)
     figure = blank(4.8, 0.75 + 0.34 * n)
@@ -116,14 +105,8 @@ def errors_figure(errors: Array, without_friction: Array, floor: Array) -> Figur
 def residual_time_figure(time: Array, residuals: Array, used: NDArray[np.bool_]) -> Figure:
     """Return the residuals of all actuators over a whole recording, one above the other.
 
-    Parameters
-    ----------
-    time : array, shape (T,)
-        s.
-    residuals : array, shape (T, n)
-        N.
-    used : array of bool, shape (T, n)
-        Whether a sample counts; others are grey, and may lie outside.
+    Time (T,) is in s, residuals (T, n) in N. Samples that are not `used` (T, n) do not count: they
+    are grey, and may lie outside.
     """
     n = residuals.shape[1]
     figure = blank(4.8, 0.5 + 0.8 * n)
@@ -149,14 +132,8 @@ def residual_speed_figure(
 ) -> Figure:
     """Return an actuator's residuals over its slider's speed: friction that is missing shows here.
 
-    Parameters
-    ----------
-    speed, residuals : array, shape (T,)
-        m/s and N.
-    used : array of bool, shape (T,)
-        Whether a sample counts; others are grey, and may lie outside.
-    leg : int
-        Which actuator, from 0, for its colour.
+    Speeds (T,) are in m/s, residuals (T,) in N. Samples that are not `used` (T,) do not count: they
+    are grey, and may lie outside. `leg`, from 0, gives the colour.
     """
     figure = blank(3.1, 2.4)
     axes = plain_axes(figure, "slider speed (m/s)", "residual (N)")

@@ -31,18 +31,10 @@ def forces_figure(
     turning_point: float | None = None,
     ylabel: str = "actuator force (N)",
 ) -> Figure:
-    """Return the forces of all legs over time.
+    """Return the forces (T, n) of all legs, N, over time (T,), s.
 
-    Parameters
-    ----------
-    time : array, shape (T,)
-        s.
-    forces : array, shape (T, n)
-        N.
-    turning_point : float, optional
-        Where the way back begins, s.
-    ylabel : str
-        What is shown; other quantities of the legs look the same.
+    The way back begins at the turning point, s. Other quantities of the legs look the same, under
+    another label.
     """
     figure = blank(5.4, 3.3)
     axes = plain_axes(figure, "time (s)", ylabel)
@@ -69,18 +61,8 @@ def regularity_figure(
 ) -> Figure:
     """Return abs(det J), relative to its largest value, over phi.
 
-    Parameters
-    ----------
-    angles : array, shape (A,)
-        phi, rad, ascending.
-    regularity : array, shape (A,)
-        det J over its largest value.
-    singular : array, shape (S,)
-        The singular orientations, rad.
-    home : float, optional
-        phi of the home pose, rad.
-    used : (float, float), optional
-        The least and greatest phi of a motion, rad.
+    The angles (A,) ascend; the singular orientations, phi of the home pose, and the least and
+    greatest phi that a motion uses are marked. All are in rad.
     """
     figure = blank(5.4, 2.9)
     axes = plain_axes(figure, "orientation φ (degrees)", "|det J| / max |det J|")

@@ -21,17 +21,10 @@ _DASHES = ("-", "-", (0, (3, 2)), (0, (3, 2)))
 
 
 def reach_figure(cut: ReachSlice, *, path: Array | None = None) -> Figure:
-    """Return the map of a slice.
+    """Return the map of a slice, with the positions (T, 3) of a motion, m, in projection.
 
     In reach, the shade deepens with the margin. Outside, the colour is that of the leg that misses
     the pose by most; a line in a leg's colour is where it is stretched or folded (type I).
-
-    Parameters
-    ----------
-    cut : ReachSlice
-        The slice.
-    path : array, shape (T, 3), optional
-        Positions of a motion, drawn in projection.
     """
     figure = blank(3.9, 3.9)
     axes = plain_axes(figure, f"{cut.plane[0]} (mm)", f"{cut.plane[1]} (mm)")

@@ -26,18 +26,9 @@ def robot_figure(
 ) -> Figure:
     """Return the machine in one pose, with the vertical upwards.
 
-    Parameters
-    ----------
-    points : JointPoints
-        The joints in one pose.
-    rails : array, shape (n, 2, 3)
-        The ends of each guide, m.
-    gravity : array, shape (3,), optional
-        Drawn as an arrow; without it the platform frame's z points up.
-    path : array, shape (T, 3), optional
-        Positions of P in a motion.
-    angle : str
-        The orientation, in words, beside the platform frame's x axis.
+    The guides' ends `rails` (n, 2, 3) and the `path` (T, 3) of P are in m. Gravity (3,) is drawn as
+    an arrow; without it the platform frame's z points up. The `angle` stands, in words, beside the
+    platform frame's x axis.
     """
     figure = blank(5.6, 4.4)
     space = Space(figure, points.axes[2] if gravity is None else -gravity)

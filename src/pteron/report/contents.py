@@ -72,20 +72,9 @@ class Orientations:
 class Report:
     """All that a page says about a machine; the cycle has T samples.
 
-    Attributes
-    ----------
-    doubts : tuple of str
-        What is possible but unlikely in the machine's file.
-    least : float
-        The reserve that the cycle keeps.
-    rails : array, shape (n, 2, 3)
-        The ends of the guides, m: the sliders' limits, or a little more than the cycle needs.
-    forces, slider_speeds : array, shape (T, n)
-        Over the cycle, N and m/s.
-    slices : tuple of ReachSlice
-        Through the home pose, all of the same width.
-    orientations : Orientations or None
-        None for 3T.
+    The cycle keeps the reserve `least`; its forces and slider speeds (T, n) are in N and m/s. The
+    guides' ends `rails` (n, 2, 3), m, are the sliders' limits, or a little more than the cycle
+    needs. The slices go through the home pose and are all of one width.
     """
 
     robot: Manipulator
@@ -129,15 +118,7 @@ class Report:
 
 
 def contents(robot: Manipulator) -> Report:
-    """Return the report on a machine.
-
-    Raises
-    ------
-    ModelError
-        If the machine reaches no pose.
-    SingularPose
-        If the machine is singular at every pose.
-    """
+    """Return the report on a machine that reaches a pose and is not singular everywhere."""
     home = home_pose(robot)
     at_home = reserve(robot, home)
     # A machine with little reserve anywhere moves where it has half of its best.

@@ -61,7 +61,7 @@ def dense_operations(base: BaseParameters, kept: Sequence[int]) -> int:
     2 m^3 / 3 + 2 m^2 c. Columns are the sliders', those of the links, and four of the platform.
     """
     m: int = base.robot.freedom
-    platform = base.selection.shape[0] - 4
+    platform: int = base.selection.shape[0] - 4
     sliders = sum(k < m for k in kept)
     links = sum(m <= k < platform for k in kept)
     products = m * sliders * (2 * m - 1) + m * links * (2 * 6 - 1)

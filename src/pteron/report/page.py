@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -130,16 +129,11 @@ def _plain(array: Array) -> Any:
     return (np.round(array, _DECIMALS) + 0.0).tolist()
 
 
-@dataclass(frozen=True)
-class InSymbols:
-    """Base parameters in symbols of the geometry, and the symbols' values in m, as HTML."""
+def in_symbols(base: BaseParameters) -> dict[str, list[Any]] | None:
+    """Return the base parameters in symbols, `sums`, and the symbols' values in m, `lengths`.
 
-    sums: tuple[Markup, ...]
-    lengths: tuple[tuple[Markup, float], ...]
-
-
-def in_symbols(base: BaseParameters) -> InSymbols | None:
-    """Return the base parameters in symbols; None where they have none, or are too long."""
+    None where they have none, or are too long.
+    """
     try:
         lines = base.expressions(symbols=True)
     except ModelError:
@@ -147,11 +141,8 @@ def in_symbols(base: BaseParameters) -> InSymbols | None:
     if max(map(len, lines)) > _LONGEST:
         return None
     used = set(re.findall(r"\b(?:l[ul]\d|s\d[xy])\b", " ".join(lines)))
-    return InSymbols(
-        tuple(geometric(expression(line)) for line in lines),
-        tuple(
-            (geometric(escape(name)), value)
-            for name, value in base.geometry_values.items()
-            if name in used
-        ),
-    )
+    values = base.geometry_values.items()
+    return {
+        "sums": [geometric(expression(line)) for line in lines],
+        "lengths": [(geometric(escape(name)), value) for name, value in values if name in used],
+    }

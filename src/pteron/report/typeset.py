@@ -55,24 +55,12 @@ def fixed(value: float, places: int = 1) -> str:
 
 
 def compact(value: float) -> str:
-    """Return a number with at most four significant digits and no needless zeros.
-
-    Examples
-    --------
-    >>> compact(-0.04), compact(0.123456), compact(1e-17)
-    ('−0.04', '0.1235', '0')
-    """
+    """Return a number with at most four significant digits and no needless zeros."""
     return "0" if abs(value) < 1e-9 else f"{value:.4g}".replace("-", _MINUS)
 
 
 def triple(values: Iterable[float], factor: float = 1.0) -> str:
-    """Return a vector, each component as `compact` has it.
-
-    Examples
-    --------
-    >>> triple((0.0, -0.34, 0.0), 1000.0)
-    '(0, −340, 0)'
-    """
+    """Return a vector, each component as `compact` has it."""
     return f"({', '.join(compact(factor * value) for value in values)})"
 
 

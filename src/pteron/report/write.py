@@ -57,11 +57,6 @@ def checked_folder(path: str | Path) -> Path:
     """Return a folder after a check, before the work, that it can be made and written.
 
     Nothing is left behind if the work then fails, or is interrupted, however roughly.
-
-    Raises
-    ------
-    OutputError
-        If it cannot.
     """
     if str(path) == "":
         raise OutputError("the folder's name is empty; name one")

@@ -8,9 +8,8 @@ from pathlib import PurePath
 
 import numpy as np
 
-from pteron.identification import Identification, Prediction
+from pteron.identification import Identification, Prediction, Treatment
 from pteron.kernels import Array
-from pteron.report.identification.treatment import TreatedLog, treated_logs
 from pteron.report.identification.values import Body, Parameter, body_rows, parameter_rows
 
 _MOST_PICTURES = 3
@@ -42,24 +41,10 @@ class Shown:
 class Contents:
     """All that a page says about an identification.
 
-    Attributes
-    ----------
-    tone : {"good", "care", "bad"}
-        The verdict's.
-    reasons, steps, notes : tuple of str
-        With recordings called as on the page.
-    drawn : tuple of Shown
-        Those held out that are drawn, the worst first.
-    repeats : bool
-        Whether what was held out is the end of what was fitted.
-    findings : tuple of (str, str, str, str)
-        Kind, row, column and message of each.
-    residuals : array, shape (R, n)
-        What the equations leave, N; NaN where an equation is not used.
-    correlations : array, shape (L, n)
-        Their autocorrelation at lags 1 to L.
-    bound : array, shape (n,)
-        Size that white noise's keep below, nineteen times in twenty.
+    Texts call recordings as on the page. `drawn` are the worst of those held out; `repeats` says
+    whether what was held out is the end of what was fitted. A finding is a kind, a row, a column
+    and a message. The residuals (R, n), N, are NaN where an equation is not used; white noise keeps
+    their correlations (L, n) at lags 1 to L below the bound (n,), nineteen times in twenty.
     """
 
     result: Identification
@@ -73,7 +58,7 @@ class Contents:
     repeats: bool
     parameters: tuple[Parameter, ...]
     bodies: tuple[Body, ...]
-    treated: tuple[TreatedLog, ...]
+    treated: tuple[tuple[str, Treatment], ...]
     findings: tuple[tuple[str, str, str, str], ...]
     residuals: Array
     correlations: Array
@@ -136,7 +121,10 @@ def contents(result: Identification) -> Contents:
         repeats={one.name for one in held} <= {one.name for one in fitted},
         parameters=parameter_rows(result),
         bodies=body_rows(result),
-        treated=treated_logs(result, names),
+        treated=tuple(
+            (names[one.source], treatment)
+            for one, treatment in zip(result.fitted, result.treatments, strict=True)
+        ),
         findings=tuple(
             (one.kind, "" if one.row is None else str(one.row), one.column or "", text)
             for one, text in zip(

@@ -25,24 +25,11 @@ _SHARED = re.compile(r"([pule])(\d*|\([\d,]+\))")
 
 @dataclass(frozen=True)
 class Parameter:
-    """One value of the model.
+    """One value of the model, and whether the data show it.
 
-    Attributes
-    ----------
-    half : float
-        Half of the value's 95 % interval.
-    relative : float
-        Standard deviation over the value's size; infinite for a value of zero.
-    ratio : float
-        The value's size over its standard deviation.
-    cad : float or None
-        What the CAD model says of it; None for friction and other terms.
-    status : {"essential", "dropped", "unseen"}
-        Whether the data show it.
-    partner : str or None
-        The value it is most strongly correlated with, where that is above 0.95.
-    correlation : float
-        The correlation with that value.
+    `half` is half of its 95 % interval, `relative` its standard deviation over its size, `ratio`
+    the inverse of that. The CAD model says nothing of friction and other terms. The partner is the
+    value it is most strongly correlated with, where that is above 0.95.
     """
 
     name: str

@@ -82,21 +82,9 @@ def write_identification(
 
 
 def model_path(folder: str | Path, name: str, sources: Iterable[str | Path] = ()) -> Path:
-    """Return where the model file of a machine goes.
+    """Return where the model file of a machine goes, in a folder of results.
 
-    Parameters
-    ----------
-    folder : str or path
-        The folder of the results.
-    name : str
-        The machine's name.
-    sources : iterable of str or path
-        Files that were read, which it must not replace.
-
-    Raises
-    ------
-    OutputError
-        If it would replace one of those, or be taken for the description of a log.
+    It must not replace a file that was read, nor be taken for the description of a log.
     """
     stem = _SAFE.sub("_", name).strip("._") or "robot"
     path = Path(folder) / f"{stem[:100]}.toml"
