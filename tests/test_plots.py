@@ -22,10 +22,10 @@ from pteron.plots import (
     robot_figure,
     svg,
 )
-from pteron.plots.robot import upright
+from pteron.plots.space import upright
 from pteron.workspace import reach_slice
 
-MACHINES = ["quadrupteron", "tripteron", "quadrupteron turned", "random 3T 0"]
+MACHINES = ["tripteron", "quadrupteron turned"]
 
 
 def rails(points):
@@ -59,7 +59,9 @@ def regularity():
 
 
 PICTURES = {
-    **{f"{make.__name__} {m}": (make, m) for make in (machine, reach, forces) for m in MACHINES},
+    "machine": (machine, "quadrupteron turned"),
+    "reach": (reach, "quadrupteron"),
+    "forces": (forces, "tripteron"),
     "regularity": (regularity,),
 }
 

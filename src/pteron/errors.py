@@ -8,7 +8,17 @@ class PteronError(ValueError):
 
 
 class ModelError(PteronError):
-    """A manipulator, or the file that describes it, is not a machine Pteron can model."""
+    """A manipulator, or the file that describes it, is not a machine Pteron can model.
+
+    Attributes
+    ----------
+    faults : tuple of str
+        Every fault of a file, one line each; empty where the message says all.
+    """
+
+    def __init__(self, message: str, *, faults: tuple[str, ...] = ()) -> None:
+        super().__init__(message)
+        self.faults = faults
 
 
 class DataError(PteronError):

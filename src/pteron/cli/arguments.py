@@ -1,44 +1,160 @@
-"""Arguments and options that several subcommands share."""
+"""Arguments and options that several subcommands share, and the numbers and machines in them."""
 
 from __future__ import annotations
 
-from enum import StrEnum
-from typing import Annotated
+import math
+from collections import deque
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from typer import Argument, Option
+from typer.core import TyperCommand
 
-__all__ = ["Elbows", "Failure", "Json", "OnFailure", "Out", "Robot", "TableFile"]
+from pteron.errors import DataError
+
+if TYPE_CHECKING:
+    from pteron.manipulator import Manipulator
 
 
-class Failure(StrEnum):
-    """What becomes of a row that cannot be served."""
-
-    RAISE = "raise"
-    NAN = "nan"
+def option(name: str, help: str, metavar: str | None = None, **more: Any) -> Any:  # noqa: A002
+    """Return an option by what it is called, what its help says, and what stands for its value."""
+    return Option(f"--{name}", help=help, metavar=metavar, **more)
 
 
 Robot = Annotated[
     str,
     Argument(metavar="ROBOT", help="A machine of the catalog (see pteron catalog) or a TOML file."),
 ]
-Json = Annotated[bool, Option("--json", help="Print data for a program, as JSON.")]
-Out = Annotated[
-    str | None,
-    Option("--out", metavar="FILE", help="Write the result to a .csv or .parquet file."),
-]
+Json = Annotated[bool, option("json", "Print data for a program, as JSON.")]
+Out = Annotated[str | None, option("out", "Write the result to a .csv or .parquet file.", "FILE")]
 TableFile = Annotated[
     str | None,
-    Option(
-        "--table",
-        metavar="FILE",
-        help="Take the rows of a .csv or .parquet file; - is CSV on standard input.",
-    ),
+    option("table", "Take a .csv or .parquet file's rows; - is CSV on standard input.", "FILE"),
 ]
+Failure = Literal["raise", "nan"]
+"""What becomes of a row that cannot be served."""
 OnFailure = Annotated[
-    Failure,
-    Option("--on-failure", help="Stop at a row that fails, or leave its results empty."),
+    Failure, option("on-failure", "Stop at a row that fails, or leave its results empty.")
 ]
 Elbows = Annotated[
-    str | None,
-    Option("--elbows", metavar="SIGNS", help="The working mode, one sign a leg, such as ++-+."),
+    str | None, option("elbows", "The working mode, one sign a leg, such as ++-+.", "SIGNS")
 ]
+
+_VECTORS = ("--pose", "--velocity", "--acceleration", "--wrench")
+"""The options that take as many numbers as follow them."""
+
+
+class Command(TyperCommand):
+    """A command whose help gives its flags no type."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Return the parameters; ``--json <bool>`` would look as if it took a value."""
+        return without_types(super().get_params(ctx))
+
+
+def without_types(parameters: list[Any]) -> list[Any]:
+    """Return a command's parameters, the flags among them without a type in the help."""
+    for parameter in parameters:
+        if getattr(parameter, "is_flag", False):
+            parameter.metavar = ""
+    return parameters
+
+
+class NumbersCommand(Command):
+    """A command whose arguments may be negative numbers, and whose options may take several."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the arguments, put in an order that Typer understands."""
+        valued = [
+            name
+            for parameter in self.params
+            if parameter.param_type_name == "option" and not getattr(parameter, "is_flag", False)
+            for name in parameter.opts
+        ]
+        return super().parse_args(ctx, regrouped(args, valued))
+
+
+def regrouped(args: Sequence[str], valued: Collection[str]) -> list[str]:
+    """Return arguments with an option's numbers joined by commas and the free ones behind ``--``.
+
+    `valued` are the options that take a value.
+
+    Examples
+    --------
+    >>> regrouped(["robot", "-0.1", "0", "--json", "2"], [])
+    ['robot', '--json', '--', '-0.1', '0', '2']
+    >>> regrouped(["robot", "--pose", "-1", "2", "--out", "-3"], ["--pose", "--out"])
+    ['robot', '--pose=-1,2', '--out', '-3']
+    """
+    kept: list[str] = []
+    free: list[str] = []
+    rest = deque(args)
+    while rest:
+        word = rest.popleft()
+        if word == "--":
+            free += rest
+            break
+        if word in _VECTORS and rest and _numeric(rest[0]):
+            values = []
+            while rest and _numeric(rest[0]):
+                values.append(rest.popleft())
+            kept.append(f"{word}={','.join(values)}")
+        elif word in valued and rest:
+            kept += [word, rest.popleft()]
+        else:
+            (free if _numeric(word) else kept).append(word)
+    return [*kept, "--", *free] if free else kept
+
+
+def _numeric(word: str) -> bool:
+    """Say whether a word is meant as a number, also where it is none, as in -0.1.2."""
+    if word[:1] == "-" and word[1:2] and word[1] in ".0123456789":
+        return True
+    try:
+        for part in word.split(","):
+            float(part)
+    except ValueError:
+        return False
+    return True
+
+
+def parsed_numbers(words: Sequence[str], names: Sequence[str], what: str) -> list[float]:
+    """Return the finite numbers in words, apart by blanks or commas; `names` say what each is."""
+    parts = " ".join(words).replace(",", " ").split()
+    values = []
+    for part in parts:
+        try:
+            value = float(part)
+        except ValueError:
+            raise DataError(f"{what}: {part!r} is not a number; give {' '.join(names)}") from None
+        if not math.isfinite(value):
+            raise DataError(f"{what}: {part!r} is not a finite number; give {' '.join(names)}")
+        values.append(value)
+    if len(values) != len(names):
+        noun = "value" if len(values) == 1 else "values"
+        raise DataError(
+            f"{what}: {len(values)} {noun} given, {len(names)} expected: {' '.join(names)}"
+        )
+    return values
+
+
+def load_robot(name_or_path: str, elbows: str | None = None) -> Manipulator:
+    """Load a machine, in the working mode that `elbows` says, such as ``++-+``."""
+    from pteron.manipulator import load
+
+    robot = load(name_or_path)
+    if elbows is None:
+        return robot
+    if set(elbows) - set("+-") or len(elbows) != len(robot.legs):
+        raise DataError(
+            f"--elbows: {elbows!r} given, {len(robot.legs)} signs + or - expected, one for each "
+            f"leg of {robot.name}, such as {signs(robot)}"
+        )
+    legs = zip(robot.legs, elbows, strict=True)
+    return replace(robot, legs=tuple(replace(leg, elbow=int(f"{s}1")) for leg, s in legs))
+
+
+def signs(robot: Manipulator) -> str:
+    """Return a machine's working mode as one sign a leg."""
+    return "".join("+" if leg.elbow > 0 else "-" for leg in robot.legs)

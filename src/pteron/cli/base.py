@@ -1,60 +1,39 @@
-"""`pteron base`: the base inertial parameters."""
+"""`pteron base` and `pteron table1`: the base inertial parameters, and the paper's own."""
 
 from __future__ import annotations
 
-from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from rich.markup import escape
-from typer import Option, echo
+from typer import Exit, echo
 
-from pteron.cli.arguments import Elbows, Json, Robot
-from pteron.cli.progress import spinner
-from pteron.cli.robots import load_robot
-from pteron.cli.screen import is_terminal, show, show_json, table
+from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
+from pteron.cli.screen import is_terminal, plain, show, show_json, spinner, table
 
 if TYPE_CHECKING:
     from pteron.reduction import BaseParameters
 
-__all__ = ["base"]
 
+Format = Literal["text", "sympy", "latex", "json"]
 
-class Method(StrEnum):
-    """How the rank is found."""
-
-    EXACT = "exact"
-    SVD = "svd"
-    QR = "qr"
-
-
-class Format(StrEnum):
-    """How the base parameters are written."""
-
-    TEXT = "text"
-    SYMPY = "sympy"
-    LATEX = "latex"
-    JSON = "json"
-
-
-COMMENTS = {Format.SYMPY: "#", Format.LATEX: "%"}
+_COMMENTS = {"sympy": "#", "latex": "%"}
 """What begins a line that is for the reader, not for SymPy or LaTeX."""
 
 
 def base(
     robot: Robot,
     method: Annotated[
-        Method, Option("--method", help="Exact arithmetic with a proof, or a numerical rank.")
-    ] = Method.EXACT,
+        Literal["exact", "svd", "qr"],
+        option("method", "Exact arithmetic with a proof, or a numerical rank."),
+    ] = "exact",
     keep: Annotated[
-        str | None,
-        Option("--keep", metavar="NAMES", help="Parameters to keep before others: I_l1,m_l4."),
+        str | None, option("keep", "Parameters to keep before others: I_l1,m_l4.", "NAMES")
     ] = None,
     shared: Annotated[
-        bool, Option("--shared", help="All legs share one set of inertial parameters.")
+        bool, option("shared", "All legs share one set of inertial parameters.")
     ] = False,
-    format: Annotated[Format, Option("--format", help="How they are written.")] = Format.TEXT,  # noqa: A002
+    format: Annotated[Format, option("format", "How they are written.")] = "text",  # noqa: A002
     symbols: Annotated[
-        bool, Option("--symbols", help="Write the coefficients in symbols of the geometry.")
+        bool, option("symbols", "Write the coefficients in symbols of the geometry.")
     ] = False,
     elbows: Elbows = None,
     json: Json = False,
@@ -65,36 +44,36 @@ def base(
         from pteron.reduction import base_parameters
 
         names = None if keep is None else [name.strip() for name in keep.split(",")]
-        found = base_parameters(machine, method.value, names, shared=shared)
-    if json or format is Format.JSON:
+        found = base_parameters(machine, method, names, shared=shared)
+    if json or format == "json":
         data = found.as_dict()
         if symbols:
             data["symbolic"] = list(found.expressions(symbols=True))
             data["geometry"] = found.geometry_values
+            data["shared_symbols"] = found.shared_symbols
         show_json(data)
-    elif format is Format.TEXT:
+    elif format == "text":
         _show(found, symbols=symbols)
     else:
-        form: Literal["sympy", "latex"] = "sympy" if format is Format.SYMPY else "latex"
-        for expression in found.expressions(form, symbols=symbols):
+        for expression in found.expressions(format, symbols=symbols):
             echo(str(expression))
         for line in (*_meanings(found, symbols=symbols), *_proof(found)):
-            echo(f"{COMMENTS[format]} {line}")
+            echo(f"{_COMMENTS[format]} {line}")
 
 
 def _show(found: BaseParameters, *, symbols: bool) -> None:
     expressions = found.expressions(symbols=symbols)
-    closing = [escape(line) for line in (*_meanings(found, symbols=symbols), *_proof(found))]
+    closing = [plain(line) for line in (*_meanings(found, symbols=symbols), *_proof(found))]
     if not is_terminal():
-        show(*(escape(line) for line in expressions), "", *closing)
+        show(*(plain(line) for line in expressions), "", *closing)
         return
     made = table("", "base parameter", "value", "unit", numbers=("", "value"))
     for i, (line, value, unit) in enumerate(
         zip(expressions, found.values(), _units(found), strict=True), start=1
     ):
-        made.add_row(str(i), escape(line), f"{value:.5g}", unit)
+        made.add_row(str(i), plain(line), f"{value:.5g}", unit)
     show(
-        f"[bold]{escape(found.robot.name)}[/bold]: {found.rank} base parameters of "
+        f"[bold]{plain(found.robot.name)}[/bold]: {found.rank} base parameters of "
         f"{len(found.columns)} inertial parameters",
         made,
         *closing,
@@ -113,12 +92,40 @@ def _units(found: BaseParameters) -> list[str]:
 
 
 def _meanings(found: BaseParameters, *, symbols: bool) -> list[str]:
-    """Return a line that says what the symbols stand for, if there are any."""
+    """Return what the symbols stand for, if there are any, and which lengths share one."""
     if not symbols:
         return []
-    values = (f"{name} = {value:g}" for name, value in found.geometry_values.items())
-    return [f"In metres: {', '.join(values)}."]
+    lines = [f"In metres: {', '.join(f'{n} = {v:g}' for n, v in found.geometry_values.items())}."]
+    shared = found.shared_symbols
+    if shared:
+        text = "; ".join(
+            f"{name} stands for {', '.join(more)} too" for name, more in shared.items()
+        )
+        lines.append(f"Values that are equal but for their sign share a symbol: {text}.")
+    return lines
 
 
 def _proof(found: BaseParameters) -> list[str]:
     return found.certificate.summary().splitlines()
+
+
+def table1(json: Json = False) -> None:
+    """Print the paper's Table 1, as printed and as computed; exit with 1 if they disagree."""
+    with spinner("Computing Table 1"):
+        from pteron.report.table1 import rows
+
+        found = rows()
+    wrong = sum(not row.agrees for row in found)
+    if json:
+        names = ("parameter", "kept", "printed", "computed", "agrees", "restored")
+        show_json([{name: getattr(row, name) for name in names} for row in found])
+    else:
+        made = table("", "printed", "computed", "agrees")
+        for row in found:
+            verdict = "yes" if row.agrees else "[bold red]NO[/bold red]"
+            verdict += " *" if row.restored else ""
+            made.add_row(row.parameter, plain(row.printed), plain(row.computed), verdict)
+        note = "* damaged in the scan of the paper; restored from its legible rows"
+        show(made, f"{len(found) - wrong} of {len(found)} rows agree.", note)
+    if wrong:
+        raise Exit(1)

@@ -2,79 +2,55 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from rich.markup import escape
 from rich.table import Table
-from typer import Option
 
-from pteron.cli.arguments import Elbows, Json, Robot
-from pteron.cli.progress import progress_bar
-from pteron.cli.robots import load_robot
-from pteron.cli.screen import note, show, show_json, table
+from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
+from pteron.cli.screen import note, plain, progress_bar, show, show_json, table
 from pteron.errors import OutputError
 
 if TYPE_CHECKING:
     from pteron.identification.excitation import Excitation
 
-__all__ = ["excite"]
-
 _STEPS = 1000
-"""Of the progress bar."""
-
-
-class _Space(StrEnum):
-    PLATFORM = "platform"
-    SLIDERS = "sliders"
-
-
-class _Criterion(StrEnum):
-    CONDITION = "condition"
-    LOGDET = "logdet"
+"""Steps of the progress bar."""
 
 
 def excite(
     robot: Robot,
     out: Annotated[
-        str | None,
-        Option("--out", metavar="FILE", help="Write it to FILE.csv, and FILE.toml beside it."),
+        str | None, option("out", "Write it to FILE.csv, and FILE.toml beside it.", "FILE")
     ] = None,
     space: Annotated[
-        _Space, Option("--space", help="Whose coordinates the Fourier series are of.")
-    ] = _Space.PLATFORM,
-    harmonics: Annotated[int, Option("--harmonics", help="How many.")] = 5,
-    period: Annotated[float, Option("--period", help="In s.")] = 5.0,
-    speed: Annotated[float, Option("--speed", help="The sliders' limit, m/s.")] = 1.0,
-    acceleration: Annotated[
-        float, Option("--acceleration", help="The sliders' limit, m/s^2.")
-    ] = 10.0,
+        Literal["platform", "sliders"],
+        option("space", "Whose coordinates the Fourier series are of."),
+    ] = "platform",
+    harmonics: Annotated[int, option("harmonics", "How many.")] = 5,
+    period: Annotated[float, option("period", "In s.")] = 5.0,
+    speed: Annotated[float, option("speed", "The sliders' limit, m/s.")] = 1.0,
+    acceleration: Annotated[float, option("acceleration", "The sliders' limit, m/s^2.")] = 10.0,
     force: Annotated[
         float | None,
-        Option("--force", help="The actuators' limit, N; none if left out.", show_default=False),
+        option("force", "The actuators' limit, N; none if left out.", show_default=False),
     ] = None,
-    elbow_sine: Annotated[
-        float, Option("--elbow-sine", help="Least sine of every elbow's angle.")
-    ] = 0.25,
+    elbow_sine: Annotated[float, option("elbow-sine", "Least sine of every elbow's angle.")] = 0.25,
     regularity: Annotated[
-        float, Option("--regularity", help="Least abs(det J), of its largest value.")
+        float, option("regularity", "Least abs(det J), of its largest value.")
     ] = 0.3,
-    clearance: Annotated[
-        float, Option("--clearance", help="Of the sliders from their ends, m.")
-    ] = 0.005,
+    clearance: Annotated[float, option("clearance", "Of the sliders from their ends, m.")] = 0.005,
     criterion: Annotated[
-        _Criterion, Option("--criterion", help="What is made small.")
-    ] = _Criterion.CONDITION,
-    rate: Annotated[float, Option("--rate", help="Samples a second in the file.")] = 1000.0,
-    periods: Annotated[int, Option("--periods", help="Periods in the file.")] = 1,
-    starts: Annotated[int, Option("--starts", help="Random motions improved.")] = 12,
-    draws: Annotated[int, Option("--draws", help="Random motions drawn.")] = 100,
-    seconds: Annotated[float, Option("--seconds", help="Time for the search.")] = 60.0,
-    seed: Annotated[int, Option("--seed", help="Of the random motions.")] = 0,
+        Literal["condition", "logdet"], option("criterion", "What is made small.")
+    ] = "condition",
+    rate: Annotated[float, option("rate", "Samples a second in the file.")] = 1000.0,
+    periods: Annotated[int, option("periods", "Periods in the file.")] = 1,
+    starts: Annotated[int, option("starts", "Random motions improved.")] = 12,
+    draws: Annotated[int, option("draws", "Random motions drawn.")] = 100,
+    seconds: Annotated[float, option("seconds", "Time for the search.")] = 60.0,
+    seed: Annotated[int, option("seed", "Of the random motions.")] = 0,
     workers: Annotated[
-        int | None,
-        Option("--workers", help="Processes at a time.", show_default="one a core, up to 4"),
+        int | None, option("workers", "Processes at a time.", show_default="one a core, up to 4")
     ] = None,
     elbows: Elbows = None,
     json: Json = False,
@@ -107,11 +83,11 @@ def excite(
 
         found = optimal_excitation(
             machine,
-            space=space.value,
+            space=space,
             harmonics=harmonics,
             period=period,
             limits=Limits(speed, acceleration, force, elbow_sine, regularity, clearance),
-            criterion=criterion.value,
+            criterion=criterion,
             starts=starts,
             draws=draws,
             seed=seed,
@@ -131,7 +107,7 @@ def excite(
         show_json({**found.as_dict(), "files": [str(path) for path in files]})
         return
     show(_quality(found), _margins(found))
-    show(*(f"Written: {escape(str(path))}" for path in files))
+    show(*(f"Written: {plain(str(path))}" for path in files))
 
 
 def _quality(found: Excitation) -> Table:

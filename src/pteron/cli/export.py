@@ -4,31 +4,21 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from rich.markup import escape
-from typer import Option
-
-from pteron.cli.arguments import Elbows, Json, Robot
-from pteron.cli.progress import spinner
-from pteron.cli.robots import load_robot
-from pteron.cli.screen import show, show_json
+from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
+from pteron.cli.screen import plain, show, show_json, spinner
 from pteron.errors import DataError
-
-__all__ = ["export"]
 
 
 def export(
     robot: Robot,
-    c: Annotated[str | None, Option("--c", metavar="DIR", help="Write C99 to this folder.")] = None,
-    st: Annotated[
-        str | None, Option("--st", metavar="DIR", help="Write Structured Text to this folder.")
-    ] = None,
+    c: Annotated[str | None, option("c", "Write C99 to this folder.", "DIR")] = None,
+    st: Annotated[str | None, option("st", "Write Structured Text to this folder.", "DIR")] = None,
     function: Annotated[
-        list[str] | None,
-        Option("--function", metavar="NAME", help="What to write; again for more."),
+        list[str] | None, option("function", "What to write; again for more.", "NAME")
     ] = None,
-    single: Annotated[bool, Option("--float", help="C: float instead of double.")] = False,
+    single: Annotated[bool, option("float", "C: float instead of double.")] = False,
     specialised: Annotated[
-        bool, Option("--specialised", help="C: fold the inertial parameters in.")
+        bool, option("specialised", "C: fold the inertial parameters in.")
     ] = False,
     elbows: Elbows = None,
     json: Json = False,
@@ -55,4 +45,4 @@ def export(
     if json:
         show_json({"robot": machine.name, "files": [str(path) for path in files]})
         return
-    show(*(f"Written: {escape(str(path))}" for path in files))
+    show(*(f"Written: {plain(str(path))}" for path in files))

@@ -2,47 +2,35 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from shutil import get_terminal_size
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from typer import Argument, Option
+from rich.table import Table
+from typer import Argument
 
-from pteron.cli.arguments import Elbows, Json
-from pteron.cli.progress import spinner
-from pteron.cli.robots import load_robot
-from pteron.cli.screen import show_json
-from pteron.cli.stages import stages
+from pteron.cli.arguments import Elbows, Json, load_robot, option
+from pteron.cli.screen import plain, show, show_json, spinner, stages, table
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
-    from pteron.identification import Bounds, Terms
+    from pteron.identification import Bounds, Identification, Terms
     from pteron.identification.consistency.bounds import Box
     from pteron.manipulator import Manipulator
+    from pteron.report.identification import Written
 
-__all__ = ["identify"]
+_NARROW = 56
+"""Width of a terminal below which tables leave out what the page has anyway."""
+
+_COLORS = {"trustworthy": "green", "usable with care": "yellow", "not trustworthy": "red"}
 
 _TERMS = ("coulomb", "viscous", "offset")
 
 
-class _Estimator(StrEnum):
-    WEIGHTED = "weighted"
-    ORDINARY = "ordinary"
-    HUBER = "huber"
-    TOTAL = "total"
-    LIKELIHOOD = "likelihood"
-
-
-class _Joints(StrEnum):
-    NONE = "none"
-    SHARED = "shared"
-    EACH = "each"
-
-
-class _Derivatives(StrEnum):
-    PERIODIC = "periodic"
-    CENTRAL = "central"
-    SPLINE = "spline"
+Estimator = Literal["weighted", "ordinary", "huber", "total", "likelihood"]
+Joints = Literal["none", "shared", "each"]
+Derivatives = Literal["periodic", "central", "spline"]
+"""The library's own, which are slow to import."""
 
 
 def identify(
@@ -50,55 +38,46 @@ def identify(
         list[str],
         Argument(metavar="LOG...", help="Recorded motions, .csv or .parquet: t rho1.. force1.."),
     ],
-    robot: Annotated[str, Option("--robot", metavar="ROBOT", help="The machine as it is drawn.")],
-    out: Annotated[str, Option("--out", metavar="DIR", help="The folder to write it to.")],
+    robot: Annotated[str, option("robot", "The machine as it is drawn.", "ROBOT")],
+    out: Annotated[str, option("out", "The folder to write it to.", "DIR")],
     held_out: Annotated[
         list[str] | None,
-        Option(
-            "--held-out",
-            metavar="LOG",
-            help="What to judge by; once for each. By default the last 30 % of every log.",
+        option(
+            "held-out",
+            "What to judge by; once for each. By default the last 30 % of every log.",
+            "LOG",
         ),
     ] = None,
     description: Annotated[
-        str | None,
-        Option("--description", metavar="TOML", help="Of all logs; by default beside each."),
+        str | None, option("description", "Of all logs; by default beside each.", "TOML")
     ] = None,
     estimator: Annotated[
-        _Estimator, Option("--estimator", help="How the equations are solved.")
-    ] = _Estimator.WEIGHTED,
+        Estimator, option("estimator", "How the equations are solved.")
+    ] = "weighted",
     without: Annotated[
-        str | None,
-        Option("--without", metavar="TERMS", help="Leave out: coulomb,viscous,offset."),
+        str | None, option("without", "Leave out: coulomb,viscous,offset.", "TERMS")
     ] = None,
-    joints: Annotated[
-        _Joints, Option("--joints", help="Viscous friction in the passive joints.")
-    ] = _Joints.NONE,
-    rotors: Annotated[bool, Option("--rotors", help="With the inertia of the motors.")] = False,
-    payload: Annotated[bool, Option("--payload", help="With the payload carried.")] = False,
+    joints: Annotated[Joints, option("joints", "Viscous friction in the passive joints.")] = "none",
+    rotors: Annotated[bool, option("rotors", "With the inertia of the motors.")] = False,
+    payload: Annotated[bool, option("payload", "With the payload carried.")] = False,
     shared: Annotated[
-        bool, Option("--shared", help="All legs share one set of inertial parameters.")
+        bool, option("shared", "All legs share one set of inertial parameters.")
     ] = False,
     derivatives: Annotated[
-        _Derivatives | None,
-        Option("--derivatives", help="How positions are differentiated; the data decide."),
+        Derivatives | None,
+        option("derivatives", "How positions are differentiated; the data decide."),
     ] = None,
-    cutoff: Annotated[
-        float | None, Option("--cutoff", metavar="HZ", help="Of the positions' filter.")
-    ] = None,
-    band: Annotated[
-        float | None, Option("--band", metavar="HZ", help="Of the filter on both sides.")
-    ] = None,
+    cutoff: Annotated[float | None, option("cutoff", "Of the positions' filter.", "HZ")] = None,
+    band: Annotated[float | None, option("band", "Of the filter on both sides.", "HZ")] = None,
     period: Annotated[
-        float | None, Option("--period", metavar="S", help="After which the motion repeats.")
+        float | None, option("period", "After which the motion repeats.", "S")
     ] = None,
     cad: Annotated[
-        str,
-        Option("--cad", metavar="WHICH", help="Bodies are near: robot, none, or a machine's file."),
+        str, option("cad", "Bodies are near: robot, none, or a machine's file.", "WHICH")
     ] = "robot",
     boxes: Annotated[
         list[str] | None,
-        Option("--box", metavar="BODY=X0,X1,Y0,Y1", help="Holds all mass of u1, l3, e, u, ...; m."),
+        option("box", "Holds all mass of u1, l3, e, u, ...; m.", "BODY=X0,X1,Y0,Y1"),
     ] = None,
     elbows: Elbows = None,
     as_json: Json = False,
@@ -109,22 +88,17 @@ def identify(
     machine with real bodies as NAME.toml. The exit code is 0 whatever the verdict.
     """
     machine = load_robot(robot, elbows)
-    drawn = _cad(cad)
+    named = {"robot": "robot", "none": None}
+    drawn: Any = named[cad] if cad in named else load_robot(cad)
     with spinner("Opening the logs"):
         from pteron.identification import Processing, open_log
         from pteron.identification import identify as identified
-        from pteron.report.identification import (
-            model_path,
-            numbers,
-            prepared_folder,
-            write_identification,
-        )
+        from pteron.report.identification import model_path, numbers, write_identification
+        from pteron.report.write import checked_folder
 
         terms = _terms(without, joints, rotors=rotors, payload=payload)
-        bounds = _bounds(boxes or (), machine)
-        processing = Processing(
-            None if derivatives is None else derivatives.value, cutoff, band, period
-        )
+        bounds = _bounds(boxes, machine)
+        processing = Processing(derivatives, cutoff, band, period)
         fit, check = (
             [open_log(path, machine, description=description) for path in paths]
             for paths in (logs, held_out or [])
@@ -133,54 +107,40 @@ def identify(
     sources = [path for path in read if Path(path).is_file()]
     model_path(out, machine.name, sources)
     rows = sum(log.rows_estimate or 0 for log in (*fit, *check))
-    with prepared_folder(out) as folder:
-        with stages(f"Identifying {machine.name}", rows) as tell:
-            result = identified(
-                machine,
-                fit,
-                held_out=check,
-                terms=terms,
-                shared=shared,
-                estimator=estimator.value,
-                processing=processing,
-                cad=drawn,
-                bounds=bounds,
-                progress=tell,
-            )
-        with spinner("Drawing the report"):
-            files = write_identification(result, folder, sources=sources)
+    folder = checked_folder(out)
+    with stages(f"Identifying {machine.name}", rows) as tell:
+        result = identified(
+            machine,
+            fit,
+            held_out=check,
+            terms=terms,
+            shared=shared,
+            estimator=estimator,
+            processing=processing,
+            cad=drawn,
+            bounds=bounds,
+            progress=tell,
+        )
+    with spinner("Drawing the report"):
+        files = write_identification(result, folder, sources=sources)
     if as_json:
         show_json({"files": [str(path) for path in files.paths], **numbers(result)})
         return
-    from pteron.cli.identified import show_identification
-
-    show_identification(result, files)
+    _show(result, files)
 
 
-def _terms(without: str | None, joints: _Joints, *, rotors: bool, payload: bool) -> Terms:
+def _terms(without: str | None, joints: Joints, *, rotors: bool, payload: bool) -> Terms:
     from pteron.identification import Terms
 
     left_out = [] if without is None else [name.strip() for name in without.split(",")]
     for name in left_out:
         if name not in _TERMS:
             raise DataError(f"--without: {name!r} is not one of {', '.join(_TERMS)}")
-    return Terms(
-        coulomb="coulomb" not in left_out,
-        viscous="viscous" not in left_out,
-        offset="offset" not in left_out,
-        joints=joints.value,
-        payload=payload,
-        rotors=rotors,
-    )
+    friction = {name: name not in left_out for name in _TERMS}
+    return Terms(**friction, joints=joints, payload=payload, rotors=rotors)
 
 
-def _cad(which: str) -> Manipulator | Literal["robot"] | None:
-    if which == "robot":
-        return "robot"
-    return None if which == "none" else load_robot(which)
-
-
-def _bounds(boxes: list[str] | tuple[()], machine: Manipulator) -> Bounds | None:
+def _bounds(boxes: list[str] | None, machine: Manipulator) -> Bounds | None:
     """Return the boxes as bounds, refused before the work if they do not fit the machine."""
     if not boxes:
         return None
@@ -201,3 +161,74 @@ def _box(text: str) -> tuple[str, Box]:
             "u1=-0.02,0.17,-0.03,0.03"
         ) from None
     return body.strip(), ((x0, x1), (y0, y1))
+
+
+def _show(result: Identification, files: Written) -> None:
+    """Print a verdict, the errors, the values, what was found in the logs, and the files."""
+    verdict = result.verdict
+    worst = max(float(prediction.nrms.max()) for prediction in result.held_out)
+    color = _COLORS[verdict.grade]
+    show(
+        f"[bold {color}]{plain(result.robot.name)}: {verdict.grade}[/bold {color}], "
+        f"held-out error up to {worst:.3g} %",
+        _errors(result),
+        _values(result),
+        *(plain(text) for text in (*verdict.reasons, *verdict.next_steps, *_bodies(result))),
+        *(f"[yellow]Note:[/yellow] {plain(one.message)}" for one in result.findings),
+        *(f"Written: {plain(str(path))}" for path in files.paths),
+    )
+
+
+def _errors(result: Identification) -> Table:
+    from pteron.report.typeset import significant
+
+    headings = ("held-out NRMS (%)", "noise", "no friction")[: 2 if _narrow() else 3]
+    made = table("actuator", *headings, numbers=headings)
+    several = len(result.held_out) > 1
+    for prediction in result.held_out:
+        columns = prediction.nrms, prediction.floor, prediction.nrms_without_friction
+        for i, values in enumerate(zip(*columns[: len(headings)], strict=True), start=1):
+            where = f" in {prediction.source}" if several else ""
+            made.add_row(plain(f"{i}{where}"), *(significant(value) for value in values))
+    return made
+
+
+def _values(result: Identification) -> Table:
+    from pteron.report.identification import measured, parameter_rows
+    from pteron.report.typeset import significant
+
+    headings = ("value", "+- 95 %", "rel. (%)")
+    numbers = headings[: 2 if _narrow() else 3]
+    columns = ["parameter", *numbers, *(() if _narrow() else ("unit",)), ""]
+    caption = "Base parameters are sums, named by one term; the page has them in full."
+    made = table(*columns, numbers=numbers, caption=caption)
+    marks = {"essential": "", "dropped": "[yellow]weak[/]", "unseen": "[yellow]unseen[/]"}
+    for row in parameter_rows(result):
+        value, half = map(_ascii, measured(row.value, row.half))
+        relative = ">999" if row.relative >= 9.995 else _ascii(significant(100.0 * row.relative, 2))
+        rest = () if _narrow() else (relative, row.unit)
+        made.add_row(plain(row.name), value, half, *rest, marks[row.status])
+    return made
+
+
+def _narrow() -> bool:
+    return get_terminal_size().columns < _NARROW
+
+
+def _ascii(number: str) -> str:
+    """Return a number with the minus that every terminal has."""
+    return number.replace("\u2212", "-").replace("\u221e", "inf")
+
+
+def _bodies(result: Identification) -> tuple[str, ...]:
+    found = result.consistency
+    if found is None:
+        return result.notes
+    border = f"; at the border: {', '.join(found.at_border)}" if found.at_border else ""
+    lines = [f"Real bodies have exactly these base parameters{border}."]
+    if not found.feasible:
+        away = f"the nearest are {found.distance:.2g} standard deviations away{border}."
+        lines = [f"No real bodies have exactly these base parameters; {away}"]
+    if not found.cad_feasible:
+        lines.append(f"The CAD model itself is not real: {'; '.join(found.cad_violations)}.")
+    return (*lines, *result.notes)

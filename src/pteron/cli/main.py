@@ -1,29 +1,94 @@
-"""The command `pteron` and the list of its subcommands."""
+"""The command `pteron`: its subcommands, and how it ends: with an exit code, and no traceback."""
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Callable
+from contextlib import suppress
 from inspect import cleandoc
-from typing import Annotated
+from io import StringIO
+from typing import Annotated, Any
 
-from typer import Context, Exit, Option, Typer, echo
-from typer.core import TyperCommand
+from typer import Abort, Context, Exit, Option, Typer, echo
+from typer.core import TyperGroup
 
-from pteron.cli.base import base
-from pteron.cli.catalog import catalog
-from pteron.cli.check import check
-from pteron.cli.direct import direct
+from pteron.cli.arguments import Command, NumbersCommand, without_types
+from pteron.cli.base import base, table1
 from pteron.cli.excite import excite
 from pteron.cli.export import export
-from pteron.cli.forces import forces
 from pteron.cli.identify import identify
-from pteron.cli.inverse import inverse
-from pteron.cli.numbers import NumbersCommand
-from pteron.cli.program import Program
+from pteron.cli.machines import catalog, check
+from pteron.cli.motions import direct, forces, inverse
 from pteron.cli.report import report
-from pteron.cli.table1 import table1
+from pteron.cli.screen import complain, note
+from pteron.errors import PteronError
 
-__all__ = ["app", "main"]
+_USER_ERROR = 2
+_INTERRUPTED = 130
+_PIPE_CLOSED = 1
+
+
+class Program(TyperGroup):
+    """The group of all subcommands; it turns errors into lines and exit codes."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Return the parameters, flags without a type in the help."""
+        return without_types(super().get_params(ctx))
+
+    def main(self, *args: Any, **extra: Any) -> Any:
+        """Run a subcommand and exit."""
+        _open_closed_streams()
+        try:
+            status = super().main(*args, **extra | {"standalone_mode": False})
+            sys.stdout.flush()
+            if status == _INTERRUPTED:  # Typer has caught it
+                raise KeyboardInterrupt
+        except PteronError as error:
+            complain(str(error))
+            status = _USER_ERROR
+        except BrokenPipeError:
+            _close_standard_output()
+            status = _PIPE_CLOSED
+        except OSError as error:
+            where = error.filename or "standard output"
+            complain(f"{where}: {error.strerror or error}")
+            _close_standard_output()
+            status = _USER_ERROR
+        except (Abort, KeyboardInterrupt):
+            note("Interrupted")
+            status = _INTERRUPTED
+        except Exception as error:
+            # Typer's own errors have moved between modules; their method has kept its name.
+            if not hasattr(error, "format_message"):
+                raise
+            complain(_usage(error))
+            status = _USER_ERROR
+        sys.exit(status if isinstance(status, int) else 0)
+
+
+def _open_closed_streams() -> None:
+    """Let what is printed go nowhere if the caller has closed the stream (``>&-``)."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, StringIO())
+
+
+def _usage(error: Any) -> str:
+    message = " ".join(str(error.format_message()).split()).rstrip(".")
+    message = message.replace("Value error, ", "")
+    context = getattr(error, "ctx", None)
+    if context is None:
+        return message
+    joint = " See" if message.endswith("?") else "; see"
+    return f"{message}{joint} {context.command_path} --help"
+
+
+def _close_standard_output() -> None:
+    """Send Python's last flush nowhere: who read the output has left, or its disk is full."""
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
 
 app = Typer(
     name="pteron",
@@ -43,9 +108,7 @@ def _examples(*lines: str) -> str:
     return "\n\n".join(["[bold]Examples[/bold]", *lines])
 
 
-def _add(
-    function: Callable[..., None], *examples: str, cls: type[TyperCommand] = TyperCommand
-) -> None:
+def _add(function: Callable[..., None], *examples: str, cls: type[Command] = Command) -> None:
     app.command(cls=cls, help=_paragraphs(function.__doc__), epilog=_examples(*examples))(function)
 
 

@@ -6,16 +6,10 @@ import json
 import math
 from typing import Annotated, Any
 
-from rich.markup import escape
 from rich.table import Table
-from typer import Option
 
-from pteron.cli.arguments import Elbows, Json, Robot
-from pteron.cli.progress import spinner
-from pteron.cli.robots import load_robot
-from pteron.cli.screen import show, show_json, table
-
-__all__ = ["report"]
+from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
+from pteron.cli.screen import note, plain, show, show_json, spinner, table
 
 _SERIES = ("time", "pose", "velocity", "acceleration", "forces")
 """What the report's file holds of each sample of the cycle: nothing to print."""
@@ -23,7 +17,7 @@ _SERIES = ("time", "pose", "velocity", "acceleration", "forces")
 
 def report(
     robot: Robot,
-    out: Annotated[str, Option("--out", metavar="DIR", help="The folder to write it to.")],
+    out: Annotated[str, option("out", "The folder to write it to.", "DIR")],
     elbows: Elbows = None,
     as_json: Json = False,
 ) -> None:
@@ -37,20 +31,20 @@ def report(
 
         page = write_report(machine, out)
     found = json.loads((page.parent / "report.json").read_text(encoding="utf-8"))
+    for text in found["doubts"]:
+        note(f"Warning: {text}")
     if as_json:
         cycle = {key: value for key, value in found["cycle"].items() if key not in _SERIES}
         show_json({"page": str(page), **found, "cycle": cycle})
         return
-    show(_machine(found), _legs(found["cycle"]))
-    if found["costs"]:
-        show(_costs(found["costs"]))
-    show(f"Written to {escape(str(page))}")
+    show(_machine(found), _legs(found["cycle"]), _costs(found["costs"]))
+    show(f"Written to {plain(str(page))}")
 
 
 def _machine(found: dict[str, Any]) -> Table:
     home, reach, base = found["home"], found["reach"], found["base_parameters"]
     singular = ", ".join(f"{math.degrees(a):.4g}" for a in found["singular_orientations"] or ())
-    made = table(escape(found["robot"]), "")
+    made = table(plain(found["robot"]), "")
     made.add_row("home pose", " ".join(f"{value:.4g}" for value in home["pose"]))
     made.add_row("reserve there", f"{home['reserve']:.3f} of 1")
     made.add_row("condition number there", f"{home['condition_number']:.4g}")
@@ -71,8 +65,7 @@ def _legs(cycle: dict[str, Any]) -> Table:
 
 
 def _costs(costs: list[dict[str, Any]]) -> Table:
-    headings = ("operations", "us/state")
-    made = table("inverse dynamics as", *headings, numbers=headings)
+    made = table("inverse dynamics as", "operations", numbers=("operations",))
     for cost in costs:
-        made.add_row(escape(cost["form"]), str(cost["operations"]), f"{cost['microseconds']:.2f}")
+        made.add_row(plain(cost["form"]), str(cost["operations"]))
     return made

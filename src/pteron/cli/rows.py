@@ -1,52 +1,48 @@
-"""The rows a subcommand works on, from the command line or a table, and the work in chunks."""
+"""The rows a subcommand works on, the work in chunks, and where its results go."""
 
 from __future__ import annotations
 
-import re
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from pteron.cli.arguments import Failure
-from pteron.cli.progress import progress_bar
-from pteron.errors import DataError, PteronError, SingularPose, UnreachablePose
+from pteron.cli.arguments import Failure, parsed_numbers
+from pteron.cli.screen import is_terminal, note, progress_bar, show, show_json, table, write
+from pteron.errors import DataError, OutputError, PteronError, SingularPose, UnreachablePose
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from pteron.manipulator import Manipulator
     from pteron.tables import Table
-
-__all__ = ["Rows", "rows_of_table", "single_row"]
 
 CHUNK = 50_000
 """Rows served at once: enough to be fast, few enough to show how far the work is."""
 LONG = 200_000
 """More rows than that are worth a progress bar."""
+SHOWN_ROWS = 40
+"""More rows than that are no reading for a person."""
+
+_UNITS = {"row": "", "mode": "", "phi": "rad"}
+_DECIMALS = {"m": 6, "rad": 6, "N": 4}
 
 
 @dataclass(frozen=True)
 class Rows:
-    """A table, or the one row that was typed.
-
-    Parameters
-    ----------
-    table : Table
-        The rows.
-    single : bool
-        Whether it was typed, so that no message speaks of rows.
-    """
+    """A table, or the one row that was typed, so that no message speaks of rows."""
 
     table: Table
     single: bool = False
 
     def served(
         self,
+        robot: Manipulator,
         serve: Callable[[NDArray[Any]], NDArray[Any]],
         columns: Sequence[str],
         on_failure: Failure,
     ) -> NDArray[Any]:
-        """Return what `serve` makes of the numbers in `columns`, chunk by chunk.
+        """Return what `serve` makes of the numbers (..., K) in `columns`, chunk by chunk.
 
         Raises
         ------
@@ -55,14 +51,23 @@ class Rows:
         """
         import numpy as np
 
-        values = self.table.numbers(columns, on_failure.value)
-        if len(values) <= LONG:
-            return np.concatenate(list(self._chunks(serve, values)))
-        parts = []
-        with progress_bar(self.table.source, len(values)) as advance:
-            for part in self._chunks(serve, values):
-                parts.append(part)
-                advance(len(part))
+        from pteron.workspace.doubts import value_doubts
+
+        values = self.table.numbers(columns, on_failure)
+        unlikely = "; ".join(value_doubts(robot, columns, values))
+        try:
+            if len(values) <= LONG:
+                parts = list(self._chunks(serve, values))
+            else:
+                parts = []
+                with progress_bar(self.table.source, len(values)) as advance:
+                    for part in self._chunks(serve, values):
+                        parts.append(part)
+                        advance(len(part))
+        except PteronError as error:
+            raise (PteronError(f"{error}; {unlikely}") if unlikely else error) from None
+        if unlikely:
+            note(f"Note: {self.table.source}: {unlikely}")
         return np.concatenate(parts)
 
     def _chunks(
@@ -72,18 +77,34 @@ class Rows:
             try:
                 yield serve(values[start : start + CHUNK])
             except (UnreachablePose, SingularPose) as error:
-                raise self._placed(error, start) from None
+                if not error.index:
+                    raise
+                self._refuse(serve, values, start + error.index[0])
+                raise
 
-    def _placed(self, error: UnreachablePose | SingularPose, start: int) -> PteronError:
-        """Return the error with the row of the table for the element of the chunk."""
-        element = re.match(r"(\w+)\[[\d, ]+\]: ", str(error))
-        if not (element and error.index):
-            return PteronError(str(error))
-        text = re.sub(r" \(\d+ such poses in the batch\)$", "", str(error)[element.end() :])
-        if self.single:
-            return PteronError(f"{element[1]}: {text}")
-        place = self.table.place(start + error.index[0])
-        return PteronError(f"{place}: {text}, or leave such rows empty with --on-failure nan")
+    def _refuse(
+        self, serve: Callable[[NDArray[Any]], NDArray[Any]], values: NDArray[Any], row: int
+    ) -> None:
+        """Serve the row that fails alone: its message then speaks of it, and of no batch."""
+        try:
+            serve(values[row])
+        except PteronError as error:
+            if self.single:
+                raise PteronError(str(error)) from None
+            raise PteronError(
+                f"{self.table.place(row)}, {error}, or leave such rows empty with --on-failure nan"
+            ) from None
+
+
+def given_rows(
+    file: str | None, typed: Sequence[str] | None, what: str, names: Sequence[str]
+) -> Rows:
+    """Return the rows of a table's file, or the one that was typed; `names` are its columns."""
+    if not typed:
+        return rows_of_table(file, what, names)
+    if file is not None:
+        raise DataError(f"{what} and --table given; give one of them")
+    return single_row(names, parsed_numbers(typed, names, what))
 
 
 def single_row(columns: Sequence[str], values: Sequence[float]) -> Rows:
@@ -96,18 +117,8 @@ def single_row(columns: Sequence[str], values: Sequence[float]) -> Rows:
     return Rows(Table("the command line", pl.DataFrame(cells)), single=True)
 
 
-def rows_of_table(file: str | None, typed: bool, what: str, names: Sequence[str]) -> Rows | None:
-    """Return the rows of a table's file, or None if the numbers were typed instead.
-
-    Raises
-    ------
-    DataError
-        If there are both or neither, or if the file cannot be read.
-    """
-    if typed and file is not None:
-        raise DataError(f"{what} and --table given; give one of them")
-    if typed:
-        return None
+def rows_of_table(file: str | None, what: str, names: Sequence[str]) -> Rows:
+    """Return the rows of a table's file."""
     if file is None:
         raise DataError(f"no {what} given; give {' '.join(names)}, or --table FILE")
     from pteron.tables import read_table
@@ -116,3 +127,80 @@ def rows_of_table(file: str | None, typed: bool, what: str, names: Sequence[str]
         # Polars, once imported, lets a read of standard input go on through Ctrl-C.
         signal.siginterrupt(signal.SIGINT, True)
     return Rows(read_table(file))
+
+
+def check_destination(
+    out: str | None, source: str | None, table: Table, added: Sequence[str]
+) -> None:
+    """Refuse, before the work begins, a file that cannot be written or would lose data.
+
+    The columns `added` to the table replace those of the same name: it must not be written over the
+    file `source` that it was read from.
+    """
+    replaced = [name for name in added if name in table.columns]
+    columns = f"{'column' if len(replaced) == 1 else 'columns'} {', '.join(replaced)}"
+    if out is not None:
+        from pteron.tables import check_output
+
+        file = check_output(out)
+        if replaced and source is not None and file.exists() and file.samefile(source):
+            raise OutputError(f"{out}: its own {columns} would be lost; write to another file")
+    if replaced:
+        note(f"Note: {table.source}: {columns} replaced by the result")
+
+
+def deliver(
+    result: Table, shown: Sequence[str], *, out: str | None, as_json: bool, single: bool = False
+) -> None:
+    """Write a result with all its columns to a file or a program, or show some to a person.
+
+    The last one of those `shown` is empty in a row that failed; a `single` result belongs to
+    numbers that were typed.
+    """
+    empty = result.frame[shown[-1]].null_count()
+    without = f", {empty} of them without a result" if empty else ""
+    if out is not None:
+        from pteron.tables import write_table
+
+        write_table(result.frame, out)
+        if as_json:
+            show_json({"out": out, "rows": len(result), "empty": empty})
+        else:
+            note(f"Wrote {_count(len(result))} to {out}{without}")
+    elif as_json:
+        text = result.json()
+        write(text[1:-1] if single else text)
+        write("\n")
+    elif is_terminal():
+        _show(result, shown, single=single)
+    else:
+        for text in result.text():
+            write(text)
+        if empty and not single:
+            note(f"Printed {_count(len(result))}{without}")
+
+
+def _show(result: Table, shown: Sequence[str], *, single: bool) -> None:
+    """Print the first rows for a person, with units."""
+    units = [_UNITS.get(name, "N" if name.startswith("force") else "m") for name in shown]
+    headings = [f"{n} ({unit})" if unit else n for n, unit in zip(shown, units, strict=True)]
+    numbered = ["row"] if not single and "mode" not in shown else []
+    made = table(*numbered, *headings, numbers=("row", *headings))
+    rows = result.frame.select(shown).head(SHOWN_ROWS).iter_rows()
+    for i, cells in enumerate(rows, start=1):
+        texts = (_text(cell, unit) for cell, unit in zip(cells, units, strict=True))
+        made.add_row(*(str(i) for _ in numbered), *texts)
+    show(made)
+    if len(result) > SHOWN_ROWS:
+        note(f"{SHOWN_ROWS} of {_count(len(result))} shown; --out FILE writes them all")
+
+
+def _text(cell: float | int | None, unit: str) -> str:
+    if cell is None:
+        return "-"
+    # Adding zero takes the sign from what was rounded to zero.
+    return f"{round(cell, _DECIMALS[unit]) + 0.0:.{_DECIMALS[unit]}f}" if unit else str(cell)
+
+
+def _count(rows: int) -> str:
+    return f"{rows} {'row' if rows == 1 else 'rows'}"

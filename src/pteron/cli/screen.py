@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import math
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from io import TextIOWrapper
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -14,7 +16,8 @@ from rich.markup import escape
 from rich.table import Table
 from typer import echo
 
-__all__ = ["complain", "is_terminal", "note", "show", "show_json", "table", "write"]
+if TYPE_CHECKING:
+    from rich.progress import Progress
 
 _PIECE = 1 << 16
 
@@ -22,6 +25,25 @@ _PIECE = 1 << 16
 def is_terminal() -> bool:
     """Say whether a person reads standard output."""
     return sys.stdout.isatty()
+
+
+def plain(text: str) -> str:
+    r"""Return a text in which neither Rich nor a terminal finds a command.
+
+    Names come from files that anyone may have written.
+
+    Examples
+    --------
+    >>> print(plain("[red]odd\x1b[2J"))
+    \[red]odd\x1b[2J
+    """
+    return escape(_visible(text))
+
+
+def _visible(text: str) -> str:
+    """Return a text on one line, with control characters as Python writes them."""
+    spaced = " ".join(text.splitlines())
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in spaced)
 
 
 def show(*things: str | Table) -> None:
@@ -42,12 +64,11 @@ def write(text: str) -> None:
 
 
 def show_json(data: Any) -> None:
-    """Print data on standard output as JSON."""
+    """Print data on standard output as JSON, null for the numbers that it does not have."""
     write(json.dumps(_finite(data), indent=2, allow_nan=False) + "\n")
 
 
 def _finite(data: Any) -> Any:
-    """Return data with null for the numbers that JSON does not have."""
     if isinstance(data, dict):
         return {key: _finite(value) for key, value in data.items()}
     if isinstance(data, list | tuple):
@@ -55,28 +76,84 @@ def _finite(data: Any) -> Any:
     return None if isinstance(data, float) and not math.isfinite(data) else data
 
 
-def table(*columns: str, numbers: tuple[str, ...] = (), title: str | None = None) -> Table:
+def table(*columns: str, numbers: tuple[str, ...] = (), caption: str | None = None) -> Table:
     """Return a table without rows; the columns in `numbers` are set to the right, unbroken."""
-    made = Table(
-        box=SIMPLE_HEAD, title=title, title_justify="left", pad_edge=False, collapse_padding=True
-    )
+    made = Table(box=SIMPLE_HEAD, caption=caption, pad_edge=False, collapse_padding=True)
     for name in columns:
         number = name in numbers
-        made.add_column(
-            escape(name),
-            justify="right" if number else "left",
-            no_wrap=number,
-            overflow="fold",
-        )
+        justify: Any = "right" if number else "left"
+        made.add_column(plain(name), justify=justify, no_wrap=number, overflow="fold")
     return made
 
 
 def note(message: str) -> None:
     """Print a line on standard error."""
-    echo(" ".join(message.splitlines()), err=True)
+    echo(_visible(message), err=True)
 
 
 def complain(message: str) -> None:
     """Print an error as one line on standard error."""
     console = Console(stderr=True, highlight=False, emoji=False, soft_wrap=True)
-    console.print(f"[bold red]Error:[/bold red] {escape(' '.join(message.splitlines()))}")
+    console.print(f"[bold red]Error:[/bold red] {plain(message)}")
+
+
+@contextmanager
+def spinner(task: str) -> Iterator[None]:
+    """Show a person on standard error that work of unknown length goes on."""
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield
+        return
+    with console.status(plain(task)):
+        yield
+
+
+@contextmanager
+def progress_bar(task: str, total: int) -> Iterator[Callable[[int], None]]:
+    """Show a person how much of the work is done; yields what is called with each amount done."""
+    with _bar() as progress:
+        number = progress.add_task(plain(task), total=total)
+        yield lambda done: progress.update(number, advance=done)
+
+
+@contextmanager
+def stages(task: str, rows: int) -> Iterator[Callable[[str, int, int], None]]:
+    """Show a bar for each stage of long work, and between them that the work goes on.
+
+    Yields what is to be told a stage's name, how many of its rows are done, and how many there are:
+    no more than are done where the stage does not know, which then has `rows`.
+    """
+    with _bar() as progress:
+        number = progress.add_task(plain(task), total=None)
+        stage, before = "", 0
+
+        def tell(name: str, done: int, total: int) -> None:
+            nonlocal before, stage
+            if name != stage:
+                progress.reset(number, total=max(total, rows), description=plain(name))
+                stage, before = name, 0
+            # The rows of a stage's next file are counted anew.
+            progress.update(number, advance=done - before if done >= before else done)
+            before = done
+            if done >= max(total, rows):
+                progress.reset(number, total=None, description=plain(task))
+                stage = ""
+
+        yield tell
+
+
+def _bar() -> Progress:
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TaskProgressColumn,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    console = Console(stderr=True)
+    columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn()
+    left = TimeRemainingColumn()
+    return Progress(
+        *columns, left, console=console, disable=not console.is_terminal, transient=True
+    )

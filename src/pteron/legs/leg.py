@@ -316,6 +316,11 @@ class LegKind(ABC):
         """Return the TOML keys of its own, for `save`."""
 
     @property
+    def extents(self) -> dict[str, tuple[str, float, float, str]]:
+        """Where a body's mass is expected: its TOML key, least and greatest x, and what is there."""
+        return {}
+
+    @property
     def size(self) -> float:
         """The length that its reach is measured by, m."""
         return sum(float(q.value[0]) for q in self.quantities if q.role == "length")

@@ -209,6 +209,13 @@ class PRRR(LegKind):
             "lower": self.lower,
         }
 
+    @property
+    def extents(self) -> dict[str, tuple[str, float, float, str]]:
+        return {
+            "u": ("upper", 0.0, self.upper_length, "R1, where it begins, and R2"),
+            "l": ("lower", -self.lower_length, 0.0, "R2 and R3, where its x is zero"),
+        }
+
     def transfers(self, gravity: Vector) -> tuple[Transfer, ...]:
         found = [
             Transfer(

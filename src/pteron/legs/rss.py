@@ -212,6 +212,13 @@ class RSS(LegKind):
             "lower": self.lower,
         }
 
+    @property
+    def extents(self) -> dict[str, tuple[str, float, float, str]]:
+        return {
+            "u": ("upper", 0.0, self.upper_length, "its axis and the rod"),
+            "l": ("lower", -self.lower_length, 0.0, "crank and platform, where its x is zero"),
+        }
+
     def transfers(self, gravity: Vector) -> tuple[Transfer, ...]:
         found = [
             Transfer("the crank{} turns about a fixed axis", {("m", "u"): (1, ())}),

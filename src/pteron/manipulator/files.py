@@ -91,7 +91,8 @@ def _parse(text: str, source: str) -> Manipulator:
         )
         if robot is not None:
             return robot
-    raise ModelError(f"{source}: {'; '.join(reading.faults)}")
+    faults = tuple(f"{source}: {fault}" for fault in reading.faults)
+    raise ModelError(f"{source}: {'; '.join(reading.faults)}", faults=faults)
 
 
 @dataclass

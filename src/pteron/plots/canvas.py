@@ -1,17 +1,48 @@
-"""Empty figures in the style of all pictures."""
+"""Empty figures in the style of all pictures, their colours, and figures as SVG text.
+
+The legs' four colours are Okabe and Ito's, which the colour-blind can tell apart. `svg` writes each
+colour as a CSS variable with this value as its default, so that one picture serves a light and a
+dark page.
+"""
 
 from __future__ import annotations
 
+import re
+from html import escape
+from io import StringIO
+from typing import Any
+
+import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.gridspec import GridSpec
 
-from pteron.plots.colors import GRID, INK, MUTED
+LEG_COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7")
+_LEG_STYLES = ("-", (0, (6, 1.5)), (0, (2, 1.2)), (0, (6, 1.5, 1.5, 1.5)))
+"""Legs 1 to 4, in every picture and table: colour alone does not survive every printer."""
 
-__all__ = ["FONT_SIZE", "blank", "plain_axes"]
+INK = "#1c2630"
+MUTED = "#66727f"
+GRID = "#d3dae1"
+PAPER = "#fdfefe"
+REACH = "#3d6b8f"
+WARNING = "#b3261e"
+
+_VARIABLES = {
+    INK: "--ink",
+    MUTED: "--muted",
+    GRID: "--grid",
+    PAPER: "--paper",
+    REACH: "--reach",
+    WARNING: "--warning",
+    **{color: f"--leg{i + 1}" for i, color in enumerate(LEG_COLORS)},
+}
 
 FONT_SIZE = 9.0
 """Points. Figures are about as wide as a phone's screen, so that text stays legible there."""
+
+_NO_METADATA = dict.fromkeys(("Creator", "Date", "Format", "Type"))
 
 
 def blank(width: float, height: float) -> Figure:
@@ -35,3 +66,93 @@ def plain_axes(figure: Figure, xlabel: str, ylabel: str) -> Axes:
     axes.grid(color=GRID, linewidth=0.6)
     axes.set_axisbelow(True)
     return axes
+
+
+def stack(
+    figure: Figure, xlabel: str, ylabels: list[str], ratios: list[float] | None = None
+) -> list[Axes]:
+    """Return axes one above the other, which share the lowest one's scale along x."""
+    grid = GridSpec(len(ylabels), 1, figure=figure, height_ratios=ratios)
+    found = [plain_axes(figure, "", ylabel) for ylabel in ylabels]
+    for i, axes in enumerate(found):
+        axes.set_subplotspec(grid[i])
+    found[-1].set_xlabel(xlabel)
+    for axes in found[:-1]:
+        axes.sharex(found[-1])
+        axes.tick_params(labelbottom=False)
+    return found
+
+
+def leg_style(i: int, width: float) -> dict[str, Any]:
+    """Return the colour and style of a leg's line, with its width in points."""
+    return {"color": LEG_COLORS[i], "linestyle": _LEG_STYLES[i], "linewidth": width}
+
+
+def legend(figure: Figure, columns: int) -> None:
+    """Put a legend without a frame above the axes."""
+    figure.legend(
+        loc="outside upper center",
+        ncols=columns,
+        frameon=False,
+        fontsize=FONT_SIZE - 1.0,
+        labelcolor=INK,
+        handlelength=2.2,
+        columnspacing=1.2,
+        handletextpad=0.5,
+    )
+
+
+def spot(axes: Axes, x: float, y: float, face: str, edge: str, size: float, **more: Any) -> None:
+    """Draw one round mark."""
+    style = {"marker": "o", "linestyle": "none", "markersize": size, **more}
+    axes.plot([x], [y], markerfacecolor=face, markeredgecolor=edge, **style)
+
+
+def remark(axes: Axes, text: str, x: float, y: float, color: str, rise: float = 0.0) -> None:
+    """Write at a point, or so many points of type above it; y = inf is the top of the axes."""
+    top = y == float("inf")
+    axes.annotate(
+        text,
+        (x, 1.0 if top else y),
+        xycoords=("data", "axes fraction") if top else "data",
+        xytext=(0.0, rise),
+        textcoords="offset points",
+        ha="center",
+        fontsize=FONT_SIZE,
+        color=color,
+    )
+
+
+def svg(figure: Figure, *, name: str, title: str) -> str:
+    """Return a figure as one `<svg>` element for an HTML page.
+
+    It holds no date, no random identifier and no address, and its colours are CSS variables with
+    the printed colours as defaults. Text stays text, in the page's font. The name, of letters and
+    digits, is put before every identifier, which must be unique in a page; the title says what the
+    picture shows to those who cannot see it.
+    """
+    buffer = StringIO()
+    with mpl.rc_context({"svg.hashsalt": "pteron", "svg.fonttype": "none"}):
+        figure.savefig(buffer, format="svg", metadata=_NO_METADATA)
+    text = buffer.getvalue()
+    text = text[text.index("<svg") :].rstrip()
+    text = re.sub(r"\s*<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    text = re.sub(r"<!--.*?-->\s*", "", text, flags=re.DOTALL)
+    text = re.sub(r'\sid="', f' id="{name}-', text)
+    text = re.sub(r'href="#', f'href="#{name}-', text)
+    text = re.sub(r"url\(#", f"url(#{name}-", text)
+    # The generic families that end matplotlib's list are the page's affair too.
+    text = re.sub(r"font: ([^'\";]*?)'[^;\"]*", r"font: \1var(--font, sans-serif)", text)
+    # A hundredth of a point is enough; only tags hold coordinates, the rest is text to read.
+    text = re.sub(r"<[^>]*>", lambda tag: re.sub(r"(\.\d\d)\d+", r"\1", tag[0]), text)
+    for color, variable in _VARIABLES.items():
+        text = text.replace(color, f"var({variable}, {color})")
+    box = re.search(r'viewBox="([^"]+)"', text)
+    assert box is not None  # matplotlib always writes it
+    _, _, width, height = box[1].split()
+    head = (
+        f'<svg class="plot" role="img" aria-label="{escape(title)}" viewBox="{box[1]}" '
+        f'style="--width: {width}px; aspect-ratio: {width} / {height}">'
+        f"<title>{escape(title)}</title>"
+    )
+    return head + text[text.index(">") + 1 :]

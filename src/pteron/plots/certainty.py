@@ -1,4 +1,4 @@
-"""How well parameters are known: each by itself, and how they go together."""
+"""Residuals as noise, and how well parameters are known: one by one, and together."""
 
 from __future__ import annotations
 
@@ -12,17 +12,82 @@ from matplotlib.path import Path
 from numpy.typing import NDArray
 
 from pteron.kernels import Array
-from pteron.plots.canvas import FONT_SIZE, blank, plain_axes
-from pteron.plots.colors import GRID, INK, LEG_COLORS, MUTED, PAPER, REACH, WARNING
-
-__all__ = ["certainty_figure", "correlation_figure"]
+from pteron.plots.canvas import (
+    FONT_SIZE,
+    GRID,
+    INK,
+    LEG_COLORS,
+    MUTED,
+    PAPER,
+    REACH,
+    WARNING,
+    blank,
+    leg_style,
+    legend,
+    plain_axes,
+    spot,
+)
 
 _CERTAIN = 1.96
 """Standard deviations from zero beyond which a value is not zero, at 95 %."""
 
 _LEVELS = 10
 _LEAST = 0.05
-"""Correlations that are nothing to see."""
+"""Correlations below it are nothing to see."""
+
+_REACH = 4.5
+"""Standard deviations to each side."""
+
+
+def histogram_figure(residuals: Array) -> Figure:
+    """Return the distribution of residuals, each in its standard deviation, and the normal one.
+
+    Residuals have shape (R, n), NaN where there is none.
+    """
+    figure = blank(5.4, 3.1)
+    axes = plain_axes(figure, "residual (standard deviations)", "density")
+    fine = np.linspace(-_REACH, _REACH, 121)
+    normal = np.exp(-(fine**2) / 2.0) / np.sqrt(2.0 * np.pi)
+    axes.fill_between(fine, normal, color=GRID, linewidth=0.0, zorder=0.6)
+    axes.plot(fine, normal, color=INK, linewidth=1.2, label="normal")
+    for i, column in enumerate(residuals.T):
+        seen = column[np.isfinite(column)]
+        size = float(seen.std()) if len(seen) else 0.0
+        if size == 0.0:
+            continue
+        bins = int(np.clip(2.0 * np.cbrt(len(seen)), 12, 60))
+        # What is farther out is counted where the picture ends.
+        scaled = np.clip((seen - seen.mean()) / size, -_REACH, _REACH)
+        density, edges = np.histogram(scaled, bins, (-_REACH, _REACH), density=True)
+        axes.stairs(density, edges, label=f"actuator {i + 1}", **leg_style(i, 1.5))
+    axes.set_xlim(-_REACH, _REACH)
+    axes.set_ylim(0.0, None)
+    legend(figure, 1 + residuals.shape[1])
+    return figure
+
+
+def autocorrelation_figure(correlations: Array, bound: Array) -> Figure:
+    """Return the autocorrelation of residuals, and the band in which white noise stays.
+
+    Correlations (L, n) are those at lags 1 to L; white noise keeps below the bound (n,) nineteen
+    times in twenty.
+    """
+    figure = blank(5.4, 3.1)
+    axes = plain_axes(figure, "lag (equations)", "autocorrelation")
+    lags = np.arange(1, len(correlations) + 1)
+    edge = float(bound.max())
+    axes.axhspan(-edge, edge, color=GRID, alpha=0.8, linewidth=0.0, zorder=0.5)
+    axes.axhline(0.0, color=MUTED, linewidth=0.8)
+    for i, column in enumerate(correlations.T):
+        line = leg_style(i, 1.4)
+        axes.plot(lags, column, marker="o", markersize=2.6, label=f"actuator {i + 1}", **line)
+    # Without a correlation to show, the band still is.
+    largest = float(np.abs(correlations).max()) if correlations.size else 0.0
+    reach = min(1.15 * max(largest, 2.0 * edge), 1.05)
+    axes.set_ylim(-reach, reach)
+    axes.set_xlim(0.0, len(correlations) + 1.0)
+    legend(figure, correlations.shape[1])
+    return figure
 
 
 def certainty_figure(
@@ -30,20 +95,8 @@ def certainty_figure(
 ) -> Figure:
     """Return each value over its standard deviation, on a logarithmic scale.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Of the p values.
-    ratios : array, shape (p,)
-        Size of each value over its standard deviation.
-    weak : array of bool, shape (p,)
-        Which of them the data hardly show.
-    inertial : int
-        How many of them, at the front, are inertial parameters.
-
-    Returns
-    -------
-    matplotlib Figure
+    The p values have names, ratios (p,) of size to standard deviation, and are `weak` (p,) where
+    the data hardly show them. The first `inertial` of them are inertial parameters.
     """
     p = len(names)
     figure = blank(5.4, 0.7 + 0.185 * p)
@@ -56,15 +109,8 @@ def certainty_figure(
         y = p - 1 - k
         color = WARNING if weak[k] else REACH if k < inertial else LEG_COLORS[1]
         axes.plot([_CERTAIN, ratio], [y, y], color=color, linewidth=1.2, alpha=0.6)
-        axes.plot(
-            [ratio],
-            [y],
-            marker="o" if k < inertial else "s",
-            markersize=5.5,
-            color=color,
-            markeredgecolor=PAPER,
-            markeredgewidth=0.6,
-        )
+        marker = "o" if k < inertial else "s"
+        spot(axes, ratio, y, color, PAPER, 5.5, marker=marker, markeredgewidth=0.6)
     axes.axvline(_CERTAIN, color=MUTED, linewidth=0.9, linestyle=(0, (4, 2)))
     axes.set_xscale("log")
     axes.set_xlim(0.1, high)
@@ -77,19 +123,7 @@ def certainty_figure(
 
 
 def correlation_figure(names: Sequence[str], correlation: Array) -> Figure:
-    """Return a matrix of correlations: blue goes together, orange one for the other.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Of the p values.
-    correlation : array, shape (p, p)
-        From -1 to 1.
-
-    Returns
-    -------
-    matplotlib Figure
-    """
+    """Return a matrix (p, p) of correlations: blue goes together, orange one for the other."""
     p = len(names)
     side = max(1.0 + 0.165 * p, 3.0)
     figure = blank(side, side)
@@ -119,5 +153,5 @@ def _squares(axes: Axes, cells: NDArray[np.intp], color: str, alpha: float) -> N
     corners = np.array([[-0.46, -0.46], [0.46, -0.46], [0.46, 0.46], [-0.46, 0.46], [0.0, 0.0]])
     vertices = (cells[:, None, ::-1] + corners).reshape(-1, 2)
     codes = np.tile([Path.MOVETO, *[Path.LINETO] * 3, Path.CLOSEPOLY], len(cells))
-    patch = PathPatch(Path(vertices, codes), facecolor=color, edgecolor="none", alpha=alpha)
-    axes.add_patch(patch)
+    path = Path(vertices, codes)
+    axes.add_patch(PathPatch(path, facecolor=color, edgecolor="none", alpha=alpha))

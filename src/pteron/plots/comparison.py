@@ -1,21 +1,38 @@
-"""Forces that were measured against forces that were predicted."""
+"""Forces that were measured against forces that were predicted, and what is left of them."""
 
 from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from numpy.typing import NDArray
 
 from pteron.kernels import Array
-from pteron.plots.canvas import FONT_SIZE, blank, plain_axes
-from pteron.plots.colors import GRID, INK, LEG_COLORS, MUTED, PAPER
-from pteron.plots.panels import stack
-
-__all__ = ["comparison_figure", "errors_figure"]
+from pteron.plots.canvas import (
+    FONT_SIZE,
+    GRID,
+    INK,
+    LEG_COLORS,
+    MUTED,
+    PAPER,
+    blank,
+    plain_axes,
+    spot,
+    stack,
+)
 
 _TICKS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0)
+
+_COLUMNS = 360
+"""Points of the curve over a whole recording: what is finer than a line is an envelope."""
+
+_DOTS = 600
+_BINS = 30
+_FEWEST = 8
+"""Samples in a bin whose mean says something."""
 
 
 def comparison_figure(
@@ -29,20 +46,8 @@ def comparison_figure(
 ) -> Figure:
     """Return an actuator's measured and predicted force over time, and their difference below.
 
-    Parameters
-    ----------
-    time : array, shape (T,)
-        s.
-    measured, predicted, without_friction : array, shape (T,)
-        N; the last one is what the model says without friction and offset.
-    used : array of bool, shape (T,)
-        Whether a sample counts; the others are shaded.
-    leg : int
-        Which actuator, from 0, for its colour.
-
-    Returns
-    -------
-    matplotlib Figure
+    Time (T,) is in s, forces (T,) in N, the last one without friction and offset. Samples that are
+    not `used` (T,) do not count and are shaded. `leg`, from 0, gives the colour.
     """
     figure = blank(4.4, 3.1)
     color = LEG_COLORS[leg]
@@ -57,33 +62,20 @@ def comparison_figure(
     # What does not count may be far out: it must not flatten what does.
     size = float(np.abs(np.where(used, missed, 0.0)).max()) or 1.0
     rest.set_ylim(-1.2 * size, 1.2 * size)
-    for axes in (forces, rest):
-        _shade(axes, time, ~used)
+    edges = np.flatnonzero(np.diff(np.r_[False, ~used, False].astype(int))).reshape(-1, 2)
+    for start, stop in np.minimum(edges, len(time) - 1).tolist():
+        for axes in (forces, rest):
+            axes.axvspan(time[start], time[stop], color=GRID, alpha=0.75, linewidth=0.0, zorder=0.5)
     rest.set_xlim(float(time[0]), float(time[-1]))
     figure.align_ylabels([forces, rest])
     return figure
 
 
-def _shade(axes: Axes, time: Array, where: NDArray[np.bool_]) -> None:
-    edges = np.flatnonzero(np.diff(np.r_[False, where, False].astype(int)))
-    last = len(time) - 1
-    for start, stop in edges.reshape(-1, 2).tolist():
-        low, high = float(time[start]), float(time[min(stop, last)])
-        axes.axvspan(low, high, color=GRID, alpha=0.75, linewidth=0.0, zorder=0.5)
-
-
 def errors_figure(errors: Array, without_friction: Array, floor: Array) -> Figure:
     """Return the errors of a prediction beside the noise, on a logarithmic scale.
 
-    Parameters
-    ----------
-    errors, without_friction, floor : array, shape (n,)
-        Of the whole model, of the model without friction and offset, and of the noise, in percent
-        of the force's standard deviation.
-
-    Returns
-    -------
-    matplotlib Figure
+    The errors (n,) of the whole model and of that without friction and offset, and the noise, are
+    in percent of the force's standard deviation.
     """
     n = len(errors)
     figure = blank(4.8, 0.75 + 0.34 * n)
@@ -92,35 +84,94 @@ def errors_figure(errors: Array, without_friction: Array, floor: Array) -> Figur
     every = np.concatenate([errors, without_friction, floor])
     every = every[np.isfinite(every) & (every > 0.0)]
     low, high = (0.1, 100.0) if not len(every) else (every.min() / 1.5, every.max() * 1.5)
-    for i in range(n):
+    for i, color in zip(range(n), LEG_COLORS, strict=False):
         y = n - 1 - i
         least = max(float(floor[i]), low)
         axes.plot([least, max(without_friction[i], low)], [y, y], color=GRID, linewidth=3.0)
-        axes.plot([least, max(errors[i], low)], [y, y], color=LEG_COLORS[i], linewidth=3.0)
-        axes.plot(
-            [without_friction[i]],
-            [y],
-            marker="o",
-            markersize=7.0,
-            color=PAPER,
-            markeredgecolor=LEG_COLORS[i],
-            markeredgewidth=1.6,
-        )
-        axes.plot(
-            [errors[i]],
-            [y],
-            marker="o",
-            markersize=8.0,
-            color=LEG_COLORS[i],
-            markeredgecolor=PAPER,
-        )
+        axes.plot([least, max(errors[i], low)], [y, y], color=color, linewidth=3.0)
+        spot(axes, without_friction[i], y, PAPER, color, 7.0, markeredgewidth=1.6)
+        spot(axes, errors[i], y, color, PAPER, 8.0)
         axes.plot([least], [y], marker="|", markersize=15.0, color=INK, markeredgewidth=1.8)
     axes.set_xscale("log")
     axes.set_xlim(low, high)
     axes.xaxis.set_major_locator(FixedLocator([t for t in _TICKS if low <= t <= high]))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set_ylim(-0.6, n - 0.4)
     axes.set_yticks(range(n), [f"actuator {n - y}" for y in range(n)], fontsize=FONT_SIZE)
     return figure
+
+
+def residual_time_figure(time: Array, residuals: Array, used: NDArray[np.bool_]) -> Figure:
+    """Return the residuals of all actuators over a whole recording, one above the other.
+
+    Time (T,) is in s, residuals (T, n) in N. Samples that are not `used` (T, n) do not count: they
+    are grey, and may lie outside.
+    """
+    n = residuals.shape[1]
+    figure = blank(4.8, 0.5 + 0.8 * n)
+    panels = stack(figure, "time (s)", [f"{i + 1}  (N)" for i in range(n)])
+    edges = np.unique(np.linspace(0, len(time), min(_COLUMNS, len(time)) + 1).astype(int))
+    starts = edges[:-1]
+    middle = np.add.reduceat(time, starts) / np.diff(edges)
+    for i, axes in enumerate(panels):
+        axes.axhline(0.0, color=MUTED, linewidth=0.8)
+        counted = np.where(used[:, i], residuals[:, i], np.nan)
+        for values, color in ((residuals[:, i], MUTED), (counted, LEG_COLORS[i])):
+            low, high = (f.reduceat(values, starts) for f in (np.fmin, np.fmax))
+            axes.fill_between(middle, low, high, facecolor=color, edgecolor=color, linewidth=0.6)
+        size = float(np.nanmax(np.abs(counted), initial=0.0)) or 1.0
+        axes.set_ylim(-1.15 * size, 1.15 * size)
+    panels[-1].set_xlim(float(time[0]), float(time[-1]))
+    figure.align_ylabels(panels)
+    return figure
+
+
+def residual_speed_figure(
+    speed: Array, residuals: Array, used: NDArray[np.bool_], *, leg: int
+) -> Figure:
+    """Return an actuator's residuals over its slider's speed: friction that is missing shows here.
+
+    Speeds (T,) are in m/s, residuals (T,) in N. Samples that are not `used` (T,) do not count: they
+    are grey, and may lie outside. `leg`, from 0, gives the colour.
+    """
+    figure = blank(3.1, 2.4)
+    axes = plain_axes(figure, "slider speed (m/s)", "residual (N)")
+    axes.axhline(0.0, color=MUTED, linewidth=0.8)
+    step = max(len(speed) // _DOTS, 1)
+    some = slice(step // 2, None, step)
+    for chosen, color in ((~used[some], MUTED), (used[some], LEG_COLORS[leg])):
+        _dots(axes, speed[some][chosen], residuals[some][chosen], color)
+    middle, mean = _means(speed[used], residuals[used])
+    axes.plot(middle, mean, color=PAPER, linewidth=4.2, solid_capstyle="round", zorder=4)
+    axes.plot(middle, mean, color=INK, linewidth=1.8, solid_capstyle="round", zorder=5)
+    # What does not count may lie outside: a stuck slider would make the rest a line.
+    counted = residuals[used] if used.any() else residuals
+    size = float(np.quantile(np.abs(counted), 0.998)) or 1.0
+    axes.set_ylim(-2.0 * size, 2.0 * size)
+    reach = 1.04 * float(np.abs(speed).max()) or 1.0
+    axes.set_xlim(-reach, reach)
+    return figure
+
+
+def _dots(axes: Axes, x: Array, y: Array, color: str) -> None:
+    """Draw dots as one path of short strokes: a tenth of the size of markers in an SVG."""
+    if not len(x):
+        return
+    path = Path(
+        np.repeat(np.column_stack([x, y]), 2, axis=0), np.tile([Path.MOVETO, Path.LINETO], len(x))
+    )
+    # A face keeps Matplotlib from dropping strokes without length.
+    axes.add_patch(PathPatch(path, color=color, linewidth=2.6, capstyle="round", alpha=0.55))
+
+
+def _means(speed: Array, residuals: Array) -> tuple[Array, Array]:
+    """Return the mean residual in bins of the speed."""
+    if not len(speed):
+        return np.empty(0), np.empty(0)
+    edges = np.linspace(float(speed.min()), float(speed.max()) + 1e-12, _BINS + 1)
+    bins = np.clip(np.digitize(speed, edges) - 1, 0, _BINS - 1)
+    count = np.bincount(bins, minlength=_BINS)
+    total = np.bincount(bins, weights=residuals, minlength=_BINS)
+    mean = np.where(count >= _FEWEST, total / np.maximum(count, 1), np.nan)
+    return (edges[:-1] + edges[1:]) / 2.0, mean

@@ -1,17 +1,27 @@
-"""Actuator forces over time."""
+"""Quantities of the legs over time, and how well the joints hold the platform over its angle."""
 
 from __future__ import annotations
 
+from math import inf
+
+import numpy as np
 from matplotlib.figure import Figure
 
 from pteron.kernels import Array
-from pteron.plots.canvas import FONT_SIZE, blank, plain_axes
-from pteron.plots.colors import INK, LEG_COLORS, MUTED
-
-__all__ = ["forces_figure"]
-
-_STYLES = ("-", (0, (6, 1.5)), (0, (2, 1.2)), (0, (6, 1.5, 1.5, 1.5)))
-"""Of legs 1 to 4: colour alone does not survive every printer."""
+from pteron.plots.canvas import (
+    GRID,
+    INK,
+    MUTED,
+    PAPER,
+    REACH,
+    WARNING,
+    blank,
+    leg_style,
+    legend,
+    plain_axes,
+    remark,
+    spot,
+)
 
 
 def forces_figure(
@@ -21,57 +31,56 @@ def forces_figure(
     turning_point: float | None = None,
     ylabel: str = "actuator force (N)",
 ) -> Figure:
-    """Return the forces of all legs over time.
+    """Return the forces (T, n) of all legs, N, over time (T,), s.
 
-    Parameters
-    ----------
-    time : array, shape (T,)
-        s.
-    forces : array, shape (T, n)
-        N.
-    turning_point : float, optional
-        Where the way back begins, s.
-    ylabel : str
-        What is shown; other quantities of the legs look the same.
-
-    Returns
-    -------
-    matplotlib Figure
+    The way back begins at the turning point, s. Other quantities of the legs look the same, under
+    another label.
     """
     figure = blank(5.4, 3.3)
     axes = plain_axes(figure, "time (s)", ylabel)
     axes.axhline(0.0, color=MUTED, linewidth=0.8)
     for i, force in enumerate(forces.T):
-        axes.plot(
-            time,
-            force,
-            color=LEG_COLORS[i],
-            linestyle=_STYLES[i],
-            linewidth=1.8,
-            label=f"leg {i + 1}",
-        )
-    axes.set_xlim(float(time[0]), float(time[-1]))
+        axes.plot(time, force, label=f"leg {i + 1}", **leg_style(i, 1.8))
+    start, end = float(time[0]), float(time[-1])
+    axes.set_xlim(start, end)
     if turning_point is not None:
         axes.axvline(turning_point, color=MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
-        middle = (float(time[0]) + turning_point) / 2.0, (turning_point + float(time[-1])) / 2.0
-        for at, word in zip(middle, ("out", "back"), strict=True):
-            axes.annotate(
-                word,
-                (at, 1.0),
-                xycoords=("data", "axes fraction"),
-                xytext=(0.0, 3.0),
-                textcoords="offset points",
-                ha="center",
-                fontsize=FONT_SIZE,
-                color=MUTED,
-            )
-    figure.legend(
-        loc="outside upper center",
-        ncols=len(forces.T),
-        frameon=False,
-        fontsize=FONT_SIZE,
-        labelcolor=INK,
-        handlelength=2.4,
-        columnspacing=1.6,
-    )
+        remark(axes, "out", (start + turning_point) / 2.0, inf, MUTED, 3.0)
+        remark(axes, "back", (turning_point + end) / 2.0, inf, MUTED, 3.0)
+    legend(figure, forces.shape[1])
+    return figure
+
+
+def regularity_figure(
+    angles: Array,
+    regularity: Array,
+    singular: Array,
+    *,
+    home: float | None = None,
+    used: tuple[float, float] | None = None,
+) -> Figure:
+    """Return abs(det J), relative to its largest value, over phi.
+
+    The angles (A,) ascend; the singular orientations, phi of the home pose, and the least and
+    greatest phi that a motion uses are marked. All are in rad.
+    """
+    figure = blank(5.4, 2.9)
+    axes = plain_axes(figure, "orientation φ (degrees)", "|det J| / max |det J|")
+    degrees = np.degrees(angles)
+    if used is not None:
+        low, high = (float(angle) for angle in np.degrees(used))
+        axes.axvspan(low, high, color=GRID, alpha=0.6, linewidth=0.0, zorder=0.5)
+        remark(axes, "used by the cycle", (low + high) / 2.0, 0.04, MUTED)
+    axes.plot(degrees, np.abs(regularity), color=REACH, linewidth=2.0, zorder=3)
+    for angle in np.degrees(singular):
+        axes.axvline(angle, color=WARNING, linewidth=1.2, linestyle=(0, (4, 2)))
+        text = f"singular, {angle:.1f}°".replace("-", "\u2212")
+        remark(axes, text, float(angle), inf, WARNING, 3.0)
+    if home is not None:
+        at, value = float(np.degrees(home)), float(np.interp(home, angles, np.abs(regularity)))
+        spot(axes, at, value, INK, PAPER, 6.0, zorder=4)
+        remark(axes, "home", at, value, INK, -12.0)
+    axes.set_xlim(float(degrees[0]), float(degrees[-1]))
+    axes.set_xticks(np.arange(-180, 181, 60))
+    axes.set_ylim(0.0, 1.06)
     return figure

@@ -7,11 +7,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from pteron.kernels import Array
-from pteron.plots.canvas import FONT_SIZE, blank, plain_axes
-from pteron.plots.colors import INK, LEG_COLORS, MUTED, PAPER, REACH
+from pteron.plots.canvas import INK, LEG_COLORS, MUTED, PAPER, REACH, blank, plain_axes, spot
 from pteron.workspace import BEYOND_LIMITS, ReachSlice
-
-__all__ = ["reach_figure"]
 
 _BANDS = 4
 """Shades of the margin inside the reach."""
@@ -20,84 +17,42 @@ _TIE = 1e-9
 """Metres."""
 
 _DASHES = ("-", "-", (0, (3, 2)), (0, (3, 2)))
-"""Of legs 1 to 4, so that lines which coincide, as those of mirrored legs do, both show."""
+"""Legs 1 to 4: lines which coincide, as those of mirrored legs do, both show."""
 
 
 def reach_figure(cut: ReachSlice, *, path: Array | None = None) -> Figure:
-    """Return the map of a slice.
+    """Return the map of a slice, with the positions (T, 3) of a motion, m, in projection.
 
     In reach, the shade deepens with the margin. Outside, the colour is that of the leg that misses
     the pose by most; a line in a leg's colour is where it is stretched or folded (type I).
-
-    Parameters
-    ----------
-    cut : ReachSlice
-        The slice.
-    path : array, shape (T, 3), optional
-        Positions of a motion, drawn in projection.
-
-    Returns
-    -------
-    matplotlib Figure
     """
     figure = blank(3.9, 3.9)
     axes = plain_axes(figure, f"{cut.plane[0]} (mm)", f"{cut.plane[1]} (mm)")
-    first, second = 1e3 * cut.first, 1e3 * cut.second
     axes.grid(visible=False)
+    first, second = 1e3 * cut.first, 1e3 * cut.second
+
+    def fill(field: Array, color: str, alpha: float, level: float = 0.0) -> None:
+        if field.max() > level:
+            axes.contourf(first, second, field, levels=[level, np.inf], colors=[color], alpha=alpha)
 
     legs = np.moveaxis(cut.leg_margins, -1, 0)
-    for i, field in enumerate(_territories(legs)):
-        if (field > 0.0).any():
-            axes.contourf(
-                first, second, field, levels=[0.0, np.inf], colors=[LEG_COLORS[i]], alpha=0.16
-            )
-    barred = legs.min(axis=0)
+    for field, color in zip(_territories(legs), LEG_COLORS, strict=False):
+        fill(field, color, 0.16)
     if (cut.status == BEYOND_LIMITS).any():
-        axes.contourf(
-            first,
-            second,
-            np.minimum(barred, -cut.margin),
-            levels=[0.0, np.inf],
-            colors=[MUTED],
-            alpha=0.4,
-        )
-    deepest = float(cut.margin.max())
-    if deepest > 0.0:
-        for level in np.linspace(0.0, deepest, _BANDS, endpoint=False):
-            axes.contourf(
-                first, second, cut.margin, levels=[level, np.inf], colors=[REACH], alpha=0.24
-            )
+        fill(np.minimum(legs.min(axis=0), -cut.margin), MUTED, 0.4)
+    for level in np.linspace(0.0, max(float(cut.margin.max()), 0.0), _BANDS, endpoint=False):
+        fill(cut.margin, REACH, 0.24, float(level))
     for i, margin in enumerate(legs):
         if margin.min() < 0.0 < margin.max():
-            axes.contour(
-                first,
-                second,
-                margin,
-                levels=[0.0],
-                colors=[LEG_COLORS[i]],
-                linewidths=1.6,
-                linestyles=[_DASHES[i]],
-            )
+            edge = axes.contour(first, second, margin, levels=[0.0], colors=[LEG_COLORS[i]])
+            edge.set(linestyles=[_DASHES[i]], linewidths=1.6)
     i, j = ("xyz".index(letter) for letter in cut.plane)
     if path is not None:
-        axes.plot(
-            1e3 * path[:, i], 1e3 * path[:, j], color=PAPER, linewidth=3.2, solid_capstyle="round"
-        )
-        axes.plot(
-            1e3 * path[:, i], 1e3 * path[:, j], color=INK, linewidth=1.4, solid_capstyle="round"
-        )
-    axes.plot(
-        [1e3 * cut.center[i]],
-        [1e3 * cut.center[j]],
-        marker="o",
-        markersize=6.0,
-        color=INK,
-        markeredgecolor=PAPER,
-        linestyle="none",
-        zorder=5,
-    )
+        for color, width in ((PAPER, 3.2), (INK, 1.4)):
+            (line,) = axes.plot(1e3 * path[:, i], 1e3 * path[:, j], color=color, linewidth=width)
+            line.set_solid_capstyle("round")
+    spot(axes, 1e3 * cut.center[i], 1e3 * cut.center[j], INK, PAPER, 6.0, zorder=5)
     axes.set_aspect("equal")
-    axes.tick_params(labelsize=FONT_SIZE)
     axes.set(xlim=(first[0], first[-1]), ylim=(second[0], second[-1]))
     step = _nice(max(first[-1] - first[0], second[-1] - second[0]) / 6.0)
     axes.xaxis.set_major_locator(MultipleLocator(step))

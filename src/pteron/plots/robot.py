@@ -9,11 +9,8 @@ from matplotlib.figure import Figure
 
 from pteron.kernels import Array
 from pteron.motion import JointPoints
-from pteron.plots.canvas import blank
-from pteron.plots.colors import INK, LEG_COLORS, MUTED, PAPER, REACH
+from pteron.plots.canvas import INK, LEG_COLORS, MUTED, PAPER, REACH, blank
 from pteron.plots.space import Space, upright
-
-__all__ = ["outline", "robot_figure", "upright"]
 
 _PLATFORM_AXES = ("x\u2032", "y\u2032", "z\u2032")
 """x, y and z with a prime."""
@@ -29,22 +26,9 @@ def robot_figure(
 ) -> Figure:
     """Return the machine in one pose, with the vertical upwards.
 
-    Parameters
-    ----------
-    points : JointPoints
-        Of one pose.
-    rails : array, shape (n, 2, 3)
-        The ends of each guide, m.
-    gravity : array, shape (3,), optional
-        Drawn as an arrow; without it the platform frame's z points up.
-    path : array, shape (T, 3), optional
-        Positions of P in a motion.
-    angle : str
-        The orientation, in words, beside the platform frame's x axis.
-
-    Returns
-    -------
-    matplotlib Figure
+    The guides' ends `rails` (n, 2, 3) and the `path` (T, 3) of P are in m. Gravity (3,) is drawn as
+    an arrow; without it the platform frame's z points up. The `angle` stands, in words, beside the
+    platform frame's x axis.
     """
     figure = blank(5.6, 4.4)
     space = Space(figure, points.axes[2] if gravity is None else -gravity)
@@ -91,18 +75,11 @@ def _block(center: Array, along: Array, size: float) -> list[Array]:
     """Return the six faces of a slider's block."""
     frame = upright(along)
     half = size * np.array([0.02, 0.02, 0.036])
-    corners = {
-        signs: center + (np.array(signs) * half) @ frame for signs in product((-1, 1), repeat=3)
-    }
-    faces = []
-    for axis, side in product(range(3), (-1, 1)):
-        loop = []
-        for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
-            signs = [a, b]
-            signs.insert(axis, side)
-            loop.append(corners[signs[0], signs[1], signs[2]])
-        faces.append(np.array(loop))
-    return faces
+    loop = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+    return [
+        center + (np.insert(loop, axis, side, axis=1) * half) @ frame
+        for axis, side in product(range(3), (-1, 1))
+    ]
 
 
 def _draw_platform(space: Space, points: JointPoints, size: float, angle: str) -> None:

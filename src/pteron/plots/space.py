@@ -12,19 +12,16 @@ from mpl_toolkits.mplot3d.art3d import (  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.proj3d import proj_transform  # type: ignore[import-untyped]
 
 from pteron.kernels import Array
-from pteron.plots.canvas import FONT_SIZE
-from pteron.plots.colors import GRID, PAPER
-
-__all__ = ["Space", "upright"]
+from pteron.plots.canvas import FONT_SIZE, GRID, PAPER
 
 _ELEVATION, _AZIMUTH = 24.0, -52.0
 """Degrees, from which the machine is seen."""
 
 _MARGIN = 0.04
-"""Of the figure, on each side."""
+"""Share of the figure on each side."""
 
 _GRID_STEP = 0.1
-"""Of the ground's squares, m."""
+"""Side of the ground's squares, m."""
 
 
 def upright(vertical: Array) -> Array:
@@ -51,12 +48,9 @@ class Space:
         self.rotation = upright(vertical)
         self._drawn: list[Array] = []
         elevation, azimuth = np.radians(_ELEVATION), np.radians(_AZIMUTH)
+        across = np.cos(elevation)
         self._towards_eye = np.array(
-            [
-                np.cos(elevation) * np.cos(azimuth),
-                np.cos(elevation) * np.sin(azimuth),
-                np.sin(elevation),
-            ]
+            [across * np.cos(azimuth), across * np.sin(azimuth), np.sin(elevation)]
         )
 
     def _order(self, points: Array, raised: float) -> float:
@@ -80,28 +74,15 @@ class Space:
         """Draw a line through points (K, 3)."""
         p = points @ self.rotation.T
         self._drawn.append(p)
-        self.axes.plot(
-            *p.T,
-            color=color,
-            linewidth=width,
-            linestyle=style,
-            solid_capstyle="round",
-            zorder=self._order(p, raised),
-        )
+        look = {"color": color, "linewidth": width, "linestyle": style, "solid_capstyle": "round"}
+        self.axes.plot(*p.T, zorder=self._order(p, raised), **look)
 
     def mark(self, point: Array, face: str, edge: str, size: float, raised: float = 0.03) -> None:
         """Draw a ring at a point."""
         p = (point @ self.rotation.T)[None]
-        self.axes.plot(
-            *p.T,
-            marker="o",
-            markersize=size,
-            markerfacecolor=face,
-            markeredgecolor=edge,
-            markeredgewidth=1.4,
-            linestyle="none",
-            zorder=self._order(p, raised),
-        )
+        look = {"marker": "o", "markersize": size, "markeredgewidth": 1.4, "linestyle": "none"}
+        colors = {"markerfacecolor": face, "markeredgecolor": edge}
+        self.axes.plot(*p.T, zorder=self._order(p, raised), **look, **colors)
 
     def faces(self, faces: list[Array], color: str, alpha: float, raised: float = 0.0) -> None:
         """Draw polygons, at one distance."""
@@ -116,16 +97,8 @@ class Space:
         """Write beside a point, over everything."""
         p = point @ self.rotation.T
         self._drawn.append(p[None])
-        self.axes.text(
-            *p,
-            text,
-            color=color,
-            fontsize=FONT_SIZE,
-            fontweight="bold" if bold else "normal",
-            ha="center",
-            va="center",
-            zorder=30.0,
-        )
+        look = {"fontsize": FONT_SIZE, "fontweight": "bold" if bold else "normal"}
+        self.axes.text(*p, text, color=color, ha="center", va="center", zorder=30.0, **look)
 
     def fill(self) -> None:
         """Place the axes so that what was drawn fills the figure."""

@@ -129,6 +129,16 @@ class BaseParameters:
             if str(named[name]) == name
         }
 
+    @property
+    def shared_symbols(self) -> dict[str, tuple[str, ...]]:
+        """The geometric symbols that stand for several values, equal but for their sign."""
+        found: dict[str, tuple[str, ...]] = {}
+        for name, value in named_values(exact_geometry(self.robot)).items():
+            bearer = str(value).lstrip("-")
+            if bearer not in (name, "0"):
+                found[bearer] = (*found.get(bearer, ()), name)
+        return found
+
     def expressions(
         self, form: Form = "text", *, symbols: bool = False, digits: int = 4
     ) -> tuple[Any, ...]:

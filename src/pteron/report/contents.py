@@ -8,7 +8,6 @@ from typing import Literal
 import numpy as np
 
 from pteron.dynamics import inverse_dynamics
-from pteron.errors import ModelError
 from pteron.kernels import Array, numeric
 from pteron.kinematics import jacobian, joint_rates, singular_orientations
 from pteron.manipulator import Manipulator
@@ -27,15 +26,17 @@ from pteron.workspace import (
     reserve,
     slider_ranges,
 )
-
-__all__ = ["JacobianAtHome", "Orientations", "Report", "contents"]
+from pteron.workspace.doubts import doubts
 
 _SAMPLES = 481
-"""Of the cycle: 120 steps of the moving picture, four samples each."""
+"""Samples of the cycle: 120 steps of the moving picture, four each."""
 
 _LEAST_RESERVE = 0.2
 _PLANES: tuple[Literal["xy", "xz", "yz"], ...] = ("xy", "xz", "yz")
 _ANGLES = 361
+
+_RIM = 0.08
+"""Share of the reach's greatest width that the slices show around it."""
 
 _BARE_RAIL = 0.25
 """Length of a guide without limits, beyond what the cycle uses, as a share of the longest leg."""
@@ -43,16 +44,11 @@ _BARE_RAIL = 0.25
 
 @dataclass(frozen=True)
 class JacobianAtHome:
-    """The Jacobian at the home pose, Eq. (10).
+    """The Jacobian (n, m) at the home pose, Eq. (10), and its condition number.
 
-    Attributes
-    ----------
-    matrix : array, shape (n, m)
-        J: without unit, and m/rad in the last column of 3T1R.
-    radius : float or None
-        Root mean square distance of the platform points from the platform's axis, m; None for 3T.
-    condition : float
-        Of J with the angle's column divided by `radius`, so that no unit is mixed with another.
+    The number is that of J with the angle's column divided by `radius`, the root mean square
+    distance of the platform points from the platform's axis, so that no unit is mixed with another;
+    a platform that does not turn has none.
     """
 
     matrix: Array
@@ -62,16 +58,9 @@ class JacobianAtHome:
 
 @dataclass(frozen=True)
 class Orientations:
-    """How well the sliders hold a 3T1R platform over phi.
+    """How well the sliders hold the platform over phi: det J over its largest value, shape (A,).
 
-    Attributes
-    ----------
-    angles : array, shape (A,)
-        phi, rad.
-    regularity : array, shape (A,)
-        det J over its largest value.
-    singular : array, shape (2,)
-        The type-II singular orientations, rad.
+    `singular` has the type-II singular orientations; angles are in rad.
     """
 
     angles: Array
@@ -81,44 +70,15 @@ class Orientations:
 
 @dataclass(frozen=True)
 class Report:
-    """All that a page says about a machine.
+    """All that a page says about a machine; the cycle has T samples.
 
-    Attributes
-    ----------
-    robot : Manipulator
-    home : array, shape (m,)
-        The home pose.
-    reserve : Reserve
-        Of the home pose.
-    least : float
-        The reserve that the cycle keeps.
-    cycle : PickAndPlace
-        The largest pick-and-place cycle about it, T samples.
-    points : JointPoints
-        Where the joints are in the cycle.
-    home_points : JointPoints
-        And in the home pose.
-    rails : array, shape (n, 2, 3)
-        The ends of the guides, m: the sliders' limits, or a little more than the cycle needs.
-    forces : array, shape (T, n)
-        The actuator forces of the cycle, N.
-    slider_speeds : array, shape (T, n)
-        m/s.
-    sliders : SliderRanges
-        Over the cycle.
-    slices : tuple of ReachSlice
-        Through the home pose.
-    volume : ReachVolume
-        At the home pose's orientation.
-    jacobian : JacobianAtHome
-    orientations : Orientations or None
-        None for 3T.
-    base : BaseParameters
-    costs : tuple of Cost
-        Empty where too few poses are in reach to measure them.
+    The cycle keeps the reserve `least`; its forces and slider speeds (T, n) are in N and m/s. The
+    guides' ends `rails` (n, 2, 3), m, are the sliders' limits, or a little more than the cycle
+    needs. The slices go through the home pose and are all of one width.
     """
 
     robot: Manipulator
+    doubts: tuple[str, ...]
     home: Array
     reserve: Reserve
     least: float
@@ -158,34 +118,18 @@ class Report:
 
 
 def contents(robot: Manipulator) -> Report:
-    """Return the report on a machine.
-
-    Parameters
-    ----------
-    robot : Manipulator
-        The machine.
-
-    Returns
-    -------
-    Report
-
-    Raises
-    ------
-    ModelError
-        If the machine reaches no pose.
-    SingularPose
-        If the machine is singular at every pose.
-    """
+    """Return the report on a machine that reaches a pose and is not singular everywhere."""
     home = home_pose(robot)
     at_home = reserve(robot, home)
     # A machine with little reserve anywhere moves where it has half of its best.
     least = min(_LEAST_RESERVE, float(at_home.smallest) / 2.0)
     cycle = pick_and_place(robot, home, samples=_SAMPLES, least=least)
-    state = cycle.pose, cycle.velocity, cycle.acceleration
     sliders = slider_ranges(robot, cycle.pose)
+    volume = reach_volume(robot, home)
     base = base_parameters(robot)
     return Report(
         robot=robot,
+        doubts=doubts(robot),
         home=home,
         reserve=at_home,
         least=least,
@@ -193,16 +137,28 @@ def contents(robot: Manipulator) -> Report:
         points=joint_points(robot, cycle.pose),
         home_points=joint_points(robot, home),
         rails=_rails(robot, sliders),
-        forces=inverse_dynamics(robot, *state),
+        forces=inverse_dynamics(robot, cycle.pose, cycle.velocity, cycle.acceleration),
         slider_speeds=joint_rates(robot, cycle.pose, cycle.velocity).sliders,
         sliders=sliders,
-        slices=tuple(reach_slice(robot, home, plane) for plane in _PLANES),
-        volume=reach_volume(robot, home),
+        slices=_slices(robot, home, volume.box),
+        volume=volume,
         jacobian=_jacobian(robot, home),
         orientations=_orientations(robot, home),
         base=base,
-        costs=_costs(base),
+        costs=costs(base),
     )
+
+
+def _slices(robot: Manipulator, home: Array, box: Array) -> tuple[ReachSlice, ...]:
+    """Return squares of one width through the home pose, so that the pictures share a scale."""
+    middle = box.mean(axis=0)
+    half = (0.5 + _RIM) * float((box[1] - box[0]).max())
+    found = []
+    for plane in _PLANES:
+        x, y = (float(middle["xyz".index(letter)]) for letter in plane)
+        extent = x - half, x + half, y - half, y + half
+        found.append(reach_slice(robot, home, plane, extent=extent))
+    return tuple(found)
 
 
 def _rails(robot: Manipulator, ranges: SliderRanges) -> Array:
@@ -228,14 +184,5 @@ def _orientations(robot: Manipulator, home: Array) -> Orientations | None:
     if not robot.platform.turns:
         return None
     poses = np.tile(home, (_ANGLES, 1))
-    poses[:, 3] = np.linspace(-np.pi, np.pi, _ANGLES)
-    return Orientations(
-        poses[:, 3], numeric(robot, "regularity")(poses), singular_orientations(robot)
-    )
-
-
-def _costs(base: BaseParameters) -> tuple[Cost, ...]:
-    try:
-        return costs(base)
-    except ModelError:
-        return ()
+    poses[:, 3] = angles = np.linspace(-np.pi, np.pi, _ANGLES)
+    return Orientations(angles, numeric(robot, "regularity")(poses), singular_orientations(robot))

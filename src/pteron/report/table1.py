@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from pteron.manipulator import load
 from pteron.reduction import base_parameters
 
-__all__ = ["Row", "rows"]
-
 PRINTED = (
     "m_p1 + m_u1 + 20.11 I_l1",
     "m_p2 + m_u2 + 38.58 I_l2",
@@ -49,20 +47,10 @@ _TERM = re.compile(r"([+-]?)\s*([\d.]+)?\s*([A-Za-z]\w*)")
 
 @dataclass(frozen=True)
 class Row:
-    """One base parameter.
+    """One base parameter: its name in the paper, ``P_b1`` to ``P_b26``, and the one it has here.
 
-    Attributes
-    ----------
-    parameter : str
-        The paper's name, ``P_b1`` to ``P_b26``.
-    kept : str
-        The inertial parameter that names it here.
-    printed, computed : str
-        The sums.
-    agrees : bool
-        Whether both have the same terms, and every computed coefficient rounds to the printed one.
-    restored : bool
-        Whether the scan of the paper is damaged there; see `RESTORED`.
+    The sums agree where they have the same terms, and every computed coefficient rounds to the
+    printed one. Where the scan of the paper is damaged the row is restored, see `RESTORED`.
     """
 
     parameter: str
@@ -82,12 +70,13 @@ def rows() -> tuple[Row, ...]:
         zip(PRINTED, exact, base.names, strict=True), start=1
     ):
         shown = base.expressions()[i - 1]
-        agrees = _agree(printed, computed)
+        agrees = agree(printed, computed)
         found.append(Row(f"P_b{i}", name, printed, shown, agrees, i in RESTORED))
     return tuple(found)
 
 
-def _agree(printed: str, computed: str) -> bool:
+def agree(printed: str, computed: str) -> bool:
+    """Say whether two sums agree, as `Row` has it."""
     given, found = _terms(printed), _terms(computed)
     return given.keys() == found.keys() and all(
         round(float(found[name]), _decimals(text)) == float(text) for name, text in given.items()

@@ -7,7 +7,7 @@
   if (!pen) return;
   document.documentElement.classList.add("scripted");
   const play = document.getElementById("play"), seek = document.getElementById("seek");
-  const clock = document.getElementById("clock");
+  const clock = document.getElementById("clock"), pace = document.getElementById("pace");
   const frames = data.time.length, legs = data.rails.length;
   const calm = window.matchMedia("(prefers-reduced-motion: reduce)");
 
@@ -235,8 +235,8 @@
   function tick(now) {
     if (!playing) return;
     if (last !== null && shown) {
-      // A real cycle is over in a second; at 40 % of its speed the eye can follow.
-      phase = (phase + (0.4 * (now - last)) / 1e3 / data.duration) % 1;
+      // A real cycle is over in a second: the eye follows a slower one, and the page says how slow.
+      phase = (phase + (Number(pace.value) * (now - last)) / 1e3 / data.duration) % 1;
       const k = Math.floor(phase * frames);
       if (k !== frame) { frame = k; draw(); }
     }
@@ -251,14 +251,12 @@
   function turn(yaw, pitch) {
     camera.yaw += yaw; camera.pitch = Math.min(1.5, Math.max(-0.3, camera.pitch + pitch)); redraw();
   }
-  function zoom(factor) {
-    const before = camera.zoom;
-    camera.zoom = Math.min(8, Math.max(0.5, before * factor)); redraw();
-    return camera.zoom !== before;
-  }
+  function zoom(factor) { camera.zoom = Math.min(8, Math.max(0.5, camera.zoom * factor)); redraw(); }
 
   const fingers = new Map();
+  let engaged = false;
   canvas.addEventListener("pointerdown", (event) => {
+    engaged = true;
     fingers.set(event.pointerId, [event.clientX, event.clientY]); canvas.setPointerCapture(event.pointerId);
   });
   canvas.addEventListener("pointermove", (event) => {
@@ -273,8 +271,13 @@
     fingers.set(event.pointerId, to);
   });
   for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, (event) => fingers.delete(event.pointerId));
-  // At either end of the zoom the wheel scrolls the page again.
-  canvas.addEventListener("wheel", (event) => { if (zoom(Math.exp(-0.0016 * event.deltaY))) event.preventDefault(); }, { passive: false });
+  // The wheel scrolls the page unless the view was clicked, or a key says that it is meant.
+  for (const name of ["pointerleave", "blur"]) canvas.addEventListener(name, () => { engaged = false; });
+  canvas.addEventListener("wheel", (event) => {
+    if (!engaged && !event.ctrlKey && !event.shiftKey && !event.metaKey) return;
+    zoom(Math.exp(-0.0016 * (event.deltaY || event.deltaX)));
+    event.preventDefault();
+  }, { passive: false });
   canvas.addEventListener("keydown", (event) => {
     const keys = {
       ArrowLeft: () => turn(-0.09, 0), ArrowRight: () => turn(0.09, 0), ArrowUp: () => turn(0, -0.07), ArrowDown: () => turn(0, 0.07),
@@ -290,6 +293,12 @@
   calm.addEventListener("change", () => { if (calm.matches) run(false); });
   if ("IntersectionObserver" in window) new IntersectionObserver((seen) => { shown = seen[0].isIntersecting; last = null; }).observe(canvas);
   if ("ResizeObserver" in window) new ResizeObserver(() => { fit(); draw(); }).observe(canvas);
+
+  // Paper has no use for closed sections.
+  const folds = () => [...document.querySelectorAll("details:not([open])")];
+  let opened = [];
+  window.addEventListener("beforeprint", () => { opened = folds(); opened.forEach((fold) => { fold.open = true; }); });
+  window.addEventListener("afterprint", () => opened.forEach((fold) => { fold.open = false; }));
 
   seek.max = String(frames - 1);
   theme(); fit(); draw();

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import json
-from contextlib import suppress
+import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from pteron.atomic import make_folder, write_text
-from pteron.errors import PteronError
+from pteron.errors import OutputError
 from pteron.manipulator import Manipulator
 
-__all__ = ["write_report"]
+if TYPE_CHECKING:
+    from pteron.report.contents import Report
 
 
 def write_report(robot: Manipulator, folder: str | Path) -> Path:
     """Write the report on a machine: `report.html`, one page that needs no other file or network.
 
-    `report.json` beside it holds the numbers. Each file is written whole or not at all.
+    `report.json` beside it holds the numbers. Each file is written whole or not at all, and the
+    folder is made last.
 
     Parameters
     ----------
@@ -41,20 +44,88 @@ def write_report(robot: Manipulator, folder: str | Path) -> Path:
     """
     # Matplotlib, SciPy and SymPy are behind these; the table of the paper needs none of them.
     from pteron.report.contents import contents
-    from pteron.report.numbers import numbers
     from pteron.report.page import page
 
-    there = Path(folder).exists()
-    target = make_folder(folder)  # before the work, not after it
-    try:
-        report = contents(robot)
-        html = page(report)
-    except PteronError:
-        if not there:
-            with suppress(OSError):  # unless somebody has put something there meanwhile
-                target.rmdir()
-        raise
-    write_text(
-        target / "report.json", json.dumps(numbers(report), indent=1, allow_nan=False) + "\n"
-    )
+    target = checked_folder(folder)
+    report = contents(robot)
+    html, data = page(report), json.dumps(numbers(report), indent=1, allow_nan=False)
+    write_text(make_folder(target) / "report.json", data + "\n")
     return write_text(target / "report.html", html)
+
+
+def checked_folder(path: str | Path) -> Path:
+    """Return a folder after a check, before the work, that it can be made and written.
+
+    Nothing is left behind if the work then fails, or is interrupted, however roughly.
+    """
+    if str(path) == "":
+        raise OutputError("the folder's name is empty; name one")
+    target = Path(path)
+    there = next(folder for folder in (target, *target.parents) if folder.exists())
+    try:
+        with tempfile.TemporaryFile(dir=there):
+            return target
+    except OSError as error:
+        reason = f"{there} is a file" if there != target else "it is a file"
+        reason = reason if there.is_file() else error.strerror or str(error)
+        raise OutputError(f"{target}: cannot be written to as a folder ({reason})") from None
+
+
+def numbers(report: Report) -> dict[str, Any]:
+    """Return the numbers of a report as plain data in SI units and radians."""
+    robot, cycle, ranges = report.robot, report.cycle, report.sliders
+    orientations = report.orientations
+    return {
+        "robot": robot.name,
+        "motion": robot.platform.motion,
+        "coordinates": list(robot.coordinates),
+        "elbows": [leg.elbow for leg in robot.legs],
+        "gravity": list(robot.gravity),
+        "doubts": list(report.doubts),
+        "home": {
+            "pose": report.home.tolist(),
+            "elbow_sines": report.reserve.elbow_sines.tolist(),
+            "regularity": float(report.reserve.regularity),
+            "slider_clearances": report.reserve.slider_clearances.tolist(),
+            "reserve": float(report.reserve.smallest),
+            "jacobian": report.jacobian.matrix.tolist(),
+            "condition_number": report.jacobian.condition,
+            "condition_radius": report.jacobian.radius,
+        },
+        "singular_orientations": None if orientations is None else orientations.singular.tolist(),
+        "reach": {
+            "volume": report.volume.volume,
+            "standard_error": report.volume.standard_error,
+            "samples": report.volume.count,
+            "box": report.volume.box.tolist(),
+        },
+        "cycle": {
+            "scale": cycle.scale,
+            "duration": cycle.duration,
+            "across": cycle.across.tolist(),
+            "up": cycle.up.tolist(),
+            "turn": cycle.turn,
+            "time": cycle.time.tolist(),
+            "pose": cycle.pose.tolist(),
+            "velocity": cycle.velocity.tolist(),
+            "acceleration": cycle.acceleration.tolist(),
+            "forces": report.forces.tolist(),
+            "peak_forces": report.peak_forces.tolist(),
+            "rms_forces": report.rms_forces.tolist(),
+            "peak_slider_speeds": report.peak_speeds.tolist(),
+            "sliders": {
+                "least": ranges.least.tolist(),
+                "greatest": ranges.greatest.tolist(),
+                "limits": [None if limits is None else list(limits) for limits in ranges.limits],
+                "within": ranges.within.tolist(),
+            },
+        },
+        "base_parameters": {
+            "rank": report.base.rank,
+            "of": len(report.base.columns),
+            "names": list(report.base.names),
+            "expressions": list(report.base.expressions()),
+            "values": report.base.values().tolist(),
+        },
+        "costs": [vars(cost) for cost in report.costs],
+    }

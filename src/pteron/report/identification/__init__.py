@@ -1,10 +1,7 @@
 """An identification as files: a page to read, its numbers, and the model of real bodies."""
 
-from pteron.report.identification.folder import prepared_folder
-from pteron.report.identification.model_file import model_path
-from pteron.report.identification.numbers import numbers
-from pteron.report.identification.parameters import Parameter, measured, parameter_rows
-from pteron.report.identification.write import Written, write_identification
+from pteron.report.identification.values import Parameter, measured, parameter_rows
+from pteron.report.identification.write import Written, model_path, numbers, write_identification
 
 __all__ = [
     "Parameter",
@@ -13,6 +10,5 @@ __all__ = [
     "model_path",
     "numbers",
     "parameter_rows",
-    "prepared_folder",
     "write_identification",
 ]

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import PurePath
 
 import numpy as np
 
-from pteron.identification import Identification, Prediction
+from pteron.identification import Identification, Prediction, Treatment
 from pteron.kernels import Array
-from pteron.report.identification.bodies import Body, body_rows
-from pteron.report.identification.names import short_sources, shortened
-from pteron.report.identification.parameters import Parameter, parameter_rows
-from pteron.report.identification.treatment import TreatedLog, treated_logs
-
-__all__ = ["Contents", "Shown", "contents"]
+from pteron.report.identification.values import Body, Parameter, body_rows, parameter_rows
 
 _MOST_PICTURES = 3
 """Held-out recordings that are drawn; all of them are in the table."""
@@ -27,17 +24,7 @@ _LAGS = 40
 
 @dataclass(frozen=True)
 class Shown:
-    """A recording as the page shows it.
-
-    Attributes
-    ----------
-    name : str
-        What it is called there.
-    prediction : Prediction
-        How well it is predicted.
-    stretch : slice
-        Of its samples: where the model misses most.
-    """
+    """A recording as the page calls it, and the samples among which the model misses most."""
 
     name: str
     prediction: Prediction
@@ -54,31 +41,10 @@ class Shown:
 class Contents:
     """All that a page says about an identification.
 
-    Attributes
-    ----------
-    result : Identification
-    tone : {"good", "care", "bad"}
-        Of the verdict.
-    reasons, steps, notes : tuple of str
-        With recordings called as on the page.
-    held_out, fitted : tuple of Shown
-        Every recording.
-    drawn : tuple of Shown
-        Those held out that are drawn, the worst first.
-    repeats : bool
-        Whether what was held out is the end of what was fitted.
-    parameters : tuple of Parameter
-    bodies : tuple of Body
-        Empty where there are no real ones.
-    treated : tuple of TreatedLog
-    findings : tuple of (str, str, str, str)
-        Kind, row, column and message of each.
-    residuals : array, shape (R, n)
-        Of the equations, N; NaN where an equation is not used.
-    correlations : array, shape (L, n)
-        Of these, at lags 1 to L.
-    bound : array, shape (n,)
-        Size that white noise's keep below, nineteen times in twenty.
+    Texts call recordings as on the page. `drawn` are the worst of those held out; `repeats` says
+    whether what was held out is the end of what was fitted. A finding is a kind, a row, a column
+    and a message. The residuals (R, n), N, are NaN where an equation is not used; white noise keeps
+    their correlations (L, n) at lags 1 to L below the bound (n,), nineteen times in twenty.
     """
 
     result: Identification
@@ -92,7 +58,7 @@ class Contents:
     repeats: bool
     parameters: tuple[Parameter, ...]
     bodies: tuple[Body, ...]
-    treated: tuple[TreatedLog, ...]
+    treated: tuple[tuple[str, Treatment], ...]
     findings: tuple[tuple[str, str, str, str], ...]
     residuals: Array
     correlations: Array
@@ -115,10 +81,29 @@ class Contents:
         return sum(not row.weak for row in self.parameters)
 
 
+def short_sources(result: Identification) -> dict[str, str]:
+    """Return what recordings are called on a page: without folders, unless two would be alike."""
+    every = list(dict.fromkeys(one.source for one in (*result.fitted, *result.held_out)))
+    names = [PurePath(source).name or source for source in every]
+    return {
+        source: name if names.count(name) == 1 else source
+        for source, name in zip(every, names, strict=True)
+    }
+
+
+def shortened(texts: Iterable[str], sources: Mapping[str, str]) -> tuple[str, ...]:
+    """Return messages with the recordings called as on the page."""
+    found = []
+    for text in texts:
+        for source in sorted(sources, key=len, reverse=True):
+            text = text.replace(source, sources[source])
+        found.append(text)
+    return tuple(found)
+
+
 def contents(result: Identification) -> Contents:
     """Return what the page of an identification holds."""
-    predictions = (*result.held_out, *result.fitted)
-    names = short_sources(prediction.source for prediction in predictions)
+    names = short_sources(result)
     held = tuple(_shown(prediction, names) for prediction in result.held_out)
     fitted = tuple(_shown(prediction, names) for prediction in result.fitted)
     residuals = _residuals(result)
@@ -127,24 +112,26 @@ def contents(result: Identification) -> Contents:
     return Contents(
         result=result,
         tone=tones[result.verdict.grade],
-        reasons=tuple(shortened(text, names) for text in result.verdict.reasons),
-        steps=tuple(shortened(text, names) for text in result.verdict.next_steps),
-        notes=tuple(shortened(text, names) for text in result.notes),
+        reasons=shortened(result.verdict.reasons, names),
+        steps=shortened(result.verdict.next_steps, names),
+        notes=shortened(result.notes, names),
         held_out=held,
         fitted=fitted,
         drawn=_drawn(held),
         repeats={one.name for one in held} <= {one.name for one in fitted},
         parameters=parameter_rows(result),
         bodies=body_rows(result),
-        treated=treated_logs(result, names),
+        treated=tuple(
+            (names[one.source], treatment)
+            for one, treatment in zip(result.fitted, result.treatments, strict=True)
+        ),
         findings=tuple(
-            (
-                finding.kind,
-                "" if finding.row is None else str(finding.row),
-                finding.column or "",
-                shortened(finding.message, names),
+            (one.kind, "" if one.row is None else str(one.row), one.column or "", text)
+            for one, text in zip(
+                result.findings,
+                shortened((one.message for one in result.findings), names),
+                strict=True,
             )
-            for finding in result.findings
         ),
         residuals=residuals,
         correlations=correlations,
@@ -153,7 +140,7 @@ def contents(result: Identification) -> Contents:
 
 
 def _drawn(held: tuple[Shown, ...]) -> tuple[Shown, ...]:
-    # Of a single sample there is nothing to draw.
+    # A single sample is nothing to draw.
     several = [one for one in held if len(one.prediction.time) > 1]
     several.sort(key=lambda one: -float(one.prediction.nrms.max()))
     return tuple(several[:_MOST_PICTURES])

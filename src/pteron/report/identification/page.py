@@ -3,47 +3,44 @@
 from __future__ import annotations
 
 import re
-from importlib.resources import files
+from typing import Any
 
+import numpy as np
 from markupsafe import Markup, escape
+from matplotlib.figure import Figure
 
 import pteron
 from pteron.identification import Identification
 from pteron.identification.verdict import AT_THE_FLOOR, LARGE, SMALL
-from pteron.report.digits import significant
-from pteron.report.environment import environment
-from pteron.report.identification.contents import contents
-from pteron.report.identification.figures import figures
-from pteron.report.identification.names import typeset
-from pteron.report.identification.parameters import measured
-
-__all__ = ["page"]
+from pteron.plots import (
+    autocorrelation_figure,
+    certainty_figure,
+    comparison_figure,
+    correlation_figure,
+    errors_figure,
+    histogram_figure,
+    residual_speed_figure,
+    residual_time_figure,
+    svg,
+)
+from pteron.report.identification.contents import Contents, Shown, contents
+from pteron.report.identification.values import measured
+from pteron.report.typeset import resource, significant, template
 
 
 def page(result: Identification, model_file: str | None = None) -> str:
-    """Return the page of an identification.
+    """Return the page of an identification, as HTML without any reference to another file.
 
-    Parameters
-    ----------
-    result : Identification
-        What it says.
-    model_file : str, optional
-        Name of the file of the machine with its identified bodies, beside the page.
-
-    Returns
-    -------
-    str
-        HTML without any reference to another file or address.
+    `model_file` names the file of the machine with its identified bodies, beside the page.
     """
-    templates = environment(
-        "report/identification",
+    made = template(
+        "identification/page.html.j2",
         measured=lambda row: measured(row.value, row.half),
         percent=_percent,
         prose=_prose,
-        typeset=typeset,
     )
     found = contents(result)
-    return templates.get_template("page.html.j2").render(
+    return made.render(
         found=found,
         result=result,
         robot=result.robot,
@@ -54,7 +51,7 @@ def page(result: Identification, model_file: str | None = None) -> str:
         figures=figures(found),
         model_file=model_file,
         version=pteron.__version__,
-        style=_resource("report", "page.css") + _resource("report.identification", "page.css"),
+        style=resource("page.css") + resource("identification/page.css"),
     )
 
 
@@ -69,5 +66,67 @@ def _percent(share: float) -> str:
     return "less than 0.01 %" if 0.0 <= share < 1e-4 else f"{significant(100.0 * share, 2)} %"
 
 
-def _resource(package: str, name: str) -> Markup:
-    return Markup((files(f"pteron.{package}") / name).read_text(encoding="utf-8"))
+def figures(found: Contents) -> dict[str, Any]:
+    """Return the pictures as SVG; those of residuals are None where an estimator keeps none."""
+    rows = found.parameters
+    names = [row.name for row in rows]
+    ratios, weak = np.array([row.ratio for row in rows]), np.array([row.weak for row in rows])
+    made: dict[str, Any] = {
+        "held_out": [
+            _panels(one, f"held{k}", speed=k == 1) for k, one in enumerate(found.drawn, start=1)
+        ],
+        "fitted": _panels(found.fitted[0], "fitted", speed=not found.drawn),
+        "histogram": None,
+        "autocorrelation": None,
+        "certainty": _inline(
+            certainty_figure(names, ratios, weak, found.result.model.base.rank),
+            "certainty",
+            "Size of each value over its standard deviation",
+        ),
+        "correlation": _inline(
+            correlation_figure(names, found.result.estimate.correlation),
+            "correlation",
+            "Correlations of the identified values",
+        ),
+    }
+    if np.isfinite(found.residuals).any():
+        figure = histogram_figure(found.residuals)
+        title = "Distribution of the residuals against the normal one"
+        made["histogram"] = _inline(figure, "histogram", title)
+        figure = autocorrelation_figure(found.correlations, found.bound)
+        made["autocorrelation"] = _inline(
+            figure, "autocorrelation", "Autocorrelation of the residuals"
+        )
+    return made
+
+
+def _panels(shown: Shown, name: str, *, speed: bool) -> dict[str, Any]:
+    """Return the pictures of one recording; those over speed only where they are asked for."""
+    p, part = shown.prediction, shown.stretch
+    rest = p.measured - p.predicted
+    series = p.measured[part], p.predicted[part], p.without_friction[part]
+    forces, over_speed = [], []
+    for i in range(p.measured.shape[1]):
+        given, predicted, rigid = (one[:, i] for one in series)
+        used = p.used[part, i]
+        figure = comparison_figure(p.time[part], given, predicted, rigid, used, leg=i)
+        title = f"Measured and predicted force of actuator {i + 1} in {shown.name}"
+        forces.append(_inline(figure, f"{name}forces{i + 1}", title))
+        if speed:
+            figure = residual_speed_figure(p.speed[:, i], rest[:, i], p.used[:, i], leg=i)
+            title = f"Residual of actuator {i + 1} over its slider's speed in {shown.name}"
+            over_speed.append(_inline(figure, f"{name}speed{i + 1}", title))
+    errors = errors_figure(p.nrms, p.nrms_without_friction, p.floor)
+    time = residual_time_figure(p.time, rest, p.used)
+    title = f"Residuals of all actuators over time in {shown.name}"
+    return {
+        "shown": shown,
+        "forces": forces,
+        "speed": over_speed,
+        "errors": _inline(errors, f"{name}errors", f"Errors of the prediction of {shown.name}"),
+        "time": _inline(time, f"{name}time", title),
+    }
+
+
+def _inline(figure: Figure, name: str, title: str) -> Markup:
+    return Markup(svg(figure, name=name, title=title))

@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import json
+import math
+import re
+import tempfile
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from pteron.atomic import write_text
+import numpy as np
+
+from pteron.atomic import make_folder, write_text
+from pteron.errors import OutputError
 from pteron.identification import Identification
-from pteron.report.identification.folder import prepared_folder
-from pteron.report.identification.model_file import model_path, model_text
-from pteron.report.identification.numbers import numbers
+from pteron.manipulator import save
+from pteron.report.identification.contents import short_sources, shortened
+from pteron.report.write import checked_folder
 
-__all__ = ["Written", "write_identification"]
+_SAFE = re.compile(r"[^\w.-]+")
 
 
 @dataclass(frozen=True)
@@ -60,14 +67,88 @@ def write_identification(
     from pteron.report.identification.page import page
 
     path = model_path(folder, result.robot.name, sources)
-    with prepared_folder(folder) as target:
-        model = model_text(result)
-        data = json.dumps(numbers(result), indent=1, allow_nan=False) + "\n"
-        html = page(result, None if model is None else path.name)
-        if model is not None:
-            write_text(path, model)
-        return Written(
-            numbers=write_text(target / "identification.json", data),
-            page=write_text(target / "identification.html", html),
-            model=None if model is None else path,
-        )
+    target = checked_folder(folder)
+    model = _model_text(result)
+    data = json.dumps(numbers(result), indent=1, allow_nan=False) + "\n"
+    html = page(result, None if model is None else path.name)
+    make_folder(target)
+    if model is not None:
+        write_text(path, model)
+    return Written(
+        numbers=write_text(target / "identification.json", data),
+        page=write_text(target / "identification.html", html),
+        model=None if model is None else path,
+    )
+
+
+def model_path(folder: str | Path, name: str, sources: Iterable[str | Path] = ()) -> Path:
+    """Return where the model file of a machine goes, in a folder of results.
+
+    It must not replace a file that was read, nor be taken for the description of a log.
+    """
+    stem = _SAFE.sub("_", name).strip("._") or "robot"
+    path = Path(folder) / f"{stem[:100]}.toml"
+    for source in map(Path, sources):
+        if source.resolve() == path.resolve():
+            raise OutputError(f"{path}: would replace a file that is read; give another folder")
+        if source.with_suffix(".toml").resolve() == path.resolve():
+            raise OutputError(
+                f"{path}: would be taken for the description of {source.name}; give another folder"
+            )
+    return path
+
+
+def _model_text(result: Identification) -> str | None:
+    """Return the model file of an identification; None where there are no real bodies."""
+    if result.consistency is None:
+        return None
+    with tempfile.TemporaryDirectory() as folder:
+        plain = save(result.consistency.robot, Path(folder) / "robot.toml").read_text("utf-8")
+    return "".join(f"# {_line(text)}\n" for text in _header(result)) + "#\n" + plain
+
+
+def _header(result: Identification) -> list[str]:
+    consistency = result.consistency
+    assert consistency is not None
+    names = short_sources(result)
+    fitted = list(dict.fromkeys(names[p.source] for p in result.fitted))
+    held = list(dict.fromkeys(names[p.source] for p in result.held_out))
+    repeats = "" if set(held) - set(fitted) else " (their last part)"
+    distance = (
+        "exactly"
+        if consistency.feasible
+        else f"as nearly as real bodies can, {consistency.distance:.2g} standard deviations away"
+    )
+    plain = "near uniform rods and a uniform disc."
+    return [
+        f"{result.robot.name}, identified from {', '.join(fitted)}; "
+        f"judged on {', '.join(held)}{repeats}.",
+        f"Verdict: {result.verdict.grade}.",
+        *shortened(result.verdict.reasons, names),
+        f"Bodies that have the identified base parameters {distance}.",
+        "What the forces do not show of them is "
+        + ("as near as can be to the CAD model." if consistency.nearest_to == "CAD" else plain),
+        "Friction and offsets are no part of a machine's file: identification.json has them.",
+    ]
+
+
+def _line(text: str) -> str:
+    """Return text as a comment may hold it: TOML forbids control characters there."""
+    return " ".join("".join(c if c.isprintable() else " " for c in text).split())
+
+
+def numbers(result: Identification) -> dict[str, Any]:
+    """Return the numbers of an identification as plain data, null where one is not finite."""
+    found = _finite(result.as_dict())
+    assert isinstance(found, dict)
+    return found
+
+
+def _finite(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {key: _finite(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [_finite(value) for value in data]
+    if isinstance(data, np.generic):
+        data = data.item()
+    return None if isinstance(data, float) and not math.isfinite(data) else data

@@ -1,0 +1,134 @@
+"""`pteron catalog` and `pteron check`: the machines that come with Pteron, and the user's own."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Annotated, Any
+
+from typer import Argument, Exit
+
+from pteron.cli.arguments import Json, load_robot, signs
+from pteron.cli.screen import complain, note, plain, show, show_json, spinner, table
+from pteron.errors import ModelError, PteronError
+
+if TYPE_CHECKING:
+    from pteron.manipulator import Leg, Manipulator
+
+_FAULTY = 2
+
+
+def catalog(json: Json = False) -> None:
+    """List the machines that come with Pteron."""
+    from pteron.manipulator import catalog as names
+    from pteron.manipulator import load
+
+    found = [{**_machine(robot), "legs": len(robot.legs)} for robot in map(load, names())]
+    if json:
+        show_json(found)
+        return
+    made = table("name", "motion", "pose", "legs", "elbows", numbers=("legs",))
+    for one in found:
+        pose, legs = " ".join(one["coordinates"]), str(one["legs"])
+        made.add_row(one["name"], one["motion"], pose, legs, one["working_mode"])
+    show(made)
+
+
+def _machine(robot: Manipulator) -> dict[str, Any]:
+    return {
+        "name": robot.name,
+        "motion": robot.platform.motion,
+        "coordinates": list(robot.coordinates),
+        "working_mode": signs(robot),
+    }
+
+
+def check(
+    file: Annotated[str, Argument(metavar="FILE", help="A machine's TOML file.")],
+    json: Json = False,
+) -> None:
+    """Check a machine's file and say what the machine is.
+
+    It fails if the file is not valid, telling all its faults, if the machine is singular at every
+    pose, or if no pose is in reach of all its legs. What is possible but unlikely, such as a length
+    in millimetres or a centre of mass beyond its link, is told as a warning.
+    """
+    try:
+        robot = load_robot(file)
+    except ModelError as error:
+        for fault in error.faults or (str(error),):
+            complain(fault)
+        raise Exit(_FAULTY) from None
+    from pteron.workspace.doubts import doubts
+
+    try:
+        with spinner(f"Looking where {robot.name} can work"):
+            found = _findings(robot, doubts(robot))
+    except PteronError as error:
+        # What the library says of a machine begins with its name; the user gave a file.
+        message = str(error).removeprefix(f"{robot.name}: ")
+        unlikely = "".join(f"; {text}" for text in doubts(robot))
+        raise ModelError(f"{file}: {message}{unlikely}") from None
+    for text in found["doubts"]:
+        note(f"Warning: {file}: {text}")
+    if json:
+        show_json(found)
+    else:
+        _show(robot, found)
+
+
+def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
+    from pteron.kinematics import singular_orientations
+    from pteron.workspace import home_pose, reserve
+
+    home = home_pose(robot)
+    return {
+        **_machine(robot),
+        "gravity": list(robot.gravity),
+        "legs": [_leg(leg) for leg in robot.legs],
+        "singular_orientations": singular_orientations(robot).tolist(),
+        "home_pose": home.tolist(),
+        "home_reserve": float(reserve(robot, home).smallest),
+        "doubts": list(unlikely),
+    }
+
+
+def _leg(leg: Leg) -> dict[str, Any]:
+    return {
+        "direction": list(leg.direction),
+        "slider_direction": list(leg.e),
+        "upper_length": leg.upper_length,
+        "lower_length": leg.lower_length,
+        "elbow": leg.elbow,
+        "slider_limits": list(leg.slider_limits) if leg.slider_limits else None,
+    }
+
+
+def _show(robot: Manipulator, found: dict[str, Any]) -> None:
+    numbers = ("leg", "upper (m)", "lower (m)")
+    made = table("leg", "direction", "upper (m)", "lower (m)", "slider (m)", numbers=numbers)
+    for i, leg in enumerate(found["legs"], start=1):
+        limits = leg["slider_limits"]
+        made.add_row(
+            str(i),
+            _vector(leg["direction"]),
+            f"{leg['upper_length']:g}",
+            f"{leg['lower_length']:g}",
+            "no limits" if limits is None else "{:g} to {:g}".format(*limits),
+        )
+    turns = ", ".join(f"{math.degrees(angle):.4g}" for angle in found["singular_orientations"])
+    work = "[green]This machine can work.[/green]"
+    if found["doubts"]:
+        work = "[yellow]This machine can work, if the warnings are none.[/yellow]"
+    show(
+        f"[bold]{plain(robot.name)}[/bold]: a {robot.platform.motion} machine with "
+        f"{len(robot.legs)} legs, pose {' '.join(robot.coordinates)}, "
+        f"working mode {signs(robot)}",
+        made,
+        f"Singular orientations: {turns} deg" if turns else "Singular orientations: none",
+        f"Home pose: {_vector(found['home_pose'])}, reserve {found['home_reserve']:.2f} of 1",
+        work,
+    )
+
+
+def _vector(values: Any) -> str:
+    return f"({', '.join(f'{round(value, 4) + 0.0:g}' for value in values)})"

@@ -1,0 +1,199 @@
+"""`pteron inverse`, `direct` and `forces`: poses, joint coordinates and actuator forces."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+from typer import Argument
+
+from pteron.cli.arguments import (
+    Elbows,
+    Failure,
+    Json,
+    OnFailure,
+    Out,
+    Robot,
+    TableFile,
+    load_robot,
+    option,
+    parsed_numbers,
+)
+from pteron.cli.rows import (
+    Rows,
+    check_destination,
+    deliver,
+    given_rows,
+    rows_of_table,
+    single_row,
+)
+from pteron.errors import DataError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from pteron.tables import Table
+
+_LOADS = ("fx", "fy", "fz", "mk")
+
+
+def inverse(
+    robot: Robot,
+    pose: Annotated[
+        list[str] | None,
+        Argument(metavar="POSE", help="x y z phi, or x y z for 3T; m and rad.", show_default=False),
+    ] = None,
+    table: TableFile = None,
+    out: Out = None,
+    on_failure: OnFailure = "raise",
+    json: Json = False,
+) -> None:
+    """Compute the sliders' coordinates at poses.
+
+    A table has the columns x y z phi (x y z for 3T); the result has its columns and rho1, rho2, ...
+    """
+    from pteron.kinematics import inverse_kinematics
+
+    machine = load_robot(robot)
+    columns = machine.coordinates
+    rows = given_rows(table, pose, "pose", columns)
+    added = [f"rho{i}" for i in range(1, machine.freedom + 1)]
+    check_destination(out, table, rows.table, added)
+    sliders = rows.served(
+        machine,
+        lambda poses: inverse_kinematics(machine, poses, on_failure=on_failure),
+        columns,
+        on_failure,
+    )
+    result = rows.table.extended(dict(zip(added, sliders.T, strict=True)))
+    deliver(result, added, out=out, as_json=json, single=rows.single)
+
+
+def direct(
+    robot: Robot,
+    sliders: Annotated[
+        list[str] | None,
+        Argument(metavar="SLIDERS", help="rho1 rho2 ..., one a leg; m.", show_default=False),
+    ] = None,
+    table: TableFile = None,
+    out: Out = None,
+    on_failure: Annotated[
+        Failure | None,
+        option(
+            "on-failure",
+            "Stop where no pose has the sliders, or leave the row empty; raise for sliders typed "
+            "here, nan for a table.",
+            show_default=False,
+        ),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Compute every pose that has the sliders' coordinates: all assembly modes.
+
+    A table has the columns rho1, rho2, ...; the result has one row for each real pose, with the
+    table's row (from 1) and its columns, the assembly mode (from 1) and x y z phi. Where there is
+    no real pose, these are empty.
+    """
+    from pteron.kinematics import direct_kinematics
+
+    machine = load_robot(robot)
+    columns = [f"rho{i}" for i in range(1, machine.freedom + 1)]
+    rows = given_rows(table, sliders, "sliders", columns)
+    failure: Failure = on_failure or ("raise" if rows.single else "nan")
+    added = ["row", "mode", *machine.coordinates]
+    check_destination(out, table, rows.table, added)
+    poses = rows.served(
+        machine,
+        lambda values: direct_kinematics(machine, values, on_failure=failure),
+        columns,
+        failure,
+    )
+    result = _modes(rows.table, poses, machine.coordinates)
+    shown = added[1:] if rows.single else added
+    deliver(result, shown, out=out, as_json=json)
+
+
+def _modes(table: Table, poses: NDArray[Any], coordinates: tuple[str, ...]) -> Table:
+    """Return one row for each real pose, and one without a pose where there is none."""
+    from dataclasses import replace
+
+    import numpy as np
+    import polars as pl
+
+    real = ~np.isnan(poses).any(axis=-1)
+    lost = ~real.any(axis=-1)
+    real[lost, 0] = True
+    row, mode = np.nonzero(real)
+    frame = table.frame.drop("row", "mode", *coordinates, strict=False)[row]
+    frame.insert_column(0, pl.Series("row", row + 1))
+    modes = pl.Series("mode", mode + 1, dtype=pl.Int64)
+    frame = frame.hstack([modes.zip_with(~pl.Series(lost[row]), pl.Series([None], dtype=pl.Int64))])
+    found = poses[row, mode].T
+    return replace(table, frame=frame).extended(dict(zip(coordinates, found, strict=True)))
+
+
+def _vector(name: str, text: str) -> Any:
+    return option(name, text, "NUMBERS", show_default=False)
+
+
+def forces(
+    robot: Robot,
+    pose: Annotated[str | None, _vector("pose", "x y z phi, or x y z for 3T; m and rad.")] = None,
+    velocity: Annotated[str | None, _vector("velocity", "Its rate; at rest if left out.")] = None,
+    acceleration: Annotated[
+        str | None, _vector("acceleration", "The rate of that; zero if left out.")
+    ] = None,
+    wrench: Annotated[
+        str | None, _vector("wrench", "fx fy fz mk on the platform at P; N and N m.")
+    ] = None,
+    table: TableFile = None,
+    out: Out = None,
+    elbows: Elbows = None,
+    on_failure: OnFailure = "raise",
+    json: Json = False,
+) -> None:
+    """Compute the actuator forces of a motion.
+
+    A table has the columns x y z phi dx dy dz dphi ddx ddy ddz ddphi (3T: without the angles) and,
+    if a wrench acts on the platform, fx fy fz mk (3T: fx fy fz); the result has its columns and
+    force1, force2, ...
+    """
+    from pteron.dynamics import inverse_dynamics
+
+    machine = load_robot(robot, elbows)
+    m = machine.freedom
+    loads = _LOADS[:m]
+    motion = [f"{rate}{name}" for rate in ("", "d", "dd") for name in machine.coordinates]
+    typed = [pose, velocity, acceleration, wrench]
+    if all(text is None for text in typed):
+        rows = rows_of_table(table, "pose", motion)
+    elif table is not None:
+        raise DataError("pose and --table given; give one of them")
+    else:
+        rows = _typed_row(typed, motion, loads)
+    columns = [*motion, *(loads if set(loads) & set(rows.table.columns) else ())]
+    added = [f"force{i}" for i in range(1, m + 1)]
+    check_destination(out, table, rows.table, added)
+
+    def serve(values: NDArray[Any]) -> NDArray[Any]:
+        parts = (values[..., k : k + m] for k in range(0, len(columns), m))
+        return inverse_dynamics(machine, *parts, on_failure=on_failure)
+
+    found = rows.served(machine, serve, columns, on_failure)
+    result = rows.table.extended(dict(zip(added, found.T, strict=True)))
+    deliver(result, added, out=out, as_json=json, single=rows.single)
+
+
+def _typed_row(typed: list[str | None], motion: list[str], loads: tuple[str, ...]) -> Rows:
+    m = len(loads)
+    if typed[0] is None:
+        raise DataError(f"no pose given; give --pose with {' '.join(motion[:m])}")
+    names: list[str] = []
+    values: list[float] = []
+    parts = (motion[:m], motion[m : 2 * m], motion[2 * m :], loads)
+    options = ("--pose", "--velocity", "--acceleration", "--wrench")
+    for name, given, own in zip(options, typed, parts, strict=True):
+        if given is None and name == "--wrench":
+            continue
+        names += own
+        values += [0.0] * m if given is None else parsed_numbers([given], own, name)
+    return single_row(names, values)

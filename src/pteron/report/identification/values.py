@@ -1,0 +1,150 @@
+"""The identified values and bodies one by one: how well each is known, and why some hardly are."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from math import floor, isfinite, log10
+from typing import Literal
+
+import numpy as np
+
+from pteron.identification import Identification
+from pteron.kernels import Array
+from pteron.manipulator import Manipulator
+from pteron.report.typeset import fixed, significant
+
+_STRONG = 0.95
+"""Correlation from which two values can hardly be told apart."""
+
+_NORMAL = 1.959963984540054
+"""Standard deviations to each side that hold 95 %."""
+
+_SHARED = re.compile(r"([pule])(\d*|\([\d,]+\))")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One value of the model, and whether the data show it.
+
+    `half` is half of its 95 % interval, `relative` its standard deviation over its size, `ratio`
+    the inverse of that. The CAD model says nothing of friction and other terms. The partner is the
+    value it is most strongly correlated with, where that is above 0.95.
+    """
+
+    name: str
+    expression: str
+    unit: str
+    value: float
+    half: float
+    relative: float
+    ratio: float
+    cad: float | None
+    status: Literal["essential", "dropped", "unseen"]
+    partner: str | None
+    correlation: float
+
+    @property
+    def weak(self) -> bool:
+        """Whether the data hardly show it."""
+        return self.status != "essential"
+
+
+def parameter_rows(result: Identification) -> tuple[Parameter, ...]:
+    """Return the values of an identification, in the model's order."""
+    estimate, model = result.estimate, result.model
+    base = model.base.values(result.robot)
+    partners, strengths = _partners(estimate.correlation)
+    found = []
+    for k, name in enumerate(estimate.names):
+        value, deviation = float(estimate.values[k]), float(estimate.deviations[k])
+        status: Literal["essential", "dropped", "unseen"] = "essential"
+        if name in (*result.unseen, *result.essential.dropped):
+            status = "unseen" if name in result.unseen else "dropped"
+        found.append(
+            Parameter(
+                name=name,
+                expression=model.expressions[k],
+                unit=estimate.units[k],
+                value=value,
+                half=_NORMAL * deviation,
+                relative=deviation / abs(value) if value else float("inf"),
+                ratio=abs(value) / deviation if deviation > 0.0 else float("inf"),
+                cad=float(base[k]) if k < model.base.rank else None,
+                status=status,
+                partner=estimate.names[partners[k]] if abs(strengths[k]) > _STRONG else None,
+                correlation=float(strengths[k]),
+            )
+        )
+    return tuple(found)
+
+
+def _partners(correlation: Array) -> tuple[Array, Array]:
+    """Return for each value which other one goes with it most, and how much."""
+    p = len(correlation)
+    off = np.where(np.eye(p, dtype=bool), 0.0, np.nan_to_num(correlation))
+    partners = np.argmax(np.abs(off), axis=1)
+    return partners, off[np.arange(p), partners]
+
+
+def measured(value: float, half: float) -> tuple[str, str]:
+    """Return a value and half its interval, to the second digit of the latter.
+
+    Examples
+    --------
+    >>> measured(1.2361326, 0.012752), measured(-0.004113744, 4.4e-05)
+    (('1.236', '0.013'), ('−0.004114', '0.000044'))
+    """
+    if not isfinite(half) or half <= 0.0:
+        return significant(value, 6), significant(half, 2)
+    # 0.0996 is 0.10 in two digits: the size counts after rounding.
+    places = max(1 - floor(log10(float(f"{half:.1e}"))), 0)
+    return fixed(value, places), fixed(half, places)
+
+
+@dataclass(frozen=True)
+class Body:
+    """A body as it was identified and as it was drawn.
+
+    Values are the mass, kg; for a link or the platform also the centre of mass, m, and the moment
+    of inertia about the body's reference point, kg m^2. A body on the border only just exists.
+    """
+
+    kind: str
+    leg: int | None
+    identified: tuple[float, ...]
+    drawn: tuple[float, ...]
+    border: bool
+
+
+def body_rows(result: Identification) -> tuple[Body, ...]:
+    """Return the bodies of an identification; none where there are no real ones."""
+    consistency = result.consistency
+    if consistency is None:
+        return ()
+    border = consistency.at_border
+    identified, drawn = _bodies(consistency.robot), _bodies(result.robot)
+    return tuple(
+        Body(kind, leg, values, drawn[key][2], any(_is(key, name) for name in border))
+        for key, (kind, leg, values) in identified.items()
+    )
+
+
+def _is(key: str, name: str) -> bool:
+    """Say whether a body is one of those that share a name, such as u(2,4), or u of all legs."""
+    found = _SHARED.fullmatch(name)
+    if found is None:
+        return False
+    legs = re.findall(r"\d+", found[2])
+    return key[0] == found[1] and (not legs or key[1:] in legs)
+
+
+def _bodies(robot: Manipulator) -> dict[str, tuple[str, int | None, tuple[float, ...]]]:
+    found: dict[str, tuple[str, int | None, tuple[float, ...]]] = {}
+    for i, leg in enumerate(robot.legs):
+        found[f"p{i + 1}"] = "slider", i, (leg.slider_mass,)
+        for key, kind, body in (("u", "upper link", leg.upper), ("l", "lower link", leg.lower)):
+            found[f"{key}{i + 1}"] = kind, i, (body.mass, *body.center_of_mass, body.inertia)
+    body = robot.platform.inertia
+    found["e"] = "platform", None, (body.mass, *body.center_of_mass, body.inertia)
+    return found
