@@ -216,7 +216,7 @@ def _fault(fault: Any, model: Any, location: tuple[int | str, ...]) -> str:
         return f"unknown key; the valid ones there are {', '.join(valid)}"
     expected = _expected(_type_at(model, location))
     if kind == "missing" and fault["loc"] == location:
-        return "missing; the file must give it" + (f" ({expected})" if expected else "")
+        return f"missing; the file must give {expected or 'it'}"
     bounds = {"greater_than": "above", "greater_than_equal": "of at least", "less_than": "below"}
     if kind in bounds:
         expected = f"a number {bounds[kind]} {next(iter(context.values())):g}"

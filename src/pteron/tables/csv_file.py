@@ -105,7 +105,9 @@ class CsvFile:
         rows = sample.count(b"\n")
         size = len(data) if isinstance(data, bytes) else data.stat().st_size
         self.rows_estimate = round((size - self._start) * rows / len(sample)) if rows else None
-        self.hint = self._hint(head[: self._start].decode(), sample)
+        other_dialect = self._other_dialect(head[: self._start].decode(), sample)
+        self.hint = other_dialect or "the first line must name the columns"
+        self._mend = other_dialect or "mend the row"
 
     def tables(self, numbers: Sequence[str] | None = None) -> Iterator[Table]:
         """Yield the rows in order, a block of them at a time; blank lines are skipped.
@@ -197,11 +199,12 @@ class CsvFile:
             )
         return names, start, lines + 1
 
-    def _hint(self, header: str, rows: bytes) -> str:
+    def _other_dialect(self, header: str, rows: bytes) -> str | None:
+        """Say in which dialect the file seems to be written, if not in the one it is read in."""
         separator = self._dialect.separator
         other = next((s for s in _SEPARATORS if s != separator and s in header), None)
         if len(self.columns) > 1 or other is None:
-            return "the first line must name the columns"
+            return None
         comma = other != "," and re.search(rb"\d,\d", rows.partition(b"\n")[0]) is not None
         advice = "separate the cells with commas and decimals with points"
         if self._describable:
@@ -269,7 +272,7 @@ class CsvFile:
                     raise DataError(
                         f"{self.source}: row {row + len(rows) + 1} (line {begins}) has "
                         f"{len(cells)} cells, but the header names {len(names)} columns "
-                        f"({listed(names)}); mend the row"
+                        f"({listed(names)}); {self._mend}"
                     )
                 rows.append([cell or None for cell in cells])
         except UnicodeDecodeError:

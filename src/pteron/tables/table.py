@@ -84,8 +84,8 @@ class Table:
         missing = ~np.isfinite(values)
         if missing.any():
             text = np.zeros(values.shape, dtype=bool)
-            for j in np.flatnonzero(missing.any(axis=0)):
-                cells, found = self._cells(columns[j])
+            for j, name in enumerate(columns):
+                cells, found = self._cells(name)
                 text[:, j] = (found.is_null() & cells.is_not_null()).to_numpy()
             bad = text if on_failure == "nan" else missing
             if bad.any():

@@ -96,7 +96,7 @@ def _raises_data_errors(cls: _Class) -> _Class:
     @wraps(checked)
     def __init__(self: Any, *args: Any, **given: Any) -> None:  # noqa: N807
         try:
-            checked(self, *args, **given)
+            checked(self, **dict(zip(cls.__dataclass_fields__, args, strict=False)), **given)
         except ValidationError as error:
             raise DataError(told(cls.__name__, fault_lines(error, cls))) from None
 
