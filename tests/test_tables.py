@@ -60,8 +60,11 @@ def test_a_csv_file_is_read_however_it_was_written(given, content: bytes):
         (b"x,y\n1,\xff\n", "not UTF-8 text"),
         ("x,y\n1,2\n".encode("utf-16"), "not UTF-8 text"),
         (b"x,y,x\n1,2,3\n", "two columns are called 'x'"),
-        (b"x,\ry\n1,2\n", "line 1 has a carriage return in its midst; end all lines in the same"),
-        (b'x,"y\n1,2\n', "check the quotes of its header"),
+        (
+            b"x,\ry\n1,2\n",
+            "its header is not CSV (a carriage return in the midst of a line); check",
+        ),
+        (b'x,"y\n1,2\n', "its header is not CSV (unexpected end of data); check its quotes"),
         (b"x;y\n1,5;2\n", "its cells look separated by semicolons, with decimal commas; separate"),
     ],
 )
@@ -231,9 +234,9 @@ NOTES = b"n,note,x\n" + b"".join(
 
 
 @pytest.mark.parametrize("block", [50, 64, 997, 1 << 20])
-@pytest.mark.parametrize("numbers", [None, ["x"]], ids=["text", "numbers"])
-def test_a_file_is_read_alike_in_blocks_of_any_size(block: int, numbers: list[str] | None):
-    tables = list(CsvFile(NOTES, "notes", block=block).tables(numbers))
+@pytest.mark.parametrize("columns", [None, ["x"]], ids=["all", "one"])
+def test_a_file_is_read_alike_in_blocks_of_any_size(block: int, columns: list[str] | None):
+    tables = list(CsvFile(NOTES, "notes", block=block).tables(columns))
     assert len(tables) == 1 if block > len(NOTES) else len(tables) > 5
     values = np.concatenate([table.numbers(["x"])[:, 0] for table in tables])
     np.testing.assert_array_equal(values, np.arange(200))

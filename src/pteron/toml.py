@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
-from types import NoneType, UnionType
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar, Union, get_args, get_origin
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from pteron.errors import PteronError, shown
 
@@ -15,7 +14,7 @@ if TYPE_CHECKING:
     from pydantic import ValidationError
 
 Item = Callable[[str, int], str]
-"""Names an item of a list: from its key and its number, counted from 1."""
+"""Names an item of a list, from its key and its number, counted from 1: "leg 2"."""
 
 _Model = TypeVar("_Model")
 
@@ -23,6 +22,20 @@ _LARGEST = 1 << 24
 _PARTS = 16
 _MANY = 20
 """Faults of a file that are told."""
+
+_BOUNDS = {
+    "greater_than": "above",
+    "greater_than_equal": "of at least",
+    "less_than": "below",
+    "less_than_equal": "of at most",
+}
+_WORDS = {
+    "number": "a number",
+    "integer": "a whole number",
+    "string": "a text",
+    "boolean": "true or false",
+    "object": "a table",
+}
 
 _STRING_OR_COMMENT = re.compile(
     r'"""[^"\\]*(?:(?:\\.|"{1,2}(?!"))[^"\\]*)*"""'
@@ -104,12 +117,16 @@ def parsed_toml(data: bytes, source: str, error: type[PteronError]) -> dict[str,
     raise error(f"{source}: not a TOML file ({reason})")
 
 
+def _item(key: str, number: int) -> str:
+    return f"{key}, item {number}"
+
+
 def validated(
     model: type[_Model],
     document: dict[str, Any],
     source: str,
     error: type[PteronError],
-    item: Item | None = None,
+    item: Item = _item,
 ) -> _Model:
     """Return what a document says as an instance of a pydantic model.
 
@@ -124,7 +141,7 @@ def validated(
     error : type
         What is raised.
     item : callable, optional
-        Names an item of a list; see `fault_lines`.
+        Names an item of a list.
 
     Raises
     ------
@@ -147,7 +164,7 @@ def told(source: str, lines: list[str]) -> str:
     return "\n  ".join([f"{source}: {len(lines)} faults", *lines[:_MANY], *more])
 
 
-def fault_lines(error: ValidationError, model: Any, item: Item | None = None) -> list[str]:
+def fault_lines(error: ValidationError, model: Any, item: Item = _item) -> list[str]:
     r"""Return a line for every fault that pydantic found: the key, what was given and expected.
 
     Parameters
@@ -158,8 +175,7 @@ def fault_lines(error: ValidationError, model: Any, item: Item | None = None) ->
         The pydantic model or dataclass that refused it. Aliases with a dot, such as
         ``"time.unit"``, are understood as keys of tables.
     item : callable, optional
-        Returns what an item of a list is called, from its key and its number, counted from 1:
-        ``("legs", 2)`` to ``"leg 2"``. By default ``"legs, item 2"``.
+        Names an item of a list; by default ``"legs, item 2"``.
 
     Examples
     --------
@@ -176,6 +192,7 @@ def fault_lines(error: ValidationError, model: Any, item: Item | None = None) ->
     leg 2: mass: 'x' given, a number expected
     nam: unknown key; the valid ones there are gravity, legs
     """
+    schema = _Schema(model)
     lines = []
     for fault in error.errors(include_url=False):
         location = fault["loc"]
@@ -183,43 +200,41 @@ def fault_lines(error: ValidationError, model: Any, item: Item | None = None) ->
         if fault["type"] == "missing" and location and isinstance(location[-1], int):
             location = location[:-1]
         key = _key(location, item)
-        line = f"{key}: {_fault(fault, model, location)}" if key else _fault(fault, model, location)
-        if line not in lines:
-            lines.append(line)
-    return lines
+        lines.append(f"{key}: " * bool(key) + _fault(fault, schema, location))
+    return list(dict.fromkeys(lines))
 
 
-def _key(location: tuple[int | str, ...], item: Item | None) -> str:
-    key = ""
+def table_keys(model: Any) -> tuple[str, ...]:
+    """Return the keys of a model; of aliases with a dot, the tables."""
+    return _Schema(model).keys((), "")
+
+
+def _key(location: tuple[int | str, ...], item: Item) -> str:
+    named, key = list[str](), ""
     for part in location:
-        if not isinstance(part, int):
-            key += ("" if not key or key.endswith(": ") else ".") + shown(part, bare=True)
-        elif item is None:
-            key += f", item {part + 1}"
+        if isinstance(part, int):
+            named.append(item(key, part + 1) if key else f"item {part + 1}")
+            key = ""
         else:
-            before, _, last = key.rpartition(": ")
-            named = item(last, part + 1)
-            key = f"{before}: {named}: " if before else f"{named}: "
-    return key.removesuffix(": ")
+            key += ("." if key else "") + shown(part, bare=True)
+    return ": ".join([*named, key] if key else named)
 
 
-def _fault(fault: Any, model: Any, location: tuple[int | str, ...]) -> str:
-    kind, given = fault["type"], shown(fault["input"])
-    context = fault.get("ctx", {})
+def _fault(fault: Any, schema: _Schema, location: tuple[int | str, ...]) -> str:
+    kind, given, context = fault["type"], shown(fault["input"]), fault.get("ctx", {})
     if kind == "value_error":
         return str(context["error"])
     if kind in ("extra_forbidden", "unexpected_keyword_argument"):
-        table, _, _ = str(location[-1]).rpartition(".")
-        valid = table_keys(_type_at(model, location[:-1]), table)
+        table, dot, _ = str(location[-1]).rpartition(".")
+        valid = schema.keys(location[:-1], table + dot)
         if location[-1] in valid:
             return f"{given} given, a table expected"
         return f"unknown key; the valid ones there are {', '.join(valid)}"
-    expected = _expected(_type_at(model, location))
+    expected = schema.words(location)
     if kind == "missing" and fault["loc"] == location:
         return f"missing; the file must give {expected or 'it'}"
-    bounds = {"greater_than": "above", "greater_than_equal": "of at least", "less_than": "below"}
-    if kind in bounds:
-        expected = f"a number {bounds[kind]} {next(iter(context.values())):g}"
+    if kind in _BOUNDS:
+        expected = f"a number {_BOUNDS[kind]} {next(iter(context.values())):g}"
     elif kind == "finite_number":
         expected = "a finite number"
     elif kind == "literal_error":
@@ -229,60 +244,46 @@ def _fault(fault: Any, model: Any, location: tuple[int | str, ...]) -> str:
     return f"{given} given, {expected} expected"
 
 
-def table_keys(model: Any, table: str = "") -> list[str]:
-    """Return the keys of a model, or of one of its tables where its aliases have dots."""
-    before = f"{table}." if table else ""
-    names = [name for name, _ in _fields(model) if name.startswith(before)]
-    return list(dict.fromkeys(name.removeprefix(before).partition(".")[0] for name in names))
+class _Schema:
+    """What a model expects at a location, from its JSON schema."""
 
+    def __init__(self, model: Any) -> None:
+        from pydantic import TypeAdapter
 
-def _fields(model: Any) -> Iterator[tuple[str, Any]]:
-    """Yield the keys that a pydantic model or dataclass takes, with their types."""
-    fields = getattr(model, "model_fields", None) or getattr(model, "__pydantic_fields__", {})
-    for name, field in fields.items():
-        alias = field.validation_alias or field.alias or name
-        for key in getattr(alias, "choices", [alias]):
-            yield key, field.annotation
+        self._whole = TypeAdapter(model).json_schema(by_alias=True)
 
+    def keys(self, location: tuple[int | str, ...], table: str) -> tuple[str, ...]:
+        """Return the keys that are valid there; `table` is what aliases begin with."""
+        names = self._at(location).get("properties", {})
+        inner = (name.removeprefix(table) for name in names if name.startswith(table))
+        return tuple(dict.fromkeys(name.partition(".")[0] for name in inner))
 
-def _type_at(model: Any, location: tuple[int | str, ...]) -> Any:
-    """Return the type that a model expects at a location, None where it is not known."""
-    kind = _plain(model)
-    for part in location:
-        arguments = get_args(kind)
-        if not isinstance(part, int):
-            kind = dict(_fields(kind)).get(part, arguments[-1] if arguments else None)
-        elif get_origin(kind) is tuple and Ellipsis not in arguments:
-            kind = arguments[part] if part < len(arguments) else None
-        else:
-            kind = arguments[0] if arguments else None
-        kind = _plain(kind)
-    return kind
+    def words(self, location: tuple[int | str, ...]) -> str:
+        """Return what is expected there; empty where there are no words for it."""
+        return self._words(self._at(location))
 
+    def _words(self, node: dict[str, Any]) -> str:
+        if node.get("type") != "array":
+            return _WORDS.get(node.get("type", ""), "")
+        several = node.get("prefixItems", [])
+        item = self._words(self._resolved(several[0] if several else node.get("items", {})))
+        count = f"{len(several)} " if several else ""
+        return f"a list of {count}{item.removeprefix('a ')}s" if item else "a list"
 
-def _plain(kind: Any) -> Any:
-    """Return a type without its annotations, and without None beside it."""
-    while True:
-        if get_origin(kind) is Annotated:
-            kind = get_args(kind)[0]
-        elif get_origin(kind) in (Union, UnionType):
-            others = [one for one in get_args(kind) if one is not NoneType]
-            if len(others) > 1:
-                return kind
-            kind = others[0]
-        else:
-            return kind
+    def _at(self, location: tuple[int | str, ...]) -> dict[str, Any]:
+        node = self._resolved(self._whole)
+        for part in location:
+            if isinstance(part, int):
+                several = node.get("prefixItems", [])
+                inner = several[part] if part < len(several) else node.get("items")
+            else:
+                inner = node.get("properties", {}).get(part, node.get("additionalProperties"))
+            node = self._resolved(inner if isinstance(inner, dict) else {})
+        return node
 
-
-def _expected(kind: Any) -> str:
-    """Return the words for a type; empty where there are none."""
-    words = {float: "a number", int: "a whole number", str: "a text", bool: "true or false"}
-    if kind in words:
-        return words[kind]
-    if get_origin(kind) in (tuple, list):
-        arguments = get_args(kind)
-        fixed = get_origin(kind) is tuple and Ellipsis not in arguments
-        singular = _expected(_plain(arguments[0])).removeprefix("a ")
-        several = f" of {f'{len(arguments)} ' if fixed else ''}{singular}s" if singular else ""
-        return f"a list{several}"
-    return "a table" if get_origin(kind) is dict or any(_fields(kind)) else ""
+    def _resolved(self, node: dict[str, Any]) -> dict[str, Any]:
+        """Return a part of the schema itself, where another stands for it or may be null."""
+        if "$ref" in node:
+            return self._resolved(self._whole["$defs"][node["$ref"].rpartition("/")[2]])
+        others = [one for one in node.get("anyOf", []) if one.get("type") != "null"]
+        return self._resolved(others[0]) if len(others) == 1 else node

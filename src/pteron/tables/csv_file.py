@@ -1,4 +1,4 @@
-"""CSV files: in blocks by Polars, or record by record where it must be said what is wrong."""
+"""CSV files: a block at a time by Polars, or by record where it must be said what is wrong."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import chain, islice, pairwise
 from pathlib import Path
+from typing import Literal
 
 import polars as pl
 
@@ -20,7 +21,6 @@ from pteron.tables.table import Table, listed
 BLOCK = 16 << 20
 """Bytes read at a time: large enough for Polars to be fast, small beside any memory."""
 _HEAD = 1 << 20
-_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
 
 
@@ -41,10 +41,22 @@ class Dialect:
         not blank names them.
     """
 
-    separator: str = ","
-    decimal: str = "."
+    separator: Literal[",", ";", "\t", "|", " "] = ","
+    decimal: Literal[".", ","] = "."
     encoding: str = "utf-8"
     header_lines: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.decimal == self.separator:
+            raise DataError('decimal: "," cannot be the separator too')
+        if self.header_lines is not None and self.header_lines < 1:
+            raise DataError(f"header_lines: {self.header_lines} given, at least 1 expected")
+        try:
+            codecs.lookup(self.encoding)
+        except (LookupError, ValueError):
+            raise DataError(
+                f"encoding: {shown(self.encoding)} is no text encoding that Python knows"
+            ) from None
 
 
 class CsvFile:
@@ -56,7 +68,7 @@ class CsvFile:
         A regular file, or what was in one.
     source : str
         What messages call it.
-    dialect : Dialect
+    dialect : Dialect, optional
         How it is written.
     describable : bool
         Whether a TOML file beside it may declare its dialect, so that messages advise it.
@@ -65,8 +77,6 @@ class CsvFile:
 
     Attributes
     ----------
-    source : str
-        As given.
     columns : tuple of str
         Names of the columns, stripped of blanks.
     rows_estimate : int or None
@@ -89,8 +99,8 @@ class CsvFile:
         describable: bool = False,
         block: int = BLOCK,
     ) -> None:
-        self._data = data
         self.source = source
+        self._data = data
         self._dialect = dialect or Dialect()
         self._describable = describable
         self._block = block
@@ -101,27 +111,28 @@ class CsvFile:
         if self._old_line_ends:
             head = head.replace(b"\r", b"\n")
         self.columns, self._start, self._first_line = self._header(head)
-        sample = head[self._start :]
+        header, sample = head[: self._start], head[self._start :]
         rows = sample.count(b"\n")
         size = len(data) if isinstance(data, bytes) else data.stat().st_size
         self.rows_estimate = round((size - self._start) * rows / len(sample)) if rows else None
-        other_dialect = self._other_dialect(head[: self._start].decode(), sample)
+        other_dialect = self._other_dialect(header.decode(), sample.partition(b"\n")[0])
         self.hint = other_dialect or "the first line must name the columns"
         self._mend = other_dialect or "mend the row"
 
-    def tables(self, numbers: Sequence[str] | None = None) -> Iterator[Table]:
-        """Yield the rows in order, a block of them at a time; blank lines are skipped.
+    def tables(self, columns: Sequence[str] | None = None) -> Iterator[Table]:
+        """Yield the cells as text, a block of rows at a time; blank lines are skipped.
 
         Parameters
         ----------
-        numbers : sequence of str, optional
-            The columns to be read, for their numbers. By default all are read, as text.
+        columns : sequence of str, optional
+            Those to be read, by default all.
 
         Raises
         ------
         DataError
             If a row is ragged, or if the file is not text; the message names the row and the line.
         """
+        names = [name for name in self.columns if columns is None or name in columns]
         row, line, rest = 0, self._first_line, b""
         for chunk, following in pairwise(chain(self._body(), [None])):
             assert chunk is not None
@@ -130,27 +141,27 @@ class CsvFile:
             if not cut and len(whole) > 2 * self._block:  # a quote that is never closed
                 cut = len(whole)
             block, rest = whole[:cut], whole[cut:]
-            table = self._table(block, numbers, row, line)
-            if len(table):
-                yield table
-            row, line = row + len(table), line + block.count(b"\n")
+            frame = self._at_once(block, names)
+            if frame is None:
+                frame = self._by_record(block, row, line).select(names)
+            if len(frame):
+                line_of = partial(self._line_of, block, line)
+                yield Table(self.source, frame, self.hint, row, line_of, self._dialect.decimal)
+            row, line = row + len(frame), line + block.count(b"\n")
 
     def _text(self, size: int) -> Iterator[bytes]:
         """Yield the file's text in UTF-8, so many bytes of the file at a time."""
         encoding = codecs.lookup(self._dialect.encoding).name
         decode = None if encoding == "utf-8" else codecs.getincrementaldecoder(encoding)().decode
-        mark = _BYTE_ORDER_MARK
-        with (
-            io.BytesIO(self._data)
-            if isinstance(self._data, bytes)
-            else self._data.open("rb") as file
-        ):
+        mark = codecs.BOM_UTF8
+        data = self._data
+        with io.BytesIO(data) if isinstance(data, bytes) else data.open("rb") as file:
             while chunk := file.read(size):
                 if decode is not None:
                     try:
                         chunk = decode(chunk).encode()
                     except UnicodeError:
-                        raise self._not_text("") from None
+                        raise self._not_text() from None
                 chunk, mark = chunk.removeprefix(mark), b""
                 yield chunk.replace(b"\r", b"\n") if self._old_line_ends else chunk
 
@@ -162,78 +173,48 @@ class CsvFile:
 
     def _header(self, head: bytes) -> tuple[tuple[str, ...], int, int]:
         """Return the columns' names, where the rows begin, and on which line."""
-        start, lines = 0, 0
-        above = self._dialect.header_lines
-
-        def read() -> Iterator[bytes]:
-            nonlocal start, lines
-            for line in io.BytesIO(head):
-                start, lines = start + len(line), lines + 1
-                yield line
-
-        def decoded() -> Iterator[str]:
-            for line in islice(read(), above and above - 1, above):
-                if b"\r" in line.rstrip(b"\r\n"):
-                    raise DataError(
-                        f"{self.source}: line {lines} has a carriage return in its midst; end all "
-                        "lines in the same way"
-                    )
-                yield line.decode("utf-8")
-
+        lines = io.BytesIO(head).readlines()
+        above = self._dialect.header_lines or 1
+        records = csv.reader(
+            map(_header_line, lines[above - 1 :]), delimiter=self._dialect.separator, strict=True
+        )
         try:
-            records = csv.reader(decoded(), delimiter=self._dialect.separator, strict=True)
             names = next((tuple(c.strip() for c in cells) for cells in records if _any(cells)), ())
         except UnicodeDecodeError:
-            raise self._not_text("") from None
+            raise self._not_text() from None
         except csv.Error as error:
             raise DataError(
-                f"{self.source}: not a CSV file ({error}); check the quotes of its header"
+                f"{self.source}: its header is not CSV ({error}); check its quotes and line ends"
             ) from None
         if not names:
-            which = "first line" if above is None else f"line {above}"
+            which = "first line" if above == 1 else f"line {above}"
             raise DataError(f"{self.source}: is empty; its {which} must name the columns")
         twice = next((name for i, name in enumerate(names) if name in names[:i]), None)
         if twice is not None:
             raise DataError(
                 f"{self.source}: two columns are called {shown(twice)}; rename or remove one"
             )
-        return names, start, lines + 1
+        read = above - 1 + records.line_num
+        return names, sum(map(len, lines[:read])), read + 1
 
-    def _other_dialect(self, header: str, rows: bytes) -> str | None:
+    def _other_dialect(self, header: str, row: bytes) -> str | None:
         """Say in which dialect the file seems to be written, if not in the one it is read in."""
         separator = self._dialect.separator
         other = next((s for s in _SEPARATORS if s != separator and s in header), None)
         if len(self.columns) > 1 or other is None:
             return None
-        comma = other != "," and re.search(rb"\d,\d", rows.partition(b"\n")[0]) is not None
-        advice = "separate the cells with commas and decimals with points"
+        comma = other != "," and re.search(rb"\d,\d", row) is not None
+        found = _SEPARATORS[other] + ", with decimal commas" * comma
+        declare = ""
         if self._describable:
-            decimal = ', decimal = ","' if comma else ""
-            sign = other.replace("\t", "\\t")
-            advice += (
-                f', or declare it in a TOML file beside it: [csv] separator = "{sign}"{decimal}'
-            )
-        with_commas = ", with decimal commas" if comma else ""
-        return f"its cells look separated by {_SEPARATORS[other]}{with_commas}; {advice}"
+            declaration = f'separator = "{other}"'.replace("\t", "\\t") + ', decimal = ","' * comma
+            declare = f", or declare it in a TOML file beside it: [csv] {declaration}"
+        return (
+            f"its cells look separated by {found}; separate the cells with commas and decimals "
+            f"with points{declare}"
+        )
 
-    def _table(self, block: bytes, numbers: Sequence[str] | None, row: int, line: int) -> Table:
-        names = self.columns if numbers is None else sorted(set(numbers), key=self.columns.index)
-        frame = None
-        decimal = self._dialect.decimal
-        if numbers is not None and (decimal == "." or b"." not in block):
-            frame = self._at_once(block, names, pl.Float64)
-            if frame is not None and not all(column.is_finite().all() for column in frame):
-                frame = None
-        if frame is None:
-            frame = self._at_once(block, names, pl.String)
-        if frame is None:
-            frame = self._by_record(block, row, line).select(names)
-        line_of = partial(self._line_of, block, line)
-        return Table(self.source, frame, self.hint, row, line_of, decimal)
-
-    def _at_once(
-        self, block: bytes, names: Sequence[str], kind: type[pl.DataType]
-    ) -> pl.DataFrame | None:
+    def _at_once(self, block: bytes, names: Sequence[str]) -> pl.DataFrame | None:
         """Return the cells as Polars reads them, or None where a row may be at fault.
 
         Polars fills short rows and takes blank lines for rows. Both leave the last cell empty, and
@@ -243,19 +224,16 @@ class CsvFile:
             return None
         separator, last = self._dialect.separator, len(self.columns) - 1
         wanted = [self.columns.index(name) for name in names]
-        quoted = b'"' in block
+        by_last = b'"' in block or not last
+        schema = {str(j): pl.String for j in range(last + 1)}
+        columns = sorted({*wanted, last}) if by_last else wanted
         try:
             frame = pl.read_csv(
-                block,
-                has_header=False,
-                schema={str(j): kind if j in wanted else pl.String for j in range(last + 1)},
-                columns=None if quoted or not last else wanted,
-                separator=separator,
-                decimal_comma=kind == pl.Float64 and self._dialect.decimal == ",",
+                block, has_header=False, schema=schema, columns=columns, separator=separator
             )
         except pl.exceptions.PolarsError:
             return None
-        if quoted or not last:
+        if by_last:
             whole = not frame[str(last)].has_nulls()
         else:
             whole = block.count(separator.encode()) == frame.height * last
@@ -265,7 +243,6 @@ class CsvFile:
 
     def _by_record(self, block: bytes, row: int, line: int) -> pl.DataFrame:
         names, rows = self.columns, list[list[str | None]]()
-        begins = line
         try:
             for begins, cells in self._records(block, line):
                 if len(cells) != len(names):
@@ -278,10 +255,9 @@ class CsvFile:
         except UnicodeDecodeError:
             raise self._not_text(f" behind row {row}" if row else "") from None
         except csv.Error as error:
-            behind = f" (line {begins})" if rows else ""
             raise DataError(
-                f"{self.source}: behind row {row + len(rows)}{behind} is not CSV ({error}); check "
-                "its quotes"
+                f"{self.source}: behind row {row + len(rows)} is not CSV ({error}); check its "
+                "quotes"
             ) from None
         return pl.DataFrame(rows, schema=dict.fromkeys(names, pl.String), orient="row")
 
@@ -298,14 +274,18 @@ class CsvFile:
     def _line_of(self, block: bytes, line: int, index: int) -> int:
         return next(islice(self._records(block, line), index, None))[0]
 
-    def _not_text(self, where: str) -> DataError:
-        encoding = self._dialect.encoding
-        name = "UTF-8" if encoding == "utf-8" else encoding
+    def _not_text(self, where: str = "") -> DataError:
         declare = "; or declare its encoding in a TOML file beside it: [csv] encoding = ..."
         return DataError(
-            f"{self.source}: not {name} text{where}; save it as CSV in UTF-8"
-            f"{declare if self._describable else ''}"
+            f"{self.source}: not {self._dialect.encoding.upper()} text{where}; save it as CSV in "
+            f"UTF-8{declare if self._describable else ''}"
         )
+
+
+def _header_line(line: bytes) -> str:
+    if b"\r" in line.rstrip(b"\r\n"):
+        raise csv.Error("a carriage return in the midst of a line")
+    return line.decode("utf-8")
 
 
 def _any(cells: Sequence[str]) -> bool:

@@ -54,14 +54,13 @@ class ParquetFile:
             ) from None
         self.columns = tuple(self._kinds)
 
-    def tables(self, numbers: Sequence[str] | None = None) -> Iterator[Table]:
+    def tables(self, columns: Sequence[str] | None = None) -> Iterator[Table]:
         """Yield the rows in order, a block of them at a time.
 
         Parameters
         ----------
-        numbers : sequence of str, optional
-            The columns to be read, for their numbers; truth values are 0 and 1. By default all are
-            read, as they are.
+        columns : sequence of str, optional
+            Those to be read, truth values as 0 and 1; by default all, as they are.
 
         Raises
         ------
@@ -69,9 +68,9 @@ class ParquetFile:
             If a part of the file cannot be read.
         """
         frame = self._frame
-        if numbers is not None:
-            truths = [name for name in numbers if self._kinds[name] == pl.Boolean]
-            frame = frame.select(*dict.fromkeys(numbers)).cast(dict.fromkeys(truths, pl.Float64))
+        if columns is not None:
+            truths = [name for name in columns if self._kinds[name] == pl.Boolean]
+            frame = frame.select(*dict.fromkeys(columns)).cast(dict.fromkeys(truths, pl.Float64))
         for start in range(0, self.rows_estimate, _ROWS):
             try:
                 part = frame.slice(start, _ROWS).collect()

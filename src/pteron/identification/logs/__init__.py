@@ -4,9 +4,8 @@ Nothing is repaired: what cannot be a motion of the machine is refused, with its
 what looks odd is stated as a finding.
 """
 
-from pteron.identification.logs.description import (
-    Description,
-    KnownPayload,
+from pteron.identification.logs.description import Description, KnownPayload
+from pteron.identification.logs.description_file import (
     find_description,
     read_description,
     write_description,

@@ -1,32 +1,27 @@
-"""What is known about a log beside its numbers: the TOML file beside it, found, read, written."""
+"""What is known about a log beside its numbers."""
 
 from __future__ import annotations
 
-import codecs
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from functools import wraps
-from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar, get_args
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import (
     AfterValidator,
-    AliasChoices,
     BeforeValidator,
     ConfigDict,
     Field,
-    TypeAdapter,
     ValidationError,
     field_validator,
     model_validator,
 )
 from pydantic.dataclasses import dataclass
 
-from pteron.atomic import write_text
 from pteron.errors import DataError, shown
 from pteron.identification.logs.joints import joint_symbols, units_of
 from pteron.manipulator import Manipulator
 from pteron.tables import Dialect
-from pteron.toml import fault_lines, read_toml, table_keys, told, validated
+from pteron.toml import fault_lines, told
 
 TimeUnit = Literal["s", "ms", "us"]
 LengthUnit = Literal["m", "mm", "um"]
@@ -35,7 +30,7 @@ ForceUnit = Literal["N", "N m", "A", "V", "%"]
 JointUnit = Literal["m", "mm", "um", "rad", "deg"]
 
 _ROUNDING = 1e-12
-_OF_A_MANIPULATOR = {"platform", "legs"}
+_OF_DRIVES = ("A", "V", "%")
 _Class = TypeVar("_Class", bound=type)
 
 
@@ -58,32 +53,11 @@ def _pairs(given: Any) -> Any:
     return [given] if flat and not any(isinstance(one, list | tuple) for one in given) else given
 
 
-def _single(given: Any) -> Any:
-    """Return one unit, which holds for all joints that it can measure, as a list of units."""
-    if isinstance(given, str) and given not in get_args(JointUnit):
-        raise ValueError(f"{shown(given)} given, one of {', '.join(get_args(JointUnit))} expected")
-    return (given,) if isinstance(given, str) else given
-
-
-def _known_encoding(name: str) -> str:
-    try:
-        codecs.lookup(name)
-    except (LookupError, ValueError):
-        raise ValueError(f"{shown(name)} is no text encoding that Python knows") from None
-    return name
-
-
 Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 Factor = Annotated[Number, AfterValidator(_not_zero)]
 Two = tuple[Number, Number]
 Pair = Annotated[Two, AfterValidator(_rising)]
 Names = Annotated[tuple[str, ...], Field(min_length=1)]
-
-
-def _of_joints(key: str) -> Any:
-    """Return the field of a key under ``[joints]``, which older files call ``[sliders]``."""
-    choices = AliasChoices(f"joints.{key}", f"sliders.{key}")
-    return Field(validation_alias=choices, serialization_alias=f"joints.{key}")
 
 
 _CONFIG = ConfigDict(extra="forbid", validate_by_name=True, validate_by_alias=True)
@@ -158,16 +132,17 @@ class Description:
 
     Parameters
     ----------
-    csv_separator, csv_decimal, csv_encoding, csv_header_lines : optional
-        How a CSV file is written; see `pteron.tables.Dialect`.
+    csv : Dialect, optional
+        How a CSV file is written.
     time_column, payload_column : str, optional
         Names of columns.
     joint_columns, force_columns, pose_columns : tuple of str, optional
         Names of columns, in the order of the legs and of the pose's coordinates.
     time_unit : {"s", "ms", "us"}, optional
-    joint_unit : {"m", "mm", "um", "rad", "deg"} or tuple of them, optional
-        Unit of the joint coordinates, or one each; a single one holds for the joints it can
-        measure, lengths for sliders and angles for cranks.
+    joint_unit : {"m", "mm", "um", "rad", "deg"}, optional
+        Unit of the joint coordinates that it can measure: lengths of sliders, angles of cranks.
+    joint_angle_unit : {"rad", "deg"}, optional
+        Unit of the cranks' coordinates where there are both.
     length_unit : {"m", "mm", "um"}, optional
         Unit of x, y and z.
     angle_unit : {"rad", "deg"}, optional
@@ -197,22 +172,12 @@ class Description:
         column is named twice.
     """
 
-    csv_separator: Annotated[
-        Literal[",", ";", "\t", "|", " "] | None, Field(alias="csv.separator")
-    ] = None
-    csv_decimal: Annotated[Literal[".", ","] | None, Field(alias="csv.decimal")] = None
-    csv_encoding: Annotated[
-        Annotated[str, AfterValidator(_known_encoding)] | None, Field(alias="csv.encoding")
-    ] = None
-    csv_header_lines: Annotated[int | None, Field(alias="csv.header_lines", ge=1, strict=True)] = (
-        None
-    )
+    csv: Dialect | None = None
     time_column: Annotated[str | None, Field(alias="time.column")] = None
     time_unit: Annotated[TimeUnit | None, Field(alias="time.unit")] = None
-    joint_columns: Annotated[Names | None, _of_joints("columns")] = None
-    joint_unit: Annotated[
-        tuple[JointUnit, ...] | None, BeforeValidator(_single), _of_joints("unit")
-    ] = None
+    joint_columns: Annotated[Names | None, Field(alias="joints.columns")] = None
+    joint_unit: Annotated[JointUnit | None, Field(alias="joints.unit")] = None
+    joint_angle_unit: Annotated[AngleUnit | None, Field(alias="joints.angle_unit")] = None
     force_columns: Annotated[Names | None, Field(alias="forces.columns")] = None
     column_force_unit: Annotated[ForceUnit | None, Field(alias="forces.unit")] = None
     gains: Annotated[tuple[Factor, ...] | None, Field(alias="forces.gains")] = None
@@ -253,8 +218,6 @@ class Description:
         twice = next((name for i, name in enumerate(columns) if name in columns[:i]), None)
         if twice is not None:
             raise ValueError(f"columns: {shown(twice)} is named twice; each column has one meaning")
-        if self.dialect.decimal == self.dialect.separator:
-            raise ValueError('csv: "," cannot be both the separator and the decimal sign')
         return self
 
     @property
@@ -263,156 +226,48 @@ class Description:
         raw = self.column_force_unit
         return "N" if raw is None or raw == "N m" or self.gains is not None else raw
 
-    @property
-    def dialect(self) -> Dialect:
-        """How a CSV file is written."""
-        return Dialect(
-            self.csv_separator or ",",
-            self.csv_decimal or ".",
-            self.csv_encoding or "utf-8",
-            self.csv_header_lines,
-        )
-
     def joint_units(self, robot: Manipulator) -> tuple[str | None, ...]:
         """Return the unit declared for each joint of a machine, None where nothing is."""
-        joints, given = joint_symbols(robot), self.joint_unit or ()
-        if len(given) != 1:
-            return given or (None,) * len(joints)
-        return tuple(given[0] if given[0] in units_of(joint) else None for joint in joints)
+        declared = (self.joint_angle_unit, self.joint_unit)
+        return tuple(
+            next((unit for unit in declared if unit in units_of(joint)), None)
+            for joint in joint_symbols(robot)
+        )
 
     def check(self, robot: Manipulator) -> None:
         """Raise a `DataError` if this is no description of a machine's log."""
-        joints, legs = joint_symbols(robot), len(robot.legs)
+        legs, coordinates = f"{len(robot.legs)} legs", f"{len(robot.coordinates)} pose coordinates"
         lists = {
             "joints.columns": (self.joint_columns, legs),
             "forces.columns": (self.force_columns, legs),
             "forces.gains": (self.gains, legs),
             "drives.rotor_inertia": (self.rotor_inertia, legs),
             "drives.ratio": (self.ratio, legs),
-            "pose.columns": (self.pose_columns, len(robot.coordinates)),
+            "pose.columns": (self.pose_columns, coordinates),
         }
         for key, (values, needed) in lists.items():
-            if values is not None and len(values) != needed:
-                what = f"{needed} pose coordinates" if key == "pose.columns" else f"{needed} legs"
+            if values is not None and len(values) != int(needed.split()[0]):
                 raise DataError(
-                    f"{key}: {len(values)} given, but the machine has {what}; give one each, or "
+                    f"{key}: {len(values)} given, but the machine has {needed}; give one each, or "
                     "name the machine the log belongs to"
                 )
-        one_or_each = {
-            "forces.limits": (self.limits, "pairs"),
-            "joints.unit": (self.joint_unit, "units"),
-        }
-        for key, (several, noun) in one_or_each.items():
-            if several is not None and len(several) not in (1, legs):
+        if self.limits is not None and len(self.limits) not in (1, len(robot.legs)):
+            raise DataError(
+                f"forces.limits: {len(self.limits)} pairs given, but the machine has {legs}; give "
+                "one pair for all, or one each"
+            )
+        joints = joint_symbols(robot)
+        for key, unit, known in (
+            ("joints.unit", self.joint_unit, [one for j in joints for one in units_of(j)]),
+            ("forces.unit", self.column_force_unit, [*_OF_DRIVES, *(j.force_unit for j in joints)]),
+        ):
+            if unit is not None and unit not in known:
                 raise DataError(
-                    f"{key}: {len(several)} {noun} given, but the machine has {legs} legs; give "
-                    "one for all, or one each"
-                )
-        if self.joint_unit is not None:
-            units = self.joint_units(robot)
-            right = [unit in units_of(joint) for unit, joint in zip(units, joints, strict=True)]
-            if not (any(right) if len(self.joint_unit) == 1 else all(right)):
-                raise DataError(
-                    f"joints.unit: {', '.join(self.joint_unit)} given, but the joints of this "
-                    f"machine are measured in {_counted(joint.unit for joint in joints)}"
-                )
-        if self.column_force_unit in ("N", "N m"):
-            usual = [joint.force_unit for joint in joints]
-            if self.column_force_unit not in usual:
-                raise DataError(
-                    f"forces.unit: {self.column_force_unit} given, but the forces of this "
-                    f"machine's joints are measured in {_counted(usual)}"
+                    f"{key}: {unit} given, but on this machine it is one of "
+                    f"{', '.join(dict.fromkeys(known))}"
                 )
         if self.payload is not None and "phi" in robot.coordinates and not self.payload.inertia:
             raise DataError(
                 "payload: only its mass is given, but the machine turns its platform; give "
                 "center_of_mass (or first_moment) and inertia about P"
             )
-
-
-def find_description(log_path: str | Path) -> Path | None:
-    """Return the TOML file beside a log, of the same stem, or None where there is none.
-
-    A manipulator's file is no description of a log, whatever it is called.
-    """
-    path = Path(log_path).with_suffix(".toml")
-    if not path.is_file():
-        return None
-    try:
-        document = read_toml(path, DataError, _ABSENT)
-    except DataError:
-        return path  # what is wrong with it is told where it is read
-    return None if document.keys() >= _OF_A_MANIPULATOR else path
-
-
-def read_description(path: str | Path) -> Description:
-    """Read the description of a log from a TOML file, in which every key is optional.
-
-    Parameters
-    ----------
-    path : str or path
-        The file. Its tables: ``[csv]`` separator, decimal, encoding, header_lines; ``[time]``
-        column, unit; ``[joints]`` (or ``[sliders]``) columns, unit; ``[forces]`` columns, unit,
-        gains, limits; ``[pose]`` columns, length_unit, angle_unit; ``[payload]`` column, mass,
-        center_of_mass or first_moment, inertia; ``[motion]`` period, assembly_mode; ``[drives]``
-        rotor_inertia, ratio.
-
-    Returns
-    -------
-    Description
-
-    Raises
-    ------
-    DataError
-        If there is no such file, or if it is not TOML, has unknown keys or values that cannot be;
-        the message names each such key, and the valid ones.
-    """
-    source = shown(str(path), bare=True, longest=1000)
-    document = read_toml(path, DataError, _ABSENT)
-    if document.keys() >= _OF_A_MANIPULATOR:
-        raise DataError(f"{source}: describes a manipulator; the description of a log was expected")
-    if document.keys() >= {"joints", "sliders"}:
-        raise DataError(f"{source}: [sliders] is the older name of [joints]; give one of them")
-    flat: dict[str, Any] = {}
-    for table, entries in document.items():
-        if table not in _TABLES or not isinstance(entries, dict):
-            flat[table] = entries
-        elif table == "payload":
-            rest = dict(entries)
-            flat |= {"payload.column": rest.pop("column")} if "column" in rest else {}
-            flat |= {"payload": rest} if rest else {}
-        else:
-            flat |= {f"{table}.{key}": value for key, value in entries.items()}
-    return validated(Description, flat, source, DataError)
-
-
-def write_description(description: Description, path: str | Path) -> Path:
-    """Write a description to a TOML file that `read_description` reads back without loss.
-
-    Raises
-    ------
-    OutputError
-        If the file cannot be written; one that was there is left as it was.
-    """
-    import tomlkit
-
-    given = TypeAdapter(Description).dump_python(
-        description, mode="json", by_alias=True, exclude_none=True
-    )
-    tables: dict[str, dict[str, Any]] = {}
-    for key, value in given.items():
-        table, _, entry = key.partition(".")
-        tables.setdefault(table, {}).update({entry: value} if entry else value)
-    document = tomlkit.document()
-    document.add(tomlkit.comment("A log for Pteron: its columns, their units, what is known."))
-    for name, entries in tables.items():
-        document.add(name, tomlkit.item(entries))
-    return write_text(path, tomlkit.dumps(document))
-
-
-_ABSENT = "no such file; it should describe a log"
-_TABLES = table_keys(Description)
-
-
-def _counted(units: Iterable[str]) -> str:
-    return " and ".join(dict.fromkeys(units))

@@ -13,11 +13,8 @@ from numpy.typing import NDArray
 from pteron.errors import DataError, shown
 from pteron.identification.logs.channels import Channel
 from pteron.identification.logs.columns import find_columns
-from pteron.identification.logs.description import (
-    Description,
-    find_description,
-    read_description,
-)
+from pteron.identification.logs.description import Description
+from pteron.identification.logs.description_file import find_description, read_description
 from pteron.identification.logs.joints import in_si, joint_symbols
 from pteron.identification.logs.log import Log, joined
 from pteron.identification.logs.sizes import (
@@ -241,7 +238,7 @@ def open_log(
         beside.check(robot)
     except DataError as error:
         raise DataError(f"{shown(str(origin), bare=True, longest=1000)}: {error}") from None
-    file = open_table(path, noun="log", dialect=beside.dialect, describable=True)
+    file = open_table(path, noun="log", dialect=beside.csv, describable=True)
     return LogFile(file, robot, beside)
 
 
