@@ -80,9 +80,15 @@ def assert_same(one: Log, other: Log) -> None:
             np.testing.assert_array_equal(a, b)
 
 
-@pytest.mark.parametrize("ending", [".csv", ".parquet"])
-@pytest.mark.parametrize("robot", [QUADRUPTERON, TRIPTERON], ids=["quadrupteron", "tripteron"])
-@pytest.mark.parametrize("extras", [True, False], ids=["pose and payload", "bare"])
+@pytest.mark.parametrize(
+    ("ending", "robot", "extras"),
+    [
+        (".csv", QUADRUPTERON, True),
+        (".parquet", QUADRUPTERON, True),
+        (".csv", TRIPTERON, True),
+        (".csv", QUADRUPTERON, False),
+    ],
+)
 def test_a_log_written_is_read_back_bit_for_bit(tmp_path, ending, robot, extras):
     log = motion(robot, pose=extras, payload=extras)
     path = write_log(log, tmp_path / f"motion{ending}")
@@ -95,7 +101,7 @@ def test_a_log_written_is_read_back_bit_for_bit(tmp_path, ending, robot, extras)
     assert back.payload is None or back.payload.dtype == np.int64
 
 
-@pytest.mark.parametrize("unit", ["A", "V", "%"])
+@pytest.mark.parametrize("unit", ["A", "%"])
 def test_forces_in_a_drives_unit_are_written_with_it(tmp_path, unit):
     log = replace(motion(), description=Description(column_force_unit=unit))
     back = read_log(write_log(log, tmp_path / "motion.csv"), QUADRUPTERON)
@@ -130,8 +136,9 @@ def test_a_csv_file_is_read_however_it_was_written(tmp_path, change):
     assert_same(log, read_log(path, QUADRUPTERON))
 
 
-@pytest.mark.parametrize("ending", [".csv", ".parquet"])
-@pytest.mark.parametrize("rows", [7, 100, 499, 10_000])
+@pytest.mark.parametrize(
+    ("ending", "rows"), [(".csv", 7), (".csv", 499), (".csv", 10_000), (".parquet", 100)]
+)
 def test_pieces_together_are_the_whole(tmp_path, ending, rows):
     path = write_log(motion(), tmp_path / f"motion{ending}")
     whole = read_log(path, QUADRUPTERON)
@@ -204,8 +211,7 @@ def test_a_ragged_row_is_refused_though_its_end_is_not_needed(tmp_path):
         read_log(path, QUADRUPTERON)
 
 
-@pytest.mark.parametrize("ending", [".csv", ".parquet"])
-@pytest.mark.parametrize("rows", [0, 3, 49])
+@pytest.mark.parametrize(("ending", "rows"), [(".csv", 0), (".csv", 49), (".parquet", 0)])
 def test_too_few_rows_are_refused(tmp_path, ending, rows):
     path = write_log(motion(rows=rows), tmp_path / f"motion{ending}")
     with pytest.raises(DataError, match=f"{rows} rows given, at least 50 expected"):
@@ -248,8 +254,9 @@ def test_ambiguous_and_duplicate_columns_are_refused(tmp_path):
         open_log(saved(tmp_path, both), QUADRUPTERON)
 
 
-@pytest.mark.parametrize(("change", "what"), [(0.0, "is repeated"), (-0.5, "runs backward")])
-@pytest.mark.parametrize("rows", [100, 262_144])
+@pytest.mark.parametrize(
+    ("change", "what", "rows"), [(0.0, "is repeated", 100), (-0.5, "runs backward", 262_144)]
+)
 def test_time_that_does_not_rise_is_refused(tmp_path, change, what, rows):
     given = columns(motion())
     given["t"][200] = given["t"][199] + change * STEP
@@ -310,8 +317,7 @@ def test_poses_in_another_unit_are_refused(tmp_path, coordinate, factor):
     np.testing.assert_allclose(back, np.column_stack(list(pose.values())) * scale, rtol=1e-14)
 
 
-@pytest.mark.parametrize("column", ["rho2", "force3"])
-@pytest.mark.parametrize("rows", [60, 262_144])
+@pytest.mark.parametrize(("column", "rows"), [("rho2", 60), ("force3", 262_144)])
 def test_a_dead_channel_is_refused(tmp_path, column, rows):
     path = saved(tmp_path, columns(motion()) | {column: np.full(500, 0.1)})
     message = rf"motion\.csv: column {column} holds 0\.1 in all 500 rows: dead channel"
@@ -435,7 +441,6 @@ def test_a_description_is_given_by_value_or_path(tmp_path):
         ),
         ("[forces]\ngains = [1, 0, 1, 1]\n", "forces.gains, item 2: 0 given: its motor would not"),
         ("[forces]\ngains = [1, 2]\n", "forces.gains: 2 given, but the machine has 4 legs"),
-        ("[forces]\ngains = 2\n", "forces.gains: 2 given, a list of numbers expected"),
         ("[forces]\nunit = 'N m'\n", "forces.unit: N m given, but .* it is one of A, V, %, N$"),
         ("[forces]\nlimits = [1, -1]\n", "forces.limits, item 1: 1 is not below -1"),
         ("[forces]\nlimits = [[-1, 1], [-1, 1]]\n", "forces.limits: 2 pairs given"),
@@ -448,7 +453,6 @@ def test_a_description_is_given_by_value_or_path(tmp_path):
             "[drives]\nrotor_inertia = [-1, 1, 1, 1]\n",
             "item 1: -1 given, a number of at least 0 exp",
         ),
-        ("[payload]\ninertia = 1\n", "payload.mass: missing"),
         ("[payload]\nmass = 1\n", "only its mass is given, but the machine turns"),
         ("[payload]\nmass = 1\ninertia = 1\n", "neither center_of_mass nor first_moment given"),
         ("[payload]\nmass = 1\nfirst_moment = [1, 0]\n", "payload: inertia is missing"),

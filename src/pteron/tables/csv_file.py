@@ -138,7 +138,7 @@ class CsvFile:
             assert chunk is not None
             whole = rest + chunk
             cut = len(whole) if following is None else _end_of_records(whole)
-            if not cut and len(whole) > 2 * self._block:  # a quote that is never closed
+            if not cut and len(whole) > self._block + _HEAD:  # a quote that is never closed
                 cut = len(whole)
             block, rest = whole[:cut], whole[cut:]
             frame = self._at_once(block, names)
@@ -147,7 +147,8 @@ class CsvFile:
             if len(frame):
                 line_of = partial(self._line_of, block, line)
                 yield Table(self.source, frame, self.hint, row, line_of, self._dialect.decimal)
-            row, line = row + len(frame), line + block.count(b"\n")
+            row += len(frame)
+            line += block.count(b"\n") + block.count(b"\r") - block.count(b"\r\n")
 
     def _text(self, size: int) -> Iterator[bytes]:
         """Yield the file's text in UTF-8, so many bytes of the file at a time."""
@@ -215,31 +216,25 @@ class CsvFile:
         )
 
     def _at_once(self, block: bytes, names: Sequence[str]) -> pl.DataFrame | None:
-        """Return the cells as Polars reads them, or None where a row may be at fault.
+        """Return the cells as Polars reads them, or None where it might read them otherwise.
 
-        Polars fills short rows and takes blank lines for rows. Both leave the last cell empty, and
-        separators that are not there.
+        Polars fills short rows and takes blank lines for rows, which separators that are not there
+        tell; and it is lenient with quotes and line ends.
         """
-        if block.count(b"\r") != block.count(b"\r\n"):
-            return None
         separator, last = self._dialect.separator, len(self.columns) - 1
+        if not last or b'"' in block or block.count(b"\r") != block.count(b"\r\n"):
+            return None
         wanted = [self.columns.index(name) for name in names]
-        by_last = b'"' in block or not last
         schema = {str(j): pl.String for j in range(last + 1)}
-        columns = sorted({*wanted, last}) if by_last else wanted
         try:
             frame = pl.read_csv(
-                block, has_header=False, schema=schema, columns=columns, separator=separator
+                block, has_header=False, schema=schema, columns=wanted, separator=separator
             )
         except pl.exceptions.PolarsError:
             return None
-        if by_last:
-            whole = not frame[str(last)].has_nulls()
-        else:
-            whole = block.count(separator.encode()) == frame.height * last
-        return (
-            frame.select(pl.col(str(j)).alias(self.columns[j]) for j in wanted) if whole else None
-        )
+        if block.count(separator.encode()) != frame.height * last:
+            return None
+        return frame.rename({str(j): self.columns[j] for j in wanted})
 
     def _by_record(self, block: bytes, row: int, line: int) -> pl.DataFrame:
         names, rows = self.columns, list[list[str | None]]()

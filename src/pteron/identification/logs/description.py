@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import fields
 from functools import wraps
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -66,11 +67,12 @@ _CONFIG = ConfigDict(extra="forbid", validate_by_name=True, validate_by_alias=Tr
 def _raises_data_errors(cls: _Class) -> _Class:
     """Make a pydantic dataclass refuse its arguments with a `DataError`."""
     checked: Callable[..., None] = cls.__init__  # type: ignore[misc]
+    names = [one.name for one in fields(cls)]
 
     @wraps(checked)
     def __init__(self: Any, *args: Any, **given: Any) -> None:  # noqa: N807
         try:
-            checked(self, **dict(zip(cls.__dataclass_fields__, args, strict=False)), **given)
+            checked(self, **dict(zip(names, args, strict=False)), **given)
         except ValidationError as error:
             raise DataError(told(cls.__name__, fault_lines(error, cls))) from None
 
