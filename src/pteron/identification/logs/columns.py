@@ -66,18 +66,8 @@ def find_columns(
 ) -> Columns:
     """Return where a file's columns are, after what is declared, documented, or else guessed.
 
-    Parameters
-    ----------
-    names : sequence of str
-        The file's columns.
-    robot : Manipulator
-        The machine.
-    description : Description
-        What the log's TOML file declares.
-    source : str
-        What messages call the file.
-    hint : str
-        What may be amiss with the header where nothing is found.
+    `source` is what messages call the file, `hint` what may be amiss with its header where nothing
+    is found.
 
     Raises
     ------
