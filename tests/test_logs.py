@@ -3,26 +3,31 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import polars as pl
 import pytest
 from mechanisms import CATALOG
 
+import pteron
 from pteron.errors import DataError, OutputError
 from pteron.identification.logs import (
     Description,
+    JointSymbols,
     KnownPayload,
     Log,
     find_description,
+    joint_symbols,
     open_log,
     read_description,
     read_log,
     write_description,
     write_log,
 )
+from pteron.manipulator import Leg, Manipulator
 
 QUADRUPTERON = CATALOG["quadrupteron"]
 TRIPTERON = CATALOG["tripteron"]
@@ -75,9 +80,15 @@ def assert_same(one: Log, other: Log) -> None:
             np.testing.assert_array_equal(a, b)
 
 
-@pytest.mark.parametrize("ending", [".csv", ".parquet"])
-@pytest.mark.parametrize("robot", [QUADRUPTERON, TRIPTERON], ids=["quadrupteron", "tripteron"])
-@pytest.mark.parametrize("extras", [True, False], ids=["pose and payload", "bare"])
+@pytest.mark.parametrize(
+    ("ending", "robot", "extras"),
+    [
+        (".csv", QUADRUPTERON, True),
+        (".parquet", QUADRUPTERON, True),
+        (".csv", TRIPTERON, True),
+        (".csv", QUADRUPTERON, False),
+    ],
+)
 def test_a_log_written_is_read_back_bit_for_bit(tmp_path, ending, robot, extras):
     log = motion(robot, pose=extras, payload=extras)
     path = write_log(log, tmp_path / f"motion{ending}")
@@ -90,7 +101,7 @@ def test_a_log_written_is_read_back_bit_for_bit(tmp_path, ending, robot, extras)
     assert back.payload is None or back.payload.dtype == np.int64
 
 
-@pytest.mark.parametrize("unit", ["A", "V", "%"])
+@pytest.mark.parametrize("unit", ["A", "%"])
 def test_forces_in_a_drives_unit_are_written_with_it(tmp_path, unit):
     log = replace(motion(), description=Description(column_force_unit=unit))
     back = read_log(write_log(log, tmp_path / "motion.csv"), QUADRUPTERON)
@@ -125,8 +136,9 @@ def test_a_csv_file_is_read_however_it_was_written(tmp_path, change):
     assert_same(log, read_log(path, QUADRUPTERON))
 
 
-@pytest.mark.parametrize("ending", [".csv", ".parquet"])
-@pytest.mark.parametrize("rows", [1, 7, 100, 499, 500, 10_000])
+@pytest.mark.parametrize(
+    ("ending", "rows"), [(".csv", 7), (".csv", 499), (".csv", 10_000), (".parquet", 100)]
+)
 def test_pieces_together_are_the_whole(tmp_path, ending, rows):
     path = write_log(motion(), tmp_path / f"motion{ending}")
     whole = read_log(path, QUADRUPTERON)
@@ -142,19 +154,6 @@ def test_pieces_together_are_the_whole(tmp_path, ending, rows):
     assert pieces[-1].place(0) == whole.place(pieces[-1].first_row)
 
 
-def test_blocks_of_a_file_larger_than_one_are_joined(tmp_path, monkeypatch):
-    monkeypatch.setattr("pteron.identification.logs.csv_rows._BLOCK", 1000)
-    log = motion()
-    path = write_log(log, tmp_path / "motion.csv")
-    assert_same(log, read_log(path, QUADRUPTERON))
-    lines = path.read_text().splitlines()
-    lines[400] = lines[400].replace(lines[400].split(",")[2], "oops")
-    path.write_text("\n".join(lines))
-    message = r"row 400 \(line 401\), column rho2: 'oops' given, a number expected"
-    with pytest.raises(DataError, match=message):
-        read_log(path, QUADRUPTERON)
-
-
 def test_a_part_knows_its_rows():
     log = motion()
     part = log.part(100, 200).part(10, 20)
@@ -164,14 +163,18 @@ def test_a_part_knows_its_rows():
     assert part.segments == (slice(0, 10),)
 
 
-CELLS = [("", "empty"), ("nan", "finite number expected"), ("-inf", "finite number expected")]
-
-
 @pytest.mark.parametrize(
-    ("cell", "words"), [*CELLS, ("fast", "a number expected"), ("1_0", "a nu")]
+    ("column", "cell", "words"),
+    [
+        ("t", "", "the cell is empty"),
+        ("rho3", "nan", "'nan' given, a finite number expected; correct the cell$"),
+        ("force4", "-inf", "'-inf' given, a finite number expected"),
+        ("t", "fast", "'fast' given, a number expected"),
+        ("rho3", "1_0", "'1_0' given, a number expected"),
+        ("rho3", "\x1b[31m" + "7" * 500, r"'\\x1b\[31m7{55}\.\.\.' given"),
+    ],
 )
-@pytest.mark.parametrize("column", ["t", "rho3", "force4"])
-def test_a_bad_cell_is_refused_with_row_line_and_column(tmp_path, cell, words, column):
+def test_a_bad_cell_is_refused_with_row_line_and_column(tmp_path, column, cell, words):
     given = columns(motion())
     given = {key: [repr(float(v)) for v in values] for key, values in given.items()}
     given[column][17] = cell
@@ -193,7 +196,7 @@ def test_a_bad_cell_of_a_parquet_file_is_refused(tmp_path, value):
 def test_text_in_a_parquet_file_is_refused(tmp_path):
     given = columns(motion()) | {"rho3": ["far"] * 500}
     path = saved(tmp_path, given, "motion.parquet")
-    with pytest.raises(DataError, match="column rho3 holds String; numbers were expected"):
+    with pytest.raises(DataError, match="row 1, column rho3: 'far' given, a number expected"):
         read_log(path, QUADRUPTERON)
 
 
@@ -208,8 +211,7 @@ def test_a_ragged_row_is_refused_though_its_end_is_not_needed(tmp_path):
         read_log(path, QUADRUPTERON)
 
 
-@pytest.mark.parametrize("ending", [".csv", ".parquet"])
-@pytest.mark.parametrize("rows", [0, 3, 49])
+@pytest.mark.parametrize(("ending", "rows"), [(".csv", 0), (".csv", 49), (".parquet", 0)])
 def test_too_few_rows_are_refused(tmp_path, ending, rows):
     path = write_log(motion(rows=rows), tmp_path / f"motion{ending}")
     with pytest.raises(DataError, match=f"{rows} rows given, at least 50 expected"):
@@ -221,7 +223,7 @@ def test_too_few_rows_are_refused(tmp_path, ending, rows):
     [
         ({"t": "when"}, r"no columns for the time \(found: when, rho1.*\[time\] column"),
         ({"rho2": "spot"}, r"the columns rho1, rho3, rho4 are for 3 sliders, but .* 4 legs"),
-        ({f"rho{j}": f"spot{j}" for j in range(1, 5)}, r"no columns for the sliders .*\[sliders\]"),
+        ({f"rho{j}": f"spot{j}" for j in range(1, 5)}, r"no columns for the sliders .*\[joints\]"),
         ({f"force{j}": f"x{j}" for j in range(1, 5)}, r"no columns for the forces .*\[forces\]"),
         ({"force4": "effort"}, "3 forces, but the machine has 4 legs.*another machine"),
     ],
@@ -252,8 +254,9 @@ def test_ambiguous_and_duplicate_columns_are_refused(tmp_path):
         open_log(saved(tmp_path, both), QUADRUPTERON)
 
 
-@pytest.mark.parametrize(("change", "what"), [(0.0, "is repeated"), (-0.5, "runs backward")])
-@pytest.mark.parametrize("rows", [100, 262_144])
+@pytest.mark.parametrize(
+    ("change", "what", "rows"), [(0.0, "is repeated", 100), (-0.5, "runs backward", 262_144)]
+)
 def test_time_that_does_not_rise_is_refused(tmp_path, change, what, rows):
     given = columns(motion())
     given["t"][200] = given["t"][199] + change * STEP
@@ -270,9 +273,10 @@ def test_sliders_in_another_unit_are_refused_until_it_is_declared(tmp_path, fact
     for j in range(1, 5):
         given[f"rho{j}"] *= factor
     path = saved(tmp_path, given)
-    with pytest.raises(DataError, match=rf'row 1, column rho1: .*\[sliders\] unit = "{unit}"'):
+    with pytest.raises(DataError, match=rf'row 1, column rho1: .*\[joints\] unit = "{unit}"'):
         read_log(path, QUADRUPTERON)
-    path.with_suffix(".toml").write_text(f'[sliders]\nunit = "{unit}"\n')
+    table = "joints" if unit == "mm" else "sliders"  # as older files say
+    path.with_suffix(".toml").write_text(f'[{table}]\nunit = "{unit}"\n')
     back = read_log(path, QUADRUPTERON)
     np.testing.assert_allclose(back.sliders, log.sliders, rtol=1e-15)
     assert back.findings == ()
@@ -313,8 +317,7 @@ def test_poses_in_another_unit_are_refused(tmp_path, coordinate, factor):
     np.testing.assert_allclose(back, np.column_stack(list(pose.values())) * scale, rtol=1e-14)
 
 
-@pytest.mark.parametrize("column", ["rho2", "force3"])
-@pytest.mark.parametrize("rows", [60, 262_144])
+@pytest.mark.parametrize(("column", "rows"), [("rho2", 60), ("force3", 262_144)])
 def test_a_dead_channel_is_refused(tmp_path, column, rows):
     path = saved(tmp_path, columns(motion()) | {column: np.full(500, 0.1)})
     message = rf"motion\.csv: column {column} holds 0\.1 in all 500 rows: dead channel"
@@ -420,25 +423,44 @@ def test_a_description_is_given_by_value_or_path(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("[force]\n", "force: unknown key; the valid ones there are time, sliders, forces, pose,"),
+        (
+            "[force]\n",
+            "force: unknown key; the valid ones there are csv, time, joints, forces, ",
+        ),
+        ("forces = 3\n", "forces: 3 given, a table expected"),
         ("[forces]\nunits = 'N'\n", "forces.units: unknown key; .* columns, unit, gains, limits"),
-        ("[sliders]\nunit = 'cm'\n", "sliders.unit: 'cm' given; .*'m', 'mm' or 'um'"),
-        ("[forces]\ngains = [1, 'x', 1, 1]\n", r"forces.gains\[1\]: 'x' given"),
-        ("[forces]\ngains = [1, 0, 1, 1]\n", "forces.gains: one is 0"),
+        (
+            "[sliders]\nunit = 'cm'\n",
+            "joints.unit: 'cm' given, 'm', 'mm', 'um', 'rad' or 'deg' expected",
+        ),
+        ("[joints]\nunit = 'deg'\n", "joints.unit: deg given, but .* it is one of m, mm, um$"),
+        ("[joints]\n[sliders]\n", "older name"),
+        (
+            "[forces]\ngains = [1, 'x', 1, 1]\n",
+            "forces.gains, item 2: 'x' given, a number expected",
+        ),
+        ("[forces]\ngains = [1, 0, 1, 1]\n", "forces.gains, item 2: 0 given: its motor would not"),
         ("[forces]\ngains = [1, 2]\n", "forces.gains: 2 given, but the machine has 4 legs"),
-        ("[forces]\nlimits = [1, -1]\n", "forces.limits: 1 is not below -1"),
+        ("[forces]\nunit = 'N m'\n", "forces.unit: N m given, but .* it is one of A, V, %, N$"),
+        ("[forces]\nlimits = [1, -1]\n", "forces.limits, item 1: 1 is not below -1"),
         ("[forces]\nlimits = [[-1, 1], [-1, 1]]\n", "forces.limits: 2 pairs given"),
         ("[pose]\ncolumns = ['x']\n", "pose.columns: 1 given, .*4 pose coordinates"),
-        ("[sliders]\ncolumns = ['a','b','c','d']\n", r"no column a, b, c, d, which .*\[sliders\]"),
+        ("[joints]\ncolumns = ['a','b','c','d']\n", r"no column a, b, c, d, which .*\[joints\]"),
         ("[time]\ncolumn = 'a'\n[payload]\ncolumn = 'a'\n", "columns: 'a' is named twice"),
-        ("[motion]\nperiod = 0\n", "motion.period: 0 s given"),
-        ("[motion]\nassembly_mode = 3\n", "motion.assembly_mode: 3 given"),
-        ("[drives]\nrotor_inertia = [-1, 1, 1, 1]\n", "drives.rotor_inertia: one is below 0"),
-        ("[payload]\ninertia = 1\n", "payload.mass: missing"),
+        ("[motion]\nperiod = 0\n", "motion.period: 0 given, a number above 0 expected"),
+        ("[motion]\nassembly_mode = 3\n", "motion.assembly_mode: 3 given, 1 or 2 expected"),
+        (
+            "[drives]\nrotor_inertia = [-1, 1, 1, 1]\n",
+            "item 1: -1 given, a number of at least 0 exp",
+        ),
         ("[payload]\nmass = 1\n", "only its mass is given, but the machine turns"),
-        ("[payload]\nmass = 1\ninertia = 1\n", "neither it and first_moment given"),
-        ("[payload]\nmass = 1\nfirst_moment = [1, 0]\n", "payload.inertia: missing"),
+        ("[payload]\nmass = 1\ninertia = 1\n", "neither center_of_mass nor first_moment given"),
+        ("[payload]\nmass = 1\nfirst_moment = [1, 0]\n", "payload: inertia is missing"),
         ("[payload]\nmass = 1\nfirst_moment = [1, 0]\ninertia = 0.5\n", "no real body"),
+        ("[payload]\nmas = 1\n", r"payload.mas: unknown key; .*mass, first_moment"),
+        ("[csv]\nseparator = ','\ndecimal = ','\n", "csv: decimal: .* cannot be the separator too"),
+        ("[csv]\nsep = ';'\n", "csv.sep: unknown key; the valid ones there are separator, decimal"),
+        ("[csv]\nencoding = 'klingon'\n", "csv: encoding: 'klingon' is no text encoding"),
         ("[payload\n", "not a TOML file"),
     ],
 )
@@ -447,7 +469,186 @@ def test_a_wrong_description_is_refused_with_its_key(tmp_path, text, words):
     with pytest.raises(DataError, match=words) as caught:
         open_log(path, QUADRUPTERON)
     assert "motion.toml" in str(caught.value) or "description's" in str(caught.value)
-    assert "\n" not in str(caught.value) or "not a TOML" in str(caught.value)
+
+
+def test_all_faults_of_a_description_are_told_at_once(tmp_path):
+    (tmp_path / "motion.toml").write_text(
+        "[forces]\ngain = 1\n[motion]\nperiod = '4 s'\nmode = 1\n"
+    )
+    with pytest.raises(DataError) as caught:
+        read_description(tmp_path / "motion.toml")
+    assert [line.strip().partition(":")[0] for line in str(caught.value).splitlines()[1:]] == [
+        "motion.period",
+        "forces.gain",
+        "motion.mode",
+    ]
+
+
+def test_a_description_in_python_is_checked_too():
+    with pytest.raises(DataError, match=r"period: -1\.0 given, a number above 0 expected"):
+        Description(period=-1.0)
+    with pytest.raises(DataError, match=r"mass: -1\.0 given"):
+        KnownPayload(-1.0)
+    about = Description(joint_unit="mm", period=4.0)
+    assert replace(about, period=None) == Description(joint_unit="mm")
+
+
+def test_the_file_of_a_robot_is_no_description_of_a_log(tmp_path):
+    path = write_log(motion(), tmp_path / "my.csv")
+    pteron.save(QUADRUPTERON, tmp_path / "my.toml")
+    assert find_description(path) is None
+    assert read_log(path, QUADRUPTERON).rows == 500
+    with pytest.raises(DataError, match="describes a manipulator; the description of a log was"):
+        read_log(path, QUADRUPTERON, description=tmp_path / "my.toml")
+
+
+# Dialects of CSV -----------------------------------------------------------------------------
+
+
+def in_german(path: Path, encoding: str = "latin-1") -> None:
+    """Write a log's file anew with semicolons, decimal commas, lines above it and an umlaut."""
+    text = path.read_text().replace(",", ";").replace(".", ",").replace("t;", "Zeit für s;", 1)
+    path.write_bytes(f"Maschine 7\n;;;\n{text}".encode(encoding))
+
+
+SAID = """
+[csv]
+separator = ";"
+decimal = ","
+encoding = "{}"
+header_lines = 3
+[time]
+column = "Zeit für s"
+"""
+
+
+@pytest.mark.parametrize("encoding", ["latin-1", "utf-16"])
+def test_a_declared_dialect_is_read_to_the_last_digit(tmp_path, encoding):
+    log = motion()
+    path = write_log(log, tmp_path / "motion.csv")
+    in_german(path, encoding)
+    path.with_suffix(".toml").write_text(SAID.format(encoding), encoding="utf-8")
+    assert_same(log, read_log(path, QUADRUPTERON))
+    text = path.read_bytes().decode(encoding).replace("0,004;", "0.004;", 1)
+    path.write_bytes(text.encode(encoding))
+    words = r"row 5 \(line 8\), .*'0\.004' given, a number with a decimal comma expected"
+    with pytest.raises(DataError, match=words):
+        read_log(path, QUADRUPTERON)
+
+
+@pytest.mark.parametrize("toml", ["", '[joints]\ncolumns = ["rho1", "rho2", "rho3", "rho4"]\n'])
+def test_an_undeclared_dialect_is_named_with_how_to_declare_it(tmp_path, toml):
+    path = write_log(motion(), tmp_path / "motion.csv")
+    path.write_text(path.read_text().replace(",", ";").replace(".", ","))
+    path.with_suffix(".toml").write_text(toml)
+    with pytest.raises(DataError) as caught:
+        read_log(path, QUADRUPTERON)
+    message = str(caught.value)
+    assert "its cells look separated by semicolons, with decimal commas" in message
+    assert message.count('[csv] separator = ";", decimal = ","') == 1
+    declared = message.partition("[csv] ")[2].partition('","')[0] + '","'
+    path.with_suffix(".toml").write_text("[csv]\n" + declared.replace(", decimal", "\ndecimal"))
+    assert read_log(path, QUADRUPTERON).rows == 500
+
+
+def test_text_that_is_not_utf_8_may_be_declared(tmp_path):
+    path = write_log(motion(), tmp_path / "motion.csv")
+    path.write_bytes(path.read_bytes().replace(b"rho1", b"rh\xf61"))
+    with pytest.raises(DataError, match=r"not UTF-8 text; .*\[csv\] encoding = "):
+        open_log(path, QUADRUPTERON)
+
+
+def test_escape_codes_in_a_name_do_not_reach_the_terminal(tmp_path):
+    given = columns(motion()) | {"\x1b[31mred" + "x" * 500: np.zeros(500)}
+    del given["force4"]
+    path = saved(tmp_path, given, "mo\x1btion.csv")
+    with pytest.raises(DataError) as caught:
+        open_log(path, QUADRUPTERON)
+    message = str(caught.value)
+    assert message.isprintable()
+    assert r"mo\x1btion.csv" in message
+    assert len(message) < 900
+
+
+@pytest.mark.parametrize("name", ["time", "sliders", "forces", "pose", "payload"])
+def test_masked_values_are_refused(name):
+    log = motion()
+    values = np.ma.array(getattr(log, name))
+    assert type(getattr(replace(log, **{name: values}), name)) is np.ndarray
+    values[7] = np.ma.masked
+    with pytest.raises(DataError, match=rf"made: \d values of {name} are masked; leave their rows"):
+        replace(log, **{name: values})
+
+
+# Cranks --------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Crank(Leg):
+    """A leg whose joint is spoken of as a crank, whatever it is."""
+
+    joint: ClassVar[JointSymbols] = JointSymbols("crank", "theta", "rad", "torque", "N m")
+
+
+def with_cranks(*turned: int) -> Manipulator:
+    """Return the Tripteron with legs, from 0, that are spoken of as cranks."""
+    legs = [Crank(**vars(leg)) if j in turned else leg for j, leg in enumerate(TRIPTERON.legs)]
+    return replace(TRIPTERON, legs=tuple(legs))
+
+
+@pytest.mark.parametrize("turned", [(0, 1, 2), (1, 2)], ids=["cranks", "mixed"])
+def test_the_columns_of_cranks_are_angles_and_torques(tmp_path, turned):
+    robot = with_cranks(*turned)
+    log = replace(motion(TRIPTERON, pose=False), joints=joint_symbols(robot))
+    path = write_log(log, tmp_path / "motion.csv")
+    stems = ["theta" if j in turned else "rho" for j in range(3)]
+    header = path.read_text().partition("\n")[0].split(",")
+    assert header[1:4] == [f"{stem}{j + 1}" for j, stem in enumerate(stems)]
+    assert header[4 + turned[-1]] == f"torque{turned[-1] + 1}"
+    back = read_log(path, robot)
+    assert_same(log, back)
+    assert (back.findings, back.description.force_unit) == ((), "N")
+    assert_same(log, read_log(write_log(back, tmp_path / "copy.parquet"), robot))
+    with pytest.raises(DataError, match=r"for (the|1) sliders.*needed: t, rho1, rho2, rho3"):
+        read_log(path, TRIPTERON)
+
+
+def test_degrees_are_found_by_name_and_told_by_size(tmp_path):
+    robot = with_cranks(1, 2)
+    log = motion(TRIPTERON, pose=False, payload=False)
+    log = replace(log, sliders=log.sliders * [1.0, 20.0, 20.0])
+    given = {"t": log.time, "rho1": log.sliders[:, 0]}
+    given |= {f"theta{j + 1} (deg)": np.degrees(log.sliders[:, j]) for j in (1, 2)}
+    given |= {"force1": log.forces[:, 0]}
+    given |= {f"torque{j + 1}_Nm": log.forces[:, j] for j in (1, 2)}
+    back = read_log(saved(tmp_path, given), robot)
+    np.testing.assert_allclose(back.sliders, log.sliders, rtol=1e-14)
+    assert "taken for the crank coordinates in deg" in back.findings[0].message
+    assert "taken for the actuator torques in N m" in back.findings[1].message
+    plain = renamed(given, {f"theta{j} (deg)": f"theta{j}" for j in (2, 3)})
+    path = saved(tmp_path, plain)
+    words = r'column theta2: .* rad, read as rad, is over two turns; .*\[joints\] unit = "deg"'
+    with pytest.raises(DataError, match=words):
+        read_log(path, robot)
+    for declared in ('unit = "deg"', 'unit = "m"\nangle_unit = "deg"'):
+        path.with_suffix(".toml").write_text(f"[joints]\n{declared}\n")
+        np.testing.assert_allclose(read_log(path, robot).sliders, log.sliders, rtol=1e-14)
+
+
+def test_a_currents_unit_holds_for_all_joints(tmp_path):
+    robot = with_cranks(1, 2)
+    log = replace(motion(TRIPTERON, pose=False), joints=joint_symbols(robot))
+    log = replace(log, description=Description(column_force_unit="A"))
+    path = write_log(log, tmp_path / "motion.csv")
+    assert read_log(path, robot).description.force_unit == "A"
+    path.write_text(path.read_text().replace("current1", "force1", 1))
+    with pytest.raises(
+        DataError, match="are in N, A, A; give all in their SI units, or all in one"
+    ):
+        read_log(path, robot)
+
+
+# Guesses and findings ------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -557,7 +758,7 @@ def test_gaps_jitter_frozen_and_clipped_channels_are_found(tmp_path):
 
 @pytest.mark.parametrize(
     ("ending", "rows"),
-    [(".csv", rows) for rows in (1, 2, 3, 97, 1000, 1999, 2000, 3200, 4501)] + [(".parquet", 1700)],
+    [(".csv", rows) for rows in (3, 97, 1999, 3200)] + [(".parquet", 1700)],
 )
 def test_findings_do_not_depend_on_the_pieces(tmp_path, ending, rows):
     path = saved(tmp_path, faulty(), f"motion{ending}")

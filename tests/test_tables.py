@@ -12,7 +12,7 @@ import polars as pl
 import pytest
 
 from pteron.errors import DataError, OutputError
-from pteron.tables import Table, check_output, read_table, write_table
+from pteron.tables import CsvFile, Table, check_output, read_table, write_table
 
 
 @pytest.fixture
@@ -60,6 +60,12 @@ def test_a_csv_file_is_read_however_it_was_written(given, content: bytes):
         (b"x,y\n1,\xff\n", "not UTF-8 text"),
         ("x,y\n1,2\n".encode("utf-16"), "not UTF-8 text"),
         (b"x,y,x\n1,2,3\n", "two columns are called 'x'"),
+        (
+            b"x,\ry\n1,2\n",
+            "its header is not CSV (a carriage return in the midst of a line); check",
+        ),
+        (b'x,"y\n1,2\n', "its header is not CSV (unexpected end of data); check its quotes"),
+        (b"x;y\n1,5;2\n", "its cells look separated by semicolons, with decimal commas; separate"),
     ],
 )
 def test_a_csv_file_that_is_none_is_refused(given, content: bytes, words: str):
@@ -100,8 +106,8 @@ def test_what_is_missing_may_become_nan_but_text_may_not(given):
     [
         (b"x,y,z\n1,2,3\n", "no column phi (found: x, y, z; needed: x, y, phi)"),
         (b"1,2\n3,4\n", "the first line must name the columns"),
-        (b"x;y;phi\n1;2;3\n", "separate the cells with commas"),
-        (b"x\ty\n1\t2\n", "separate the cells with commas"),
+        (b"x;y;phi\n1;2;3\n", "its cells look separated by semicolons; separate the cells with"),
+        (b"x\ty\n1\t2\n", "its cells look separated by tabs; separate the cells with commas"),
     ],
 )
 def test_a_missing_column_is_named_with_those_found(given, content: bytes, words: str):
@@ -219,6 +225,41 @@ def test_standard_input_is_csv(monkeypatch: pytest.MonkeyPatch):
     table = read_table("-")
     assert table.source == "standard input"
     assert table.numbers(["y"]).tolist() == [[2.0]]
+
+
+NOTES = b"n,note,x\n" + b"".join(
+    b'%d,"a ""note""\nof, %d lines",%d\n\n' % (i, i % 7, i) if i % 3 else b"%d,plain,%d\n" % (i, i)
+    for i in range(200)
+)
+
+
+@pytest.mark.parametrize("block", [50, 64, 997, 1 << 20])
+@pytest.mark.parametrize("columns", [None, ["x"]], ids=["all", "one"])
+def test_a_file_is_read_alike_in_blocks_of_any_size(block: int, columns: list[str] | None):
+    tables = list(CsvFile(NOTES, "notes", block=block).tables(columns))
+    assert len(tables) == 1 if block > len(NOTES) else len(tables) > 5
+    values = np.concatenate([table.numbers(["x"])[:, 0] for table in tables])
+    np.testing.assert_array_equal(values, np.arange(200))
+    assert [table.first_row for table in tables] == np.cumsum([0, *map(len, tables)])[:-1].tolist()
+    last = tables[-1]
+    assert last.place(len(last) - 1) == f"notes: row 200 (line {2 + 67 + 3 * 132})"
+
+
+@pytest.mark.parametrize("block", [30, 1 << 20])
+def test_a_fault_behind_many_blocks_is_placed(block: int):
+    rows = b"".join(b"%d,%d\n" % (i, i) for i in range(100))
+    file = CsvFile(b"x,y\n" + rows.replace(b"90,90", b"90"), "file", block=block)
+    with pytest.raises(DataError, match=r"row 91 \(line 92\) has 1 cells"):
+        list(file.tables())
+    file = CsvFile(b"x,y\n" + rows.replace(b"90,90", b"90,oops"), "file", block=block)
+    with pytest.raises(DataError, match=r"row 91 \(line 92\), column y: 'oops' given"):
+        [table.numbers(["y"]) for table in file.tables(["y"])]
+
+
+def test_a_quote_that_is_never_closed_is_told_without_reading_on():
+    content = b"x,y\n" + b'1,"2\n' + b"3,4\n" * 1_000_000
+    with pytest.raises(DataError, match=r"behind row 0 is not CSV .*check its quotes"):
+        list(CsvFile(content, "file", block=100).tables())
 
 
 def test_the_last_row_of_a_long_table_is_found(given):

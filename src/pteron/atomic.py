@@ -8,8 +8,6 @@ from pathlib import Path
 
 from pteron.errors import OutputError
 
-__all__ = ["make_folder", "write_bytes", "write_text"]
-
 
 def write_text(path: str | Path, text: str) -> Path:
     """Write `text` to `path` in UTF-8, through a temporary file beside it and a rename."""

@@ -2,6 +2,13 @@
 
 from __future__ import annotations
 
+from reprlib import Repr
+
+_LONGEST = 60
+_brief = Repr()
+_brief.maxstring = _brief.maxother = _brief.maxlong = _LONGEST
+_brief.maxlevel = 3
+
 
 class PteronError(ValueError):
     """Root of every error that Pteron raises for something the user can mend."""
@@ -74,3 +81,32 @@ class SingularPose(PteronError):
         self.measure = measure
         self.index = index
         self.leg = leg
+
+
+def shown(value: object, *, bare: bool = False, longest: int = _LONGEST) -> str:
+    r"""Return a value as messages show it: short, on one line, without control characters.
+
+    Parameters
+    ----------
+    value : object
+        What a user gave.
+    bare : bool
+        Whether it is a name or a path, which stands without quotation marks.
+    longest : int
+        Characters of a text that are kept.
+
+    Examples
+    --------
+    >>> shown("1,5"), shown("rho1\x1b[31m", bare=True), shown([1.0] * 9)
+    ("'1,5'", 'rho1\\x1b[31m', '[1.0, 1.0, 1.0, 1.0, 1.0, 1.0, ...]')
+    """
+    if isinstance(value, str):
+        text = value if len(value) <= longest else f"{value[:longest]}..."
+        if not bare:
+            return repr(text)
+        return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+    try:
+        text = _brief.repr(value)
+    except ValueError:  # Python does not print integers of over 4300 digits
+        text = f"a value of type {type(value).__name__}"
+    return text if len(text) <= 4 * _LONGEST else f"{text[: 4 * _LONGEST]}..."

@@ -11,8 +11,6 @@ from pteron.errors import DataError
 from pteron.identification.logs import Finding, Log, LogFile
 from pteron.kernels import Array
 
-__all__ = ["Recording", "divided", "recording", "same"]
-
 _IN_MEMORY = 2_000_000
 """Rows up to which a file is read whole: 150 MB for four sliders."""
 
@@ -98,7 +96,7 @@ class Recording:
 def recording(log: Log | LogFile, progress: Callable[[int], None] | None = None) -> Recording:
     """Return a log as a recording; files of a usual length are read whole."""
     if isinstance(log, LogFile) and (log.rows_estimate or 0) <= _IN_MEMORY:
-        log = _whole(log, progress)
+        log = log.read(progress)
     if isinstance(log, Log):
         return Recording(replace(log, time=_since(log.time)), 0, log.rows)
     return Recording(log, 0, _END)
@@ -157,16 +155,3 @@ def divided(whole: Recording, period: float | None) -> tuple[Recording, Recordin
             f"{whole.source}: {whole.rows} rows are too few to hold some out; record longer"
         )
     return replace(whole, stop=cut), replace(whole, start=cut)
-
-
-def _whole(file: LogFile, progress: Callable[[int], None] | None) -> Log:
-    pieces = list(file.pieces(_PIECE, progress))
-    first = pieces[0]
-
-    def joined(name: str) -> np.ndarray | None:
-        parts = [getattr(piece, name) for piece in pieces]
-        return None if parts[0] is None else np.concatenate(parts)
-
-    names = ("time", "sliders", "forces", "pose", "payload")
-    arrays = {name: joined(name) for name in names}
-    return replace(first, **arrays, findings=file.findings)  # type: ignore[arg-type]

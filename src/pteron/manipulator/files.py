@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
-from errno import ENOENT
 from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
@@ -14,10 +12,11 @@ from typing import Any, Literal, TypeVar
 
 from pteron.atomic import write_text
 from pteron.bodies.inertia import PointMass
-from pteron.errors import ModelError
+from pteron.errors import ModelError, shown
 from pteron.legs import KINDS, LegKind
 from pteron.manipulator.manipulator import STANDARD_GRAVITY, Manipulator
 from pteron.platforms import EQUATIONS, Platform
+from pteron.toml import fault_lines, parsed_toml, read_toml, told
 
 _Built = TypeVar("_Built")
 
@@ -57,34 +56,25 @@ def load(name_or_path: str | Path) -> Manipulator:
     """
     if str(name_or_path) in catalog():
         resource = files("pteron.manipulator") / "catalog" / f"{name_or_path}.toml"
-        return _parse(resource.read_text(encoding="utf-8"), str(name_or_path))
-    path = Path(name_or_path)
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError:
-        raise ModelError(f"{path}: not a TOML file (it is not UTF-8 text)") from None
-    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        raise ModelError(_not_found(path, error)) from None
-    return _parse(text, str(path))
-
-
-def _not_found(path: Path, error: OSError | ValueError) -> str:
-    if isinstance(error, OSError) and error.errno != ENOENT:
-        return f"{path}: cannot be read ({error.strerror})"
-    close = get_close_matches(str(path), catalog(), n=1)
+        return _machine(
+            parsed_toml(resource.read_bytes(), str(name_or_path), ModelError), str(name_or_path)
+        )
+    close = get_close_matches(str(name_or_path), catalog(), n=1)
     guess = f'; did you mean "{close[0]}"?' if close else ""
-    return f"{path}: neither a file nor a machine of the catalog ({', '.join(catalog())}){guess}"
+    names = ", ".join(catalog())
+    absent = f"neither a file nor a machine of the catalog ({names}){guess}"
+    return _machine(read_toml(name_or_path, ModelError, absent), str(name_or_path))
 
 
-def _parse(text: str, source: str) -> Manipulator:
-    try:
-        document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ModelError(f"{source}: not a TOML file ({error})") from None
-    reading = _Reading()
+def _machine(document: dict[str, Any], source: str) -> Manipulator:
+    source, reading = shown(source, bare=True, longest=1000), _Reading()
     machine = reading.table(_machine_table(), document, "")
     platform = machine and reading.built("platform.", lambda: _platform(machine.platform))
-    legs = [reading.leg(i, given) for i, given in enumerate(document.get("legs") or [], start=1)]
+    given = document.get("legs")
+    legs = [
+        reading.leg(i, leg)
+        for i, leg in enumerate(given if isinstance(given, list) else [], start=1)
+    ]
     if not reading.faults and machine is not None and platform is not None:
         robot = reading.built(
             "", lambda: Manipulator(machine.name, platform, tuple(legs), machine.gravity)
@@ -92,7 +82,7 @@ def _parse(text: str, source: str) -> Manipulator:
         if robot is not None:
             return robot
     faults = tuple(f"{source}: {fault}" for fault in reading.faults)
-    raise ModelError(f"{source}: {'; '.join(reading.faults)}", faults=faults)
+    raise ModelError(told(source, reading.faults), faults=faults)
 
 
 @dataclass
@@ -108,8 +98,7 @@ class _Reading:
         try:
             return model.model_validate(given)
         except ValidationError as error:
-            for fault in error.errors(include_url=False):
-                self.faults.append(prefix + _fault(fault))
+            self.faults += [prefix + line for line in fault_lines(error, model)]
             return None
 
     def built(self, prefix: str, build: Callable[[], _Built]) -> _Built | None:
@@ -124,28 +113,15 @@ class _Reading:
         """Return leg i, from 1, or None."""
         prefix = f"leg {i}: "
         if not isinstance(given, dict):
-            self.faults.append(f"{prefix}{given!r} given, a table [[legs]] expected")
+            self.faults.append(f"{prefix}{shown(given)} given, a table [[legs]] expected")
             return None
         name = given.get("type", _DEFAULT_KIND)
         kind = KINDS.get(name) if isinstance(name, str) else None
         if kind is None:
-            self.faults.append(f"{prefix}type: {name!r} is not one of {', '.join(KINDS)}")
+            self.faults.append(f"{prefix}type: {shown(name)} is not one of {', '.join(KINDS)}")
             return None
         table = self.table(_leg_table(kind.type), given, prefix)
         return table and self.built(prefix, lambda: kind.of_table(table))
-
-
-def _fault(fault: Any) -> str:
-    """Return one of pydantic's faults: the key, what was given and what was expected."""
-    key = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in fault["loc"]).lstrip(".")
-    kind, given = fault["type"], fault["input"]
-    if kind == "missing":
-        return f"{key}: missing; the file must give it"
-    if kind == "extra_forbidden":
-        return f"{key}: unknown key (value {given!r}); check its spelling or remove it"
-    if kind == "tuple_type":
-        return f"{key}: {given!r} given, a list of numbers in brackets expected"
-    return f"{key}: {given!r} given; {fault['msg'][0].lower()}{fault['msg'][1:]}"
 
 
 @lru_cache(maxsize=1)

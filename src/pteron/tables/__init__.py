@@ -1,17 +1,32 @@
-"""Tables of poses, sliders and forces in CSV and Parquet files.
+"""Tables in CSV and Parquet files, read with care.
 
 Rows are counted from 1 as data rows, as a person counts them, and messages name the line of the
-file too. The cells of a CSV file are kept as text until a number is asked for, so that columns
-which Pteron does not use are written back as they came.
+file too. A file is read a block of rows at a time. The cells of a CSV file are text until a number
+is asked for, so that columns which Pteron does not use are written back as they came.
 """
 
+from pteron.tables.csv_file import CsvFile, Dialect
 from pteron.tables.files import (
     ENDINGS,
     STANDARD_INPUT,
     check_output,
+    open_table,
     read_table,
     write_table,
 )
-from pteron.tables.table import Table
+from pteron.tables.parquet_file import ParquetFile
+from pteron.tables.table import Table, listed
 
-__all__ = ["ENDINGS", "STANDARD_INPUT", "Table", "check_output", "read_table", "write_table"]
+__all__ = [
+    "ENDINGS",
+    "STANDARD_INPUT",
+    "CsvFile",
+    "Dialect",
+    "ParquetFile",
+    "Table",
+    "check_output",
+    "listed",
+    "open_table",
+    "read_table",
+    "write_table",
+]

@@ -4,20 +4,64 @@ from __future__ import annotations
 
 import io
 import sys
-from collections.abc import Callable
+from bisect import bisect_right
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import polars as pl
 
 from pteron.atomic import write_bytes
-from pteron.errors import DataError, OutputError
-from pteron.tables.csv_text import read_cells
-from pteron.tables.table import Table, typed
-
-__all__ = ["ENDINGS", "STANDARD_INPUT", "check_output", "read_table", "write_table"]
+from pteron.errors import DataError, OutputError, shown
+from pteron.tables.csv_file import CsvFile, Dialect
+from pteron.tables.parquet_file import ParquetFile
+from pteron.tables.table import Table, listed, typed
 
 STANDARD_INPUT = "-"
 """The path that stands for CSV on standard input."""
+
+_LONGEST_PATH = 1000
+
+
+def open_table(
+    path: str | Path,
+    *,
+    noun: str = "table",
+    dialect: Dialect | None = None,
+    describable: bool = False,
+) -> CsvFile | ParquetFile:
+    """Open a CSV or Parquet file whose rows are read a block at a time.
+
+    Parameters
+    ----------
+    path : str or path
+        A regular file; its ending says which it is.
+    noun : str
+        What messages call such files.
+    dialect : Dialect, optional
+        How a CSV file is written.
+    describable : bool
+        Whether a TOML file beside it may declare that.
+
+    Raises
+    ------
+    DataError
+        If there is no such file, or if it is empty or of another kind.
+    """
+    source = shown(str(path), bare=True, longest=_LONGEST_PATH)
+    file = Path(path)
+    with _told_by_name(source):
+        if file.is_dir():
+            raise IsADirectoryError
+        if file.suffix.lower() not in ENDINGS:
+            raise DataError(f"{source}: {_unknown(file, noun)}")
+        if file.exists() and not file.is_file():
+            raise DataError(
+                f"{source}: is no regular file, and a {noun} is read twice; save it as a file"
+            )
+        if file.suffix.lower() == ".csv":
+            return CsvFile(file, source, dialect, describable=describable)
+        return ParquetFile(file, source)
 
 
 def read_table(path: str | Path) -> Table:
@@ -38,27 +82,53 @@ def read_table(path: str | Path) -> Table:
     DataError
         If there is no such file, or if it is empty, ragged or of another kind.
     """
-    source = str(path)
-    try:
-        if source == STANDARD_INPUT:
+    source = shown(str(path), bare=True, longest=_LONGEST_PATH)
+    special = Path(path)
+    file: CsvFile | ParquetFile
+    with _told_by_name(source):
+        if str(path) == STANDARD_INPUT:
+            source = "standard input"
             if sys.stdin is None:
-                raise DataError("standard input: is closed; give it a table, or name a file")
-            return _from_csv(sys.stdin.buffer.read(), "standard input")
-        file = Path(path)
-        special = file.is_fifo() or file.is_char_device()
-        ending = ".csv" if special else file.suffix.lower()
-        if file.is_dir():
-            raise IsADirectoryError
-        if ending not in ENDINGS:
-            raise DataError(f"{source}: {_unknown(file)}")
-        data = file.read_bytes()
+                raise DataError(f"{source}: is closed; give it a table, or name a file")
+            file = CsvFile(sys.stdin.buffer.read(), source)
+        elif special.is_fifo() or special.is_char_device():
+            file = CsvFile(special.read_bytes(), source)
+        else:
+            file = open_table(path)
+        tables = list(file.tables())
+    if not tables:
+        below = f" below its header; the names are {listed(file.columns)}"
+        raise DataError(f"{source}: has no rows{below if isinstance(file, CsvFile) else ''}")
+    return _joined(tables)
+
+
+def _joined(tables: list[Table]) -> Table:
+    first = tables[0]
+    if len(tables) == 1:
+        return first
+    starts = [table.first_row for table in tables]
+
+    def line_of(index: int) -> int:
+        table = tables[bisect_right(starts, index) - 1]
+        assert table.line_of is not None
+        return table.line_of(index - table.first_row)
+
+    frame = pl.concat([table.frame for table in tables])
+    return Table(
+        first.source, frame, first.hint, line_of=line_of if first.line_of is not None else None
+    )
+
+
+@contextmanager
+def _told_by_name(source: str) -> Iterator[None]:
+    try:
+        yield
     except FileNotFoundError:
         raise DataError(f"{source}: no such file") from None
     except IsADirectoryError:
         raise DataError(f"{source}: is a folder; name a file in it") from None
     except OSError as error:
         raise DataError(f"{source}: cannot be read ({error.strerror or error})") from None
-    return (_from_csv if ending == ".csv" else _from_parquet)(data, source)
 
 
 def check_output(path: str | Path) -> Path:
@@ -73,7 +143,7 @@ def check_output(path: str | Path) -> Path:
     if file.is_dir():
         raise OutputError(f"{path}: is a folder; name a file in it")
     if file.suffix.lower() not in ENDINGS:
-        raise OutputError(f"{path}: {_unknown(file)}")
+        raise OutputError(f"{path}: {_unknown(file, 'table')}")
     if not file.parent.is_dir():
         raise OutputError(f"{path}: there is no folder {file.parent}; make it first")
     return file
@@ -97,35 +167,13 @@ def write_table(frame: pl.DataFrame, path: str | Path) -> Path:
     return write_bytes(file, buffer.getvalue())
 
 
-def _write_csv(frame: pl.DataFrame, buffer: io.BytesIO) -> None:
-    frame.write_csv(buffer)
-
-
-def _write_parquet(frame: pl.DataFrame, buffer: io.BytesIO) -> None:
-    typed(frame).write_parquet(buffer)
-
-
 ENDINGS: dict[str, Callable[[pl.DataFrame, io.BytesIO], None]] = {
-    ".csv": _write_csv,
-    ".parquet": _write_parquet,
+    ".csv": lambda frame, buffer: frame.write_csv(buffer),
+    ".parquet": lambda frame, buffer: typed(frame).write_parquet(buffer),
 }
 """The endings of the files that hold tables, each with what writes one."""
 
 
-def _unknown(file: Path) -> str:
-    given = f"unknown ending {file.suffix!r}" if file.suffix else "no ending"
-    return f"{given}; a table's file ends in {' or '.join(ENDINGS)}"
-
-
-def _from_parquet(data: bytes, source: str) -> Table:
-    try:
-        frame = pl.read_parquet(io.BytesIO(data))
-    except pl.exceptions.PolarsError:
-        raise DataError(f"{source}: not a Parquet file; write it again, or give a CSV") from None
-    if frame.is_empty():
-        raise DataError(f"{source}: has no rows")
-    return Table(source, frame)
-
-
-def _from_csv(data: bytes, source: str) -> Table:
-    return Table(source, read_cells(data, source), data)
+def _unknown(file: Path, noun: str) -> str:
+    given = f"unknown ending {shown(file.suffix)}" if file.suffix else "no ending"
+    return f"{given}; a {noun}'s file ends in {' or '.join(ENDINGS)}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,10 +11,7 @@ import polars as pl
 from numpy.typing import ArrayLike, NDArray
 
 from pteron.conventions import OnFailure
-from pteron.errors import DataError
-from pteron.tables.csv_text import line_of_row
-
-__all__ = ["Table", "typed"]
+from pteron.errors import DataError, shown
 
 _ROWS_AT_A_TIME = 10_000
 
@@ -29,13 +26,22 @@ class Table:
         What messages call it: the path of the file.
     frame : polars.DataFrame
         The cells; those of a CSV file are text.
-    csv : bytes, optional
-        The file's text, from which the line of a row is found.
+    hint : str
+        What to do where a column is missing.
+    first_row : int
+        Index from 0 of the first row in its file.
+    line_of : callable, optional
+        Returns the line of a text file, from 1, on which a row begins.
+    decimal : {".", ","}
+        The decimal sign of cells that are text.
     """
 
     source: str
     frame: pl.DataFrame
-    csv: bytes | None = None
+    hint: str = "add what is missing"
+    first_row: int = 0
+    line_of: Callable[[int], int] | None = None
+    decimal: str = "."
 
     def __len__(self) -> int:
         return self.frame.height
@@ -47,20 +53,19 @@ class Table:
 
     def place(self, index: int) -> str:
         """Return where a row is: its number from 1 and, in a CSV file, its line."""
-        row = f"{self.source}: row {index + 1}"
-        if self.csv is None:
-            return row
-        return f"{row} (line {line_of_row(self.csv, index)})"
+        row = f"{self.source}: row {self.first_row + index + 1}"
+        return row if self.line_of is None else f"{row} (line {self.line_of(index)})"
 
-    def numbers(self, columns: Sequence[str], on_failure: OnFailure = "raise") -> NDArray[Any]:
+    def numbers(self, columns: Sequence[str], on_failure: OnFailure | None = None) -> NDArray[Any]:
         """Return columns as an array of floats.
 
         Parameters
         ----------
         columns : sequence of str
             Their names.
-        on_failure : {"raise", "nan"}
-            Whether a cell that is empty or not finite raises, or becomes NaN. Text always raises.
+        on_failure : {"raise", "nan"}, optional
+            Whether a cell that is empty or not finite raises, or becomes NaN; where the user has no
+            such choice, it raises. Text always raises.
 
         Returns
         -------
@@ -74,14 +79,21 @@ class Table:
         """
         self._require(columns)
         values = np.empty((len(self), len(columns)))
-        text = np.zeros(values.shape, dtype=bool)
         for j, name in enumerate(columns):
-            values[:, j], text[:, j] = self._cells(name)
-        bad = text if on_failure == "nan" else text | ~np.isfinite(values)
-        if bad.any():
-            row, j = (int(i) for i in np.argwhere(bad)[0])
-            raise DataError(self._fault(row, columns[j], is_text=bool(text[row, j])))
-        values[~np.isfinite(values)] = np.nan
+            values[:, j] = self._cells(name)[1].fill_null(np.nan).to_numpy()
+        missing = ~np.isfinite(values)
+        if missing.any():
+            text = np.zeros(values.shape, dtype=bool)
+            for j, name in enumerate(columns):
+                cells, found = self._cells(name)
+                text[:, j] = (found.is_null() & cells.is_not_null()).to_numpy()
+            bad = text if on_failure == "nan" else missing
+            if bad.any():
+                row, j = (int(i) for i in np.argwhere(bad)[0])
+                is_text = bool(text[row, j])
+                choice = on_failure is not None and not is_text
+                raise DataError(self._fault(row, columns[j], is_text=is_text, choice=choice))
+            values[missing] = np.nan
         return values
 
     def extended(self, results: Mapping[str, ArrayLike]) -> Table:
@@ -120,38 +132,46 @@ class Table:
         missing = [name for name in columns if name not in self.columns]
         if not missing:
             return
-        found = ", ".join(self.columns[:20]) + (", ..." if len(self.columns) > 20 else "")
         noun = "column" if len(missing) == 1 else "columns"
-        hint = "the first line must name the columns"
-        if len(self.columns) == 1 and any(mark in found for mark in ";\t"):
-            hint = "separate the cells with commas"
         raise DataError(
-            f"{self.source}: no {noun} {', '.join(missing)} (found: {found}; needed: "
-            f"{', '.join(columns)}); {hint if self.csv is not None else 'add what is missing'}"
+            f"{self.source}: no {noun} {', '.join(missing)} (found: {listed(self.columns)}; "
+            f"needed: {', '.join(columns)}); {self.hint}"
         )
 
-    def _cells(self, name: str) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Return a column's numbers, NaN where there is none, and where there is text instead."""
-        given = self.frame[name]
-        if given.dtype == pl.String:
-            given = given.str.strip_chars()
-            given = given.set(given == "", None)
-        elif not (given.dtype.is_numeric() or given.dtype == pl.Null):
+    def _cells(self, name: str) -> tuple[pl.Series, pl.Series]:
+        """Return a column's cells, null where there are none, and their numbers, else null."""
+        cells = self.frame[name]
+        if cells.dtype == pl.String:
+            cells = cells.str.strip_chars()
+            cells = cells.set(cells == "", None)
+        elif not (cells.dtype.is_numeric() or cells.dtype == pl.Null):
             raise DataError(
-                f"{self.source}: column {name} holds {given.dtype}; numbers were expected"
+                f"{self.source}: column {shown(name, bare=True)} holds {cells.dtype}; numbers were "
+                "expected"
             )
-        numbers = given.cast(pl.Float64, strict=False)
-        text = (numbers.is_null() & given.is_not_null()).to_numpy()
-        return numbers.fill_null(np.nan).to_numpy(), text
+        signs = cells
+        if cells.dtype == pl.String and self.decimal == ",":
+            # A point is no decimal sign there: what was meant by 1.500 cannot be known.
+            signs = cells.str.replace_all(".", "?", literal=True)
+            signs = signs.str.replace_all(",", ".", literal=True)
+        return cells, signs.cast(pl.Float64, strict=False)
 
-    def _fault(self, row: int, column: str, *, is_text: bool) -> str:
+    def _fault(self, row: int, column: str, *, is_text: bool, choice: bool) -> str:
         cell = self.frame[column][row]
-        given = f"the cell is empty; {column} needs a number"
+        name = shown(column, bare=True)
+        given = f"the cell is empty; {name} needs a number"
         if cell is not None and str(cell).strip():
             expected = "a number" if is_text else "a finite number"
-            given = f"{str(cell).strip()!r} given, {expected} expected"
-        leave = "" if is_text else ", or choose on-failure nan to leave such rows empty"
-        return f"{self.place(row)}, column {column}: {given}; correct the cell{leave}"
+            comma = " with a decimal comma" if is_text and self.decimal == "," else ""
+            given = f"{shown(str(cell).strip())} given, {expected}{comma} expected"
+        leave = ", or choose on-failure nan to leave such rows empty" if choice else ""
+        return f"{self.place(row)}, column {name}: {given}; correct the cell{leave}"
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names as a message lists them: not all of very many, and none at full length."""
+    some = ", ".join(shown(name, bare=True) for name in names[:20])
+    return some + (", ..." if len(names) > 20 else "")
 
 
 def typed(frame: pl.DataFrame) -> pl.DataFrame:

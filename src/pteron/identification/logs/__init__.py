@@ -5,24 +5,25 @@ what looks odd is stated as a finding.
 """
 
 from pteron.identification.logs.description import Description, KnownPayload
-from pteron.identification.logs.description_files import (
+from pteron.identification.logs.description_file import (
     find_description,
     read_description,
     write_description,
 )
-from pteron.identification.logs.finding import Finding
-from pteron.identification.logs.log import Log
-from pteron.identification.logs.log_file import LogFile
-from pteron.identification.logs.read import open_log, read_log
-from pteron.identification.logs.write import write_log
+from pteron.identification.logs.joints import JointSymbols, joint_symbols
+from pteron.identification.logs.log import Finding, Log, joined, write_log
+from pteron.identification.logs.log_file import LogFile, open_log, read_log
 
 __all__ = [
     "Description",
     "Finding",
+    "JointSymbols",
     "KnownPayload",
     "Log",
     "LogFile",
     "find_description",
+    "joint_symbols",
+    "joined",
     "open_log",
     "read_description",
     "read_log",

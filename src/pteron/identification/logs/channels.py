@@ -6,30 +6,34 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter  # type: ignore[import-untyped]
 
 from pteron.errors import DataError
-from pteron.identification.logs.finding import Finding
-from pteron.identification.logs.spikes import Spikes
-
-__all__ = ["Channel"]
+from pteron.identification.logs.log import Finding
 
 _CLIPPED_ROWS = 3
 _CLIPPED_RUNS = 2
 """A force is clipped that holds its extreme for this many rows, this many times."""
 _FROZEN_ROWS = 1000
 _MOVED = 0.01
-"""A channel is frozen that stays for over so many rows while another slider moves this part of the
-machine's size."""
+"""A channel is frozen that stays for over so many rows while another joint moves this part of
+its span."""
 _ROUNDING = 1e-9
-_FORCES, _SLIDERS = 0.5, 0.05
+_FORCES, _JOINTS = 0.5, 0.05
 """Share of a channel's span by which a spike stands out; friction makes forces jump."""
+_WINDOW = 5
+"""Samples whose median a sample is compared with: steps pass, single samples do not."""
+_USUAL = 20.0
+"""Distance from the median that makes a spike, in that which one sample in a hundred exceeds."""
+_SHARES = (1.0, 99.0)
+"""Percentiles between which a channel's usual span lies."""
 
 Values = NDArray[np.float64]
 
 
 @dataclass
 class _Run:
-    """A stretch of equal values, and between what the sliders were meanwhile."""
+    """A stretch of equal values, and the joint coordinates' bounds meanwhile."""
 
     value: float
     start: int
@@ -58,18 +62,16 @@ class _Extreme:
 
 
 class Channel:
-    """What has been seen of one slider or force.
+    """What has been seen of one joint coordinate or force.
 
     Parameters
     ----------
-    column : str
-        What the file calls it.
-    source : str
-        What messages call the file.
-    size : float
-        The machine's size, m.
-    slider : int, optional
-        Which slider this is, from 0; a force if it is not given.
+    column, source : str
+        What messages call it, and the file.
+    spans : array, shape (n,)
+        What the travel of each joint is compared with, m or rad.
+    joint : int, optional
+        Which joint's coordinate this is, from 0; a force if it is not given.
     limits : (float, float), optional
         Declared saturation of a force.
     """
@@ -78,15 +80,15 @@ class Channel:
         self,
         column: str,
         source: str,
-        size: float,
+        spans: Values,
         *,
-        slider: int | None = None,
+        joint: int | None = None,
         limits: tuple[float, float] | None = None,
     ) -> None:
         self._column = column
         self._source = source
-        self._moved = _MOVED * size
-        self._slider = slider
+        self._moved = _MOVED * spans
+        self._joint = joint
         self._limits = limits
         self._rows = 0
         self._run: _Run | None = None
@@ -95,10 +97,10 @@ class Channel:
         self._first_frozen = (0, 0, 0.0)
         self._beyond = 0
         self._first_beyond = 0
-        self._spikes = Spikes(column, source, _FORCES if slider is None else _SLIDERS)
+        self._spikes = _Spikes(column, source, _FORCES if joint is None else _JOINTS)
 
-    def take(self, values: Values, sliders: Values) -> None:
-        """Look at the next piece: this channel, shape (rows,), and all sliders, (rows, n), in m."""
+    def take(self, values: Values, joints: Values) -> None:
+        """Look at the next piece: this channel, (rows,), and all joint coordinates, (rows, n)."""
         self._spikes.take(values)
         self._high.raise_to(float(values.max()))
         self._low.raise_to(float(-values.min()))
@@ -107,14 +109,14 @@ class Channel:
         starts = np.concatenate([[0], np.flatnonzero(values[1:] != values[:-1]) + 1])
         firsts = starts + self._rows
         held = values[starts]
-        last = sliders[starts[-1] :]
+        last = joints[starts[-1] :]
         run = _Run(float(held[-1]), int(firsts[-1]), last.min(axis=0), last.max(axis=0))
         open_run = self._run
         if open_run is not None and open_run.value != held[0]:
             self._close(open_run, self._rows)
         elif open_run is not None:
             firsts[0] = open_run.start
-            first = sliders[: starts[1] if len(starts) > 1 else None]
+            first = joints[: starts[1] if len(starts) > 1 else None]
             open_run.least = np.minimum(open_run.least, first.min(axis=0))
             open_run.greatest = np.maximum(open_run.greatest, first.max(axis=0))
             if len(starts) == 1:
@@ -126,7 +128,7 @@ class Channel:
         lengths = np.diff(firsts)
         for i in np.flatnonzero(lengths >= _CLIPPED_ROWS):
             if i >= begun_here:
-                part = sliders[starts[i] : starts[i + 1]]
+                part = joints[starts[i] : starts[i + 1]]
                 closed = _Run(float(held[i]), int(firsts[i]), part[0], part[0])
                 if lengths[i] > _FROZEN_ROWS:
                     closed.least, closed.greatest = part.min(axis=0), part.max(axis=0)
@@ -156,12 +158,12 @@ class Channel:
             start, stop, value = self._first_frozen
             message = (
                 f"{self._source}: column {self._column} holds {value:g} in rows {start + 1} to "
-                f"{stop} while other sliders move: frozen channel"
+                f"{stop} while other joints move: frozen channel"
             )
             if self._frozen > 1:
                 message += f" ({self._frozen} such stretches in all)"
             found.append(Finding("frozen", message, start + 1, self._column, self._frozen))
-        if self._slider is None:
+        if self._joint is None:
             found += self._clipped()
         found += self._spikes.findings()
         return tuple(found)
@@ -181,9 +183,8 @@ class Channel:
                 if value == extreme.value:
                     extreme.count(run.start, rows)
         if rows > _FROZEN_ROWS:
-            moved = run.greatest - run.least
-            others = np.delete(moved, [] if self._slider is None else [self._slider])
-            if others.max() > self._moved:
+            moved = run.greatest - run.least > self._moved
+            if np.delete(moved, [] if self._joint is None else [self._joint]).any():
                 if not self._frozen:
                     self._first_frozen = (run.start, stop, run.value)
                 self._frozen += 1
@@ -210,3 +211,48 @@ class Channel:
                 row = extreme.first + 1
                 found.append(Finding("clipped", message, row, self._column, extreme.rows))
         return found
+
+
+class _Spikes:
+    """The spikes of one channel.
+
+    Parameters
+    ----------
+    column, source : str
+        What messages call it, and the file.
+    share : float
+        Distance from the median, as a share of the channel's usual span, beyond which it is no
+        motion.
+    """
+
+    def __init__(self, column: str, source: str, share: float) -> None:
+        self._column = column
+        self._source = source
+        self._share = share
+        self._rows = 0
+        self._count = 0
+        self._first = (0, 0.0)
+
+    def take(self, values: NDArray[np.float64]) -> None:
+        """Look at the next piece, shape (rows,); its first and last samples have no neighbours."""
+        if len(values) > _WINDOW:
+            apart = np.abs(values - median_filter(values, _WINDOW, mode="nearest"))
+            low, high = np.percentile(values, _SHARES)
+            usual = _USUAL * np.percentile(apart, _SHARES[1])
+            found = np.flatnonzero(apart > max(usual, self._share * (high - low)))
+            if len(found) and not self._count:
+                self._first = (self._rows + int(found[0]), float(values[found[0]]))
+            self._count += len(found)
+        self._rows += len(values)
+
+    def findings(self) -> tuple[Finding, ...]:
+        """Return what was found, once all pieces are taken."""
+        if not self._count:
+            return ()
+        row, value = self._first
+        more = f" ({self._count} such samples in all)" if self._count > 1 else ""
+        message = (
+            f"{self._source}: row {row + 1}, column {self._column}: {value:g} stands out from its "
+            f"neighbours: spike{more}"
+        )
+        return (Finding("spike", message, row + 1, self._column, self._count),)

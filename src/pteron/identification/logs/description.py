@@ -1,30 +1,87 @@
-"""What is known about a log beside its numbers: names, units, drives, payload, the motion."""
+"""What is known about a log beside its numbers."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal, get_args
+from collections.abc import Callable
+from dataclasses import fields
+from functools import wraps
+from typing import Annotated, Any, Literal, TypeVar
 
-from pteron.errors import DataError
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
+from pydantic.dataclasses import dataclass
 
-__all__ = [
-    "AngleUnit",
-    "Description",
-    "ForceUnit",
-    "KnownPayload",
-    "LengthUnit",
-    "TimeUnit",
-]
+from pteron.errors import DataError, shown
+from pteron.identification.logs.joints import joint_symbols, units_of
+from pteron.manipulator import Manipulator
+from pteron.tables import Dialect
+from pteron.toml import fault_lines, told
 
 TimeUnit = Literal["s", "ms", "us"]
 LengthUnit = Literal["m", "mm", "um"]
 AngleUnit = Literal["rad", "deg"]
-ForceUnit = Literal["N", "A", "V", "%"]
+ForceUnit = Literal["N", "N m", "A", "V", "%"]
+JointUnit = Literal["m", "mm", "um", "rad", "deg"]
 
 _ROUNDING = 1e-12
+_OF_DRIVES = ("A", "V", "%")
+_Class = TypeVar("_Class", bound=type)
 
 
-@dataclass(frozen=True)
+def _not_zero(value: float) -> float:
+    if value == 0.0:
+        raise ValueError("0 given: its motor would not move the joint")
+    return value
+
+
+def _rising(pair: tuple[float, float]) -> tuple[float, float]:
+    low, high = pair
+    if not low < high:
+        raise ValueError(f"{low:g} is not below {high:g}; give [low, high]")
+    return pair
+
+
+def _pairs(given: Any) -> Any:
+    """Return one pair, which holds for all joints, as a list of pairs."""
+    flat = isinstance(given, list | tuple) and len(given) == 2
+    return [given] if flat and not any(isinstance(one, list | tuple) for one in given) else given
+
+
+Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
+Factor = Annotated[Number, AfterValidator(_not_zero)]
+Two = tuple[Number, Number]
+Pair = Annotated[Two, AfterValidator(_rising)]
+Names = Annotated[tuple[str, ...], Field(min_length=1)]
+
+
+_CONFIG = ConfigDict(extra="forbid", validate_by_name=True, validate_by_alias=True)
+
+
+def _raises_data_errors(cls: _Class) -> _Class:
+    """Make a pydantic dataclass refuse its arguments with a `DataError`."""
+    checked: Callable[..., None] = cls.__init__  # type: ignore[misc]
+    names = [one.name for one in fields(cls)]
+
+    @wraps(checked)
+    def __init__(self: Any, *args: Any, **given: Any) -> None:  # noqa: N807
+        try:
+            checked(self, **dict(zip(names, args, strict=False)), **given)
+        except ValidationError as error:
+            raise DataError(told(cls.__name__, fault_lines(error, cls))) from None
+
+    cls.__init__ = __init__  # type: ignore[misc]
+    return cls
+
+
+@_raises_data_errors
+@dataclass(frozen=True, config=_CONFIG)
 class KnownPayload:
     """A payload whose inertia is known, carried in phase 1 of a log.
 
@@ -38,6 +95,8 @@ class KnownPayload:
     inertia : float
         Moment of inertia about the platform's axis through P, kg m^2. A 3T platform does not feel
         it.
+    center_of_mass : tuple of float, optional
+        Its position in the platform frame, m, in place of the first moment.
 
     Raises
     ------
@@ -45,52 +104,68 @@ class KnownPayload:
         If no real body has this inertia: the mass must be positive and I m >= (m gamma)^2.
     """
 
-    mass: float
-    first_moment: tuple[float, float] = (0.0, 0.0)
-    inertia: float = 0.0
+    mass: Annotated[Number, Field(gt=0.0)]
+    first_moment: Two = (0.0, 0.0)
+    inertia: Number = 0.0
+    center_of_mass: Annotated[Two | None, Field(exclude=True)] = None
 
-    def __post_init__(self) -> None:
-        if not self.mass > 0.0:
-            raise DataError(f"payload.mass: {self.mass:g} kg given; a payload's mass is above 0 kg")
+    @model_validator(mode="after")
+    def _real(self) -> KnownPayload:
+        if self.center_of_mass is not None:
+            x, y = self.center_of_mass
+            object.__setattr__(self, "first_moment", (self.mass * x, self.mass * y))
+            object.__setattr__(self, "center_of_mass", None)
         hx, hy = self.first_moment
         least = (hx * hx + hy * hy) / self.mass
         if not self.inertia >= least * (1.0 - _ROUNDING):
-            raise DataError(
-                f"payload.inertia: {self.inertia:g} kg m^2 belongs to no real body; with this mass "
-                f"and centre of mass, and about P, it must be at least {least:g} kg m^2"
+            raise ValueError(
+                f"inertia: {self.inertia:g} kg m^2 belongs to no real body; with this mass and "
+                f"centre of mass, and about P, it must be at least {least:g} kg m^2"
             )
+        return self
 
 
-@dataclass(frozen=True)
+@_raises_data_errors
+@dataclass(frozen=True, config=_CONFIG)
 class Description:
     """The description of a log, as its TOML file gives it; None where it says nothing.
 
+    The alias of each field is the key in the file: ``[time] unit`` is ``"time.unit"``.
+
     Parameters
     ----------
+    csv : Dialect, optional
+        How a CSV file is written.
     time_column, payload_column : str, optional
         Names of columns.
-    slider_columns, force_columns, pose_columns : tuple of str, optional
+    joint_columns, force_columns, pose_columns : tuple of str, optional
         Names of columns, in the order of the legs and of the pose's coordinates.
     time_unit : {"s", "ms", "us"}, optional
-    slider_unit, length_unit : {"m", "mm", "um"}, optional
-        Units of the sliders, and of x, y and z.
+    joint_unit : {"m", "mm", "um", "rad", "deg"}, optional
+        Unit of the joint coordinates that it can measure: lengths of sliders, angles of cranks.
+    joint_angle_unit : {"rad", "deg"}, optional
+        Unit of the cranks' coordinates where there are both.
+    length_unit : {"m", "mm", "um"}, optional
+        Unit of x, y and z.
     angle_unit : {"rad", "deg"}, optional
-    column_force_unit : {"N", "A", "V", "%"}, optional
+        Unit of phi.
+    column_force_unit : {"N", "N m", "A", "V", "%"}, optional
         Unit of the force columns, before the gains.
     gains : tuple of float, optional
-        Newtons per unit of the force columns, one a slider.
+        Newtons (at a crank: newton metres) per unit of the force columns, one a joint.
     limits : tuple of (float, float), optional
-        Saturation of the forces in `force_unit`: one pair for all sliders, or one each.
+        Saturation of the forces in `force_unit`: one pair for all joints, or one each.
     payload : KnownPayload, optional
         What is carried in phase 1.
     period : float, optional
         Period of the excitation, s.
     assembly_mode : {1, 2}, optional
-        Which solution of the direct kinematics the machine is in.
+        Which solution of the direct kinematics the machine is in, counted from 1 as a person
+        counts. (`Treatment.mode` counts columns of `direct_kinematics`, from 0.)
     rotor_inertia : tuple of float, optional
-        Of each slider's motor, kg m^2.
+        Of each joint's motor, kg m^2.
     ratio : tuple of float, optional
-        Turn of each motor a metre of its slider, rad/m.
+        Turn of each motor per metre (or radian) of its joint, rad.
 
     Raises
     ------
@@ -99,85 +174,101 @@ class Description:
         column is named twice.
     """
 
-    time_column: str | None = None
-    time_unit: TimeUnit | None = None
-    slider_columns: tuple[str, ...] | None = None
-    slider_unit: LengthUnit | None = None
-    force_columns: tuple[str, ...] | None = None
-    column_force_unit: ForceUnit | None = None
-    gains: tuple[float, ...] | None = None
-    limits: tuple[tuple[float, float], ...] | None = None
-    pose_columns: tuple[str, ...] | None = None
-    length_unit: LengthUnit | None = None
-    angle_unit: AngleUnit | None = None
-    payload_column: str | None = None
+    csv: Dialect | None = None
+    time_column: Annotated[str | None, Field(alias="time.column")] = None
+    time_unit: Annotated[TimeUnit | None, Field(alias="time.unit")] = None
+    joint_columns: Annotated[Names | None, Field(alias="joints.columns")] = None
+    joint_unit: Annotated[JointUnit | None, Field(alias="joints.unit")] = None
+    joint_angle_unit: Annotated[AngleUnit | None, Field(alias="joints.angle_unit")] = None
+    force_columns: Annotated[Names | None, Field(alias="forces.columns")] = None
+    column_force_unit: Annotated[ForceUnit | None, Field(alias="forces.unit")] = None
+    gains: Annotated[tuple[Factor, ...] | None, Field(alias="forces.gains")] = None
+    limits: Annotated[
+        tuple[Pair, ...] | None, BeforeValidator(_pairs), Field(alias="forces.limits")
+    ] = None
+    pose_columns: Annotated[Names | None, Field(alias="pose.columns")] = None
+    length_unit: Annotated[LengthUnit | None, Field(alias="pose.length_unit")] = None
+    angle_unit: Annotated[AngleUnit | None, Field(alias="pose.angle_unit")] = None
+    payload_column: Annotated[str | None, Field(alias="payload.column")] = None
     payload: KnownPayload | None = None
-    period: float | None = None
-    assembly_mode: int | None = None
-    rotor_inertia: tuple[float, ...] | None = None
-    ratio: tuple[float, ...] | None = None
+    period: Annotated[Number | None, Field(alias="motion.period", gt=0.0)] = None
+    assembly_mode: Annotated[Literal[1, 2] | None, Field(alias="motion.assembly_mode")] = None
+    rotor_inertia: Annotated[
+        tuple[Annotated[Number, Field(ge=0.0)], ...] | None, Field(alias="drives.rotor_inertia")
+    ] = None
+    ratio: Annotated[tuple[Factor, ...] | None, Field(alias="drives.ratio")] = None
 
-    def __post_init__(self) -> None:
-        units = {
-            "time.unit": (self.time_unit, TimeUnit),
-            "sliders.unit": (self.slider_unit, LengthUnit),
-            "forces.unit": (self.column_force_unit, ForceUnit),
-            "pose.length_unit": (self.length_unit, LengthUnit),
-            "pose.angle_unit": (self.angle_unit, AngleUnit),
-        }
-        for key, (unit, known) in units.items():
-            if unit is not None and unit not in get_args(known):
-                raise DataError(f"{key}: {unit!r} is not one of {', '.join(get_args(known))}")
-        columns = [
-            *(name for name in (self.time_column, self.payload_column) if name is not None),
-            *(self.slider_columns or ()),
-            *(self.force_columns or ()),
-            *(self.pose_columns or ()),
-        ]
+    @field_validator("payload", mode="before")
+    @classmethod
+    def _whole_payload(cls, given: Any) -> Any:
+        if not isinstance(given, dict) or "mass" not in given:
+            return given
+        center, moment = "center_of_mass" in given, "first_moment" in given
+        if (center or moment) and "inertia" not in given:
+            raise ValueError("inertia is missing; give it about P, in kg m^2")
+        if "inertia" in given and center == moment:
+            which = "both center_of_mass and" if center else "neither center_of_mass nor"
+            raise ValueError(f"{which} first_moment given; give one of the two")
+        return given
+
+    @model_validator(mode="after")
+    def _apart(self) -> Description:
+        named = [self.time_column, self.payload_column]
+        for several in (self.joint_columns, self.force_columns, self.pose_columns):
+            named += several or ()
+        columns = [name for name in named if name is not None]
         twice = next((name for i, name in enumerate(columns) if name in columns[:i]), None)
         if twice is not None:
-            raise DataError(f"columns: {twice!r} is named twice; each column has one meaning")
-        if self.period is not None and not self.period > 0.0:
-            raise DataError(f"motion.period: {self.period:g} s given; a period is above 0 s")
-        if self.assembly_mode not in (None, 1, 2):
-            raise DataError(f"motion.assembly_mode: {self.assembly_mode!r} is neither 1 nor 2")
-        for key, values in (("forces.gains", self.gains), ("drives.ratio", self.ratio)):
-            if values is not None and 0.0 in values:
-                raise DataError(f"{key}: one is 0, so that its motor would not move the slider")
-        if any(inertia < 0.0 for inertia in self.rotor_inertia or ()):
-            raise DataError("drives.rotor_inertia: one is below 0 kg m^2")
-        for low, high in self.limits or ():
-            if not low < high:
-                raise DataError(f"forces.limits: {low:g} is not below {high:g}; give [low, high]")
+            raise ValueError(f"columns: {shown(twice)} is named twice; each column has one meaning")
+        return self
 
     @property
     def force_unit(self) -> str:
-        """Unit of a log's forces: newtons once gains are applied, else that of the columns."""
-        return "N" if self.gains is not None else self.column_force_unit or "N"
+        """Unit of a log's forces: "N" (at cranks N m) once gains are applied, else the columns'."""
+        raw = self.column_force_unit
+        return "N" if raw is None or raw == "N m" or self.gains is not None else raw
 
-    def check(self, legs: int, coordinates: tuple[str, ...]) -> None:
-        """Raise a `DataError` if lists do not have one entry a leg (or coordinate) of a machine."""
+    def joint_units(self, robot: Manipulator) -> tuple[str | None, ...]:
+        """Return the unit declared for each joint of a machine, None where nothing is."""
+        declared = (self.joint_angle_unit, self.joint_unit)
+        return tuple(
+            next((unit for unit in declared if unit in units_of(joint)), None)
+            for joint in joint_symbols(robot)
+        )
+
+    def check(self, robot: Manipulator) -> None:
+        """Raise a `DataError` if this is no description of a machine's log."""
+        legs, coordinates = f"{len(robot.legs)} legs", f"{len(robot.coordinates)} pose coordinates"
         lists = {
-            "sliders.columns": (self.slider_columns, legs),
+            "joints.columns": (self.joint_columns, legs),
             "forces.columns": (self.force_columns, legs),
             "forces.gains": (self.gains, legs),
             "drives.rotor_inertia": (self.rotor_inertia, legs),
             "drives.ratio": (self.ratio, legs),
-            "pose.columns": (self.pose_columns, len(coordinates)),
+            "pose.columns": (self.pose_columns, coordinates),
         }
         for key, (values, needed) in lists.items():
-            if values is not None and len(values) != needed:
-                what = f"{needed} pose coordinates" if key == "pose.columns" else f"{needed} legs"
+            if values is not None and len(values) != int(needed.split()[0]):
                 raise DataError(
-                    f"{key}: {len(values)} given, but the machine has {what}; give one each, or "
+                    f"{key}: {len(values)} given, but the machine has {needed}; give one each, or "
                     "name the machine the log belongs to"
                 )
-        if self.limits is not None and len(self.limits) not in (1, legs):
+        if self.limits is not None and len(self.limits) not in (1, len(robot.legs)):
             raise DataError(
-                f"forces.limits: {len(self.limits)} pairs given, but the machine has {legs} legs; "
-                "give one pair for all, or one each"
+                f"forces.limits: {len(self.limits)} pairs given, but the machine has {legs}; give "
+                "one pair for all, or one each"
             )
-        if self.payload is not None and "phi" in coordinates and not self.payload.inertia:
+        joints = joint_symbols(robot)
+        for key, unit, known in (
+            ("joints.unit", self.joint_unit, [one for j in joints for one in units_of(j)]),
+            ("forces.unit", self.column_force_unit, [*_OF_DRIVES, *(j.force_unit for j in joints)]),
+        ):
+            if unit is not None and unit not in known:
+                raise DataError(
+                    f"{key}: {unit} given, but on this machine it is one of "
+                    f"{', '.join(dict.fromkeys(known))}"
+                )
+        if self.payload is not None and "phi" in robot.coordinates and not self.payload.inertia:
             raise DataError(
                 "payload: only its mass is given, but the machine turns its platform; give "
                 "center_of_mass (or first_moment) and inertia about P"

@@ -1,21 +1,60 @@
-"""A log: the recorded motion of a machine, in SI units."""
+"""A log: the recorded motion of a machine, in SI units; joined, divided, written."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
+import polars as pl
 from jaxtyping import Int
 
 from pteron.conventions import BatchOfNumbers, BatchOfPoses, BatchOfSliders
+from pteron.errors import DataError
 from pteron.identification.logs.description import Description
-from pteron.identification.logs.finding import Finding
-from pteron.identification.logs.time_stamps import GAP
+from pteron.identification.logs.joints import SLIDER, JointSymbols
+from pteron.tables import write_table
 
-__all__ = ["Log"]
+GAP = 1.5
+"""A step longer than this many usual ones is a gap: at least one sample is missing."""
+
+_ARRAYS = ("time", "sliders", "forces", "pose", "payload")
+_POSE = ("x", "y", "z", "phi")
 
 _Phases = Int[np.ndarray, "*batch"]
+
+
+Kind = Literal["gap", "jitter", "clipped", "frozen", "spike", "guessed", "units"]
+"""Missing samples, uneven steps, saturated forces, a channel that stops, single samples that stand
+out, a name or a unit guessed, a unit that looks wrong."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something in a log that a person should know; nothing was repaired.
+
+    Parameters
+    ----------
+    kind : str
+        One of `Kind`.
+    message : str
+        One line: what, where and how much.
+    row : int or None
+        The data row, from 1, where it is first seen.
+    column : str or None
+        The column, as the file calls it.
+    count : int
+        How often it occurs: gaps, uneven steps, clipped rows, frozen stretches, spikes or columns.
+    """
+
+    kind: Kind
+    message: str
+    row: int | None = None
+    column: str | None = None
+    count: int = 1
 
 
 @dataclass(frozen=True)
@@ -29,10 +68,10 @@ class Log:
     time : array, shape (T,)
         s, rising.
     sliders : array, shape (T, n)
-        Slider coordinates, m.
+        Joint coordinates, m; rad at a crank.
     forces : array, shape (T, n)
-        Actuator forces in `description.force_unit`: N, or the drive's own unit where no gains are
-        known.
+        Actuator forces in `description.force_unit`: N (at a crank N m), or the drive's own unit
+        where no gains are known.
     pose : array, shape (T, m), optional
         Measured poses, m and rad.
     payload : array of int, shape (T,), optional
@@ -45,6 +84,13 @@ class Log:
         Index from 0 of the first sample among the data rows of its file.
     step : float, optional
         The usual time step of the file, s; the median step of these samples if it is not given.
+    joints : tuple of JointSymbols, optional
+        What the joint of each leg is called; they are sliders if it is not given.
+
+    Raises
+    ------
+    DataError
+        If values of an array are masked.
     """
 
     source: str
@@ -57,6 +103,18 @@ class Log:
     findings: tuple[Finding, ...] = ()
     first_row: int = 0
     step: float | None = None
+    joints: tuple[JointSymbols, ...] | None = None
+
+    def __post_init__(self) -> None:
+        for name in _ARRAYS:
+            values = getattr(self, name)
+            if isinstance(values, np.ma.MaskedArray):
+                if count := int(np.ma.getmaskarray(values).sum()):
+                    raise DataError(
+                        f"{self.source}: {count} values of {name} are masked; leave their rows "
+                        "out: a gap in time is understood"
+                    )
+                object.__setattr__(self, name, np.ma.getdata(values))
 
     def __len__(self) -> int:
         return len(self.time)
@@ -97,12 +155,49 @@ class Log:
         The findings stay those of the whole file; their rows are rows of the file.
         """
         start, stop, _ = slice(start, stop).indices(self.rows)
-        return replace(
-            self,
-            time=self.time[start:stop],
-            sliders=self.sliders[start:stop],
-            forces=self.forces[start:stop],
-            pose=None if self.pose is None else self.pose[start:stop],
-            payload=None if self.payload is None else self.payload[start:stop],
-            first_row=self.first_row + start,
-        )
+        parts = {name: getattr(self, name) for name in _ARRAYS}
+        changed: dict[str, Any] = {
+            name: None if values is None else values[start:stop] for name, values in parts.items()
+        }
+        return replace(self, **changed, first_row=self.first_row + start)
+
+
+def joined(pieces: Sequence[Log]) -> Log:
+    """Return pieces that follow each other as one log, with what is said of the first."""
+    first = pieces[0]
+    if len(pieces) == 1:
+        return first
+    changed: dict[str, Any] = {
+        name: np.concatenate([getattr(piece, name) for piece in pieces])
+        for name in _ARRAYS
+        if getattr(first, name) is not None
+    }
+    return replace(first, **changed)
+
+
+def write_log(log: Log, path: str | Path) -> Path:
+    """Write a log to a CSV or Parquet file, whole or not at all, at full precision.
+
+    The columns are t (s), rho1.. (m), force1.. (N) or current1.. (A), x y z phi (m, rad) and
+    payload; at a crank theta (rad) and torque (N m). Forces in volts or per cent say so in their
+    names. The description is not written: it speaks of the columns of the file that the log came
+    from.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written; one that was there is left as it was.
+    """
+    unit = log.description.force_unit
+    columns = {"t": log.time}
+    joints = log.joints or (SLIDER,) * log.sliders.shape[1]
+    for j, joint in enumerate(joints):
+        columns[f"{joint.coordinate}{j + 1}"] = log.sliders[:, j]
+    for j, joint in enumerate(joints):
+        stem = "current" if unit == "A" else joint.force
+        columns[f"{stem}{j + 1}" + (f" ({unit})" if unit in ("V", "%") else "")] = log.forces[:, j]
+    if log.pose is not None:
+        columns |= dict(zip(_POSE[: log.pose.shape[1]], log.pose.T, strict=True))
+    if log.payload is not None:
+        columns["payload"] = log.payload
+    return write_table(pl.DataFrame(columns), path)

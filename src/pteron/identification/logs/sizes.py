@@ -1,4 +1,4 @@
-"""Units compared with the machine: sliders, poses and time steps that cannot be its own."""
+"""Units compared with the machine: joints, poses and time steps that cannot be its own."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.errors import DataError
-from pteron.identification.logs.finding import Finding
-from pteron.manipulator import Manipulator
-
-__all__ = ["check_forces", "check_pose", "check_sliders", "check_step", "size_of", "standstill"]
+from pteron.identification.logs.joints import joint_symbols
+from pteron.identification.logs.log import Finding
+from pteron.manipulator import Leg, Manipulator
 
 _BEYOND = 3.0
 """How far beyond the machine's size a coordinate may lie; encoders have their own zero."""
@@ -34,34 +33,41 @@ def size_of(robot: Manipulator) -> float:
     return float(apart + reach)
 
 
-def check_sliders(
-    sliders: NDArray[np.float64],
+def joint_spans(robot: Manipulator) -> NDArray[np.float64]:
+    """Return what a travel of each joint is compared with, (n,): the machine's size, m; 1 rad."""
+    size = size_of(robot)
+    return np.array([size if joint.unit == "m" else 1.0 for joint in joint_symbols(robot)])
+
+
+def check_joints(
+    joints: NDArray[np.float64],
     robot: Manipulator,
-    unit: str,
+    units: tuple[str, ...],
     columns: tuple[str, ...],
     source: str,
     first_row: int,
 ) -> None:
-    """Raise a `DataError` where slider coordinates, (rows, n) in m, are too large for the machine.
+    """Raise a `DataError` where joint coordinates, (rows, n) in SI, are too large for the machine.
 
     A slider cannot leave the others far behind: its coordinate is bound by its limits, or by the
-    machine's size, along a guide that may be oblique to the leg's plane.
+    machine's size, along a guide that may be oblique to the leg's plane. A crank makes few turns.
     """
-    size = size_of(robot)
-    for j, leg in enumerate(robot.legs):
-        oblique = abs(float(np.dot(leg.direction, leg.e)))
-        travel = size / oblique
-        if leg.slider_limits is not None:
-            travel = max(abs(limit) for limit in leg.slider_limits)
-        beyond = np.abs(sliders[:, j]) > _BEYOND * travel
-        if beyond.any():
-            i = int(np.argmax(beyond))
-            peak = float(np.abs(sliders[:, j]).max())
-            raise DataError(
-                f"{source}: row {first_row + i + 1}, column {columns[j]}: "
-                f"{sliders[i, j]:g} m, read as {unit}, but the slider of this machine travels "
-                f"about {travel:.2g} m; {_advice('sliders', 'unit', unit, peak, travel)}"
-            )
+    for j, (leg, joint) in enumerate(zip(robot.legs, joint_symbols(robot), strict=True)):
+        values = joints[:, j]
+        travel = _BEYOND * _travel_of(leg, robot) if joint.unit == "m" else _TURNS
+        beyond = np.abs(values) > travel
+        if not beyond.any():
+            continue
+        i = int(np.argmax(beyond))
+        place = f"{source}: row {first_row + i + 1}, column {columns[j]}"
+        if joint.unit != "m":
+            raise DataError(f"{place}: {_turned(values[i], units[j], 'joints', 'unit')}")
+        usual = travel / _BEYOND
+        advice = _advice("joints", "unit", units[j], float(np.abs(values).max()), usual)
+        raise DataError(
+            f"{place}: {values[i]:g} m, read as {units[j]}, but the slider of this machine travels "
+            f"about {usual:.2g} m; {advice}"
+        )
 
 
 def check_forces(
@@ -87,19 +93,17 @@ def check_pose(
 ) -> None:
     """Raise a `DataError` where measured poses, (rows, m), are too large for the machine."""
     far = max(float(np.linalg.norm(leg.guide_point)) for leg in robot.legs)
-    size = size_of(robot) + far + max(_travel(leg.slider_limits) for leg in robot.legs)
+    size = size_of(robot) + far + max(_farthest(leg.slider_limits) for leg in robot.legs)
     for j, column in enumerate(columns):
-        largest = _TURNS if j == 3 else _BEYOND * size
+        turns = robot.coordinates[j] == "phi"
+        largest = _TURNS if turns else _BEYOND * size
         beyond = np.abs(pose[:, j]) > largest
         if not beyond.any():
             continue
         i = int(np.argmax(beyond))
         place = f"{source}: row {first_row + i + 1}, column {column}"
-        if j == 3:
-            raise DataError(
-                f"{place}: {pose[i, j]:g} rad, read as {units[1]}, is over two turns; if the file "
-                'holds degrees, say so: [pose] angle_unit = "deg" in a TOML file beside it'
-            )
+        if turns:
+            raise DataError(f"{place}: {_turned(pose[i, j], units[1], 'pose', 'angle_unit')}")
         peak = float(np.abs(pose[:, j]).max())
         raise DataError(
             f"{place}: {pose[i, j]:g} m, read as {units[0]}, but the machine extends about "
@@ -110,23 +114,25 @@ def check_pose(
 def standstill(
     travelled: NDArray[np.float64],
     robot: Manipulator,
-    unit: str,
+    units: tuple[str, ...],
     columns: tuple[str, ...],
     source: str,
 ) -> tuple[Finding, ...]:
-    """Return a finding where no slider moves by a thousandth of the machine: the unit may be wrong.
+    """Return a finding where no joint moves by a thousandth of its span: the unit may be wrong.
 
-    `travelled` is between each slider's least and greatest coordinate, shape (n,), m.
+    `travelled` is between each joint's least and greatest coordinate, shape (n,), m or rad.
     """
-    size = size_of(robot)
-    most = float(travelled.max())
-    if most > _STANDSTILL * size:
+    spans = joint_spans(robot)
+    j = int(np.argmax(travelled / spans))
+    if travelled[j] > _STANDSTILL * spans[j]:
         return ()
+    joint = joint_symbols(robot)[j]
+    machine = f", where the machine extends about {spans[j]:.2g} m" if joint.unit == "m" else ""
     message = (
-        f"{source}: the sliders, read as {unit}, travel at most {most:.2g} m, where the machine "
-        f"extends about {size:.2g} m; check their unit"
+        f"{source}: the {joint.noun}s, read as {units[j]}, travel at most {travelled[j]:.2g} "
+        f"{joint.unit}{machine}; check their unit"
     )
-    return (Finding("units", message, column=columns[int(np.argmax(travelled))]),)
+    return (Finding("units", message, column=columns[j]),)
 
 
 def check_step(step: float, column: str, source: str) -> None:
@@ -141,8 +147,21 @@ def check_step(step: float, column: str, source: str) -> None:
     )
 
 
-def _travel(limits: tuple[float, float] | None) -> float:
+def _travel_of(leg: Leg, robot: Manipulator) -> float:
+    if leg.slider_limits is not None:
+        return _farthest(leg.slider_limits)
+    return size_of(robot) / abs(float(np.dot(leg.direction, leg.e)))
+
+
+def _farthest(limits: tuple[float, float] | None) -> float:
     return 0.0 if limits is None else max(abs(limit) for limit in limits)
+
+
+def _turned(value: float, unit: str, table: str, key: str) -> str:
+    return (
+        f"{value:g} rad, read as {unit}, is over two turns; if the file holds degrees, say so: "
+        f'[{table}] {key} = "deg" in a TOML file beside it'
+    )
 
 
 def _advice(table: str, key: str, unit: str, peak: float, size: float) -> str:

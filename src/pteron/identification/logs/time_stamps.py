@@ -6,12 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.errors import DataError
-from pteron.identification.logs.finding import Finding
+from pteron.identification.logs.log import GAP, Finding
 
-__all__ = ["GAP", "TimeStamps"]
-
-GAP = 1.5
-"""A step longer than this many usual ones is a gap: at least one sample is missing."""
 _JITTER = 0.01
 """Steps that differ from the usual one by more than this part of it are uneven."""
 

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
-from pteron.identification.logs import Log
+from pteron.identification.logs import Log, joined
 
 __all__ = ["blocks"]
 
@@ -39,7 +37,7 @@ def blocks(pieces: Iterable[Log], margin: int, size: int, rate: float) -> Iterat
             if held is not None and not _continues(held, stretch, rate):
                 yield from _rest(held, margin)
                 held = None
-            held = stretch if held is None else _joined(held, stretch)
+            held = stretch if held is None else joined([held, stretch])
             while held.rows >= size + 2 * margin:
                 yield held.part(0, size + 2 * margin)
                 held = held.part(size, held.rows)
@@ -70,13 +68,3 @@ def _continues(held: Log, following: Log, rate: float) -> bool:
         following.payload is not None and held.payload[-1] == following.payload[0]
     )
     return same and step * rate <= _GAP
-
-
-def _joined(first: Log, second: Log) -> Log:
-    def both(name: str) -> np.ndarray | None:
-        one, other = getattr(first, name), getattr(second, name)
-        return None if one is None or other is None else np.concatenate([one, other])
-
-    names = ("time", "sliders", "forces", "pose", "payload")
-    joined: dict[str, Any] = {name: both(name) for name in names}
-    return replace(first, **joined)

@@ -1,0 +1,82 @@
+"""Parquet files, some rows at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import polars as pl
+
+from pteron.errors import DataError
+from pteron.tables.table import Table
+
+_ROWS = 262_144
+
+
+class ParquetFile:
+    """A Parquet file that is open for reading; each pass over its tables reads it anew.
+
+    Parameters
+    ----------
+    path : path
+        A regular file.
+    source : str
+        What messages call it.
+
+    Attributes
+    ----------
+    source : str
+        As given.
+    columns : tuple of str
+        Names of the columns.
+    rows_estimate : int
+        How many rows it has.
+    hint : str
+        What to do where a column is missing.
+
+    Raises
+    ------
+    DataError
+        If it is not a Parquet file.
+    """
+
+    hint = "add what is missing"
+
+    def __init__(self, path: Path, source: str) -> None:
+        self.source = source
+        self._frame = pl.scan_parquet(path, glob=False)
+        try:
+            self._kinds = self._frame.collect_schema()
+            self.rows_estimate = int(self._frame.select(pl.len()).collect().item())
+        except pl.exceptions.PolarsError:
+            raise DataError(
+                f"{source}: not a Parquet file; write it again, or give a CSV"
+            ) from None
+        self.columns = tuple(self._kinds)
+
+    def tables(self, columns: Sequence[str] | None = None) -> Iterator[Table]:
+        """Yield the rows in order, a block of them at a time.
+
+        Parameters
+        ----------
+        columns : sequence of str, optional
+            Those to be read, truth values as 0 and 1; by default all, as they are.
+
+        Raises
+        ------
+        DataError
+            If a part of the file cannot be read.
+        """
+        frame = self._frame
+        if columns is not None:
+            truths = [name for name in columns if self._kinds[name] == pl.Boolean]
+            frame = frame.select(*dict.fromkeys(columns)).cast(dict.fromkeys(truths, pl.Float64))
+        for start in range(0, self.rows_estimate, _ROWS):
+            try:
+                part = frame.slice(start, _ROWS).collect()
+            except pl.exceptions.PolarsError as error:
+                reason = str(error).splitlines()[0]
+                raise DataError(
+                    f"{self.source}: cannot be read behind row {start} ({reason}); write it again"
+                ) from None
+            yield Table(self.source, part, self.hint, start)

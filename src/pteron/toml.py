@@ -1,0 +1,289 @@
+"""TOML files, read safely and checked against pydantic models: every fault is told at once."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from pteron.errors import PteronError, shown
+
+if TYPE_CHECKING:
+    from pydantic import ValidationError
+
+Item = Callable[[str, int], str]
+"""Names an item of a list, from its key and its number, counted from 1: "leg 2"."""
+
+_Model = TypeVar("_Model")
+
+_LARGEST = 1 << 24
+_PARTS = 16
+_MANY = 20
+"""Faults of a file that are told."""
+
+_BOUNDS = {
+    "greater_than": "above",
+    "greater_than_equal": "of at least",
+    "less_than": "below",
+    "less_than_equal": "of at most",
+}
+_WORDS = {
+    "number": "a number",
+    "integer": "a whole number",
+    "string": "a text",
+    "boolean": "true or false",
+    "object": "a table",
+}
+
+_STRING_OR_COMMENT = re.compile(
+    r'"""[^"\\]*(?:(?:\\.|"{1,2}(?!"))[^"\\]*)*"""'
+    r"|'''.*?'''"
+    r'|"[^"\\\n]*(?:\\.[^"\\\n]*)*"'
+    r"|'[^'\n]*'"
+    r"|#[^\n]*",
+    re.DOTALL,
+)
+_LONG_KEY = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{_PARTS}}}")
+
+
+def read_toml(path: str | Path, error: type[PteronError], absent: str) -> dict[str, Any]:
+    """Return what a TOML file holds.
+
+    Parameters
+    ----------
+    path : str or path
+        The file.
+    error : type
+        What is raised: a `ModelError` for a manipulator, a `DataError` for a log.
+    absent : str
+        What the message says if there is no such file.
+
+    Raises
+    ------
+    PteronError
+        If it cannot be read, or as `parsed_toml`.
+    """
+    source = shown(str(path), bare=True, longest=1000)
+    try:
+        with Path(path).open("rb") as file:
+            data = file.read(_LARGEST + 1)
+    except (FileNotFoundError, ValueError):  # ValueError: a NUL in the name
+        raise error(f"{source}: {absent}") from None
+    except OSError as reason:
+        raise error(f"{source}: cannot be read ({reason.strerror or reason})") from None
+    return parsed_toml(data, source, error)
+
+
+def parsed_toml(data: bytes, source: str, error: type[PteronError]) -> dict[str, Any]:
+    """Return what a TOML text holds.
+
+    Parameters
+    ----------
+    data : bytes
+        The text in UTF-8; a byte order mark before it is passed over.
+    source : str
+        What messages call it.
+    error : type
+        What is raised.
+
+    Raises
+    ------
+    PteronError
+        If it is not TOML, or is not meant to be read: nested too deeply, keys of very many parts,
+        numbers of thousands of digits.
+    """
+    if len(data) > _LARGEST:
+        raise error(f"{source}: has over {_LARGEST >> 20} MB; a TOML file of settings is short")
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise error(f"{source}: not a TOML file (it is not UTF-8 text)") from None
+    # The parser's time and memory grow with the square of a dotted key's length.
+    if long := _LONG_KEY.search(_STRING_OR_COMMENT.sub("_", text)):
+        start = shown(long[0], bare=True, longest=20)
+        raise error(
+            f"{source}: not a file of settings (the key {start} has over {_PARTS} parts); mend it"
+        )
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as fault:
+        reason = shown(str(fault), bare=True, longest=200)
+    except RecursionError:
+        reason = "its brackets are nested too deeply"
+    except ValueError:  # of `int`
+        reason = "a number in it has thousands of digits"
+    raise error(f"{source}: not a TOML file ({reason})")
+
+
+def _item(key: str, number: int) -> str:
+    return f"{key}, item {number}"
+
+
+def validated(
+    model: type[_Model],
+    document: dict[str, Any],
+    source: str,
+    error: type[PteronError],
+    item: Item = _item,
+) -> _Model:
+    """Return what a document says as an instance of a pydantic model.
+
+    Parameters
+    ----------
+    model : type
+        A pydantic model or dataclass.
+    document : dict
+        What the file holds.
+    source : str
+        What messages call the file.
+    error : type
+        What is raised.
+    item : callable, optional
+        Names an item of a list.
+
+    Raises
+    ------
+    PteronError
+        With all faults of the file, each on a line if there is more than one.
+    """
+    from pydantic import TypeAdapter, ValidationError
+
+    try:
+        return TypeAdapter(model).validate_python(document)
+    except ValidationError as fault:
+        raise error(told(source, fault_lines(fault, model, item))) from None
+
+
+def told(source: str, lines: list[str]) -> str:
+    """Return the message of a file's faults."""
+    if len(lines) == 1:
+        return f"{source}: {lines[0]}"
+    more = [f"and {len(lines) - _MANY} more"] if len(lines) > _MANY else []
+    return "\n  ".join([f"{source}: {len(lines)} faults", *lines[:_MANY], *more])
+
+
+def fault_lines(error: ValidationError, model: Any, item: Item = _item) -> list[str]:
+    r"""Return a line for every fault that pydantic found: the key, what was given and expected.
+
+    Parameters
+    ----------
+    error : ValidationError
+        Of a file's content.
+    model : type
+        The pydantic model or dataclass that refused it. Aliases with a dot, such as
+        ``"time.unit"``, are understood as keys of tables.
+    item : callable, optional
+        Names an item of a list; by default ``"legs, item 2"``.
+
+    Examples
+    --------
+    >>> from pydantic import BaseModel, ValidationError
+    >>> class Machine(BaseModel, extra="forbid"):
+    ...     gravity: tuple[float, float, float]
+    ...     legs: list[dict[str, float]]
+    >>> try:
+    ...     Machine.model_validate({"gravity": 9.81, "legs": [{}, {"mass": "x"}], "nam": "a"})
+    ... except ValidationError as error:
+    ...     lines = fault_lines(error, Machine, lambda key, number: f"leg {number}")
+    >>> print(*lines, sep="\n")
+    gravity: 9.81 given, a list of 3 numbers expected
+    leg 2: mass: 'x' given, a number expected
+    nam: unknown key; the valid ones there are gravity, legs
+    """
+    schema = _Schema(model)
+    lines = []
+    for fault in error.errors(include_url=False):
+        location = fault["loc"]
+        # What a list of fixed length lacks is a fault of the list.
+        if fault["type"] == "missing" and location and isinstance(location[-1], int):
+            location = location[:-1]
+        key = _key(location, item)
+        lines.append(f"{key}: " * bool(key) + _fault(fault, schema, location))
+    return list(dict.fromkeys(lines))
+
+
+def table_keys(model: Any) -> tuple[str, ...]:
+    """Return the keys of a model; of aliases with a dot, the tables."""
+    return _Schema(model).keys((), "")
+
+
+def _key(location: tuple[int | str, ...], item: Item) -> str:
+    named, key = list[str](), ""
+    for part in location:
+        if isinstance(part, int):
+            named.append(item(key, part + 1) if key else f"item {part + 1}")
+            key = ""
+        else:
+            key += ("." if key else "") + shown(part, bare=True)
+    return ": ".join([*named, key] if key else named)
+
+
+def _fault(fault: Any, schema: _Schema, location: tuple[int | str, ...]) -> str:
+    kind, given, context = fault["type"], shown(fault["input"]), fault.get("ctx", {})
+    if kind == "value_error":
+        return str(context["error"])
+    if kind in ("extra_forbidden", "unexpected_keyword_argument"):
+        table, dot, _ = str(location[-1]).rpartition(".")
+        valid = schema.keys(location[:-1], table + dot)
+        if location[-1] in valid:
+            return f"{given} given, a table expected"
+        return f"unknown key; the valid ones there are {', '.join(valid)}"
+    expected = schema.words(location)
+    if kind == "missing" and fault["loc"] == location:
+        return f"missing; the file must give {expected or 'it'}"
+    if kind in _BOUNDS:
+        expected = f"a number {_BOUNDS[kind]} {next(iter(context.values())):g}"
+    elif kind == "finite_number":
+        expected = "a finite number"
+    elif kind == "literal_error":
+        expected = context["expected"]
+    if not expected:
+        return f"{given} given; {fault['msg'][0].lower()}{fault['msg'][1:]}"
+    return f"{given} given, {expected} expected"
+
+
+class _Schema:
+    """What a model expects at a location, from its JSON schema."""
+
+    def __init__(self, model: Any) -> None:
+        from pydantic import TypeAdapter
+
+        self._whole = TypeAdapter(model).json_schema(by_alias=True)
+
+    def keys(self, location: tuple[int | str, ...], table: str) -> tuple[str, ...]:
+        """Return the keys that are valid there; `table` is what aliases begin with."""
+        names = self._at(location).get("properties", {})
+        inner = (name.removeprefix(table) for name in names if name.startswith(table))
+        return tuple(dict.fromkeys(name.partition(".")[0] for name in inner))
+
+    def words(self, location: tuple[int | str, ...]) -> str:
+        """Return what is expected there; empty where there are no words for it."""
+        return self._words(self._at(location))
+
+    def _words(self, node: dict[str, Any]) -> str:
+        if node.get("type") != "array":
+            return _WORDS.get(node.get("type", ""), "")
+        several = node.get("prefixItems", [])
+        item = self._words(self._resolved(several[0] if several else node.get("items", {})))
+        count = f"{len(several)} " if several else ""
+        return f"a list of {count}{item.removeprefix('a ')}s" if item else "a list"
+
+    def _at(self, location: tuple[int | str, ...]) -> dict[str, Any]:
+        node = self._resolved(self._whole)
+        for part in location:
+            if isinstance(part, int):
+                several = node.get("prefixItems", [])
+                inner = several[part] if part < len(several) else node.get("items")
+            else:
+                inner = node.get("properties", {}).get(part, node.get("additionalProperties"))
+            node = self._resolved(inner if isinstance(inner, dict) else {})
+        return node
+
+    def _resolved(self, node: dict[str, Any]) -> dict[str, Any]:
+        """Return a part of the schema itself, where another stands for it or may be null."""
+        if "$ref" in node:
+            return self._resolved(self._whole["$defs"][node["$ref"].rpartition("/")[2]])
+        others = [one for one in node.get("anyOf", []) if one.get("type") != "null"]
+        return self._resolved(others[0]) if len(others) == 1 else node
