@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from pteron.equations.machine import closure_of
@@ -215,19 +217,8 @@ def direct_kinematics(
     if is_singular_everywhere(robot):
         raise SingularPose(EVERYWHERE.format(name=robot.name), kind="II", measure=0.0, index=())
     given = checked(robot, joints, "joints", on_failure)
-    poses: Poses = evaluated(robot, "direct_kinematics", "nan", given)
-    if robot.platform.turns:
-        poses[..., 3] = np.where(poses[..., 3] <= -np.pi, np.pi, poses[..., 3])
-    closure = closure_of(robot)
-    back = evaluated(robot, "inverse_kinematics", "nan", poses)
-    if not closure.keeps_modes and not all_branches:
-        apart = np.abs(back - given[..., None, :])
-        cranks = np.array([leg.joint.unit == "rad" for leg in robot.legs])
-        turn = 2.0 * np.pi
-        apart = np.where(cranks, np.abs((apart + np.pi) % turn - np.pi), apart)
-        back = np.where((apart <= _SAME_JOINT).all(axis=-1, keepdims=True), back, np.nan)
-    poses[np.isnan(back).any(axis=-1)] = np.nan
-    if not closure.keeps_modes:
+    poses = assembly_modes(robot, given, all_branches=all_branches)
+    if not closure_of(robot).keeps_modes:
         order = np.lexsort(tuple(np.moveaxis(poses, -1, 0)))
         poses = np.take_along_axis(poses, order[..., None], axis=-2)
     lost = np.isnan(poses).all(axis=(-2, -1))
@@ -241,3 +232,39 @@ def direct_kinematics(
             index=index,
         )
     return poses
+
+
+def assembly_modes(robot: Manipulator, joints: Array, *, all_branches: bool = False) -> Poses:
+    """Return the pose (..., k, m) of joint coordinates (..., n) in each assembly mode.
+
+    Unlike those of `direct_kinematics` they are never sorted: along a motion each column is one
+    mode, a side of the singularities. NaN where a mode has no pose, or one of other elbows.
+    """
+    poses: Poses = evaluated(robot, "direct_kinematics", "nan", joints)
+    if robot.platform.turns:
+        poses[..., 3] = np.where(poses[..., 3] <= -np.pi, np.pi, poses[..., 3])
+    back = evaluated(robot, "inverse_kinematics", "nan", poses)
+    lost = np.isnan(back).any(axis=-1)
+    if not closure_of(robot).keeps_modes and not all_branches:
+        apart = np.abs(back - joints[..., None, :])
+        cranks = np.array([leg.joint.unit == "rad" for leg in robot.legs])
+        turn = 2.0 * np.pi
+        apart = np.where(cranks, np.abs((apart + np.pi) % turn - np.pi), apart)
+        lost |= ~(apart <= _SAME_JOINT).all(axis=-1)
+    poses[lost] = np.nan
+    return poses
+
+
+@lru_cache(maxsize=64)
+def mode_of(robot: Manipulator, pose: tuple[float, ...]) -> int:
+    """Return the column of `assembly_modes` that a pose is in."""
+    joints = evaluated(robot, "inverse_kinematics", "raise", np.array(pose))
+    poses = assembly_modes(robot, joints, all_branches=True)
+    return int(np.nanargmin(np.linalg.norm(poses[:, :3] - pose[:3], axis=-1) + _turn(poses, pose)))
+
+
+def _turn(poses: Array, pose: tuple[float, ...]) -> Array:
+    """Return how far (k,) poses are turned against another: the half chord."""
+    if poses.shape[-1] < 4:
+        return np.zeros(len(poses))
+    return np.abs(np.sin(0.5 * (poses[:, 3] - pose[3])))
