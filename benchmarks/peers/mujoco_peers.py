@@ -48,8 +48,8 @@ def _model(robot: pteron.Manipulator, closed: bool = False) -> Any:
         )
         for axis in body.slides:
             made.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
-        for axis in body.hinges:
-            hinge = [0.0, 0.0, 1.0] if axis == "z" else [0.0, 1.0, 0.0]
+        for letter in body.hinges:
+            hinge = [0.0, 0.0, 1.0] if letter == "z" else [0.0, 1.0, 0.0]
             made.add_joint(type=mujoco.mjtJoint.mjJNT_HINGE, axis=hinge)
         built.append(made)
     for i, leg in enumerate(robot.legs if closed else ()):
