@@ -1,8 +1,8 @@
-"""Fastest: the quadrupteron's inverse dynamics against other engines, in one run.
+"""Fastest: inverse dynamics of the Quadrupteron and the Delta against other engines, in one run.
 
-Three contests: one state a call from Python; one state a call in C, each waiting for the last; and
-a batch. The contestants of a contest take turns, round by round, and ratios are of the same round.
-Each has to give the right forces first. Times are of this machine; ratios carry further.
+Three contests each: one state a call from Python; one state a call in C, each waiting for the last;
+and a batch. The contestants of a contest take turns, round by round, and ratios are of the same
+round. Each has to give the right forces first. Times are of this machine; ratios carry further.
 """
 
 from __future__ import annotations
@@ -50,14 +50,16 @@ _SECONDS = 0.02
 
 
 def main() -> None:
-    """Run the three contests."""
-    robot = pteron.load("quadrupteron")
-    others = peers(robot, quick=quick())
+    """Run the three contests of each machine."""
     if compiler() is None:
         print("target c and the exported C: left out, no C compiler")
-    single_calls(robot, others)
-    exported_calls(robot)
-    batches(robot, others)
+    for name in ("quadrupteron", "delta"):
+        robot = pteron.load(name)
+        print(f"\nInverse dynamics of the {name}")
+        others = peers(robot, quick=quick())
+        single_calls(robot, others)
+        exported_calls(robot)
+        batches(robot, others)
 
 
 def single_calls(robot: pteron.Manipulator, others: list[Peer]) -> None:

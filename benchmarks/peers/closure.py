@@ -25,7 +25,7 @@ Expression = Any
 """A CasADi SX matrix."""
 
 
-def plane(leg: pteron.Leg) -> Array:
+def plane(leg: Any) -> Array:
     """Return the axes (3, 3), as columns, of a leg's frame: two of its plane, then d."""
     d = np.array(leg.direction)
     i = int(np.argmax(np.abs(d)))
@@ -67,7 +67,8 @@ class Closure:
         """Return the closure of one machine."""
         x, y, k = (np.array(axis) for axis in robot.platform.frame)
         rows, cosine, sine, rest = [], [], [], []
-        for leg in robot.legs:
+        legs: tuple[Any, ...] = robot.legs
+        for leg in legs:
             d, e, s = np.array(leg.direction), np.array(leg.e), leg.platform_point
             d_bar = d / (d @ e)
             across = plane(leg).T[:2]
@@ -82,9 +83,9 @@ class Closure:
             np.stack(cosine, axis=-1),
             np.stack(sine, axis=-1),
             np.stack(rest, axis=-1),
-            np.array([leg.upper_length for leg in robot.legs]),
-            np.array([leg.lower_length for leg in robot.legs]),
-            np.array([float(leg.elbow) for leg in robot.legs]),
+            np.array([leg.upper_length for leg in legs]),
+            np.array([leg.lower_length for leg in legs]),
+            np.array([float(leg.elbow) for leg in legs]),
         )
 
     @cached_property

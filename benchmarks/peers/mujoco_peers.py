@@ -48,11 +48,12 @@ def _model(robot: pteron.Manipulator, closed: bool = False) -> Any:
         )
         for axis in body.slides:
             made.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
-        for axis in body.hinges:
-            hinge = [0.0, 0.0, 1.0] if axis == "z" else [0.0, 1.0, 0.0]
+        for letter in body.hinges:
+            hinge = [0.0, 0.0, 1.0] if letter == "z" else [0.0, 1.0, 0.0]
             made.add_joint(type=mujoco.mjtJoint.mjJNT_HINGE, axis=hinge)
         built.append(made)
-    for i, leg in enumerate(robot.legs if closed else ()):
+    legs: tuple[Any, ...] = robot.legs if closed else ()
+    for i, leg in enumerate(legs):
         built[2 * i + 1].add_site(name=f"link {i}", pos=[leg.lower_length, 0.0, 0.0])
         built[-1].add_site(name=f"point {i}", pos=leg.platform_point)
         spec.add_equality(

@@ -99,9 +99,9 @@ def _model(robot: pteron.Manipulator) -> tuple[Any, Any]:
             kind = pin.JointModelPZ() if along_z else pin.JointModelPrismaticUnaligned(axis)
             joint = model.addJoint(joint, kind, place, f"p{n}")
             place = pin.SE3.Identity()
-        for axis in body.hinges:
-            kind = pin.JointModelRUBZ() if axis == "z" else pin.JointModelRUBY()
-            joint = model.addJoint(joint, kind, place, f"{axis}{n}")
+        for letter in body.hinges:
+            kind = pin.JointModelRUBZ() if letter == "z" else pin.JointModelRUBY()
+            joint = model.addJoint(joint, kind, place, f"{letter}{n}")
             place = pin.SE3.Identity()
         inertia = pin.Inertia(body.mass, body.center, np.diag(body.inertia))
         model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
@@ -170,8 +170,8 @@ def _table(bodies: list[Body]) -> Array:
         elif body.slides:
             table.append(np.array([slide, parent, *place, *body.slides[0], *nothing]))
             parent, place = float(len(table)), resting
-        for axis in body.hinges:
-            table.append(np.array([turn[axis], parent, *place, 0.0, 0.0, 1.0, *nothing]))
+        for letter in body.hinges:
+            table.append(np.array([turn[letter], parent, *place, 0.0, 0.0, 1.0, *nothing]))
             parent, place = float(len(table)), resting
         table[-1][-7:] = [body.mass, *body.center, *body.inertia]
         ids.append(parent)
