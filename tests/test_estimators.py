@@ -11,7 +11,7 @@ from mechanisms import CATALOG
 from scipy.stats import binom
 
 from pteron.errors import DataError
-from pteron.identification.equations import Equations, equations_of
+from pteron.identification.observation import Observations, observations_of
 from pteron.identification.estimators import (
     ESTIMATORS,
     essential_parameters,
@@ -26,7 +26,7 @@ from pteron.identification.estimators.likelihood import maximum_likelihood
 from pteron.identification.estimators.triangle import triangle
 from pteron.identification.estimators.whiteness import whiteness
 from pteron.identification.model import identification_model
-from pteron.identification.signals import Processing, treatment_of
+from pteron.identification.signals import Processing, preprocessing_of
 
 P = 6
 TRUE = np.array([2.0, -1.0, 0.5, 3.0, 0.3, -0.2])
@@ -37,10 +37,10 @@ each_estimator = pytest.mark.parametrize("estimator", list(ESTIMATORS.values()),
 
 
 def made(matrix, forces, *, names=NAMES, used=None):
-    """Return equations; those that are not used are zero, as `equations_of` leaves them."""
+    """Return equations; those that are not used are zero, as `observations_of` leaves them."""
     gain = np.ones(forces.shape) if used is None else used.astype(float)
     rows = len(forces)
-    return Equations(
+    return Observations(
         tuple(names[: matrix.shape[-1]]),
         ("N",) * matrix.shape[-1],
         matrix * gain[..., None],
@@ -485,12 +485,12 @@ def experiment(slider_noise, seed=0, derivatives="periodic"):
         seed=2,
     )
     period = 2.0 if derivatives == "periodic" else None
-    treatment = treatment_of(robot, log, Processing(derivatives=derivatives, period=period))
+    treatment = preprocessing_of(robot, log, Processing(derivatives=derivatives, period=period))
     return SimpleNamespace(
         model=model,
         log=log,
         treatment=treatment,
-        equations=equations_of(model, log, treatment),
+        equations=observations_of(model, log, treatment),
         truth=truth(model),
     )
 
@@ -514,7 +514,7 @@ def test_likelihood_agrees_with_weights_where_positions_are_good():
     made_by = experiment(1e-8)
     # Likelihood uses every sample, as the others do without a parallel filter.
     plain = replace(made_by.treatment, band=0.45 * made_by.treatment.rate)
-    one = weighted(equations_of(made_by.model, made_by.log, plain))
+    one = weighted(observations_of(made_by.model, made_by.log, plain))
     other = maximum_likelihood(made_by.model, made_by.log, plain)
     assert other.names == one.names
     # The other one's band still takes a tenth of the noise away, and of the masked columns.
@@ -550,6 +550,6 @@ def test_motion_along_one_axis_names_what_it_cannot_see():
     log = log_of(robot, size=np.array(0.0), turn=0.0)
     wave = 0.04 * np.sin(2.0 * np.pi * 0.5 * log.time)
     sliders = log.sliders + np.outer(wave, [leg.direction[2] for leg in robot.legs])
-    treatment = treatment_of(robot, replace(log, sliders=sliders), Processing(band=10.0))
+    treatment = preprocessing_of(robot, replace(log, sliders=sliders), Processing(band=10.0))
     with pytest.raises(DataError, match=r"too little motion: .* values cannot be seen"):
-        weighted(equations_of(model, replace(log, sliders=sliders), treatment))
+        weighted(observations_of(model, replace(log, sliders=sliders), treatment))

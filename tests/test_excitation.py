@@ -30,7 +30,7 @@ from pteron.identification.excitation import (
 )
 from pteron.identification.excitation.draws import within_limits
 from pteron.identification.excitation.limits import UNITS
-from pteron.identification.excitation.spectrum import measure
+from pteron.identification.excitation.program import measure
 from pteron.identification.logs import read_log
 from pteron.workspace import home_pose
 

@@ -80,7 +80,7 @@ def test_the_noise_that_is_stated_is_the_noise_that_is_there():
     found = identify(QUADRUPTERON, noisy(QUADRUPTERON, 3))
     # A hundred rows or so for each actuator.
     assert np.allclose(found.estimate.noise, NOISE["force_noise"], rtol=0.25)
-    assert np.allclose(found.treatments[0].force_noise, NOISE["force_noise"], rtol=0.15)
+    assert np.allclose(found.preprocessing[0].force_noise, NOISE["force_noise"], rtol=0.15)
 
 
 def resting(robot, *, seed=3, rate=1000.0):
@@ -166,7 +166,7 @@ def test_a_periodic_log_is_divided_at_its_periods():
     fit, check = divided(recording(log), 4.0)
     assert (fit.rows, check.rows) == (4000, 2000)
     found = identify(QUADRUPTERON, log)
-    assert found.treatments[0].derivatives == "periodic"
+    assert found.preprocessing[0].derivatives == "periodic"
     assert found.verdict.grade == "trustworthy"
 
 
@@ -220,9 +220,9 @@ def test_passive_joints_are_identified():
     robot = QUADRUPTERON
     log = log_of(robot)
     model = identification_model(robot, Terms(joints="each"))
-    from pteron.identification import equations_of, treatment_of
+    from pteron.identification import observations_of, preprocessing_of
 
-    equations = equations_of(model, log, treatment_of(robot, log))
+    equations = observations_of(model, log, preprocessing_of(robot, log))
     truths = np.r_[truth(identification_model(robot)), np.full(13, 0.05)]
     found = np.linalg.lstsq(
         equations.matrix.reshape(-1, len(truths)), (equations.matrix @ truths).ravel(), rcond=None

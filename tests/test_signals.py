@@ -20,7 +20,7 @@ from pteron.identification.signals import (
     fitted_series,
     smoothed,
     spline_motion,
-    treatment_of,
+    preprocessing_of,
     white_noise,
 )
 from pteron.identification.signals import samples as samples_module
@@ -394,7 +394,7 @@ def unreachable(log, row):
 def test_a_sample_without_a_pose_is_named_in_any_block(row, first, monkeypatch):
     robot = CATALOG["quadrupteron"]
     log = replace(log_of(robot, duration=4.0), first_row=first)
-    treatment = replace(treatment_of(robot, log), derivatives="central", cutoff=None, band=100.0)
+    treatment = replace(preprocessing_of(robot, log), derivatives="central", cutoff=None, band=100.0)
     monkeypatch.setattr(samples_module, "_BLOCK", 250)
     broken = unreachable(log, row)
     for given in (broken, pieces(broken, 333)):
@@ -406,7 +406,7 @@ def test_a_wrong_mode_is_told_from_a_wrong_machine():
     # A pose that is lost in one mode only does not exist here: both fail, and the hint is general.
     robot = CATALOG["quadrupteron"]
     log = unreachable(log_of(robot, duration=1.0), 100)
-    treatment = treatment_of(robot, log, Processing(derivatives="central"))
+    treatment = preprocessing_of(robot, log, Processing(derivatives="central"))
     with pytest.raises(DataError, match="another machine"):
         list(samples(robot, log, replace(treatment, cutoff=None)))
 
@@ -438,7 +438,7 @@ def test_fresh_samples_of_blocks_tile_a_log(derivatives, margin, monkeypatch):
     robot = CATALOG["tripteron"]
     # The knots of a spline are where a block says: noise falls on them in other ways.
     log = log_of(robot, duration=4.0, slider_noise=1e-6 * (derivatives == "central"))
-    treatment = treatment_of(robot, log, Processing(derivatives=derivatives, cutoff=20.0))
+    treatment = preprocessing_of(robot, log, Processing(derivatives=derivatives, cutoff=20.0))
     whole = list(samples(robot, log, treatment, margin=margin))
     assert len(whole) == 1
     monkeypatch.setattr(samples_module, "_BLOCK", 300)
@@ -461,7 +461,7 @@ def test_fresh_samples_of_blocks_tile_a_log(derivatives, margin, monkeypatch):
 def test_a_log_shorter_than_the_edges_is_refused():
     robot = CATALOG["tripteron"]
     log = log_of(robot, duration=8.0)
-    treatment = treatment_of(robot, log, Processing(derivatives="central", cutoff=5.0))
+    treatment = preprocessing_of(robot, log, Processing(derivatives="central", cutoff=5.0))
     with pytest.raises(DataError, match="shorter than the"):
         list(samples(robot, log.part(0, 900), treatment))
 
@@ -489,7 +489,7 @@ def test_uneven_samples_give_the_motion(derivatives):
     rng = np.random.default_rng(13)
     time = np.arange(4000) / 500.0 + rng.uniform(-4e-4, 4e-4, 4000)
     log = log_of(robot, time=time)
-    treatment = treatment_of(robot, log, Processing(derivatives=derivatives))
+    treatment = preprocessing_of(robot, log, Processing(derivatives=derivatives))
     (found,) = samples(robot, log, replace(treatment, cutoff=None))
     expected = motion(robot, found.states.time)
     assert found.states.pose == pytest.approx(expected[0], abs=1e-8)
@@ -499,13 +499,13 @@ def test_uneven_samples_give_the_motion(derivatives):
 def test_the_data_choose_the_treatment():
     robot = CATALOG["quadrupteron"]
     clean, noisy = log_of(robot), log_of(robot, slider_noise=1e-5)
-    assert treatment_of(robot, clean).derivatives == "spline"
-    assert treatment_of(robot, noisy).derivatives == "central"
+    assert preprocessing_of(robot, clean).derivatives == "spline"
+    assert preprocessing_of(robot, noisy).derivatives == "central"
     known = replace(noisy, description=Description(period=4.0))
-    periodic = treatment_of(robot, known)
+    periodic = preprocessing_of(robot, known)
     assert (periodic.derivatives, periodic.period) == ("periodic", 4.0)
-    assert treatment_of(robot, known, rows=10**8).derivatives == "central"
-    assert treatment_of(robot, noisy).slider_noise == pytest.approx(1e-5, rel=0.1)
+    assert preprocessing_of(robot, known, rows=10**8).derivatives == "central"
+    assert preprocessing_of(robot, noisy).slider_noise == pytest.approx(1e-5, rel=0.1)
 
 
 def test_speeds_that_count_as_slow_are_a_share_of_the_usual_ones():
@@ -514,7 +514,7 @@ def test_speeds_that_count_as_slow_are_a_share_of_the_usual_ones():
     pose, velocity, _ = motion(robot, log.time)
     usual = np.sqrt((pteron.joint_rates(robot, pose, velocity).sliders ** 2).mean(axis=0))
     for share in (0.0, 0.02, 0.3):
-        slow = treatment_of(robot, log, Processing(slow=share)).slow
+        slow = preprocessing_of(robot, log, Processing(slow=share)).slow
         assert slow == pytest.approx(share * usual, rel=0.01, abs=1e-15)
 
 
@@ -537,12 +537,12 @@ def test_a_treatment_that_cannot_be_is_refused(case):
     robot = CATALOG["tripteron"]
     log = log_of(robot)
     with pytest.raises(DataError, match=message):
-        treatment_of(robot, log, Processing(**given))
+        preprocessing_of(robot, log, Processing(**given))
 
 
 def test_the_longest_stretch_decides_the_treatment():
     robot = CATALOG["tripteron"]
     log = log_of(robot, slider_noise=1e-5)
-    whole, cut = treatment_of(robot, log), treatment_of(robot, without(log, 400, 700))
+    whole, cut = preprocessing_of(robot, log), preprocessing_of(robot, without(log, 400, 700))
     assert cut.rate == pytest.approx(whole.rate, rel=1e-9)
     assert cut.cutoff == pytest.approx(whole.cutoff, rel=0.5)

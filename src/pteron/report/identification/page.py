@@ -9,7 +9,7 @@ from markupsafe import Markup, escape
 
 import pteron
 from pteron.identification import Identification
-from pteron.identification.verdict import AT_THE_FLOOR, LARGE, SMALL
+from pteron.identification.result import AT_THE_FLOOR, LARGE, SMALL
 from pteron.report.digits import significant
 from pteron.report.environment import environment
 from pteron.report.identification.contents import contents

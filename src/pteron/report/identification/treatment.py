@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pteron.identification import Identification, Treatment
+from pteron.identification import Identification, Preprocessing
 from pteron.kernels import Array
 from pteron.report.digits import fixed, significant
 
@@ -48,11 +48,11 @@ def treated_logs(result: Identification, names: Mapping[str, str]) -> tuple[Trea
             np.asarray(treatment.force_noise),
             _SLOW * treatment.slow,
         )
-        for prediction, treatment in zip(result.fitted, result.treatments, strict=True)
+        for prediction, treatment in zip(result.fitted, result.preprocessing, strict=True)
     )
 
 
-def _steps(treatment: Treatment, modes: int) -> tuple[tuple[str, str, str], ...]:
+def _steps(treatment: Preprocessing, modes: int) -> tuple[tuple[str, str, str], ...]:
     band = significant(treatment.band)
     return (
         (
@@ -107,7 +107,7 @@ _DERIVATIVES = {
 }
 
 
-def _cutoff(treatment: Treatment) -> tuple[str, str, str]:
+def _cutoff(treatment: Preprocessing) -> tuple[str, str, str]:
     if treatment.cutoff is None:
         return (
             "Cut-off",
