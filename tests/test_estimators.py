@@ -11,21 +11,20 @@ from mechanisms import CATALOG
 from scipy.stats import binom
 
 from pteron.errors import DataError
-from pteron.identification.observation import Observations, observations_of
 from pteron.identification.estimators import (
     ESTIMATORS,
+    column_errors,
     essential_parameters,
     huber,
+    maximum_likelihood,
     ordinary,
-    ridge,
+    qr_factor,
     total,
     weighted,
+    whiteness,
 )
-from pteron.identification.estimators.column_errors import column_errors
-from pteron.identification.estimators.likelihood import maximum_likelihood
-from pteron.identification.estimators.triangle import triangle
-from pteron.identification.estimators.whiteness import whiteness
 from pteron.identification.model import identification_model
+from pteron.identification.observation import Observations, observations_of
 from pteron.identification.signals import Processing, preprocessing_of
 
 P = 6
@@ -118,12 +117,11 @@ def test_weighted_is_that_of_numpy_with_rows_scaled():
     assert (np.abs(estimate.values - expected) < 0.01 * estimate.deviations).all()
 
 
-def test_a_triangle_holds_all_that_its_blocks_do(monkeypatch):
+def test_a_factor_holds_all_that_its_blocks_do():
     equations = drawn(3, rows=200)
     weights = np.random.default_rng(0).uniform(0.5, 2.0, equations.forces.shape)
-    whole = triangle(equations, weights)
-    monkeypatch.setattr("pteron.identification.estimators.triangle._BLOCK", 7)
-    parts = triangle(equations, weights)
+    whole = qr_factor(equations, weights)
+    parts = qr_factor(equations, weights, block=7)
     assert parts.values() == pytest.approx(whole.values(), rel=1e-12)
     assert parts.inverse() == pytest.approx(whole.inverse(), rel=1e-10)
     assert parts.rest == pytest.approx(whole.rest, rel=1e-10)
@@ -349,47 +347,6 @@ def test_noise_in_every_column_explains_all_or_nothing():
     equations = made(rng.normal(size=(400, 2, P)), rng.normal(size=(400, 2)))
     estimate = total(equations)
     assert (np.abs(estimate.values) < 5.0 * estimate.deviations).all()
-
-
-# Ridge
-
-
-def poor(rows=60):
-    """Return equations that hardly move the third value and leave out the fourth."""
-    matrix = regressor(rows)
-    matrix[..., 2] *= 1e-3
-    matrix[..., 3] = 0.0
-    rng = np.random.default_rng(10)
-    return made(matrix, matrix @ TRUE + 0.3 * rng.normal(size=(rows, 3)))
-
-
-def test_ridge_names_what_the_data_hardly_touch():
-    prior, spread = np.full(P, 0.7), np.full(P, 2.0)
-    found = ridge(poor(), prior, spread)
-    assert found.poorly_excited == ("c", "d")
-    assert found.estimate.values[3] == pytest.approx(0.7, abs=1e-12)
-    assert found.estimate.deviations[3] == pytest.approx(2.0)
-    assert found.from_data[[0, 1, 4, 5]] == pytest.approx(1.0, abs=1e-2)
-    assert found.from_data[3] == pytest.approx(0.0, abs=1e-12)
-    seen = [0, 1, 4, 5]
-    error = (found.estimate.values - TRUE)[seen] / found.estimate.deviations[seen]
-    assert np.abs(error).max() < 4.0
-
-
-def test_a_wide_prior_leaves_the_data_alone():
-    equations = drawn(11)
-    found = ridge(equations, np.zeros(P), np.full(P, 1e6))
-    assert found.estimate.values == pytest.approx(weighted(equations).values, rel=1e-2)
-    assert found.poorly_excited == ()
-
-
-@pytest.mark.parametrize("rows", [1, 2, 3])
-def test_ridge_answers_with_hardly_any_equations(rows):
-    found = ridge(drawn(12, rows=rows, n=2), TRUE + 0.1, np.full(P, 0.5))
-    assert np.isfinite(found.estimate.values).all()
-    assert np.isfinite(found.estimate.noise).all()
-    assert (found.estimate.deviations <= 0.5 * (1.0 + 1e-9)).all()
-    assert np.abs(found.estimate.values - TRUE).max() < 2.0
 
 
 # Refusals

@@ -10,8 +10,8 @@ import pteron
 from pteron.identification import (
     Log,
     Processing,
-    observations_of,
     identification_model,
+    observations_of,
     preprocessing_of,
     weighted,
 )

@@ -147,7 +147,7 @@ def improved(starts: Sequence[Improvement], workers: int) -> Iterator[Improvemen
         starts = failed
     for one in starts:
         while not one.ended:
-            one = one.next()  # noqa: PLW2901
+            one = one.next()
             yield one
 
 
