@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import signal
+import threading
+import time
 import tomllib
 from dataclasses import replace
 from functools import lru_cache
@@ -422,6 +425,22 @@ def test_an_interrupt_keeps_the_best_until_then(share: float):
     assert found.conditioning.scaled <= found.random.scaled
     assert (found.gain > 1.5) == (share > 0.1)
     assert seen == sorted(seen)
+
+
+def test_an_interrupt_during_the_program_ends_it_at_once():
+    # A signal that arrives while IPOPT runs is CasADi's to see first.
+    robot = CATALOG["quadrupteron"]
+    interrupted = []
+
+    def progress(share: float) -> None:
+        if share >= 0.1 and not interrupted:
+            interrupted.append(time.monotonic())
+            main = threading.main_thread().ident
+            threading.Timer(1.0, signal.pthread_kill, (main, signal.SIGINT)).start()
+
+    found = optimal_excitation(robot, starts=2, draws=2, workers=1, seconds=30.0, progress=progress)
+    assert found.interrupted
+    assert time.monotonic() - interrupted[0] < 8.0
 
 
 def test_time_cuts_the_search_and_a_result_is_there_all_the_same():

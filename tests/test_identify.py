@@ -1,5 +1,8 @@
 """The whole way from logs to a verdict: what is found, and what is refused."""
 
+import signal
+import time
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +11,7 @@ from logs_of_motions import Friction, log_of, truth
 from mechanisms import CATALOG, random_machine
 
 import pteron
+from pteron.cli.interrupts import insistent_interrupts
 from pteron.identification import (
     Log,
     Processing,
@@ -454,6 +458,29 @@ def test_a_fault_says_what_is_wrong():
     text = fault.message()
     assert "force1, force2 and force3 are in another order" in text
     assert "force1 has the sign flipped" in text
+
+
+# Interrupts ----------------------------------------------------------------------------------
+
+
+def test_an_interrupt_in_a_callback_of_a_weak_reference_gets_through():
+    class Target:
+        pass
+
+    def work():
+        target = Target()
+        # Whatever a callback raises is dropped by Python; here Ctrl-C comes while it runs.
+        watched = weakref.ref(target, lambda _: signal.raise_signal(signal.SIGINT))
+        del target
+        assert watched() is None
+        end = time.monotonic() + 5.0
+        while time.monotonic() < end:
+            time.sleep(0.01)
+
+    with pytest.raises(KeyboardInterrupt), insistent_interrupts():
+        work()
+    with pytest.raises(KeyboardInterrupt), insistent_interrupts():
+        raise ImportError("initialization failed") from KeyboardInterrupt()
 
 
 # Files ---------------------------------------------------------------------------------------

@@ -11,6 +11,7 @@ from typing import Any
 
 from typer.core import TyperGroup
 
+from pteron.cli.interrupts import insistent_interrupts
 from pteron.cli.screen import complain
 from pteron.errors import PteronError
 
@@ -36,10 +37,11 @@ class Program(TyperGroup):
         """Run a subcommand and exit; `standalone_mode` is always on."""
         _open_closed_streams()
         try:
-            status = super().main(
-                args, prog_name, complete_var, False, windows_expand_args, **extra
-            )
-            sys.stdout.flush()
+            with insistent_interrupts():
+                status = super().main(
+                    args, prog_name, complete_var, False, windows_expand_args, **extra
+                )
+                sys.stdout.flush()
         except PteronError as error:
             complain(str(error))
             status = USER_ERROR

@@ -29,6 +29,10 @@ _BACK_OFF = 1e-3
 
 _ITERATIONS = 200
 
+_INTERRUPTED = ("User_Requested_Stop", "NonIpopt_Exception_Thrown")
+"""How IPOPT ends when CasADi has taken an interrupt from the keyboard for itself: all other errors
+of its callbacks are numbers that are invalid."""
+
 
 @dataclass(frozen=True)
 class Setting:
@@ -103,7 +107,10 @@ def minimised(
         )
     except RuntimeError:
         return None
-    if solver.stats()["return_status"] == "Invalid_Number_Detected":
+    status = solver.stats()["return_status"]
+    if status in _INTERRUPTED:
+        raise KeyboardInterrupt
+    if status == "Invalid_Number_Detected":
         return None
     result: Array = np.array(ca.reshape(found["x"], rows, n)) * size
     return result if np.isfinite(result).all() else None
