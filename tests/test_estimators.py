@@ -154,6 +154,26 @@ def test_an_estimate_carries_its_diagnosis(estimator):
     assert estimate.as_dict()["equations"] == 360
 
 
+@pytest.mark.parametrize("estimator", [weighted, huber])
+def test_an_estimate_says_whether_its_search_has_settled(estimator):
+    equations = drawn(4, noise=np.array([0.1, 1.0, 5.0]))
+    settled, hasty = estimator(equations), estimator(equations, iterations=1)
+    assert settled.converged
+    assert settled.iterations > 1
+    assert not hasty.converged
+    assert hasty.iterations == 1
+    assert hasty.as_dict()["converged"] is False
+
+
+def test_total_counts_its_iterations_and_says_whether_they_settled():
+    equations = noisy_columns(0, 0.1)
+    settled, hasty = total(equations, ERRORS), total(equations, ERRORS, iterations=1)
+    assert settled.converged
+    assert settled.iterations > 1
+    assert (hasty.converged, hasty.iterations) == (False, 1)
+    assert total(equations).iterations == 1
+
+
 @each_estimator
 def test_rows_that_are_not_used_count_for_nothing(estimator):
     whole = drawn(5, rows=100)
@@ -478,6 +498,9 @@ def test_likelihood_agrees_with_weights_where_positions_are_good():
     assert (np.abs(other.values - one.values) < 1.0 * one.deviations).all()
     assert other.deviations == pytest.approx(one.deviations, rel=0.3)
     assert (np.abs(other.values - made_by.truth) < 4.5 * other.deviations).all()
+    assert other.converged
+    hasty = maximum_likelihood(made_by.model, made_by.log, plain, iterations=1)
+    assert (hasty.converged, hasty.iterations) == (False, 1)
 
 
 def test_likelihood_is_better_where_positions_are_noisy():

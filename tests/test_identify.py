@@ -4,6 +4,7 @@ import signal
 import time
 import weakref
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from pteron.identification import (
     Log,
     Processing,
     Terms,
+    huber,
     identification_model,
     identify,
     open_log,
@@ -182,6 +184,14 @@ def test_every_estimator_serves(estimator):
     assert found.estimate.method == estimator
     assert found.estimate.converged
     assert not found.notes
+
+
+def test_an_estimate_that_has_not_settled_is_noted():
+    hasty = partial(huber, iterations=2)
+    found = identify(CATALOG["tripteron"], noisy(CATALOG["tripteron"]), estimator=hasty)
+    assert not found.estimate.converged
+    assert "huber has not settled in 2 iterations" in found.notes[0]
+    assert found.as_dict()["estimate"]["converged"] is False
 
 
 def test_an_unknown_estimator_is_refused_with_the_known_ones():

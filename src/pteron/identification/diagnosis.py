@@ -73,24 +73,11 @@ class Fault:
 
 
 def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> Fault | None:
-    """Return the exchange of columns, or of signs, that explains the forces far better.
+    """Return the exchange of columns, or of signs, that explains a log's forces far better.
 
     All n! 2^n orders and signs of the forces are tried, all orders of the sliders, and their signs
     one by one. Signs of all forces at once are settled by the machine's inertia, which is positive.
-
-    Parameters
-    ----------
-    model : Model
-        The model.
-    log : Log
-        Whose forces it explains badly, or with negative inertia.
-    preprocessing : Preprocessing
-        How the log is preprocessed.
-
-    Returns
-    -------
-    Fault or None
-        None where nothing makes the error three times smaller, or the inertia positive.
+    None where nothing makes the error three times smaller, or the inertia positive.
     """
     # Without the mask of slow sliders, which belongs to the order that is in question.
     plain = replace(preprocessing, slow=np.zeros_like(preprocessing.slow))
@@ -141,16 +128,7 @@ def exchanged_sliders(
 ) -> Fault | None:
     """Return the order of the sliders, or the sign of one, that explains the forces far better.
 
-    Parameters
-    ----------
-    model : Model
-        The model.
-    log : Log
-        The log.
-    preprocessing : Preprocessing
-        How it is preprocessed.
-    before : float
-        Error of the fit relative to the forces as they are.
+    `before` is the error of the fit relative to the forces as they are.
     """
     n = log.sliders.shape[1]
     best: Fault | None = None

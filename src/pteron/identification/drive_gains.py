@@ -127,8 +127,8 @@ def identify_drive_gains(
     robot : Manipulator
         The machine: its geometry counts, its inertial parameters play no part.
     log : Log
-        Of currents (A, V or %), whose payload column has both phases, 0 and 1; or a log without
-        payload.
+        A log of currents (A, V or %), whose payload column has both phases, 0 and 1; or one
+        without payload.
     with_payload : Log, optional
         A log of the same machine with the payload, where the first has none.
     payload : KnownPayload, optional

@@ -89,25 +89,26 @@ def fit_observations(
 
 
 def estimated(
-    name: str,
+    estimator: str | Callable[[Observations], Estimate],
     model: Model,
     fit: Sequence[Recording],
     preprocessing: Sequence[Preprocessing],
     observations: Observations,
 ) -> Estimate:
-    """Return what the estimator of that name makes of the observations, or of their recording."""
-    if name in ("likelihood", "total"):
-        one = fit[0]
-        if len(fit) > 1 or not isinstance(one.log, Log):
-            raise DataError(
-                f"estimator: {name} takes one log of at most some million rows; choose weighted, "
-                "or give one log"
-            )
-        log = one.head()
-        if name == "likelihood":
-            return maximum_likelihood(model, log, preprocessing[0])
-        return total(observations, column_errors(model, log, preprocessing[0]))
-    return ESTIMATORS[name](observations)
+    """Return what an estimator makes of the observations, or of their recording."""
+    if not isinstance(estimator, str):
+        return estimator(observations)
+    if estimator not in ("likelihood", "total"):
+        return ESTIMATORS[estimator](observations)
+    if len(fit) > 1 or not isinstance(fit[0].log, Log):
+        raise DataError(
+            f"estimator: {estimator} takes one log of at most some million rows; choose weighted, "
+            "or give one log"
+        )
+    log, how = fit[0].head(), preprocessing[0]
+    if estimator == "likelihood":
+        return maximum_likelihood(model, log, how)
+    return total(observations, column_errors(model, log, how))
 
 
 def check_columns(model: Model, one: Recording, preprocessing: Preprocessing) -> None:

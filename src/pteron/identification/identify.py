@@ -53,7 +53,7 @@ def identify(
     held_out: Logs = (),
     terms: Terms | None = None,
     shared: Sharing = False,
-    estimator: str = "weighted",
+    estimator: str | Callable[[Observations], Estimate] = "weighted",
     processing: Processing | None = None,
     cad: Manipulator | Literal["robot"] | None = "robot",
     bounds: Bounds | None = None,
@@ -78,8 +78,9 @@ def identify(
         Friction, offsets and other terms beside the base parameters.
     shared : bool or groups of legs
         Whether legs share one parameter set; see `pteron.base_parameters`.
-    estimator : str
-        One of `METHODS`: ordinary, weighted (the default), huber, total, likelihood.
+    estimator : str or callable
+        One of `METHODS`: ordinary, weighted (the default), huber, total, likelihood; or what takes
+        observations and returns an estimate, such as `functools.partial(huber, threshold=2.0)`.
     processing : Processing, optional
         How positions are differentiated and filtered; by default the data decide.
     cad : Manipulator, "robot" or None
@@ -97,7 +98,7 @@ def identify(
     ModelError
         If the estimator is not known, or the bounds contradict each other.
     """
-    if estimator not in METHODS:
+    if isinstance(estimator, str) and estimator not in METHODS:
         raise ModelError(f"estimator: {estimator!r} is not one of {', '.join(METHODS)}")
     report = progress or (lambda task, done, total: None)
     wanted = processing or Processing()
@@ -154,7 +155,8 @@ def identify(
     )
 
     # Find what the data show by themselves, and real bodies
-    essential = essential_parameters(observations, estimate, ESTIMATORS.get(estimator, weighted))
+    again = ESTIMATORS.get(estimator, weighted) if isinstance(estimator, str) else estimator
+    essential = essential_parameters(observations, estimate, again)
     known = np.zeros(len(model.names))
     for name, mass in rotors.items():
         known += model.share_of(name, mass)

@@ -38,20 +38,10 @@ def doubts(
     consistency: Consistency | None,
     cad: Manipulator | Literal["robot"] | None,
 ) -> list[str]:
-    """Return what held-out forces cannot show: they may be right for the wrong machine.
+    """Return what held-out forces cannot show: values may be right for the wrong machine.
 
-    Parameters
-    ----------
-    model : Model
-        The model.
-    estimate : Estimate
-        Its values.
-    known : array, shape (p,)
-        What of them is no part of the bodies, such as rotors.
-    consistency : Consistency or None
-        The real bodies that were found.
-    cad : Manipulator, "robot" or None
-        The machine as it is drawn.
+    `known` (p,) is what of the values is no part of the bodies, such as rotors; `consistency` are
+    the real bodies that were found, and `cad` is the machine as it is drawn.
     """
     found = []
     if has_negative_inertia(model, estimate.values):

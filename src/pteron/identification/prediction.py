@@ -114,20 +114,9 @@ def predict(
     preprocessing: Preprocessing,
     progress: Callable[[int], None] | None = None,
 ) -> Prediction:
-    """Return how well values of a model predict a recording.
+    """Return how well a model with values (p,) predicts a recording, preprocessed in its way.
 
-    Parameters
-    ----------
-    model : Model
-        The model.
-    values : array, shape (p,)
-        The values of its parameters, SI units.
-    recording : Recording
-        What was recorded.
-    preprocessing : Preprocessing
-        How its motion is found from its positions.
-    progress : callable, optional
-        Called with the number of rows just read.
+    `progress` is called with the number of rows just read.
 
     Raises
     ------

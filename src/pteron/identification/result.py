@@ -59,14 +59,9 @@ class Verdict:
 
 
 def verdict_of(held_out: list[Prediction], *, repeats: bool) -> Verdict:
-    """Return the verdict on a model.
+    """Return the verdict on a model from its predictions of recordings that were not fitted.
 
-    Parameters
-    ----------
-    held_out : list of Prediction
-        How well it predicts recordings that were not fitted.
-    repeats : bool
-        Whether they repeat the motion that was fitted.
+    `repeats` says whether they repeat the motion that was fitted.
     """
     reasons: list[str] = []
     steps: list[str] = []

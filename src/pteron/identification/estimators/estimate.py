@@ -168,27 +168,10 @@ def estimate_of(
 ) -> Estimate:
     """Return the estimate that an estimator found.
 
-    Parameters
-    ----------
-    method : str
-        The estimator's name.
-    observations : Observations
-        What was solved.
-    factor : QrFactor
-        The factor of the weighted observations.
-    values, covariance : array, shape (p,) and (p, p)
-        What was found, for white residuals.
-    weights : array, shape (R, n) or (n,)
-        What the rows were multiplied by.
-    iterations : int
-        How many iterations it took.
-    converged : bool
-        Whether they settled.
-    scores : array, shape (R, n), optional
-        Weighted residuals that stand for the plain ones in a covariance that allows for their
-        correlation.
-    inverse : array, shape (p, p), optional
-        Inverse of the weighted normal equations, where it is not that of `factor`.
+    `values` (p,) and their `covariance` (p, p), for white residuals, come from `factor`, that of
+    the observations with rows times `weights`, (R, n) or (n,). `scores` (R, n) are weighted
+    residuals that stand for the plain ones in a covariance that allows for their correlation;
+    `inverse` (p, p) is that of the weighted normal equations, where it is not that of `factor`.
     """
     rest = residuals_of(observations, values)
     share = factor.degrees / factor.rows
@@ -221,7 +204,7 @@ def estimate_of(
 def whiteness(residuals: Array, used: NDArray[np.bool_] | None = None) -> Whiteness:
     """Return the test of residuals (R, n), in the order of time.
 
-    Of those that are not used, none takes part: a lag has the pairs of which both are used.
+    Those that are not `used` (R, n) take no part: a lag has the pairs of which both are used.
     """
     taken = np.ones(residuals.shape, dtype=bool) if used is None else used
     count = taken.sum(axis=0)
@@ -239,21 +222,11 @@ def whiteness(residuals: Array, used: NDArray[np.bool_] | None = None) -> Whiten
 
 
 def long_run_covariance(scores: Array, inverse: Array, degrees: float) -> Array:
-    """Return the covariance of values whose residuals are correlated in time.
+    """Return the covariance (p, p) of values whose residuals are correlated in time.
 
-    Parameters
-    ----------
-    scores : array, shape (R, p)
-        W^T times the weighted residuals of each row.
-    inverse : array, shape (p, p)
-        (W^T W)^-1 of the weighted equations.
-    degrees : float
-        Share of the equations that is not spent on the values.
-
-    Returns
-    -------
-    array, shape (p, p)
-        The sandwich of Newey and West, with Bartlett's weights.
+    It is the sandwich of Newey and West, with Bartlett's weights, of `scores` (R, p), W^T times the
+    weighted residuals of each row, and `inverse` (p, p), (W^T W)^-1 of the weighted equations.
+    `degrees` is the share of the equations that is not spent on the values.
     """
     rows = len(scores)
     lags = min(int(np.ceil(1.3 * np.sqrt(rows))), _MOST_LAGS)

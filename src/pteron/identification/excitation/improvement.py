@@ -7,7 +7,7 @@ import pickle
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
@@ -135,7 +135,7 @@ class Improvement:
         return replace(done, seconds=left, ended=ended or finished, finished=finished)
 
 
-def improved(starts: Sequence[Improvement], workers: int) -> Iterator[Improvement]:
+def improved(starts: Sequence[Improvement], workers: int) -> Generator[Improvement, None, None]:
     """Yield every start after each of its stages, done by so many processes; by this one if one.
 
     A start whose process fails is improved here, after the others. When the iteration is given up

@@ -64,27 +64,12 @@ def minimised(
     extra: Array,
     seconds: float,
 ) -> Array | None:
-    """Return coefficients (2 H + 1, n) from a start that is better, but need not keep the limits.
+    """Return coefficients (2 H + 1, n) that are better, but need not keep the limits.
 
-    Parameters
-    ----------
-    setting : Setting
-        What is optimised.
-    start : array, shape (2 H + 1, n)
-        Coefficients of a motion that keeps the limits.
-    doublings : int
-        Sharpness of the measure (see `measure`).
-    watched : tuple of str
-        The limits that are kept, by name; the fewer, the faster.
-    extra : array, shape (E,)
-        Instants beside the regular ones at which the limits are kept, s.
-    seconds : float
-        After which the solver stops where it is.
-
-    Returns
-    -------
-    array or None
-        None if the solver could not begin.
+    It begins at `start` (2 H + 1, n), a motion that keeps the limits, and stops after so many
+    seconds; None if it could not begin. `doublings` is the sharpness of the measure (see
+    `measure`). The limits `watched` by name are kept; the fewer, the faster; `extra` (E,) are
+    instants (s) beside the regular ones at which they are.
     """
     n, rows = setting.robot.freedom, 2 * setting.harmonics + 1
     count = max(_SAMPLES * setting.harmonics, 3 * _SAMPLES)

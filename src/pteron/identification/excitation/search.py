@@ -57,10 +57,10 @@ def optimal_excitation(
 ) -> Excitation:
     """Return a periodic trajectory from whose forces the base parameters are seen best.
 
-    Of random Fourier motions, each as large as the limits allow, the best are improved by IPOPT
-    with exact gradients. The limits hold at samples, and where they are then violated between these
-    the worst instants join the samples; in the end the motion is shrunk about its center, if need
-    be, until all limits are kept throughout the period.
+    The best of many random Fourier motions, each as large as the limits allow, are improved by
+    IPOPT with exact gradients. The limits hold at samples; where they are then violated between
+    these, the worst instants join the samples; in the end the motion is shrunk about its center, if
+    need be, until all limits are kept throughout the period.
 
     Parameters
     ----------

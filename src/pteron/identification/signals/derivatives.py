@@ -240,22 +240,10 @@ def uniform(time: Array, signal: Array) -> tuple[Array, Array]:
 
 
 def central_differences(signal: Array, rate: float) -> tuple[Array, Array]:
-    """Return first and second derivatives by central differences of eighth order.
+    """Return first and second derivatives of uniform samples (T, k), central and of eighth order.
 
-    At a hundredth of the sampling rate they are wrong by 1e-12, where the usual ones of second
-    order are wrong by 1e-3.
-
-    Parameters
-    ----------
-    signal : array, shape (T, k)
-        Uniformly sampled.
-    rate : float
-        Samples per second.
-
-    Returns
-    -------
-    first, second : array, shape (T - 8, k)
-        At the samples 4 to T - 5; per second, and per second squared.
+    They stand at the samples 4 to T - 5. At a hundredth of the sampling rate (Hz) they are wrong by
+    1e-12, where the usual ones of second order are wrong by 1e-3.
     """
     rows = len(signal) - 2 * LOST
     first, second = np.zeros((2, rows, signal.shape[1]))

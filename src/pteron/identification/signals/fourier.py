@@ -122,19 +122,9 @@ def fitted_series(
 ) -> FourierSeries:
     """Return the series fitted to samples by least squares, with the harmonics that show.
 
-    All periods count alike, so that noise is averaged over them, and samples may stand anywhere in
-    time. Harmonics above the last one that rises over the noise are left out.
-
-    Parameters
-    ----------
-    time : array, shape (T,)
-        Times of the samples, s.
-    signal : array, shape (T, k)
-        The samples, in any unit.
-    period : float
-        The time after which the signals repeat, s.
-    highest : float, optional
-        Take exactly the harmonics up to this frequency (Hz) instead.
+    All periods count alike, so that noise is averaged over them, and samples (T, k) may stand at
+    any times (T,), s. Harmonics above the last one that rises over the noise are left out, unless
+    `highest` (Hz) tells to take exactly those up to it.
 
     Raises
     ------

@@ -63,22 +63,9 @@ class States:
     ) -> States:
         """Return the states of sliders that move so: rho = J x inverted, and differentiated twice.
 
-        Parameters
-        ----------
-        robot : Manipulator
-            The machine.
-        motion : tuple of array, shape (R, n)
-            Slider coordinates, rates and accelerations.
-        time : array, shape (R,)
-            s.
-        mode : int
-            The assembly mode, from 0.
-        payload : array of int, shape (R,), optional
-            The phase.
-        source : str
-            What messages call the log.
-        first_row : int
-            The row of the first sample in it, from 0.
+        `motion` holds slider coordinates, rates and accelerations (R, n) at times (R,), s; `mode`
+        is the assembly mode, from 0, and `payload` the phases (R,). Messages call the log `source`;
+        its row `first_row`, from 0, is the first sample.
 
         Raises
         ------
