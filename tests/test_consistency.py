@@ -15,6 +15,13 @@ from pteron.identification.consistency import Bounds, Consistency, consistent_mo
 pytest.importorskip("cvxpy")
 
 QUADRUPTERON = CATALOG["quadrupteron"]
+SOME = [
+    "quadrupteron turned",
+    "quadrupteron-oblique +--+",
+    "tripteron",
+    "random 3T1R 1",
+    "random 3T 0",
+]
 BASES = {}
 
 
@@ -48,7 +55,7 @@ def disturbed(robot, seed, by=0.2):
     return values
 
 
-@pytest.mark.parametrize("name", MECHANISMS)
+@pytest.mark.parametrize("name", SOME)
 def test_exact_values_give_the_cad_model_back(name):
     robot = MECHANISMS[name]
     base = base_of(robot)
@@ -62,7 +69,7 @@ def test_exact_values_give_the_cad_model_back(name):
     np.testing.assert_allclose(result.parameters, pteron.parameters(robot), rtol=0, atol=1e-8)
 
 
-@pytest.mark.parametrize("name", MECHANISMS)
+@pytest.mark.parametrize("name", SOME)
 def test_a_wrong_cad_model_does_not_keep_the_forces_from_being_right(name):
     robot = MECHANISMS[name]
     base = base_of(robot)
@@ -83,8 +90,7 @@ def test_a_wrong_cad_model_does_not_keep_the_forces_from_being_right(name):
         )
 
 
-@pytest.mark.parametrize("name", ["quadrupteron", "tripteron", "random 3T1R 0"])
-@pytest.mark.parametrize("groups", [True, [(1, 3)]])
+@pytest.mark.parametrize(("name", "groups"), [("tripteron", True), ("random 3T1R 0", [(1, 3)])])
 def test_legs_that_share_parameters_keep_sharing_them(name, groups):
     robot = MECHANISMS[name]
     base = base_of(robot, groups)
@@ -108,7 +114,7 @@ def test_legs_that_share_parameters_keep_sharing_them(name, groups):
     np.testing.assert_allclose(again.parameters, pteron.parameters(true), rtol=0, atol=1e-8)
 
 
-@pytest.mark.parametrize("name", CATALOG)
+@pytest.mark.parametrize("name", ["quadrupteron", "tripteron-oblique"])
 def test_values_of_no_real_bodies_are_told_with_their_distance(name):
     robot = CATALOG[name]
     base = base_of(robot)
@@ -331,9 +337,8 @@ def test_input_is_checked():
         consistent_model(CATALOG["tripteron"], base, values)
 
 
-@pytest.mark.parametrize("name", ["quadrupteron", "tripteron-oblique", "random 3T1R 1"])
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("noise", [0.5, 10.0, 100.0])
+@pytest.mark.parametrize("name", ["quadrupteron", "random 3T1R 1"])
+@pytest.mark.parametrize(("noise", "seed"), [(0.5, 0), (10.0, 1), (100.0, 2)])
 def test_forces_differ_from_the_free_fit_by_little_of_the_residual(name, seed, noise):
     """Below 5 % of the residual, with noise (N) that leaves the free fit real, or far from it."""
     robot = MECHANISMS[name]

@@ -11,22 +11,21 @@ from mechanisms import CATALOG
 from scipy.stats import binom
 
 from pteron.errors import DataError
-from pteron.identification.equations import Equations, equations_of
 from pteron.identification.estimators import (
     ESTIMATORS,
+    column_errors,
     essential_parameters,
     huber,
+    maximum_likelihood,
     ordinary,
-    ridge,
+    qr_factor,
     total,
     weighted,
+    whiteness,
 )
-from pteron.identification.estimators.column_errors import column_errors
-from pteron.identification.estimators.likelihood import maximum_likelihood
-from pteron.identification.estimators.triangle import triangle
-from pteron.identification.estimators.whiteness import whiteness
 from pteron.identification.model import identification_model
-from pteron.identification.signals import Processing, treatment_of
+from pteron.identification.observation import Observations, observations_of
+from pteron.identification.signals import Processing, preprocessing_of
 
 P = 6
 TRUE = np.array([2.0, -1.0, 0.5, 3.0, 0.3, -0.2])
@@ -37,10 +36,10 @@ each_estimator = pytest.mark.parametrize("estimator", list(ESTIMATORS.values()),
 
 
 def made(matrix, forces, *, names=NAMES, used=None):
-    """Return equations; those that are not used are zero, as `equations_of` leaves them."""
+    """Return equations; those that are not used are zero, as `observations_of` leaves them."""
     gain = np.ones(forces.shape) if used is None else used.astype(float)
     rows = len(forces)
-    return Equations(
+    return Observations(
         tuple(names[: matrix.shape[-1]]),
         ("N",) * matrix.shape[-1],
         matrix * gain[..., None],
@@ -118,12 +117,11 @@ def test_weighted_is_that_of_numpy_with_rows_scaled():
     assert (np.abs(estimate.values - expected) < 0.01 * estimate.deviations).all()
 
 
-def test_a_triangle_holds_all_that_its_blocks_do(monkeypatch):
+def test_a_factor_holds_all_that_its_blocks_do():
     equations = drawn(3, rows=200)
     weights = np.random.default_rng(0).uniform(0.5, 2.0, equations.forces.shape)
-    whole = triangle(equations, weights)
-    monkeypatch.setattr("pteron.identification.estimators.triangle._BLOCK", 7)
-    parts = triangle(equations, weights)
+    whole = qr_factor(equations, weights)
+    parts = qr_factor(equations, weights, block=7)
     assert parts.values() == pytest.approx(whole.values(), rel=1e-12)
     assert parts.inverse() == pytest.approx(whole.inverse(), rel=1e-10)
     assert parts.rest == pytest.approx(whole.rest, rel=1e-10)
@@ -154,6 +152,26 @@ def test_an_estimate_carries_its_diagnosis(estimator):
     assert high - low == pytest.approx(2.0 * 0.6744897 * estimate.deviations)
     assert estimate.value("c") == estimate.values[2]
     assert estimate.as_dict()["equations"] == 360
+
+
+@pytest.mark.parametrize("estimator", [weighted, huber])
+def test_an_estimate_says_whether_its_search_has_settled(estimator):
+    equations = drawn(4, noise=np.array([0.1, 1.0, 5.0]))
+    settled, hasty = estimator(equations), estimator(equations, iterations=1)
+    assert settled.converged
+    assert settled.iterations > 1
+    assert not hasty.converged
+    assert hasty.iterations == 1
+    assert hasty.as_dict()["converged"] is False
+
+
+def test_total_counts_its_iterations_and_says_whether_they_settled():
+    equations = noisy_columns(0, 0.1)
+    settled, hasty = total(equations, ERRORS), total(equations, ERRORS, iterations=1)
+    assert settled.converged
+    assert settled.iterations > 1
+    assert (hasty.converged, hasty.iterations) == (False, 1)
+    assert total(equations).iterations == 1
 
 
 @each_estimator
@@ -351,47 +369,6 @@ def test_noise_in_every_column_explains_all_or_nothing():
     assert (np.abs(estimate.values) < 5.0 * estimate.deviations).all()
 
 
-# Ridge
-
-
-def poor(rows=60):
-    """Return equations that hardly move the third value and leave out the fourth."""
-    matrix = regressor(rows)
-    matrix[..., 2] *= 1e-3
-    matrix[..., 3] = 0.0
-    rng = np.random.default_rng(10)
-    return made(matrix, matrix @ TRUE + 0.3 * rng.normal(size=(rows, 3)))
-
-
-def test_ridge_names_what_the_data_hardly_touch():
-    prior, spread = np.full(P, 0.7), np.full(P, 2.0)
-    found = ridge(poor(), prior, spread)
-    assert found.poorly_excited == ("c", "d")
-    assert found.estimate.values[3] == pytest.approx(0.7, abs=1e-12)
-    assert found.estimate.deviations[3] == pytest.approx(2.0)
-    assert found.from_data[[0, 1, 4, 5]] == pytest.approx(1.0, abs=1e-2)
-    assert found.from_data[3] == pytest.approx(0.0, abs=1e-12)
-    seen = [0, 1, 4, 5]
-    error = (found.estimate.values - TRUE)[seen] / found.estimate.deviations[seen]
-    assert np.abs(error).max() < 4.0
-
-
-def test_a_wide_prior_leaves_the_data_alone():
-    equations = drawn(11)
-    found = ridge(equations, np.zeros(P), np.full(P, 1e6))
-    assert found.estimate.values == pytest.approx(weighted(equations).values, rel=1e-2)
-    assert found.poorly_excited == ()
-
-
-@pytest.mark.parametrize("rows", [1, 2, 3])
-def test_ridge_answers_with_hardly_any_equations(rows):
-    found = ridge(drawn(12, rows=rows, n=2), TRUE + 0.1, np.full(P, 0.5))
-    assert np.isfinite(found.estimate.values).all()
-    assert np.isfinite(found.estimate.noise).all()
-    assert (found.estimate.deviations <= 0.5 * (1.0 + 1e-9)).all()
-    assert np.abs(found.estimate.values - TRUE).max() < 2.0
-
-
 # Refusals
 
 
@@ -485,12 +462,12 @@ def experiment(slider_noise, seed=0, derivatives="periodic"):
         seed=2,
     )
     period = 2.0 if derivatives == "periodic" else None
-    treatment = treatment_of(robot, log, Processing(derivatives=derivatives, period=period))
+    treatment = preprocessing_of(robot, log, Processing(derivatives=derivatives, period=period))
     return SimpleNamespace(
         model=model,
         log=log,
         treatment=treatment,
-        equations=equations_of(model, log, treatment),
+        equations=observations_of(model, log, treatment),
         truth=truth(model),
     )
 
@@ -514,13 +491,16 @@ def test_likelihood_agrees_with_weights_where_positions_are_good():
     made_by = experiment(1e-8)
     # Likelihood uses every sample, as the others do without a parallel filter.
     plain = replace(made_by.treatment, band=0.45 * made_by.treatment.rate)
-    one = weighted(equations_of(made_by.model, made_by.log, plain))
+    one = weighted(observations_of(made_by.model, made_by.log, plain))
     other = maximum_likelihood(made_by.model, made_by.log, plain)
     assert other.names == one.names
     # The other one's band still takes a tenth of the noise away, and of the masked columns.
     assert (np.abs(other.values - one.values) < 1.0 * one.deviations).all()
     assert other.deviations == pytest.approx(one.deviations, rel=0.3)
     assert (np.abs(other.values - made_by.truth) < 4.5 * other.deviations).all()
+    assert other.converged
+    hasty = maximum_likelihood(made_by.model, made_by.log, plain, iterations=1)
+    assert (hasty.converged, hasty.iterations) == (False, 1)
 
 
 def test_likelihood_is_better_where_positions_are_noisy():
@@ -550,6 +530,6 @@ def test_motion_along_one_axis_names_what_it_cannot_see():
     log = log_of(robot, size=np.array(0.0), turn=0.0)
     wave = 0.04 * np.sin(2.0 * np.pi * 0.5 * log.time)
     sliders = log.sliders + np.outer(wave, [leg.direction[2] for leg in robot.legs])
-    treatment = treatment_of(robot, replace(log, sliders=sliders), Processing(band=10.0))
+    treatment = preprocessing_of(robot, replace(log, sliders=sliders), Processing(band=10.0))
     with pytest.raises(DataError, match=r"too little motion: .* values cannot be seen"):
-        weighted(equations_of(model, replace(log, sliders=sliders), treatment))
+        weighted(observations_of(model, replace(log, sliders=sliders), treatment))

@@ -20,7 +20,7 @@ from pteron.cli import identify as command
 from pteron.cli.screen import stages
 from pteron.identification import METHODS, write_log
 from pteron.identification.model import Joints
-from pteron.identification.signals.treatment import Derivatives
+from pteron.identification.signals import Derivatives
 
 FILES = ["identification.html", "identification.json"]
 
@@ -118,13 +118,13 @@ def test_options_reach_the_work():
     assert "Fv_R1" in names
     assert not {"Fv1", "offset1"} & set(names)
     assert "mgx_u" in names, "legs share their parameters"
-    for treatment in found["treatments"]:
+    for treatment in found["preprocessing"]:
         assert (treatment["derivatives"], treatment["band"]) == ("spline", 15.0)
     text = done(line.replace(" --json", ""))
     assert " 1 in c.csv " in text
     assert " 3 in d.csv " in text
     periodic = "identify a.csv --robot tripteron --out out --json --period 4 --cutoff 20"
-    assert json.loads(done(periodic))["treatments"][0]["period"] == 4.0
+    assert json.loads(done(periodic))["preprocessing"][0]["period"] == 4.0
 
 
 def test_choices_are_those_of_the_library():

@@ -10,9 +10,9 @@ import pteron
 from pteron.identification import (
     Log,
     Processing,
-    equations_of,
     identification_model,
-    treatment_of,
+    observations_of,
+    preprocessing_of,
     weighted,
 )
 
@@ -57,8 +57,8 @@ def test_it_is_identified_through_its_sensors(recorded):
     seen = plant.measured(recording, encoder=1e-6, force=0.01, jitter=1e-5, seed=0)
     log = Log("plant", seen.time, seen.sliders, seen.forces)
     model = identification_model(robot)
-    treatment = treatment_of(robot, log, Processing(derivatives="central"))
-    found = weighted(equations_of(model, log, treatment))
+    treatment = preprocessing_of(robot, log, Processing(derivatives="central"))
+    found = weighted(observations_of(model, log, treatment))
     truth = np.r_[model.base.values(built), friction.coulomb, friction.viscous, friction.offset]
     errors = (found.values - truth) / found.deviations
     assert np.abs(errors).max() < 4.5

@@ -9,6 +9,7 @@ from mechanisms import CATALOG, MECHANISMS, states
 
 import pteron
 from pteron.errors import DataError
+from pteron.identification.errors import LogError
 from pteron.identification.logs import Description, Log
 from pteron.identification.signals import (
     Decimation,
@@ -18,16 +19,15 @@ from pteron.identification.signals import (
     central_differences,
     cutoff_of,
     fitted_series,
+    preprocessing_of,
+    samples,
     smoothed,
     spline_motion,
-    treatment_of,
+    uniform,
     white_noise,
 )
-from pteron.identification.signals import samples as samples_module
 from pteron.identification.signals.blocks import blocks
-from pteron.identification.signals.differences import LOST
-from pteron.identification.signals.samples import samples
-from pteron.identification.signals.uniform import uniform
+from pteron.identification.signals.derivatives import LOST
 from pteron.kernels import numeric
 from pteron.workspace import home_pose
 
@@ -44,7 +44,7 @@ def waves(time, derivative=0):
 # Noise
 
 
-@pytest.mark.parametrize("size", [1e-7, 1e-5, 1e-3])
+@pytest.mark.parametrize("size", [1e-7, 1e-3])
 def test_white_noise_is_found_under_a_motion(size):
     noise = size * np.random.default_rng(0).normal(size=(len(TIME), 2))
     assert white_noise(waves(TIME) + noise) == pytest.approx(size, rel=0.05)
@@ -73,7 +73,7 @@ def test_a_constant_signal_has_no_noise():
 # Low-pass filter
 
 
-@pytest.mark.parametrize("size", [1e-6, 1e-4, 1e-2])
+@pytest.mark.parametrize("size", [1e-6, 1e-2])
 def test_a_cutoff_is_above_the_motion_and_takes_noise_away(size):
     noise = size * np.random.default_rng(2).normal(size=(len(TIME), 2))
     cutoff = cutoff_of(waves(TIME) + noise, RATE)
@@ -183,7 +183,7 @@ def test_a_series_is_found_with_its_harmonics(name):
         assert np.abs(found.at(time, k) - series(time, k)).max() < least
 
 
-@pytest.mark.parametrize("name", SAMPLINGS)
+@pytest.mark.parametrize("name", ["four and a half", "uneven", "with a gap"])
 def test_noise_adds_no_harmonics_and_is_measured(name):
     time = SAMPLINGS[name]
     size = 1e-3
@@ -209,8 +209,8 @@ def test_a_gap_that_hides_a_part_of_the_period_is_refused():
 # The parallel filter
 
 
-@pytest.mark.parametrize("factor", [1, 2, 5, 16])
-@pytest.mark.parametrize("rows", [300, 301, 333])
+@pytest.mark.parametrize("factor", [1, 5, 16])
+@pytest.mark.parametrize("rows", [300, 333])
 def test_decimation_keeps_an_equation_true(factor, rows):
     rng = np.random.default_rng(8)
     decimation = Decimation(factor)
@@ -220,7 +220,7 @@ def test_decimation_keeps_an_equation_true(factor, rows):
     assert filtered @ values == pytest.approx(decimation(matrix @ values), abs=1e-12)
 
 
-@pytest.mark.parametrize("factor", [1, 2, 5, 16])
+@pytest.mark.parametrize("factor", [1, 5, 16])
 def test_decimation_is_a_convolution_at_its_centers(factor):
     signal = np.random.default_rng(9).normal(size=(400, 2))
     decimation = Decimation(factor)
@@ -255,7 +255,7 @@ def test_what_decimation_leaves_of_white_noise_is_nearly_white():
     assert abs(neighbours) < 0.1
 
 
-@pytest.mark.parametrize("rows", [0, 1, 80, 81])
+@pytest.mark.parametrize("rows", [0, 80, 81])
 def test_decimation_of_a_few_rows(rows):
     decimation = Decimation(10)
     assert decimation(np.ones((rows, 2))).shape == (int(rows == 81), 2)
@@ -280,9 +280,9 @@ def counted(rows, *, gaps=(), payload=None, rate=100.0, first_row=0):
     return Log("log.csv", time, numbers, numbers, payload=phases, first_row=first_row)
 
 
-@pytest.mark.parametrize("size", [1, 2, 7, 50, 1000])
-@pytest.mark.parametrize("margin", [1, 4, 13])
-@pytest.mark.parametrize("length", [1, 3, 29, 200])
+@pytest.mark.parametrize("size", [1, 7, 1000])
+@pytest.mark.parametrize("margin", [1, 13])
+@pytest.mark.parametrize("length", [1, 29, 200])
 def test_blocks_tile_a_log_without_overlap_or_loss(size, margin, length):
     log = counted(200)
     fresh = []
@@ -295,7 +295,7 @@ def test_blocks_tile_a_log_without_overlap_or_loss(size, margin, length):
     assert np.array_equal(np.concatenate(fresh), np.arange(margin, 200 - margin))
 
 
-@pytest.mark.parametrize("length", [1, 2, 10, 31, 200])
+@pytest.mark.parametrize("length", [1, 31, 200])
 def test_blocks_bridge_neither_gaps_nor_changes_of_the_payload(length):
     payload = np.r_[np.zeros(120, dtype=int), np.ones(80, dtype=int)]
     log = counted(200, gaps=(50,), payload=payload, first_row=1000)
@@ -321,7 +321,7 @@ def test_short_stretches_yield_nothing():
 
 
 each_kind = pytest.mark.parametrize(
-    "name", ["quadrupteron", "quadrupteron ----", "tripteron on a wall", "random 3T1R 1"]
+    "name", ["quadrupteron ----", "tripteron on a wall", "random 3T1R 1"]
 )
 
 
@@ -354,7 +354,7 @@ def in_mode(robot, mode):
     return Log("log.csv", np.arange(float(len(pose))), sliders, sliders, pose=pose)
 
 
-@pytest.mark.parametrize("name", ["quadrupteron", "random 3T1R 1"])
+@pytest.mark.parametrize("name", ["random 3T1R 1"])
 @pytest.mark.parametrize("mode", [0, 1])
 def test_a_measured_pose_says_the_assembly_mode(name, mode):
     robot = MECHANISMS[name]
@@ -363,7 +363,7 @@ def test_a_measured_pose_says_the_assembly_mode(name, mode):
     assert assembly_mode(robot, log) == assembly_mode(robot, turned) == mode
 
 
-@pytest.mark.parametrize("name", ["quadrupteron", "random 3T1R 1"])
+@pytest.mark.parametrize("name", ["random 3T1R 1"])
 def test_a_declared_mode_comes_first_and_that_of_home_last(name):
     robot = MECHANISMS[name]
     log = in_mode(robot, 0)
@@ -389,24 +389,25 @@ def unreachable(log, row):
     return replace(log, sliders=sliders)
 
 
-@pytest.mark.parametrize("row", [300, 1111, 1900])
-@pytest.mark.parametrize("first", [0, 5000])
-def test_a_sample_without_a_pose_is_named_in_any_block(row, first, monkeypatch):
+@pytest.mark.parametrize(("row", "first"), [(300, 0), (1900, 5000)])
+def test_a_sample_without_a_pose_is_named_in_any_block(row, first):
     robot = CATALOG["quadrupteron"]
     log = replace(log_of(robot, duration=4.0), first_row=first)
-    treatment = replace(treatment_of(robot, log), derivatives="central", cutoff=None, band=100.0)
-    monkeypatch.setattr(samples_module, "_BLOCK", 250)
+    treatment = preprocessing_of(robot, log)
+    treatment = replace(treatment, derivatives="central", cutoff=None, band=100.0)
     broken = unreachable(log, row)
     for given in (broken, pieces(broken, 333)):
-        with pytest.raises(DataError, match=rf"row {first + row + 1}: no pose of quadrupteron"):
-            list(samples(robot, given, treatment))
+        with pytest.raises(LogError, match=": no pose of quadrupteron has the sliders") as caught:
+            list(samples(robot, given, treatment, block=250))
+        assert caught.value.reason == "no pose"
+        assert caught.value.place == f"log.csv: row {first + row + 1}"
 
 
 def test_a_wrong_mode_is_told_from_a_wrong_machine():
     # A pose that is lost in one mode only does not exist here: both fail, and the hint is general.
     robot = CATALOG["quadrupteron"]
     log = unreachable(log_of(robot, duration=1.0), 100)
-    treatment = treatment_of(robot, log, Processing(derivatives="central"))
+    treatment = preprocessing_of(robot, log, Processing(derivatives="central"))
     with pytest.raises(DataError, match="another machine"):
         list(samples(robot, log, replace(treatment, cutoff=None)))
 
@@ -432,17 +433,15 @@ def test_a_singular_sample_is_named():
         States.of_sliders(robot, tuple(motion_of), np.arange(30.0), 0, first_row=1000)
 
 
-@pytest.mark.parametrize("derivatives", ["central", "spline"])
-@pytest.mark.parametrize("margin", [0, 37])
-def test_fresh_samples_of_blocks_tile_a_log(derivatives, margin, monkeypatch):
+@pytest.mark.parametrize(("derivatives", "margin"), [("central", 0), ("spline", 37)])
+def test_fresh_samples_of_blocks_tile_a_log(derivatives, margin):
     robot = CATALOG["tripteron"]
     # The knots of a spline are where a block says: noise falls on them in other ways.
     log = log_of(robot, duration=4.0, slider_noise=1e-6 * (derivatives == "central"))
-    treatment = treatment_of(robot, log, Processing(derivatives=derivatives, cutoff=20.0))
+    treatment = preprocessing_of(robot, log, Processing(derivatives=derivatives, cutoff=20.0))
     whole = list(samples(robot, log, treatment, margin=margin))
     assert len(whole) == 1
-    monkeypatch.setattr(samples_module, "_BLOCK", 300)
-    found = list(samples(robot, pieces(log, 123), treatment, margin=margin))
+    found = list(samples(robot, pieces(log, 123), treatment, margin=margin, block=300))
     assert len(found) > 3
     for name, least in (
         ("time", 1e-12),
@@ -461,7 +460,7 @@ def test_fresh_samples_of_blocks_tile_a_log(derivatives, margin, monkeypatch):
 def test_a_log_shorter_than_the_edges_is_refused():
     robot = CATALOG["tripteron"]
     log = log_of(robot, duration=8.0)
-    treatment = treatment_of(robot, log, Processing(derivatives="central", cutoff=5.0))
+    treatment = preprocessing_of(robot, log, Processing(derivatives="central", cutoff=5.0))
     with pytest.raises(DataError, match="shorter than the"):
         list(samples(robot, log.part(0, 900), treatment))
 
@@ -489,7 +488,7 @@ def test_uneven_samples_give_the_motion(derivatives):
     rng = np.random.default_rng(13)
     time = np.arange(4000) / 500.0 + rng.uniform(-4e-4, 4e-4, 4000)
     log = log_of(robot, time=time)
-    treatment = treatment_of(robot, log, Processing(derivatives=derivatives))
+    treatment = preprocessing_of(robot, log, Processing(derivatives=derivatives))
     (found,) = samples(robot, log, replace(treatment, cutoff=None))
     expected = motion(robot, found.states.time)
     assert found.states.pose == pytest.approx(expected[0], abs=1e-8)
@@ -499,13 +498,13 @@ def test_uneven_samples_give_the_motion(derivatives):
 def test_the_data_choose_the_treatment():
     robot = CATALOG["quadrupteron"]
     clean, noisy = log_of(robot), log_of(robot, slider_noise=1e-5)
-    assert treatment_of(robot, clean).derivatives == "spline"
-    assert treatment_of(robot, noisy).derivatives == "central"
+    assert preprocessing_of(robot, clean).derivatives == "spline"
+    assert preprocessing_of(robot, noisy).derivatives == "central"
     known = replace(noisy, description=Description(period=4.0))
-    periodic = treatment_of(robot, known)
+    periodic = preprocessing_of(robot, known)
     assert (periodic.derivatives, periodic.period) == ("periodic", 4.0)
-    assert treatment_of(robot, known, rows=10**8).derivatives == "central"
-    assert treatment_of(robot, noisy).slider_noise == pytest.approx(1e-5, rel=0.1)
+    assert preprocessing_of(robot, known, rows=10**8).derivatives == "central"
+    assert preprocessing_of(robot, noisy).slider_noise == pytest.approx(1e-5, rel=0.1)
 
 
 def test_speeds_that_count_as_slow_are_a_share_of_the_usual_ones():
@@ -514,7 +513,7 @@ def test_speeds_that_count_as_slow_are_a_share_of_the_usual_ones():
     pose, velocity, _ = motion(robot, log.time)
     usual = np.sqrt((pteron.joint_rates(robot, pose, velocity).sliders ** 2).mean(axis=0))
     for share in (0.0, 0.02, 0.3):
-        slow = treatment_of(robot, log, Processing(slow=share)).slow
+        slow = preprocessing_of(robot, log, Processing(slow=share)).slow
         assert slow == pytest.approx(share * usual, rel=0.01, abs=1e-15)
 
 
@@ -537,12 +536,12 @@ def test_a_treatment_that_cannot_be_is_refused(case):
     robot = CATALOG["tripteron"]
     log = log_of(robot)
     with pytest.raises(DataError, match=message):
-        treatment_of(robot, log, Processing(**given))
+        preprocessing_of(robot, log, Processing(**given))
 
 
 def test_the_longest_stretch_decides_the_treatment():
     robot = CATALOG["tripteron"]
     log = log_of(robot, slider_noise=1e-5)
-    whole, cut = treatment_of(robot, log), treatment_of(robot, without(log, 400, 700))
+    whole, cut = preprocessing_of(robot, log), preprocessing_of(robot, without(log, 400, 700))
     assert cut.rate == pytest.approx(whole.rate, rel=1e-9)
     assert cut.cutoff == pytest.approx(whole.cutoff, rel=0.5)

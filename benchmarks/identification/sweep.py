@@ -24,19 +24,19 @@ import plant
 import pteron
 from pteron import atomic
 from pteron.identification import (
-    Equations,
+    Observations,
     Estimate,
     Log,
     Model,
-    Treatment,
+    Preprocessing,
     column_errors,
-    equations_of,
+    observations_of,
     huber,
     identification_model,
     maximum_likelihood,
     ordinary,
     total,
-    treatment_of,
+    preprocessing_of,
     weighted,
 )
 from pteron.identification.prediction import predict
@@ -68,7 +68,7 @@ SWEPT = 3 if _QUICK else 10
 COMPENSATION = 0.8
 """Share of the friction that the machine's controller knows: the rest shakes it at reversals."""
 
-Estimator = Callable[[Model, Log, Treatment, Equations], Estimate]
+Estimator = Callable[[Model, Log, Preprocessing, Observations], Estimate]
 
 ESTIMATORS: dict[str, Estimator] = {
     "ordinary": lambda model, log, treatment, equations: ordinary(equations),
@@ -167,8 +167,8 @@ def score(
     held: dict[str, list[tuple[float, float, float]]] = {name: [] for name in names}
     for seed in range(repetitions):
         log = bench.log(noise, seed)
-        treatment = treatment_of(bench.robot, log)
-        equations = equations_of(bench.model, log, treatment)
+        treatment = preprocessing_of(bench.robot, log)
+        equations = observations_of(bench.model, log, treatment)
         for name in names:
             found = ESTIMATORS[name](bench.model, log, treatment, equations)
             off = found.values - bench.truth
@@ -179,7 +179,7 @@ def score(
                     bench.model,
                     found.values,
                     recording(other),
-                    treatment_of(bench.robot, other),
+                    preprocessing_of(bench.robot, other),
                 )
                 true_floor = noise[1] * np.sqrt((bench.other.forces**2).mean(axis=0))
                 held[name].append(

@@ -1,26 +1,24 @@
 """From a recorded motion to the parameters of the machine that made it, and how far to trust them.
 
 `identify` does all of it. Its parts can be used by themselves: `logs` reads, `signals` turns
-samples into states, `equations_of` stacks the regressor, `estimators` solve, `consistency` finds
+samples into states, `observations_of` stacks the regressor, `estimators` solve, `consistency` finds
 real bodies, `excitation` makes the motions worth recording.
 """
 
 from pteron.identification.consistency import Bounds, Consistency, consistent_model
 from pteron.identification.drive_gains import DriveGains, identify_drive_gains
-from pteron.identification.equations import Equations, equations_of, stacked
+from pteron.identification.errors import LogError
 from pteron.identification.estimators import (
     Essential,
     Estimate,
-    Ridge,
+    column_errors,
     essential_parameters,
     huber,
+    maximum_likelihood,
     ordinary,
-    ridge,
     total,
     weighted,
 )
-from pteron.identification.estimators.column_errors import column_errors
-from pteron.identification.estimators.likelihood import maximum_likelihood
 from pteron.identification.excitation import (
     Excitation,
     FourierMotion,
@@ -32,18 +30,17 @@ from pteron.identification.fitting import METHODS
 from pteron.identification.identify import identify
 from pteron.identification.logs import Log, open_log, read_log, write_log
 from pteron.identification.model import Model, Terms, identification_model
+from pteron.identification.observation import Observations, observations_of, stacked
 from pteron.identification.payload import Payload, identify_payload
 from pteron.identification.prediction import Prediction
-from pteron.identification.result import Identification
-from pteron.identification.signals import Processing, States, Treatment, treatment_of
-from pteron.identification.verdict import Verdict
+from pteron.identification.result import Identification, Verdict
+from pteron.identification.signals import Preprocessing, Processing, States, preprocessing_of
 
 __all__ = [
     "METHODS",
     "Bounds",
     "Consistency",
     "DriveGains",
-    "Equations",
     "Essential",
     "Estimate",
     "Excitation",
@@ -51,18 +48,18 @@ __all__ = [
     "Identification",
     "Limits",
     "Log",
+    "LogError",
     "Model",
+    "Observations",
     "Payload",
     "Prediction",
+    "Preprocessing",
     "Processing",
-    "Ridge",
     "States",
     "Terms",
-    "Treatment",
     "Verdict",
     "column_errors",
     "consistent_model",
-    "equations_of",
     "essential_parameters",
     "huber",
     "identification_model",
@@ -70,15 +67,15 @@ __all__ = [
     "identify_drive_gains",
     "identify_payload",
     "maximum_likelihood",
+    "observations_of",
     "open_log",
     "optimal_excitation",
     "ordinary",
+    "preprocessing_of",
     "random_excitation",
     "read_log",
-    "ridge",
     "stacked",
     "total",
-    "treatment_of",
     "weighted",
     "write_log",
 ]

@@ -10,17 +10,12 @@ from typing import Literal
 import numpy as np
 
 from pteron.errors import DataError
-from pteron.identification.equations import Equations, equations_of
-from pteron.identification.estimators.weighted import weighted
+from pteron.identification.estimators import weighted
 from pteron.identification.logs import Log
 from pteron.identification.model import Model
-from pteron.identification.signals import Treatment
-from pteron.kernels import Array, numeric
-from pteron.kinematics import random_poses
-from pteron.manipulator import Manipulator, parameters
-from pteron.reduction import base_regressor
-
-__all__ = ["Fault", "column_fault", "exchanged_sliders", "has_negative_inertia", "unseen"]
+from pteron.identification.observation import Observations, observations_of
+from pteron.identification.plausibility import has_negative_inertia
+from pteron.identification.signals import Preprocessing
 
 _DECISIVE = 3.0
 """Factor by which the error must fall for a fault to be called found."""
@@ -29,13 +24,9 @@ _EXPLAINED = 0.3
 """Error relative to the forces below which a fit explains them."""
 
 _ROWS = 4000
-_PROBES = 50
 
 _Choice = tuple[tuple[int, ...], tuple[int, ...]]
 """An order of the columns, and their signs."""
-
-_MOST_UNSEEN = 0.5
-"""Share of the base parameters that a motion may leave unseen."""
 
 
 @dataclass(frozen=True)
@@ -81,34 +72,21 @@ class Fault:
         return " and ".join(parts)
 
 
-def column_fault(model: Model, log: Log, treatment: Treatment) -> Fault | None:
-    """Return the exchange of columns, or of signs, that explains the forces far better.
+def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> Fault | None:
+    """Return the exchange of columns, or of signs, that explains a log's forces far better.
 
     All n! 2^n orders and signs of the forces are tried, all orders of the sliders, and their signs
     one by one. Signs of all forces at once are settled by the machine's inertia, which is positive.
-
-    Parameters
-    ----------
-    model : Model
-        The model.
-    log : Log
-        Whose forces it explains badly, or with negative inertia.
-    treatment : Treatment
-        How the log is treated.
-
-    Returns
-    -------
-    Fault or None
-        None where nothing makes the error three times smaller, or the inertia positive.
+    None where nothing makes the error three times smaller, or the inertia positive.
     """
     # Without the mask of slow sliders, which belongs to the order that is in question.
-    plain = replace(treatment, slow=np.zeros_like(treatment.slow))
-    equations = equations_of(model, log, plain)
-    n = equations.actuators
+    plain = replace(preprocessing, slow=np.zeros_like(preprocessing.slow))
+    observations = observations_of(model, log, plain)
+    n = observations.actuators
     # A choice of signs and its opposite fit alike.
     signs = [(1, *rest) for rest in product((1, -1), repeat=n - 1)]
     choices = [(order, sign) for order in permutations(range(n)) for sign in signs]
-    errors = _errors(equations, choices)
+    errors = _errors(observations, choices)
     before = errors[0]
     best = int(np.argmin(errors))
     order, sign = choices[best] if errors[best] * _DECISIVE < before else choices[0]
@@ -117,7 +95,7 @@ def column_fault(model: Model, log: Log, treatment: Treatment) -> Fault | None:
     # Exchanged forces can do some of what exchanged sliders do.
     if swapped is not None and swapped.after < 0.7 * after:
         return swapped
-    mended = equations.with_forces(equations.forces[:, list(order)] * np.array(sign))
+    mended = observations.with_forces(observations.forces[:, list(order)] * np.array(sign))
     # Where nothing explains the forces, the sign of what is left says nothing.
     if after < _EXPLAINED and has_negative_inertia(model, weighted(mended).values):
         sign = tuple(-s for s in sign)
@@ -126,13 +104,13 @@ def column_fault(model: Model, log: Log, treatment: Treatment) -> Fault | None:
     return Fault("force", tuple(order), sign, before, after)
 
 
-def _errors(equations: Equations, choices: Sequence[_Choice]) -> list[float]:
+def _errors(observations: Observations, choices: Sequence[_Choice]) -> list[float]:
     """Return the error of the fit relative to the forces, for each order and signs of these.
 
     One factorisation serves all: the error is what the projection on the columns leaves.
     """
-    step = max(len(equations.forces) // _ROWS, 1)
-    matrix, forces = equations.matrix[::step], equations.forces[::step]
+    step = max(len(observations.forces) // _ROWS, 1)
+    matrix, forces = observations.matrix[::step], observations.forces[::step]
     flat = matrix.reshape(-1, matrix.shape[-1])
     lengths = np.linalg.norm(flat, axis=0)
     basis = np.linalg.qr(flat / np.where(lengths > 0.0, lengths, 1.0))[0]
@@ -145,19 +123,12 @@ def _errors(equations: Equations, choices: Sequence[_Choice]) -> list[float]:
     return found
 
 
-def exchanged_sliders(model: Model, log: Log, treatment: Treatment, before: float) -> Fault | None:
+def exchanged_sliders(
+    model: Model, log: Log, preprocessing: Preprocessing, before: float
+) -> Fault | None:
     """Return the order of the sliders, or the sign of one, that explains the forces far better.
 
-    Parameters
-    ----------
-    model : Model
-        The model.
-    log : Log
-        The log.
-    treatment : Treatment
-        How it is treated.
-    before : float
-        Error of the fit relative to the forces as they are.
+    `before` is the error of the fit relative to the forces as they are.
     """
     n = log.sliders.shape[1]
     best: Fault | None = None
@@ -169,57 +140,13 @@ def exchanged_sliders(model: Model, log: Log, treatment: Treatment, before: floa
     for order, signs in choices:
         other = replace(log, sliders=log.sliders[:, list(order)] * np.array(signs))
         try:
-            equations = equations_of(model, other, treatment)
+            observations = observations_of(model, other, preprocessing)
         except DataError:
             continue  # no poses in this order
-        (error,) = _errors(equations, [(usual, upright)])
+        (error,) = _errors(observations, [(usual, upright)])
         if error * _DECISIVE < (before if best is None else best.after * _DECISIVE):
             best = Fault("rho", order, signs, before, error)
     return best
-
-
-def has_negative_inertia(model: Model, values: Array) -> bool:
-    """Say whether values give a machine whose kinetic energy is negative.
-
-    x''^T M x'' is the power-like product of accelerations and the forces that they need; it is
-    positive for every real machine, whatever its CAD says.
-    """
-    robot = model.robot
-    rng = np.random.default_rng(0)
-    pose = random_poses(robot, _PROBES, seed=rng, bend=0.3, hold=0.3)
-    acceleration = rng.normal(size=pose.shape)
-    rest = np.zeros_like(pose)
-    base = values[: model.base.rank]
-    needed = base_regressor(robot, model.base, pose, rest, acceleration)
-    still = base_regressor(robot, model.base, pose, rest, rest)
-    forces = (needed - still) @ base
-    jacobians = numeric(robot, "jacobian")(pose)
-    products = np.einsum("rn,rnm,rm->r", forces, jacobians, acceleration)
-    return bool((products < 0.0).mean() > 0.5)
-
-
-def unseen(
-    model: Model, deviations: Array, cad: Manipulator | None = None
-) -> tuple[tuple[str, ...], bool]:
-    """Return the base parameters that a log cannot show, and whether they are too many.
-
-    Those whose standard deviation is larger than what they are usually made of: the sizes of the
-    CAD's parameters, added up as they are grouped.
-
-    Parameters
-    ----------
-    model : Model
-        The model.
-    deviations : array, shape (p,)
-        Standard deviations of its values.
-    cad : Manipulator, optional
-        The machine as it is drawn; by default that of the model.
-    """
-    base = model.base
-    usual = np.abs(base.grouping) @ np.abs(parameters(cad or base.robot))
-    hidden = deviations[: base.rank] > usual
-    names = tuple(name for name, flag in zip(base.names, hidden, strict=True) if flag)
-    return names, bool(hidden.mean() > _MOST_UNSEEN)
 
 
 def _listed(names: Sequence[str]) -> str:

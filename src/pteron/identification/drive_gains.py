@@ -8,21 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from pteron.errors import DataError
-from pteron.identification.equations import Equations
-from pteron.identification.estimators import Estimate, weighted
-from pteron.identification.estimators.triangle import triangle
-from pteron.identification.estimators.weighted import actuator_noise
+from pteron.identification.errors import LogError
+from pteron.identification.estimators import Estimate, qr_factor, weighted
+from pteron.identification.estimators.least_squares import actuator_noise
+from pteron.identification.estimators.total import smallest_corrections
 from pteron.identification.logs import Log
 from pteron.identification.logs.description import KnownPayload
 from pteron.identification.model import Model, Terms, identification_model
-from pteron.identification.payload import equations_with_payload
+from pteron.identification.observation import Observations
+from pteron.identification.payload import observations_with_payload
 from pteron.identification.signals import Processing
 from pteron.kernels import Array
 from pteron.manipulator import BODY_PARAMETERS, Manipulator
 from pteron.reduction import BaseParameters
-
-__all__ = ["DriveGains", "identify_drive_gains"]
 
 _UNSEEN = 1e-10
 """Singular value, relative to the largest, below which gains are not told from inertia."""
@@ -49,9 +47,9 @@ class DriveGains:
     total_least_squares : array, shape (n,)
         Where the search for the gains began.
     unit : str
-        Of the log's force columns: A, V or %.
+        The unit of the log's force columns: A, V or %.
     estimate : Estimate
-        Of the gains (``g1`` ..., N per unit) and of the model's values, with payload excluded;
+        The fit of the gains (``g1`` ..., N per unit) and of the model's values without payload;
         its noise and residuals are in `unit`.
     residual : array, shape (n,)
         Standard deviation of what is left of each current, in `unit`, before the filter.
@@ -129,8 +127,8 @@ def identify_drive_gains(
     robot : Manipulator
         The machine: its geometry counts, its inertial parameters play no part.
     log : Log
-        Of currents (A, V or %), whose payload column has both phases, 0 and 1; or a log without
-        payload.
+        A log of currents (A, V or %), whose payload column has both phases, 0 and 1; or one
+        without payload.
     with_payload : Log, optional
         A log of the same machine with the payload, where the first has none.
     payload : KnownPayload, optional
@@ -142,13 +140,9 @@ def identify_drive_gains(
     base : BaseParameters, optional
         Another choice of base parameters, such as that of legs which share theirs.
 
-    Returns
-    -------
-    DriveGains
-
     Raises
     ------
-    DataError
+    LogError
         If the forces are newtons already, the payload is not known, a phase is missing, or the
         motion does not tell gains from inertia.
 
@@ -161,26 +155,30 @@ def identify_drive_gains(
     unit = _unit(logs)
     known = payload or logs[-1].description.payload or log.description.payload
     if known is None:
-        raise DataError(
-            f"{logs[-1].source}: the payload is not known, and without it gains and inertia cannot "
-            "be told apart; declare [payload] in the log's description"
+        raise LogError(
+            "no payload",
+            logs[-1].source,
+            "the payload is not known, and without it gains and inertia cannot be told apart; "
+            "declare [payload] in the log's description",
         )
     if robot.platform.turns and not known.inertia:
-        raise DataError(
-            f"{logs[-1].source}: only the payload's mass is known, but {robot.name} turns its "
-            "platform; declare its center_of_mass (or first_moment) and inertia about P too"
+        raise LogError(
+            "no payload",
+            logs[-1].source,
+            f"only the payload's mass is known, but {robot.name} turns its platform; declare its "
+            "center_of_mass (or first_moment) and inertia about P too",
         )
     plain = identification_model(robot, replace(terms or Terms(), payload=False), base=base)
     # All four columns of the payload: none is solved for, so that none need be independent.
     model = Model(plain.base, replace(plain.terms, payload=True), plain.joins)
-    equations = equations_with_payload(model, log, with_payload, processing)
-    carried = equations.matrix[..., -len(BODY_PARAMETERS) :] @ np.array(
+    observations = observations_with_payload(model, log, with_payload, processing)
+    carried = observations.matrix[..., -len(BODY_PARAMETERS) :] @ np.array(
         [known.mass, *known.first_moment, known.inertia]
     )
-    equations = equations.columns(range(len(plain.names)))
-    start, condition, gap = _total(equations, carried, log.source)
-    estimate = _likely(equations, carried, start, unit, log.source)
-    n = equations.actuators
+    observations = observations.columns(range(len(plain.names)))
+    start, condition, gap = _total(observations, carried, log.source)
+    estimate = _likely(observations, carried, start, unit, log.source)
+    n = observations.actuators
     return DriveGains(
         gains=estimate.values[:n],
         deviations=estimate.deviations[:n],
@@ -196,84 +194,90 @@ def identify_drive_gains(
 def _unit(logs: list[Log]) -> str:
     for log in logs:
         if log.description.force_unit == "N":
-            raise DataError(
-                f"{log.source}: its forces are in newtons already, motor currents (A, V or %) are "
-                "expected; declare their unit, and no gains, under [forces] in its description"
+            raise LogError(
+                "currents",
+                log.source,
+                "its forces are in newtons already, motor currents (A, V or %) are expected; "
+                "declare their unit, and no gains, under [forces] in its description",
             )
     units = {log.description.force_unit for log in logs}
     if len(units) > 1:
-        raise DataError(
-            f"{logs[1].source}: its forces are in {logs[1].description.force_unit}, those of "
-            f"{logs[0].source} in {logs[0].description.force_unit}; give both in one unit"
+        raise LogError(
+            "currents",
+            logs[1].source,
+            f"its forces are in {logs[1].description.force_unit}, those of {logs[0].source} in "
+            f"{logs[0].description.force_unit}; give both in one unit",
         )
     return units.pop()
 
 
-def _total(equations: Equations, carried: Array, source: str) -> tuple[Array, float, float]:
+def _total(observations: Observations, carried: Array, source: str) -> tuple[Array, float, float]:
     """Return g and beta by total least squares, with the condition number and the gap.
 
-    The columns W are exact, as in the likelihood: noise is in the currents alone. An orthogonal
-    factor takes them out first (Van Huffel and Vandewalle), else the weakest of dozens of inertial
-    parameters would pass for the null vector.
+    The columns W are exact, as in the likelihood: noise is in the currents alone. Else the weakest
+    of dozens of inertial parameters would pass for the null vector.
     """
-    n, p = equations.actuators, len(equations.names)
-    currents = equations.forces[..., None] * np.eye(n)
+    n, p = observations.actuators, len(observations.names)
+    currents = observations.forces[..., None] * np.eye(n)
     homogeneous = replace(
-        equations,
-        names=(*equations.names, *(f"g{i}" for i in range(1, n + 1))),
-        units=(*equations.units, *("",) * n),
-        matrix=np.concatenate([-equations.matrix, currents], axis=-1),
-        forces=-carried,
+        observations,
+        names=(*observations.names, *(f"g{i}" for i in range(1, n + 1))),
+        units=(*observations.units, *("",) * n),
+        matrix=np.concatenate([-observations.matrix, currents], axis=-1),
+        forces=carried,
     )
-    factor = triangle(homogeneous)
+    factor = qr_factor(homogeneous)
     length = np.sqrt(factor.image @ factor.image + factor.rest)
     if length == 0.0:
-        raise DataError(f"{source}: the actuators do not feel the payload; move it about")
+        raise LogError("no payload", source, "the actuators do not feel the payload; move it about")
     # W has to be seen by itself, and its message names what is not.
-    triangle(equations).check_seen()
-    scale = np.r_[np.where(factor.scale > 0.0, factor.scale, 1.0), length]
-    whole = np.zeros((p + n + 1, p + n + 1))
-    whole[:-1, :-1] = factor.factor
-    whole[:, -1] = np.r_[factor.image, np.sqrt(factor.rest)] / length
-    _, sizes, directions = np.linalg.svd(whole[p:, p:])
-    last = directions[-1]
-    if sizes[-2] <= _UNSEEN * sizes[0] or abs(last[-1]) <= _UNSEEN:
-        raise DataError(
-            f"{source}: the payload does not tell the gains from the inertia; carry a heavier one, "
-            "and move all coordinates in both phases"
+    qr_factor(observations).check_seen()
+    upper = np.zeros((p + n + 1, p + n + 1))
+    upper[:-1, :-1] = factor.factor
+    upper[:, -1] = np.r_[factor.image, np.sqrt(factor.rest)]
+    found = smallest_corrections(upper, p, np.r_[np.ones(n), length])
+    sizes = found.sizes
+    if sizes[-2] <= _UNSEEN * sizes[0] or found.share <= _UNSEEN:
+        raise LogError(
+            "too little motion",
+            source,
+            "the payload does not tell the gains from the inertia; carry a heavier one, and move "
+            "all coordinates in both phases",
         )
-    gains = last[:-1] / last[-1]
-    inertia = -np.linalg.solve(whole[:p, :p], whole[:p, p:] @ np.r_[gains, 1.0])
-    start = np.r_[gains, inertia] * length / np.r_[scale[p:-1], scale[:p]]
-    return start, float(sizes[0] / sizes[-2]), float(sizes[-1] / sizes[-2])
+    values = found.values / np.where(factor.scale > 0.0, factor.scale, 1.0)
+    return np.roll(values, n), float(sizes[0] / sizes[-2]), float(sizes[-1] / sizes[-2])
 
 
-def _likely(equations: Equations, carried: Array, start: Array, unit: str, source: str) -> Estimate:
+def _likely(
+    observations: Observations, carried: Array, start: Array, unit: str, source: str
+) -> Estimate:
     """Return g and beta of greatest likelihood, the noise being in the currents alone."""
-    n = equations.actuators
-    names = (*(f"g{i}" for i in range(1, n + 1)), *equations.names)
-    units = (*(f"N/{unit}" for _ in range(n)), *equations.units)
+    n = observations.actuators
+    names = (*(f"g{i}" for i in range(1, n + 1)), *observations.names)
+    units = (*(f"N/{unit}" for _ in range(n)), *observations.units)
     # In 1 / g the currents are bilinear: what is left out of each step is only a product.
     values = np.r_[1.0 / start[:n], start[n:]]
     for iteration in count(1):
         inverse, inertia = values[:n], values[n:]
-        force = equations.matrix @ inertia + carried
+        force = observations.matrix @ inertia + carried
         tangent = np.concatenate(
-            [force[..., None] * np.eye(n), inverse[:, None] * equations.matrix], axis=-1
+            [force[..., None] * np.eye(n), inverse[:, None] * observations.matrix], axis=-1
         )
         # J v = current - f(v0) + J v0, and J v0 = f(v0) + (W beta) / g.
-        images = equations.forces + inverse * (force - carried)
-        linear = replace(equations, names=names, units=units, matrix=tangent, forces=images)
+        images = observations.forces + inverse * (force - carried)
+        linear = replace(observations, names=names, units=units, matrix=tangent, forces=images)
         noise = actuator_noise(linear, values)
-        step = triangle(linear, 1.0 / noise).values() - values
+        step = qr_factor(linear, 1.0 / noise).values() - values
         values = values + step
         change = np.linalg.norm(tangent @ step)
-        rest = np.linalg.norm(equations.forces - inverse * force)
-        if change <= max(_SETTLED * rest, _ROUNDING * np.linalg.norm(equations.forces)):
+        rest = np.linalg.norm(observations.forces - inverse * force)
+        if change <= max(_SETTLED * rest, _ROUNDING * np.linalg.norm(observations.forces)):
             break
         if iteration == _ITERATIONS:
-            raise DataError(
-                f"{source}: the gains do not settle; record longer, or carry a heavier payload"
+            raise LogError(
+                "unsettled",
+                source,
+                "the gains do not settle; record longer, or carry a heavier payload",
             )
     estimate = weighted(linear)
     values = estimate.values

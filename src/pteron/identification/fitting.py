@@ -1,4 +1,4 @@
-"""The steps of a fit: how a recording is treated, its equations, and the estimate."""
+"""The steps of a fit: how a recording is preprocessed, its observations, and the estimate."""
 
 from __future__ import annotations
 
@@ -7,27 +7,21 @@ from dataclasses import replace
 
 from pteron.errors import DataError
 from pteron.identification.diagnosis import column_fault, exchanged_sliders
-from pteron.identification.equations import Equations, equations_of
-from pteron.identification.estimators import ESTIMATORS, Estimate
-from pteron.identification.estimators.column_errors import column_errors
-from pteron.identification.estimators.likelihood import maximum_likelihood
-from pteron.identification.estimators.total import total
+from pteron.identification.errors import LogError
+from pteron.identification.estimators import (
+    ESTIMATORS,
+    Estimate,
+    column_errors,
+    maximum_likelihood,
+    total,
+)
 from pteron.identification.logs import Log
 from pteron.identification.logs.sizes import check_forces as check_strength
 from pteron.identification.model import Model
+from pteron.identification.observation import Observations, observations_of
 from pteron.identification.recordings import Recording, same
-from pteron.identification.signals import NoPose, Processing, Treatment, treatment_of
+from pteron.identification.signals import Preprocessing, Processing, preprocessing_of
 from pteron.manipulator import Manipulator
-
-__all__ = [
-    "METHODS",
-    "check_columns",
-    "check_payload",
-    "check_recordings",
-    "estimated",
-    "fit_equations",
-    "treatment_for",
-]
 
 METHODS = (*ESTIMATORS, "likelihood")
 """Names of the estimators that `identify` knows."""
@@ -54,14 +48,16 @@ def check_payload(fit: Sequence[Recording]) -> None:
     """Refuse recordings that do not tell when a payload is carried."""
     heads = [one.head() for one in fit]
     if all(head.payload is None for head in heads):
-        raise DataError(
-            f"{fit[0].source}: no payload column; declare one that is 0 without payload and 1 with "
-            "it, or identify without the payload"
+        raise LogError(
+            "no payload",
+            fit[0].source,
+            "no payload column; declare one that is 0 without payload and 1 with it, or identify "
+            "without the payload",
         )
 
 
-def treatment_for(robot: Manipulator, one: Recording, wanted: Processing) -> Treatment:
-    """Return how a recording is to be treated, from its beginning."""
+def preprocessing_for(robot: Manipulator, one: Recording, wanted: Processing) -> Preprocessing:
+    """Return how a recording is to be preprocessed, from its beginning."""
     head = one.head()
     rows = one.rows
     period = wanted.period or head.description.period
@@ -71,60 +67,66 @@ def treatment_for(robot: Manipulator, one: Recording, wanted: Processing) -> Tre
         wanted = replace(wanted, period=None)
     if not isinstance(one.log, Log):
         rows = max(rows, 1 << 30)  # a file that is read in pieces is never fitted in one
-    return treatment_of(robot, head, wanted, rows=rows)
+    return preprocessing_of(robot, head, wanted, rows=rows)
 
 
-def fit_equations(
-    model: Model, one: Recording, treatment: Treatment, progress: Callable[[int], None]
-) -> Equations:
-    """Return a recording's equations; where it has no poses, say whether sliders are swapped."""
+def fit_observations(
+    model: Model, one: Recording, preprocessing: Preprocessing, progress: Callable[[int], None]
+) -> Observations:
+    """Return a recording's observations; where it has no poses, say whether sliders are swapped."""
     try:
-        return equations_of(model, one.samples(progress), treatment)
-    except NoPose as error:
+        return observations_of(model, one.samples(progress), preprocessing)
+    except LogError as error:
+        if error.reason != "no pose":
+            raise
         head = one.head()
         some = head.part(0, min(head.rows, _LOOK))
-        swap = exchanged_sliders(model, some, treatment, _EXPLAINED)
+        swap = exchanged_sliders(model, some, preprocessing, _EXPLAINED)
         if swap is None:
             raise
-        raise DataError(f"{error}; or {swap.message()}: then every row has a pose") from None
+        error.args = (f"{error}; or {swap.message()}: then every row has a pose",)
+        raise
 
 
 def estimated(
-    name: str,
+    estimator: str | Callable[[Observations], Estimate],
     model: Model,
     fit: Sequence[Recording],
-    treatments: Sequence[Treatment],
-    equations: Equations,
+    preprocessing: Sequence[Preprocessing],
+    observations: Observations,
 ) -> Estimate:
-    """Return what the estimator of that name makes of the equations, or of their recording."""
-    if name in ("likelihood", "total"):
-        one = fit[0]
-        if len(fit) > 1 or not isinstance(one.log, Log):
-            raise DataError(
-                f"estimator: {name} takes one log of at most some million rows; choose weighted, "
-                "or give one log"
-            )
-        log = one.head()
-        if name == "likelihood":
-            return maximum_likelihood(model, log, treatments[0])
-        return total(equations, column_errors(model, log, treatments[0]))
-    return ESTIMATORS[name](equations)
+    """Return what an estimator makes of the observations, or of their recording."""
+    if not isinstance(estimator, str):
+        return estimator(observations)
+    if estimator not in ("likelihood", "total"):
+        return ESTIMATORS[estimator](observations)
+    if len(fit) > 1 or not isinstance(fit[0].log, Log):
+        raise DataError(
+            f"estimator: {estimator} takes one log of at most some million rows; choose weighted, "
+            "or give one log"
+        )
+    log, how = fit[0].head(), preprocessing[0]
+    if estimator == "likelihood":
+        return maximum_likelihood(model, log, how)
+    return total(observations, column_errors(model, log, how))
 
 
-def check_columns(model: Model, one: Recording, treatment: Treatment) -> None:
+def check_columns(model: Model, one: Recording, preprocessing: Preprocessing) -> None:
     """Refuse a log whose columns, exchanged or with other signs, would be explained far better."""
     head = one.head()
     head = head.part(0, min(head.rows, _LOOK))
-    fault = column_fault(model, head, treatment)
+    fault = column_fault(model, head, preprocessing)
     if fault is None:
         return
     if fault.after < fault.before:
         why = f": mended so, the error of the fit falls {fault.before / fault.after:.1f} times"
     else:
         why = ": as they are, the machine would have negative inertia"
-    raise DataError(
-        f"{one.source}: {fault.message()}{why}; correct the columns, or declare their order and "
-        "gains in the log's description"
+    raise LogError(
+        "columns",
+        one.source,
+        f"{fault.message()}{why}; correct the columns, or declare their order and gains in the "
+        "log's description",
     )
 
 
@@ -135,9 +137,11 @@ def _check_forces(one: Recording) -> None:
         check_strength(one.log.forces, names, one.source, one.log.first_row)
     unit = one.head().description.force_unit
     if unit != "N":
-        raise DataError(
-            f"{one.source}: its forces are in {unit}; declare gains (N per {unit}) in its "
-            "description, or find them with identify_drive_gains"
+        raise LogError(
+            "currents",
+            one.source,
+            f"its forces are in {unit}; declare gains (N per {unit}) in its description, or find "
+            "them with identify_drive_gains",
         )
 
 
@@ -146,12 +150,16 @@ def _check_apart(whole: Sequence[Recording], others: Sequence[Recording]) -> Non
     for i, one in enumerate(whole):
         for other in whole[i + 1 :]:
             if same(one, other):
-                raise DataError(f"{other.source}: the same samples as {one.source}; give them once")
+                raise LogError(
+                    "twice", other.source, f"the same samples as {one.source}; give them once"
+                )
         for other in others:
             if same(one, other):
-                raise DataError(
-                    f"{other.source}: is held out, but the same samples are fitted; hold out "
-                    "another motion, or nothing: then the end of each log is"
+                raise LogError(
+                    "twice",
+                    other.source,
+                    "is held out, but the same samples are fitted; hold out another motion, or "
+                    "nothing: then the end of each log is",
                 )
 
 
@@ -161,7 +169,9 @@ def _check_period(whole: Sequence[Recording], period: float | None) -> None:
         if period is None or not isinstance(one.log, Log):
             continue
         if head.duration < period * (1.0 - 1e-3):
-            raise DataError(
-                f"{one.source}: period: {period:g} s given, but it lasts {head.duration:g} s; "
-                "give the time after which the motion repeats, or none"
+            raise LogError(
+                "too short",
+                one.source,
+                f"period: {period:g} s given, but it lasts {head.duration:g} s; give the time "
+                "after which the motion repeats, or none",
             )

@@ -10,9 +10,7 @@ import numpy as np
 
 from pteron.errors import DataError, ModelError
 from pteron.identification.consistency import Bounds, Consistency, MissingSolver, consistent_model
-from pteron.identification.diagnosis import has_negative_inertia, unseen
-from pteron.identification.doubts import doubts, left_over
-from pteron.identification.equations import Equations, stacked
+from pteron.identification.errors import LogError
 from pteron.identification.estimators import (
     ESTIMATORS,
     Essential,
@@ -26,22 +24,23 @@ from pteron.identification.fitting import (
     check_payload,
     check_recordings,
     estimated,
-    fit_equations,
-    treatment_for,
+    fit_observations,
+    preprocessing_for,
 )
 from pteron.identification.logs import Log, LogFile
 from pteron.identification.model import Model, Terms, identification_model
+from pteron.identification.observation import Observations, stacked
+from pteron.identification.plausibility import doubts, has_negative_inertia, left_over, unseen
 from pteron.identification.prediction import predict
 from pteron.identification.recordings import Recording, divided, recording
-from pteron.identification.result import Identification
-from pteron.identification.signals import Processing
-from pteron.identification.verdict import verdict_of
+from pteron.identification.result import Identification, verdict_of
+from pteron.identification.signals import Preprocessing, Processing
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.reduction import base_parameters
 from pteron.reduction.sharing import Sharing
 
-__all__ = ["identify"]
+Logs = Log | LogFile | Sequence[Log | LogFile]
 
 Stage = Callable[[str, int, int], None]
 """Told what is being done, how many rows of it are done, and how many there are."""
@@ -49,12 +48,12 @@ Stage = Callable[[str, int, int], None]
 
 def identify(
     robot: Manipulator,
-    logs: Log | LogFile | Sequence[Log | LogFile],
+    logs: Logs,
     *,
-    held_out: Log | LogFile | Sequence[Log | LogFile] = (),
+    held_out: Logs = (),
     terms: Terms | None = None,
     shared: Sharing = False,
-    estimator: str = "weighted",
+    estimator: str | Callable[[Observations], Estimate] = "weighted",
     processing: Processing | None = None,
     cad: Manipulator | Literal["robot"] | None = "robot",
     bounds: Bounds | None = None,
@@ -62,7 +61,7 @@ def identify(
 ) -> Identification:
     """Identify a machine from recorded motions.
 
-    Positions are smoothed and differentiated, poses follow by direct kinematics, the equations
+    Positions are smoothed and differentiated, poses follow by direct kinematics, the observations
     F = W beta are filtered and solved, real bodies are found that have these base parameters, and
     the result is judged on motions that were held out.
 
@@ -79,8 +78,9 @@ def identify(
         Friction, offsets and other terms beside the base parameters.
     shared : bool or groups of legs
         Whether legs share one parameter set; see `pteron.base_parameters`.
-    estimator : str
-        One of `METHODS`: ordinary, weighted (the default), huber, total, likelihood.
+    estimator : str or callable
+        One of `METHODS`: ordinary, weighted (the default), huber, total, likelihood; or what takes
+        observations and returns an estimate, such as `functools.partial(huber, threshold=2.0)`.
     processing : Processing, optional
         How positions are differentiated and filtered; by default the data decide.
     cad : Manipulator, "robot" or None
@@ -90,85 +90,78 @@ def identify(
     progress : callable, optional
         Told what is being done, how many rows of it are done and how many there are.
 
-    Returns
-    -------
-    Identification
-
     Raises
     ------
-    DataError
+    LogError
         If a log does not fit the machine or its motion does not show the parameters, if forces have
         their sign flipped or columns are swapped; the message says what was found.
     ModelError
         If the estimator is not known, or the bounds contradict each other.
     """
-    if estimator not in METHODS:
+    if isinstance(estimator, str) and estimator not in METHODS:
         raise ModelError(f"estimator: {estimator!r} is not one of {', '.join(METHODS)}")
     report = progress or (lambda task, done, total: None)
-    read = _reader(report, "Reading")
-    whole = [recording(log, read) for log in _sequence(logs)]
-    others = [recording(log, read) for log in _sequence(held_out)]
     wanted = processing or Processing()
+
+    # Read the logs, and hold some rows out
+    read = _reader(report, "Reading")
+    whole, others = (
+        [recording(log, read) for log in _sequence(given)] for given in (logs, held_out)
+    )
     check_recordings(whole, others, wanted)
-    fit, check = list(whole), others
-    if not others:
-        periods = [wanted.period or one.head().description.period for one in whole]
-        pairs = [divided(one, period) for one, period in zip(whole, periods, strict=True)]
-        fit, check = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
+    fit, check = (whole, others) if others else _divided(whole, wanted.period)
+
+    # Build the model
     base = base_parameters(robot, shared=shared)
     rotors = _reflected(fit)
-    model = identification_model(
-        robot, replace(terms or Terms(), rotors=True) if rotors else terms, base=base
-    )
+    known_rotors = replace(terms or Terms(), rotors=True) if rotors else terms
+    model = identification_model(robot, known_rotors, base=base)
     if model.terms.payload:
         check_payload(fit)
-    treatments = [treatment_for(robot, one, wanted) for one in fit]
-    parts = [
-        fit_equations(model, one, treatment, _reader(report, "Filtering"))
-        for one, treatment in zip(fit, treatments, strict=True)
-    ]
-    equations = stacked(parts)
+
+    # Preprocess, stack and solve
+    preprocessing = tuple(preprocessing_for(robot, one, wanted) for one in fit)
+    observations = stacked(
+        [
+            fit_observations(model, one, how, _reader(report, "Filtering"))
+            for one, how in zip(fit, preprocessing, strict=True)
+        ]
+    )
     try:
-        estimate = estimated(estimator, model, fit, treatments, equations)
+        estimate = estimated(estimator, model, fit, preprocessing, observations)
     except DataError as error:
-        raise DataError(f"{error}{_noticed(whole)}") from None
-    hidden, too_many = unseen(model, estimate.deviations)
+        raise _with_findings(error, whole) from None
+
+    # Judge by what was held out, which betrays columns that are not what they are called
     held = [
         predict(
             model,
             estimate.values,
             one,
-            treatment_for(robot, one, wanted),
+            preprocessing_for(robot, one, wanted),
             _reader(report, "Checking"),
         )
         for one in check
     ]
-    # What was held out betrays columns that are not what they are called.
     verdict = verdict_of(held, repeats=not others)
     if verdict.grade != "trustworthy" or has_negative_inertia(model, estimate.values):
-        check_columns(model, fit[0], treatments[0])
+        check_columns(model, fit[0], preprocessing[0])
+    hidden, too_many = unseen(model, estimate.deviations)
     if too_many:
-        names = ", ".join(hidden) if len(hidden) < base.rank else "all"
-        cause = left_over(estimate, treatments)
-        raise DataError(
-            f"{fit[0].source}: {cause or 'too little motion'}: {len(hidden)} of {base.rank} base "
-            f"parameters cannot be seen ({names}), their standard deviations are larger than their "
-            f"usual size; {'mend that, or ' if cause else ''}move faster and along all "
-            f"coordinates, as pteron excite proposes{_noticed(whole)}"
-        )
+        raise _with_findings(_too_little(model, hidden, estimate, preprocessing, fit[0]), whole)
     fitted = tuple(
-        predict(model, estimate.values, one.beginning(), treatment, _reader(report, "Predicting"))
-        for one, treatment in zip(fit, treatments, strict=True)
+        predict(model, estimate.values, one.beginning(), how, _reader(report, "Predicting"))
+        for one, how in zip(fit, preprocessing, strict=True)
     )
-    essential = essential_parameters(equations, estimate, ESTIMATORS.get(estimator, weighted))
-    notes: list[str] = []
+
+    # Find what the data show by themselves, and real bodies
+    again = ESTIMATORS.get(estimator, weighted) if isinstance(estimator, str) else estimator
+    essential = essential_parameters(observations, estimate, again)
     known = np.zeros(len(model.names))
     for name, mass in rotors.items():
         known += model.share_of(name, mass)
-        notes.append(f"{name} = {mass:.6g} kg is known, and no part of the real bodies.")
-    consistency, share = _real_bodies(model, estimate, known, equations, cad, bounds, notes)
-    for name, shares in model.joins.items():
-        notes.append(f"{name} joins {' and '.join(shares) or 'nothing: it does not act'}.")
+    consistency, share, missing = _real_bodies(model, estimate, known, observations, cad, bounds)
+    notes = [*_notes(model, estimate, rotors), *missing]
     advice = [*_advice(hidden, essential), *doubts(model, estimate, known, consistency, cad)]
     return Identification(
         robot=robot,
@@ -179,7 +172,7 @@ def identify(
         consistency_share=share,
         fitted=fitted,
         held_out=tuple(held),
-        treatments=tuple(treatments),
+        preprocessing=preprocessing,
         verdict=replace(verdict, next_steps=(*verdict.next_steps, *advice)),
         unseen=hidden,
         findings=tuple(f for one in (*whole, *others) for f in one.findings),
@@ -187,14 +180,8 @@ def identify(
     )
 
 
-def _sequence(logs: Log | LogFile | Sequence[Log | LogFile]) -> list[Log | LogFile]:
+def _sequence(logs: Logs) -> list[Log | LogFile]:
     return [logs] if isinstance(logs, Log | LogFile) else list(logs)
-
-
-def _noticed(whole: Sequence[Recording]) -> str:
-    """Return what was noticed in the logs, to stand behind an error that it may explain."""
-    findings = [finding.message for one in whole for finding in one.findings]
-    return f" (noticed before: {'; '.join(findings[:3])})" if findings else ""
 
 
 def _reader(report: Stage, task: str) -> Callable[[int], None]:
@@ -208,6 +195,14 @@ def _reader(report: Stage, task: str) -> Callable[[int], None]:
     return tell
 
 
+def _divided(
+    whole: Sequence[Recording], period: float | None
+) -> tuple[list[Recording], list[Recording]]:
+    """Return what of each recording is fitted, and what is held out."""
+    pairs = [divided(one, period or one.head().description.period) for one in whole]
+    return [first for first, _ in pairs], [second for _, second in pairs]
+
+
 def _reflected(fit: Sequence[Recording]) -> dict[str, float]:
     """Return what the rotors of known drives weigh on the sliders, J r^2 in kg, by name."""
     description = fit[0].head().description
@@ -217,28 +212,75 @@ def _reflected(fit: Sequence[Recording]) -> dict[str, float]:
     return {f"J_m{i}": inertia * ratio**2 for i, (inertia, ratio) in enumerate(pairs, start=1)}
 
 
+def _with_findings(error: DataError, whole: Sequence[Recording]) -> DataError:
+    """Return an error with what was noticed in the logs behind it, which may explain it."""
+    findings = [finding.message for one in whole for finding in one.findings]
+    if findings:
+        error.args = (f"{error} (noticed before: {'; '.join(findings[:3])})",)
+    return error
+
+
+def _too_little(
+    model: Model,
+    hidden: tuple[str, ...],
+    estimate: Estimate,
+    preprocessing: Sequence[Preprocessing],
+    first: Recording,
+) -> LogError:
+    """Return the error for a motion that leaves most base parameters unseen."""
+    rank = model.base.rank
+    names = ", ".join(hidden) if len(hidden) < rank else "all"
+    cause = left_over(estimate, preprocessing)
+    return LogError(
+        "too little motion",
+        first.source,
+        f"{cause or 'too little motion'}: {len(hidden)} of {rank} base parameters cannot be seen "
+        f"({names}), their standard deviations are larger than their usual size; "
+        f"{'mend that, or ' if cause else ''}move faster and along all coordinates, as pteron "
+        "excite proposes",
+    )
+
+
 def _real_bodies(
     model: Model,
     estimate: Estimate,
     known: Array,
-    equations: Equations,
+    observations: Observations,
     cad: Manipulator | Literal["robot"] | None,
     bounds: Bounds | None,
-    notes: list[str],
-) -> tuple[Consistency | None, float]:
-    base = model.base
-    values = (estimate.values - known)[: base.rank]
-    covariance = estimate.covariance[: base.rank, : base.rank]
+) -> tuple[Consistency | None, float, tuple[str, ...]]:
+    """Return real bodies, how far their forces are off, and why there are none if so."""
+    rank = model.base.rank
+    values = (estimate.values - known)[:rank]
+    covariance = estimate.covariance[:rank, :rank]
     try:
-        found = consistent_model(model.robot, base, values, covariance, cad=cad, bounds=bounds)
+        found = consistent_model(
+            model.robot, model.base, values, covariance, cad=cad, bounds=bounds
+        )
     except MissingSolver as error:
-        notes.append(f"No model of real bodies: {error}")
-        return None, float("nan")
+        return None, float("nan"), (f"No model of real bodies: {error}",)
     shift = np.zeros(len(estimate.values))
-    shift[: base.rank] = found.base_values - values
-    moved = np.sqrt(((equations.matrix @ shift) ** 2).mean())
+    shift[:rank] = found.base_values - values
+    moved = np.sqrt(((observations.matrix @ shift) ** 2).mean())
     left = np.sqrt((estimate.residuals**2).mean())
-    return found, float(moved / max(left, np.finfo(float).tiny))
+    return found, float(moved / max(left, np.finfo(float).tiny)), ()
+
+
+def _notes(model: Model, estimate: Estimate, rotors: dict[str, float]) -> list[str]:
+    """Return what else is to be known of an estimate."""
+    notes = []
+    if not estimate.converged:
+        notes.append(
+            f"The estimator {estimate.method} has not settled in {estimate.iterations} iterations: "
+            "values and intervals may be off; choose another estimator, or record longer."
+        )
+    notes += [
+        f"{name} = {mass:.6g} kg is known, and no part of the real bodies."
+        for name, mass in rotors.items()
+    ]
+    for name, shares in model.joins.items():
+        notes.append(f"{name} joins {' and '.join(shares) or 'nothing: it does not act'}.")
+    return notes
 
 
 def _advice(hidden: tuple[str, ...], essential: Essential) -> tuple[str, ...]:

@@ -15,8 +15,6 @@ from pteron.kinematics import random_poses
 from pteron.manipulator import BODY_PARAMETERS, Manipulator, parameter_names, parameter_units
 from pteron.reduction import BaseParameters, base_parameters, base_regressor
 
-__all__ = ["Joints", "Model", "Terms", "identification_model"]
-
 Joints = Literal["none", "shared", "each"]
 """Viscous friction in the passive joints: none, one coefficient a kind of joint, or one each."""
 

@@ -9,17 +9,15 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2  # type: ignore[import-untyped]
 
-from pteron.errors import DataError
-from pteron.identification.equations import Equations, equations_of, stacked
+from pteron.identification.errors import LogError
 from pteron.identification.estimators import Estimate, weighted
 from pteron.identification.logs import Log
 from pteron.identification.model import Model, Terms, identification_model
-from pteron.identification.signals import Processing, treatment_of
+from pteron.identification.observation import Observations, observations_of, stacked
+from pteron.identification.signals import Processing, preprocessing_of
 from pteron.kernels import Array
 from pteron.manipulator import BODY_PARAMETERS, Manipulator
 from pteron.reduction import BaseParameters
-
-__all__ = ["Payload", "equations_with_payload", "identify_payload"]
 
 _NAMES = tuple(f"{name}_L" for name in BODY_PARAMETERS)
 
@@ -40,11 +38,11 @@ class Payload:
     inertia : float or None
         About the platform's axis through P, kg m^2; a 3T platform does not feel it.
     names : tuple of str
-        Of the k values that the forces show: ``m_L, mgx_L, mgy_L, I_L``, or some of them.
+        The k values that the forces show: ``m_L, mgx_L, mgy_L, I_L``, or some of them.
     covariance : array, shape (k, k)
-        Of these values, SI units.
+        The covariance of these values, SI units.
     estimate : Estimate
-        Of everything: base parameters, friction and offsets first, the payload last.
+        The fit of everything: base parameters, friction and offsets first, the payload last.
     residual : array, shape (n,)
         Standard deviation of what is left of each actuator's forces, N, before the filter.
     """
@@ -142,7 +140,7 @@ def identify_payload(
     *,
     terms: Terms | None = None,
     processing: Processing | None = None,
-    estimator: Callable[[Equations], Estimate] = weighted,
+    estimator: Callable[[Observations], Estimate] = weighted,
     base: BaseParameters | None = None,
 ) -> Payload:
     """Return a payload's inertia from motions with and without it.
@@ -164,17 +162,13 @@ def identify_payload(
     processing : Processing, optional
         How the logs are treated; by default the data decide.
     estimator : callable
-        What solves the equations.
+        What solves the observations.
     base : BaseParameters, optional
         Another choice of base parameters, such as that of legs which share theirs.
 
-    Returns
-    -------
-    Payload
-
     Raises
     ------
-    DataError
+    LogError
         If a phase is missing, the forces are not in newtons, or the motion does not show the
         values.
 
@@ -186,12 +180,14 @@ def identify_payload(
     for log in (without, with_payload):
         if log is not None and log.description.force_unit != "N":
             unit = log.description.force_unit
-            raise DataError(
-                f"{log.source}: its forces are in {unit}, newtons are expected; declare gains "
-                f"(N per {unit}) in its description"
+            raise LogError(
+                "currents",
+                log.source,
+                f"its forces are in {unit}, newtons are expected; declare gains (N per {unit}) in "
+                "its description",
             )
     model = identification_model(robot, replace(terms or Terms(), payload=True), base=base)
-    estimate = estimator(equations_with_payload(model, without, with_payload, processing))
+    estimate = estimator(observations_with_payload(model, without, with_payload, processing))
     names = tuple(name for name in estimate.names if name in _NAMES)
     chosen = [estimate.names.index(name) for name in names]
     found = dict(zip(names, (float(value) for value in estimate.values[chosen]), strict=True))
@@ -207,50 +203,68 @@ def identify_payload(
     )
 
 
-def equations_with_payload(
+def observations_with_payload(
     model: Model, without: Log, with_payload: Log | None, processing: Processing | None
-) -> Equations:
-    """Return the equations of a log with both phases, or of two logs, as one.
+) -> Observations:
+    """Return the observations of a log with both phases, or of two logs, as one.
 
     Raises
     ------
-    DataError
+    LogError
         If a phase is missing, or nothing of it is left between the filters' edges.
     """
     if with_payload is None:
         logs = [without]
-        phases = np.unique(without.payload) if without.payload is not None else np.zeros(1)
-        if len(phases) < 2:
-            which = "one where a payload is carried" if not phases.any() else "one without payload"
-            raise DataError(
-                f"{without.source}: its payload column has phase {phases[0]:g} only, 0 and 1 are "
-                f"expected; add {which}, or give two logs"
-                if without.payload is not None
-                else f"{without.source}: no payload column; declare one that is 0 without payload "
-                "and 1 with it, or give two logs"
-            )
+        _check_phases(without)
     else:
         logs = [_in_phase(without, 0), _in_phase(with_payload, 1)]
-    equations = stacked(
-        [equations_of(model, log, treatment_of(model.robot, log, processing)) for log in logs]
+    observations = stacked(
+        [
+            observations_of(model, log, preprocessing_of(model.robot, log, processing))
+            for log in logs
+        ]
     )
-    seen = (equations.gain > 0.0).any(axis=1)
+    seen = (observations.gain > 0.0).any(axis=1)
     for phase, called in ((0, "without payload"), (1, "with payload")):
-        if not (seen & ((equations.payload != 0) == phase)).any():
-            raise DataError(
-                f"{logs[phase * (len(logs) - 1)].source}: no samples {called} are left between the "
-                "filters' edges; record that phase longer"
+        if not (seen & ((observations.payload != 0) == phase)).any():
+            raise LogError(
+                "too short",
+                logs[phase * (len(logs) - 1)].source,
+                f"no samples {called} are left between the filters' edges; record that phase "
+                "longer",
             )
-    return equations
+    return observations
+
+
+def _check_phases(log: Log) -> None:
+    """Refuse a single log that has not both phases."""
+    if log.payload is None:
+        raise LogError(
+            "no payload",
+            log.source,
+            "no payload column; declare one that is 0 without payload and 1 with it, or give two "
+            "logs",
+        )
+    phases = np.unique(log.payload)
+    if len(phases) < 2:
+        which = "one where a payload is carried" if not phases.any() else "one without payload"
+        raise LogError(
+            "no payload",
+            log.source,
+            f"its payload column has phase {phases[0]:g} only, 0 and 1 are expected; add {which}, "
+            "or give two logs",
+        )
 
 
 def _in_phase(log: Log, phase: int) -> Log:
     """Return a log as one phase throughout."""
     if log.payload is not None and ((log.payload != 0) != phase).any():
         row = int(np.argmax((log.payload != 0) != phase))
-        raise DataError(
-            f"{log.place(row)}: payload {log.payload[row]} in the log "
-            f"{'with' if phase else 'without'} payload, {phase} expected throughout; give first "
-            "the log without payload, then the one with it, or one log with both phases alone"
+        raise LogError(
+            "no payload",
+            log.place(row),
+            f"payload {log.payload[row]} in the log {'with' if phase else 'without'} payload, "
+            f"{phase} expected throughout; give first the log without payload, then the one with "
+            "it, or one log with both phases alone",
         )
     return replace(log, payload=np.full(log.rows, phase, dtype=np.int64))

@@ -9,14 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.identification.equations import in_motion
 from pteron.identification.model import Model
+from pteron.identification.observation import in_motion
 from pteron.identification.recordings import Recording
-from pteron.identification.signals import Treatment
-from pteron.identification.signals.samples import samples
+from pteron.identification.signals import Preprocessing, samples
 from pteron.kernels import Array
-
-__all__ = ["Prediction", "predict"]
 
 _KEPT = 6000
 """Samples that are kept to be looked at."""
@@ -47,11 +44,11 @@ class Prediction:
         Root mean square of what the model misses, with all its terms and without friction and
         offsets, N.
     error_of_all : array, shape (n,)
-        As `error`, of every sample, N.
+        The same over every sample, with all terms, N.
     noise : array, shape (n,)
         Standard deviation of the white noise on the measured forces, N: no model can do better.
     time : array, shape (S,)
-        Of some of the samples, evenly spaced, to be looked at, s.
+        Times of some of the samples, evenly spaced, to be looked at, s.
     measured, predicted, without_friction, speed : array, shape (S, n)
         Forces, N, and the sliders' rates, m/s.
     used : array of bool, shape (S, n)
@@ -114,31 +111,16 @@ def predict(
     model: Model,
     values: Array,
     recording: Recording,
-    treatment: Treatment,
+    preprocessing: Preprocessing,
     progress: Callable[[int], None] | None = None,
 ) -> Prediction:
-    """Return how well values of a model predict a recording.
+    """Return how well a model with values (p,) predicts a recording, preprocessed in its way.
 
-    Parameters
-    ----------
-    model : Model
-        The model.
-    values : array, shape (p,)
-        Of its parameters.
-    recording : Recording
-        What was recorded.
-    treatment : Treatment
-        How its motion is found from its positions.
-    progress : callable, optional
-        Called with the number of rows just read.
-
-    Returns
-    -------
-    Prediction
+    `progress` is called with the number of rows just read.
 
     Raises
     ------
-    DataError
+    LogError
         If a sample has no pose or is next to a singularity, or the recording is too short.
     """
     n = len(model.robot.legs)
@@ -148,11 +130,11 @@ def predict(
     sums = np.zeros((5, n))
     shown: list[Array] = []
     step = max(recording.rows // _KEPT, 1)
-    for block in samples(model.robot, recording.samples(progress), treatment):
+    for block in samples(model.robot, recording.samples(progress), preprocessing):
         states, measured = block.states.part(block.fresh), block.forces[block.fresh]
         matrix = model.matrix(states)
         predicted, without = matrix @ values, matrix @ plain
-        used = in_motion(states.slider_rates, treatment.slow, treatment.turning)
+        used = in_motion(states.slider_rates, preprocessing.slow, preprocessing.turning)
         error, bare = measured - predicted, measured - without
         sums += [
             measured.sum(axis=0),
@@ -179,7 +161,7 @@ def predict(
         error=np.sqrt(sums[2] / seen),
         error_without_friction=np.sqrt(sums[3] / seen),
         error_of_all=np.sqrt(sums[4] / total),
-        noise=treatment.force_noise,
+        noise=preprocessing.force_noise,
         time=kept[:, 0],
         measured=parts[0],
         predicted=parts[1],

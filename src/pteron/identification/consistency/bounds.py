@@ -11,8 +11,6 @@ from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator, parameter_names
 
-__all__ = ["Bounds", "Box", "Limits"]
-
 Box = tuple[tuple[float, float], tuple[float, float]]
 """((xmin, xmax), (ymin, ymax)) in the body's frame, m."""
 

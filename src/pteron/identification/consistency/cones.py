@@ -15,8 +15,6 @@ import numpy as np
 from pteron.errors import ModelError
 from pteron.kernels import Array
 
-__all__ = ["MissingSolver", "RealBodies", "closest", "nearest", "widest"]
-
 _TOLERANCE = 1e-10
 _SOLVED = ("optimal", "optimal_inaccurate")
 

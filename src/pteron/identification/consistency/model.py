@@ -6,19 +6,24 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.stats import chi2  # type: ignore[import-untyped]
 
-from pteron.errors import ModelError
-from pteron.identification.consistency.bodies import Bodies, bodies_of, parameters_of, real_bodies
+from pteron.errors import DataError, ModelError
+from pteron.identification.consistency.bodies import (
+    Bodies,
+    Target,
+    bodies_of,
+    cad_target,
+    parameters_of,
+    plain_target,
+    real_bodies,
+)
 from pteron.identification.consistency.bounds import Bounds, Limits
 from pteron.identification.consistency.cones import RealBodies, closest, nearest, widest
-from pteron.identification.consistency.information import checked_values, square_root
 from pteron.identification.consistency.result import Consistency
-from pteron.identification.consistency.target import Target, cad_target, plain_target
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator, parameter_names, parameters, with_parameters
 from pteron.reduction import BaseParameters
-
-__all__ = ["consistent_model"]
 
 _DEEPEST = 2.0
 """Twice the margin: there the margin itself leaves room for the search of the nearest model."""
@@ -106,8 +111,8 @@ def consistent_model(
         raise ModelError(
             f"base: made for {base.robot.name}, which has other parameters than {robot.name}"
         )
-    vector = checked_values(values, base.rank)
-    root = None if covariance is None else square_root(covariance, base.rank)
+    vector = _checked_values(values, base.rank)
+    root = None if covariance is None else _square_root(covariance, base.rank)
     bodies = bodies_of(base)
     limits = (bounds or Bounds()).limits(robot)
     prior = _prior(robot, cad)
@@ -169,7 +174,7 @@ def consistent_model(
         names=base.names,
         feasible=feasible,
         distance=distance,
-        p_value=_p_value(distance, base.rank) if root is not None else float("nan"),
+        p_value=float("nan") if root is None else float(chi2.sf(distance**2, base.rank)),
         shifts=moved / np.linalg.norm(spread, axis=1),
         metric="relative" if root is None else "covariance",
         at_border=at_border,
@@ -178,6 +183,38 @@ def consistent_model(
         residual=residual,
         nearest_to=target.kind,
     )
+
+
+def _checked_values(values: ArrayLike, rank: int) -> Array:
+    """Return identified values (rank,) as a checked array."""
+    vector = np.asarray(values, dtype=float)
+    if vector.shape != (rank,):
+        raise DataError(f"values: shape {vector.shape} given, ({rank},) expected")
+    if not np.isfinite(vector).all():
+        raise DataError("values: not all are finite numbers; identify the parameters again")
+    return vector
+
+
+def _square_root(covariance: ArrayLike, rank: int) -> Array:
+    """Return the lower triangular square root of a covariance (rank, rank), after checking it."""
+    matrix = np.asarray(covariance, dtype=float)
+    if matrix.shape != (rank, rank):
+        raise DataError(f"covariance: shape {matrix.shape} given, ({rank}, {rank}) expected")
+    deviations = np.sqrt(np.abs(np.diag(matrix)))
+    if not np.isfinite(matrix).all() or (np.diag(matrix) <= 0.0).any():
+        raise DataError("covariance: every variance must be a positive, finite number")
+    correlations = matrix / np.outer(deviations, deviations)
+    if np.abs(correlations - correlations.T).max() > 1e-8:
+        raise DataError("covariance: the matrix is not symmetric")
+    try:
+        # Correlations, since the variances' units differ by orders of magnitude.
+        root = np.linalg.cholesky(0.5 * (correlations + correlations.T))
+    except np.linalg.LinAlgError:
+        raise DataError(
+            "covariance: the matrix is not positive definite; give that of a fit in which every "
+            "base parameter is identified"
+        ) from None
+    return np.asarray(deviations[:, None] * root)
 
 
 def _prior(robot: Manipulator, cad: Manipulator | ArrayLike | str | None) -> Array | None:
@@ -250,9 +287,3 @@ def _inside(bodies: Bodies, point: Array, deep: Array, margins: Array) -> Array:
         if (bodies.least(moved) >= 0.5 * margins).all():
             break
     return np.asarray(moved)
-
-
-def _p_value(distance: float, rank: int) -> float:
-    from scipy.stats import chi2  # type: ignore[import-untyped]
-
-    return float(chi2.sf(distance**2, rank))

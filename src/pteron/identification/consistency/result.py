@@ -10,8 +10,6 @@ import numpy as np
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 
-__all__ = ["Consistency"]
-
 
 @dataclass(frozen=True)
 class Consistency:

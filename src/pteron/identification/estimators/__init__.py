@@ -1,35 +1,36 @@
-"""Estimators, one a file: each takes equations and returns an estimate."""
+"""Estimators: each takes observations and returns an estimate."""
 
 from collections.abc import Callable
 
-from pteron.identification.equations import Equations
 from pteron.identification.estimators.essential import Essential, essential_parameters
-from pteron.identification.estimators.estimate import Estimate
-from pteron.identification.estimators.huber import huber
-from pteron.identification.estimators.ordinary import ordinary
-from pteron.identification.estimators.ridge import Ridge, ridge
-from pteron.identification.estimators.total import total
-from pteron.identification.estimators.weighted import weighted
-from pteron.identification.estimators.whiteness import Whiteness
+from pteron.identification.estimators.estimate import Estimate, Whiteness, whiteness
+from pteron.identification.estimators.least_squares import huber, ordinary, weighted
+from pteron.identification.estimators.likelihood import maximum_likelihood
+from pteron.identification.estimators.qr import QrFactor, qr_factor
+from pteron.identification.estimators.total import column_errors, total
+from pteron.identification.observation import Observations
 
 __all__ = [
     "ESTIMATORS",
     "Essential",
     "Estimate",
-    "Ridge",
+    "QrFactor",
     "Whiteness",
+    "column_errors",
     "essential_parameters",
     "huber",
+    "maximum_likelihood",
     "ordinary",
-    "ridge",
+    "qr_factor",
     "total",
     "weighted",
+    "whiteness",
 ]
 
-ESTIMATORS: dict[str, Callable[[Equations], Estimate]] = {
+ESTIMATORS: dict[str, Callable[[Observations], Estimate]] = {
     "ordinary": ordinary,
     "weighted": weighted,
     "huber": huber,
     "total": total,
 }
-"""The estimators that need nothing but equations, by name."""
+"""The estimators that need nothing but observations, by name."""

@@ -8,10 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2  # type: ignore[import-untyped]
 
-from pteron.identification.equations import Equations
 from pteron.identification.estimators.estimate import Estimate
-
-__all__ = ["Essential", "essential_parameters"]
+from pteron.identification.observation import Observations
 
 LEVEL = 0.05
 
@@ -23,15 +21,15 @@ class Essential:
     Attributes
     ----------
     names : tuple of str
-        Of the values kept.
+        The values kept.
     dropped : tuple of str
-        Of those left out, in the order in which they went.
+        Those left out, in the order in which they went.
     estimate : Estimate
-        Of the values kept, with the others at zero.
+        The fit of the values kept, with the others at zero.
     p_value : float
         Chance of a larger statistic if all that were dropped are zero: at least `level`.
     level : float
-        Of the test.
+        The level of the test.
     """
 
     names: tuple[str, ...]
@@ -42,9 +40,9 @@ class Essential:
 
 
 def essential_parameters(
-    equations: Equations,
+    observations: Observations,
     estimate: Estimate,
-    estimator: Callable[[Equations], Estimate],
+    estimator: Callable[[Observations], Estimate],
     *,
     level: float = LEVEL,
 ) -> Essential:
@@ -57,18 +55,14 @@ def essential_parameters(
 
     Parameters
     ----------
-    equations : Equations
+    observations : Observations
         What was solved.
     estimate : Estimate
-        Of all values.
+        The fit of all values.
     estimator : callable
         What fits those that are kept.
     level : float
-        Of the test.
-
-    Returns
-    -------
-    Essential
+        The level of the test.
 
     Notes
     -----
@@ -90,7 +84,7 @@ def essential_parameters(
         gone.append(left.pop(least))
     if not gone:
         return Essential(estimate.names, (), estimate, 1.0, level)
-    refit = estimator(equations.columns(left))
+    refit = estimator(observations.columns(left))
     return Essential(refit.names, tuple(estimate.names[k] for k in gone), refit, p_value, level)
 
 

@@ -7,19 +7,42 @@ from statistics import NormalDist
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2  # type: ignore[import-untyped]
 
-from pteron.identification.equations import Equations
-from pteron.identification.estimators.triangle import Triangle
-from pteron.identification.estimators.whiteness import (
-    Whiteness,
-    long_run_covariance,
-    whiteness,
-)
+from pteron.identification.estimators.qr import QrFactor
+from pteron.identification.observation import Observations
 from pteron.kernels import Array
 
-__all__ = ["Estimate", "estimate_of", "residuals_of"]
-
 _BLOCK = 1 << 14
+
+_LAGS = 20
+_MOST_LAGS = 100
+"""Rows, of a parallel filter's, beyond which noise has forgotten itself in any case."""
+
+_LEVEL = 0.01
+"""Chance at which white residuals would be called coloured."""
+
+
+@dataclass(frozen=True)
+class Whiteness:
+    """The test of Ljung and Box on each actuator's residuals.
+
+    Attributes
+    ----------
+    autocorrelation : array, shape (n,)
+        Between neighbouring rows; 0 for white noise.
+    p_values : array, shape (n,)
+        The chance that white noise looks less white.
+    """
+
+    autocorrelation: Array
+    p_values: Array
+
+    @property
+    def white(self) -> bool:
+        """Whether nothing speaks against white noise, at 1 % over all actuators."""
+        return bool((self.p_values > _LEVEL / len(self.p_values)).all())
 
 
 @dataclass(frozen=True)
@@ -31,11 +54,11 @@ class Estimate:
     method : str
         The estimator.
     names, units : tuple of str
-        Of the p values.
+        What the p values are called, and their SI units.
     values : array, shape (p,)
-        SI units.
+        The values, SI units.
     covariance : array, shape (p, p)
-        Of the values.
+        Their covariance.
     noise : array, shape (n,)
         Standard deviation of each actuator's residuals, N, of the samples before the filter.
     whiteness : Whiteness
@@ -48,9 +71,11 @@ class Estimate:
     rows : int
         Equations used.
     iterations : int
-        That it took.
+        How many iterations the search took.
+    converged : bool
+        Whether the search settled within the iterations allowed.
     residuals : array, shape (R, n)
-        F - W values at the rows of the equations, in units of the noise before the filter, N.
+        F - W values at the rows of the observations, in units of the noise before the filter, N.
     """
 
     method: str
@@ -64,6 +89,7 @@ class Estimate:
     condition: float
     rows: int
     iterations: int = 1
+    converged: bool = True
     residuals: Array = field(repr=False, default_factory=lambda: np.empty((0, 0)))
 
     @property
@@ -114,76 +140,98 @@ class Estimate:
             "condition_number": self.condition,
             "equations": self.rows,
             "iterations": self.iterations,
+            "converged": self.converged,
         }
 
 
-def residuals_of(equations: Equations, values: Array) -> Array:
+def residuals_of(observations: Observations, values: Array) -> Array:
     """Return F - W values (R, n)."""
-    rest = np.empty_like(equations.forces)
+    rest = np.empty_like(observations.forces)
     for start in range(0, len(rest), _BLOCK):
         rows = slice(start, start + _BLOCK)
-        rest[rows] = equations.forces[rows] - equations.matrix[rows] @ values
+        rest[rows] = observations.forces[rows] - observations.matrix[rows] @ values
     return rest
 
 
 def estimate_of(
     method: str,
-    equations: Equations,
-    factor: Triangle,
+    observations: Observations,
+    factor: QrFactor,
     values: Array,
     covariance: Array,
     *,
     weights: Array,
     iterations: int = 1,
+    converged: bool = True,
     scores: Array | None = None,
     inverse: Array | None = None,
 ) -> Estimate:
     """Return the estimate that an estimator found.
 
-    Parameters
-    ----------
-    method : str
-        Its name.
-    equations : Equations
-        What was solved.
-    factor : Triangle
-        Of the weighted equations.
-    values, covariance : array, shape (p,) and (p, p)
-        What was found, for white residuals.
-    weights : array, shape (R, n) or (n,)
-        What the rows were multiplied by.
-    iterations : int
-        That it took.
-    scores : array, shape (R, n), optional
-        Weighted residuals that stand for the plain ones in a covariance that allows for their
-        correlation.
-    inverse : array, shape (p, p), optional
-        Of the weighted normal equations, where it is not that of `factor`.
+    `values` (p,) and their `covariance` (p, p), for white residuals, come from `factor`, that of
+    the observations with rows times `weights`, (R, n) or (n,). `scores` (R, n) are weighted
+    residuals that stand for the plain ones in a covariance that allows for their correlation;
+    `inverse` (p, p) is that of the weighted normal equations, where it is not that of `factor`.
     """
-    rest = residuals_of(equations, values)
-    # Only a prior lets there be fewer equations than values.
-    share = max(factor.degrees, 1) / max(factor.rows, 1)
-    noise = np.sqrt((rest**2).sum(axis=0) / np.maximum(equations.used, 1) / share)
-    test = whiteness(rest, equations.gain > 0.0)
+    rest = residuals_of(observations, values)
+    share = factor.degrees / factor.rows
+    noise = np.sqrt((rest**2).sum(axis=0) / np.maximum(observations.used, 1) / share)
+    test = whiteness(rest, observations.gain > 0.0)
     # Whatever the test says: in a short log it does not see all correlation that matters.
     weighted = weights**2 * rest if scores is None else scores
-    rows = np.einsum("rnp,rn->rp", equations.matrix, weighted, optimize=True)
+    rows = np.einsum("rnp,rn->rp", observations.matrix, weighted, optimize=True)
     bread = factor.inverse() if inverse is None else inverse
     allowed = long_run_covariance(rows, bread, share)
     # Correlation that happens to help is not counted on.
     worse = np.sqrt(np.maximum(np.diag(allowed) / np.diag(covariance), 1.0))
-    covariance = covariance * np.outer(worse, worse)
     return Estimate(
         method,
-        equations.names,
-        equations.units,
+        observations.names,
+        observations.units,
         values,
-        covariance,
+        covariance * np.outer(worse, worse),
         noise,
         test,
         not test.white,
         factor.condition,
         factor.rows,
         iterations,
+        converged,
         rest,
     )
+
+
+def whiteness(residuals: Array, used: NDArray[np.bool_] | None = None) -> Whiteness:
+    """Return the test of residuals (R, n), in the order of time.
+
+    Those that are not `used` (R, n) take no part: a lag has the pairs of which both are used.
+    """
+    taken = np.ones(residuals.shape, dtype=bool) if used is None else used
+    count = taken.sum(axis=0)
+    mean = np.where(taken, residuals, 0.0).sum(axis=0) / np.maximum(count, 1)
+    centred = np.where(taken, residuals - mean, 0.0)
+    power = np.maximum((centred**2).sum(axis=0), np.finfo(float).tiny)
+    lags = range(1, min(_LAGS, len(residuals) // 5) + 1)
+    if not lags:
+        return Whiteness(np.zeros(residuals.shape[1]), np.ones(residuals.shape[1]))
+    found = np.array([(centred[k:] * centred[:-k]).sum(axis=0) / power for k in lags])
+    pairs = np.array([(taken[k:] & taken[:-k]).sum(axis=0) for k in lags])
+    statistic = count * (count + 2.0) * (found**2 / np.maximum(pairs, 1)).sum(axis=0)
+    degrees = np.maximum((pairs > 0).sum(axis=0), 1)
+    return Whiteness(found[0], np.asarray(chi2.sf(statistic, degrees)))
+
+
+def long_run_covariance(scores: Array, inverse: Array, degrees: float) -> Array:
+    """Return the covariance (p, p) of values whose residuals are correlated in time.
+
+    It is the sandwich of Newey and West, with Bartlett's weights, of `scores` (R, p), W^T times the
+    weighted residuals of each row, and `inverse` (p, p), (W^T W)^-1 of the weighted equations.
+    `degrees` is the share of the equations that is not spent on the values.
+    """
+    rows = len(scores)
+    lags = min(int(np.ceil(1.3 * np.sqrt(rows))), _MOST_LAGS)
+    middle = scores.T @ scores
+    for lag in range(1, min(lags, rows - 1) + 1):
+        shifted = scores[lag:].T @ scores[:-lag]
+        middle += (1.0 - lag / (lags + 1.0)) * (shifted + shifted.T)
+    return np.asarray(inverse @ middle @ inverse / degrees)

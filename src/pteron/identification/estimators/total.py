@@ -2,28 +2,61 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from dataclasses import replace
+from typing import NamedTuple
 
-from pteron.errors import DataError
-from pteron.identification.equations import Equations
+import numpy as np
+
+from pteron.identification.errors import LogError
 from pteron.identification.estimators.estimate import Estimate, estimate_of
-from pteron.identification.estimators.triangle import triangle
-from pteron.identification.estimators.weighted import actuator_noise
+from pteron.identification.estimators.least_squares import actuator_noise
+from pteron.identification.estimators.qr import qr_factor
+from pteron.identification.logs import Log
+from pteron.identification.model import Model
+from pteron.identification.observation import Observations, observations_of
+from pteron.identification.signals import Preprocessing
 from pteron.kernels import Array
 
-__all__ = ["total"]
-
-_ITERATIONS = 50
 _SETTLED = 1e-3
 """Relative change of the forces' noise that no longer matters."""
 
 _LEAST_SHARE = 0.01
-"""Of the residuals' variance that is left to the forces, whatever the columns' noise is said to be:
-columns whose errors belong together add up to less than the sum of their squares."""
+"""Share of the residuals' variance that is left to the forces, whatever the columns' noise is said
+to be: columns whose errors belong together add up to less than the sum of their squares."""
 
 
-def total(equations: Equations, errors: Array | None = None) -> Estimate:
+class SmallestCorrections(NamedTuple):
+    """The solution of mixed total least squares.
+
+    `values` (p,) are infinite or wrong where `share` is 0: that of the forces in the last right
+    singular vector. `sizes` are the singular values, in units of the noise.
+    """
+
+    values: Array
+    sizes: Array
+    share: float
+
+
+def smallest_corrections(upper: Array, exact: int, noise: Array) -> SmallestCorrections:
+    """Return what makes W and F agree with the smallest corrections, in units of their noise.
+
+    `upper` is the triangular factor (p + 1, p + 1) of W, its `exact` columns without noise first,
+    and F. `noise` are the standard deviations of the p - `exact` noisy columns and of the forces.
+    An orthogonal factor takes the exact columns out (Van Huffel and Vandewalle): what it leaves
+    below them does not know them.
+    """
+    _, sizes, directions = np.linalg.svd(upper[exact:, exact:] / noise)
+    last = directions[-1]
+    with np.errstate(all="ignore"):
+        noisy = -last[:-1] / last[-1] * noise[-1] / noise[:-1]
+        rest = upper[:exact, -1] - upper[:exact, exact:-1] @ noisy
+        first = np.linalg.solve(upper[:exact, :exact], rest)
+    return SmallestCorrections(np.r_[first, noisy], sizes, float(abs(last[-1])))
+
+
+def total(
+    observations: Observations, errors: Array | None = None, *, iterations: int = 50
+) -> Estimate:
     """Return the values of mixed total least squares (Van Huffel and Vandewalle).
 
     Forces and regressor both get the smallest corrections that make them agree, each measured by
@@ -31,87 +64,117 @@ def total(equations: Equations, errors: Array | None = None) -> Estimate:
 
     Parameters
     ----------
-    equations : Equations
-        From `equations_of`.
+    observations : Observations
+        From `observations_of`.
     errors : array, shape (p,), optional
         Standard deviation of the noise in each column, N per unit of its value and before the
         filter; zero for an exact one. `column_errors` finds them. By default every column but
         constant and Coulomb ones has the same noise relative to its size as the forces have.
-
-    Returns
-    -------
-    Estimate
+    iterations : int
+        How many times the forces' noise is estimated anew at most.
 
     Raises
     ------
-    DataError
-        If the equations do not determine the values, or noise explains all there is.
+    LogError
+        If the observations do not determine the values, or noise explains all there is.
     """
-    plain = triangle(equations)
+    plain = qr_factor(observations)
     plain.check_seen()
-    noise = actuator_noise(equations, plain.values())
-    factor = triangle(equations, 1.0 / noise)
+    noise = actuator_noise(observations, plain.values())
+    factor = qr_factor(observations, 1.0 / noise)
     given = errors
     if given is None:
         relative = np.sqrt(factor.rest / (factor.rest + factor.image @ factor.image))
         errors = relative * factor.scale / np.sqrt(factor.rows)
-        errors[[k for k, name in enumerate(equations.names) if _constant(name)]] = 0.0
+        errors[[k for k, name in enumerate(observations.names) if _constant(name)]] = 0.0
     else:
         # On average over the equations that there are: an actuator without any has no noise.
-        weight = (equations.used / noise**2).sum() / equations.rows
+        weight = (observations.used / noise**2).sum() / observations.rows
         errors = np.asarray(given, dtype=float) * np.sqrt(weight)
-    exact = np.flatnonzero(errors == 0.0)
-    noisy = np.flatnonzero(errors > 0.0)
-    p = len(equations.names)
-    # Exact columns first: what an orthogonal factor leaves below them does not know them.
+    order = np.argsort(errors > 0.0, kind="stable")
+    exact = int((errors == 0.0).sum())
+    p = len(order)
     stack = np.column_stack([factor.factor * factor.scale, factor.image])
     stack = np.vstack([stack, np.r_[np.zeros(p), np.sqrt(factor.rest)]])
-    ordered = np.asarray(np.linalg.qr(stack[:, [*exact, *noisy, p]], mode="r"))
-    forces = 1.0
-    for _ in range(_ITERATIONS):
-        values, least = _smallest_corrections(ordered, exact, noisy, errors, forces)
+    upper = np.asarray(np.linalg.qr(stack[:, [*order, p]], mode="r"))
+    forces, converged = 1.0, False
+    values = np.empty(p)
+    for iteration in range(1, iterations + 1):  # noqa: B007 (told in the result)
+        found = smallest_corrections(upper, exact, np.r_[errors[order[exact:]], forces])
+        sizes = found.sizes
+        if found.share < 1e-12 or (len(sizes) > 1 and sizes[-1] >= sizes[-2]):
+            raise LogError(
+                "too little motion",
+                observations.source,
+                "total least squares: noise explains all there is; record a livelier motion",
+            )
+        values[order] = found.values
         through = ((values * errors) ** 2).sum()
-        if given is None:
-            break
         # The residuals hold the noise of the columns as well as that of the forces.
         left = factor.rest + ((factor.image - factor.factor @ (factor.scale * values)) ** 2).sum()
         variance = left / factor.degrees
-        if variance == 0.0:
+        converged = given is None or variance == 0.0
+        if converged:
             break
         before, forces = forces, np.sqrt(max(variance - through, _LEAST_SHARE * variance))
-        if abs(forces / before - 1.0) < _SETTLED:
+        converged = bool(abs(forces / before - 1.0) < _SETTLED)
+        if converged:
             break
     # First-order perturbation: noise of variance s^2 in all entries, and its own bias taken out.
+    least = float(sizes[-1] ** 2)
     effective = least / factor.degrees * (forces**2 + through)
     normal = (factor.scale[:, None] * factor.factor.T) @ (factor.factor * factor.scale)
     normal = normal - least * np.diag(errors**2)
     covariance = effective * np.linalg.inv(normal / np.outer(factor.scale, factor.scale))
     covariance = covariance / np.outer(factor.scale, factor.scale)
     return estimate_of(
-        "total", equations, factor, values, covariance, weights=1.0 / noise, iterations=1
+        "total",
+        observations,
+        factor,
+        values,
+        covariance,
+        weights=1.0 / noise,
+        iterations=iteration,
+        converged=converged,
     )
 
 
-def _smallest_corrections(
-    ordered: Array, exact: NDArray[np.intp], noisy: NDArray[np.intp], errors: Array, forces: float
-) -> tuple[Array, float]:
-    """Return the values (p,), and the sum of squares of the corrections, in units of the noise.
+def column_errors(model: Model, log: Log, preprocessing: Preprocessing, *, seed: int = 0) -> Array:
+    """Return the standard deviation (p,) of the noise in the regressor's columns.
 
-    `ordered` is the triangular factor of the exact columns, the noisy ones and the forces.
+    Noise like that of the positions is put on them once more; what it changes has the size of what
+    their own noise has changed, to first order.
+
+    Parameters
+    ----------
+    model : Model
+        What is identified.
+    log : Log
+        The log, or a part of it.
+    preprocessing : Preprocessing
+        How it is preprocessed.
+    seed : int
+        Where the noise comes from.
+
+    Returns
+    -------
+    array, shape (p,)
+        N per unit of each value, in units of the noise before the parallel filter; zero for columns
+        that do not depend on positions.
     """
-    e = len(exact)
-    scaled = ordered[e:, e:] / np.r_[errors[noisy], forces]
-    _, singular, directions = np.linalg.svd(scaled)
-    last = directions[-1]
-    if abs(last[-1]) < 1e-12 or (len(singular) > 1 and singular[-1] >= singular[-2]):
-        raise DataError(
-            "total least squares: noise explains all there is; record a livelier motion"
-        )
-    values = np.empty(len(errors))
-    values[noisy] = -last[:-1] / last[-1] * forces / errors[noisy]
-    rest = ordered[:e, -1] - ordered[:e, e:-1] @ values[noisy]
-    values[exact] = np.linalg.solve(ordered[:e, :e], rest)
-    return values, float(singular[-1] ** 2)
+    rng = np.random.default_rng(seed)
+    noise = preprocessing.slider_noise * rng.normal(size=log.sliders.shape)
+    shaken = observations_of(model, replace(log, sliders=log.sliders + noise), preprocessing)
+    plain = observations_of(model, log, preprocessing)
+    # Slow rows that are left out of one, and not of the other, are no error: both sides miss them.
+    same = (shaken.gain == plain.gain) & (plain.gain > 0.0)
+    if not same.any():
+        same = (shaken.gain > 0.0) & (plain.gain > 0.0)
+    before, after = plain.matrix[same], shaken.matrix[same]
+    change = np.sqrt(((after - before) ** 2).mean(axis=0))
+    size = np.sqrt((before**2).mean(axis=0))
+    # What rounding alone moves counts as exact.
+    return np.asarray(np.where(change > 1e-12 * size, change, 0.0))
 
 
 def _constant(name: str) -> bool:

@@ -8,10 +8,9 @@ from pteron.identification.excitation.conditioning import (
 )
 from pteron.identification.excitation.draws import random_excitation
 from pteron.identification.excitation.fourier import FourierMotion
-from pteron.identification.excitation.limits import Limits
-from pteron.identification.excitation.margins import Margin, Margins, margins
-from pteron.identification.excitation.optimal import optimal_excitation
+from pteron.identification.excitation.limits import Limits, Margin, Margins, margins
 from pteron.identification.excitation.result import Excitation, Start, check_sampling
+from pteron.identification.excitation.search import optimal_excitation
 
 __all__ = [
     "Conditioning",

@@ -10,9 +10,6 @@ from pteron.identification.excitation.fourier import FourierMotion, states
 from pteron.kernels import Array, numeric
 from pteron.reduction import BaseParameters
 
-__all__ = ["Conditioning", "conditioning", "scaled_condition", "stacked_regressor"]
-
-
 _ROWS = 100
 """Rows of a matrix that are decomposed at a time."""
 
@@ -86,13 +83,9 @@ def conditioning(
     motion : FourierMotion
         The motion.
     base : BaseParameters
-        Of its machine.
+        The base parameters of its machine.
     samples : int, optional
         Instants, evenly over one period; by default 40 in a period of the highest harmonic.
-
-    Returns
-    -------
-    Conditioning
 
     Raises
     ------
@@ -105,16 +98,16 @@ def conditioning(
         worst = float("inf")
         return Conditioning(worst, worst, worst, -worst)
     # Scaling columns commutes with it: R of W = Q R has the condition numbers of W.
-    triangle = _triangle(matrix)
-    lengths = np.linalg.norm(triangle, axis=0)
-    scaled = scaled_condition(triangle)
+    factor = _qr_factor(matrix)
+    lengths = np.linalg.norm(factor, axis=0)
+    scaled = scaled_condition(factor)
     logdet = -float("inf")
     if np.isfinite(scaled):
         # Equilibrated first: the columns' sizes differ by more than the digits would bear.
-        values = np.linalg.svd(triangle / lengths, compute_uv=False)
+        values = np.linalg.svd(factor / lengths, compute_uv=False)
         logdet = float(2.0 * (np.log(values).sum() + np.log(lengths / np.sqrt(count)).sum()))
-    nominal = triangle * base.values(motion.robot)
-    return Conditioning(scaled, _condition(triangle), _condition(nominal), logdet)
+    nominal = factor * base.values(motion.robot)
+    return Conditioning(scaled, _condition(factor), _condition(nominal), logdet)
 
 
 def stacked_regressor(motion: FourierMotion, base: BaseParameters, times: Array) -> Array:
@@ -125,18 +118,18 @@ def stacked_regressor(motion: FourierMotion, base: BaseParameters, times: Array)
     return found.reshape(-1, base.rank)
 
 
-def _triangle(matrix: Array) -> Array:
+def _qr_factor(matrix: Array) -> Array:
     """Return R of the QR decomposition, some rows at a time.
 
     On blocks so small the linear algebra library stays in one thread; several, on a machine that is
     busy, can take a hundred times as long.
     """
     p = matrix.shape[1]
-    triangle: Array = np.zeros((p, p))
+    factor: Array = np.zeros((p, p))
     for start in range(0, len(matrix), _ROWS):
-        rows = np.vstack([triangle, matrix[start : start + _ROWS]])
-        triangle = np.asarray(np.linalg.qr(rows, mode="r"))
-    return triangle
+        rows = np.vstack([factor, matrix[start : start + _ROWS]])
+        factor = np.asarray(np.linalg.qr(rows, mode="r"))
+    return factor
 
 
 def _condition(matrix: Array) -> float:

@@ -6,17 +6,14 @@ import numpy as np
 
 from pteron.errors import DataError, ModelError
 from pteron.identification.excitation.fourier import FourierMotion, Space, home
-from pteron.identification.excitation.limits import Limits
-from pteron.identification.excitation.margins import check_rest, relative_margins
+from pteron.identification.excitation.limits import Limits, check_rest, relative_margins
 from pteron.kernels import Array, numeric
 from pteron.manipulator import Manipulator
 
-__all__ = ["CLEAR", "FINE", "is_clear", "random_excitation", "sizes", "within_limits"]
-
-FINE = 800
+_FINE = 800
 """Samples in a period of the highest harmonic at which the limits are checked."""
 
-CLEAR = 2e-4
+_CLEAR = 2e-4
 """By what share of its size every limit is kept clear at those samples: more than a margin can dip
 between two of them."""
 
@@ -63,15 +60,11 @@ def random_excitation(
     harmonics : int
         How many, 1 or more.
     period : float
-        s.
+        The time after which the motion repeats, s.
     limits : Limits, optional
         What the motion keeps at every instant.
     seed : int or numpy Generator
         Where the randomness comes from.
-
-    Returns
-    -------
-    FourierMotion
 
     Raises
     ------
@@ -121,7 +114,7 @@ def sizes(robot: Manipulator, space: Space) -> Array:
     return size
 
 
-def is_clear(motion: FourierMotion, limits: Limits, samples: int, clear: float = CLEAR) -> bool:
+def is_clear(motion: FourierMotion, limits: Limits, samples: int, clear: float = _CLEAR) -> bool:
     """Say whether all limits are kept at so many samples, and how clearly is given."""
     found = relative_margins(motion, limits, motion.uniform_times(samples))
     return all(float(values.min()) >= clear for values in found.values())
@@ -133,7 +126,7 @@ def within_limits(motion: FourierMotion, limits: Limits) -> FourierMotion | None
     They are then kept between samples too. None if shrinking does not help: a motion around a place
     that a leg cannot reach would have to cross it.
     """
-    samples = FINE * motion.harmonics
+    samples = _FINE * motion.harmonics
     high = 1.0
     for low in _SCALES:
         if is_clear(_scaled(motion, low), limits, samples):

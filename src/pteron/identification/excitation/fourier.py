@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pteron.errors import DataError, UnreachablePose
+from pteron.identification.signals.states import home_mode
 from pteron.kernels import Array, as_array, numeric
 from pteron.manipulator import Manipulator
 from pteron.motion import Motion
 from pteron.workspace import home_pose
-
-__all__ = ["FourierMotion", "Space", "State", "assembly_mode", "basis", "home", "states"]
 
 Space = Literal["platform", "sliders"]
 """Whose coordinates the series are of: the platform's pose, or the sliders'."""
@@ -36,9 +35,9 @@ class FourierMotion:
     space : {"platform", "sliders"}
         Whether q is the pose (x, y, z, phi) or the slider coordinates.
     period : float
-        s.
+        The time after which the motion repeats, s.
     center : array, shape (n,)
-        m and, for a platform that turns, rad.
+        The coordinates that the motion goes about, m and, for a platform that turns, rad.
     cosines, sines : array, shape (H, n)
         The coefficients a_h and b_h of the harmonics h = 1 ... H, in the units of `center`.
     mode : int
@@ -86,7 +85,7 @@ class FourierMotion:
                 "same number of harmonics expected, at least one"
             )
         if self.mode < 0:
-            object.__setattr__(self, "mode", assembly_mode(self.robot))
+            object.__setattr__(self, "mode", home_mode(self.robot))
 
     @property
     def harmonics(self) -> int:
@@ -163,7 +162,8 @@ def states(motion: FourierMotion, times: Array) -> State:
     pose: Array = poses[:, motion.mode, :].copy()
     if robot.platform.turns:
         # Within a mode phi stays on one side of the singular orientations, half a turn at most.
-        pose[:, 3] = _nearest_turn(pose[:, 3], home(robot)[3])
+        around = home(robot)[3]
+        pose[:, 3] = around + (pose[:, 3] - around + np.pi) % (2.0 * np.pi) - np.pi
     velocity, acceleration = numeric(robot, "platform_motion")(pose, dq, ddq)
     return State(pose, velocity, acceleration, q, dq, ddq)
 
@@ -184,19 +184,6 @@ def basis(times: Array, harmonics: int, period: float) -> tuple[Array, Array, Ar
 def home(robot: Manipulator) -> tuple[float, ...]:
     """Return the home pose, which takes a search the first time."""
     return tuple(home_pose(robot).tolist())
-
-
-def assembly_mode(robot: Manipulator) -> int:
-    """Return the assembly mode of the home pose: the row of `direct_kinematics`, from 0."""
-    if not robot.platform.turns:
-        return 0
-    return 0 if float(numeric(robot, "regularity")(np.array(home(robot)))) > 0.0 else 1
-
-
-def _nearest_turn(angle: Array, around: float) -> Array:
-    """Return angles, by whole turns, within half a turn of another."""
-    turned: Array = around + (angle - around + np.pi) % (2.0 * np.pi) - np.pi
-    return turned
 
 
 def _sliders(robot: Manipulator, pose: Array, rate: Array, second: Array) -> Sequence[Array]:

@@ -1,20 +1,32 @@
-"""One start improved, stage by stage, until it is good and keeps its limits between samples too."""
+"""Starts improved stage by stage, until they are good and keep their limits between samples too."""
 
 from __future__ import annotations
 
+import os
+import pickle
+import subprocess
+import sys
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Generator, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass, field, replace
+from queue import SimpleQueue
 
 import numpy as np
 
 from pteron.identification.excitation.draws import within_limits
 from pteron.identification.excitation.fourier import FourierMotion
-from pteron.identification.excitation.margins import relative_margins
-from pteron.identification.excitation.nonlinear_program import Setting, minimised
+from pteron.identification.excitation.limits import relative_margins
+from pteron.identification.excitation.program import Setting, minimised
 from pteron.kernels import Array
 
-__all__ = ["ROUNDS", "Round", "Stage", "improvements"]
+_NEAR = 0.5
+"""A limit whose least margin at the start is above that share of its size is not watched, until it
+is violated: it would cost time."""
+
+_CHECKED = 200
+"""Samples in a period of the highest harmonic in which violations are sought."""
 
 
 @dataclass(frozen=True)
@@ -22,13 +34,13 @@ class Round:
     """A round of the search: how sharp the measure is in each stage, and exchanges after them.
 
     The blunt measure has wide valleys, the sharp one is all but the condition number. In an
-    exchange, instants where limits are violated between the samples join the program.
+    exchange, instants where limits are violated between the samples join the program. In a thorough
+    round exchanges go on when a motion that keeps the limits has been found.
     """
 
     doublings: tuple[int, ...]
     exchanges: int
     thorough: bool
-    """Whether exchanges go on when a motion that keeps the limits has been found."""
 
     @property
     def stages(self) -> int:
@@ -42,62 +54,174 @@ ROUNDS = {
 }
 """For each criterion, the round for all starts, and that for the best of them."""
 
-_NEAR = 0.5
-"""A limit whose least margin at the start is above that share of its size is not watched, until it
-is violated: it would cost time."""
 
-_CHECKED = 200
-"""Samples in a period of the highest harmonic in which violations are sought."""
-
-
-@dataclass(frozen=True)
-class Stage:
-    """What a stage found.
+@dataclass(frozen=True, eq=False)
+class Improvement:
+    """How far the improvement of one start has come.
 
     Attributes
     ----------
-    coefficients : array or None
-        Of a motion that keeps all limits; None if none was found.
-    last : bool
-        Whether nothing is left to be done.
+    number : int
+        Which of the starts it is.
+    setting : Setting
+        What is optimised.
+    plan : Round
+        In which stages.
+    safe : FourierMotion
+        The last motion found that keeps all limits; the start at first.
+    seconds : float
+        What is left of its time.
+    stage : int
+        How many stages are done.
+    current : FourierMotion or None
+        Where the next stage begins: it need not keep the limits; None for `safe`.
+    watched : tuple of str
+        The limits that the program keeps, by name.
+    instants : array, shape (E,)
+        Where it keeps them beside its own samples, s.
+    improved : bool
+        Whether the last stage found a motion that keeps all limits.
+    ended, finished : bool
+        Whether there is nothing more to do, and whether it was done thoroughly.
     """
 
-    coefficients: Array | None
-    last: bool
+    number: int
+    setting: Setting
+    plan: Round
+    safe: FourierMotion
+    seconds: float
+    stage: int = 0
+    current: FourierMotion | None = None
+    watched: tuple[str, ...] = ()
+    instants: Array = field(default_factory=lambda: np.empty(0))
+    improved: bool = False
+    ended: bool = False
+    finished: bool = False
+
+    def next(self) -> Improvement:
+        """Do one stage."""
+        if self.seconds <= 0.0:
+            return replace(self, improved=False, ended=True)
+        begin = time.monotonic()
+        plan, start = self.plan, self.current or self.safe
+        watched = self.watched or _near(start, self.setting)
+        coefficients = minimised(
+            self.setting,
+            start.coefficients,
+            plan.doublings[min(self.stage, len(plan.doublings) - 1)],
+            watched,
+            self.instants,
+            self.seconds,
+        )
+        ended = self.stage == plan.stages - 1
+        finished = ended and time.monotonic() < begin + self.seconds
+        done = replace(self, stage=self.stage + 1, watched=watched, improved=False, current=None)
+        if coefficients is not None:
+            # A motion that does not keep the limits yet is still a place to go on from.
+            motion = start.with_coefficients(coefficients)
+            kept = within_limits(motion, self.setting.limits)
+            violated, instants = _violations(motion, self.setting)
+            good = not violated or (kept is not None and not plan.thorough)
+            finished = finished or (self.stage >= len(plan.doublings) - 1 and good)
+            done = replace(
+                done,
+                safe=kept or self.safe,
+                current=kept or motion,
+                improved=kept is not None,
+                watched=tuple(dict.fromkeys([*watched, *violated])),
+                instants=np.unique(np.concatenate([self.instants, instants])),
+            )
+        left = self.seconds - (time.monotonic() - begin)
+        return replace(done, seconds=left, ended=ended or finished, finished=finished)
 
 
-def improvements(
-    setting: Setting, start: FourierMotion, plan: Round, seconds: float
-) -> Iterator[Stage]:
-    """Yield what each stage finds, from a start that keeps the limits, for so many seconds."""
-    deadline = time.monotonic() + seconds
-    current = safe = start.coefficients
-    extra = np.empty(0)
-    watched = _near(start, setting)
-    for k in range(plan.stages):
-        left = deadline - time.monotonic()
-        if left <= 0.0:
-            return
-        doublings = plan.doublings[min(k, len(plan.doublings) - 1)]
-        found = minimised(setting, current, doublings, watched, extra, left)
-        last = k == plan.stages - 1 and time.monotonic() < deadline
-        if found is None:
-            current = safe
-            yield Stage(None, last)
-            continue
-        motion = start.with_coefficients(found)
-        kept = within_limits(motion, setting.limits)
-        violated, instants = _violations(motion, setting)
-        good = not violated or (kept is not None and not plan.thorough)
-        last = last or (k >= len(plan.doublings) - 1 and good)
-        yield Stage(None if kept is None else kept.coefficients, last)
-        if last:
-            return
-        # A motion that does not keep the limits yet is still a place to go on from.
-        current = found if kept is None else kept.coefficients
-        safe = safe if kept is None else kept.coefficients
-        watched = tuple(dict.fromkeys([*watched, *violated]))
-        extra = np.unique(np.concatenate([extra, instants]))
+def improved(starts: Sequence[Improvement], workers: int) -> Generator[Improvement, None, None]:
+    """Yield every start after each of its stages, done by so many processes; by this one if one.
+
+    A start whose process fails is improved here, after the others. When the iteration is given up
+    the processes are ended at once.
+    """
+    if workers > 1:
+        failed: list[Improvement] = []
+        yield from _in_processes(starts, workers, failed)
+        starts = failed
+    for one in starts:
+        while not one.ended:
+            one = one.next()
+            yield one
+
+
+def serve() -> None:
+    """Do the stages that come on standard input; their results go to standard output."""
+    # Whatever else is printed, by a solver say, must not mix with the answers.
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    with answers, suppress(EOFError):
+        while True:
+            pickle.dump(pickle.load(sys.stdin.buffer).next(), answers)
+            answers.flush()
+
+
+def _in_processes(
+    starts: Sequence[Improvement], workers: int, failed: list[Improvement]
+) -> Iterator[Improvement]:
+    """Yield every start after each of its stages, and note those whose processes fail."""
+    idle: SimpleQueue[subprocess.Popen[bytes]] = SimpleQueue()
+
+    def next_stage(one: Improvement) -> Improvement:
+        process = idle.get()
+        try:
+            assert process.stdin is not None
+            assert process.stdout is not None
+            pickle.dump(one, process.stdin)
+            process.stdin.flush()
+            answer: Improvement = pickle.load(process.stdout)
+            return answer
+        finally:
+            idle.put(process)
+
+    pool = ThreadPoolExecutor(workers)
+    with ExitStack() as ends:
+        # Last in, first out: no new work, no processes, then no threads that wait for them.
+        ends.enter_context(pool)
+        for _ in range(workers):
+            process = _started()
+            ends.callback(_end, process)
+            idle.put(process)
+        ends.callback(pool.shutdown, wait=False, cancel_futures=True)
+        running = {pool.submit(next_stage, one): one for one in starts}
+        while running:
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                before = running.pop(future)
+                try:
+                    one = future.result()
+                except (OSError, EOFError, pickle.UnpicklingError):
+                    failed.append(before)
+                    continue
+                yield one
+                if not one.ended:
+                    running[pool.submit(next_stage, one)] = one
+
+
+def _started() -> subprocess.Popen[bytes]:
+    # A program of its own: neither CasADi's state and the threads of compilations are inherited,
+    # as in a fork, nor is the caller's script run again, as by `multiprocessing`.
+    code = f"import sys; sys.path[:] = {sys.path!r}; from {__name__} import serve; serve()"
+    return subprocess.Popen(
+        [sys.executable, "-c", code],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        # One thread each, and an interrupt from the keyboard is for the caller to deal with.
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
+        start_new_session=True,
+    )
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    process.kill()
+    with suppress(OSError), process:
+        pass
 
 
 def _near(motion: FourierMotion, setting: Setting) -> tuple[str, ...]:

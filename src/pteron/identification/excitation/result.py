@@ -13,13 +13,10 @@ from pteron.atomic import write_text
 from pteron.errors import DataError
 from pteron.identification.excitation.conditioning import Conditioning
 from pteron.identification.excitation.fourier import FourierMotion, states
-from pteron.identification.excitation.limits import Limits
-from pteron.identification.excitation.margins import Margins
-from pteron.identification.excitation.spectrum import Criterion
+from pteron.identification.excitation.limits import Limits, Margins
+from pteron.identification.excitation.program import Criterion
 from pteron.kernels import numeric
 from pteron.tables import write_table
-
-__all__ = ["Excitation", "Start", "check_sampling"]
 
 _MOST_SAMPLES = 10_000_000
 
@@ -33,7 +30,7 @@ class Start:
     draw : int
         Which of the random motions it was, counted from 0.
     before, after : Conditioning
-        Of the random motion, and of the best that was made of it.
+        How good the random motion was, and the best that was made of it.
     finished : bool
         Whether it was improved thoroughly, rather than left for better ones or cut short.
     """
@@ -59,7 +56,7 @@ class Excitation:
     conditioning : Conditioning
         How well it shows the base parameters.
     random : Conditioning
-        That of the best of the random motions, which keep the same limits.
+        How well the best of the random motions does, which keep the same limits.
     margins : Margins
         What it leaves of every limit.
     starts : tuple of Start
@@ -67,6 +64,7 @@ class Excitation:
     draws : int
         How many random motions there were.
     seed : int
+        Where the random motions came from.
     seconds : float
         How long it took.
     interrupted : bool

@@ -4,29 +4,33 @@ Positions are smoothed and differentiated in slider space, where they were measu
 velocities and accelerations of the platform follow from them by exact kinematics.
 """
 
-from pteron.identification.signals.assembly import assembly_mode
-from pteron.identification.signals.differences import central_differences
+from pteron.identification.signals.derivatives import (
+    Derivatives,
+    central_differences,
+    spline_motion,
+    uniform,
+)
+from pteron.identification.signals.filters import Decimation, cutoff_of, smoothed, white_noise
 from pteron.identification.signals.fourier import FourierSeries, fitted_series
-from pteron.identification.signals.lowpass import cutoff_of, smoothed
-from pteron.identification.signals.noise import white_noise
-from pteron.identification.signals.parallel import Decimation
-from pteron.identification.signals.spline import spline_motion
-from pteron.identification.signals.states import NoPose, States
-from pteron.identification.signals.treatment import Processing, Treatment, treatment_of
+from pteron.identification.signals.preprocessing import Preprocessing, Processing, preprocessing_of
+from pteron.identification.signals.samples import samples
+from pteron.identification.signals.states import States, assembly_mode
 
 __all__ = [
     "Decimation",
+    "Derivatives",
     "FourierSeries",
-    "NoPose",
+    "Preprocessing",
     "Processing",
     "States",
-    "Treatment",
     "assembly_mode",
     "central_differences",
     "cutoff_of",
     "fitted_series",
+    "preprocessing_of",
+    "samples",
     "smoothed",
     "spline_motion",
-    "treatment_of",
+    "uniform",
     "white_noise",
 ]

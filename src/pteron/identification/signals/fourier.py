@@ -1,16 +1,18 @@
-"""A periodic signal as a Fourier series fitted to all its periods at once."""
+"""Fourier series of periodic signals, and the projection of samples onto their harmonics."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from scipy.linalg import cho_factor, cho_solve  # type: ignore[import-untyped]
 
 from pteron.errors import DataError
-from pteron.identification.signals.projection import Projection, fourier_basis, row_blocks
 from pteron.kernels import Array
 
-__all__ = ["FourierSeries", "fitted_series", "most_harmonics"]
+_BLOCK = 1 << 14
 
 _MOST = 120
 """Harmonics that are looked at."""
@@ -26,6 +28,63 @@ _ROUNDING = 1e-15
 """Noise relative to a signal's size that is rounding: harmonics below it are not looked for."""
 
 
+def row_blocks(rows: int) -> Iterator[slice]:
+    """Yield so many rows in parts of a bounded size."""
+    for start in range(0, rows, _BLOCK):
+        yield slice(start, min(start + _BLOCK, rows))
+
+
+def fourier_basis(time: Array, period: float, harmonics: int, derivative: int = 0) -> Array:
+    """Return one, and sine and cosine of each harmonic (T, 2 H + 1), or their derivatives."""
+    angle = 2.0 * np.pi / period
+    columns = np.zeros((len(time), 2 * harmonics + 1))
+    columns[:, 0] = float(derivative == 0)
+    phase = np.remainder(time, period) * angle
+    shift = derivative * np.pi / 2.0
+    for h in range(1, harmonics + 1):
+        scale = (h * angle) ** derivative
+        columns[:, 2 * h - 1] = scale * np.sin(h * phase + shift)
+        columns[:, 2 * h] = scale * np.cos(h * phase + shift)
+    return columns
+
+
+@dataclass(frozen=True)
+class Projection:
+    """Least squares of samples at times (T,), s, onto the lowest harmonics of a period (s).
+
+    Over a period and more the basis is nearly orthogonal, so that normal equations lose nothing.
+    """
+
+    time: Array
+    period: float
+    harmonics: int
+
+    @cached_property
+    def _normal(self) -> tuple[Array, bool]:
+        bases = (self.basis(rows) for rows in row_blocks(len(self.time)))
+        size = 2 * self.harmonics + 1
+        return cho_factor(sum((basis.T @ basis for basis in bases), np.zeros((size, size))))  # type: ignore[no-any-return]
+
+    def basis(self, rows: slice) -> Array:
+        """Return the basis functions at some of the samples."""
+        return fourier_basis(self.time[rows], self.period, self.harmonics)
+
+    def coefficients(self, signal: Callable[[slice], Array], size: int) -> Array:
+        """Return the coefficients (2 H + 1, k) of a signal that comes as (rows, k)."""
+        right = np.zeros((2 * self.harmonics + 1, size))
+        for rows in row_blocks(len(self.time)):
+            right += self.basis(rows).T @ signal(rows)
+        return np.asarray(cho_solve(self._normal, right))
+
+    def noise(self, used: Array, kept: Array) -> Array:
+        """Return what is left at times `kept` of unit white noise on samples (T, n) that are 1."""
+        at = cho_solve(self._normal, fourier_basis(kept, self.period, self.harmonics).T)
+        variance = np.zeros((len(kept), used.shape[1]))
+        for rows in row_blocks(len(self.time)):
+            variance += ((self.basis(rows) @ at) ** 2).T @ used[rows]
+        return np.asarray(np.sqrt(variance))
+
+
 @dataclass(frozen=True)
 class FourierSeries:
     """A Fourier series of k signals.
@@ -33,32 +92,28 @@ class FourierSeries:
     Attributes
     ----------
     period : float
-        s.
+        The time after which the signals repeat, s.
     coefficients : array, shape (2 H + 1, k)
         The mean, then sine and cosine of each harmonic.
     noise : array, shape (k,)
-        Standard deviation of what the fit leaves.
-    samples : int
-        To which it was fitted.
+        Standard deviation of what the fit leaves of the samples.
     """
 
     period: float
     coefficients: Array
     noise: Array
-    samples: int
 
     @property
     def harmonics(self) -> int:
-        """H."""
+        """How many harmonics there are, H."""
         return len(self.coefficients) // 2
-
-    def basis(self, time: Array, derivative: int = 0) -> Array:
-        """Return the basis functions (T, 2 H + 1) at times, or their derivatives."""
-        return fourier_basis(time, self.period, self.harmonics, derivative)
 
     def at(self, time: Array, derivative: int = 0) -> Array:
         """Return the signals (T, k) at times, or their derivatives."""
-        parts = (self.basis(time[rows], derivative) for rows in row_blocks(len(time)))
+        parts = (
+            fourier_basis(time[rows], self.period, self.harmonics, derivative)
+            for rows in row_blocks(len(time))
+        )
         return np.concatenate([part @ self.coefficients for part in parts])
 
 
@@ -67,19 +122,9 @@ def fitted_series(
 ) -> FourierSeries:
     """Return the series fitted to samples by least squares, with the harmonics that show.
 
-    All periods count alike, so that noise is averaged over them, and samples may stand anywhere in
-    time. Harmonics above the last one that rises over the noise are left out.
-
-    Parameters
-    ----------
-    time : array, shape (T,)
-        s.
-    signal : array, shape (T, k)
-        Any unit.
-    period : float
-        s.
-    highest : float, optional
-        Take exactly the harmonics up to this frequency (Hz) instead.
+    All periods count alike, so that noise is averaged over them, and samples (T, k) may stand at
+    any times (T,), s. Harmonics above the last one that rises over the noise are left out, unless
+    `highest` (Hz) tells to take exactly those up to it.
 
     Raises
     ------
@@ -109,7 +154,7 @@ def fitted_series(
         if last < most:
             # Uneven samples mix harmonics a little: what is kept is fitted by itself.
             found, _ = _fitted(time, signal, period, last)
-    return FourierSeries(period, found, noise, len(time))
+    return FourierSeries(period, found, noise)
 
 
 def most_harmonics(time: Array, period: float) -> int:
@@ -135,7 +180,7 @@ def _fitted(time: Array, signal: Array, period: float, harmonics: int) -> tuple[
 
     A second step takes out what rounding put in.
     """
-    projection = Projection.of(time, period, harmonics)
+    projection = Projection(time, period, harmonics)
     size = signal.shape[1]
     first = projection.coefficients(lambda rows: signal[rows], size)
 

@@ -1,26 +1,27 @@
-"""States of the machine at the samples of a log."""
+"""States of the machine at the samples of a log: sliders and platform, in one assembly mode."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pteron.errors import DataError
+from pteron.identification.errors import LogError
+from pteron.identification.logs import Log
 from pteron.kernels import Array, numeric
 from pteron.kinematics import direct_kinematics
 from pteron.manipulator import Manipulator
-
-__all__ = ["NoPose", "States"]
+from pteron.workspace import home_pose
 
 _LEAST_SINE = 1e-3
 _LEAST_REGULARITY = 1e-3
 """Next to a singularity the regressor grows without bound, and with it every error."""
 
-
-class NoPose(DataError):
-    """Sliders of a sample have no pose in the machine's assembly mode."""
+_LOOK = 1000
+"""Samples of the measured pose that decide on the assembly mode."""
 
 
 @dataclass(frozen=True)
@@ -62,34 +63,20 @@ class States:
     ) -> States:
         """Return the states of sliders that move so: rho = J x inverted, and differentiated twice.
 
-        Parameters
-        ----------
-        robot : Manipulator
-            The machine.
-        motion : tuple of array, shape (R, n)
-            Slider coordinates, rates and accelerations.
-        time : array, shape (R,)
-            s.
-        mode : int
-            The assembly mode, from 0.
-        payload : array of int, shape (R,), optional
-            The phase.
-        source : str
-            What messages call the log.
-        first_row : int
-            The row of the first sample in it, from 0.
+        `motion` holds slider coordinates, rates and accelerations (R, n) at times (R,), s; `mode`
+        is the assembly mode, from 0, and `payload` the phases (R,). Messages call the log `source`;
+        its row `first_row`, from 0, is the first sample.
 
         Raises
         ------
-        DataError
-            If no pose has the sliders of a sample, or if it is next to a singularity; the message
-            names the row.
+        LogError
+            If no pose has the sliders of a sample, or if it is next to a singularity.
         """
         sliders, rates, accelerations = motion
         pose = np.ascontiguousarray(direct_kinematics(robot, sliders)[:, mode])
         lost = np.isnan(pose).any(axis=-1)
         if lost.any():
-            raise NoPose(_no_pose(robot, sliders, lost, mode, source, first_row))
+            raise _no_pose(robot, sliders, lost, mode, source, first_row)
         _check_regular(robot, pose, source, first_row)
         velocity, acceleration = numeric(robot, "platform_motion")(pose, rates, accelerations)
         phases = np.zeros(len(time), dtype=np.int64) if payload is None else payload
@@ -103,9 +90,48 @@ class States:
         return replace(self, **{name: value[rows] for name, value in vars(self).items()})
 
 
+def assembly_mode(robot: Manipulator, log: Log) -> int:
+    """Return the column of `direct_kinematics`, from 0, that a log follows.
+
+    A column stands for one assembly mode throughout, between the singular orientations: to follow
+    it is to follow the motion by continuity. The description's choice counts first, then the
+    measured pose, if there is one, and else the mode of the machine's home pose.
+
+    Raises
+    ------
+    DataError
+        If the description names a mode that the machine has not.
+    """
+    if not robot.platform.turns:
+        return 0
+    declared = log.description.assembly_mode
+    if declared is not None:
+        if declared not in (1, 2):
+            raise DataError(f"{log.source}: assembly_mode = {declared}; {robot.name} has 1 and 2")
+        return declared - 1
+    if log.pose is None:
+        return home_mode(robot)
+    # Position and half-chord of the angle, so that whole turns count for nothing.
+    step = max(log.rows // _LOOK, 1)
+    poses, measured = direct_kinematics(robot, log.sliders[::step]), log.pose[::step, None]
+    position = np.linalg.norm(poses[..., :3] - measured[..., :3], axis=-1)
+    angle = np.abs(np.sin(0.5 * (poses[..., 3] - measured[..., 3])))
+    off = np.nan_to_num(position + angle, nan=np.inf)
+    return int(np.argmin(np.median(off, axis=0)))
+
+
+@lru_cache(maxsize=64)
+def home_mode(robot: Manipulator) -> int:
+    """Return the assembly mode of the home pose, from 0."""
+    if not robot.platform.turns:
+        return 0
+    # The first mode has the positive determinant; see `pteron.direct_kinematics`.
+    return 0 if float(numeric(robot, "regularity")(home_pose(robot))) > 0.0 else 1
+
+
 def _no_pose(
-    robot: Manipulator, sliders: Array, lost: Array, mode: int, source: str, first_row: int
-) -> str:
+    robot: Manipulator, sliders: Array, lost: NDArray[np.bool_], mode: int, source: str, first: int
+) -> LogError:
     row = int(np.argmax(lost))
     count = int(lost.sum())
     values = ", ".join(f"{value:.4f}" for value in sliders[row])
@@ -114,9 +140,10 @@ def _no_pose(
     if others.shape[-2] > 1 and not np.isnan(others[:, 1 - mode]).any():
         hint = f"assembly mode {2 - mode} has one: declare it in the log's description"
     more = f", nor those of {count - 1} more rows" if count > 1 else ""
-    return (
-        f"{source}: row {first_row + row + 1}: no pose of {robot.name} has the sliders "
-        f"({values}) m{more}; {hint}"
+    return LogError(
+        "no pose",
+        f"{source}: row {first + row + 1}",
+        f"no pose of {robot.name} has the sliders ({values}) m{more}; {hint}",
     )
 
 
@@ -129,7 +156,9 @@ def _check_regular(robot: Manipulator, pose: Array, source: str, first_row: int)
     for what, size, least in found:
         if (size < least).any():
             row = int(np.argmax(size < least))
-            raise DataError(
-                f"{source}: row {first_row + row + 1}: {what} ({size[row]:.1e} of 1, at least "
-                f"{least:g} is needed); cut this part out of the log"
+            raise LogError(
+                "singular",
+                f"{source}: row {first_row + row + 1}",
+                f"{what} ({size[row]:.1e} of 1, at least {least:g} is needed); cut this part out "
+                "of the log",
             )

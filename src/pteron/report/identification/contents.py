@@ -8,7 +8,7 @@ from pathlib import PurePath
 
 import numpy as np
 
-from pteron.identification import Identification, Prediction, Treatment
+from pteron.identification import Identification, Prediction, Preprocessing
 from pteron.kernels import Array
 from pteron.report.identification.values import Body, Parameter, body_rows, parameter_rows
 
@@ -58,7 +58,7 @@ class Contents:
     repeats: bool
     parameters: tuple[Parameter, ...]
     bodies: tuple[Body, ...]
-    treated: tuple[tuple[str, Treatment], ...]
+    treated: tuple[tuple[str, Preprocessing], ...]
     findings: tuple[tuple[str, str, str, str], ...]
     residuals: Array
     correlations: Array
@@ -123,7 +123,7 @@ def contents(result: Identification) -> Contents:
         bodies=body_rows(result),
         treated=tuple(
             (names[one.source], treatment)
-            for one, treatment in zip(result.fitted, result.treatments, strict=True)
+            for one, treatment in zip(result.fitted, result.preprocessing, strict=True)
         ),
         findings=tuple(
             (one.kind, "" if one.row is None else str(one.row), one.column or "", text)

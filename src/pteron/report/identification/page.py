@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 import pteron
 from pteron.identification import Identification
-from pteron.identification.verdict import AT_THE_FLOOR, LARGE, SMALL
+from pteron.identification.result import AT_THE_FLOOR, LARGE, SMALL
 from pteron.plots import (
     autocorrelation_figure,
     certainty_figure,

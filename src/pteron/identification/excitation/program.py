@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, Literal
 
 import casadi as ca
 import numpy as np
 
 from pteron.equations.geometry import Expression
 from pteron.identification.excitation.draws import sizes
-from pteron.identification.excitation.fourier import Space, assembly_mode, basis
+from pteron.identification.excitation.fourier import Space, basis
 from pteron.identification.excitation.limits import Limits, per_slider, slider_sizes
-from pteron.identification.excitation.spectrum import Criterion, measure
+from pteron.identification.signals.states import home_mode
 from pteron.kernels import Array, Columns, program
 from pteron.manipulator import Manipulator, parameters
 
-__all__ = ["Setting", "minimised"]
+Criterion = Literal["condition", "logdet"]
+"""What is made small: the scaled condition number, or the volume of the confidence ellipsoid."""
 
 _SAMPLES = 20
 """Samples in a period of the highest harmonic. The limits are kept where the regressor is taken:
@@ -27,6 +28,10 @@ _BACK_OFF = 1e-3
 """By what share of its size the program keeps every limit clear at its samples."""
 
 _ITERATIONS = 200
+
+_INTERRUPTED = ("User_Requested_Stop", "NonIpopt_Exception_Thrown")
+"""How IPOPT ends when CasADi has taken an interrupt from the keyboard for itself: all other errors
+of its callbacks are numbers that are invalid."""
 
 
 @dataclass(frozen=True)
@@ -59,27 +64,12 @@ def minimised(
     extra: Array,
     seconds: float,
 ) -> Array | None:
-    """Return coefficients (2 H + 1, n) from a start that is better, but need not keep the limits.
+    """Return coefficients (2 H + 1, n) that are better, but need not keep the limits.
 
-    Parameters
-    ----------
-    setting : Setting
-        What is optimised.
-    start : array, shape (2 H + 1, n)
-        Coefficients of a motion that keeps the limits.
-    doublings : int
-        Sharpness of the measure (see `measure`).
-    watched : tuple of str
-        The limits that are kept, by name; the fewer, the faster.
-    extra : array, shape (E,)
-        Instants beside the regular ones at which the limits are kept, s.
-    seconds : float
-        After which the solver stops where it is.
-
-    Returns
-    -------
-    array or None
-        None if the solver could not begin.
+    It begins at `start` (2 H + 1, n), a motion that keeps the limits, and stops after so many
+    seconds; None if it could not begin. `doublings` is the sharpness of the measure (see
+    `measure`). The limits `watched` by name are kept; the fewer, the faster; `extra` (E,) are
+    instants (s) beside the regular ones at which they are.
     """
     n, rows = setting.robot.freedom, 2 * setting.harmonics + 1
     count = max(_SAMPLES * setting.harmonics, 3 * _SAMPLES)
@@ -102,7 +92,10 @@ def minimised(
         )
     except RuntimeError:
         return None
-    if solver.stats()["return_status"] == "Invalid_Number_Detected":
+    status = solver.stats()["return_status"]
+    if status in _INTERRUPTED:
+        raise KeyboardInterrupt
+    if status == "Invalid_Number_Detected":
         return None
     result: Array = np.array(ca.reshape(found["x"], rows, n)) * size
     return result if np.isfinite(result).all() else None
@@ -153,7 +146,7 @@ def _path(setting: Setting, watched: tuple[str, ...]) -> _Path:
     deltas = program(robot, "discriminants").function(pose).T
     least = (limits.elbow_sine + _BACK_OFF) ** 2
     found["elbow_sine"] = deltas / np.square(lengths), least, np.inf
-    sign = 1.0 if assembly_mode(robot) == 0 else -1.0
+    sign = 1.0 if home_mode(robot) == 0 else -1.0
     regularity = sign * program(robot, "regularity").function(pose)
     found["regularity"] = regularity, limits.regularity + _BACK_OFF, np.inf
     if setting.space == "sliders":
@@ -184,5 +177,51 @@ def _state(setting: Setting) -> tuple[list[Expression], list[Expression]]:
     if setting.space == "platform":
         return q, q
     poses = program(robot, "closure_poses").function(q[0])
-    pose = poses[:, assembly_mode(robot)]
+    pose = poses[:, home_mode(robot)]
     return q, [pose, *(rate.T for rate in program(robot, "platform_motion").function(pose, *q[1:]))]
+
+
+def measure(information: Expression, criterion: Criterion, doublings: int) -> Expression:
+    """Return what an optimiser makes small, of the information matrix M = W^T W (p, p).
+
+    R is M with rows and columns divided by the roots of its diagonal, so that the condition number
+    of R is the square of the scaled condition number of W.
+
+    ``"logdet"``: -log det M / p. Scaling the columns of W only adds a constant to it.
+
+    ``"condition"``: log(tr(R^q) tr(R^-q)) / (2 q), q = 2^doublings. It is smooth, at least the log
+    of the scaled condition number, and at most log(p) / q above it.
+    """
+    p = information.shape[0]
+    scale = 1.0 / ca.sqrt(ca.diag(information))
+    equilibrated = information * ca.mtimes(scale, scale.T)
+    inverse, logdet = _inverse(p)(equilibrated)
+    if criterion == "logdet":
+        return (2.0 * ca.sum1(ca.log(scale)) - logdet) / p
+    return 0.5 * (_log_trace(equilibrated, doublings) + _log_trace(inverse, doublings))
+
+
+def _log_trace(matrix: Expression, doublings: int) -> Expression:
+    """Return log(tr(A^q)) / q with q = 2^doublings, of a symmetric matrix, free of overflow."""
+    power = 1
+    total = ca.log(ca.trace(matrix))
+    matrix = matrix / ca.trace(matrix)
+    for _ in range(doublings):
+        matrix = ca.mtimes(matrix, matrix)
+        power *= 2
+        trace = ca.trace(matrix)
+        total = 2.0 * total + ca.log(trace)
+        matrix = matrix / trace
+    return total / power
+
+
+@lru_cache(maxsize=16)
+def _inverse(p: int) -> ca.Function:
+    """Return the function that inverts a positive definite matrix, and gives its log det."""
+    matrix = ca.SX.sym("matrix", p, p)
+    upper = ca.chol(matrix)
+    inverse = ca.solve(upper, ca.SX.eye(p))
+    logdet = 2.0 * ca.sum1(ca.log(ca.diag(upper)))
+    return ca.Function(
+        "inverse", [matrix], [ca.densify(ca.mtimes(inverse, inverse.T)), logdet], {"cse": True}
+    )

@@ -1,19 +1,19 @@
-"""Least squares through a triangular factor, which is built block by block and holds everything."""
+"""Least squares through a QR factor, which is built block by block and holds everything."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import solve_triangular  # type: ignore[import-untyped]
 
-from pteron.errors import DataError
-from pteron.identification.equations import Equations
+from pteron.identification.errors import LogError
+from pteron.identification.observation import Observations
 from pteron.kernels import Array
 
-__all__ = ["Triangle", "triangle"]
-
-_BLOCK = 1 << 14
+BLOCK = 1 << 14
+"""Rows that are factorised at a time."""
 
 _UNSEEN = 1e-10
 """Singular value, relative to the largest, below which a combination of values is not seen."""
@@ -23,13 +23,13 @@ _TAKES_PART = 0.05
 
 
 @dataclass(frozen=True)
-class Triangle:
+class QrFactor:
     """The triangular factor R of [W F], with the columns of W scaled to unit length.
 
     Attributes
     ----------
     factor : array, shape (p, p)
-        Of the scaled W.
+        R of the scaled W.
     image : array, shape (p,)
         Q^T F.
     rest : float
@@ -39,7 +39,7 @@ class Triangle:
     rows : int
         Equations that went in.
     names : tuple of str
-        Of the values.
+        What the values are called.
     source : str
         What messages call the log.
     """
@@ -72,70 +72,73 @@ class Triangle:
         return np.asarray((inverse @ inverse.T) / np.outer(self.scale, self.scale))
 
     def check_seen(self) -> None:
-        """Refuse equations that do not determine the values.
+        """Refuse observations that do not determine the values.
 
         Raises
         ------
-        DataError
+        LogError
             If there are fewer equations than values, or some combinations of values leave the
             forces as they are; it names these values.
         """
         if self.degrees <= 0:
-            raise DataError(
-                f"{self.source}: {self.rows} equations are left after filters and edges, more than "
-                f"{len(self.names)} are needed; record longer, or choose a higher band"
+            raise LogError(
+                "too short",
+                self.source,
+                f"{self.rows} equations are left after filters and edges, more than "
+                f"{len(self.names)} are needed; record longer, or choose a higher band",
             )
         _, sizes, directions = np.linalg.svd(self.factor)
         unseen = directions[sizes <= _UNSEEN * sizes[0]]
         concerned = (np.abs(unseen) > _TAKES_PART).any(axis=0) | (self.scale == 0.0)
         if concerned.any():
             names = [name for name, flag in zip(self.names, concerned, strict=True) if flag]
-            raise DataError(
-                f"{self.source}: too little motion: {len(names)} of {len(self.names)} values "
-                f"cannot be seen ({', '.join(names)}); move all coordinates at once, such as along "
-                "a trajectory of pteron excite"
+            raise LogError(
+                "too little motion",
+                self.source,
+                f"too little motion: {len(names)} of {len(self.names)} values cannot be seen "
+                f"({', '.join(names)}); move all coordinates at once, such as along a trajectory "
+                "of pteron excite",
             )
 
 
-def triangle(equations: Equations, weights: Array | None = None) -> Triangle:
-    """Return the triangular factor of equations.
+def qr_factor(
+    observations: Observations, weights: Array | None = None, *, block: int = BLOCK
+) -> QrFactor:
+    """Return the QR factor of observations, `block` rows at a time.
 
-    Parameters
-    ----------
-    equations : Equations
-        R n of them.
-    weights : array, shape (R, n) or (n,), optional
-        Factors on the rows.
+    The rows are multiplied by `weights`, (R, n) or (n,), where they are given.
     """
-    p = len(equations.names)
+    p = len(observations.names)
     squares = np.zeros(p)
     factor = np.zeros((0, p + 1))
     # Two passes: lengths first, so that the factor is one of columns of like size.
-    for matrix, _ in _blocks(equations, weights):
+    for matrix, _ in _blocks(observations, weights, block):
         squares += (matrix**2).sum(axis=0)
     scale = np.sqrt(squares)
     divisor = np.where(scale > 0.0, scale, 1.0)
-    for matrix, forces in _blocks(equations, weights):
-        block = np.column_stack([matrix / divisor, forces])
-        factor = np.asarray(np.linalg.qr(np.vstack([factor, block]), mode="r"))
+    for matrix, forces in _blocks(observations, weights, block):
+        rows = np.column_stack([matrix / divisor, forces])
+        factor = np.asarray(np.linalg.qr(np.vstack([factor, rows]), mode="r"))
     full = np.zeros((p + 1, p + 1))
     full[: len(factor)] = factor
-    return Triangle(
+    return QrFactor(
         full[:p, :p],
         full[:p, p],
         float(full[p, p] ** 2),
         scale,
-        equations.rows,
-        equations.names,
-        equations.source,
+        observations.rows,
+        observations.names,
+        observations.source,
     )
 
 
-def _blocks(equations: Equations, weights: Array | None):  # type: ignore[no-untyped-def]
-    p = len(equations.names)
-    for start in range(0, len(equations.forces), _BLOCK):
-        rows = slice(start, start + _BLOCK)
-        matrix, forces = equations.matrix[rows], equations.forces[rows]
+def _blocks(
+    observations: Observations, weights: Array | None, block: int
+) -> Iterator[tuple[Array, Array]]:
+    p = len(observations.names)
+    for start in range(0, len(observations.forces), block):
+        rows = slice(start, start + block)
+        matrix, forces = observations.matrix[rows], observations.forces[rows]
         if weights is not None:
             factors = weights if weights.ndim == 1 else weights[rows]
             matrix, forces = factors[..., None] * matrix, factors * forces

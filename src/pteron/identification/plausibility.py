@@ -1,4 +1,4 @@
-"""What held-out forces do not show: values may be right for another machine than the one drawn."""
+"""Whether values can be those of the machine, whatever the forces say: plausibility checks."""
 
 from __future__ import annotations
 
@@ -8,14 +8,18 @@ from typing import Literal
 import numpy as np
 
 from pteron.identification.consistency import Consistency
-from pteron.identification.diagnosis import has_negative_inertia
 from pteron.identification.estimators import Estimate
 from pteron.identification.model import Model
-from pteron.identification.signals import Treatment
-from pteron.kernels import Array
+from pteron.identification.signals import Preprocessing
+from pteron.kernels import Array, numeric
+from pteron.kinematics import random_poses
 from pteron.manipulator import Manipulator, parameters
+from pteron.reduction import base_regressor
 
-__all__ = ["doubts", "left_over"]
+_PROBES = 50
+
+_MOST_UNSEEN = 0.5
+"""Share of the base parameters that a motion may leave unseen."""
 
 _FAR_ABOVE = 5.0
 """What a fit leaves of the forces, over their noise, where the model is not the machine's."""
@@ -34,20 +38,10 @@ def doubts(
     consistency: Consistency | None,
     cad: Manipulator | Literal["robot"] | None,
 ) -> list[str]:
-    """Return what held-out forces cannot show: they may be right for the wrong machine.
+    """Return what held-out forces cannot show: values may be right for the wrong machine.
 
-    Parameters
-    ----------
-    model : Model
-        The model.
-    estimate : Estimate
-        Its values.
-    known : array, shape (p,)
-        What of them is no part of the bodies, such as rotors.
-    consistency : Consistency or None
-        The real bodies that were found.
-    cad : Manipulator, "robot" or None
-        The machine as it is drawn.
+    `known` (p,) is what of the values is no part of the bodies, such as rotors; `consistency` are
+    the real bodies that were found, and `cad` is the machine as it is drawn.
     """
     found = []
     if has_negative_inertia(model, estimate.values):
@@ -61,7 +55,7 @@ def doubts(
     if cad is not None:
         drawn = parameters(model.robot if cad == "robot" else cad)
         base = model.base
-        usual = np.abs(base.grouping) @ np.abs(drawn)
+        usual = _usual(model, drawn)
         values = (estimate.values - known)[: base.rank]
         off = np.abs(values - base.grouping @ drawn)
         far = (off > _FAR * usual) & (off > 5.0 * estimate.deviations[: base.rank])
@@ -78,9 +72,9 @@ def doubts(
     return found
 
 
-def left_over(estimate: Estimate, treatments: Sequence[Treatment]) -> str:
+def left_over(estimate: Estimate, preprocessing: Sequence[Preprocessing]) -> str:
     """Return what may explain a fit that leaves far more of the forces than their noise."""
-    noise = np.max([treatment.force_noise for treatment in treatments], axis=0)
+    noise = np.max([one.force_noise for one in preprocessing], axis=0)
     ratio = float((estimate.noise / np.maximum(noise, np.finfo(float).tiny)).max())
     if ratio < _FAR_ABOVE:
         return ""
@@ -88,3 +82,40 @@ def left_over(estimate: Estimate, treatments: Sequence[Treatment]) -> str:
         f"the model leaves {ratio:.0f} times the noise of the forces, as where friction is left "
         "out, a force stands out, or it is the log of another machine"
     )
+
+
+def has_negative_inertia(model: Model, values: Array) -> bool:
+    """Say whether values (p,) give a machine whose kinetic energy is negative.
+
+    x''^T M x'', the product of accelerations and the forces that they need, is positive for every
+    real machine, whatever its CAD says.
+    """
+    robot = model.robot
+    rng = np.random.default_rng(0)
+    pose = random_poses(robot, _PROBES, seed=rng, bend=0.3, hold=0.3)
+    acceleration = rng.normal(size=pose.shape)
+    rest = np.zeros_like(pose)
+    base = values[: model.base.rank]
+    needed = base_regressor(robot, model.base, pose, rest, acceleration)
+    still = base_regressor(robot, model.base, pose, rest, rest)
+    forces = (needed - still) @ base
+    jacobians = numeric(robot, "jacobian")(pose)
+    products = np.einsum("rn,rnm,rm->r", forces, jacobians, acceleration)
+    return bool((products < 0.0).mean() > 0.5)
+
+
+def unseen(model: Model, deviations: Array) -> tuple[tuple[str, ...], bool]:
+    """Return the base parameters that a log cannot show, and whether they are too many.
+
+    Those whose standard deviation, among the (p,) of all values, is larger than what they are
+    usually made of: the sizes of the CAD's parameters, added up as they are grouped.
+    """
+    base = model.base
+    hidden = deviations[: base.rank] > _usual(model, parameters(model.robot))
+    names = tuple(name for name, flag in zip(base.names, hidden, strict=True) if flag)
+    return names, bool(hidden.mean() > _MOST_UNSEEN)
+
+
+def _usual(model: Model, drawn: Array) -> Array:
+    """Return the sizes (rank,) of what base parameters are made of, for CAD parameters (N,)."""
+    return np.asarray(np.abs(model.base.grouping) @ np.abs(drawn))

@@ -1,4 +1,7 @@
-"""The equations of a log, F = W beta, filtered, decimated and stacked: what estimators solve."""
+"""The observations of a log, F = W beta, filtered, decimated and stacked: what estimators solve.
+
+W is the observation matrix (Gautier): the regressors of all samples below one another.
+"""
 
 from __future__ import annotations
 
@@ -11,16 +14,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter1d  # type: ignore[import-untyped]
 
-from pteron.errors import DataError
+from pteron.identification.errors import LogError
 from pteron.identification.logs import Log
 from pteron.identification.model import Model
-from pteron.identification.signals import States, Treatment
-from pteron.identification.signals.fourier import fitted_series, most_harmonics
-from pteron.identification.signals.projection import Projection, fourier_basis
-from pteron.identification.signals.samples import Samples, samples
+from pteron.identification.signals import Preprocessing, States
+from pteron.identification.signals.derivatives import FourierFit
+from pteron.identification.signals.fourier import (
+    Projection,
+    fitted_series,
+    fourier_basis,
+    most_harmonics,
+)
+from pteron.identification.signals.samples import BLOCK, Samples, samples
 from pteron.kernels import Array
-
-__all__ = ["Equations", "equations_of", "in_motion", "stacked"]
 
 _LEAST_SHARE = 0.3
 """Noise of an equation, relative to the usual, below which it is made of hardly any samples."""
@@ -30,7 +36,7 @@ _EVEN = 1e-3
 
 
 @dataclass(frozen=True)
-class Equations:
+class Observations:
     """Rows of F = W beta, after the parallel filter.
 
     Rows are divided by the filter's gain for white noise: what a fit leaves of the forces has the
@@ -39,19 +45,19 @@ class Equations:
     Attributes
     ----------
     names, units : tuple of str
-        Of the p values.
+        What the p values are called, and their SI units.
     matrix : array, shape (R, n, p)
-        W.
+        The observation matrix W.
     forces : array, shape (R, n)
         F, N.
     time : array, shape (R,)
         s.
     gain : array, shape (R, n)
-        What they were divided by; 0 for an equation that is not used, whose numbers are 0 too.
+        What the rows were divided by; 0 for an equation that is not used, whose numbers are 0 too.
     payload : array of int, shape (R,)
         The phase of each row.
     source : str
-        What messages call them: the log they come from.
+        What messages call the log they come from.
     """
 
     names: tuple[str, ...]
@@ -78,8 +84,8 @@ class Equations:
         """How many actuators there are, n."""
         return int(self.forces.shape[1])
 
-    def columns(self, keep: Sequence[int]) -> Equations:
-        """Return the equations of some of the values."""
+    def columns(self, keep: Sequence[int]) -> Observations:
+        """Return the observations of some of the values."""
         return replace(
             self,
             names=tuple(self.names[k] for k in keep),
@@ -87,13 +93,15 @@ class Equations:
             matrix=np.ascontiguousarray(self.matrix[..., list(keep)]),
         )
 
-    def with_forces(self, forces: Array) -> Equations:
-        """Return the equations for other forces (R, n)."""
+    def with_forces(self, forces: Array) -> Observations:
+        """Return the observations of other forces (R, n)."""
         return replace(self, forces=forces)
 
 
-def equations_of(model: Model, log: Log | Iterable[Log], treatment: Treatment) -> Equations:
-    """Return the equations of a log.
+def observations_of(
+    model: Model, log: Log | Iterable[Log], preprocessing: Preprocessing, *, block: int = BLOCK
+) -> Observations:
+    """Return the observations of a log.
 
     Parameters
     ----------
@@ -101,33 +109,35 @@ def equations_of(model: Model, log: Log | Iterable[Log], treatment: Treatment) -
         What is identified.
     log : Log or iterable of Log
         The log, or its pieces in order, which are not kept.
-    treatment : Treatment
-        How it is treated, from `treatment_of`.
-
-    Returns
-    -------
-    Equations
+    preprocessing : Preprocessing
+        How it is preprocessed, from `preprocessing_of`.
+    block : int
+        How many rows are filtered at a time, about.
 
     Raises
     ------
-    DataError
+    LogError
         If a sample has no pose or is next to a singularity, or the log is too short.
     """
-    if treatment.derivatives == "periodic":
-        assert isinstance(log, Log)  # `treatment_of` takes no other for periodic
-        parts = [_periodic(model, part, treatment) for part in _phases(log, treatment)]
+    fit = preprocessing.differentiator
+    if isinstance(fit, FourierFit):
+        assert isinstance(log, Log)  # `preprocessing_of` takes no other for periodic
+        parts = [
+            _periodic(model, part, preprocessing, fit)
+            for part in _phases(log, preprocessing.rate, fit)
+        ]
         return replace(stacked(parts), source=log.source)
     # Whether a row counts depends on those around it, in the next block too.
-    margin = treatment.decimation.margin + treatment.settling
+    margin = preprocessing.decimation.margin + preprocessing.settling
     found, source = [], "the log"
-    for block in samples(model.robot, log, treatment, margin=margin):
-        found.append(_filtered(model, block, treatment))
-        source = block.source
+    for one in samples(model.robot, log, preprocessing, margin=margin, block=block):
+        found.append(_filtered(model, one, preprocessing))
+        source = one.source
     return replace(stacked(found), source=source)
 
 
-def stacked(parts: Sequence[Equations]) -> Equations:
-    """Return the equations of several logs, or parts of one, as one."""
+def stacked(parts: Sequence[Observations]) -> Observations:
+    """Return the observations of several logs, or parts of one, as one."""
     first = parts[0]
     if len(parts) == 1:
         return first
@@ -150,11 +160,11 @@ def in_motion(rates: Array, slow: Array, rows: int, *, wraps: bool = False) -> A
     return np.asarray(minimum_filter1d(moves, size, axis=0, mode=mode))
 
 
-def _filtered(model: Model, block: Samples, treatment: Treatment) -> Equations:
-    decimation = treatment.decimation
+def _filtered(model: Model, block: Samples, preprocessing: Preprocessing) -> Observations:
+    decimation = preprocessing.decimation
     states, forces = block.states, block.forces
-    inner = slice(treatment.settling, len(states) - treatment.settling)
-    moving = in_motion(states.slider_rates, treatment.slow, treatment.settling)
+    inner = slice(preprocessing.settling, len(states) - preprocessing.settling)
+    moving = in_motion(states.slider_rates, preprocessing.slow, preprocessing.settling)
     moving = (moving * block.smooth[:, None])[inner]
     states, forces = states.part(inner), forces[inner]
     kept = decimation.centers(len(states))
@@ -177,11 +187,11 @@ def _assembled(
     time: Array,
     payload: NDArray[np.int64],
     usual: float | np.floating[Any],
-) -> Equations:
-    """Return equations whose noise (R, n) is known, for white noise of unit size on the samples."""
+) -> Observations:
+    """Return observations from their noise (R, n), for unit white noise on the samples."""
     gain = np.where(noise >= _LEAST_SHARE * usual, noise, 0.0)
     factor = np.divide(1.0, gain, out=np.zeros_like(gain), where=gain > 0.0)
-    return Equations(
+    return Observations(
         model.names,
         model.units,
         factor[..., None] * matrix,
@@ -192,39 +202,40 @@ def _assembled(
     )
 
 
-def _phases(log: Log, treatment: Treatment) -> list[Log]:
+def _phases(log: Log, rate: float, fit: FourierFit) -> list[Log]:
     """Return the stretches of a periodic log with one payload that last a period or more."""
-    assert treatment.period is not None
     edges = [0, log.rows]
     if log.payload is not None:
         edges[1:1] = (np.flatnonzero(np.diff(log.payload)) + 1).tolist()
     parts = [log.part(start, stop) for start, stop in pairwise(edges)]
-    step = 1.0 / treatment.rate
-    whole = [part for part in parts if part.duration + step >= treatment.period * (1.0 - 1e-3)]
+    whole = [part for part in parts if part.duration + 1.0 / rate >= fit.period * (1.0 - 1e-3)]
     if not whole:
-        raise DataError(
-            f"{log.source}: no stretch with one payload lasts its period of {treatment.period:g} "
-            's; record longer, or choose derivatives "central"'
+        raise LogError(
+            "too short",
+            log.source,
+            f"no stretch with one payload lasts its period of {fit.period:g} s; record longer, or "
+            'choose derivatives "central"',
         )
     return whole
 
 
-def _periodic(model: Model, log: Log, treatment: Treatment) -> Equations:
-    """Return the equations of one period, with noise averaged over all that were recorded.
+def _periodic(
+    model: Model, log: Log, preprocessing: Preprocessing, fit: FourierFit
+) -> Observations:
+    """Return the observations of one period, with noise averaged over all that were recorded.
 
     The parallel filter keeps the harmonics up to the band, on both sides, and as many rows as
     these have coefficients: a projection, so that white noise stays white.
     """
-    period, rate = treatment.period, treatment.rate
-    assert period is not None
+    period, rate = fit.period, preprocessing.rate
     start = float(log.time[0])
     periods = int((log.duration + 1.0 / rate) / period + 1e-3)
     log = log.part(0, int(np.searchsorted(log.time, start + periods * period - 0.5 / rate)))
     per_period = round(period * rate)
-    harmonics = max(min(int(treatment.band * period), most_harmonics(log.time, period)), 1)
-    series = fitted_series(log.time, log.sliders, period, highest=treatment.cutoff)
+    harmonics = max(min(int(preprocessing.band * period), most_harmonics(log.time, period)), 1)
+    series = fit.series(log)
     fine = np.linspace(start, start + period, per_period, endpoint=False)
-    moving = in_motion(series.at(fine, 1), treatment.slow, treatment.settling, wraps=True)
+    moving = in_motion(series.at(fine, 1), preprocessing.slow, preprocessing.settling, wraps=True)
     count = 2 * harmonics + 1
     kept = np.linspace(start, start + period, count, endpoint=False)
 
@@ -233,7 +244,7 @@ def _periodic(model: Model, log: Log, treatment: Treatment) -> Equations:
             model.robot,
             (series.at(time), series.at(time, 1), series.at(time, 2)),
             time,
-            treatment.mode,
+            preprocessing.mode,
             payload=None if log.payload is None else np.full(len(time), log.payload[0]),
             source=log.source,
             first_row=first_row,
@@ -249,7 +260,7 @@ def _periodic(model: Model, log: Log, treatment: Treatment) -> Equations:
         rows = forces.at(kept)
         noise = _projected_noise(moving, count) * np.sqrt(per_period / log.rows)
     else:
-        projection = Projection.of(log.time, period, harmonics)
+        projection = Projection(log.time, period, harmonics)
         basis = fourier_basis(kept, period, harmonics)
         n, p = used.shape[1], len(model.names)
 

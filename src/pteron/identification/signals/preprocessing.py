@@ -1,27 +1,33 @@
-"""How a log is treated: what the user asked for, and what the data made of it."""
+"""How a log is preprocessed: what the user asked for, and what the data made of it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import get_args
 
 import numpy as np
 
 from pteron.errors import DataError
+from pteron.identification.errors import LogError
 from pteron.identification.logs import Log
-from pteron.identification.signals.assembly import assembly_mode
-from pteron.identification.signals.differences import central_differences
+from pteron.identification.signals.derivatives import (
+    Derivatives,
+    Differentiator,
+    central_differences,
+    differentiator,
+    uniform,
+)
+from pteron.identification.signals.filters import (
+    Decimation,
+    bins_below,
+    cutoff_of,
+    smoothed,
+    white_noise,
+)
 from pteron.identification.signals.fourier import FourierSeries, fitted_series
-from pteron.identification.signals.lowpass import cutoff_of, smoothed
-from pteron.identification.signals.noise import white_noise
-from pteron.identification.signals.parallel import Decimation
-from pteron.identification.signals.uniform import uniform
+from pteron.identification.signals.states import assembly_mode
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
-
-__all__ = ["Derivatives", "Processing", "Treatment", "treatment_of"]
-
-Derivatives = Literal["periodic", "central", "spline"]
 
 _LARGEST_PERIODIC = 4_000_000
 """Rows up to which a periodic log is fitted in one piece."""
@@ -57,7 +63,7 @@ the motion. More rows than needed cost little."""
 
 @dataclass(frozen=True)
 class Processing:
-    """What a user may choose about the treatment of a log; by default the data decide.
+    """What a user may choose about the preprocessing of a log; by default the data decide.
 
     Parameters
     ----------
@@ -66,11 +72,13 @@ class Processing:
         central differences (the default else), or a smoothing spline (the default where positions
         have no noise but rounding: it makes least of that).
     cutoff : float, optional
-        Of the positions' filter, Hz. By default twice what leaves white noise only.
+        Cut-off frequency of the low-pass filter on the positions, Hz. By default twice the lowest
+        frequency above which there is white noise only.
     band : float, optional
-        Of the parallel filter on forces and regressor, Hz. By default ten times the motion's.
+        Cut-off frequency of the parallel filter on forces and regressor, Hz. By default ten times
+        the bandwidth of the motion.
     period : float, optional
-        Of the motion, s; by default what the log's description says.
+        Time after which the motion repeats, s; by default what the log's description says.
     slow : float
         Speed, as a share of each slider's root mean square, below which the slider's equation is
         not used: dry friction holds a slider at rest with any force, and turns in no time.
@@ -97,23 +105,23 @@ class Processing:
 
 
 @dataclass(frozen=True)
-class Treatment:
-    """How a log is treated.
+class Preprocessing:
+    """How a log is preprocessed.
 
     Attributes
     ----------
     derivatives : {"periodic", "central", "spline"}
-        See `Processing`.
+        How positions are differentiated; see `Processing`.
     mode : int
         The assembly mode, from 0.
     rate : float
         Samples per second.
     cutoff : float or None
-        Of the positions' filter, Hz; None where they need none.
+        Cut-off frequency of the low-pass filter on the positions, Hz; None where they need none.
     band : float
-        Of the parallel filter, Hz.
+        Cut-off frequency of the parallel filter on forces and regressor, Hz.
     period : float or None
-        s.
+        Time after which the motion repeats, s; None where it is not known to.
     slider_noise, force_noise : array, shape (n,)
         Standard deviation of the white noise on sliders (m) and forces (N).
     slow : array, shape (n,)
@@ -134,6 +142,18 @@ class Treatment:
     stroke: float
 
     @property
+    def differentiator(self) -> Differentiator:
+        """What differentiates the positions."""
+        return differentiator(
+            self.derivatives, rate=self.rate, cutoff=self.cutoff, period=self.period
+        )
+
+    @property
+    def decimation(self) -> Decimation:
+        """The parallel filter of a log that is not taken as periodic."""
+        return Decimation.to_band(self.rate, self.band)
+
+    @property
     def settling(self) -> int:
         """Rows before and after a slow one that the positions' filter has mixed with it."""
         return self._rows(_MIXED)
@@ -144,22 +164,16 @@ class Treatment:
         return self._rows(_UNSURE)
 
     def _rows(self, periods: float) -> int:
-        if self.cutoff is None:
+        fastest = self.differentiator.fastest(self.band)
+        if fastest is None:
             return 0
-        # A series ends where noise begins: what a slow motion leaves there mixes nothing.
-        fastest = max(self.cutoff, self.band) if self.derivatives == "periodic" else self.cutoff
         return round(min(periods / fastest, _SPARED * self.stroke) * self.rate)
 
-    @property
-    def decimation(self) -> Decimation:
-        """The parallel filter of a log that is not treated as periodic."""
-        return Decimation.to_band(self.rate, self.band)
 
-
-def treatment_of(
+def preprocessing_of(
     robot: Manipulator, log: Log, processing: Processing | None = None, *, rows: int | None = None
-) -> Treatment:
-    """Return how a log is to be treated.
+) -> Preprocessing:
+    """Return how a log is to be preprocessed.
 
     Parameters
     ----------
@@ -170,11 +184,7 @@ def treatment_of(
     processing : Processing, optional
         What the user wants.
     rows : int, optional
-        Of the whole log, where `log` is only a part.
-
-    Returns
-    -------
-    Treatment
+        How many rows the whole log has, where `log` is only a part.
 
     Raises
     ------
@@ -182,40 +192,45 @@ def treatment_of(
         If a frequency is beyond what the sampling allows, or there is less than one period.
     """
     wanted = processing or Processing()
-    head = log.part(*_longest(log))
     # Noise and cut-offs concern samples as they came: uneven steps are noise to them.
+    head = _longest_part(log)
     time, values = uniform(head.time, np.hstack([head.sliders, head.forces]))
     rate = (len(time) - 1) / float(time[-1] - time[0])
-    n = head.sliders.shape[1]
-    sliders, forces = values[:, :n], values[:, n:]
-    period = wanted.period or log.description.period
-    derivatives = wanted.derivatives or _derivatives(period, rows or log.rows)
-    if derivatives == "periodic":
-        _check_period(log, period)
+    sliders, forces = np.hsplit(values, 2)
     _check_frequencies(wanted, rate)
     cutoff = wanted.cutoff or cutoff_of(sliders, rate)
-    if wanted.derivatives is None and derivatives == "central" and cutoff is None:
-        derivatives = "spline"
+
+    # How positions are differentiated
+    period = wanted.period or log.description.period
+    derivatives = wanted.derivatives or ("spline" if cutoff is None else "central")
     series = None
-    if derivatives == "periodic" and period is not None:
-        series = fitted_series(log.time, log.sliders, period)
-        _check_repeats(log, series, period)
-        if wanted.derivatives is None and not _is_series(series, sliders):
-            derivatives, series = "central" if cutoff is not None else "spline", None
+    if wanted.derivatives == "periodic":
+        derivatives, series = "periodic", _checked_series(log, period)
+    elif wanted.derivatives is None and period and (rows or log.rows) <= _LARGEST_PERIODIC:
+        series = _checked_series(log, period)
+        if _is_series(series, sliders):
+            derivatives = "periodic"
+        else:
+            series = None
     if series is not None:
-        power = (np.arange(1, series.harmonics + 1) ** 2)[:, None] * (
+        cutoff = series.harmonics / series.period
+
+    # How fast the motion is
+    rates, _ = central_differences(smoothed(sliders, rate, cutoff), rate)
+    if series is None:
+        frequencies = np.asarray(np.fft.rfftfreq(len(rates), 1.0 / rate), dtype=float)
+        power = np.abs(np.fft.rfft(np.hanning(len(rates))[:, None] * rates, axis=0)) ** 2
+    else:
+        order = np.arange(1, series.harmonics + 1)
+        frequencies = order / series.period
+        power = (order**2)[:, None] * (
             series.coefficients[1::2] ** 2 + series.coefficients[2::2] ** 2
         )
-        frequencies = np.arange(1, series.harmonics + 1) / series.period
-        cutoff = float(frequencies[-1])
-    else:
-        frequencies, power = _speed_power(sliders, rate, cutoff)
-    band = wanted.band or min(_PRODUCTS * _edge(frequencies, power), rate / 2.0)
-    if wanted.band is None and cutoff is not None and derivatives != "periodic":
+    edge = float(frequencies[min(bins_below(power, _POWER), len(frequencies) - 1)])
+    band = wanted.band or min(_PRODUCTS * edge, rate / 2.0)
+    if wanted.band is None and cutoff is not None and series is None:
         band = min(band, cutoff)
-    smooth = sliders if cutoff is None else smoothed(sliders, rate, cutoff)
-    rates, _ = central_differences(smooth, rate)
-    return Treatment(
+    return Preprocessing(
         derivatives=derivatives,
         mode=assembly_mode(robot, log),
         rate=rate,
@@ -229,39 +244,40 @@ def treatment_of(
     )
 
 
-def _derivatives(period: float | None, rows: int) -> Derivatives:
-    return "periodic" if period is not None and rows <= _LARGEST_PERIODIC else "central"
-
-
-def _longest(log: Log) -> tuple[int, int]:
-    """Return where the longest part without a gap begins and ends, cut to a usual length."""
+def _longest_part(log: Log) -> Log:
+    """Return the longest part without a gap, cut to a usual length."""
     longest = max(log.segments, key=lambda part: part.stop - part.start)
-    return longest.start, min(longest.stop, longest.start + _LOOK)
+    return log.part(longest.start, min(longest.stop, longest.start + _LOOK))
 
 
-def _check_period(log: Log, period: float | None) -> None:
+def _checked_series(log: Log, period: float | None) -> FourierSeries:
+    """Return the series of the positions; refuse a period that is not that of the motion."""
     if period is None:
-        raise DataError(
-            f'{log.source}: derivatives "periodic" needs the period; declare it under [motion] in '
-            "the log's description, or give period"
+        raise LogError(
+            "no period",
+            log.source,
+            'derivatives "periodic" needs the period; declare it under [motion] in the log\'s '
+            "description, or give period",
         )
     if log.duration < period * (1.0 - 1e-3):
-        raise DataError(
-            f"{log.source}: lasts {log.duration:g} s, less than its period of {period:g} s; "
-            'record a whole period, or choose derivatives "central"'
+        raise LogError(
+            "too short",
+            log.source,
+            f"lasts {log.duration:g} s, less than its period of {period:g} s; record a whole "
+            'period, or choose derivatives "central"',
         )
-
-
-def _check_repeats(log: Log, series: FourierSeries, period: float) -> None:
-    """Refuse a period that is not that of the motion."""
+    series = fitted_series(log.time, log.sliders, period)
     span = np.ptp(log.sliders, axis=0)
     worst = int(np.argmax(series.noise / span))
     if series.noise[worst] > _REPEATS * span[worst]:
-        raise DataError(
-            f"{log.source}: does not repeat after its period of {period:g} s: rho{worst + 1} is "
+        raise LogError(
+            "not repeating",
+            log.source,
+            f"does not repeat after its period of {period:g} s: rho{worst + 1} is "
             f"{series.noise[worst]:.2g} m (rms) off; correct the period in the log's description, "
-            "or leave it out"
+            "or leave it out",
         )
+    return series
 
 
 def _is_series(series: FourierSeries, sliders: Array) -> bool:
@@ -280,13 +296,6 @@ def _check_frequencies(wanted: Processing, rate: float) -> None:
             )
 
 
-def _speed_power(sliders: Array, rate: float, cutoff: float | None) -> tuple[Array, Array]:
-    smooth = sliders if cutoff is None else smoothed(sliders, rate, cutoff)
-    rates, _ = central_differences(smooth, rate)
-    power = np.abs(np.fft.rfft(np.hanning(len(rates))[:, None] * rates, axis=0)) ** 2
-    return np.asarray(np.fft.rfftfreq(len(rates), 1.0 / rate), dtype=float), power
-
-
 def _stroke(rates: Array, rate: float) -> float:
     """Return the mean time between two reversals of the slider that reverses most, s.
 
@@ -298,10 +307,3 @@ def _stroke(rates: Array, rate: float) -> float:
         reversals = int((np.diff(signs) != 0.0).sum())
         fewest = min(fewest, len(rates) / rate / (reversals + 1))
     return float(fewest)
-
-
-def _edge(frequencies: Array, power: Array) -> float:
-    """Return the frequency below which nearly all the power of every slider is."""
-    share = np.cumsum(power, axis=0) / np.maximum(power.sum(axis=0), np.finfo(float).tiny)
-    last = int((share < _POWER).sum(axis=0).max())
-    return float(frequencies[min(last, len(frequencies) - 1)])

@@ -1,4 +1,4 @@
-"""The model's columns, and the equations that a log gives."""
+"""The model's columns, and the observations that a log gives."""
 
 from dataclasses import replace
 from functools import lru_cache
@@ -10,20 +10,13 @@ from mechanisms import CATALOG, MECHANISMS, relative_error, states
 
 import pteron
 from pteron.errors import DataError, ModelError
-from pteron.identification.equations import equations_of, in_motion, stacked
 from pteron.identification.estimators import ordinary
 from pteron.identification.logs import Description
 from pteron.identification.model import Terms, identification_model
-from pteron.identification.signals import Processing, States, treatment_of
-from pteron.identification.signals import samples as samples_module
+from pteron.identification.observation import in_motion, observations_of, stacked
+from pteron.identification.signals import Processing, States, preprocessing_of
 
-KINDS = [
-    "quadrupteron",
-    "quadrupteron turned",
-    "tripteron-oblique --+",
-    "random 3T1R 0",
-    "random 3T 0",
-]
+KINDS = ["quadrupteron turned", "tripteron-oblique --+", "random 3T1R 0"]
 each_kind = pytest.mark.parametrize("name", KINDS)
 
 
@@ -75,9 +68,14 @@ def test_a_model_names_every_column_once(name, kind):
     assert len(set(model.names)) == len(model.names) == model.base.rank + extra
     assert len(model.units) == len(model.expressions) == len(model.names)
     assert model.matrix(states_of(robot)).shape == (60, n, len(model.names))
-    assert model.units[-1] == {"none": "N", "shared": "N m s", "each": "N m s"}[terms.joints] or (
-        not terms.offset
+    sliders = [("N", terms.coulomb), ("N s/m", terms.viscous), ("N", terms.offset)]
+    assert model.units[model.base.rank :] == (
+        *(unit for unit, taken in sliders for _ in range(n * taken)),
+        *("N m s",) * joints[terms.joints],
     )
+    usual = {"m": "kg", "mgx": "kg m", "mgy": "kg m", "I": "kg m^2"}
+    kinds = [name.split("_")[0] for name in model.base.names]
+    assert model.units[: model.base.rank] == tuple(usual[kind] for kind in kinds)
 
 
 @each_kind
@@ -102,7 +100,7 @@ def test_columns_of_the_base_are_those_of_the_regressor(name):
     assert relative_error(found, whole @ values) < 1e-9
 
 
-@pytest.mark.parametrize("name", ["quadrupteron", "tripteron-oblique"])
+@pytest.mark.parametrize("name", ["quadrupteron"])
 def test_legs_that_share_their_values_have_fewer(name):
     robot = CATALOG[name]
     base = pteron.base_parameters(robot, shared=True)
@@ -127,7 +125,7 @@ def test_legs_that_share_their_values_have_fewer(name):
     assert len(model.units) == len(model.names)
 
 
-@pytest.mark.parametrize("name", ["quadrupteron", "tripteron"])
+@pytest.mark.parametrize("name", ["quadrupteron"])
 def test_shared_joints_are_the_sums_of_each(name):
     n = len(CATALOG[name].legs)
     at = states_of(CATALOG[name])
@@ -139,7 +137,7 @@ def test_shared_joints_are_the_sums_of_each(name):
     assert shared.names[start : start + 3] == ("Fv_R1", "Fv_R2", "Fv_R3")
 
 
-@pytest.mark.parametrize("name", ["quadrupteron", "quadrupteron-oblique"])
+@pytest.mark.parametrize("name", ["quadrupteron-oblique"])
 def test_the_payload_is_a_body_more_on_the_platform(name):
     robot = CATALOG[name]
     model = model_of(name, Terms(payload=True))
@@ -154,7 +152,7 @@ def test_the_payload_is_a_body_more_on_the_platform(name):
     assert not model.matrix(states_of(robot, payload=0))[..., -4:].any()
 
 
-@pytest.mark.parametrize("name", ["quadrupteron", "tripteron-oblique", "random 3T 0"])
+@pytest.mark.parametrize("name", ["quadrupteron", "random 3T1R 0"])
 def test_a_rotor_joins_what_acts_like_it(name):
     plain, driven = (model_of(name, Terms(rotors=flag)) for flag in (False, True))
     assert plain.names == driven.names
@@ -191,8 +189,8 @@ def equations_and_truth(name, derivatives="central", *, processing=None, **log):
     made = log_of(MECHANISMS[name], **log)
     period = log.get("period", 4.0) if derivatives == "periodic" else None
     wanted = replace(processing or Processing(), derivatives=derivatives, period=period)
-    treatment = treatment_of(MECHANISMS[name], made, wanted)
-    return made, treatment, equations_of(model, made, treatment), truth(model)
+    treatment = preprocessing_of(MECHANISMS[name], made, wanted)
+    return made, treatment, observations_of(model, made, treatment), truth(model)
 
 
 @pytest.mark.parametrize("name", SOME)
@@ -208,8 +206,7 @@ def test_a_log_without_noise_gives_the_values(name, derivatives):
 
 
 @pytest.mark.parametrize("name", ["tripteron-oblique --+"])
-@pytest.mark.parametrize("rate", [50.0, 500.0])
-@pytest.mark.parametrize("period", [4.0, 3.7013])
+@pytest.mark.parametrize(("rate", "period"), [(50.0, 4.0), (500.0, 3.7013)])
 def test_a_period_need_not_be_a_number_of_samples(name, rate, period):
     _, _, equations, values = equations_and_truth(name, "periodic", rate=rate, period=period)
     assert equations.rows > 150
@@ -222,10 +219,10 @@ def test_periods_with_uneven_samples_and_a_gap_are_exact(name):
     rng = np.random.default_rng(1)
     time = np.arange(4000) / 500.0 + rng.uniform(-4e-4, 4e-4, 4000)
     log = without(log_of(MECHANISMS[name], time=time), 700, 900)
-    treatment = treatment_of(
+    treatment = preprocessing_of(
         MECHANISMS[name], log, Processing(derivatives="periodic", period=4.0, cutoff=12.0)
     )
-    equations = equations_of(model, log, treatment)
+    equations = observations_of(model, log, treatment)
     assert equations.rows > 150
     assert np.abs(equations.forces - equations.matrix @ truth(model)).max() < 1e-7
 
@@ -234,7 +231,7 @@ def test_a_gap_that_no_other_period_fills_is_refused():
     log = without(log_of(CATALOG["quadrupteron"], duration=4.0), 500, 1500)
     processing = Processing(derivatives="periodic", period=4.0)
     with pytest.raises(DataError, match="samples leave"):
-        treatment_of(CATALOG["quadrupteron"], log, processing)
+        preprocessing_of(CATALOG["quadrupteron"], log, processing)
 
 
 # What is left out
@@ -253,15 +250,15 @@ def test_slow_sliders_are_left_out_on_both_sides(derivatives):
     stuck = np.abs(rates) < 0.95 * treatment.slow
     assert stuck.mean() > 0.03
     spoiled = replace(log, forces=log.forces + 50.0 * stuck)
-    found = equations_of(model_of(name), spoiled, treatment)
+    found = observations_of(model_of(name), spoiled, treatment)
     assert np.array_equal(found.gain, equations.gain)
     assert found.forces == pytest.approx(equations.forces, abs=1e-9)
     assert np.abs(found.forces - found.matrix @ values).max() < 1e-7
     awake = replace(treatment, slow=np.zeros(3))
     assert (
         np.abs(
-            equations_of(model_of(name), spoiled, awake).forces
-            - equations_of(model_of(name), log, awake).forces
+            observations_of(model_of(name), spoiled, awake).forces
+            - observations_of(model_of(name), log, awake).forces
         ).max()
         > 1.0
     )
@@ -310,7 +307,7 @@ def test_what_is_left_of_noise_has_the_size_of_the_noise(case):
     model = model_of(name)
     for _ in range(draws):
         noise = rng.normal(size=log.forces.shape)
-        noisy = equations_of(model, replace(log, forces=log.forces + noise), treatment)
+        noisy = observations_of(model, replace(log, forces=log.forces + noise), treatment)
         rest = noisy.forces - equations.forces
         squares += rest**2 / draws
         neighbours += (rest[1:] * rest[:-1]).sum() / (rest**2).sum() / draws
@@ -328,19 +325,17 @@ def test_what_is_left_of_noise_has_the_size_of_the_noise(case):
 # Streams
 
 
-@pytest.mark.parametrize("derivatives", ["central", "spline"])
-@pytest.mark.parametrize("size", [57, 1000])
-def test_pieces_give_the_equations_of_the_whole(derivatives, size, monkeypatch):
+@pytest.mark.parametrize(("derivatives", "size"), [("central", 57), ("spline", 1000)])
+def test_pieces_give_the_equations_of_the_whole(derivatives, size):
     name = "tripteron"
     log = log_of(CATALOG[name], slider_noise=1e-6 * (derivatives == "central"))
     log = without(log, 2000, 2050)
     log = replace(log, payload=(np.arange(log.rows) > 2600).astype(int))
     wanted = Processing(derivatives=derivatives, cutoff=25.0, slow=0.2)
-    treatment = treatment_of(CATALOG[name], log, wanted)
+    treatment = preprocessing_of(CATALOG[name], log, wanted)
     assert treatment.settling > 5
-    whole = equations_of(model_of(name), log, treatment)
-    monkeypatch.setattr(samples_module, "_BLOCK", 400)
-    parts = equations_of(model_of(name), pieces(log, size), treatment)
+    whole = observations_of(model_of(name), log, treatment)
+    parts = observations_of(model_of(name), pieces(log, size), treatment, block=400)
     assert parts.time == pytest.approx(whole.time, abs=1e-9)
     assert np.array_equal(parts.payload, whole.payload)
     assert len(set(whole.payload)) == 2
@@ -379,16 +374,16 @@ def test_a_payload_is_found_from_two_phases():
     )
     for derivatives, period in (("central", None), ("periodic", 4.0)):
         wanted = Processing(derivatives=derivatives, period=period)
-        treatment = treatment_of(robot, log, wanted)
-        equations = equations_of(model, log, treatment)
+        treatment = preprocessing_of(robot, log, wanted)
+        equations = observations_of(model, log, treatment)
         assert ordinary(equations).values[-4:] == pytest.approx(load, abs=1e-7)
 
 
 def test_the_period_is_taken_from_the_description():
     robot = CATALOG["tripteron"]
     log = log_of(robot, description=Description(period=4.0), slider_noise=1e-7)
-    treatment = treatment_of(robot, log)
-    equations = equations_of(model_of("tripteron"), log, treatment)
+    treatment = preprocessing_of(robot, log)
+    equations = observations_of(model_of("tripteron"), log, treatment)
     assert treatment.derivatives == "periodic"
     assert equations.time[-1] < 4.0
     assert len(equations.time) % 2 == 1

@@ -16,18 +16,13 @@ from pteron.errors import DataError
 from pteron.identification.excitation.conditioning import Conditioning, conditioning
 from pteron.identification.excitation.draws import random_excitation
 from pteron.identification.excitation.fourier import FourierMotion, Space
-from pteron.identification.excitation.improvement import ROUNDS, Round, Stage
-from pteron.identification.excitation.limits import Limits
-from pteron.identification.excitation.margins import margins
-from pteron.identification.excitation.nonlinear_program import Setting
+from pteron.identification.excitation.improvement import ROUNDS, Improvement, Round, improved
+from pteron.identification.excitation.limits import Limits, margins
+from pteron.identification.excitation.program import Criterion, Setting
 from pteron.identification.excitation.result import Excitation, Start
-from pteron.identification.excitation.spectrum import Criterion
-from pteron.identification.excitation.worker import Task, here, in_processes
 from pteron.kernels import columns_of
 from pteron.manipulator import Manipulator
 from pteron.reduction import BaseParameters, base_parameters
-
-__all__ = ["optimal_excitation"]
 
 _MOST_WORKERS = 4
 
@@ -62,10 +57,10 @@ def optimal_excitation(
 ) -> Excitation:
     """Return a periodic trajectory from whose forces the base parameters are seen best.
 
-    Of random Fourier motions, each as large as the limits allow, the best are improved by IPOPT
-    with exact gradients. The limits hold at samples, and where they are then violated between these
-    the worst instants join the samples; in the end the motion is shrunk about its center, if need
-    be, until all limits are kept throughout the period.
+    The best of many random Fourier motions, each as large as the limits allow, are improved by
+    IPOPT with exact gradients. The limits hold at samples; where they are then violated between
+    these, the worst instants join the samples; in the end the motion is shrunk about its center, if
+    need be, until all limits are kept throughout the period.
 
     Parameters
     ----------
@@ -78,7 +73,7 @@ def optimal_excitation(
     harmonics : int
         How many, 1 or more.
     period : float
-        s.
+        The time after which the motion repeats, s.
     limits : Limits, optional
         What the trajectory keeps at every instant.
     criterion : {"condition", "logdet"}
@@ -90,7 +85,7 @@ def optimal_excitation(
     draws : int
         How many random motions there are.
     seed : int
-        Of the random motions.
+        Where the random motions come from.
     seconds : float
         After which the best until then is returned. It holds for the search as a whole; what
         comes before, such as the base parameters, is not counted.
@@ -228,30 +223,27 @@ class _Search:
         each = seconds / math.ceil(len(self.running) / workers)
         if each <= 0.0:
             return
-        tasks = [Task(k, setting, self.best[k].motion, plan, each) for k in self.running]
-        reports = here(tasks) if workers == 1 else in_processes(tasks, workers)
+        tasks = [Improvement(k, setting, plan, self.best[k].motion, each) for k in self.running]
         seen = self.seen
-        share = {task.number: 0.0 for task in tasks}
+        share = dict.fromkeys(self.running, 0.0)
         weight = (1.0 - seen) if plan.thorough else _FIRST * (1.0 - seen)
-        with closing(reports):
-            for number, stage in reports:
-                if stage is None:
-                    share[number] = 1.0
-                else:
-                    share[number] += 1.0 / (plan.stages + 1)
-                    self.take(number, stage, plan)
+        with closing(improved(tasks, workers)) as stages:
+            for one in stages:
+                share[one.number] = 1.0 if one.ended else one.stage / (plan.stages + 1)
+                self.take(one)
                 self.report(seen + weight * sum(share.values()) / len(share))
 
     def report(self, share: float) -> None:
         self.seen = share
         self.progress(share)
 
-    def take(self, number: int, stage: Stage, plan: Round) -> None:
-        if stage.last and plan.thorough:
+    def take(self, one: Improvement) -> None:
+        number = one.number
+        if one.finished and one.plan.thorough:
             self.starts[number] = replace(self.starts[number], finished=True)
-        if stage.coefficients is None:
+        if not one.improved:
             return
-        found = self.judged(self.best[number].motion.with_coefficients(stage.coefficients))
+        found = self.judged(one.safe)
         if self.cost(found.conditioning) < self.cost(self.best[number].conditioning):
             self.best[number] = found
             self.starts[number] = replace(self.starts[number], after=found.conditioning)

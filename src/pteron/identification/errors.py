@@ -1,0 +1,40 @@
+"""The error for a log that does not show what is asked of it."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pteron.errors import DataError
+
+Reason = Literal[
+    "columns",
+    "currents",
+    "gap",
+    "no payload",
+    "no period",
+    "no pose",
+    "not repeating",
+    "singular",
+    "too large",
+    "too little motion",
+    "too short",
+    "twice",
+    "unsettled",
+]
+
+
+class LogError(DataError):
+    """A log does not show what is asked of it.
+
+    Attributes
+    ----------
+    reason : str
+        The kind of fault, such as "too short", "no pose" or "too little motion".
+    place : str
+        The log, and the row where a single one is to blame.
+    """
+
+    def __init__(self, reason: Reason, place: str, message: str) -> None:
+        super().__init__(f"{place}: {message}")
+        self.reason = reason
+        self.place = place

@@ -1,0 +1,305 @@
+"""Differentiators: how measured positions become positions, rates and accelerations.
+
+Each one is a frozen value with the interface of `Differentiator`; `Preprocessing` chooses it once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import ceil
+from typing import ClassVar, Literal, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse  # type: ignore[import-untyped]
+from scipy.interpolate import (  # type: ignore[import-untyped]
+    BSpline,
+    make_interp_spline,
+    make_lsq_spline,
+)
+from scipy.ndimage import maximum_filter1d  # type: ignore[import-untyped]
+
+from pteron.identification.logs import Log
+from pteron.identification.signals.filters import SETTLING, smoothed
+from pteron.identification.signals.fourier import FourierSeries, fitted_series, fourier_basis
+from pteron.kernels import Array
+
+Derivatives = Literal["periodic", "central", "spline"]
+"""The differentiators' names."""
+
+LOST = 4
+"""Samples at each end that have no central difference."""
+
+_FIRST = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105, -1 / 280])
+_SECOND = np.array([-1 / 560, 8 / 315, -1 / 5, 8 / 5, -205 / 72, 8 / 5, -1 / 5, 8 / 315, -1 / 560])
+
+_EVEN = 1e-3
+"""Deviation from even steps, in steps, that is a matter of how stamps were written."""
+
+_DEGREE = 7
+"""The sixth power of sampling is left in a spline's second derivative."""
+
+_SPLINE_SETTLING = 20.0
+"""Knots at a block's ends that feel where it ends; the feeling halves from each to the next."""
+
+_ENDS = 2.0
+"""Knots at each end of a fitted spline whose samples say little: few samples hold it there."""
+
+_AGREES = 1e-7
+"""Relative difference of two second derivatives that is their error on a smooth motion."""
+
+_FEW = 0.5
+_ROUNDING = 1e-14
+_SMEARED = 24
+"""Samples to each side of a jump that a spline of degree 7 spreads it over, to 1e-7 of it."""
+
+
+class Differentiated(NamedTuple):
+    """A block of a log without its edges: R samples.
+
+    `motion` holds coordinates, rates and accelerations (R, n); `smooth` is False where positions
+    without noise have a jump in a derivative, which a spline smears.
+    """
+
+    time: Array
+    motion: tuple[Array, Array, Array]
+    forces: Array
+    smooth: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A motion as a sum of basis functions, at the T samples of a log.
+
+    Attributes
+    ----------
+    coefficients : array, shape (C, n)
+        How much of each basis function there is in each slider, m.
+    bases : tuple of sparse array, shape (T, C)
+        The basis functions, and their first and second derivatives.
+    ends : int
+        Samples at each end where the curve is not well known.
+    """
+
+    coefficients: Array
+    bases: tuple[sparse.csr_matrix, sparse.csr_matrix, sparse.csr_matrix]
+    ends: int
+
+    @property
+    def motion(self) -> tuple[Array, Array, Array]:
+        """Coordinates, rates and accelerations (T, n)."""
+        q, dq, ddq = (np.asarray(basis @ self.coefficients) for basis in self.bases)
+        return q, dq, ddq
+
+    def with_coefficients(self, coefficients: Array) -> Curve:
+        """Return another curve of the same basis functions."""
+        return replace(self, coefficients=coefficients)
+
+
+class Differentiator(Protocol):
+    """What the rest of the identification asks of a differentiator."""
+
+    whole: ClassVar[bool]
+    """Whether it takes a log as a whole, with an edge of 0, and not in blocks."""
+
+    @property
+    def edge(self) -> int:
+        """Rows at each end of a block that it loses."""
+
+    def differentiated(self, block: Log, edge: int) -> Differentiated:
+        """Return a block's motion without `edge` rows at each end, at least as many as it loses."""
+
+    def curve(self, log: Log) -> Curve:
+        """Return the log's motion as a curve."""
+
+    def fastest(self, band: float) -> float | None:
+        """Return the frequency (Hz) above which nothing of the positions is left, if any.
+
+        `band` is that of the parallel filter, Hz.
+        """
+
+
+@dataclass(frozen=True)
+class _Sampled:
+    """What central differences and splines share: sampling rate and cut-off, Hz."""
+
+    rate: float
+    cutoff: float | None
+    whole: ClassVar[bool] = False
+
+    def curve(self, log: Log) -> Curve:
+        """Return the least-squares spline of the log's positions."""
+        spline = fitted_spline(log.time, log.sliders, self.cutoff)
+        bases = tuple(_design(spline, log.time, k) for k in range(3))
+        ends = ceil(_ENDS * self.rate / (2.0 * self.cutoff)) if self.cutoff else 0
+        return Curve(spline.c, (bases[0], bases[1], bases[2]), ends)
+
+    def fastest(self, band: float) -> float | None:
+        """Return the cut-off."""
+        return self.cutoff
+
+
+@dataclass(frozen=True)
+class CentralDifferences(_Sampled):
+    """A low-pass filter without phase, then central differences of eighth order."""
+
+    @property
+    def edge(self) -> int:
+        """What the filter needs to settle, and the differences' own ends."""
+        return LOST + (ceil(SETTLING * self.rate / self.cutoff) if self.cutoff else 0)
+
+    def differentiated(self, block: Log, edge: int) -> Differentiated:
+        """Return the block at even steps of time."""
+        time, sliders = uniform(block.time, block.sliders)
+        even = sliders is block.sliders
+        forces = block.forces if even else uniform(block.time, block.forces)[1]
+        rate = (len(time) - 1) / float(time[-1] - time[0])
+        sliders = smoothed(sliders, rate, self.cutoff)
+        first, second = central_differences(sliders, rate)
+        inner, lost = slice(edge, len(time) - edge), slice(edge - LOST, len(first) - (edge - LOST))
+        motion = sliders[inner], first[lost], second[lost]
+        return Differentiated(
+            time[inner], motion, forces[inner], np.ones(len(motion[0]), dtype=bool)
+        )
+
+
+@dataclass(frozen=True)
+class SmoothingSpline(_Sampled):
+    """A spline of degree 7, through all samples or smoother where there is a cut-off."""
+
+    @property
+    def edge(self) -> int:
+        """What a spline feels of a block's ends."""
+        knot = 1.0 / (2.0 * self.cutoff) if self.cutoff else 1.0 / self.rate
+        return ceil(_SPLINE_SETTLING * knot * self.rate)
+
+    def differentiated(self, block: Log, edge: int) -> Differentiated:
+        """Return the block at its own times."""
+        inner = slice(edge, block.rows - edge)
+        q, dq, ddq = spline_motion(block.time, block.sliders, self.cutoff)
+        smooth = np.ones(block.rows, dtype=bool)
+        if self.cutoff is None:
+            smooth = _without_jumps(block.time, block.sliders)
+        motion = q[inner], dq[inner], ddq[inner]
+        return Differentiated(block.time[inner], motion, block.forces[inner], smooth[inner])
+
+
+@dataclass(frozen=True)
+class FourierFit:
+    """A Fourier series over all periods of the log, with harmonics up to the cut-off."""
+
+    period: float
+    cutoff: float | None
+    whole: ClassVar[bool] = True
+    edge: ClassVar[int] = 0
+
+    def series(self, log: Log) -> FourierSeries:
+        """Return the series of the log's positions."""
+        return fitted_series(log.time, log.sliders, self.period, highest=self.cutoff)
+
+    def differentiated(self, block: Log, edge: int) -> Differentiated:
+        """Return the log at its own times."""
+        series = self.series(block)
+        motion = series.at(block.time), series.at(block.time, 1), series.at(block.time, 2)
+        return Differentiated(block.time, motion, block.forces, np.ones(block.rows, dtype=bool))
+
+    def curve(self, log: Log) -> Curve:
+        """Return the series at the log's samples."""
+        series = self.series(log)
+        q, dq, ddq = (
+            sparse.csr_matrix(fourier_basis(log.time, self.period, series.harmonics, k))
+            for k in range(3)
+        )
+        return Curve(series.coefficients, (q, dq, ddq), 0)
+
+    def fastest(self, band: float) -> float | None:
+        """Return the cut-off or the band: a series ends where noise begins, and mixes nothing."""
+        return None if self.cutoff is None else max(self.cutoff, band)
+
+
+def differentiator(
+    kind: Derivatives, *, rate: float, cutoff: float | None, period: float | None
+) -> Differentiator:
+    """Return the differentiator of that name; rate and cut-off in Hz, the period in s."""
+    if kind == "periodic":
+        assert period is not None  # `preprocessing_of` sees to it
+        return FourierFit(period, cutoff)
+    return CentralDifferences(rate, cutoff) if kind == "central" else SmoothingSpline(rate, cutoff)
+
+
+def uniform(time: Array, signal: Array) -> tuple[Array, Array]:
+    """Return even times and the signals (T, k) there, by a quintic spline through the samples.
+
+    Samples that are even already are returned as they are; the log's findings tell of uneven ones.
+    """
+    even = np.linspace(time[0], time[-1], len(time))
+    step = (time[-1] - time[0]) / (len(time) - 1)
+    if np.abs(time - even).max() <= _EVEN * step:
+        return even, signal
+    return even, make_interp_spline(time, signal, k=5)(even)
+
+
+def central_differences(signal: Array, rate: float) -> tuple[Array, Array]:
+    """Return first and second derivatives of uniform samples (T, k), central and of eighth order.
+
+    They stand at the samples 4 to T - 5. At a hundredth of the sampling rate (Hz) they are wrong by
+    1e-12, where the usual ones of second order are wrong by 1e-3.
+    """
+    rows = len(signal) - 2 * LOST
+    first, second = np.zeros((2, rows, signal.shape[1]))
+    for k in range(2 * LOST + 1):
+        part = signal[k : k + rows]
+        first += _FIRST[k] * part
+        second += _SECOND[k] * part
+    return first * rate, second * rate**2
+
+
+def fitted_spline(time: Array, signal: Array, cutoff: float | None) -> BSpline:
+    """Return the spline of degree 7 that is nearest to samples, in the least-squares sense.
+
+    Its knots are half a period of the cut-off (Hz) apart, so that what is faster is taken for
+    noise. Without a cut-off it passes through every sample (T, k). The times (T,), s, ascend, but
+    need not be uniform.
+    """
+    if cutoff is not None:
+        pieces = int(np.ceil((time[-1] - time[0]) * 2.0 * cutoff))
+        if pieces + _DEGREE < len(time) // 2:
+            inner = np.linspace(time[0], time[-1], pieces + 1)
+            knots = np.r_[[time[0]] * _DEGREE, inner, [time[-1]] * _DEGREE]
+            return make_lsq_spline(time, signal, knots, k=_DEGREE, method="qr")
+    return make_interp_spline(time, signal, k=_DEGREE)
+
+
+def spline_motion(time: Array, signal: Array, cutoff: float | None) -> tuple[Array, Array, Array]:
+    """Return value, first and second derivative (T, k) of the fitted spline at the samples."""
+    spline = fitted_spline(time, signal, cutoff)
+    return spline(time), spline(time, 1), spline(time, 2)
+
+
+def _design(spline: BSpline, time: Array, derivative: int) -> sparse.csr_matrix:
+    """Return a spline's basis functions (T, C) at times, or their derivatives."""
+    if derivative == 0:
+        return sparse.csr_matrix(BSpline.design_matrix(time, spline.t, spline.k))
+    # A derivative is a spline of lower degree, whose coefficients are differences of these.
+    slopes = BSpline(spline.t, np.eye(len(spline.c)), spline.k).derivative(derivative)
+    design = BSpline.design_matrix(time, slopes.t, slopes.k)
+    return sparse.csr_matrix(design @ sparse.csr_matrix(slopes.c[: design.shape[1]]))
+
+
+def _without_jumps(time: Array, sliders: Array) -> NDArray[np.bool_]:
+    """Return where a spline through samples without noise agrees with central differences.
+
+    They err in different ways next to a jump in a derivative, as at the ends of a rest. Jumps are
+    few: where most samples are apart it is for another reason, such as the rounding of the stamps.
+    """
+    spline = fitted_spline(time, sliders, None)
+    even = np.linspace(time[0], time[-1], len(time))
+    rate = (len(even) - 1) / float(even[-1] - even[0])
+    _, second = central_differences(spline(even), rate)
+    rounding = _ROUNDING * np.abs(sliders).max() * rate**2
+    least = _AGREES * np.abs(second).max(axis=0) + rounding
+    apart = (np.abs(spline(even[LOST:-LOST], 2) - second) > least).any(axis=1)
+    if apart.mean() > _FEW:
+        return np.ones(len(time), dtype=bool)
+    apart = maximum_filter1d(np.pad(apart, LOST).astype(int), 2 * _SMEARED + 1) > 0
+    return np.asarray(~apart)

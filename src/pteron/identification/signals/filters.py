@@ -1,0 +1,198 @@
+"""Noise and what takes it away: its size, the positions' low-pass filter, the parallel filter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import comb
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import (  # type: ignore[import-untyped]
+    butter,
+    firwin,
+    freqz_sos,
+    sosfiltfilt,
+    upfirdn,
+)
+
+from pteron.kernels import Array
+
+MEDIAN_SIZE = 0.6744897501960817
+"""Median size of a standard normal variable."""
+
+SETTLING = 6.0
+"""Time that a block's ends need to settle, in periods of the cut-off: 1e-6 of a step is left."""
+
+_DIFFERENCE = 8
+"""Order of the differences: what a smooth motion leaves falls with this power of its sampling."""
+
+_GRID_LOOK = 20_000
+_ON_GRID = 1e-3
+"""Deviation from a multiple of the step, in steps, that is rounding of the numbers."""
+
+_ORDER = 4
+_SAFETY = 2.0
+"""Factor on the frequency that position needs: acceleration weighs what lies above it more."""
+
+_HIGHEST = 0.2
+"""Share of the sampling rate beyond which a filter would take nothing worth its edges."""
+
+_MARGIN = 20.0
+"""Factor on the motion's own bandwidth beyond which what shows is noise of another colour."""
+
+_POSITION_POWER = 0.9999
+_CANDIDATES = 40
+_LOOK = 60_000
+"""Samples that the search for a cut-off looks at."""
+
+_NOISE_FREE = 1e-12
+"""Noise, relative to a signal's span, that is rounding: there is nothing to filter."""
+
+_HALF = 4
+"""Half the parallel filter's length, in samples that are kept."""
+
+
+def white_noise(signal: Array) -> Array:
+    """Return the standard deviation (k,) of the white noise on uniformly sampled signals (T, k).
+
+    The eighth differences of a motion sampled much faster than it moves vanish; those of white
+    noise have C(16, 8) times its variance. Values on a grid, such as an encoder's counts, have at
+    least the rounding error of the grid, also where they stand still. At least 9 samples.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t = np.linspace(0.0, 10.0, 10_001)[:, None]
+    >>> noise = 1e-6 * np.random.default_rng(0).normal(size=t.shape)
+    >>> bool(abs(white_noise(np.sin(t) + noise)[0] / 1e-6 - 1.0) < 0.05)
+    True
+    """
+    rough = np.abs(np.diff(signal, n=_DIFFERENCE, axis=0)) / np.sqrt(
+        comb(2 * _DIFFERENCE, _DIFFERENCE)
+    )
+    # The median forgives jumps, such as those of Coulomb friction.
+    spread = np.median(rough, axis=0) / MEDIAN_SIZE
+    return np.asarray(np.maximum(spread, _grid(signal) / np.sqrt(12.0)))
+
+
+def _grid(signal: Array) -> Array:
+    """Return the step (k,) of the grid that values stand on; 0 where there is none."""
+    steps = np.zeros(signal.shape[1])
+    for k, values in enumerate(signal[:_GRID_LOOK].T):
+        levels = np.unique(values)
+        if len(levels) < 2:
+            continue
+        step = float(np.diff(levels).min())
+        multiples = (levels - levels[0]) / step
+        # A grid has few levels for the values on it, and all of them are multiples of its step.
+        if np.abs(multiples - np.round(multiples)).max() < _ON_GRID:
+            steps[k] = step
+    return steps
+
+
+def smoothed(signal: Array, rate: float, cutoff: float | None) -> Array:
+    """Return signals (T, k) after a Butterworth filter of order 4 forward and backward.
+
+    Its gain is 1 / (1 + (f / cutoff)^8), its phase zero. Without a cut-off there is no filter.
+    """
+    if cutoff is None:
+        return signal
+    sections = butter(_ORDER, cutoff, fs=rate, output="sos")
+    padding = min(round(SETTLING * rate / cutoff), len(signal) - 1)
+    return np.asarray(sosfiltfilt(sections, signal, axis=0, padlen=padding))
+
+
+def cutoff_of(signal: Array, rate: float) -> float | None:
+    """Return the cut-off for positions (T, k), Hz, or None where they need no filter.
+
+    It is twice the lowest frequency at which what the filter takes away is white noise, of the
+    strength that `white_noise` finds, and no motion: the residual analysis of Winter. It is at most
+    twenty times the frequency below which nearly all the motion is, as noise need not be white.
+    """
+    part = signal[:_LOOK]
+    noise = white_noise(part)
+    if (noise <= _NOISE_FREE * np.ptp(part, axis=0)).all():
+        return None
+    inside = slice(len(part) // 10, len(part) - len(part) // 10)
+    # Both the strength of the noise and that of the residual are estimates themselves.
+    slack = 4.0 * np.sqrt(10.0 / len(part))
+    # Bandwidth of the position, not of the speed: coarse encoders' noise would outweigh the motion.
+    window = np.hanning(len(part))[:, None]
+    power = np.abs(np.fft.rfft(window * (part - part.mean(axis=0)), axis=0)) ** 2
+    bandwidth = bins_below(power, _POSITION_POWER) * rate / len(part)
+    lowest = min(20.0 * rate / len(part), 0.5 * _HIGHEST * rate / _SAFETY)
+    highest = min(_HIGHEST * rate, _MARGIN * bandwidth) / _SAFETY
+    for candidate in np.geomspace(lowest, max(highest, lowest), _CANDIDATES):
+        residual = (part - smoothed(part, rate, float(candidate)))[inside]
+        share = _taken(rate, float(candidate))
+        if (np.mean(residual**2, axis=0) <= noise**2 * (share + slack)).all():
+            break
+    return float(_SAFETY * candidate)
+
+
+def bins_below(power: Array, share: float) -> int:
+    """Return how many frequencies of a spectrum (F, k) hold that share of every signal's power."""
+    total = np.maximum(power.sum(axis=0), np.finfo(float).tiny)
+    return int((np.cumsum(power, axis=0) / total < share).sum(axis=0).max())
+
+
+def _taken(rate: float, cutoff: float) -> float:
+    """Return the share of white noise that the filter takes away."""
+    sections = butter(_ORDER, cutoff, fs=rate, output="sos")
+    _, gain = freqz_sos(sections, worN=2048, fs=rate)
+    return float(np.mean((1.0 - np.abs(gain) ** 2) ** 2))
+
+
+@dataclass(frozen=True)
+class Decimation:
+    """The parallel filter: a linear-phase low-pass that keeps every `factor`-th sample.
+
+    A linear filter that treats forces and regressor alike leaves F = W beta as true as it was. It
+    takes away what the motion does not cover, noise above all, and leaves residuals that are nearly
+    white, so that standard deviations may be believed. The cut-off is half the new sampling rate;
+    what is folded over it is the same on both sides.
+    """
+
+    factor: int
+
+    @classmethod
+    def to_band(cls, rate: float, band: float | None) -> Decimation:
+        """Return the decimation for a band from 0 to `band` Hz; none, where it is None."""
+        return cls(1 if band is None else max(int(rate / (2.0 * band)), 1))
+
+    @property
+    def margin(self) -> int:
+        """Samples at each end that are lost."""
+        return 0 if self.factor == 1 else _HALF * self.factor
+
+    def centers(self, rows: int) -> NDArray[np.int64]:
+        """Return the indices of the samples kept, of so many."""
+        return np.arange(self.margin, rows - self.margin, self.factor, dtype=np.int64)
+
+    @cached_property
+    def taps(self) -> Array:
+        """The filter's coefficients, which sum to one."""
+        if self.factor == 1:
+            return np.ones(1)
+        return np.asarray(firwin(2 * self.margin + 1, 1.0 / self.factor, window=("kaiser", 5.0)))
+
+    def noise(self, used: Array) -> Array:
+        """Return what is left of unit white noise on the samples (T, n) that are 1, not 0."""
+        return np.asarray(np.sqrt(np.maximum(self._filtered(used, self.taps**2), 0.0)))
+
+    def __call__(self, signal: Array) -> Array:
+        """Return signals (T, ...) filtered and decimated: one row for each of `centers`."""
+        return self._filtered(signal, self.taps)
+
+    def _filtered(self, signal: Array, taps: Array) -> Array:
+        if self.factor == 1:
+            return signal
+        count = len(self.centers(len(signal)))
+        if count == 0:
+            return signal[:0]
+        flat = signal.reshape(len(signal), -1)
+        # Sample k of the full convolution belongs to the centre k - margin, and the margin is a
+        # multiple of the factor.
+        filtered = upfirdn(taps, flat, down=self.factor, axis=0)[2 * _HALF : 2 * _HALF + count]
+        return np.asarray(filtered.reshape(count, *signal.shape[1:]))
