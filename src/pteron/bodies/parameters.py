@@ -63,6 +63,11 @@ class Parameter:
         return f"{self.kind}_{self.body}{self.suffix}"
 
     @property
+    def owner(self) -> str:
+        """The name of its body: ``u1``, ``l(2,4)``, ``e``."""
+        return f"{self.body}{self.suffix}"
+
+    @property
     def suffix(self) -> str:
         """What tells its legs in the name."""
         if self.everyone or not self.legs:
@@ -73,6 +78,14 @@ class Parameter:
     def length_power(self) -> int:
         """The power of length in its unit: 0, 1 or 2."""
         return LENGTH_POWERS[self.kind]
+
+
+def body_places(parameters: Iterable[Parameter]) -> dict[str, dict[str, int]]:
+    """Return where the parameters of each body stand, by the body's name and their kind."""
+    places: dict[str, dict[str, int]] = {}
+    for k, parameter in enumerate(parameters):
+        places.setdefault(parameter.owner, {})[parameter.kind] = k
+    return places
 
 
 def parameter_list(

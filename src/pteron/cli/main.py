@@ -18,6 +18,7 @@ from pteron.cli.base import base, table1
 from pteron.cli.excite import excite
 from pteron.cli.export import export
 from pteron.cli.identify import identify
+from pteron.cli.interrupts import insistent_interrupts
 from pteron.cli.machines import catalog, check
 from pteron.cli.motions import direct, forces, inverse
 from pteron.cli.report import report
@@ -40,8 +41,9 @@ class Program(TyperGroup):
         """Run a subcommand and exit."""
         _open_closed_streams()
         try:
-            status = super().main(*args, **extra | {"standalone_mode": False})
-            sys.stdout.flush()
+            with insistent_interrupts():
+                status = super().main(*args, **extra | {"standalone_mode": False})
+                sys.stdout.flush()
             if status == _INTERRUPTED:  # Typer has caught it
                 raise KeyboardInterrupt
         except PteronError as error:

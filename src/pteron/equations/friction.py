@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import casadi as ca
 
 from pteron.bodies.motion import Expression
 from pteron.equations.machine import Machine, State
+from pteron.manipulator import Manipulator
 
 
 def passive_friction(machine: Machine, state: State) -> Expression:
@@ -17,12 +20,29 @@ def passive_friction(machine: Machine, state: State) -> Expression:
     phi', so that only the sum of their coefficients acts.
     """
     columns = []
-    for i, leg in enumerate(state.legs):
-        for joint in leg.chain[1:]:
-            if not joint.row[:3].is_zero():
-                row = ca.mtimes(joint.row, state.platform.matrices[i])
-                columns.append(ca.mtimes(row.T, joint.rate))
+    for i, k in _turning(state):
+        joint = state.legs[i].chain[k]
+        row = ca.mtimes(joint.row, state.platform.matrices[i])
+        columns.append(ca.mtimes(row.T, joint.rate))
     if state.platform.angle is not None:
         columns.append(ca.vertcat(ca.SX(3, 1), state.platform.angle.rate))
     forces = [machine.closure.forces(load, state.platform, state.legs) for load in columns]
     return ca.horzcat(*forces)
+
+
+@lru_cache(maxsize=64)
+def passive_joints(robot: Manipulator) -> tuple[tuple[int, int], ...]:
+    """Return the leg and the number in its chain, both from 1, of each column but the last."""
+    machine = Machine.of(robot)
+    state = machine.state(ca.SX.sym("pose", machine.freedom))
+    return tuple((i + 1, k) for i, k in _turning(state))
+
+
+def _turning(state: State) -> list[tuple[int, int]]:
+    """Return leg and place in its chain of the passive joints that their point's motion turns."""
+    return [
+        (i, k)
+        for i, leg in enumerate(state.legs)
+        for k, joint in enumerate(leg.chain)
+        if k > 0 and not joint.row[:3].is_zero()
+    ]

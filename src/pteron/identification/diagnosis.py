@@ -65,7 +65,7 @@ class Fault:
                 order = ", ".join(f"{self.kind}{k + 1}" for k in self.order)
                 parts[-1] += f" (they should be {order})"
         if len(flipped) == n:
-            parts.append("the forces, or all sliders, have the sign flipped")
+            parts.append("the forces, or all joints, have the sign flipped")
         elif flipped:
             names = _listed([f"{self.kind}{self.order[k - 1] + 1}" for k in flipped])
             parts.append(f"{names} {'has' if len(flipped) == 1 else 'have'} the sign flipped")
@@ -75,11 +75,11 @@ class Fault:
 def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> Fault | None:
     """Return the exchange of columns, or of signs, that explains a log's forces far better.
 
-    All n! 2^n orders and signs of the forces are tried, all orders of the sliders, and their signs
+    All n! 2^n orders and signs of the forces are tried, all orders of the joints, and their signs
     one by one. Signs of all forces at once are settled by the machine's inertia, which is positive.
     None where nothing makes the error three times smaller, or the inertia positive.
     """
-    # Without the mask of slow sliders, which belongs to the order that is in question.
+    # Without the mask of slow joints, which belongs to the order that is in question.
     plain = replace(preprocessing, slow=np.zeros_like(preprocessing.slow))
     observations = observations_of(model, log, plain)
     n = observations.actuators
@@ -91,8 +91,8 @@ def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> Fault 
     best = int(np.argmin(errors))
     order, sign = choices[best] if errors[best] * _DECISIVE < before else choices[0]
     after = min(errors[best], before) if (order, sign) != choices[0] else before
-    swapped = exchanged_sliders(model, log, plain, before)
-    # Exchanged forces can do some of what exchanged sliders do.
+    swapped = exchanged_joints(model, log, plain, before)
+    # Exchanged forces can do some of what exchanged joints do.
     if swapped is not None and swapped.after < 0.7 * after:
         return swapped
     mended = observations.with_forces(observations.forces[:, list(order)] * np.array(sign))
@@ -123,14 +123,14 @@ def _errors(observations: Observations, choices: Sequence[_Choice]) -> list[floa
     return found
 
 
-def exchanged_sliders(
+def exchanged_joints(
     model: Model, log: Log, preprocessing: Preprocessing, before: float
 ) -> Fault | None:
-    """Return the order of the sliders, or the sign of one, that explains the forces far better.
+    """Return the order of the joints, or the sign of one, that explains the forces far better.
 
     `before` is the error of the fit relative to the forces as they are.
     """
-    n = log.sliders.shape[1]
+    n = log.joints.shape[1]
     best: Fault | None = None
     usual, upright = tuple(range(n)), (1,) * n
     choices = [(usual, tuple(-1 if k == i else 1 for k in range(n))) for i in range(n)]
@@ -138,7 +138,7 @@ def exchanged_sliders(
     orders = sorted(permutations(range(n)), key=lambda order: sum(map(int.__ne__, order, usual)))
     choices += [(order, upright) for order in orders[1:]]
     for order, signs in choices:
-        other = replace(log, sliders=log.sliders[:, list(order)] * np.array(signs))
+        other = replace(log, joints=log.joints[:, list(order)] * np.array(signs))
         try:
             observations = observations_of(model, other, preprocessing)
         except DataError:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from pteron.bodies.parameters import PLATFORM_KINDS
 from pteron.identification.errors import LogError
 from pteron.identification.estimators import Estimate, qr_factor, weighted
 from pteron.identification.estimators.least_squares import actuator_noise
@@ -19,7 +20,7 @@ from pteron.identification.observation import Observations
 from pteron.identification.payload import observations_with_payload
 from pteron.identification.signals import Processing
 from pteron.kernels import Array
-from pteron.manipulator import BODY_PARAMETERS, Manipulator
+from pteron.manipulator import Manipulator
 from pteron.reduction import BaseParameters
 
 _UNSEEN = 1e-10
@@ -172,7 +173,7 @@ def identify_drive_gains(
     # All four columns of the payload: none is solved for, so that none need be independent.
     model = Model(plain.base, replace(plain.terms, payload=True), plain.joins)
     observations = observations_with_payload(model, log, with_payload, processing)
-    carried = observations.matrix[..., -len(BODY_PARAMETERS) :] @ np.array(
+    carried = observations.matrix[..., -len(PLATFORM_KINDS) :] @ np.array(
         [known.mass, *known.first_moment, known.inertia]
     )
     observations = observations.columns(range(len(plain.names)))

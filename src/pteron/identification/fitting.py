@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from pteron.errors import DataError
-from pteron.identification.diagnosis import column_fault, exchanged_sliders
+from pteron.identification.diagnosis import column_fault, exchanged_joints
 from pteron.identification.errors import LogError
 from pteron.identification.estimators import (
     ESTIMATORS,
@@ -27,7 +27,7 @@ METHODS = (*ESTIMATORS, "likelihood")
 """Names of the estimators that `identify` knows."""
 
 _EXPLAINED = 0.2
-"""Error relative to the forces, three times smaller than which sliders without a pose must make it
+"""Error relative to the forces, three times smaller than which joints without a pose must make it
 to be called mended."""
 
 _LOOK = 30_000
@@ -73,7 +73,7 @@ def preprocessing_for(robot: Manipulator, one: Recording, wanted: Processing) ->
 def fit_observations(
     model: Model, one: Recording, preprocessing: Preprocessing, progress: Callable[[int], None]
 ) -> Observations:
-    """Return a recording's observations; where it has no poses, say whether sliders are swapped."""
+    """Return a recording's observations; where it has no poses, say whether joints are swapped."""
     try:
         return observations_of(model, one.samples(progress), preprocessing)
     except LogError as error:
@@ -81,7 +81,7 @@ def fit_observations(
             raise
         head = one.head()
         some = head.part(0, min(head.rows, _LOOK))
-        swap = exchanged_sliders(model, some, preprocessing, _EXPLAINED)
+        swap = exchanged_joints(model, some, preprocessing, _EXPLAINED)
         if swap is None:
             raise
         error.args = (f"{error}; or {swap.message()}: then every row has a pose",)

@@ -204,7 +204,7 @@ def _divided(
 
 
 def _reflected(fit: Sequence[Recording]) -> dict[str, float]:
-    """Return what the rotors of known drives weigh on the sliders, J r^2 in kg, by name."""
+    """Return what the rotors of known drives weigh on the joints, J r^2 in kg, by name."""
     description = fit[0].head().description
     if description.rotor_inertia is None or description.ratio is None:
         return {}

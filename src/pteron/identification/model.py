@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
+from pteron.bodies.parameters import PLATFORM_KINDS
+from pteron.equations.friction import passive_joints
 from pteron.errors import ModelError
 from pteron.identification.signals import States
-from pteron.kernels import Array, numeric
+from pteron.kernels import Array
 from pteron.kinematics import random_poses
-from pteron.manipulator import BODY_PARAMETERS, Manipulator, parameter_names, parameter_units
+from pteron.kinematics.evaluate import unchecked
+from pteron.manipulator import Manipulator
 from pteron.reduction import BaseParameters, base_parameters, base_regressor
 
-Joints = Literal["none", "shared", "each"]
+Passive = Literal["none", "shared", "each"]
 """Viscous friction in the passive joints: none, one coefficient a kind of joint, or one each."""
 
 _PROBES = 200
@@ -30,28 +33,38 @@ class Terms:
     Parameters
     ----------
     coulomb, viscous, offset : bool
-        Friction of each slider, Fc sign(rho') + Fv rho', and a constant force.
-    joints : {"none", "shared", "each"}
-        Viscous friction in the passive joints R1 to R4.
+        Friction of each actuated joint, Fc sign(q') + Fv q', and a constant force.
+    passive : {"none", "shared", "each"}
+        Viscous friction in the passive joints of the legs.
     payload : bool
         The platform's four parameters once more, where a payload is carried.
     rotors : bool
-        The inertia of each slider's motor, reflected through its drive: J_m = J r^2 (kg) with J of
-        the rotor and r in rad/m. Its column is rho'': on a level guide it joins the mass of its
-        slider, m_p; on any other guide, where gravity pulls at m_p but not at a rotor, it joins
-        m_p and the offset. `Model.joins` and the expressions say so.
+        The inertia of each motor, reflected through its drive: J_m = J r^2 with J of the rotor and
+        r in rad/m (kg), or in rad/rad at a crank (kg m^2). Its column is q'': at a crank it joins
+        I_u, on a level guide the mass of its slider, m_p; on any other guide, where gravity pulls
+        at m_p but not at a rotor, it joins m_p and the offset. `Model.joins` and the expressions say so.
     """
 
     coulomb: bool = True
     viscous: bool = True
     offset: bool = True
-    joints: Joints = "none"
+    passive: Passive = "none"
     payload: bool = False
     rotors: bool = False
 
     def __post_init__(self) -> None:
-        if self.joints not in get_args(Joints):
-            raise ModelError(f"joints: {self.joints!r} is not one of {', '.join(get_args(Joints))}")
+        if self.passive not in get_args(Passive):
+            raise ModelError(
+                f"passive: {self.passive!r} is not one of {', '.join(get_args(Passive))}"
+            )
+
+
+class Term(NamedTuple):
+    """One value beside the base parameters: what it is, of which leg or joint, and its unit."""
+
+    kind: Literal["coulomb", "viscous", "offset", "passive", "rotor", "payload"]
+    name: str
+    unit: str
 
 
 @dataclass(frozen=True)
@@ -84,21 +97,25 @@ class Model:
         return self.base.robot
 
     @cached_property
+    def kept_terms(self) -> tuple[Term, ...]:
+        """The terms that are values of their own, after the base parameters."""
+        return tuple(term for term in self._terms if term.name not in self.left_out)
+
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the values, the base parameters first."""
-        extra = (name for name, _ in self._extras if name not in self.left_out)
-        return (*self.base.names, *extra)
+        return (*self.base.names, *(term.name for term in self.kept_terms))
+
+    @cached_property
+    def kinds(self) -> tuple[str, ...]:
+        """What the values are: "base", or the kind of the term."""
+        return (*("base" for _ in self.base.names), *(term.kind for term in self.kept_terms))
 
     @cached_property
     def units(self) -> tuple[str, ...]:
         """SI units of the values."""
-        robot = self.robot
-        of_kind = {
-            name.rstrip("0123456789"): unit
-            for name, unit in zip(parameter_names(robot), parameter_units(robot), strict=True)
-        }
-        base = (of_kind[name.rstrip("0123456789(),")] for name in self.base.names)
-        return (*base, *(unit for name, unit in self._extras if name not in self.left_out))
+        base = (self.base.parameters[column].unit for column in self.base.kept)
+        return (*base, *(term.unit for term in self.kept_terms))
 
     @property
     def expressions(self) -> tuple[str, ...]:
@@ -119,37 +136,57 @@ class Model:
         return added
 
     def matrix(self, states: States) -> Array:
-        """Return the regressor (R, n, p) of states, each column in N per unit of its value."""
+        """Return the regressor (R, n, p) of states: N or N m per unit of each value."""
         return np.ascontiguousarray(self._everything(states)[..., self._kept])
 
     @property
     def _kept(self) -> list[int]:
-        names = (*self.base.names, *(name for name, _ in self._extras))
+        names = (*self.base.names, *(term.name for term in self._terms))
         return [k for k, name in enumerate(names) if name not in self.left_out]
 
     @property
-    def _extras(self) -> list[tuple[str, str]]:
-        """The terms' names and units, before dependent ones are left out."""
-        legs = range(1, len(self.robot.legs) + 1)
-        found: list[tuple[str, str]] = []
-        if self.terms.coulomb:
-            found += [(f"Fc{i}", "N") for i in legs]
-        if self.terms.viscous:
-            found += [(f"Fv{i}", "N s/m") for i in legs]
-        if self.terms.offset:
-            found += [(f"offset{i}", "N") for i in legs]
-        kinds = ("R1", "R2", "R3")
-        if self.terms.joints == "each":
-            found += [(f"Fv_{kind}_{i}", "N m s") for i in legs for kind in kinds]
-        elif self.terms.joints == "shared":
-            found += [(f"Fv_{kind}", "N m s") for kind in kinds]
-        if self.terms.joints != "none" and self.robot.platform.turns:
-            found.append(("Fv_R4", "N m s"))
-        if self.terms.rotors:
-            found += [(f"J_m{i}", "kg") for i in legs]
+    def _terms(self) -> list[Term]:
+        """The terms, before dependent ones are left out."""
+        joints = [leg.joint for leg in self.robot.legs]
+        found: list[Term] = []
+        for i, joint in enumerate(joints, start=1):
+            if self.terms.coulomb:
+                found.append(Term("coulomb", f"Fc{i}", joint.force_unit))
+        for i, joint in enumerate(joints, start=1):
+            if self.terms.viscous:
+                unit = "N s/m" if joint.unit == "m" else "N m s"
+                found.append(Term("viscous", f"Fv{i}", unit))
+        for i, joint in enumerate(joints, start=1):
+            if self.terms.offset:
+                found.append(Term("offset", f"offset{i}", joint.force_unit))
+        found += [Term("passive", name, "N m s") for name in self._passive]
+        for i, joint in enumerate(joints, start=1):
+            if self.terms.rotors:
+                found.append(Term("rotor", f"J_m{i}", "kg" if joint.unit == "m" else "kg m^2"))
         if self.terms.payload:
             units = ("kg", "kg m", "kg m", "kg m^2")
-            found += list(zip((f"{p}_L" for p in BODY_PARAMETERS), units, strict=True))
+            pairs = zip(PLATFORM_KINDS, units, strict=True)
+            found += [Term("payload", f"{kind}_L", unit) for kind, unit in pairs]
+        return found
+
+    @property
+    def _passive(self) -> dict[str, list[int]]:
+        """The columns of `passive_friction` that each coefficient of passive joints is for."""
+        if self.terms.passive == "none":
+            return {}
+        found: dict[str, list[int]] = {}
+        kinds = [leg.type for leg in self.robot.legs]
+        places = passive_joints(self.robot)
+        for column, (leg, number) in enumerate(places):
+            if self.terms.passive == "each":
+                name = f"Fv_R{number}_{leg}"
+            else:
+                alike = [i for i, kind in enumerate(kinds, start=1) if kind == kinds[leg - 1]]
+                legs = "" if len(alike) == len(kinds) else f"({','.join(map(str, alike))})"
+                name = f"Fv_R{number}{legs}"
+            found.setdefault(name, []).append(column)
+        if self.robot.platform.turns:
+            found[f"Fv_R{1 + max(number for _, number in places)}"] = [len(places)]
         return found
 
     def _everything(self, states: States) -> Array:
@@ -158,21 +195,18 @@ class Model:
         motion = states.pose, states.velocity, states.acceleration
         parts = [base_regressor(robot, self.base, *motion)]
         if terms.coulomb:
-            parts.append(_diagonal(np.sign(states.slider_rates)))
+            parts.append(_diagonal(np.sign(states.joint_rates)))
         if terms.viscous:
-            parts.append(_diagonal(states.slider_rates))
+            parts.append(_diagonal(states.joint_rates))
         if terms.offset:
             parts.append(np.broadcast_to(np.eye(n), (len(states), n, n)))
-        if terms.joints != "none":
-            joints = numeric(robot, "passive_friction")(states.pose, states.velocity)
-            each = joints[..., : 3 * n]
-            if terms.joints == "shared":
-                each = each.reshape(*each.shape[:-1], n, 3).sum(axis=-2)
-            parts += [each, joints[..., 3 * n :]]
+        if terms.passive != "none":
+            joints = unchecked(robot, "passive_friction", states.pose, states.velocity)
+            parts += [joints[..., columns].sum(-1)[..., None] for columns in self._passive.values()]
         if terms.rotors:
-            parts.append(_diagonal(states.slider_accelerations))
+            parts.append(_diagonal(states.joint_accelerations))
         if terms.payload:
-            carried = numeric(robot, "regressor")(*motion)[..., -len(BODY_PARAMETERS) :]
+            carried = unchecked(robot, "regressor", *motion)[..., -len(PLATFORM_KINDS) :]
             parts.append(carried * (states.payload != 0)[:, None, None])
         return np.concatenate(parts, axis=-1)
 
@@ -187,7 +221,7 @@ def identification_model(
     robot : Manipulator
         The machine; its inertial parameters play no part.
     terms : Terms, optional
-        What it has beside the base parameters; friction and offset of each slider by default.
+        What it has beside the base parameters; friction and offset of each joint by default.
     base : BaseParameters, optional
         Another choice of base parameters, such as that of legs which share theirs.
 
@@ -232,13 +266,13 @@ def _probes(robot: Manipulator) -> States:
     rng = np.random.default_rng(0)
     pose = random_poses(robot, _PROBES, seed=rng)
     velocity, acceleration = rng.normal(size=pose.shape), 10.0 * rng.normal(size=pose.shape)
-    rates = numeric(robot, "joint_rates")(pose, velocity)[..., 0]
-    seconds = numeric(robot, "joint_accelerations")(pose, velocity, acceleration)[..., 0]
+    rates = unchecked(robot, "joint_rates", pose, velocity)[0]
+    seconds = unchecked(robot, "joint_accelerations", pose, velocity, acceleration)[0]
     # Every other one carries a payload, else its columns would be those of the platform.
     payload = np.arange(_PROBES) % 2
     return States(np.zeros(_PROBES), rates, rates, seconds, pose, velocity, acceleration, payload)
 
 
 def _diagonal(values: Array) -> Array:
-    """Return (R, n, n): a column for each slider."""
+    """Return (R, n, n): a column for each joint."""
     return np.asarray(values[..., None] * np.eye(values.shape[-1]))

@@ -58,6 +58,8 @@ class Observations:
         The phase of each row.
     source : str
         What messages call the log they come from.
+    kinds : tuple of str
+        What the values are, as `Model.kinds`; empty where nobody has said.
     """
 
     names: tuple[str, ...]
@@ -68,6 +70,7 @@ class Observations:
     gain: Array
     payload: NDArray[np.int64]
     source: str = "the log"
+    kinds: tuple[str, ...] = ()
 
     @property
     def used(self) -> Array:
@@ -90,6 +93,7 @@ class Observations:
             self,
             names=tuple(self.names[k] for k in keep),
             units=tuple(self.units[k] for k in keep),
+            kinds=tuple(self.kinds[k] for k in keep) if self.kinds else (),
             matrix=np.ascontiguousarray(self.matrix[..., list(keep)]),
         )
 
@@ -149,7 +153,7 @@ def stacked(parts: Sequence[Observations]) -> Observations:
 
 
 def in_motion(rates: Array, slow: Array, rows: int, *, wraps: bool = False) -> Array:
-    """Return 1 where a slider (R, n) moves, 0 where its friction is not known.
+    """Return 1 where a joint (R, n) moves, 0 where its friction is not known.
 
     Dry friction turns with the rate, and acceleration jumps with it: what is slow is left out, and
     the rows before and after it. Both sides are multiplied with the result before the parallel
@@ -164,7 +168,7 @@ def _filtered(model: Model, block: Samples, preprocessing: Preprocessing) -> Obs
     decimation = preprocessing.decimation
     states, forces = block.states, block.forces
     inner = slice(preprocessing.settling, len(states) - preprocessing.settling)
-    moving = in_motion(states.slider_rates, preprocessing.slow, preprocessing.settling)
+    moving = in_motion(states.joint_rates, preprocessing.slow, preprocessing.settling)
     moving = (moving * block.smooth[:, None])[inner]
     states, forces = states.part(inner), forces[inner]
     kept = decimation.centers(len(states))
@@ -199,6 +203,7 @@ def _assembled(
         time,
         gain,
         payload,
+        kinds=model.kinds,
     )
 
 
@@ -240,7 +245,7 @@ def _periodic(
     kept = np.linspace(start, start + period, count, endpoint=False)
 
     def regressor(time: Array, used: Array, first_row: int) -> Array:
-        states = States.of_sliders(
+        states = States.of_joints(
             model.robot,
             (series.at(time), series.at(time, 1), series.at(time, 2)),
             time,

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2  # type: ignore[import-untyped]
 
+from pteron.bodies.parameters import PLATFORM_KINDS
 from pteron.identification.errors import LogError
 from pteron.identification.estimators import Estimate, weighted
 from pteron.identification.logs import Log
@@ -16,10 +17,10 @@ from pteron.identification.model import Model, Terms, identification_model
 from pteron.identification.observation import Observations, observations_of, stacked
 from pteron.identification.signals import Processing, preprocessing_of
 from pteron.kernels import Array
-from pteron.manipulator import BODY_PARAMETERS, Manipulator
+from pteron.manipulator import Manipulator
 from pteron.reduction import BaseParameters
 
-_NAMES = tuple(f"{name}_L" for name in BODY_PARAMETERS)
+_NAMES = tuple(f"{name}_L" for name in PLATFORM_KINDS)
 
 _CHANCE = 1e-3
 """Probability at which values are still taken for those of no payload."""

@@ -11,8 +11,9 @@ from pteron.identification.consistency import Consistency
 from pteron.identification.estimators import Estimate
 from pteron.identification.model import Model
 from pteron.identification.signals import Preprocessing
-from pteron.kernels import Array, numeric
+from pteron.kernels import Array
 from pteron.kinematics import random_poses
+from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator, parameters
 from pteron.reduction import base_regressor
 
@@ -92,14 +93,14 @@ def has_negative_inertia(model: Model, values: Array) -> bool:
     """
     robot = model.robot
     rng = np.random.default_rng(0)
-    pose = random_poses(robot, _PROBES, seed=rng, bend=0.3, hold=0.3)
+    pose = random_poses(robot, _PROBES, seed=rng, type_i=0.3, type_ii=0.3)
     acceleration = rng.normal(size=pose.shape)
     rest = np.zeros_like(pose)
     base = values[: model.base.rank]
     needed = base_regressor(robot, model.base, pose, rest, acceleration)
     still = base_regressor(robot, model.base, pose, rest, rest)
     forces = (needed - still) @ base
-    jacobians = numeric(robot, "jacobian")(pose)
+    jacobians = unchecked(robot, "jacobian", pose)
     products = np.einsum("rn,rnm,rm->r", forces, jacobians, acceleration)
     return bool((products < 0.0).mean() > 0.5)
 

@@ -18,14 +18,14 @@ from pteron.kernels import Array
 _KEPT = 6000
 """Samples that are kept to be looked at."""
 
-_FRICTION = ("Fc", "Fv", "offset")
+_FRICTION = ("coulomb", "viscous", "offset")
 
 
 @dataclass(frozen=True)
 class Prediction:
     """How well a model predicts the forces of a recording, at its own samples.
 
-    Samples of a slider that hardly moves are left out, and those next to them in which the way it
+    Samples of a joint that hardly moves are left out, and those next to them in which the way it
     moves is not certain: dry friction may hold it with any force.
     NRMS is the root mean square of the error over the standard deviation of the measured force, in
     percent, so that a constant load does not flatter.
@@ -50,7 +50,7 @@ class Prediction:
     time : array, shape (S,)
         Times of some of the samples, evenly spaced, to be looked at, s.
     measured, predicted, without_friction, speed : array, shape (S, n)
-        Forces, N, and the sliders' rates, m/s.
+        Forces, N, and the joints' rates, m/s.
     used : array of bool, shape (S, n)
         Whether they count.
     """
@@ -125,7 +125,7 @@ def predict(
     """
     n = len(model.robot.legs)
     plain = values.copy()
-    plain[[k for k, name in enumerate(model.names) if name.startswith(_FRICTION)]] = 0.0
+    plain[[k for k, kind in enumerate(model.kinds) if kind in _FRICTION]] = 0.0
     counts, total = np.zeros(n), 0
     sums = np.zeros((5, n))
     shown: list[Array] = []
@@ -134,7 +134,7 @@ def predict(
         states, measured = block.states.part(block.fresh), block.forces[block.fresh]
         matrix = model.matrix(states)
         predicted, without = matrix @ values, matrix @ plain
-        used = in_motion(states.slider_rates, preprocessing.slow, preprocessing.turning)
+        used = in_motion(states.joint_rates, preprocessing.slow, preprocessing.turning)
         error, bare = measured - predicted, measured - without
         sums += [
             measured.sum(axis=0),
@@ -146,7 +146,7 @@ def predict(
         counts += used.sum(axis=0)
         first = -total % step
         rows = slice(first, None, step)
-        columns = states.time, measured, predicted, without, states.slider_rates, used
+        columns = states.time, measured, predicted, without, states.joint_rates, used
         shown.append(np.column_stack([column[rows] for column in columns]))
         total += len(states)
     kept = np.concatenate(shown)

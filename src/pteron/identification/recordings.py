@@ -12,7 +12,7 @@ from pteron.identification.logs import Finding, Log, LogFile
 from pteron.kernels import Array
 
 _IN_MEMORY = 2_000_000
-"""Rows up to which a file is read whole: 150 MB for four sliders."""
+"""Rows up to which a file is read whole: 150 MB for four joints."""
 
 _PIECE = 1 << 18
 
@@ -106,7 +106,7 @@ def same(one: Recording, other: Recording) -> bool:
     """Say whether two recordings hold the same samples."""
     first, second = one.head(), other.head()
     return np.array_equal(first.forces, second.forces) and np.array_equal(
-        first.sliders, second.sliders
+        first.joints, second.joints
     )
 
 

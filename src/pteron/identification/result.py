@@ -96,8 +96,8 @@ def verdict_of(held_out: list[Prediction], *, repeats: bool) -> Verdict:
             friction = prediction.nrms_without_friction[worst] - prediction.nrms[worst]
             if friction < 0.1 * prediction.nrms_without_friction[worst]:
                 steps.append(
-                    "Friction of sliders explains little of the error: look at the drive gains, "
-                    "the geometry and the signs of forces and sliders."
+                    "Friction of joints explains little of the error: look at the drive gains, "
+                    "the geometry and the signs of forces and joints."
                 )
             else:
                 steps.append(

@@ -114,6 +114,13 @@ def _discriminants(m: Machine, v: dict[str, Expression]) -> Outputs:
     return {"discriminants": (ca.vertcat(*(leg.discriminant for leg in found)), (m.freedom,))}
 
 
+def _squared_type_i(m: Machine, v: dict[str, Expression]) -> Outputs:
+    # Finite and smooth out of reach too, where it is negative.
+    found = kinematics.reach(m, v["pose"])
+    squares = ca.vertcat(*(leg.discriminant / leg.scale for leg in found))
+    return {"squares": (squares, (m.freedom,))}
+
+
 def _type_ii(m: Machine, v: dict[str, Expression]) -> Outputs:
     state = _state(m, v)
     return {"type_ii": (m.closure.measure(state.platform, state.legs), ())}
@@ -241,6 +248,7 @@ _TABLE: dict[str, _Entry] = {
     "joint_points": _Entry(_POSE, _points, ("reach",)),
     "platform_points": _Entry(_POSE, _platform_points),
     "discriminants": _Entry(_POSE, _discriminants),
+    "squared_type_i": _Entry(_POSE, _squared_type_i),
     "type_ii": _Entry(_POSE, _type_ii),
     "jacobian": _Entry(_POSE, _jacobian, ("rows",)),
     "link_jacobians": _Entry(_POSE, _link_jacobians, _BENT),

@@ -55,6 +55,14 @@ def evaluated(
     return results[0] if len(results) == 1 else tuple(results)
 
 
+def unchecked(
+    robot: Manipulator, what: str, *values: ArrayLike, base: Selects | None = None
+) -> Any:
+    """Return the outputs of a function as they come: NaN, or what it may be, in a bad state."""
+    *results, _ = numeric(robot, what, base=base)(*values)
+    return results[0] if len(results) == 1 else tuple(results)
+
+
 def checked(
     robot: Manipulator, value: ArrayLike, name: str, on_failure: OnFailure = "raise"
 ) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 import polars as pl
 from numpy.typing import ArrayLike, NDArray
 
-from pteron.conventions import OnFailure
+from pteron.shapes import OnFailure
 from pteron.errors import DataError, shown
 
 _ROWS_AT_A_TIME = 10_000

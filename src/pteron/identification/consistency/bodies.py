@@ -9,9 +9,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pteron.bodies.parameters import LENGTH_POWERS, PLATFORM, Parameter, body_places
 from pteron.errors import ModelError
 from pteron.kernels import Array
-from pteron.manipulator import Manipulator, parameter_names, parameters
+from pteron.manipulator import Manipulator, parameter_data, parameter_names, parameters
 from pteron.reduction import BaseParameters
 from pteron.reduction.sharing import share
 
@@ -30,73 +31,87 @@ class Bodies:
 
     Attributes
     ----------
-    columns : tuple of str
-        Names of the free parameters: sliders first, then four for each body.
+    columns : tuple of Parameter
+        The free parameters.
     sharing : array, shape (N, columns)
         parameters = sharing @ free parameters.
-    lengths : array, shape (bodies,)
-        A length of each body, m, that makes its parameters comparable: (m, h / s, I / s^2).
+    extents : array, shape (bodies, 2)
+        Least and greatest x of each body, m: its length makes its parameters comparable.
     """
 
-    columns: tuple[str, ...]
+    columns: tuple[Parameter, ...]
     sharing: Array
-    lengths: Array
+    extents: Array
 
     @cached_property
-    def sliders(self) -> int:
-        """How many of the free parameters are sliders' masses."""
-        return sum(name.startswith("m_p") for name in self.columns)
+    def places(self) -> dict[str, dict[str, int]]:
+        """Where the parameters of each body stand, by its name and their kind."""
+        return body_places(self.columns)
 
-    @cached_property
+    @property
     def names(self) -> tuple[str, ...]:
-        """Names of the sliders, then of the bodies: ``p1`` ..., ``u1`` ..., ``l1`` ..., ``e``."""
-        heads = (*self.columns[: self.sliders], *self.columns[self.sliders :: 4])
-        return tuple(name.removeprefix("m_") for name in heads)
+        """Names of the bodies: ``p1`` ..., ``u1`` ..., ``l1`` ..., ``e``."""
+        return tuple(self.places)
+
+    @property
+    def masses(self) -> list[int]:
+        """The column of each body's mass."""
+        return [place["m"] for place in self.places.values()]
+
+    @cached_property
+    def cones(self) -> tuple[list[int], Array, Array, Array, Array]:
+        """The bodies that turn, and what takes their m, hx, hy and I out of the columns."""
+        turning = [b for b, place in enumerate(self.places.values()) if "I" in place]
+        unit = np.eye(len(self.columns))
+        rows = {kind: np.zeros((len(turning), len(self.columns))) for kind in LENGTH_POWERS}
+        for row, place in enumerate(p for p in self.places.values() if "I" in p):
+            for kind, column in place.items():
+                rows[kind][row] = unit[column]
+        return turning, rows["m"], rows["mgx"], rows["mgy"], rows["I"]
 
     def scale(self, masses: Array) -> Array:
-        """Return the unit of each free parameter, from the bodies' masses (kg), sliders first."""
-        links = masses[self.sliders :, None] * self.lengths[:, None] ** np.array([0, 1, 1, 2])
-        return np.concatenate([masses[: self.sliders], links.ravel()])
+        """Return the unit of each free parameter, from the bodies' masses, kg."""
+        lengths = self.extents[:, 1] - self.extents[:, 0]
+        found = np.empty(len(self.columns))
+        for mass, length, place in zip(masses, lengths, self.places.values(), strict=True):
+            for column in place.values():
+                found[column] = mass * length ** self.columns[column].length_power
+        return found
 
     def mean(self, values: Array) -> Array:
         """Return the free parameters of given parameters (N,): their mean where legs share."""
         return np.asarray((self.sharing / self.sharing.sum(axis=0)).T @ values)
 
     def least(self, scaled: Array) -> Array:
-        """Return how far inside each body is, sliders first, from scaled free parameters.
+        """Return how far inside each body is, from scaled free parameters.
 
-        The least eigenvalue of [[m, |h|], [|h|, I]]: no real body has a negative one.
+        The least eigenvalue of [[m, |h|], [|h|, I]]: no real body has a negative one. Of a body
+        that does not turn it is its mass.
         """
-        m, hx, hy, inertia = scaled[self.sliders :].reshape(-1, 4).T
-        inside = 0.5 * (m + inertia - np.sqrt(4 * hx * hx + 4 * hy * hy + (m - inertia) ** 2))
-        return np.concatenate([scaled[: self.sliders], inside])
-
-
-def body_lengths(robot: Manipulator) -> Array:
-    """Return a length (2 n + 1,) of each upper link, lower link and the platform, m."""
-    upper = [leg.upper_length for leg in robot.legs]
-    lower = [leg.lower_length for leg in robot.legs]
-    links = float(np.mean(upper + lower))
-    radius = max(float(np.hypot(*leg.platform_point[:2])) for leg in robot.legs)
-    platform = radius if radius > 1e-3 * links else _SMALL_PLATFORM * links
-    return np.array([*upper, *lower, platform])
+        turning, *rows = self.cones
+        m, hx, hy, inertia = (row @ scaled for row in rows)
+        inside = scaled[self.masses]
+        root = np.sqrt(4 * hx * hx + 4 * hy * hy + (m - inertia) ** 2)
+        inside[turning] = 0.5 * (m + inertia - root)
+        return np.asarray(inside)
 
 
 def bodies_of(base: BaseParameters) -> Bodies:
     """Return the bodies whose parameters `base` is made of."""
-    robot = base.robot
-    n = len(robot.legs)
-    # The columns' names say which legs share: m_p(2,4) is one slider mass of legs 2 and 4.
-    suffixes = [name.removeprefix("m_p") for name in base.columns if name.startswith("m_p")]
-    groups = [
-        [int(leg) for leg in suffix.strip("()").split(",")] if suffix else list(range(1, n + 1))
-        for suffix in suffixes
-    ]
-    columns, sharing = share(robot, groups)
-    assert columns == base.columns
-    lengths = np.concatenate([np.zeros(n), np.repeat(body_lengths(robot), 4)])
-    mean = (sharing / sharing.sum(axis=0)).T @ lengths
-    return Bodies(columns, sharing, mean[len(groups) :: 4])
+    robot, columns = base.robot, base.parameters
+    groups = list(dict.fromkeys(p.legs for p in columns if p.legs))
+    _, sharing = share(robot, groups)
+    sizes = [leg.size / max(len(leg.extents), 1) for leg in robot.legs]
+    radius = max(float(np.hypot(*leg.platform_point[:2])) for leg in robot.legs)
+    mean = float(np.mean(sizes))
+    half = 0.5 * (radius if radius > 1e-3 * mean else _SMALL_PLATFORM * mean)
+    extents = {}
+    for p in columns:
+        known = [robot.legs[leg - 1].extents.get(p.body) for leg in p.legs]
+        found = [extent[1:3] for extent in known if extent is not None]
+        default = (-half, half) if not p.legs else (0.0, mean)
+        extents[p.owner] = np.mean(found, axis=0) if found else np.array(default)
+    return Bodies(columns, sharing, np.array(list(extents.values())))
 
 
 def parameters_of(robot: Manipulator, values: ArrayLike, what: str) -> Array:
@@ -146,23 +161,19 @@ def real_bodies(robot: Manipulator, values: ArrayLike | None = None) -> tuple[st
     ('p1: mass -0.1 kg is not positive',)
     """
     vector = parameters(robot) if values is None else parameters_of(robot, values, "parameters")
-    n = len(robot.legs)
-    names = [name.removeprefix("m_") for name in parameter_names(robot)[n::4]]
-    lines = [
-        f"p{i}: mass {mass:.4g} kg is not positive"
-        for i, mass in enumerate(vector[:n], 1)
-        if mass <= 0.0
-    ]
-    for name, (m, hx, hy, inertia) in zip(names, vector[n:].reshape(-1, 4), strict=True):
+    lines = []
+    for name, place in body_places(parameter_data(robot)).items():
+        body = {kind: float(vector[column]) for kind, column in place.items()}
+        m, inertia = body["m"], body.get("I")
         if m <= 0.0:
             lines.append(f"{name}: mass {m:.4g} kg is not positive")
-            continue
-        least = (hx * hx + hy * hy) / m
-        if inertia <= 0.0 or inertia < least * (1.0 - _ROUNDING):
-            lines.append(
-                f"{name}: inertia {inertia:.4g} kg m^2 is {least - inertia:.2g} below "
-                f"{least:.4g}, the least with its mass and centre of mass"
-            )
+        elif inertia is not None:
+            least = (body.get("mgx", 0.0) ** 2 + body.get("mgy", 0.0) ** 2) / m
+            if inertia <= 0.0 or inertia < least * (1.0 - _ROUNDING):
+                lines.append(
+                    f"{name}: inertia {inertia:.4g} kg m^2 is {least - inertia:.2g} below "
+                    f"{least:.4g}, the least with its mass and centre of mass"
+                )
     return tuple(lines)
 
 
@@ -174,7 +185,7 @@ class Target:
     ----------
     scale : array, shape (columns,)
         Units of z: a mass of each body, and its length.
-    margins : array, shape (sliders + bodies,)
+    margins : array, shape (bodies,)
         How far inside its cone each body is kept.
     """
 
@@ -188,7 +199,7 @@ class Target:
 def cad_target(bodies: Bodies, cad: Array) -> Target:
     """Return the distance to CAD parameters (N,), each kind by the body's mass and length."""
     free = bodies.mean(cad)
-    heads = np.concatenate([free[: bodies.sliders], free[bodies.sliders :: 4]])
+    heads = free[bodies.masses]
     # An array from a drawing may hold any mass; a scale must be positive.
     typical = float(np.abs(heads).mean()) or 1.0
     scale = bodies.scale(np.maximum(np.abs(heads), 0.01 * typical))
@@ -207,18 +218,17 @@ def plain_target(bodies: Bodies, base: BaseParameters, values: Array) -> Target:
     is one, also where the forces leave a parameter entirely free (the platform's inertia of a
     Tripteron); an analytic centre would not exist there.
     """
-    masses = [abs(v) for v, name in zip(values, base.names, strict=True) if name.startswith("m_")]
+    kept = (base.parameters[column] for column in base.kept)
+    masses = [abs(v) for v, p in zip(values, kept, strict=True) if p.kind == "m"]
     typical = float(np.mean(masses)) if masses and np.mean(masses) > 0.0 else 1.0
-    count = bodies.sliders + len(bodies.lengths)
+    heads, count = bodies.masses, len(bodies.names)
     scale = bodies.scale(np.full(count, typical))
     rows = np.eye(len(scale))
-    heads = [*range(bodies.sliders), *range(bodies.sliders, len(scale), 4)]
-    for head, name in zip(heads, bodies.names, strict=True):
+    for (low, high), (name, place) in zip(bodies.extents, bodies.places.items(), strict=True):
+        head = place["m"]
         rows[head, heads] -= 1.0 / count
-        if name.startswith("p"):
-            continue
-        # The lower link's frame has its origin on R3 and x away from R2.
-        center = {"u": 0.5, "l": -0.5, "e": 0.0}[name[0]]
-        rows[head + 1, head] = -center
-        rows[head + 3, head] = -0.5 if name == "e" else -1.0 / 3.0
+        if "mgx" in place:
+            # A rod from one end of its extent to the other, or a disc about its reference point.
+            rows[place["mgx"], head] = -0.5 * (low + high) / (high - low)
+            rows[place["I"], head] = -0.5 if name == PLATFORM else -1.0 / 3.0
     return Target("nothing", scale, np.full(count, _MARGIN), rows, np.zeros(len(scale)))

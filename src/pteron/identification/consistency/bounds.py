@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from pteron.bodies.parameters import body_places
 from pteron.errors import ModelError
 from pteron.kernels import Array
-from pteron.manipulator import Manipulator, parameter_names
+from pteron.manipulator import Manipulator, parameter_data
 
 Box = tuple[tuple[float, float], tuple[float, float]]
 """((xmin, xmax), (ymin, ymax)) in the body's frame, m."""
@@ -94,53 +95,56 @@ class Bounds:
         ModelError
             If the machine has no such parameter or body.
         """
-        names = parameter_names(robot)
-        bodies = [name.removeprefix("m_") for name in names[len(robot.legs) :: 4]]
-        rows: list[tuple[dict[str, float], float, str]] = []
+        columns = parameter_data(robot)
+        places = body_places(columns)
+        rows: list[tuple[dict[int, float], float, str]] = []
         for side, sign, sense in ((self.lower, -1.0, ">="), (self.upper, 1.0, "<=")):
             for key, limit in side.items():
                 if not np.isfinite(limit):
                     raise ModelError(f"bounds: {key}: {limit} is not a number")
-                for name in _matching(key, names, "parameter"):
-                    rows.append(({name: sign}, sign * limit, f"{name} {sense} {limit:g}"))
+                known = {p.name: f"{p.kind}_{p.body}" for p in columns}
+                for name in _matching(key, known, "parameter"):
+                    column = list(known).index(name)
+                    rows.append(({column: sign}, sign * limit, f"{name} {sense} {limit:g}"))
         for key, box in self.boxes.items():
-            for body in _matching(key, bodies, "body"):
-                rows.extend(_box_rows(body, box))
+            turning = {p.owner: p.body for p in columns if p.kind == "I"}
+            for body in _matching(key, turning, "body"):
+                rows.extend(_box_rows(body, places[body], box))
         if self.total_mass is not None:
-            masses = [name for name in names if name.startswith("m_")]
+            masses = [place["m"] for place in places.values()]
             low, high = self.total_mass
             rows.append((dict.fromkeys(masses, -1.0), -low, f"total mass >= {low:g}"))
             rows.append((dict.fromkeys(masses, 1.0), high, f"total mass <= {high:g}"))
-        matrix = np.zeros((len(rows), len(names)))
+        matrix = np.zeros((len(rows), len(columns)))
         for k, (terms, _, _) in enumerate(rows):
-            for name, coefficient in terms.items():
-                matrix[k, names.index(name)] = coefficient
+            for column, coefficient in terms.items():
+                matrix[k, column] = coefficient
         return Limits(
             matrix, np.array([right for _, right, _ in rows]), tuple(name for _, _, name in rows)
         )
 
 
-def _matching(key: str, names: Iterable[str], what: str) -> list[str]:
-    """Return the name itself, or those of all legs."""
-    names = list(names)
-    found = [name for name in names if key in (name, name.rstrip("0123456789"))]
+def _matching(key: str, known: Mapping[str, str], what: str) -> list[str]:
+    """Return the name itself, or those of all legs that go by the same name without a number."""
+    found = [name for name, stem in known.items() if key in (name, stem)]
     if not found:
-        raise ModelError(f"bounds: {key!r} is no {what} of this machine: {', '.join(names)}")
+        raise ModelError(f"bounds: {key!r} is no {what} of this machine: {', '.join(known)}")
     return found
 
 
-def _box_rows(body: str, box: Box) -> list[tuple[dict[str, float], float, str]]:
+def _box_rows(
+    body: str, place: Mapping[str, int], box: Box
+) -> list[tuple[dict[int, float], float, str]]:
     (x0, x1), (y0, y1) = box
-    m, hx, hy, inertia = (f"{p}_{body}" for p in ("m", "mgx", "mgy", "I"))
     text = f"box of {body}"
-    return [
-        ({m: x0, hx: -1.0}, 0.0, f"{text}: centre of mass x >= {x0:g}"),
-        ({m: -x1, hx: 1.0}, 0.0, f"{text}: centre of mass x <= {x1:g}"),
-        ({m: y0, hy: -1.0}, 0.0, f"{text}: centre of mass y >= {y0:g}"),
-        ({m: -y1, hy: 1.0}, 0.0, f"{text}: centre of mass y <= {y1:g}"),
-        (
-            {inertia: 1.0, hx: -(x0 + x1), hy: -(y0 + y1), m: x0 * x1 + y0 * y1},
-            0.0,
-            f"{text}: inertia that mass inside can have",
-        ),
-    ]
+    rows: list[tuple[dict[int, float], float, str]] = []
+    inertia, least = {place["I"]: 1.0}, 0.0
+    for axis, moment, low, high in (("x", "mgx", x0, x1), ("y", "mgy", y0, y1)):
+        if moment in place:
+            m, h = place["m"], place[moment]
+            rows.append(({m: low, h: -1.0}, 0.0, f"{text}: centre of mass {axis} >= {low:g}"))
+            rows.append(({m: -high, h: 1.0}, 0.0, f"{text}: centre of mass {axis} <= {high:g}"))
+            inertia[h] = -(low + high)
+            least += low * high
+    inertia[place["m"]] = least
+    return [*rows, (inertia, 0.0, f"{text}: inertia that mass inside can have")]

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from pteron.errors import ModelError
+from pteron.identification.consistency.bodies import Bodies
 from pteron.kernels import Array
 
 _TOLERANCE = 1e-10
@@ -25,25 +26,26 @@ class RealBodies:
 
     Attributes
     ----------
-    sliders : int
-        How many of them, in front, are sliders' masses; then come four for each body.
-    margins : array, shape (sliders + bodies,)
+    bodies : Bodies
+        Which of them belong to which body.
+    margins : array, shape (bodies,)
         How far inside its cone a body shall be, times the depth asked for.
     matrix, right : arrays, shapes (limits, columns) and (limits,)
         Further limits, matrix @ z <= right.
     """
 
-    sliders: int
+    bodies: Bodies
     margins: Array
     matrix: Array
     right: Array
 
     def hold(self, cp: Any, z: Any, depth: Any) -> list[Any]:
         """Return the constraints that hold z in the set."""
-        m, hx, hy, inertia = (z[self.sliders + k :: 4] for k in range(4))
-        inside = self.margins[self.sliders :] * depth
+        turning, *rows = self.bodies.cones
+        m, hx, hy, inertia = (row @ z for row in rows)
+        inside = self.margins[turning] * depth
         constraints = [
-            z[: self.sliders] >= self.margins[: self.sliders] * depth,
+            z[self.bodies.masses] >= self.margins * depth,
             cp.SOC(m + inertia - 2 * inside, cp.vstack([2 * hx, 2 * hy, m - inertia])),
         ]
         if len(self.right):
@@ -89,8 +91,10 @@ def closest(
     hold = real.hold(cp, z, depth)
     if not _solve(cp, cp.Problem(cp.Minimize(cp.sum_squares(r)), [equal, *hold])):
         return None
-    sliders, cones, *limits = (constraint.dual_value for constraint in hold)
-    forces = np.concatenate([sliders, np.abs(cones[0]), *limits])
+    masses, cones, *limits = (constraint.dual_value for constraint in hold)
+    bodies = np.abs(masses)
+    bodies[real.bodies.cones[0]] += np.abs(cones[0])
+    forces = np.concatenate([bodies, *limits])
     return np.asarray(z.value), np.abs(forces)
 
 

@@ -239,7 +239,7 @@ def _real(bodies: Bodies, target: Target, limits: Limits) -> RealBodies:
     """Return the set of real bodies within the limits, each limit's row of size one."""
     matrix = limits.matrix @ bodies.sharing * target.scale
     sizes = np.linalg.norm(matrix, axis=1)
-    return RealBodies(bodies.sliders, target.margins, matrix / sizes[:, None], limits.right / sizes)
+    return RealBodies(bodies, target.margins, matrix / sizes[:, None], limits.right / sizes)
 
 
 def _solutions(grouping: Array) -> tuple[Array, Array]:

@@ -42,7 +42,7 @@ def maximum_likelihood(
 ) -> Estimate:
     """Return the values, and with them the motion, that make the log most likely.
 
-    Positions and forces carry white noise, each slider and actuator its own. The motion is a smooth
+    Positions and forces carry white noise, each joint and actuator its own. The motion is a smooth
     curve, a Fourier series or a spline, whose coefficients are found together with the values: the
     states in the regressor are those of the model, not those measured, as in methods that simulate
     the machine (DIDIM), but no controller needs to be known. Gauss and Newton's method takes the
@@ -80,7 +80,7 @@ def maximum_likelihood(
             "likelihood fits at once; give a part of the log",
         )
     base = curve.bases[0]
-    precision = sparse.diags(1.0 / preprocessing.slider_noise**2)
+    precision = sparse.diags(1.0 / preprocessing.joint_noise**2)
     information = sparse.kron(base.T @ base, precision, format="csc")
     values = estimate.values
     # The motion can be bent until it explains nearly all of the forces: what is noise on them is
@@ -149,7 +149,7 @@ def _check(log: Log) -> None:
 
 def _sampled(model: Model, log: Log, curve: Curve, preprocessing: Preprocessing) -> Observations:
     """Return the observations of a motion at the log's own samples, which no filter has touched."""
-    states = States.of_sliders(
+    states = States.of_joints(
         model.robot,
         curve.motion,
         log.time,
@@ -158,7 +158,7 @@ def _sampled(model: Model, log: Log, curve: Curve, preprocessing: Preprocessing)
         source=log.source,
         first_row=log.first_row,
     )
-    used = in_motion(states.slider_rates, preprocessing.slow, preprocessing.settling)
+    used = in_motion(states.joint_rates, preprocessing.slow, preprocessing.settling)
     used[: curve.ends] = used[len(used) - curve.ends :] = 0.0
     return Observations(
         model.names,
@@ -169,6 +169,7 @@ def _sampled(model: Model, log: Log, curve: Curve, preprocessing: Preprocessing)
         used,
         states.payload,
         log.source,
+        kinds=model.kinds,
     )
 
 
@@ -182,7 +183,7 @@ def _slopes(
     """Return the derivatives (T n, C n) of the forces by the motion's coefficients."""
     smooth = values.copy()
     # Coulomb friction has no slope, but where the rate changes its sign.
-    smooth[[k for k, name in enumerate(model.names) if name.startswith("Fc")]] = 0.0
+    smooth[[k for k, kind in enumerate(model.kinds) if kind == "coulomb"]] = 0.0
     n = observations.actuators
     motion = curve.motion
     total = sparse.csr_matrix((len(observations.time) * n, curve.coefficients.size))
@@ -190,7 +191,7 @@ def _slopes(
     def forces(k: int, shift: Array) -> Array:
         """Return the forces (T, n) with one derivative of the motion shifted."""
         q, dq, ddq = (part + shift if i == k else part for i, part in enumerate(motion))
-        states = States.of_sliders(
+        states = States.of_joints(
             model.robot,
             (q, dq, ddq),
             observations.time,

@@ -24,6 +24,9 @@ _LEAST_SHARE = 0.01
 """Share of the residuals' variance that is left to the forces, whatever the columns' noise is said
 to be: columns whose errors belong together add up to less than the sum of their squares."""
 
+_CONSTANT = ("coulomb", "offset")
+"""Kinds of values whose columns are exact: signs and ones."""
+
 
 class SmallestCorrections(NamedTuple):
     """The solution of mixed total least squares.
@@ -86,7 +89,7 @@ def total(
     if given is None:
         relative = np.sqrt(factor.rest / (factor.rest + factor.image @ factor.image))
         errors = relative * factor.scale / np.sqrt(factor.rows)
-        errors[[k for k, name in enumerate(observations.names) if _constant(name)]] = 0.0
+        errors[[k for k, kind in enumerate(observations.kinds) if kind in _CONSTANT]] = 0.0
     else:
         # On average over the equations that there are: an actuator without any has no noise.
         weight = (observations.used / noise**2).sum() / observations.rows
@@ -163,8 +166,8 @@ def column_errors(model: Model, log: Log, preprocessing: Preprocessing, *, seed:
         that do not depend on positions.
     """
     rng = np.random.default_rng(seed)
-    noise = preprocessing.slider_noise * rng.normal(size=log.sliders.shape)
-    shaken = observations_of(model, replace(log, sliders=log.sliders + noise), preprocessing)
+    noise = preprocessing.joint_noise * rng.normal(size=log.joints.shape)
+    shaken = observations_of(model, replace(log, joints=log.joints + noise), preprocessing)
     plain = observations_of(model, log, preprocessing)
     # Slow rows that are left out of one, and not of the other, are no error: both sides miss them.
     same = (shaken.gain == plain.gain) & (plain.gain > 0.0)
@@ -175,7 +178,3 @@ def column_errors(model: Model, log: Log, preprocessing: Preprocessing, *, seed:
     size = np.sqrt((before**2).mean(axis=0))
     # What rounding alone moves counts as exact.
     return np.asarray(np.where(change > 1e-12 * size, change, 0.0))
-
-
-def _constant(name: str) -> bool:
-    return name.startswith(("offset", "Fc"))

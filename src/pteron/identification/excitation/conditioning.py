@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pteron.identification.excitation.fourier import FourierMotion, states
-from pteron.kernels import Array, numeric
+from pteron.kernels import Array
+from pteron.kinematics.evaluate import unchecked
 from pteron.reduction import BaseParameters
 
 _ROWS = 100
@@ -113,8 +114,8 @@ def conditioning(
 def stacked_regressor(motion: FourierMotion, base: BaseParameters, times: Array) -> Array:
     """Return the base regressors at times (T,) below one another, (T n, rank)."""
     state = states(motion, times)
-    kernel = numeric(motion.robot, "base_regressor", base=base)
-    found: Array = kernel(state.pose, state.velocity, state.acceleration)
+    path = state.pose, state.velocity, state.acceleration
+    found: Array = unchecked(motion.robot, "base_regressor", *path, base=base)
     return found.reshape(-1, base.rank)
 
 

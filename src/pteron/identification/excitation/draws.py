@@ -7,7 +7,8 @@ import numpy as np
 from pteron.errors import DataError, ModelError
 from pteron.identification.excitation.fourier import FourierMotion, Space, home
 from pteron.identification.excitation.limits import Limits, check_rest, relative_margins
-from pteron.kernels import Array, numeric
+from pteron.kernels import Array
+from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator
 
 _FINE = 800
@@ -55,7 +56,7 @@ def random_excitation(
     ----------
     robot : Manipulator
         The machine.
-    space : {"platform", "sliders"}
+    space : {"platform", "joints"}
         Whose coordinates the series are of.
     harmonics : int
         How many, 1 or more.
@@ -106,10 +107,11 @@ def random_excitation(
 
 def sizes(robot: Manipulator, space: Space) -> Array:
     """Return the size (n,) of motions in each coordinate, m and rad, before they are scaled."""
-    span = np.mean([leg.upper_length + leg.lower_length for leg in robot.legs])
-    metres = 0.25 * float(span)
+    metres = 0.25 * float(np.mean([leg.size for leg in robot.legs]))
+    if space == "joints":
+        return np.array([metres / leg.lever for leg in robot.legs])
     size = np.full(robot.freedom, metres)
-    if robot.platform.turns and space == "platform":
+    if robot.platform.turns:
         size[3] = 1.0
     return size
 
@@ -179,7 +181,7 @@ def _scaled(motion: FourierMotion, scale: float) -> FourierMotion:
 
 
 def _center(robot: Manipulator, space: Space, pose: Array) -> Array:
-    center: Array = pose if space == "platform" else numeric(robot, "slider_coordinates")(pose)
+    center: Array = pose if space == "platform" else unchecked(robot, "joint_coordinates", pose)
     return center
 
 

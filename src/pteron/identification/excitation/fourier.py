@@ -12,13 +12,14 @@ from numpy.typing import ArrayLike
 
 from pteron.errors import DataError, UnreachablePose
 from pteron.identification.signals.states import home_mode
-from pteron.kernels import Array, as_array, numeric
+from pteron.kernels import Array, as_array
+from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator
 from pteron.motion import Motion
 from pteron.workspace import home_pose
 
-Space = Literal["platform", "sliders"]
-"""Whose coordinates the series are of: the platform's pose, or the sliders'."""
+Space = Literal["platform", "joints"]
+"""Whose coordinates the series are of: the platform's pose, or the joints'."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +33,8 @@ class FourierMotion:
     ----------
     robot : Manipulator
         The machine.
-    space : {"platform", "sliders"}
-        Whether q is the pose (x, y, z, phi) or the slider coordinates.
+    space : {"platform", "joints"}
+        Whether q is the pose (x, y, z, phi) or the joint coordinates.
     period : float
         The time after which the motion repeats, s.
     center : array, shape (n,)
@@ -41,7 +42,7 @@ class FourierMotion:
     cosines, sines : array, shape (H, n)
         The coefficients a_h and b_h of the harmonics h = 1 ... H, in the units of `center`.
     mode : int
-        The assembly mode of `direct_kinematics` that the sliders' motion is of, counted from 0;
+        The assembly mode of `direct_kinematics` that the joints' motion is of, counted from 0;
         that of the home pose unless given.
 
     Raises
@@ -71,7 +72,7 @@ class FourierMotion:
 
     def __post_init__(self) -> None:
         if self.space not in get_args(Space):
-            raise DataError(f'space: {self.space!r} is neither "platform" nor "sliders"')
+            raise DataError(f'space: {self.space!r} is neither "platform" nor "joints"')
         if not 0.0 < self.period < np.inf:
             raise DataError(f"period: {self.period} s given, a number above 0 expected")
         n = self.robot.freedom
@@ -113,7 +114,7 @@ class FourierMotion:
         Raises
         ------
         UnreachablePose
-            If a motion of the sliders leaves what the machine can do.
+            If a motion of the joints leaves what the machine can do.
         """
         times = _times(time)
         found = states(self, times)
@@ -121,18 +122,18 @@ class FourierMotion:
         if lost.any():
             k = int(np.argmax(lost))
             raise UnreachablePose(
-                f"time {times[k]:g} s: no pose has the slider coordinates "
-                f"{found.sliders[k].tolist()} m; make the motion smaller",
+                f"time {times[k]:g} s: no pose has the joint coordinates "
+                f"{found.joints[k].tolist()} m; make the motion smaller",
                 leg=0,
                 shortfall=float("nan"),
                 index=(k,),
             )
         return Motion(times, found.pose, found.velocity, found.acceleration)
 
-    def sliders(self, time: ArrayLike) -> tuple[Array, Array, Array]:
-        """Return the sliders' coordinates, rates and accelerations, (T, n) each, at times (T,)."""
+    def joints(self, time: ArrayLike) -> tuple[Array, Array, Array]:
+        """Return the joints' coordinates, rates and accelerations, (T, n) each, at times (T,)."""
         found = states(self, _times(time))
-        return found.sliders, found.rates, found.accelerations
+        return found.joints, found.rates, found.accelerations
 
     def uniform_times(self, count: int) -> Array:
         """Return so many times (count,) evenly over one period, without its end."""
@@ -140,31 +141,31 @@ class FourierMotion:
 
 
 class State(NamedTuple):
-    """Motion of platform and sliders, (T, n) each; NaN where the sliders have no pose."""
+    """Motion of platform and joints, (T, n) each; NaN where the joints have no pose."""
 
     pose: Array
     velocity: Array
     acceleration: Array
-    sliders: Array
+    joints: Array
     rates: Array
     accelerations: Array
 
 
 def states(motion: FourierMotion, times: Array) -> State:
-    """Return the motion of platform and sliders at times (T,)."""
+    """Return the motion of platform and joints at times (T,)."""
     robot = motion.robot
     q, dq, ddq = (
         rows @ motion.coefficients for rows in basis(times, motion.harmonics, motion.period)
     )
     if motion.space == "platform":
-        return State(q, dq, ddq, *_sliders(robot, q, dq, ddq))
-    poses = numeric(robot, "closure_poses")(q)
+        return State(q, dq, ddq, *_joints(robot, q, dq, ddq))
+    poses = unchecked(robot, "closure_poses", q)
     pose: Array = poses[:, motion.mode, :].copy()
     if robot.platform.turns:
         # Within a mode phi stays on one side of the singular orientations, half a turn at most.
         around = home(robot)[3]
         pose[:, 3] = around + (pose[:, 3] - around + np.pi) % (2.0 * np.pi) - np.pi
-    velocity, acceleration = numeric(robot, "platform_motion")(pose, dq, ddq)
+    velocity, acceleration = unchecked(robot, "platform_motion", pose, dq, ddq)
     return State(pose, velocity, acceleration, q, dq, ddq)
 
 
@@ -186,12 +187,12 @@ def home(robot: Manipulator) -> tuple[float, ...]:
     return tuple(home_pose(robot).tolist())
 
 
-def _sliders(robot: Manipulator, pose: Array, rate: Array, second: Array) -> Sequence[Array]:
-    # The sliders' columns are finite out of the legs' reach too; those of the links are not.
+def _joints(robot: Manipulator, pose: Array, rate: Array, second: Array) -> Sequence[Array]:
+    # A slider's motion is finite out of the legs' reach too; that of the links is not.
     return (
-        numeric(robot, "slider_coordinates")(pose),
-        numeric(robot, "joint_rates")(pose, rate)[..., 0],
-        numeric(robot, "joint_accelerations")(pose, rate, second)[..., 0],
+        unchecked(robot, "joint_coordinates", pose),
+        unchecked(robot, "joint_rates", pose, rate)[0],
+        unchecked(robot, "joint_accelerations", pose, rate, second)[0],
     )
 
 

@@ -228,7 +228,7 @@ def _near(motion: FourierMotion, setting: Setting) -> tuple[str, ...]:
     """Return the limits that the motion is near to; the platform's place is always watched."""
     times = motion.uniform_times(_CHECKED * motion.harmonics)
     found = relative_margins(motion, setting.limits, times)
-    always = ("elbow_sine", "regularity")
+    always = ("type_i", "type_ii")
     return tuple(name for name, values in found.items() if name in always or values.min() < _NEAR)
 
 

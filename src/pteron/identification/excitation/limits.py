@@ -8,24 +8,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pteron.equations.machine import closure_of
 from pteron.errors import DataError, ModelError
 from pteron.identification.excitation.fourier import FourierMotion, State, states
-from pteron.kernels import Array, numeric
+from pteron.kernels import Array
+from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator
 from pteron.workspace.reserve import clearances
 
 UNITS = {
-    "elbow_sine": "",
-    "regularity": "",
-    "slider_clearance": "m",
-    "speed": "m/s",
-    "acceleration": "m/s^2",
-    "force": "N",
+    "type_i": "",
+    "type_ii": "",
+    "joint_clearance": "{unit}",
+    "speed": "{unit}/s",
+    "acceleration": "{unit}/s^2",
+    "force": "{force_unit}",
 }
-"""The limits by name, and the units of their margins."""
+"""The limits by name, and the units of their margins: those of the joint."""
 
-PER_SLIDER = ("speed", "acceleration", "force")
-"""Those that may be given for each slider."""
+PER_JOINT = ("speed", "acceleration", "force")
+"""Those that may be given for each joint."""
 
 _REFINED = 33
 """Samples between the neighbours of the tightest sample, for its exact place."""
@@ -38,20 +40,20 @@ class Limits:
     Attributes
     ----------
     speed : float or sequence of n floats
-        Largest speed of the sliders, m/s.
+        Largest speed of the joints, m/s or rad/s.
     acceleration : float or sequence of n floats
-        Largest acceleration of the sliders, m/s^2.
+        Largest acceleration of the joints, m/s^2 or rad/s^2.
     force : float or sequence of n floats, optional
-        Largest actuator force, N, by the machine's nominal inertia without friction; None for no
-        limit.
-    elbow_sine : float
-        Least sine of each elbow's angle, in (0, 1): the distance from stretched and folded legs.
-    regularity : float
-        Least abs(det J) over its largest value, in (0, 1): the distance from the singular
-        orientations. Without meaning for 3T.
-    slider_clearance : float
-        Least distance of the sliders from the ends of their guides (`slider_limits`), m; without
-        effect on a slider that has no limits.
+        Largest actuator force, N or N m, by the machine's nominal inertia without friction; None
+        for no limit.
+    type_i : float
+        Least type-I measure of each leg, in (0, 1): the distance from stretched and folded legs.
+    type_ii : float
+        Least type-II measure, in (0, 1): the distance from poses where the actuators do not hold
+        the platform. Without meaning where J is constant.
+    joint_clearance : float
+        Least distance of the joints from their limits, m or rad; without effect on a joint that
+        has none.
 
     Raises
     ------
@@ -68,12 +70,12 @@ class Limits:
     speed: float | Sequence[float] = 1.0
     acceleration: float | Sequence[float] = 10.0
     force: float | Sequence[float] | None = None
-    elbow_sine: float = 0.25
-    regularity: float = 0.3
-    slider_clearance: float = 0.005
+    type_i: float = 0.25
+    type_ii: float = 0.3
+    joint_clearance: float = 0.005
 
     def __post_init__(self) -> None:
-        for name in PER_SLIDER:
+        for name in PER_JOINT:
             given = getattr(self, name)
             if given is None and name == "force":
                 continue
@@ -82,32 +84,38 @@ class Limits:
             if not values or min(values) <= 0.0:
                 raise DataError(f"limits: {name} {given} given, numbers above 0 expected")
             object.__setattr__(self, name, values if several else values[0])
-        for name in ("elbow_sine", "regularity"):
+        for name in ("type_i", "type_ii"):
             value = _number(name, getattr(self, name))
             if not 0.0 < value < 1.0:
                 raise DataError(f"limits: {name} {value:g} given, between 0 and 1 expected")
-        if _number("slider_clearance", self.slider_clearance) < 0.0:
+        if _number("joint_clearance", self.joint_clearance) < 0.0:
             raise DataError(
-                f"limits: slider_clearance {self.slider_clearance:g} given, 0 or more expected"
+                f"limits: joint_clearance {self.joint_clearance:g} given, 0 or more expected"
             )
 
 
-def per_slider(limits: Limits, name: str, robot: Manipulator) -> Array:
-    """Return a limit of each slider (n,), infinite where there is none."""
+def per_joint(limits: Limits, name: str, robot: Manipulator) -> Array:
+    """Return a limit of each joint (n,), infinite where there is none."""
     given = getattr(limits, name)
     values = np.atleast_1d(np.array(np.inf if given is None else given, dtype=float))
     if values.size not in (1, robot.freedom):
         raise DataError(
             f"limits: {values.size} numbers for {name}, one expected or {robot.freedom}, one for "
-            f"each slider of {robot.name}"
+            f"each joint of {robot.name}"
         )
     return np.broadcast_to(values, (robot.freedom,)).copy()
 
 
-def slider_sizes(robot: Manipulator) -> Array:
-    """Return half the range (n,) of each slider, m; 1 where it has no limits."""
-    ranges = [leg.slider_limits or (-1.0, 1.0) for leg in robot.legs]
+def joint_sizes(robot: Manipulator) -> Array:
+    """Return half the range (n,) of each joint, m or rad; 1 where it has no limits."""
+    ranges = [leg.limits or (-1.0, 1.0) for leg in robot.legs]
     return np.array([0.5 * (high - low) for low, high in ranges])
+
+
+def unit_of(robot: Manipulator, name: str, leg: int) -> str:
+    """Return the unit of a limit's margin, for the joint of a leg, counted from 0."""
+    joint = robot.legs[leg].joint
+    return UNITS[name].format(unit=joint.unit, force_unit=joint.force_unit)
 
 
 def _number(name: str, value: object) -> float:
@@ -205,9 +213,9 @@ def margins(motion: FourierMotion, limits: Limits, samples: int = 4000) -> Margi
             Margin(
                 name,
                 float(values[k, leg]),
-                None if name == "regularity" else int(leg) + 1,
+                None if name == "type_ii" else int(leg) + 1,
                 float(near[k] % motion.period),
-                UNITS[name],
+                unit_of(motion.robot, name, int(leg)),
             )
         )
     return Margins(tuple(found), samples)
@@ -216,7 +224,7 @@ def margins(motion: FourierMotion, limits: Limits, samples: int = 4000) -> Margi
 def relative_margins(motion: FourierMotion, limits: Limits, times: Array) -> dict[str, Array]:
     """Return the margins at times (T,), each over its limit's size: (T, n), or (T, 1).
 
-    Sizes are 1 for sines and regularity, half its range for a slider, else the limit itself.
+    Sizes are 1 for the two measures, half its range for a joint, else the limit itself.
     """
     return {
         name: values / _size(motion.robot, limits, name)
@@ -227,22 +235,22 @@ def relative_margins(motion: FourierMotion, limits: Limits, times: Array) -> dic
 def check_rest(robot: Manipulator, home: Array, limits: Limits) -> None:
     """Refuse limits that the machine at rest in its home pose does not keep, naming the limit."""
     zero = np.zeros_like(home)
-    rest = State(home, zero, zero, numeric(robot, "slider_coordinates")(home), zero, zero)
+    rest = State(home, zero, zero, unchecked(robot, "joint_coordinates", home), zero, zero)
     rows = State(*(value[None] for value in rest))
     for name, values in _margins_of(robot, limits, rows).items():
         leg = int(values[0].argmin())
         if values[0, leg] > 0.0:
             continue
-        whose = "the platform" if name == "regularity" else f"leg {leg + 1}"
+        whose = "the platform" if name == "type_ii" else f"leg {leg + 1}"
         given = getattr(limits, name)
         wanted = f"at most {given}" if name == "force" else f"at least {given:g}"
         has = (
-            per_slider(limits, name, robot)[leg] - values[0, leg]
+            per_joint(limits, name, robot)[leg] - values[0, leg]
             if name == "force"
             else (given + values[0, leg])
         )
         raise ModelError(
-            f"limits: {name} of {wanted} {UNITS[name]}".rstrip()
+            f"limits: {name} of {wanted} {unit_of(robot, name, leg)}".rstrip()
             + f" is impossible: {whose} of {robot.name} has {has:.4g} at rest in the home pose, "
             "the best one; loosen it"
         )
@@ -250,22 +258,22 @@ def check_rest(robot: Manipulator, home: Array, limits: Limits) -> None:
 
 def _margins_of(robot: Manipulator, limits: Limits, state: State) -> dict[str, Array]:
     """Return every limit's margins (T, n) or (T, 1), -inf where the machine cannot be."""
-    sine = numeric(robot, "reach")(state.pose)[2]
-    found = {"elbow_sine": sine - limits.elbow_sine}
-    if robot.platform.turns:
-        regularity = np.abs(numeric(robot, "regularity")(state.pose))[:, None]
-        found["regularity"] = regularity - limits.regularity
-    if any(leg.slider_limits for leg in robot.legs):
-        found["slider_clearance"] = clearances(robot, state.sliders) - limits.slider_clearance
-    found["speed"] = per_slider(limits, "speed", robot) - np.abs(state.rates)
-    found["acceleration"] = per_slider(limits, "acceleration", robot) - np.abs(state.accelerations)
+    found = {"type_i": unchecked(robot, "reach", state.pose)[1] - limits.type_i}
+    if closure_of(robot).vanishes() is None or robot.platform.turns:
+        type_ii = np.abs(unchecked(robot, "type_ii", state.pose))[:, None]
+        found["type_ii"] = type_ii - limits.type_ii
+    if any(leg.limits for leg in robot.legs):
+        found["joint_clearance"] = clearances(robot, state.joints) - limits.joint_clearance
+    found["speed"] = per_joint(limits, "speed", robot) - np.abs(state.rates)
+    found["acceleration"] = per_joint(limits, "acceleration", robot) - np.abs(state.accelerations)
     if limits.force is not None:
-        forces = numeric(robot, "inverse_dynamics")(state.pose, state.velocity, state.acceleration)
-        found["force"] = per_slider(limits, "force", robot) - np.abs(forces)
+        motion = state.pose, state.velocity, state.acceleration
+        forces = unchecked(robot, "inverse_dynamics", *motion)
+        found["force"] = per_joint(limits, "force", robot) - np.abs(forces)
     return {name: np.where(np.isnan(values), -np.inf, values) for name, values in found.items()}
 
 
 def _size(robot: Manipulator, limits: Limits, name: str) -> Array:
-    if name in PER_SLIDER:
-        return per_slider(limits, name, robot)
-    return slider_sizes(robot) if name == "slider_clearance" else np.ones(1)
+    if name in PER_JOINT:
+        return per_joint(limits, name, robot)
+    return joint_sizes(robot) if name == "joint_clearance" else np.ones(1)

@@ -9,12 +9,13 @@ from typing import Any, Literal
 import casadi as ca
 import numpy as np
 
-from pteron.equations.geometry import Expression
+from pteron.bodies.motion import Expression
 from pteron.identification.excitation.draws import sizes
-from pteron.identification.excitation.fourier import Space, basis
-from pteron.identification.excitation.limits import Limits, per_slider, slider_sizes
+from pteron.identification.excitation.fourier import Space, basis, home
+from pteron.identification.excitation.limits import Limits, joint_sizes, per_joint
 from pteron.identification.signals.states import home_mode
 from pteron.kernels import Array, Columns, program
+from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator, parameters
 
 Criterion = Literal["condition", "logdet"]
@@ -142,25 +143,24 @@ def _path(setting: Setting, watched: tuple[str, ...]) -> _Path:
     q, state = _state(setting)
     pose, velocity, _ = state
     found: dict[str, tuple[Expression, float | Array, float | Array]] = {}
-    lengths = [2.0 * leg.upper_length * leg.lower_length for leg in robot.legs]
-    deltas = program(robot, "discriminants").function(pose).T
-    least = (limits.elbow_sine + _BACK_OFF) ** 2
-    found["elbow_sine"] = deltas / np.square(lengths), least, np.inf
-    sign = 1.0 if home_mode(robot) == 0 else -1.0
-    regularity = sign * program(robot, "regularity").function(pose)
-    found["regularity"] = regularity, limits.regularity + _BACK_OFF, np.inf
-    if setting.space == "sliders":
-        sliders, rates, seconds = q
+    squares = program(robot, "squared_type_i").function(pose).T
+    found["type_i"] = squares, (limits.type_i + _BACK_OFF) ** 2, np.inf
+    # An assembly mode keeps the sign that the measure has in the home pose.
+    sign = float(np.sign(unchecked(robot, "type_ii", np.array(home(robot)))))
+    type_ii = sign * program(robot, "type_ii").function(pose)
+    found["type_ii"] = type_ii, limits.type_ii + _BACK_OFF, np.inf
+    if setting.space == "joints":
+        joints, rates, seconds = q
     else:
-        sliders = program(robot, "slider_coordinates").function(pose).T
-        rates = program(robot, "joint_rates").function(pose, velocity)[0, :].T
-        seconds = program(robot, "joint_accelerations").function(*state)[0, :].T
-    ranges = np.array([leg.slider_limits or (-np.inf, np.inf) for leg in robot.legs])
-    clearance = limits.slider_clearance + _BACK_OFF * slider_sizes(robot)
-    found["slider_clearance"] = sliders, ranges[:, 0] + clearance, ranges[:, 1] - clearance
+        joints = program(robot, "joint_coordinates").function(pose).T
+        rates = program(robot, "joint_rates").function(pose, velocity)[0].T
+        seconds = program(robot, "joint_accelerations").function(*state)[0].T
+    ranges = np.array([leg.limits or (-np.inf, np.inf) for leg in robot.legs])
+    clearance = limits.joint_clearance + _BACK_OFF * joint_sizes(robot)
+    found["joint_clearance"] = joints, ranges[:, 0] + clearance, ranges[:, 1] - clearance
     forces = program(robot, "inverse_dynamics").function(*state, ca.DM(parameters(robot))).T
     for name, value in (("speed", rates), ("acceleration", seconds), ("force", forces)):
-        found[name] = value / per_slider(limits, name, robot), _BACK_OFF - 1.0, 1.0 - _BACK_OFF
+        found[name] = value / per_joint(limits, name, robot), _BACK_OFF - 1.0, 1.0 - _BACK_OFF
     values, low, high = zip(*(found[name] for name in watched), strict=True)
     function = ca.Function("path", q, [ca.densify(ca.vertcat(*values))], {"cse": True})
     bounds = [

@@ -15,7 +15,7 @@ from pteron.identification.excitation.conditioning import Conditioning
 from pteron.identification.excitation.fourier import FourierMotion, states
 from pteron.identification.excitation.limits import Limits, Margins
 from pteron.identification.excitation.program import Criterion
-from pteron.kernels import numeric
+from pteron.kinematics.evaluate import unchecked
 from pteron.tables import write_table
 
 _MOST_SAMPLES = 10_000_000
@@ -94,28 +94,29 @@ class Excitation:
         motion, robot = self.motion, self.motion.robot
         times = np.arange(round(periods * motion.period * rate)) / rate
         state = states(motion, times)
-        forces = numeric(robot, "inverse_dynamics")(state.pose, state.velocity, state.acceleration)
-        legs = range(1, robot.freedom + 1)
+        path = state.pose, state.velocity, state.acceleration
+        joints = [f"{leg.joint.coordinate}{i}" for i, leg in enumerate(robot.legs, start=1)]
+        forces = [f"{leg.joint.force}{i}" for i, leg in enumerate(robot.legs, start=1)]
         columns = {"t": times}
-        for name, values in (
-            ("rho", state.sliders),
-            ("", state.pose),
-            ("drho", state.rates),
-            ("ddrho", state.accelerations),
-            ("d", state.velocity),
-            ("dd", state.acceleration),
-            ("force", forces),
+        for order, names, values in (
+            ("", joints, state.joints),
+            ("", robot.coordinates, state.pose),
+            ("d", joints, state.rates),
+            ("dd", joints, state.accelerations),
+            ("d", robot.coordinates, state.velocity),
+            ("dd", robot.coordinates, state.acceleration),
+            ("", forces, unchecked(robot, "inverse_dynamics", *path)),
         ):
-            ends = legs if name.endswith(("rho", "force")) else robot.coordinates
-            columns |= {f"{name}{end}": values[:, k] for k, end in enumerate(ends)}
+            columns |= {f"{order}{name}": values[:, k] for k, name in enumerate(names)}
         return pl.DataFrame(columns)
 
     def write_csv(self, path: str | Path, rate: float = 1000.0, periods: int = 1) -> Path:
         """Write the trajectory for a controller to a CSV (or Parquet) file.
 
         Columns t; rho1 ...; x y z phi; drho1 ...; ddrho1 ...; dx ...; ddx ...; force1 ..., in SI
-        units. The forces are those of the machine's nominal inertia, without friction. The motion
-        is periodic: the sample after the last is the first one again. It does not begin at rest.
+        units; theta and torque at a crank. The forces are those of the machine's nominal inertia,
+        without friction. The motion is periodic: the sample after the last is the first one again.
+        It does not begin at rest.
 
         Parameters
         ----------

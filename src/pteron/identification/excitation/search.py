@@ -68,7 +68,7 @@ def optimal_excitation(
         The machine.
     base : BaseParameters, optional
         What is to be seen; `base_parameters(robot)` unless given.
-    space : {"platform", "sliders"}
+    space : {"platform", "joints"}
         Whose coordinates the Fourier series are of.
     harmonics : int
         How many, 1 or more.

@@ -10,14 +10,13 @@ from pteron.identification.logs.description_file import (
     read_description,
     write_description,
 )
-from pteron.identification.logs.joints import JointSymbols, joint_symbols
+from pteron.identification.logs.joints import joint_symbols
 from pteron.identification.logs.log import Finding, Log, joined, write_log
 from pteron.identification.logs.log_file import LogFile, open_log, read_log
 
 __all__ = [
     "Description",
     "Finding",
-    "JointSymbols",
     "KnownPayload",
     "Log",
     "LogFile",

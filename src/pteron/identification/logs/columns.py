@@ -28,7 +28,7 @@ UNITS = {
 
 _TIME_WORDS = ("t", "time", "timestamp")
 _WORDS: dict[str, tuple[str, ...]] = {
-    "rho": ("rho", "q", "s", "slider"),
+    "rho": ("rho", "q", "s", "joint"),
     "theta": ("theta", "q", "angle", "crank"),
     "force": ("force", "f", "tau", "current", "i"),
     "torque": ("torque", "moment", "tau", "current", "i"),

@@ -12,16 +12,16 @@ import numpy as np
 import polars as pl
 from jaxtyping import Int
 
-from pteron.conventions import BatchOfNumbers, BatchOfPoses, BatchOfSliders
 from pteron.errors import DataError
 from pteron.identification.logs.description import Description
-from pteron.identification.logs.joints import SLIDER, JointSymbols
+from pteron.legs.leg import SLIDER, ActuatedJoint
+from pteron.shapes import Numbers, PerCoordinate, PerJoint
 from pteron.tables import write_table
 
 GAP = 1.5
 """A step longer than this many usual ones is a gap: at least one sample is missing."""
 
-_ARRAYS = ("time", "sliders", "forces", "pose", "payload")
+_ARRAYS = ("time", "joints", "forces", "pose", "payload")
 _POSE = ("x", "y", "z", "phi")
 
 _Phases = Int[np.ndarray, "*batch"]
@@ -67,7 +67,7 @@ class Log:
         What messages call the file.
     time : array, shape (T,)
         s, rising.
-    sliders : array, shape (T, n)
+    joints : array, shape (T, n)
         Joint coordinates, m; rad at a crank.
     forces : array, shape (T, n)
         Actuator forces in `description.force_unit`: N (at a crank N m), or the drive's own unit
@@ -84,8 +84,8 @@ class Log:
         Index from 0 of the first sample among the data rows of its file.
     step : float, optional
         The usual time step of the file, s; the median step of these samples if it is not given.
-    joints : tuple of JointSymbols, optional
-        What the joint of each leg is called; they are sliders if it is not given.
+    symbols : tuple of ActuatedJoint, optional
+        What the joint of each leg is called; they are joints if it is not given.
 
     Raises
     ------
@@ -94,16 +94,16 @@ class Log:
     """
 
     source: str
-    time: BatchOfNumbers
-    sliders: BatchOfSliders
-    forces: BatchOfSliders
-    pose: BatchOfPoses | None = None
+    time: Numbers
+    joints: PerJoint
+    forces: PerJoint
+    pose: PerCoordinate | None = None
     payload: _Phases | None = None
     description: Description = field(default_factory=Description)
     findings: tuple[Finding, ...] = ()
     first_row: int = 0
     step: float | None = None
-    joints: tuple[JointSymbols, ...] | None = None
+    symbols: tuple[ActuatedJoint, ...] | None = None
 
     def __post_init__(self) -> None:
         for name in _ARRAYS:
@@ -190,9 +190,9 @@ def write_log(log: Log, path: str | Path) -> Path:
     """
     unit = log.description.force_unit
     columns = {"t": log.time}
-    joints = log.joints or (SLIDER,) * log.sliders.shape[1]
+    joints = log.symbols or (SLIDER,) * log.joints.shape[1]
     for j, joint in enumerate(joints):
-        columns[f"{joint.coordinate}{j + 1}"] = log.sliders[:, j]
+        columns[f"{joint.coordinate}{j + 1}"] = log.joints[:, j]
     for j, joint in enumerate(joints):
         stem = "current" if unit == "A" else joint.force
         columns[f"{stem}{j + 1}" + (f" ({unit})" if unit in ("V", "%") else "")] = log.forces[:, j]

@@ -102,11 +102,11 @@ class LogFile:
         for values in self._values(rows):
             piece = self._piece(values, first)
             stamps.take(piece.time)
-            both = np.hstack([piece.sliders, piece.forces])
+            both = np.hstack([piece.joints, piece.forces])
             for j, channel in enumerate(channels):
-                channel.take(np.ascontiguousarray(both[:, j]), piece.sliders)
-            low = np.minimum(low, piece.sliders.min(axis=0))
-            high = np.maximum(high, piece.sliders.max(axis=0))
+                channel.take(np.ascontiguousarray(both[:, j]), piece.joints)
+            low = np.minimum(low, piece.joints.min(axis=0))
+            high = np.maximum(high, piece.joints.max(axis=0))
             first += piece.rows
             if progress is not None:
                 progress(piece.rows)
@@ -158,14 +158,14 @@ class LogFile:
         return Log(
             source=self.source,
             time=in_si(values[:, 0], c.time_unit),
-            sliders=joints,
+            joints=joints,
             forces=forces,
             pose=pose,
             payload=None if c.payload is None else self._phases(values[:, -1], first),
             description=self.description,
             first_row=first,
             step=self._step,
-            joints=joint_symbols(self._robot),
+            symbols=joint_symbols(self._robot),
         )
 
     def _phases(self, values: Values, first: int) -> NDArray[np.int64]:
@@ -285,7 +285,7 @@ def read_log(
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = write_log(Log("a motion", t, 0.05 * wave, 20.0 * wave), Path(folder) / "a.csv")
     ...     log = read_log(path, pteron.load("tripteron"))
-    >>> log.rows, log.sliders.shape, round(log.rate), log.findings
+    >>> log.rows, log.joints.shape, round(log.rate), log.findings
     (500, (500, 3), 1000, ())
     """
     return open_log(path, robot, description=description).read(progress)

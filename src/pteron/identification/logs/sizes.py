@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from pteron.errors import DataError
 from pteron.identification.logs.joints import joint_symbols
 from pteron.identification.logs.log import Finding
-from pteron.manipulator import Leg, Manipulator
+from pteron.legs import LegKind
+from pteron.manipulator import Manipulator
 
 _BEYOND = 3.0
 """How far beyond the machine's size a coordinate may lie; encoders have their own zero."""
@@ -26,10 +27,7 @@ def size_of(robot: Manipulator) -> float:
     """Return the extent of a machine, m: between its guide points, along a leg and its platform."""
     points = np.array([leg.guide_point for leg in robot.legs])
     apart = np.linalg.norm(points[:, None] - points, axis=-1).max()
-    reach = max(
-        leg.upper_length + leg.lower_length + float(np.linalg.norm(leg.platform_point))
-        for leg in robot.legs
-    )
+    reach = max(leg.size + float(np.linalg.norm(leg.platform_point)) for leg in robot.legs)
     return float(apart + reach)
 
 
@@ -49,7 +47,7 @@ def check_joints(
 ) -> None:
     """Raise a `DataError` where joint coordinates, (rows, n) in SI, are too large for the machine.
 
-    A slider cannot leave the others far behind: its coordinate is bound by its limits, or by the
+    A joint cannot leave the others far behind: its coordinate is bound by its limits, or by the
     machine's size, along a guide that may be oblique to the leg's plane. A crank makes few turns.
     """
     for j, (leg, joint) in enumerate(zip(robot.legs, joint_symbols(robot), strict=True)):
@@ -65,7 +63,7 @@ def check_joints(
         usual = travel / _BEYOND
         advice = _advice("joints", "unit", units[j], float(np.abs(values).max()), usual)
         raise DataError(
-            f"{place}: {values[i]:g} m, read as {units[j]}, but the slider of this machine travels "
+            f"{place}: {values[i]:g} m, read as {units[j]}, but the joint of this machine travels "
             f"about {usual:.2g} m; {advice}"
         )
 
@@ -93,7 +91,7 @@ def check_pose(
 ) -> None:
     """Raise a `DataError` where measured poses, (rows, m), are too large for the machine."""
     far = max(float(np.linalg.norm(leg.guide_point)) for leg in robot.legs)
-    size = size_of(robot) + far + max(_farthest(leg.slider_limits) for leg in robot.legs)
+    size = size_of(robot) + far + max(_farthest(leg.limits) for leg in robot.legs)
     for j, column in enumerate(columns):
         turns = robot.coordinates[j] == "phi"
         largest = _TURNS if turns else _BEYOND * size
@@ -147,10 +145,11 @@ def check_step(step: float, column: str, source: str) -> None:
     )
 
 
-def _travel_of(leg: Leg, robot: Manipulator) -> float:
-    if leg.slider_limits is not None:
-        return _farthest(leg.slider_limits)
-    return size_of(robot) / abs(float(np.dot(leg.direction, leg.e)))
+def _travel_of(leg: LegKind, robot: Manipulator) -> float:
+    if leg.limits is not None:
+        return _farthest(leg.limits)
+    # Along a guide that is oblique to the leg's reach the slider travels farther.
+    return size_of(robot) * max(leg.reach_bound.radius / leg.size, 1.0)
 
 
 def _farthest(limits: tuple[float, float] | None) -> float:

@@ -1,6 +1,6 @@
 """From a log's samples to states of the machine, with noise kept out and nothing shifted in time.
 
-Positions are smoothed and differentiated in slider space, where they were measured; poses,
+Positions are smoothed and differentiated in joint space, where they were measured; poses,
 velocities and accelerations of the platform follow from them by exact kinematics.
 """
 

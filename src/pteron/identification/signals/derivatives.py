@@ -74,7 +74,7 @@ class Curve:
     Attributes
     ----------
     coefficients : array, shape (C, n)
-        How much of each basis function there is in each slider, m.
+        How much of each basis function there is in each joint, m.
     bases : tuple of sparse array, shape (T, C)
         The basis functions, and their first and second derivatives.
     ends : int
@@ -129,7 +129,7 @@ class _Sampled:
 
     def curve(self, log: Log) -> Curve:
         """Return the least-squares spline of the log's positions."""
-        spline = fitted_spline(log.time, log.sliders, self.cutoff)
+        spline = fitted_spline(log.time, log.joints, self.cutoff)
         bases = tuple(_design(spline, log.time, k) for k in range(3))
         ends = ceil(_ENDS * self.rate / (2.0 * self.cutoff)) if self.cutoff else 0
         return Curve(spline.c, (bases[0], bases[1], bases[2]), ends)
@@ -150,14 +150,14 @@ class CentralDifferences(_Sampled):
 
     def differentiated(self, block: Log, edge: int) -> Differentiated:
         """Return the block at even steps of time."""
-        time, sliders = uniform(block.time, block.sliders)
-        even = sliders is block.sliders
+        time, joints = uniform(block.time, block.joints)
+        even = joints is block.joints
         forces = block.forces if even else uniform(block.time, block.forces)[1]
         rate = (len(time) - 1) / float(time[-1] - time[0])
-        sliders = smoothed(sliders, rate, self.cutoff)
-        first, second = central_differences(sliders, rate)
+        joints = smoothed(joints, rate, self.cutoff)
+        first, second = central_differences(joints, rate)
         inner, lost = slice(edge, len(time) - edge), slice(edge - LOST, len(first) - (edge - LOST))
-        motion = sliders[inner], first[lost], second[lost]
+        motion = joints[inner], first[lost], second[lost]
         return Differentiated(
             time[inner], motion, forces[inner], np.ones(len(motion[0]), dtype=bool)
         )
@@ -176,10 +176,10 @@ class SmoothingSpline(_Sampled):
     def differentiated(self, block: Log, edge: int) -> Differentiated:
         """Return the block at its own times."""
         inner = slice(edge, block.rows - edge)
-        q, dq, ddq = spline_motion(block.time, block.sliders, self.cutoff)
+        q, dq, ddq = spline_motion(block.time, block.joints, self.cutoff)
         smooth = np.ones(block.rows, dtype=bool)
         if self.cutoff is None:
-            smooth = _without_jumps(block.time, block.sliders)
+            smooth = _without_jumps(block.time, block.joints)
         motion = q[inner], dq[inner], ddq[inner]
         return Differentiated(block.time[inner], motion, block.forces[inner], smooth[inner])
 
@@ -195,7 +195,7 @@ class FourierFit:
 
     def series(self, log: Log) -> FourierSeries:
         """Return the series of the log's positions."""
-        return fitted_series(log.time, log.sliders, self.period, highest=self.cutoff)
+        return fitted_series(log.time, log.joints, self.period, highest=self.cutoff)
 
     def differentiated(self, block: Log, edge: int) -> Differentiated:
         """Return the log at its own times."""
@@ -286,17 +286,17 @@ def _design(spline: BSpline, time: Array, derivative: int) -> sparse.csr_matrix:
     return sparse.csr_matrix(design @ sparse.csr_matrix(slopes.c[: design.shape[1]]))
 
 
-def _without_jumps(time: Array, sliders: Array) -> NDArray[np.bool_]:
+def _without_jumps(time: Array, joints: Array) -> NDArray[np.bool_]:
     """Return where a spline through samples without noise agrees with central differences.
 
     They err in different ways next to a jump in a derivative, as at the ends of a rest. Jumps are
     few: where most samples are apart it is for another reason, such as the rounding of the stamps.
     """
-    spline = fitted_spline(time, sliders, None)
+    spline = fitted_spline(time, joints, None)
     even = np.linspace(time[0], time[-1], len(time))
     rate = (len(even) - 1) / float(even[-1] - even[0])
     _, second = central_differences(spline(even), rate)
-    rounding = _ROUNDING * np.abs(sliders).max() * rate**2
+    rounding = _ROUNDING * np.abs(joints).max() * rate**2
     least = _AGREES * np.abs(second).max(axis=0) + rounding
     apart = (np.abs(spline(even[LOST:-LOST], 2) - second) > least).any(axis=1)
     if apart.mean() > _FEW:

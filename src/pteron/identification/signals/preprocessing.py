@@ -51,10 +51,10 @@ _UNSURE = 0.1
 """Within which the smoothed rate may have the wrong sign, likewise."""
 
 _MENTIONED = 0.1
-"""Speed, as a share of a slider's root mean square, from which its sign counts."""
+"""Speed, as a share of a joint's root mean square, from which its sign counts."""
 
 _SPARED = 0.15
-"""Share of the time between two reversals of a slider that is left out, at most, on each side."""
+"""Share of the time between two reversals of a joint that is left out, at most, on each side."""
 
 _PRODUCTS = 10.0
 """Forces are products of positions and accelerations, and friction has steps: they are faster than
@@ -80,8 +80,8 @@ class Processing:
     period : float, optional
         Time after which the motion repeats, s; by default what the log's description says.
     slow : float
-        Speed, as a share of each slider's root mean square, below which the slider's equation is
-        not used: dry friction holds a slider at rest with any force, and turns in no time.
+        Speed, as a share of each joint's root mean square, below which the joint's equation is
+        not used: dry friction holds a joint at rest with any force, and turns in no time.
     """
 
     derivatives: Derivatives | None = None
@@ -122,12 +122,12 @@ class Preprocessing:
         Cut-off frequency of the parallel filter on forces and regressor, Hz.
     period : float or None
         Time after which the motion repeats, s; None where it is not known to.
-    slider_noise, force_noise : array, shape (n,)
-        Standard deviation of the white noise on sliders (m) and forces (N).
+    joint_noise, force_noise : array, shape (n,)
+        Standard deviation of the white noise on joints (m) and forces (N).
     slow : array, shape (n,)
-        Speed of each slider below which its friction is not known, m/s.
+        Speed of each joint below which its friction is not known, m/s.
     stroke : float
-        Mean time between two reversals of the slider that reverses most, s.
+        Mean time between two reversals of the joint that reverses most, s.
     """
 
     derivatives: Derivatives
@@ -136,7 +136,7 @@ class Preprocessing:
     cutoff: float | None
     band: float
     period: float | None
-    slider_noise: Array
+    joint_noise: Array
     force_noise: Array
     slow: Array
     stroke: float
@@ -160,7 +160,7 @@ class Preprocessing:
 
     @property
     def turning(self) -> int:
-        """Rows before and after a slow one in which the way a slider moves may not be known."""
+        """Rows before and after a slow one in which the way a joint moves may not be known."""
         return self._rows(_UNSURE)
 
     def _rows(self, periods: float) -> int:
@@ -194,11 +194,11 @@ def preprocessing_of(
     wanted = processing or Processing()
     # Noise and cut-offs concern samples as they came: uneven steps are noise to them.
     head = _longest_part(log)
-    time, values = uniform(head.time, np.hstack([head.sliders, head.forces]))
+    time, values = uniform(head.time, np.hstack([head.joints, head.forces]))
     rate = (len(time) - 1) / float(time[-1] - time[0])
-    sliders, forces = np.hsplit(values, 2)
+    joints, forces = np.hsplit(values, 2)
     _check_frequencies(wanted, rate)
-    cutoff = wanted.cutoff or cutoff_of(sliders, rate)
+    cutoff = wanted.cutoff or cutoff_of(joints, rate)
 
     # How positions are differentiated
     period = wanted.period or log.description.period
@@ -208,7 +208,7 @@ def preprocessing_of(
         derivatives, series = "periodic", _checked_series(log, period)
     elif wanted.derivatives is None and period and (rows or log.rows) <= _LARGEST_PERIODIC:
         series = _checked_series(log, period)
-        if _is_series(series, sliders):
+        if _is_series(series, joints):
             derivatives = "periodic"
         else:
             series = None
@@ -216,7 +216,7 @@ def preprocessing_of(
         cutoff = series.harmonics / series.period
 
     # How fast the motion is
-    rates, _ = central_differences(smoothed(sliders, rate, cutoff), rate)
+    rates, _ = central_differences(smoothed(joints, rate, cutoff), rate)
     if series is None:
         frequencies = np.asarray(np.fft.rfftfreq(len(rates), 1.0 / rate), dtype=float)
         power = np.abs(np.fft.rfft(np.hanning(len(rates))[:, None] * rates, axis=0)) ** 2
@@ -237,7 +237,7 @@ def preprocessing_of(
         cutoff=cutoff,
         band=float(band),
         period=period,
-        slider_noise=white_noise(sliders),
+        joint_noise=white_noise(joints),
         force_noise=white_noise(forces),
         slow=wanted.slow * np.sqrt((rates**2).mean(axis=0)),
         stroke=_stroke(rates, rate),
@@ -266,8 +266,8 @@ def _checked_series(log: Log, period: float | None) -> FourierSeries:
             f"lasts {log.duration:g} s, less than its period of {period:g} s; record a whole "
             'period, or choose derivatives "central"',
         )
-    series = fitted_series(log.time, log.sliders, period)
-    span = np.ptp(log.sliders, axis=0)
+    series = fitted_series(log.time, log.joints, period)
+    span = np.ptp(log.joints, axis=0)
     worst = int(np.argmax(series.noise / span))
     if series.noise[worst] > _REPEATS * span[worst]:
         raise LogError(
@@ -280,10 +280,10 @@ def _checked_series(log: Log, period: float | None) -> FourierSeries:
     return series
 
 
-def _is_series(series: FourierSeries, sliders: Array) -> bool:
+def _is_series(series: FourierSeries, joints: Array) -> bool:
     """Say whether a Fourier series leaves noise alone: jumps of acceleration take more terms."""
-    least = _ROUNDING * np.ptp(sliders, axis=0)
-    return bool((series.noise <= np.maximum(3.0 * white_noise(sliders), least)).all())
+    least = _ROUNDING * np.ptp(joints, axis=0)
+    return bool((series.noise <= np.maximum(3.0 * white_noise(joints), least)).all())
 
 
 def _check_frequencies(wanted: Processing, rate: float) -> None:
@@ -297,7 +297,7 @@ def _check_frequencies(wanted: Processing, rate: float) -> None:
 
 
 def _stroke(rates: Array, rate: float) -> float:
-    """Return the mean time between two reversals of the slider that reverses most, s.
+    """Return the mean time between two reversals of the joint that reverses most, s.
 
     A change of sign counts once the speed is worth mentioning: noise at rest is none.
     """

@@ -101,7 +101,7 @@ def _samples(
     robot: Manipulator, log: Log, preprocessing: Preprocessing, edge: int, margin: int
 ) -> Samples:
     found = preprocessing.differentiator.differentiated(log, edge)
-    states = States.of_sliders(
+    states = States.of_joints(
         robot,
         found.motion,
         found.time,

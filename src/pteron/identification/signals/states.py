@@ -1,4 +1,4 @@
-"""States of the machine at the samples of a log: sliders and platform, in one assembly mode."""
+"""States of the machine at the samples of a log: joints and platform, in one assembly mode."""
 
 from __future__ import annotations
 
@@ -8,16 +8,18 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from pteron.equations.machine import closure_of
 from pteron.errors import DataError
 from pteron.identification.errors import LogError
 from pteron.identification.logs import Log
-from pteron.kernels import Array, numeric
-from pteron.kinematics import direct_kinematics
+from pteron.kernels import Array
+from pteron.kinematics import assembly_modes, mode_of
+from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator
 from pteron.workspace import home_pose
 
-_LEAST_SINE = 1e-3
-_LEAST_REGULARITY = 1e-3
+_LEAST_TYPE_I = 1e-3
+_LEAST_TYPE_II = 1e-3
 """Next to a singularity the regressor grows without bound, and with it every error."""
 
 _LOOK = 1000
@@ -26,13 +28,13 @@ _LOOK = 1000
 
 @dataclass(frozen=True)
 class States:
-    """States at R samples: of the sliders, where they were measured, and of the platform.
+    """States at R samples: of the joints, where they were measured, and of the platform.
 
     Attributes
     ----------
     time : array, shape (R,)
         s.
-    sliders, slider_rates, slider_accelerations : array, shape (R, n)
+    joints, joint_rates, joint_accelerations : array, shape (R, n)
         m and s.
     pose, velocity, acceleration : array, shape (R, m)
         m, rad and s.
@@ -41,16 +43,16 @@ class States:
     """
 
     time: Array
-    sliders: Array
-    slider_rates: Array
-    slider_accelerations: Array
+    joints: Array
+    joint_rates: Array
+    joint_accelerations: Array
     pose: Array
     velocity: Array
     acceleration: Array
     payload: NDArray[np.int64]
 
     @classmethod
-    def of_sliders(
+    def of_joints(
         cls,
         robot: Manipulator,
         motion: tuple[Array, Array, Array],
@@ -58,29 +60,29 @@ class States:
         mode: int,
         *,
         payload: NDArray[np.int64] | None = None,
-        source: str = "sliders",
+        source: str = "joints",
         first_row: int = 0,
     ) -> States:
-        """Return the states of sliders that move so: rho = J x inverted, and differentiated twice.
+        """Return the states of joints that move so: rho = J x inverted, and differentiated twice.
 
-        `motion` holds slider coordinates, rates and accelerations (R, n) at times (R,), s; `mode`
+        `motion` holds joint coordinates, rates and accelerations (R, n) at times (R,), s; `mode`
         is the assembly mode, from 0, and `payload` the phases (R,). Messages call the log `source`;
         its row `first_row`, from 0, is the first sample.
 
         Raises
         ------
         LogError
-            If no pose has the sliders of a sample, or if it is next to a singularity.
+            If no pose has the joints of a sample, or if it is next to a singularity.
         """
-        sliders, rates, accelerations = motion
-        pose = np.ascontiguousarray(direct_kinematics(robot, sliders)[:, mode])
+        joints, rates, accelerations = motion
+        pose = np.ascontiguousarray(assembly_modes(robot, joints)[:, mode])
         lost = np.isnan(pose).any(axis=-1)
         if lost.any():
-            raise _no_pose(robot, sliders, lost, mode, source, first_row)
+            raise _no_pose(robot, joints, lost, mode, source, first_row)
         _check_regular(robot, pose, source, first_row)
-        velocity, acceleration = numeric(robot, "platform_motion")(pose, rates, accelerations)
+        velocity, acceleration = unchecked(robot, "platform_motion", pose, rates, accelerations)
         phases = np.zeros(len(time), dtype=np.int64) if payload is None else payload
-        return cls(time, sliders, rates, accelerations, pose, velocity, acceleration, phases)
+        return cls(time, joints, rates, accelerations, pose, velocity, acceleration, phases)
 
     def __len__(self) -> int:
         return len(self.time)
@@ -91,9 +93,9 @@ class States:
 
 
 def assembly_mode(robot: Manipulator, log: Log) -> int:
-    """Return the column of `direct_kinematics`, from 0, that a log follows.
+    """Return the column of `assembly_modes`, from 0, that a log follows.
 
-    A column stands for one assembly mode throughout, between the singular orientations: to follow
+    A column stands for one assembly mode throughout, between the singular poses: to follow
     it is to follow the motion by continuity. The description's choice counts first, then the
     measured pose, if there is one, and else the mode of the machine's home pose.
 
@@ -102,57 +104,59 @@ def assembly_mode(robot: Manipulator, log: Log) -> int:
     DataError
         If the description names a mode that the machine has not.
     """
-    if not robot.platform.turns:
-        return 0
+    modes = closure_of(robot).modes
     declared = log.description.assembly_mode
     if declared is not None:
-        if declared not in (1, 2):
-            raise DataError(f"{log.source}: assembly_mode = {declared}; {robot.name} has 1 and 2")
+        if not 1 <= declared <= modes:
+            raise DataError(
+                f"{log.source}: assembly_mode = {declared}; {robot.name} has "
+                f"{' and '.join(map(str, range(1, modes + 1)))}"
+            )
         return declared - 1
+    if modes == 1:
+        return 0
     if log.pose is None:
         return home_mode(robot)
     # Position and half-chord of the angle, so that whole turns count for nothing.
     step = max(log.rows // _LOOK, 1)
-    poses, measured = direct_kinematics(robot, log.sliders[::step]), log.pose[::step, None]
-    position = np.linalg.norm(poses[..., :3] - measured[..., :3], axis=-1)
-    angle = np.abs(np.sin(0.5 * (poses[..., 3] - measured[..., 3])))
-    off = np.nan_to_num(position + angle, nan=np.inf)
+    poses, measured = assembly_modes(robot, log.joints[::step]), log.pose[::step, None]
+    off = np.linalg.norm(poses[..., :3] - measured[..., :3], axis=-1)
+    if robot.platform.turns:
+        off += np.abs(np.sin(0.5 * (poses[..., 3] - measured[..., 3])))
+    off = np.nan_to_num(off, nan=np.inf)
     return int(np.argmin(np.median(off, axis=0)))
 
 
 @lru_cache(maxsize=64)
 def home_mode(robot: Manipulator) -> int:
     """Return the assembly mode of the home pose, from 0."""
-    if not robot.platform.turns:
-        return 0
-    # The first mode has the positive determinant; see `pteron.direct_kinematics`.
-    return 0 if float(numeric(robot, "regularity")(home_pose(robot))) > 0.0 else 1
+    return mode_of(robot, tuple(home_pose(robot).tolist()))
 
 
 def _no_pose(
-    robot: Manipulator, sliders: Array, lost: NDArray[np.bool_], mode: int, source: str, first: int
+    robot: Manipulator, joints: Array, lost: NDArray[np.bool_], mode: int, source: str, first: int
 ) -> LogError:
     row = int(np.argmax(lost))
     count = int(lost.sum())
-    values = ", ".join(f"{value:.4f}" for value in sliders[row])
-    others = direct_kinematics(robot, sliders[lost])
-    hint = "perhaps it is the log of another machine, or its sliders have other zeros"
+    values = ", ".join(f"{value:.4f}" for value in joints[row])
+    others = assembly_modes(robot, joints[lost])
+    hint = "perhaps it is the log of another machine, or its joints have other zeros"
     if others.shape[-2] > 1 and not np.isnan(others[:, 1 - mode]).any():
         hint = f"assembly mode {2 - mode} has one: declare it in the log's description"
     more = f", nor those of {count - 1} more rows" if count > 1 else ""
     return LogError(
         "no pose",
         f"{source}: row {first + row + 1}",
-        f"no pose of {robot.name} has the sliders ({values}) m{more}; {hint}",
+        f"no pose of {robot.name} has the joints ({values}){more}; {hint}",
     )
 
 
 def _check_regular(robot: Manipulator, pose: Array, source: str, first_row: int) -> None:
-    _, _, sine = numeric(robot, "reach")(pose)
-    found = [("a leg is all but stretched or folded", sine.min(axis=-1), _LEAST_SINE)]
-    if robot.platform.turns:
-        regularity = np.abs(numeric(robot, "regularity")(pose))
-        found.append(("the orientation is all but singular", regularity, _LEAST_REGULARITY))
+    type_i = unchecked(robot, "reach", pose)[1].min(axis=-1)
+    found = [("a leg is all but stretched or folded", type_i, _LEAST_TYPE_I)]
+    if closure_of(robot).vanishes() is None or robot.platform.turns:
+        type_ii = np.abs(unchecked(robot, "type_ii", pose))
+        found.append(("the pose is all but singular", type_ii, _LEAST_TYPE_II))
     for what, size, least in found:
         if (size < least).any():
             row = int(np.argmax(size < least))
