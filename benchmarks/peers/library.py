@@ -73,7 +73,7 @@ def compiled(compiler: str, source: str, options: Sequence[str], version: str = 
             raise Missing(f"{compiler} cannot compile {source}: {(errors or [run.stderr])[0]}")
 
     try:
-        return ctypes.CDLL(str(entry(name, build) / library))
+        return ctypes.CDLL(str(entry(name, library, build)))
     except OSError as error:
         raise Missing(f"{source}: {error}") from None
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -11,12 +10,9 @@ from numpy.typing import ArrayLike
 
 from pteron.errors import DataError
 from pteron.kernels.fields import RationalField, evaluate
-from pteron.kernels.kernel import Kernel
-
-__all__ = ["Exact"]
+from pteron.kernels.kernel import Kernel, refuse_masked
 
 
-@dataclass(frozen=True)
 class Exact(Kernel):
     """A kernel in fractions.
 
@@ -30,18 +26,18 @@ class Exact(Kernel):
         """The instructions, one a line, as CasADi prints them."""
         return str(self.function.str(True))
 
-    def __call__(self, *values: ArrayLike) -> Any:
+    def __call__(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
         """Evaluate the kernel for one state; each value has its port's shape."""
-        ports = self._asked(values)
-        given = dict(self.fixed)
-        for port, value in zip(ports, values, strict=True):
-            array = np.asarray(value, dtype=object)
+        given = self._by_name(values, fixed)
+        inputs = []
+        for port in self.ports:
+            refuse_masked(given[port.name], port.name)
+            array = np.asarray(given[port.name], dtype=object)
             if array.shape != port.shape:
                 raise DataError(
                     f"{port.name}: shape {array.shape} given, {port.shape} expected: one state"
                 )
-            given[port.name] = array
-        inputs = [[Fraction(v) for v in given[port.name].ravel().tolist()] for port in self.inputs]
+            inputs.append([Fraction(value) for value in array.ravel().tolist()])
         found = evaluate(self.function, RationalField(), inputs)
         results = tuple(
             np.array(value, dtype=object).reshape(port.shape)
