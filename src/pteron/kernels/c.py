@@ -169,15 +169,11 @@ class Compiled(ArrayKernel):
         """The C code."""
         return self.code.source
 
-    @cached_property
-    def _call(self) -> Callable[..., Any]:
-        # Threads are for batches: `_checked` splits them.
+    def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
+        # Threads are for batches: `checked` splits them.
         most = 2 * SHARE if self.threads > 1 else sys.maxsize
-        return self.code.bound(self.fixed, self._checked, most)
-
-    def __call__(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
-        """Evaluate the kernel; see `ArrayKernel`."""
-        return self._call(*values, **fixed)
+        self.call = self.code.bound(self.fixed, self.checked, most)
+        return self.call(*values, **fixed)
 
     def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
         self.code.module.run(*inputs, *outputs)

@@ -31,7 +31,7 @@ def module_source(
     inputs: Sequence[Port],
     outputs: Sequence[Port],
     dtype: str,
-    block: int = 64,
+    block: int = 32,
 ) -> str:
     """Return the source of a module whose `bind` and `run` evaluate a graph.
 

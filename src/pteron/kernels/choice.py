@@ -6,7 +6,7 @@ import math
 import os
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -114,15 +114,12 @@ class Adaptive(VirtualMachine):
         super().__init__(kernel.name, kernel.function, kernel.ports, kernel.outputs, kernel.fixed)
         self.tier = tier
         self._chunk = chunk
-        self._compiled: Callable[..., Any] | None = None
 
-    def __call__(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
-        """Evaluate the kernel; see `ArrayKernel`."""
-        if self._compiled is None:
-            if not self.tier.ready:
-                return self._checked(*values, **fixed)
-            self._compiled = self.tier.code.bound(self.fixed, self._checked)
-        return self._compiled(*values, **fixed)
+    def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
+        if not self.tier.ready:
+            return self.checked(*values, **fixed)
+        self.call = self.tier.code.bound(self.fixed, self.checked)
+        return self.call(*values, **fixed)
 
     def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
         for start in range(0, batch, self._chunk):

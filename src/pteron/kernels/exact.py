@@ -10,15 +10,16 @@ from numpy.typing import ArrayLike
 
 from pteron.errors import DataError
 from pteron.kernels.fields import RationalField, evaluate
-from pteron.kernels.kernel import Kernel, refuse_masked
+from pteron.kernels.kernel import Kernel, unmasked
 
 
 class Exact(Kernel):
     """A kernel in fractions.
 
-    It takes integers, fractions and floats (as the fractions they are), and returns fractions. An
-    angle phi is given as tan(phi / 2), so that its sine and cosine are rational. `NoSquareRoot`
-    says that a root is not rational, `ZeroDivisionError` that a denominator vanishes.
+    It takes one state: integers, fractions and floats (as the fractions they are), and returns
+    fractions. An angle phi is given as tan(phi / 2), so that its sine and cosine are rational.
+    `NoSquareRoot` says that a root is not rational, `ZeroDivisionError` that a denominator
+    vanishes.
     """
 
     @property
@@ -26,13 +27,11 @@ class Exact(Kernel):
         """The instructions, one a line, as CasADi prints them."""
         return str(self.function.str(True))
 
-    def __call__(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
-        """Evaluate the kernel for one state; each value has its port's shape."""
+    def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
         given = self._by_name(values, fixed)
         inputs = []
         for port in self.ports:
-            refuse_masked(given[port.name], port.name)
-            array = np.asarray(given[port.name], dtype=object)
+            array = np.asarray(unmasked(given[port.name], port.name), dtype=object)
             if array.shape != port.shape:
                 raise DataError(
                     f"{port.name}: shape {array.shape} given, {port.shape} expected: one state"

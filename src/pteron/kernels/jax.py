@@ -17,7 +17,7 @@ import numpy as np
 from pteron.errors import DataError, ModelError
 from pteron.kernels.code import PYTHON, names_of, statements
 from pteron.kernels.graph import graph_of
-from pteron.kernels.kernel import Kernel, refuse_masked
+from pteron.kernels.kernel import Kernel, unmasked
 
 _PRINTED = PYTHON | {"select": "where({0}, {1}, 0.0)"}
 
@@ -25,6 +25,7 @@ _PRINTED = PYTHON | {"select": "where({0}, {1}, 0.0)"}
 class Traced(Kernel):
     """A kernel that JAX traces. It takes and returns JAX arrays, and may be called inside `jit`.
 
+    What is given by name, such as `parameters`, can be differentiated with respect to as well.
     With dtype float64 it switches JAX to 64 bits (`jax_enable_x64`), for the process.
     """
 
@@ -44,7 +45,7 @@ class Traced(Kernel):
         return "\n".join([*lines, f"    return {', '.join(results)},\n"])
 
     @cached_property
-    def _evaluate(self) -> Callable[..., Any]:
+    def _traced(self) -> Callable[..., Any]:
         try:
             import jax
             from jax import numpy as jnp
@@ -81,25 +82,12 @@ class Traced(Kernel):
 
         return jax.jit(evaluate)
 
-    def __call__(self, *values: Any, **fixed: Any) -> Any:
-        """Evaluate the kernel: arrays (..., *port.shape) or tracers, leading axes broadcast.
-
-        Other values of fixed inputs, such as `parameters`, go by name; what is given so can be
-        differentiated with respect to, and may have leading axes too.
-
-        Raises
-        ------
-        DataError
-            If the number of inputs or a shape is wrong.
-        ModelError
-            If JAX is not installed.
-        """
+    def _evaluate(self, *values: Any, **fixed: Any) -> Any:
         given = self._by_name(values, fixed)
         for port in self.ports:
-            value = given[port.name]
-            refuse_masked(value, port.name)
-            shape = np.shape(value)
+            given[port.name] = unmasked(given[port.name], port.name)
+            shape = np.shape(given[port.name])
             if shape[max(len(shape) - len(port.shape), 0) :] != port.shape:
                 expected = ", ".join(["...", *map(str, port.shape)])
                 raise DataError(f"{port.name}: shape {shape} given, ({expected}) expected")
-        return self._evaluate(*(given[port.name] for port in self.ports))
+        return self._traced(*(given[port.name] for port in self.ports))

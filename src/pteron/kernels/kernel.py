@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from math import prod
@@ -77,6 +77,8 @@ class Kernel(ABC):
         All inputs, the fixed ones too.
     inputs : tuple of Port
         What a call takes, in order.
+    call : callable
+        What `kernel(...)` runs: the same, some 0.1 us cheaper. It may change; do not keep it.
     """
 
     def __init__(
@@ -97,6 +99,7 @@ class Kernel(ABC):
         self.outputs = outputs
         self.dtype = dtype
         self.threads = threads
+        self.call: Callable[..., Any] = self._evaluate
 
     def __repr__(self) -> str:
         given, found = (
@@ -114,38 +117,7 @@ class Kernel(ABC):
     def source(self) -> str:
         """The code that runs, as text."""
 
-    @abstractmethod
     def __call__(self, *values: Any, **fixed: Any) -> Any:
-        """Evaluate the kernel: its `inputs`, in order; by name, other values of fixed inputs."""
-
-    def _by_name(self, values: Sequence[Any], fixed: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the value of each port."""
-        if len(values) != len(self.inputs):
-            names = ", ".join(port.name for port in self.inputs)
-            raise DataError(
-                f"{self.name}: {len(values)} inputs given, {len(self.inputs)} expected ({names})"
-            )
-        for name in fixed:
-            if name not in self.fixed:
-                allowed = ", ".join(self.fixed) or "none"
-                raise DataError(
-                    f"{self.name}: {name!r} is not a fixed input; those given by name: {allowed}"
-                )
-        given = {port.name: value for port, value in zip(self.inputs, values, strict=True)}
-        return {**self.fixed, **fixed, **given}
-
-
-class ArrayKernel(Kernel):
-    """A kernel that fills arrays of floats with batches of states; a target gives `_run`."""
-
-    _strided = False
-    """Whether `_run` takes batches as they lie in memory; else their rows follow one another."""
-
-    @abstractmethod
-    def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
-        """Fill `outputs` (batch, size) from `inputs` (batch, size), or (size,) where shared."""
-
-    def __call__(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
         """Evaluate the kernel.
 
         Parameters
@@ -163,11 +135,47 @@ class ArrayKernel(Kernel):
         Raises
         ------
         DataError
-            If the number of inputs or a shape is wrong.
+            If the number of inputs, a name or a shape is wrong.
+        ModelError
+            If the target's compiler or library is not installed.
         """
-        return self._checked(*values, **fixed)
+        return self.call(*values, **fixed) if fixed else self.call(*values)
 
-    def _checked(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
+    @abstractmethod
+    def _evaluate(self, *values: Any, **fixed: Any) -> Any:
+        """Do what `call` is asked for; a target may put something faster in its place."""
+
+    def _by_name(self, values: Sequence[Any], fixed: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the value of each port."""
+        if len(values) != len(self.inputs):
+            names = ", ".join(port.name for port in self.inputs)
+            raise DataError(
+                f"{self.name}: {len(values)} inputs given, {len(self.inputs)} expected ({names})"
+            )
+        for name in fixed:
+            if name not in self.fixed:
+                known = ", ".join(self.fixed) or 'none (grade="parametric" has `parameters`)'
+                raise DataError(
+                    f"{self.name}: {name!r} cannot be given by name; inputs that can: {known}"
+                )
+        given = {port.name: value for port, value in zip(self.inputs, values, strict=True)}
+        return {**self.fixed, **fixed, **given}
+
+
+class ArrayKernel(Kernel):
+    """A kernel that fills arrays of floats with batches of states; a target gives `_run`."""
+
+    _strided = False
+    """Whether `_run` takes batches as they lie in memory; else their rows follow one another."""
+
+    @abstractmethod
+    def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
+        """Fill `outputs` (batch, size) from `inputs` (batch, size), or (size,) where shared."""
+
+    def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
+        return self.checked(*values, **fixed)
+
+    def checked(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
         """Evaluate the kernel, after checking, converting and broadcasting what is given."""
         given = self._by_name(values, fixed)
         for port in self.ports:
@@ -234,9 +242,9 @@ def count_operations(function: ca.Function) -> int:
 
 def as_array(value: ArrayLike, name: str, shape: tuple[int, ...], dtype: str = "float64") -> Array:
     """Return `value` as floats whose last axes are `shape`, or say what was expected."""
-    refuse_masked(value, name)
+    plain = unmasked(value, name)
     try:
-        given = np.asarray(value)
+        given = np.asarray(plain)
         if given.dtype.kind not in "biufO":
             raise TypeError
         if given.dtype.kind == "O" and any(isinstance(v, str | bytes) for v in given.flat):
@@ -252,13 +260,16 @@ def as_array(value: ArrayLike, name: str, shape: tuple[int, ...], dtype: str = "
     return array
 
 
-def refuse_masked(value: Any, name: str) -> None:
-    """Raise `DataError` if elements of a masked array are masked: they have no value."""
-    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+def unmasked(value: Any, name: str) -> Any:
+    """Return a masked array's data, or raise `DataError` if elements are masked; else `value`."""
+    if not isinstance(value, np.ma.MaskedArray):
+        return value
+    if np.ma.is_masked(value):
         raise DataError(
             f"{name}: {value.size - value.count()} of {value.size} elements are masked; "
             "leave those states out, or fill them with NaN: .filled(numpy.nan)"
         )
+    return value.data
 
 
 def broadcast_lead(shapes: dict[str, tuple[int, ...]]) -> tuple[int, ...]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import importlib.util
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
@@ -72,19 +73,16 @@ class Jitted(ArrayKernel):
             for port in self.ports
         ]
 
-    def __call__(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
-        """Evaluate the kernel; see `ArrayKernel`."""
+    def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
         plain = len(values) == len(self.inputs) and not fixed
-        if plain and getattr(values[0], "ndim", 0) == 1:
+        if plain and all(type(value) is np.ndarray and value.ndim == 1 for value in values):
             given = iter(values)
             inputs = [next(given) if value is None else value for value in self._flat]
             outputs = [np.empty(port.shape) for port in self.outputs]
-            try:
+            with suppress(TypeError):  # integers, or arrays that must not be written
                 if self._module.one(*inputs, *(out.reshape(-1) for out in outputs)):
                     return outputs[0] if len(outputs) == 1 else tuple(outputs)
-            except TypeError:  # not arrays as they are asked for
-                pass
-        return self._checked(*values, **fixed)
+        return self.checked(*values, **fixed)
 
     def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
         # To Numba an array that must not be written is of another type.
