@@ -26,7 +26,7 @@ _AT_WORK = threading.Semaphore(1)
 """One compilation at a time; who comes meanwhile asks again later."""
 
 
-def numeric(robot: Manipulator, what: str, *, base: Selects | None = None) -> Kernel:
+def numeric(robot: Manipulator, what: str, *, base: Selects | None = None) -> Adaptive:
     """Return what evaluates a function for the public functions, by this policy.
 
     A first call runs at once, on CasADi's virtual machine: about 1 us a state, nothing to compile.
@@ -44,7 +44,7 @@ def numeric(robot: Manipulator, what: str, *, base: Selects | None = None) -> Ke
 
 
 @lru_cache(maxsize=512)
-def _known(robot: Manipulator, what: str) -> Kernel:
+def _known(robot: Manipulator, what: str) -> Adaptive:
     kernel = compile(robot, what, grade="parametric")
     return Adaptive(kernel, _tier(bare(robot), what, None))
 
@@ -114,6 +114,11 @@ class Adaptive(VirtualMachine):
         super().__init__(kernel.name, kernel.function, kernel.ports, kernel.outputs, kernel.fixed)
         self.tier = tier
         self._chunk = chunk
+
+    @property
+    def is_compiled(self) -> bool:
+        """Whether the C code is there."""
+        return self.tier.ready
 
     def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
         if not self.tier.ready:

@@ -196,7 +196,7 @@ class ArrayKernel(Kernel):
         inputs: list[Array] = []
         for port in self.ports:
             whole = given[port.name]
-            if not port.shared:
+            if not port.shared and whole.shape != lead + port.shape:
                 whole = np.broadcast_to(whole, lead + port.shape)
             if port.shared or not self._strided:
                 whole = np.ascontiguousarray(whole)
@@ -242,22 +242,30 @@ def count_operations(function: ca.Function) -> int:
 
 def as_array(value: ArrayLike, name: str, shape: tuple[int, ...], dtype: str = "float64") -> Array:
     """Return `value` as floats whose last axes are `shape`, or say what was expected."""
-    plain = unmasked(value, name)
-    try:
-        given = np.asarray(plain)
-        if given.dtype.kind not in "biufO":
-            raise TypeError
-        if given.dtype.kind == "O" and any(isinstance(v, str | bytes) for v in given.flat):
-            raise TypeError
-        array = np.require(given, dtype, "A")
-    except (TypeError, ValueError, OverflowError):
-        raise DataError(f"{name}: not an array of real numbers") from None
+    array: Array
+    if type(value) is np.ndarray and value.dtype == np.dtype(dtype) and value.flags.aligned:
+        array = value
+    else:
+        array = _converted(value, name, dtype)
     if len(shape) > array.ndim or array.shape[array.ndim - len(shape) :] != shape:
         expected = ", ".join(["...", *map(str, shape)])
         raise DataError(f"{name}: shape {array.shape} given, ({expected}) expected")
     if array.ndim > _AXES:
         raise DataError(f"{name}: {array.ndim} axes given, at most {_AXES} expected")
     return array
+
+
+def _converted(value: ArrayLike, name: str, dtype: str) -> Array:
+    value = unmasked(value, name)
+    try:
+        given = np.asarray(value)
+        if given.dtype.kind not in "biufO":
+            raise TypeError
+        if given.dtype.kind == "O" and any(isinstance(v, str | bytes) for v in given.flat):
+            raise TypeError
+        return np.require(given, dtype, "A")
+    except (TypeError, ValueError, OverflowError):
+        raise DataError(f"{name}: not an array of real numbers") from None
 
 
 def unmasked(value: Any, name: str) -> Any:

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import importlib.util
 import sys
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
@@ -63,26 +62,37 @@ class Jitted(ArrayKernel):
 
         return _load(entry(name, _FILE, build), name)
 
-    @cached_property
-    def _flat(self) -> list[Array | None]:
-        """Values of the fixed ports, as the compiled functions take them."""
-        return [
-            np.array(self.fixed[port.name], dtype=float).ravel()
-            if port.name in self.fixed
-            else None
-            for port in self.ports
+    def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
+        self.call = self._direct()
+        return self.call(*values, **fixed)
+
+    def _direct(self) -> Callable[..., Any]:
+        """Return what takes one state of plain arrays to `one`, and all else to `checked`."""
+        from numba.core.errors import NumbaError
+
+        one, checked, count, empty = self._module.one, self.checked, len(self.inputs), np.empty
+        shapes = [port.shape for port in self.outputs]
+        sizes = [port.size for port in self.outputs]
+        order = [port.name in self.fixed for port in self.ports]
+        known = [
+            np.array(value, dtype=float).ravel()
+            for value in (self.fixed[p.name] for p in self.ports if p.name in self.fixed)
         ]
 
-    def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
-        plain = len(values) == len(self.inputs) and not fixed
-        if plain and all(type(value) is np.ndarray and value.ndim == 1 for value in values):
-            given = iter(values)
-            inputs = [next(given) if value is None else value for value in self._flat]
-            outputs = [np.empty(port.shape) for port in self.outputs]
-            with suppress(TypeError):  # integers, or arrays that must not be written
-                if self._module.one(*inputs, *(out.reshape(-1) for out in outputs)):
-                    return outputs[0] if len(outputs) == 1 else tuple(outputs)
-        return self.checked(*values, **fixed)
+        def call(*values: Any, **fixed: Any) -> Any:
+            if not fixed and len(values) == count and getattr(values[0], "ndim", 0) == 1:
+                outputs = [empty(size) for size in sizes]
+                try:
+                    if one(*values, *known, *outputs):
+                        if len(outputs) == 1:
+                            return outputs[0].reshape(shapes[0])
+                        return tuple(map(np.reshape, outputs, shapes))
+                except (TypeError, NumbaError):  # integers, or not to be written
+                    pass
+            return checked(*values, **fixed)
+
+        # Fixed inputs come last, as `compile` has them.
+        return call if order == sorted(order) else checked
 
     def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
         # To Numba an array that must not be written is of another type.

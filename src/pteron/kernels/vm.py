@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import casadi as ca
@@ -24,9 +24,13 @@ class VirtualMachine(ArrayKernel):
         """The instructions, one a line, as CasADi prints them."""
         return str(self.function.str(True))
 
+    @cached_property
+    def _lowered(self) -> ca.Function:
+        return _lowered(self.function)
+
     def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
         shared = tuple(i for i, port in enumerate(self.ports) if port.shared)
-        function = _lowered(self.function)
+        function = self._lowered
         whole = batch - batch % _BLOCK
         if whole:
             _sweep(_mapped(function, shared), inputs, outputs, range(0, whole, _BLOCK), _BLOCK)
