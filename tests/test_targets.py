@@ -97,6 +97,13 @@ def assert_close(found, expected, tolerance):
         assert np.nanmax(error, initial=0.0) < tolerance
 
 
+def importable(target):
+    if target not in ("vm", "c"):
+        pytest.importorskip(target)
+    if target == "c" and compiler() is None:
+        pytest.skip("no C compiler")
+
+
 # Agreement.
 
 
@@ -168,10 +175,7 @@ EDGES = [
 
 @pytest.mark.parametrize("target", ["c", "numba"])
 def test_sines_have_the_same_bits_on_every_target(target):
-    if target == "numba":
-        pytest.importorskip("numba")
-    elif compiler() is None:
-        pytest.skip("no C compiler")
+    importable(target)
     x = ca.SX.sym("x")
     function = ca.Function("turn", [x], [ca.vertcat(ca.cos(x), ca.sin(x))])
     ports = (Port("angle", (1,)),), (Port("turn", (2,)),)
@@ -189,6 +193,27 @@ def test_sines_have_the_same_bits_on_every_target(target):
         for (angle,), turn in zip(angles[some], expected[some], strict=True):
             for found, exact in zip(turn, (mpmath.cos(angle), mpmath.sin(angle)), strict=True):
                 assert abs(found - exact) < np.spacing(abs(float(exact)))
+
+
+@pytest.mark.parametrize("target", ["c", "jax"])
+def test_comparisons_and_extremes_are_those_of_casadi(target):
+    importable(target)
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    truths = [x < y, x <= y, ca.eq(x, y), ca.ne(x, y), ca.logic_not(x), ca.logic_and(x, y)]
+    outputs = [*truths, ca.logic_or(x, y), ca.fmin(x, y), ca.fmax(x, y), ca.floor(x)]
+    outputs.append(ca.if_else(x <= y, x * y, 2.0))
+    function = ca.Function("f", [x, y], [ca.vertcat(*outputs)])
+    ports = (Port("x", (1,)), Port("y", (1,))), (Port("f", (len(outputs),)),)
+    vm, other = (TARGETS[name]("f", function, *ports) for name in ("vm", target))
+    values = np.array([0.0, -1.5, 1.5, 2.0, np.inf, np.nan])
+    given = np.repeat(values, 6)[:, None], np.tile(values, 6)[:, None]
+    expected = vm(*given)
+    if target == "jax":  # whose extremes of a number and NaN are NaN
+        found, expected = (np.delete(v, [7, 8], 1) for v in (other(*given), expected))
+        np.testing.assert_array_equal(found, expected)
+    else:
+        assert_same_bits(other(*given), expected)
+        assert_same_bits(other(given[0][9], given[1][9]), expected[9])
 
 
 @needs_compiler
@@ -324,13 +349,6 @@ def test_base_parameters_of_another_layout_are_refused():
 
 
 # What a call accepts.
-
-
-def importable(target):
-    if target not in ("vm", "c"):
-        pytest.importorskip(target)
-    if target == "c" and compiler() is None:
-        pytest.skip("no C compiler")
 
 
 @pytest.mark.parametrize("target", ["c", "numba"])

@@ -38,7 +38,12 @@ def module_source(
     A batch is computed in blocks of `block` states.
     """
     printed = single_precision(C) if dtype == "float32" else C
-    printed = printed | {"sin": "sincos_({0}).sine", "cos": "sincos_({0}).cosine"}
+    printed = printed | {
+        "sin": "sincos_({0}).sine",
+        "cos": "sincos_({0}).cosine",
+        "fmin": "fmin_({0}, {1})",
+        "fmax": "fmax_({0}, {1})",
+    }
     near, near_results = near_statements(C, "const double {0} = {1};")
     stages = Stages.of(graph, inputs, outputs)
 

@@ -32,9 +32,15 @@ C = {
     "fmin": "fmin({0}, {1})",
     "fmax": "fmax({0}, {1})",
     "less": "({0} < {1})",
+    "less_equal": "({0} <= {1})",
+    "equal": "({0} == {1})",
+    "unequal": "({0} != {1})",
+    "not": "({0} == 0)",
+    "and": "(({0} != 0) & ({1} != 0))",
+    "or": "(({0} != 0) | ({1} != 0))",
     "select": "({0} ? {1} : 0)",
 }
-"""Operations in C; `less` is a truth value, by which `select` takes its argument or zero."""
+"""Operations in C; comparisons give truth values, by which `select` takes its argument or zero."""
 
 PYTHON = C | {"select": "({1} if {0} else 0.0)"}
 """Operations in Python, for a namespace that has sqrt, sin and so on."""

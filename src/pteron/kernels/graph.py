@@ -34,10 +34,16 @@ _OPERATIONS = {
     ca.OP_SQ: "sq",
     ca.OP_TWICE: "twice",
     ca.OP_LT: "less",
+    ca.OP_LE: "less_equal",
+    ca.OP_EQ: "equal",
+    ca.OP_NE: "unequal",
+    ca.OP_NOT: "not",
+    ca.OP_AND: "and",
+    ca.OP_OR: "or",
     ca.OP_IF_ELSE_ZERO: "select",
 }
 
-_UNARY = frozenset({"neg", "sqrt", "sin", "cos", "fabs", "floor"})
+_UNARY = frozenset({"neg", "sqrt", "sin", "cos", "fabs", "floor", "not"})
 
 
 @dataclass(frozen=True)
