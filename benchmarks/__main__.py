@@ -9,6 +9,7 @@ import os
 import platform
 import subprocess
 import sys
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -90,11 +91,11 @@ def processor() -> str:
     return name
 
 
-def first_line(command: str | None) -> str:
+def first_line(command: Sequence[str] | None) -> str:
     """Return what a compiler calls itself."""
     if command is None:
         return "none"
-    run = subprocess.run([command, "--version"], capture_output=True, text=True, check=False)
+    run = subprocess.run([*command, "--version"], capture_output=True, text=True, check=False)
     return (run.stdout.splitlines() or ["unknown"])[0]
 
 

@@ -34,7 +34,7 @@ from peers import Peer, peers
 
 import pteron
 from pteron.export import Real
-from pteron.kernels import Kernel
+from pteron.kernels import Kernel, numeric
 from pteron.kernels.c import compiler
 
 _CPP = "Pinocchio, C++, usual flags"
@@ -44,6 +44,10 @@ _PYTHON_TUNED = "Pinocchio, Python, tuned"
 _MUJOCO = "MuJoCo, Python, tuned"
 _MUJOCO_C = "MuJoCo, C, tuned"
 _MUJOCO_CLOSED = "MuJoCo, C, loops closed by constraints"
+
+_PUBLIC = "pteron.inverse_dynamics"
+_UNDER_IT = "pteron c, parametric"
+"""The kernel that the public function evaluates."""
 
 _SECONDS = 0.02
 """Length of a round of single calls from Python."""
@@ -67,11 +71,16 @@ def single_calls(robot: pteron.Manipulator, others: list[Peer]) -> None:
     states = random_states(robot, 200)
     expected = reference(robot, states)
     contestants = []
-    for name, kernel in kernels(robot, ("vm", "numba", "c", "c, base")).items():
-        forces = np.array([kernel(*state) for state in zip(*states, strict=True)])
-        contestants.append(
-            Contestant(name, a_call(kernel, states), relative_error(forces, expected))
-        )
+    ours: dict[str, Callable[..., Array]] = dict(
+        kernels(robot, ("vm", "numba", "c", "c, parametric", "c, base"))
+    )
+    ours[_PUBLIC] = public(robot)
+    for name, function in ours.items():
+        forces = np.array([function(*state) for state in zip(*states, strict=True)])
+        error = relative_error(forces, expected)
+        contestants.append(Contestant(name, a_call(function, states), error))
+    lists = tuple([value[0].tolist()] for value in states)
+    contestants.append(Contestant("pteron c, lists", a_call(ours["pteron c"], lists), 0.0))
     for peer in others:
         if peer.call is not None:
             error = relative_error(peer.forces(*states), expected)
@@ -79,6 +88,7 @@ def single_calls(robot: pteron.Manipulator, others: list[Peer]) -> None:
     times = run("Single calls from Python", contestants, rounds=3 if quick() else 40)
     for slow in (_PYTHON, _PYTHON_TUNED, _MUJOCO):
         print_ratio(times, slow, "pteron c")
+    print_ratio(times, _PUBLIC, _UNDER_IT)
 
 
 def exported_calls(robot: pteron.Manipulator) -> None:
@@ -114,7 +124,9 @@ def batches(robot: pteron.Manipulator, others: list[Peer]) -> None:
     contestants: list[Contestant] = []
     parallel: list[Contestant] = []
     options = ("", ", base", ", 2 threads", ", base, 2 threads", ", float32", ", base, float32")
-    names = ("vm", "numba", *(f"c{option}" for option in options))
+    names = ("vm", "numba", "c, parametric", *(f"c{option}" for option in options))
+    error = relative_error(public(robot)(*states), expected)
+    contestants.append(Contestant(_PUBLIC, a_sweep(public(robot), states), error))
     for name, kernel in kernels(robot, names).items():
         given = [np.ascontiguousarray(value, dtype=kernel.dtype) for value in states]
         error = relative_error(kernel(*given).astype(float), expected)
@@ -130,6 +142,7 @@ def batches(robot: pteron.Manipulator, others: list[Peer]) -> None:
         if not (quick() and slow in (_CPP, _CPP_TUNED)):
             for fast in ("pteron c", "pteron c, base"):
                 print_ratio(times, slow, fast)
+    print_ratio(times, _PUBLIC, _UNDER_IT)
     if find_spec("jax") is None:
         print("pteron jax: left out, the package jax is not installed")
     else:
@@ -140,19 +153,30 @@ def batches(robot: pteron.Manipulator, others: list[Peer]) -> None:
 def kernels(robot: pteron.Manipulator, names: Sequence[str]) -> dict[str, Kernel]:
     """Return the kernels that these names ask for; without a C compiler, those that need none."""
     found = {}
+    no_numba = find_spec("numba") is None
     for name in names:
         target, *options = name.split(", ")
-        if target == "c" and compiler() is None:
+        if (target == "c" and compiler() is None) or (target == "numba" and no_numba):
             continue
         found[f"pteron {name}"] = pteron.compile(
             robot,
             "inverse_dynamics",
             target,
             base=pteron.cheapest_parameters(robot) if "base" in options else None,
+            grade="parametric" if "parametric" in options else "specialised",
             dtype="float32" if "float32" in options else "float64",
             threads=2 if "2 threads" in options else 1,
         )
     return found
+
+
+def public(robot: pteron.Manipulator) -> Callable[..., Array]:
+    """Return the public function, once it runs C code where there is a compiler."""
+    states = random_states(robot, 2_000)
+    deadline = perf_counter() + (60.0 if compiler() else 0.0)
+    while not numeric(robot, "inverse_dynamics").is_compiled and perf_counter() < deadline:
+        pteron.inverse_dynamics(robot, *states)
+    return partial(pteron.inverse_dynamics, robot)
 
 
 def reference(robot: pteron.Manipulator, states: States) -> Array:
@@ -161,9 +185,9 @@ def reference(robot: pteron.Manipulator, states: States) -> Array:
     return forces
 
 
-def a_call(function: Callable[..., Any], states: States) -> Callable[[], float]:
+def a_call(function: Callable[..., Any], states: Sequence[Any]) -> Callable[[], float]:
     """Return what times a round of calls with one state."""
-    one = [value[0].copy() for value in states]
+    one = [value[0] for value in states]
     names = dict(zip(("f", "x", "dx", "ddx"), (function, *one), strict=True))
     timer = Timer("f(x, dx, ddx)", globals=names)
     timer.timeit(100)
@@ -171,7 +195,7 @@ def a_call(function: Callable[..., Any], states: States) -> Callable[[], float]:
     return lambda: timer.timeit(count) / count
 
 
-def a_sweep(kernel: Kernel, given: list[Array]) -> Callable[[], float]:
+def a_sweep(kernel: Callable[..., Any], given: Sequence[Array]) -> Callable[[], float]:
     """Return what times one call with the whole batch, its result's memory included."""
 
     def seconds() -> float:

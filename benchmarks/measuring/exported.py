@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import subprocess
+from collections.abc import Sequence
 from ctypes import c_double, c_float, c_long, c_void_p
 from functools import partial
 from pathlib import Path
@@ -45,7 +46,7 @@ _COUNT = 20_000
 
 def exported(
     robot: pteron.Manipulator,
-    compiler: str,
+    compiler: Sequence[str],
     folder: Path,
     form: str,
     real: Real,
@@ -59,8 +60,8 @@ def exported(
     ----------
     robot : Manipulator
         The machine.
-    compiler : str
-        The C compiler.
+    compiler : sequence of str
+        The C compiler's command.
     folder : path
         An empty folder, whose files must stay.
     form : str
@@ -84,10 +85,10 @@ def exported(
         defined.append(f"-DTABLE={name}_{table}")
     library, loop = folder / "latency.so", folder / "latency.o"
     driver = [str(Path(__file__).with_name("latency.c")), *defined, f"-I{folder}"]
-    subprocess.run([compiler, *_FLAGS, *_LOOP, *driver, "-c", "-o", str(loop)], check=True)
+    subprocess.run([*compiler, *_FLAGS, *_LOOP, *driver, "-c", "-o", str(loop)], check=True)
     function_itself = [*level, str(folder / f"{name}.c"), str(loop)]
     subprocess.run(
-        [compiler, *_FLAGS, "-shared", *function_itself, "-o", str(library), "-lm"], check=True
+        [*compiler, *_FLAGS, "-shared", *function_itself, "-o", str(library), "-lm"], check=True
     )
 
     loaded = ctypes.CDLL(str(library))

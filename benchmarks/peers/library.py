@@ -83,7 +83,7 @@ def compiled(
             raise Missing(f"{compiler} cannot compile {source}: {(errors or [run.stderr])[0]}")
 
     try:
-        return ctypes.CDLL(str(entry(name, build) / library))
+        return ctypes.CDLL(str(entry(name, library, build)))
     except OSError as error:
         raise Missing(f"{source}: {error}") from None
 

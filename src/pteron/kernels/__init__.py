@@ -16,8 +16,7 @@ from pteron.kernels.functions import (
     specialised,
 )
 from pteron.kernels.graph import Graph, graph_of
-from pteron.kernels.kernel import Array, Kernel, Port, as_array
-from pteron.kernels.operations import count_operations
+from pteron.kernels.kernel import Array, Kernel, Port, as_array, count_operations
 from pteron.kernels.targets import (
     OTHER_LAYOUT,
     TARGETS,

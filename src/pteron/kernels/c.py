@@ -11,136 +11,169 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import shlex
 import shutil
 import subprocess
+import sys
 import sysconfig
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, lru_cache
 from importlib.machinery import EXTENSION_SUFFIXES, ExtensionFileLoader
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import casadi as ca
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pteron.errors import ModelError
 from pteron.kernels.c_module import module_source
 from pteron.kernels.cache import digest, entry, find
 from pteron.kernels.graph import graph_of
-from pteron.kernels.kernel import Array, ArrayKernel
-
-__all__ = ["Compiled", "compiler"]
+from pteron.kernels.kernel import SHARE, Array, ArrayKernel, Port
 
 _FLAGS = (
     *("-std=c99", "-O3", "-march=native", "-fno-math-errno", "-fPIC"),
+    # Nobody looks at the traps of floating-point operations; minding them keeps loops scalar.
+    "-fno-trapping-math",
     # gcc 12 makes fused operations of pairs of statements even so (vfmaddsub), unless it is kept
     # from pairing them; loops, which are what is vectorised here, do not need that.
     *("-ffp-contract=off", "-fno-tree-slp-vectorize"),
 )
 
+_LIBRARY = "pteron_kernel" + EXTENSION_SUFFIXES[0]
 
-@lru_cache(maxsize=1)
-def compiler() -> str | None:
-    """Return the C compiler, if there is one and Python's headers are there too."""
-    given = os.environ.get("CC")
-    found = shutil.which(given) if given else shutil.which("cc") or shutil.which("gcc")
+
+def compiler() -> tuple[str, ...] | None:
+    """Return the C compiler's command, if there is one and Python's headers are there too.
+
+    The environment variable CC names another than `cc` and `gcc`, with options: `CC="gcc -m64"`.
+    """
+    return _command(os.environ.get("CC", ""), os.environ.get("PATH", ""))
+
+
+@lru_cache(maxsize=4)
+def _command(given: str, path: str) -> tuple[str, ...] | None:
+    try:
+        words = shlex.split(given) or ["cc" if shutil.which("cc", path=path) else "gcc"]
+    except ValueError:
+        return None
+    found = shutil.which(words[0], path=path)
     headers = Path(sysconfig.get_path("include"), "Python.h").exists()
-    return found if headers else None
+    return (found, *words[1:]) if found and headers else None
 
 
-@lru_cache(maxsize=1)
-def _version(compiler: str) -> str:
-    done = subprocess.run([compiler, "--version"], capture_output=True, text=True, check=False)
-    return done.stdout
+@lru_cache(maxsize=4)
+def _version(command: tuple[str, ...]) -> str:
+    return _run(command, "--version").stdout
 
 
-@dataclass(frozen=True)
+def _run(command: Sequence[str], *more: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([*command, *more], capture_output=True, text=True, check=False)
+
+
+class Code:
+    """The C code of a function, compiled when it is first called; kernels may share it."""
+
+    def __init__(
+        self,
+        name: str,
+        function: ca.Function,
+        inputs: tuple[Port, ...],
+        outputs: tuple[Port, ...],
+        dtype: str = "float64",
+    ) -> None:
+        self.name = name
+        self.ports = inputs
+        self.dtype = dtype
+        self._program = function, outputs
+
+    @cached_property
+    def source(self) -> str:
+        """The C code."""
+        function, outputs = self._program
+        graph = graph_of(function, self.ports)
+        return module_source(self.name, graph, self.ports, outputs, self.dtype)
+
+    @property
+    def _entry(self) -> str:
+        command = compiler()
+        if command is None:
+            given = os.environ.get("CC")
+            why = f"CC={given} is not one" if given else "which are not here"
+            raise ModelError(
+                f'target: "c" needs a C compiler and Python\'s headers, {why}; '
+                'install them, or use "vm" or "numba"'
+            )
+        return f"c-{self.name}-{digest(self.source, *command, _version(command), *_FLAGS)}"
+
+    def is_cached(self) -> bool:
+        """Return whether the compiled code is on disk, ready to be loaded."""
+        return find(self._entry, _LIBRARY) is not None
+
+    @cached_property
+    def module(self) -> ModuleType:
+        """The module, compiled and loaded."""
+        path = str(entry(self._entry, _LIBRARY, self._build))
+        loader = ExtensionFileLoader("pteron_kernel", path)
+        spec = importlib.util.spec_from_file_location("pteron_kernel", path, loader=loader)
+        assert spec is not None
+        module = importlib.util.module_from_spec(spec)
+        loader.exec_module(module)
+        return module
+
+    def _build(self, folder: Path) -> None:
+        command = compiler()
+        assert command is not None  # `_entry` has asked
+        source, library = folder / "kernel.c", folder / _LIBRARY
+        source.write_text(self.source, encoding="utf-8")
+        headers = (f"-I{path}" for path in (sysconfig.get_path("include"), np.get_include()))
+        done = _run(command, *_FLAGS, *headers, "-shared", str(source), "-o", str(library), "-lm")
+        if done.returncode != 0:
+            lines = done.stderr.strip().splitlines() or [f"exit code {done.returncode}"]
+            raise ModelError(
+                f'target: "c" could not be compiled with {" ".join(command)}: {lines[0]}; use '
+                '"vm" or "numba", or set CC to another compiler'
+            )
+
+    def bound(
+        self, fixed: Mapping[str, Array], otherwise: Callable[..., Any], most: int = sys.maxsize
+    ) -> Callable[..., Any]:
+        """Return the callable with some inputs fixed, as cheap as a call from Python can be.
+
+        What needs converting or checking, and batches of `most` states or more, go to `otherwise`.
+        """
+        values = (
+            np.array(fixed[port.name], self.dtype).reshape(port.shape)
+            if port.name in fixed
+            else None
+            for port in self.ports
+        )
+        bound: Callable[..., Any] = self.module.bind(otherwise, most, *values)
+        return bound
+
+
 class Compiled(ArrayKernel):
     """A kernel in machine code."""
 
     _strided = True
 
     @cached_property
-    def source(self) -> str:
-        """The C code."""
-        graph = graph_of(self.function, self.inputs)
-        return module_source(self.name, graph, self.inputs, self.outputs, self.dtype)
+    def code(self) -> Code:
+        """Its C code, and what is compiled from it."""
+        return Code(self.name, self.function, self.ports, self.outputs, self.dtype)
 
     @property
-    def _name(self) -> str:
-        path = compiler()
-        if path is None:
-            raise ModelError(
-                'target: "c" needs a C compiler and Python\'s headers, which are not here; '
-                'install them, or use "numba"'
-            )
-        return f"c-{self.name}-{digest(self.source, _version(path), *_FLAGS)}"
+    def source(self) -> str:
+        """The C code."""
+        return self.code.source
 
-    def is_cached(self) -> bool:
-        """Return whether the code is on disk, ready to be loaded."""
-        return find(self._name) is not None
-
-    def prepare(self) -> None:
-        """Compile the code now, or load it."""
-        _ = self._module
-
-    @cached_property
-    def _module(self) -> ModuleType:
-        return _load(entry(self._name, self._build))
-
-    def _build(self, folder: Path) -> None:
-        path = compiler()
-        assert path is not None  # `_name` has asked
-        source, library = folder / "kernel.c", folder / _LIBRARY
-        source.write_text(self.source, encoding="utf-8")
-        headers = (sysconfig.get_path("include"), np.get_include())
-        command = [path, *_FLAGS, *(f"-I{header}" for header in headers), "-shared"]
-        command += [str(source), "-o", str(library), "-lm"]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        if done.returncode != 0:
-            lines = done.stderr.strip().splitlines() or [f"exit code {done.returncode}"]
-            raise ModelError(
-                f'target: "c" could not be compiled with {path}: {lines[0]}; use "numba", or set '
-                "CC to another compiler"
-            )
-
-    def with_fixed(self, fixed: dict[str, Array]) -> Compiled:
-        """Return the kernel with other fixed inputs, and the code that is already loaded."""
-        other = replace(self, fixed=fixed)
-        other.__dict__.update(source=self.source, _module=self._module)
-        return other
-
-    @cached_property
-    def _direct(self) -> Callable[..., Any] | None:
-        call: Callable[..., Any] = self._module.call
-        given = [port.name in self.fixed for port in self.inputs]
-        if given != sorted(given):
-            return None
-        fixed = [
-            np.ascontiguousarray(self.fixed[port.name], dtype=self.dtype).reshape(port.shape)
-            for port in self.inputs
-            if port.name in self.fixed
-        ]
-        if self.threads > 1:
-            # Threads are for batches: those go through `_checked`, which splits them.
-            return lambda *values: (
-                call(*values, *fixed) if values and getattr(values[0], "ndim", 2) < 2 else None
-            )
-        return (lambda *values: call(*values, *fixed)) if fixed else call
+    def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
+        # Threads are for batches: `checked` splits them.
+        most = 2 * SHARE if self.threads > 1 else sys.maxsize
+        self.call = self.code.bound(self.fixed, self.checked, most)
+        return self.call(*values, **fixed)
 
     def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
-        self._module.run(*inputs, *outputs)
-
-
-_LIBRARY = "pteron_kernel" + EXTENSION_SUFFIXES[0]
-
-
-def _load(folder: Path) -> ModuleType:
-    path = str(folder / _LIBRARY)
-    loader = ExtensionFileLoader("pteron_kernel", path)
-    spec = importlib.util.spec_from_file_location("pteron_kernel", path, loader=loader)
-    assert spec is not None
-    module = importlib.util.module_from_spec(spec)
-    loader.exec_module(module)
-    return module
+        self.code.module.run(*inputs, *outputs)

@@ -3,6 +3,9 @@
 An entry is a folder of files under the user's cache directory, named by a digest of all that it
 was made of. It is built in a folder of its own and moved into place, so that two processes may
 build it at once; a manifest of digests tells a damaged one, which is then built again.
+
+What lies there is loaded and run. So a directory that belongs to somebody else, or that others may
+write to, is neither read nor written: a temporary one, gone with the process, takes its place.
 """
 
 from __future__ import annotations
@@ -24,12 +27,18 @@ from pathlib import Path
 import numpy as np
 from platformdirs import user_cache_path
 
-__all__ = ["VARIABLE", "digest", "directory", "entry", "find", "host"]
+from pteron.errors import OutputError
 
 VARIABLE = "PTERON_CACHE"
 """Environment variable with another directory for compiled code."""
 
 _MANIFEST = "manifest.json"
+
+_WORK = ".pteron-work-"
+"""Begins the name of a folder that is being built, or being removed."""
+
+_MARK = ".made-by-pteron"
+"""A file in each folder that is made here: the sweep touches no other."""
 
 _STALE = 3600.0
 """Seconds after which nobody works on a folder any more."""
@@ -62,64 +71,97 @@ def digest(*parts: str) -> str:
     return total.hexdigest()[:24]
 
 
-def find(name: str) -> Path | None:
-    """Return the folder of an entry that is there and whole, or None."""
-    folder = directory() / name
+def find(name: str, file: str) -> Path | None:
+    """Return the file of an entry that is there and whole, or None."""
+    folder = _root() / name
     try:
         manifest = json.loads((folder / _MANIFEST).read_text(encoding="utf-8"))
-        whole = all(_hash(folder / file) == value for file, value in manifest.items())
-    except (OSError, ValueError, AttributeError):
+        whole = file in manifest and all(_hash(folder / f) == v for f, v in manifest.items())
+    except (OSError, ValueError, AttributeError, TypeError):
         return None
-    return folder if whole else None
+    return folder / file if whole else None
 
 
-def entry(name: str, build: Callable[[Path], None]) -> Path:
-    """Return the folder of an entry; `build` fills a new folder where there is none, or no whole.
+def entry(name: str, file: str, build: Callable[[Path], None]) -> Path:
+    """Return a file of an entry; `build` fills a new folder where there is none, or no whole.
 
-    Where the cache cannot be written, the folder is a temporary one.
+    Raises
+    ------
+    OutputError
+        If the disk takes no more.
     """
-    found = find(name)
+    found = find(name, file)
     if found is not None:
         return found
-    target = directory() / name
+    root = _root()
+    _sweep(root)
     try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        _swept(target.parent)
-        work = Path(tempfile.mkdtemp(prefix=f".{name}-", dir=target.parent))
+        work = _work_folder(root)
     except OSError:
-        work = Path(tempfile.mkdtemp(prefix="pteron-"))
-        atexit.register(shutil.rmtree, work, ignore_errors=True)
-        target = work
+        root = _private()
+        work = _work_folder(root)
     try:
         build(work)
         files = [path for path in sorted(work.rglob("*")) if path.is_file()]
         manifest = {path.relative_to(work).as_posix(): _hash(path) for path in files}
         (work / _MANIFEST).write_text(json.dumps(manifest), encoding="utf-8")
+    except OSError as error:
+        shutil.rmtree(work, ignore_errors=True)
+        raise OutputError(
+            f"{root}: compiled code cannot be written ({error.strerror or error}); make room, or "
+            f"name another folder in the environment variable {VARIABLE}"
+        ) from None
     except BaseException:
         shutil.rmtree(work, ignore_errors=True)
         raise
-    return work if target == work else _moved(work, target)
+    return _moved(work, root / name, file) / file
 
 
-def _swept(folder: Path) -> None:
-    """Remove what processes that were killed at work have left behind."""
-    for left in folder.glob(".*-*"):
+def _root() -> Path:
+    """Return the directory of entries: the user's, or a temporary one where that is not safe."""
+    folder = directory()
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        found = folder.stat()
+    except OSError:
+        return _private()
+    # On Windows a user's folders are closed to others, and modes say nothing.
+    ours = os.name == "nt" or (found.st_uid == os.geteuid() and not found.st_mode & 0o022)
+    return folder if ours else _private()
+
+
+@lru_cache(maxsize=1)
+def _private() -> Path:
+    folder = Path(tempfile.mkdtemp(prefix="pteron-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
+
+
+def _work_folder(root: Path) -> Path:
+    folder = Path(tempfile.mkdtemp(prefix=_WORK, dir=root))
+    (folder / _MARK).touch()
+    return folder
+
+
+def _sweep(root: Path) -> None:
+    """Remove what processes that were killed at work have left behind, and nothing else."""
+    for mark in root.glob(f"{_WORK}*/{_MARK}"):
         with suppress(OSError):
-            if time.time() - left.stat().st_mtime > _STALE:
-                shutil.rmtree(left, ignore_errors=True)
+            if time.time() - mark.stat().st_mtime > _STALE:
+                shutil.rmtree(mark.parent, ignore_errors=True)
 
 
-def _moved(work: Path, target: Path) -> Path:
+def _moved(work: Path, target: Path, file: str) -> Path:
     """Move a finished folder into place, unless another process was first."""
     for _ in range(3):
         try:
             work.rename(target)
         except OSError:
-            if find(target.name) is not None:
+            if find(target.name, file) is not None:
                 shutil.rmtree(work, ignore_errors=True)
                 return target
             # In place, but damaged: out of the way first, so that nobody sees half of it.
-            wreck = Path(tempfile.mkdtemp(prefix=".damaged-", dir=target.parent))
+            wreck = _work_folder(target.parent)
             with suppress(OSError):
                 target.rename(wreck / target.name)
             shutil.rmtree(wreck, ignore_errors=True)

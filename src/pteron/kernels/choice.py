@@ -2,31 +2,25 @@
 
 from __future__ import annotations
 
+import math
 import os
 import threading
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
-from pteron.kernels.c import Compiled, compiler
+from numpy.typing import ArrayLike
+
+from pteron.kernels.c import Code, compiler
 from pteron.kernels.functions import Columns, bare, program
-from pteron.kernels.kernel import Array, Kernel
+from pteron.kernels.kernel import Array, Kernel, sliced
 from pteron.kernels.targets import Selects, columns_of
 from pteron.kernels.vm import VirtualMachine
 from pteron.manipulator import Manipulator, parameters
 
-__all__ = ["VARIABLE", "Adaptive", "numeric"]
-
 VARIABLE = "PTERON_KERNELS"
 """Environment variable: `vm` keeps the public functions on CasADi's virtual machine."""
-
-_PATIENCE = 0.1
-"""Seconds of the virtual machine on one function and layout before C code is asked for."""
-
-_CHUNK = 1 << 15
-"""States between two looks at whether the C code is ready."""
 
 _AT_WORK = threading.Semaphore(1)
 """One compilation at a time; who comes meanwhile asks again later."""
@@ -34,7 +28,7 @@ _AT_WORK = threading.Semaphore(1)
 
 def numeric(
     robot: Manipulator, what: str, *, base: Selects | None = None, wrench: bool = False
-) -> Kernel:
+) -> Adaptive:
     """Return what evaluates a function for the public functions, by this policy.
 
     A first call runs at once, on CasADi's virtual machine: about 1 us a state, nothing to compile.
@@ -49,28 +43,43 @@ def numeric(
 
 
 @lru_cache(maxsize=512)
-def _known(robot: Manipulator, what: str, columns: Columns | None, wrench: bool) -> Kernel:
+def _known(robot: Manipulator, what: str, columns: Columns | None, wrench: bool) -> Adaptive:
     built = program(robot, what, columns, wrench=wrench, guarded=True)
     fixed = {port.name: parameters(robot) for port in built.inputs if port.name == "parameters"}
-    tier = _tier(bare(robot), what, columns, wrench)
-    return Adaptive(built.name, built.function, built.inputs, built.outputs, fixed, tier=tier)
+    kernel = VirtualMachine(built.name, built.function, built.inputs, built.outputs, fixed)
+    return Adaptive(kernel, _tier(bare(robot), what, columns, wrench))
 
 
-class _Tier:
-    """The C code of one function and layout, and how long it has been missed."""
+@lru_cache(maxsize=512)
+def _tier(layout: Manipulator, what: str, columns: Columns | None, wrench: bool) -> Tier:
+    """Return what machines of one layout share; their inertial parameters are left out of it."""
+    built = program(layout, what, columns, wrench=wrench, guarded=True)
+    code = Code(built.name, built.function, built.inputs, built.outputs)
+    return Tier(code, math.inf if os.environ.get(VARIABLE) == "vm" else 0.1)
 
-    def __init__(self, code: Compiled) -> None:
+
+class Tier:
+    """The C code of one function and layout, and how long it has been missed.
+
+    Parameters
+    ----------
+    code : Code
+        The code.
+    patience : float
+        Seconds of the virtual machine's work before the code is asked for.
+    """
+
+    def __init__(self, code: Code, patience: float) -> None:
         self.code = code
         self.ready = False
-        self._asked = os.environ.get(VARIABLE) == "vm"
-        self._seconds = 0.0
+        self._patience = patience
 
     def missed(self, seconds: float) -> None:
         """Take note that the virtual machine worked so long in its place."""
-        self._seconds += seconds
-        if self._asked or self._seconds < _PATIENCE or not _AT_WORK.acquire(blocking=False):
+        self._patience -= seconds
+        if self._patience > 0.0 or not _AT_WORK.acquire(blocking=False):
             return
-        self._asked = True
+        self._patience = math.inf
         if compiler() is None:
             _AT_WORK.release()
             return
@@ -79,7 +88,7 @@ class _Tier:
 
     def _fetch(self) -> None:
         try:
-            self.code.prepare()
+            _ = self.code.module
             self.ready = True
         except Exception:
             # A compiler that fails costs speed, not results: the virtual machine goes on. Whoever
@@ -89,36 +98,42 @@ class _Tier:
             _AT_WORK.release()
 
 
-@lru_cache(maxsize=512)
-def _tier(layout: Manipulator, what: str, columns: Columns | None, wrench: bool) -> _Tier:
-    """Return what machines of one layout share; their inertial parameters are left out of it."""
-    built = program(layout, what, columns, wrench=wrench, guarded=True)
-    return _Tier(Compiled(built.name, built.function, built.inputs, built.outputs))
-
-
-@dataclass(frozen=True)
 class Adaptive(VirtualMachine):
-    """A kernel of the virtual machine that gives way to C code once that is there."""
+    """A kernel of the virtual machine that gives way to C code once that is there.
 
-    tier: Any = field(default=None, hash=False, compare=False)
+    Parameters
+    ----------
+    kernel : Kernel
+        The function, its ports and what is fixed.
+    tier : Tier
+        The C code.
+    chunk : int
+        States between two looks at whether it is ready.
+    """
+
+    def __init__(self, kernel: Kernel, tier: Tier, chunk: int = 1 << 15) -> None:
+        super().__init__(kernel.name, kernel.function, kernel.ports, kernel.outputs, kernel.fixed)
+        self.tier = tier
+        self._chunk = chunk
 
     @property
-    def _direct(self) -> Callable[..., Any] | None:
+    def is_compiled(self) -> bool:
+        """Whether the C code is there."""
+        return self.tier.ready
+
+    def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
         if not self.tier.ready:
-            return None
-        if "direct" not in self.__dict__:
-            self.__dict__["direct"] = self.tier.code.with_fixed(self.fixed)._direct
-        direct: Callable[..., Any] | None = self.__dict__["direct"]
-        return direct
+            return self.checked(*values, **fixed)
+        self.call = self.tier.code.bound(self.fixed, self.checked)
+        return self.call(*values, **fixed)
 
     def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
-        for start in range(0, batch, _CHUNK):
-            stop = min(start + _CHUNK, batch)
-            part = [value if value.ndim == 1 else value[start:stop] for value in inputs]
-            results = [value[start:stop] for value in outputs]
+        for start in range(0, batch, self._chunk):
+            stop = min(start + self._chunk, batch)
+            part = sliced(inputs, outputs, start, stop)
             if self.tier.ready:
-                self.tier.code._run(stop - start, part, results)
+                self.tier.code.module.run(*part[0], *part[1])
                 continue
             begin = time.perf_counter()
-            super()._run(stop - start, part, results)
+            super()._run(stop - start, *part)
             self.tier.missed(time.perf_counter() - begin)

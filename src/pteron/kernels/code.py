@@ -5,22 +5,17 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pteron.kernels.graph import CONSTANT, INPUT, Graph
+from pteron.kernels.graph import CONSTANT, INPUT, Graph, graph_of
 from pteron.kernels.kernel import Port
+from pteron.kernels.sincos import near
 
-__all__ = [
-    "C",
-    "PYTHON",
-    "Stages",
-    "c_constant",
-    "names_of",
-    "single_precision",
-    "statements",
-    "used_inputs",
-]
+if TYPE_CHECKING:
+    import jinja2
 
 C = {
     "add": "{0} + {1}",
@@ -33,12 +28,19 @@ C = {
     "cos": "cos({0})",
     "atan2": "atan2({0}, {1})",
     "fabs": "fabs({0})",
+    "floor": "floor({0})",
     "fmin": "fmin({0}, {1})",
     "fmax": "fmax({0}, {1})",
     "less": "({0} < {1})",
+    "less_equal": "({0} <= {1})",
+    "equal": "({0} == {1})",
+    "unequal": "({0} != {1})",
+    "not": "({0} == 0)",
+    "and": "(({0} != 0) & ({1} != 0))",
+    "or": "(({0} != 0) | ({1} != 0))",
     "select": "({0} ? {1} : 0)",
 }
-"""Operations in C; `less` is a truth value, by which `select` takes its argument or zero."""
+"""Operations in C; comparisons give truth values, by which `select` takes its argument or zero."""
 
 PYTHON = C | {"select": "({1} if {0} else 0.0)"}
 """Operations in Python, for a namespace that has sqrt, sin and so on."""
@@ -106,12 +108,12 @@ def used_inputs(graph: Graph) -> list[tuple[int, int]]:
 
 @dataclass(frozen=True)
 class Stages:
-    """How a batch is computed: what is done once, what outside the vectorised loop, what inside."""
+    """How a batch is computed: what is done once, what ahead of the long loop, what inside."""
 
     shared: list[int]
     """Nodes that depend on shared inputs alone."""
-    outlying: list[int]
-    """Sines and cosines of inputs."""
+    angles: list[tuple[int, list[int]]]
+    """Inputs whose sine or cosine is asked for, each with the nodes of these."""
     rest: list[int]
     rows: dict[tuple[int, int], int]
     """The row of a block that holds an element of a batched input, by (port, element)."""
@@ -123,9 +125,13 @@ class Stages:
         """Sort the nodes of a graph."""
         nodes, operations = graph.nodes, graph.operations()
         used = [(i, j) for i, j in used_inputs(graph) if not inputs[i].shared]
+        angles: dict[int, list[int]] = {}
+        for k in operations:
+            if nodes[k].outlying:
+                angles.setdefault(nodes[k].arguments[0], []).append(k)
         return cls(
             [k for k in operations if nodes[k].shared],
-            [k for k in operations if nodes[k].outlying],
+            list(angles.items()),
             [k for k in operations if not nodes[k].shared and not nodes[k].outlying],
             {pair: row for row, pair in enumerate(used)},
             [
@@ -135,11 +141,28 @@ class Stages:
             ],
         )
 
-    def outlying_rows(self) -> list[tuple[int, int]]:
-        """Return the row of a block for each outlying node, behind those of the inputs."""
-        return list(enumerate(self.outlying, len(self.rows)))
 
-    @property
-    def height(self) -> int:
-        """Rows of a block."""
-        return len(self.rows) + len(self.outlying)
+def near_statements(printed: Mapping[str, str], form: str) -> tuple[list[str], list[str]]:
+    """Return the statements of `sincos.near` for `angle`, and the names of its two results."""
+    graph = graph_of(near(), (Port("angle", (1,)),))
+    names = names_of(graph, lambda i, j: "angle", c_constant)
+    lines = statements(graph, graph.operations(), names, printed, form)
+    return lines, [names[nodes[0]] for nodes in graph.outputs]
+
+
+def rendered(package: str, template: str, **values: Any) -> str:
+    """Return the text of a template in the folder `templates` of a package."""
+    return _environment(package).get_template(template).render(values)
+
+
+@lru_cache(maxsize=4)
+def _environment(package: str) -> jinja2.Environment:
+    import jinja2  # here, since `import pteron` does without
+
+    return jinja2.Environment(
+        loader=jinja2.PackageLoader(package),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )

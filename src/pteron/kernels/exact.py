@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -11,18 +10,16 @@ from numpy.typing import ArrayLike
 
 from pteron.errors import DataError
 from pteron.kernels.fields import RationalField, evaluate
-from pteron.kernels.kernel import Kernel
-
-__all__ = ["Exact"]
+from pteron.kernels.kernel import Kernel, unmasked
 
 
-@dataclass(frozen=True)
 class Exact(Kernel):
     """A kernel in fractions.
 
-    It takes integers, fractions and floats (as the fractions they are), and returns fractions. An
-    angle phi is given as tan(phi / 2), so that its sine and cosine are rational. `NoSquareRoot`
-    says that a root is not rational, `ZeroDivisionError` that a denominator vanishes.
+    It takes one state: integers, fractions and floats (as the fractions they are), and returns
+    fractions. An angle phi is given as tan(phi / 2), so that its sine and cosine are rational.
+    `NoSquareRoot` says that a root is not rational, `ZeroDivisionError` that a denominator
+    vanishes.
     """
 
     @property
@@ -30,18 +27,16 @@ class Exact(Kernel):
         """The instructions, one a line, as CasADi prints them."""
         return str(self.function.str(True))
 
-    def __call__(self, *values: ArrayLike) -> Any:
-        """Evaluate the kernel for one state; each value has its port's shape."""
-        ports = self._asked(values)
-        given = dict(self.fixed)
-        for port, value in zip(ports, values, strict=True):
-            array = np.asarray(value, dtype=object)
+    def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
+        given = self._by_name(values, fixed)
+        inputs = []
+        for port in self.ports:
+            array = np.asarray(unmasked(given[port.name], port.name), dtype=object)
             if array.shape != port.shape:
                 raise DataError(
                     f"{port.name}: shape {array.shape} given, {port.shape} expected: one state"
                 )
-            given[port.name] = array
-        inputs = [[Fraction(v) for v in given[port.name].ravel().tolist()] for port in self.inputs]
+            inputs.append([Fraction(value) for value in array.ravel().tolist()])
         found = evaluate(self.function, RationalField(), inputs)
         results = tuple(
             np.array(value, dtype=object).reshape(port.shape)

@@ -18,8 +18,7 @@ from pteron.equations.machine import Machine
 from pteron.equations.screws import joint_screws
 from pteron.equations.virtual_work import generalized_forces, inverse_dynamics
 from pteron.errors import ModelError
-from pteron.kernels.kernel import Port
-from pteron.kernels.operations import count_operations
+from pteron.kernels.kernel import Port, count_operations
 from pteron.kernels.passes import optimised
 from pteron.manipulator import Manipulator
 

@@ -15,8 +15,6 @@ import casadi as ca
 
 from pteron.kernels.kernel import Port
 
-__all__ = ["CONSTANT", "INPUT", "Graph", "Node", "graph_of"]
-
 INPUT, CONSTANT = "input", "constant"
 
 _OPERATIONS = {
@@ -30,13 +28,22 @@ _OPERATIONS = {
     ca.OP_COS: "cos",
     ca.OP_ATAN2: "atan2",
     ca.OP_FABS: "fabs",
+    ca.OP_FLOOR: "floor",
     ca.OP_FMIN: "fmin",
     ca.OP_FMAX: "fmax",
     ca.OP_SQ: "sq",
     ca.OP_TWICE: "twice",
     ca.OP_LT: "less",
+    ca.OP_LE: "less_equal",
+    ca.OP_EQ: "equal",
+    ca.OP_NE: "unequal",
+    ca.OP_NOT: "not",
+    ca.OP_AND: "and",
+    ca.OP_OR: "or",
     ca.OP_IF_ELSE_ZERO: "select",
 }
+
+_UNARY = frozenset({"neg", "sqrt", "sin", "cos", "fabs", "floor", "not"})
 
 
 @dataclass(frozen=True)
@@ -111,7 +118,8 @@ def _node(operation: str, arguments: list[int], nodes: Sequence[Node]) -> Node:
     """Return the node of an operation; a square is x x and twice x is x + x, to the same bit."""
     if operation in ("sq", "twice"):
         operation, arguments = ("mul" if operation == "sq" else "add"), [arguments[0]] * 2
-    arguments = arguments[:1] if operation in ("neg", "sqrt", "sin", "cos", "fabs") else arguments
+    if operation in _UNARY:
+        arguments = arguments[:1]
     shared = all(nodes[i].shared for i in arguments)
     of_input = nodes[arguments[0]].operation == INPUT
     outlying = operation in ("sin", "cos") and of_input and not shared

@@ -9,7 +9,6 @@ apart, or blocks of states, made it no better.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -18,26 +17,24 @@ import numpy as np
 from pteron.errors import DataError, ModelError
 from pteron.kernels.code import PYTHON, names_of, statements
 from pteron.kernels.graph import graph_of
-from pteron.kernels.kernel import Kernel
-
-__all__ = ["Traced"]
+from pteron.kernels.kernel import Kernel, unmasked
 
 _PRINTED = PYTHON | {"select": "where({0}, {1}, 0.0)"}
 
 
-@dataclass(frozen=True)
 class Traced(Kernel):
     """A kernel that JAX traces. It takes and returns JAX arrays, and may be called inside `jit`.
 
+    What is given by name, such as `parameters`, can be differentiated with respect to as well.
     With dtype float64 it switches JAX to 64 bits (`jax_enable_x64`), for the process.
     """
 
     @cached_property
     def source(self) -> str:
         """The Python code."""
-        graph = graph_of(self.function, self.inputs)
-        names = names_of(graph, lambda i, j: f"{self.inputs[i].name}[..., {j}]", repr)
-        arguments = ", ".join(port.name for port in self.inputs)
+        graph = graph_of(self.function, self.ports)
+        names = names_of(graph, lambda i, j: f"{self.ports[i].name}[..., {j}]", repr)
+        arguments = ", ".join(port.name for port in self.ports)
         lines = [f"def {self.name}({arguments}):"]
         lines += statements(graph, graph.operations(), names, _PRINTED, "    {0} = {1}")
         results = []
@@ -48,7 +45,7 @@ class Traced(Kernel):
         return "\n".join([*lines, f"    return {', '.join(results)},\n"])
 
     @cached_property
-    def _evaluate(self) -> Callable[..., Any]:
+    def _traced(self) -> Callable[..., Any]:
         try:
             import jax
             from jax import numpy as jnp
@@ -63,26 +60,18 @@ class Traced(Kernel):
         def stack(*values: Any) -> Any:
             return jnp.stack(jnp.broadcast_arrays(*values), axis=-1)
 
-        names = ("sqrt", "sin", "cos", "fmin", "fmax", "where", "nan")
+        names = ("sqrt", "sin", "cos", "floor", "fmin", "fmax", "where", "nan")
         space: dict[str, Any] = {name: getattr(jnp, name) for name in names}
         space |= {"atan2": jnp.arctan2, "fabs": jnp.abs, "stack": stack}
         exec(self.source, space)
-        dtype = np.dtype(self.dtype)
         function = space[self.name]
-        fixed = {name: np.asarray(value, dtype).ravel() for name, value in self.fixed.items()}
 
         def evaluate(*values: Any) -> Any:
-            given = iter(values)
-            arrays = []
-            for port in self.inputs:
-                if port.name in fixed:
-                    arrays.append(jnp.asarray(fixed[port.name]))
-                else:
-                    arrays.append(jnp.asarray(next(given), dtype))
+            arrays = [jnp.asarray(value, np.dtype(self.dtype)) for value in values]
             lead = jnp.broadcast_shapes(
                 *(
                     array.shape[: array.ndim - len(port.shape)]
-                    for array, port in zip(arrays, self.inputs, strict=True)
+                    for array, port in zip(arrays, self.ports, strict=True)
                 )
             )
             results = []
@@ -93,20 +82,12 @@ class Traced(Kernel):
 
         return jax.jit(evaluate)
 
-    def __call__(self, *values: Any) -> Any:
-        """Evaluate the kernel: arrays (..., *port.shape) or tracers, leading axes broadcast.
-
-        Raises
-        ------
-        DataError
-            If the number of inputs or a shape is wrong.
-        ModelError
-            If JAX is not installed.
-        """
-        ports = self._asked(values)
-        for value, port in zip(values, ports, strict=True):
-            shape = np.shape(value)
-            if shape[len(shape) - len(port.shape) :] != port.shape:
+    def _evaluate(self, *values: Any, **fixed: Any) -> Any:
+        given = self._by_name(values, fixed)
+        for port in self.ports:
+            given[port.name] = unmasked(given[port.name], port.name)
+            shape = np.shape(given[port.name])
+            if shape[max(len(shape) - len(port.shape), 0) :] != port.shape:
                 expected = ", ".join(["...", *map(str, port.shape)])
                 raise DataError(f"{port.name}: shape {shape} given, ({expected}) expected")
-        return self._evaluate(*values)
+        return self._traced(*(given[port.name] for port in self.ports))

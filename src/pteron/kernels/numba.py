@@ -1,8 +1,8 @@
 """Target `numba`: straight-line Python that Numba compiles, for machines without a C compiler.
 
-Two functions: one state, and batches in blocks of states held as structures of arrays, with the
-sines outside the loop that LLVM turns into vector code. Numba's own cache holds the result, within
-an entry of ours that tells whether it is whole.
+Two functions: one state, and batches in blocks of states held as structures of arrays, in loops
+that LLVM turns into vector code. Numba's own cache holds the result, within an entry of ours that
+tells whether it is whole.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from __future__ import annotations
 import importlib.util
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
@@ -18,73 +17,82 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from pteron.errors import ModelError
 from pteron.kernels.cache import digest, entry, find
-from pteron.kernels.code import PYTHON, Stages, names_of, statements
+from pteron.kernels.code import PYTHON, Stages, names_of, near_statements, rendered, statements
 from pteron.kernels.graph import Graph, graph_of
 from pteron.kernels.kernel import Array, ArrayKernel, Port
+from pteron.kernels.sincos import LIMIT
 
-__all__ = ["Jitted"]
+_FILE = "kernel.py"
 
 _BLOCK = 64
 
 
-@dataclass(frozen=True)
 class Jitted(ArrayKernel):
     """A kernel that Numba compiles."""
 
     @cached_property
     def source(self) -> str:
         """The Python code."""
-        graph = graph_of(self.function, self.inputs)
-        return _source(self.name, graph, self.inputs, self.outputs, self.dtype)
+        graph = graph_of(self.function, self.ports)
+        return _source(self.name, graph, self.ports, self.outputs)
 
     @property
-    def _name(self) -> str:
+    def _entry(self) -> str:
+        if importlib.util.find_spec("numba") is None:
+            raise ModelError(
+                'target: "numba" needs Numba, which is not installed; pip install "pteron[numba]"'
+            )
         return f"numba-{self.name}-{digest(self.source, version('numba'), version('llvmlite'))}"
 
     def is_cached(self) -> bool:
         """Return whether the code is on disk, ready to be loaded."""
-        return find(self._name) is not None
-
-    def prepare(self) -> None:
-        """Compile the code now, or load it."""
-        _ = self._module
+        return find(self._entry, _FILE) is not None
 
     @cached_property
     def _module(self) -> ModuleType:
-        return _load(entry(self._name, self._build) / "kernel.py", self._name)
+        name = self._entry
 
-    def _build(self, folder: Path) -> None:
-        path = folder / "kernel.py"
-        path.write_text(self.source, encoding="utf-8")
-        _load(path, self._name)
+        def build(folder: Path) -> None:
+            (folder / _FILE).write_text(self.source, encoding="utf-8")
+            _load(folder / _FILE, name)
 
-    @cached_property
-    def _direct(self) -> Callable[..., Any] | None:
-        given = [port.name in self.fixed for port in self.inputs]
-        if len(self.outputs) > 1 or given != sorted(given):
-            return None
-        one, empty, count = self._module.one, np.empty, given.count(False)
-        size, shape, dtype = self.outputs[0].size, self.outputs[0].shape, np.dtype(self.dtype)
-        flat = shape == (size,)
-        fixed = [
-            np.array(self.fixed[port.name], dtype=dtype).reshape(port.size)
-            for port in self.inputs
-            if port.name in self.fixed
+        return _load(entry(name, _FILE, build), name)
+
+    def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
+        self.call = self._direct()
+        return self.call(*values, **fixed)
+
+    def _direct(self) -> Callable[..., Any]:
+        """Return what takes one state of plain arrays to `one`, and all else to `checked`."""
+        from numba.core.errors import NumbaError
+
+        one, checked, count, empty = self._module.one, self.checked, len(self.inputs), np.empty
+        shapes = [port.shape for port in self.outputs]
+        sizes = [port.size for port in self.outputs]
+        order = [port.name in self.fixed for port in self.ports]
+        known = [
+            np.array(value, dtype=float).ravel()
+            for value in (self.fixed[p.name] for p in self.ports if p.name in self.fixed)
         ]
 
-        def direct(*values: Any) -> Any:
-            if len(values) != count:
-                return None
-            out = empty(size, dtype)
-            try:
-                fits = one(*values, *fixed, out)
-            except TypeError:
-                return None
-            return (out if flat else out.reshape(shape)) if fits else None
+        def call(*values: Any, **fixed: Any) -> Any:
+            if not fixed and len(values) == count and getattr(values[0], "ndim", 0) == 1:
+                outputs = [empty(size) for size in sizes]
+                try:
+                    if one(*values, *known, *outputs):
+                        if len(outputs) == 1:
+                            return outputs[0].reshape(shapes[0])
+                        return tuple(map(np.reshape, outputs, shapes))
+                except (TypeError, NumbaError):  # integers, or not to be written
+                    pass
+            return checked(*values, **fixed)
 
-        return direct
+        # Fixed inputs come last, as `compile` has them.
+        return call if order == sorted(order) else checked
 
     def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
         # To Numba an array that must not be written is of another type.
@@ -109,91 +117,52 @@ def _load(path: Path, name: str) -> ModuleType:
     return module
 
 
-def _source(
-    name: str, graph: Graph, inputs: Sequence[Port], outputs: Sequence[Port], dtype: str
-) -> str:
-    arguments = ", ".join([p.name for p in inputs] + [f"{p.name}_out" for p in outputs])
-    signature_one = ", ".join(["REAL[::1]"] * (len(inputs) + len(outputs)))
-    signature_run = ", ".join(
-        "REAL[::1]" if port.shared else "REAL[:, ::1]" for port in (*inputs, *outputs)
-    )
-    return f'''"""{name}: generated by Pteron. One state, and batches of them."""
-
-from math import atan2, cos, nan, sin, sqrt
-
-import numba
-import numpy as np
-
-fabs, fmin, fmax = abs, np.fmin, np.fmax
-REAL = numba.{dtype}
-
-
-@numba.njit(numba.boolean({signature_one}), error_model="numpy", cache=True)
-def one({arguments}):
-{_one(graph, inputs, outputs)}
-
-
-@numba.njit(numba.void({signature_run}), error_model="numpy", cache=True, nogil=True)
-def run({arguments}):
-{_run(graph, inputs, outputs, dtype)}
-'''
-
-
-def _lines(lines: Sequence[str]) -> str:
-    return "\n".join("    " + line for line in lines)
-
-
-def _one(graph: Graph, inputs: Sequence[Port], outputs: Sequence[Port]) -> str:
-    fits = " or ".join(f"{port.name}.size != {port.size}" for port in inputs)
-    names = names_of(graph, lambda i, j: f"{inputs[i].name}[{j}]", _constant)
-    lines = [f"if {fits}:", "    return False"]
-    lines += statements(graph, graph.operations(), names, PYTHON, "{0} = {1}")
-    for port, nodes in zip(outputs, graph.outputs, strict=True):
-        lines += [f"{port.name}_out[{j}] = {names[k]}" for j, k in enumerate(nodes)]
-    return _lines([*lines, "return True"])
-
-
-def _run(graph: Graph, inputs: Sequence[Port], outputs: Sequence[Port], dtype: str) -> str:
+def _source(name: str, graph: Graph, inputs: Sequence[Port], outputs: Sequence[Port]) -> str:
+    printed = PYTHON | {"sin": "sine({0})", "cos": "cosine({0})"}
+    near, near_results = near_statements(PYTHON, "{0} = {1}")
     stages = Stages.of(graph, inputs, outputs)
+
+    names = names_of(graph, lambda i, j: f"{inputs[i].name}[{j}]", _constant)
+    one = []
+    for number, (angle, nodes) in enumerate(stages.angles):
+        one.append(f"s{number}, c{number} = sincos({names[angle]})")
+        for k in nodes:
+            names[k] = f"{graph.nodes[k].operation[0]}{number}"
+    one += statements(graph, stages.shared + stages.rest, names, printed, "{0} = {1}")
+    one += [f"{port.name}_out[{j}] = {names[k]}" for port, j, k in stages.results]
 
     def input_name(i: int, j: int) -> str:
         return f"{inputs[i].name}[{j}]" if inputs[i].shared else f"i{stages.rows[i, j]}"
 
     names = names_of(graph, input_name, _constant)
-    rows = [(row, inputs[i], j) for (i, j), row in stages.rows.items()]
-    lines = statements(graph, stages.shared, names, PYTHON, "{0} = {1}")
-    lines += [
-        f"block = np.zeros(({max(stages.height, 1)}, {_BLOCK}), np.{dtype})",
-        f"result = np.empty(({len(stages.results)}, {_BLOCK}), np.{dtype})",
-        f"n = {outputs[0].name}_out.shape[0]",
-        f"for start in range(0, n, {_BLOCK}):",
-        f"    count = min({_BLOCK}, n - start)",
-        "    for k in range(count):",
-        *(f"        block[{row}, k] = {port.name}[start + k, {j}]" for row, port, j in rows),
-        *([] if rows else ["        pass"]),
-    ]
-    body = [f"i{row} = block[{row}, k]" for row, _, _ in rows]
-    for row, k in stages.outlying_rows():
-        node = graph.nodes[k]
-        i, j = graph.nodes[node.arguments[0]].arguments
-        value = PYTHON[node.operation].format(f"block[{stages.rows[i, j]}, k]")
-        lines.append(f"        block[{row}, k] = {value}")
-        body.append(f"{names[k]} = block[{row}, k]")
-    body += statements(graph, stages.rest, names, PYTHON, "{0} = {1}")
+    shared = statements(graph, stages.shared, names, printed, "{0} = {1}")
+    angles = []
+    body = [f"i{row} = block[{row}, k]" for row in stages.rows.values()]
+    for number, (angle, nodes) in enumerate(stages.angles):
+        i, j = graph.nodes[angle].arguments
+        angles.append(stages.rows[i, j])
+        for k in nodes:
+            values = "sines" if graph.nodes[k].operation == "sin" else "cosines"
+            body.append(f"{names[k]} = {values}[{number}, k]")
+    body += statements(graph, stages.rest, names, printed, "{0} = {1}")
     body += [f"result[{row}, k] = {names[k]}" for row, (_, _, k) in enumerate(stages.results)]
-    lines += [
-        "    # A block that is not full repeats its last state.",
-        f"    for k in range(count, {_BLOCK}):",
-        "        block[:, k] = block[:, count - 1]",
-        f"    for k in range({_BLOCK}):",
-        *(f"        {line}" for line in body),
-        "    for k in range(count):",
-        *(
-            f"        {port.name}_out[start + k, {j}] = result[{row}, k]"
-            for row, (port, j, _) in enumerate(stages.results)
-        ),
-    ]
-    return _lines(lines)
+    return rendered(
+        "pteron.kernels",
+        "numba.py.j2",
+        name=name,
+        width=_BLOCK,
+        limit=LIMIT,
+        near=near,
+        near_results=near_results,
+        inputs=inputs,
+        outputs=outputs,
+        one=one,
+        shared=shared,
+        angles=angles,
+        body=body,
+        rows=[(row, inputs[i], j) for (i, j), row in stages.rows.items()],
+        results=[(row, port, j) for row, (port, j, _) in enumerate(stages.results)],
+    )
 
 
 def _constant(value: float) -> str:

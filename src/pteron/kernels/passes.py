@@ -30,7 +30,7 @@ from itertools import combinations
 
 import casadi as ca
 
-from pteron.kernels.operations import count_operations
+from pteron.kernels.kernel import count_operations
 from pteron.kernels.terms import TermGraph, sign_of
 from pteron.kernels.translation import read, written
 

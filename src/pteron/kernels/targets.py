@@ -80,7 +80,8 @@ def compile(
         What is folded into the code: all of the machine's numbers, for fewest operations; its
         geometry and gravity, so that inertial parameters are an input; or nothing, so that one
         compilation serves every machine of that topology. The inputs in question are fixed to the
-        machine's own values: a kernel of any grade is called alike.
+        machine's own values, so that a kernel of any grade is called alike; a call may give others,
+        by name: `kernel(pose, velocity, acceleration, parameters=values)`.
     dtype : {"float64", "float32"}
         Of the numbers; `"float32"` for C and JAX.
     threads : int
@@ -109,7 +110,7 @@ def compile(
     >>> kernel.operations, [port.name for port in kernel.inputs]
     (385, ['pose', 'velocity', 'acceleration'])
     >>> kernel = pteron.compile(robot, "inverse_dynamics", grade="parametric")
-    >>> kernel.operations, [port.name for port in kernel.inputs]
+    >>> kernel.operations, [port.name for port in kernel.ports]
     (417, ['pose', 'velocity', 'acceleration', 'parameters'])
     """
     if target not in TARGETS:

@@ -42,7 +42,7 @@ def evaluated(
         Under ``on_failure="raise"``, for the first state, in memory order, that does not serve;
         under ``"nan"`` such states give NaN.
     """
-    *results, status = numeric(robot, what, base=base, wrench=wrench)(*values)
+    *results, status = numeric(robot, what, base=base, wrench=wrench).call(*values)
     good = status.item() if status.ndim == 0 else status.all()
     if not good or on_failure != "raise":
         if on_failure not in ("raise", "nan"):
