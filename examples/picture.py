@@ -14,7 +14,7 @@ robot = pteron.load("quadrupteron")
 cycle = pick_and_place(robot, home_pose(robot))
 forces = pteron.inverse_dynamics(robot, cycle.pose, cycle.velocity, cycle.acceleration)
 
-limits = np.array([leg.slider_limits for leg in robot.legs])
+limits = np.array([leg.limits for leg in robot.legs])
 guides = np.array([leg.guide_point for leg in robot.legs])
 directions = np.array([leg.e for leg in robot.legs])
 rails = guides[:, None, :] + limits[:, :, None] * directions[:, None, :]

@@ -60,7 +60,7 @@ def log_of(
     time=None,
     duration=8.0,
     rate=500.0,
-    slider_noise=0.0,
+    joint_noise=0.0,
     force_noise=0.0,
     friction=None,
     seed=0,
@@ -73,11 +73,11 @@ def log_of(
         time = np.arange(round(duration * rate)) / rate
     pose, velocity, acceleration = motion(robot, time, seed=seed, **shape)
     sliders = pteron.inverse_kinematics(robot, pose)
-    rates = pteron.joint_rates(robot, pose, velocity).sliders
+    rates = pteron.joint_rates(robot, pose, velocity).joints
     forces = pteron.inverse_dynamics(robot, pose, velocity, acceleration)
     forces = forces + (friction or Friction.of(len(robot.legs))).forces(rates)
     rng = np.random.default_rng(noise_seed)
-    sliders = sliders + slider_noise * rng.normal(size=sliders.shape)
+    sliders = sliders + joint_noise * rng.normal(size=sliders.shape)
     forces = forces + force_noise * rng.normal(size=forces.shape)
     return Log("log.csv", time, sliders, forces, description=description or Description())
 
@@ -99,6 +99,6 @@ def without(log, start, stop):
     kept = np.r_[0:start, stop : log.rows]
     cut = {
         name: None if getattr(log, name) is None else getattr(log, name)[kept]
-        for name in ("time", "sliders", "forces", "pose", "payload")
+        for name in ("time", "joints", "forces", "pose", "payload")
     }
     return replace(log, **cut)

@@ -396,7 +396,7 @@ def test_too_few_rows_are_refused(estimator):
 @pytest.mark.parametrize("threshold", [0.0, -1.0, float("nan")])
 def test_a_threshold_that_cannot_be_is_refused(threshold):
     with pytest.raises(DataError, match="threshold"):
-        huber(drawn(15), threshold=threshold)
+        huber(drawn(15), threstype_ii=threshold)
 
 
 # Essential parameters
@@ -447,14 +447,14 @@ def test_nothing_is_dropped_where_all_is_significant():
 
 
 @lru_cache(maxsize=8)
-def experiment(slider_noise, seed=0, derivatives="periodic"):
+def experiment(joint_noise, seed=0, derivatives="periodic"):
     """Return the model, log, treatment, equations and true values of a noisy log."""
     robot = CATALOG["tripteron"]
     model = identification_model(robot)
     log = log_of(
         robot,
         rate=250.0,
-        slider_noise=slider_noise,
+        joint_noise=joint_noise,
         force_noise=0.2,
         noise_seed=seed,
         harmonics=3,
@@ -475,7 +475,7 @@ def experiment(slider_noise, seed=0, derivatives="periodic"):
 def test_errors_of_columns_grow_with_the_noise():
     made_by = experiment(1e-5)
     small = column_errors(made_by.model, made_by.log, made_by.treatment)
-    ten = replace(made_by.treatment, slider_noise=10.0 * made_by.treatment.slider_noise)
+    ten = replace(made_by.treatment, joint_noise=10.0 * made_by.treatment.joint_noise)
     large = column_errors(made_by.model, made_by.log, ten)
     names = made_by.model.names
     noisy = [k for k, name in enumerate(names) if not name.startswith(("Fc", "offset"))]
@@ -529,7 +529,7 @@ def test_motion_along_one_axis_names_what_it_cannot_see():
     model = identification_model(robot)
     log = log_of(robot, size=np.array(0.0), turn=0.0)
     wave = 0.04 * np.sin(2.0 * np.pi * 0.5 * log.time)
-    sliders = log.sliders + np.outer(wave, [leg.direction[2] for leg in robot.legs])
-    treatment = preprocessing_of(robot, replace(log, sliders=sliders), Processing(band=10.0))
+    sliders = log.joints + np.outer(wave, [leg.direction[2] for leg in robot.legs])
+    treatment = preprocessing_of(robot, replace(log, joints=sliders), Processing(band=10.0))
     with pytest.raises(DataError, match=r"too little motion: .* values cannot be seen"):
-        weighted(observations_of(model, replace(log, sliders=sliders), treatment))
+        weighted(observations_of(model, replace(log, joints=sliders), treatment))

@@ -46,7 +46,7 @@ MACHINES = {
 PLAIN = {"COLUMNS": "100", "NO_COLOR": "1", "FORCE_COLOR": None, "TTY_COMPATIBLE": None}
 
 each_machine = pytest.mark.parametrize("name", ["quadrupteron +-+-", "random 3T1R", "random 3T"])
-each_space = pytest.mark.parametrize("space", ["platform", "sliders"])
+each_space = pytest.mark.parametrize("space", ["platform", "joints"])
 
 
 @lru_cache(maxsize=64)
@@ -82,7 +82,7 @@ def test_derivatives_are_those_of_finite_differences(name: str, space: str):
     for value, rate in (("pose", "velocity"), ("velocity", "acceleration")):
         found = (getattr(after, value) - getattr(before, value)) / (2.0 * step)
         assert found == pytest.approx(getattr(now, rate), abs=1e-5)
-    sliders = [motion.sliders(time + k * step) for k in (-1, 0, 1)]
+    sliders = [motion.joints(time + k * step) for k in (-1, 0, 1)]
     for k in (0, 1):
         found = (sliders[2][k] - sliders[0][k]) / (2.0 * step)
         assert found == pytest.approx(sliders[1][k + 1], abs=1e-5)
@@ -93,11 +93,11 @@ def test_derivatives_are_those_of_finite_differences(name: str, space: str):
 def test_platform_and_sliders_are_one_motion(name: str, space: str):
     robot, motion = MACHINES[name], drawn(name, space)
     time = np.linspace(0.0, 4.0, 23)
-    state, (rho, drho, ddrho) = motion.at(time), motion.sliders(time)
+    state, (rho, drho, ddrho) = motion.at(time), motion.joints(time)
     assert pteron.inverse_kinematics(robot, state.pose) == pytest.approx(rho, abs=1e-12)
     rates, seconds = pteron.joint_rates(robot, state.pose, state.velocity, state.acceleration)
-    assert rates.sliders == pytest.approx(drho, abs=1e-11)
-    assert seconds.sliders == pytest.approx(ddrho, abs=1e-10)
+    assert rates.joints == pytest.approx(drho, abs=1e-11)
+    assert seconds.joints == pytest.approx(ddrho, abs=1e-10)
 
 
 @each_space
@@ -109,10 +109,10 @@ def test_the_motion_is_periodic(space: str):
 
 
 def test_the_other_assembly_mode_is_another_motion_of_the_same_sliders():
-    motion = drawn("quadrupteron", "sliders")
+    motion = drawn("quadrupteron", "joints")
     other = replace(motion, mode=1 - motion.mode)
     time = np.array([0.2, 1.4])
-    assert motion.sliders(time)[0] == pytest.approx(other.sliders(time)[0])
+    assert motion.joints(time)[0] == pytest.approx(other.joints(time)[0])
     assert np.abs(motion.at(time).pose - other.at(time).pose).max() > 1.0
 
 
@@ -123,7 +123,7 @@ def test_the_angle_does_not_jump_where_home_is_at_half_a_turn():
     )
     robot = replace(robot, legs=legs)
     assert abs(home_pose(robot)[3]) == pytest.approx(np.pi)
-    motion = random_excitation(robot, space="sliders", harmonics=2, seed=3)
+    motion = random_excitation(robot, space="joints", harmonics=2, seed=3)
     angle = motion.at(motion.uniform_times(2000)).pose[:, 3]
     assert np.abs(np.diff(angle)).max() < 0.05
 
@@ -152,7 +152,7 @@ def test_a_motion_that_is_none_is_refused(changes: dict, words: str):
 
 
 def test_sliders_without_a_pose_are_refused_with_the_time():
-    motion = drawn("quadrupteron", "sliders")
+    motion = drawn("quadrupteron", "joints")
     wild = motion.with_coefficients(100.0 * motion.coefficients)
     with pytest.raises(pteron.UnreachablePose, match=r"time .* s: no pose"):
         wild.at(np.linspace(0.0, 4.0, 50))
@@ -179,12 +179,12 @@ def test_margins_are_those_of_the_public_functions(space: str):
     limits = Limits(speed=(0.5, 1.0, 1.5, 2.0), force=200.0)
     found = margins(motion, limits)
     assert [m.limit for m in found] == [
-        *("elbow_sine", "regularity", "slider_clearance", "speed", "acceleration", "force")
+        *("type_i", "type_ii", "joint_clearance", "speed", "acceleration", "force")
     ]
     state = motion.at(motion.uniform_times(4000))
     forces = np.abs(pteron.inverse_dynamics(robot, state.pose, state.velocity, state.acceleration))
     assert found["force"].least == pytest.approx(200.0 - forces.max(), abs=0.05)
-    speeds = np.abs(motion.sliders(state.time)[1])
+    speeds = np.abs(motion.joints(state.time)[1])
     assert found["speed"].least == pytest.approx((np.array(limits.speed) - speeds).min(), abs=1e-4)
     force = found["force"]
     at = motion.at(np.array([force.time]))
@@ -196,10 +196,10 @@ def test_margins_are_those_of_the_public_functions(space: str):
     ("limits", "space"),
     [
         (Limits(speed=0.05), "platform"),
-        (Limits(acceleration=(0.3, 0.2, 0.1, 0.3)), "sliders"),
-        (Limits(elbow_sine=0.9), "platform"),
-        (Limits(regularity=0.97), "sliders"),
-        (Limits(slider_clearance=0.28), "platform"),
+        (Limits(acceleration=(0.3, 0.2, 0.1, 0.3)), "joints"),
+        (Limits(type_i=0.9), "platform"),
+        (Limits(type_ii=0.97), "joints"),
+        (Limits(joint_clearance=0.28), "platform"),
         (Limits(force=31.4), "platform"),
     ],
 )
@@ -209,7 +209,7 @@ def test_every_limit_binds_when_it_is_the_tight_one(limits: Limits, space: str):
     found = margins(motion, limits, 20_000)
     tight = next(name for name in UNITS if getattr(limits, name) != getattr(Limits(), name))
     assert found.kept
-    size = {"slider_clearance": 0.3}.get(tight, 1.0)
+    size = {"joint_clearance": 0.3}.get(tight, 1.0)
     scale = getattr(limits, tight) if tight in ("speed", "force") else size
     assert found[tight].least < 0.01 * scale
 
@@ -217,8 +217,8 @@ def test_every_limit_binds_when_it_is_the_tight_one(limits: Limits, space: str):
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"elbow_sine": 0.999}, "limits: elbow_sine of at least 0.999 is impossible: leg 3"),
-        ({"slider_clearance": 0.4}, "limits: slider_clearance of at least 0.4 m is impossible"),
+        ({"type_i": 0.999}, "limits: type_i of at least 0.999 is impossible: leg 3"),
+        ({"joint_clearance": 0.4}, "limits: joint_clearance of at least 0.4 m is impossible"),
         ({"force": 20.0}, r"limits: force of at most 20.0 N is impossible: leg 1 .* 31.08"),
     ],
 )
@@ -236,9 +236,9 @@ def test_limits_that_the_machine_cannot_keep_at_rest_are_named(given: dict, word
         ({"speed": [1.0, -1.0, 1.0]}, "speed"),
         ({"acceleration": "fast"}, "acceleration 'fast'"),
         ({"force": float("nan")}, "force nan"),
-        ({"elbow_sine": 1.0}, "elbow_sine 1 given"),
-        ({"regularity": -0.1}, "regularity -0.1"),
-        ({"slider_clearance": -1.0}, "slider_clearance -1"),
+        ({"type_i": 1.0}, "type_i 1 given"),
+        ({"type_ii": -0.1}, "type_ii -0.1"),
+        ({"joint_clearance": -1.0}, "joint_clearance -1"),
     ],
 )
 def test_limits_that_are_none_are_refused(given: dict, words: str):
@@ -275,7 +275,7 @@ def test_the_scaled_condition_number_does_not_depend_on_units():
 
 
 def test_conditioning_is_that_of_the_stacked_regressor():
-    motion = drawn("quadrupteron", "sliders")
+    motion = drawn("quadrupteron", "joints")
     base = pteron.base_parameters(motion.robot)
     found = conditioning(motion, base, 120)
     matrix = stacked_regressor(motion, base, motion.uniform_times(120))
@@ -315,7 +315,7 @@ def test_the_measure_of_the_volume_is_the_log_det():
 
 @pytest.mark.parametrize(
     ("robot", "space", "gain"),
-    [("tripteron", "platform", 2.0), ("quadrupteron", "sliders", 3)],
+    [("tripteron", "platform", 2.0), ("quadrupteron", "joints", 3)],
 )
 def test_the_search_finds_better_than_random_and_keeps_every_limit(robot, space, gain):
     found = small("condition", space, robot)
@@ -471,7 +471,7 @@ def test_what_the_search_cannot_do_is_refused(given: dict, words: str):
 
 
 def test_the_table_for_the_controller(tmp_path: Path):
-    found = small("condition", "sliders", "quadrupteron")
+    found = small("condition", "joints", "quadrupteron")
     robot = found.motion.robot
     path = found.write_csv(tmp_path / "motion.csv", rate=50.0, periods=2)
     frame = pl.read_csv(path)
@@ -533,7 +533,7 @@ def test_the_command_prints_json(tmp_path: Path, monkeypatch):
     found = json.loads(result.stdout)
     assert found["conditioning"]["scaled"] <= found["random"]["scaled"]
     assert np.shape(found["motion"]["cosines"]) == (2, 4)
-    assert found["limits"]["elbow_sine"] == 0.25
+    assert found["limits"]["type_i"] == 0.25
     assert all(margin["least"] >= 0.0 for margin in found["margins"])
     assert found["files"] == []
     assert not list(tmp_path.iterdir())
@@ -543,7 +543,7 @@ def test_the_command_prints_json(tmp_path: Path, monkeypatch):
     ("line", "words"),
     [
         ("excite tripteron --out there/motion.csv", "no folder there"),
-        ("excite tripteron --elbow-sine 0.9999", "elbow_sine of at least 0.9999 is impossible"),
+        ("excite tripteron --elbow-sine 0.9999", "type_i of at least 0.9999 is impossible"),
         ("excite tripteron --speed -1", "speed -1"),
         ("excite tripteron --period -1", "period: -1"),
         ("excite tripteron --space joints", "'joints' is not one of"),
@@ -565,7 +565,7 @@ def test_help_has_an_example_in_60_columns():
 
 
 def test_worst_is_the_answer_where_the_machine_cannot_be():
-    motion = drawn("quadrupteron", "sliders")
+    motion = drawn("quadrupteron", "joints")
     wild = motion.with_coefficients(100.0 * motion.coefficients)
     base = pteron.base_parameters(motion.robot)
     assert conditioning(wild, base) == Conditioning(np.inf, np.inf, np.inf, -np.inf)

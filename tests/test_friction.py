@@ -31,7 +31,7 @@ def test_a_column_of_passive_friction_does_the_work_of_its_joint(name):
     pose, velocity, _ = states(robot, 50)
     columns = numeric(robot, "passive_friction")(pose, velocity)
     rates = passive_rates(robot, pose, velocity)
-    sliders = pteron.joint_rates(robot, pose, velocity).sliders
+    sliders = pteron.joint_rates(robot, pose, velocity).joints
     power = np.einsum("rnc,rn->rc", columns, sliders)
     assert columns.shape == (50, len(robot.legs), rates.shape[1])
     assert relative_error(power, rates**2) < 1e-11
@@ -45,7 +45,7 @@ def test_a_column_is_the_rate_times_its_slope_by_the_sliders(name):
     pose, velocity, _ = states(robot, 20)
     columns = numeric(robot, "passive_friction")(pose, velocity)
     rates = passive_rates(robot, pose, velocity)
-    sliders = pteron.joint_rates(robot, pose, velocity).sliders
+    sliders = pteron.joint_rates(robot, pose, velocity).joints
     invert = numeric(robot, "platform_motion")
     for j in range(n):
 
@@ -63,7 +63,7 @@ def test_motion_of_the_platform_inverts_that_of_the_sliders(name):
     robot = MECHANISMS[name]
     pose, velocity, acceleration = states(robot, 100)
     rates, accelerations = pteron.joint_rates(robot, pose, velocity, acceleration)
-    back = numeric(robot, "platform_motion")(pose, rates.sliders, accelerations.sliders)
+    back = numeric(robot, "platform_motion")(pose, rates.joints, accelerations.joints)
     assert relative_error(back[0], velocity) < 1e-10
     assert relative_error(back[1], acceleration) < 1e-10
 

@@ -27,7 +27,7 @@ from pteron.report.identification.contents import contents, short_sources, short
 from pteron.report.identification.page import page
 from pteron.report.typeset import expression, significant
 
-NOISE = {"duration": 5.0, "rate": 400.0, "slider_noise": 2e-7, "force_noise": 0.05}
+NOISE = {"duration": 5.0, "rate": 400.0, "joint_noise": 2e-7, "force_noise": 0.05}
 
 
 def one_sample(held):
@@ -72,7 +72,7 @@ def result(name):
         replace(robot, name=HOSTILE),
         [replace(fit, source=f"{HOSTILE}1.csv"), log_of(robot, **NOISE, seed=3, noise_seed=2)],
         held_out=[replace(other, source=s, forces=wrong) for s in ("x/1.csv", "y/1.csv")],
-        terms=Terms(joints="each", rotors=True),
+        terms=Terms(passive="each", rotors=True),
     )
 
 

@@ -33,7 +33,7 @@ from pteron.identification.result import verdict_of
 from pteron.workspace import home_pose
 
 QUADRUPTERON = CATALOG["quadrupteron"]
-NOISE = {"slider_noise": 3e-7, "force_noise": 0.1}
+NOISE = {"joint_noise": 3e-7, "force_noise": 0.1}
 
 
 def as_built(robot, seed=0):
@@ -107,7 +107,7 @@ def resting(robot, *, seed=3, rate=1000.0):
     )
     pose, velocity, acceleration = law[..., None] * step
     pose = pose + corners[start] + home_pose(robot)
-    rates = pteron.joint_rates(robot, pose, velocity).sliders
+    rates = pteron.joint_rates(robot, pose, velocity).joints
     forces = pteron.inverse_dynamics(robot, pose, velocity, acceleration)
     forces = forces + Friction.of(len(robot.legs)).forces(rates)
     return Log("rests", time, pteron.inverse_kinematics(robot, pose), forces)
@@ -158,7 +158,7 @@ def test_the_flipped_sign_of_a_slider_is_found(slider):
     log = noisy(QUADRUPTERON)
     signs = np.ones(4)
     signs[slider] = -1.0
-    refused(replace(log, sliders=signs * log.sliders), f"rho{slider + 1} has the sign flipped")
+    refused(replace(log, joints=signs * log.joints), f"rho{slider + 1} has the sign flipped")
 
 
 def test_without_other_logs_the_end_is_held_out_and_said():
@@ -229,13 +229,13 @@ def test_known_rotors_are_no_part_of_the_bodies():
 def _slider_accelerations(robot, log):
     from pteron.identification.signals import spline_motion
 
-    return spline_motion(log.time, log.sliders, None)[2]
+    return spline_motion(log.time, log.joints, None)[2]
 
 
 def test_passive_joints_are_identified():
     robot = QUADRUPTERON
     log = log_of(robot)
-    model = identification_model(robot, Terms(joints="each"))
+    model = identification_model(robot, Terms(passive="each"))
     from pteron.identification import observations_of, preprocessing_of
 
     equations = observations_of(model, log, preprocessing_of(robot, log))
@@ -289,7 +289,7 @@ def test_swapped_sliders_are_found(pair):
     log = noisy(QUADRUPTERON)
     order = list(range(4))
     order[pair[0]], order[pair[1]] = order[pair[1]], order[pair[0]]
-    changed = replace(log, sliders=log.sliders[:, order])
+    changed = replace(log, joints=log.joints[:, order])
     refused(changed, f"rho{pair[0] + 1} and rho{pair[1] + 1}", "swapped")
 
 
@@ -320,7 +320,7 @@ def test_motion_along_one_axis_names_what_is_not_seen():
     velocity[:, 2], acceleration[:, 2] = 0.1 * np.cos(2.0 * time), -0.2 * np.sin(2.0 * time)
     log = replace(
         log_of(robot, time=time),
-        sliders=pteron.inverse_kinematics(robot, pose),
+        joints=pteron.inverse_kinematics(robot, pose),
         forces=pteron.inverse_dynamics(robot, pose, velocity, acceleration),
     )
     refused(log, "too little motion", "I_u1", processing=Processing(slow=0.0))
@@ -328,7 +328,7 @@ def test_motion_along_one_axis_names_what_is_not_seen():
 
 def test_the_log_of_another_machine_is_refused_by_its_row():
     log = log_of(QUADRUPTERON)
-    away = replace(log, sliders=log.sliders + np.array([0.0, 0.3, 0.0, -0.3]))
+    away = replace(log, joints=log.joints + np.array([0.0, 0.3, 0.0, -0.3]))
     refused(away, "no pose of quadrupteron has the sliders", "row", "another machine")
 
 
@@ -364,7 +364,7 @@ def test_a_model_that_leaves_too_much_is_named_beside_too_little_motion():
 
 def test_sliders_in_any_order_are_found():
     log = noisy(QUADRUPTERON)
-    refused(replace(log, sliders=log.sliders[:, [0, 2, 3, 1]]), "rho", "in another order")
+    refused(replace(log, joints=log.joints[:, [0, 2, 3, 1]]), "rho", "in another order")
 
 
 def test_one_wild_force_is_no_flipped_sign():

@@ -32,7 +32,7 @@ def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
 
 @lru_cache
 def log(robot: str, seed: int = 3, period: float = 4.0):
-    noise = {"slider_noise": 2e-7, "force_noise": 0.05}
+    noise = {"joint_noise": 2e-7, "force_noise": 0.05}
     return log_of(
         CATALOG[robot], duration=6.0, rate=400.0, seed=seed, noise_seed=seed, period=period, **noise
     )
@@ -136,12 +136,12 @@ def test_choices_are_those_of_the_library():
 @QUICK
 def test_findings_and_a_bad_verdict_are_said_plainly():
     good, other = log("tripteron"), log("tripteron", 5, 3.0)
-    table = {"t": good.time, **{f"rho{i + 1}": c for i, c in enumerate(good.sliders.T)}}
+    table = {"t": good.time, **{f"rho{i + 1}": c for i, c in enumerate(good.joints.T)}}
     table |= {f"force{i + 1}": c for i, c in enumerate(good.forces.T)}
     frame = pl.DataFrame(table)
     pl.concat([frame[:1000], frame[1010:]]).write_csv("gap.csv")
     wrong = other.forces + 14.0 * np.sin(9.0 * other.time)[:, None]
-    held = {"t": other.time, **{f"rho{i + 1}": c for i, c in enumerate(other.sliders.T)}}
+    held = {"t": other.time, **{f"rho{i + 1}": c for i, c in enumerate(other.joints.T)}}
     pl.DataFrame(held | {f"force{i + 1}": c for i, c in enumerate(wrong.T)}).write_csv("bad.csv")
     text = done("identify gap.csv --held-out bad.csv --robot tripteron --out out")
     assert text.startswith("tripteron: not trustworthy, ")
@@ -171,7 +171,7 @@ def _damaged(name: str) -> str:
     frame = pl.DataFrame(
         {
             "t": good.time,
-            **{f"rho{i + 1}": c for i, c in enumerate(good.sliders.T)},
+            **{f"rho{i + 1}": c for i, c in enumerate(good.joints.T)},
             **{f"force{i + 1}": c for i, c in enumerate(good.forces.T)},
         }
     )

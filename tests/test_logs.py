@@ -51,10 +51,10 @@ def motion(robot=QUADRUPTERON, rows=500, seed=0, *, pose=True, payload=True) -> 
 
 
 def columns(log: Log) -> dict[str, np.ndarray]:
-    n = log.sliders.shape[1]
+    n = log.joints.shape[1]
     return (
         {"t": log.time.copy()}
-        | {f"rho{j + 1}": log.sliders[:, j].copy() for j in range(n)}
+        | {f"rho{j + 1}": log.joints[:, j].copy() for j in range(n)}
         | {f"force{j + 1}": log.forces[:, j].copy() for j in range(n)}
     )
 
@@ -73,7 +73,7 @@ def renamed(given: dict[str, np.ndarray], names: dict[str, str]) -> dict[str, np
 
 
 def assert_same(one: Log, other: Log) -> None:
-    for key in ("time", "sliders", "forces", "pose", "payload"):
+    for key in ("time", "joints", "forces", "pose", "payload"):
         a, b = getattr(one, key), getattr(other, key)
         assert (a is None) == (b is None), key
         if a is not None:
@@ -148,7 +148,7 @@ def test_pieces_together_are_the_whole(tmp_path, ending, rows):
     assert sum(done) == 500
     assert [p.first_row for p in pieces] == list(range(0, 500, rows))
     assert file.rows_estimate == pytest.approx(500, rel=0.05)
-    for key in ("time", "sliders", "forces", "pose", "payload"):
+    for key in ("time", "joints", "forces", "pose", "payload"):
         together = np.concatenate([getattr(p, key) for p in pieces])
         np.testing.assert_array_equal(together, getattr(whole, key))
     assert pieces[-1].place(0) == whole.place(pieces[-1].first_row)
@@ -275,10 +275,10 @@ def test_sliders_in_another_unit_are_refused_until_it_is_declared(tmp_path, fact
     path = saved(tmp_path, given)
     with pytest.raises(DataError, match=rf'row 1, column rho1: .*\[joints\] unit = "{unit}"'):
         read_log(path, QUADRUPTERON)
-    table = "joints" if unit == "mm" else "sliders"  # as older files say
+    table = "joints" if unit == "mm" else "joints"  # as older files say
     path.with_suffix(".toml").write_text(f'[{table}]\nunit = "{unit}"\n')
     back = read_log(path, QUADRUPTERON)
-    np.testing.assert_allclose(back.sliders, log.sliders, rtol=1e-15)
+    np.testing.assert_allclose(back.joints, log.joints, rtol=1e-15)
     assert back.findings == ()
 
 
@@ -383,13 +383,13 @@ def test_declared_columns_units_and_gains_are_taken(tmp_path):
     log = motion()
     assert log.pose is not None
     given = {"zeit": log.time * 1e3, "note": ["text"] * 500, "load": log.payload}
-    given |= dict(zip("abcd", 1e3 * log.sliders.T, strict=True))
+    given |= dict(zip("abcd", 1e3 * log.joints.T, strict=True))
     given |= dict(zip("efgh", log.forces.T, strict=True))
     given |= dict(zip("uvwr", (log.pose * [1e3, 1e3, 1e3, 180 / np.pi]).T, strict=True))
     path = saved(tmp_path, given, toml=DECLARED)
     assert find_description(path) == path.with_suffix(".toml")
     back = read_log(path, QUADRUPTERON)
-    for key in ("time", "sliders", "pose", "payload"):
+    for key in ("time", "joints", "pose", "payload"):
         np.testing.assert_allclose(getattr(back, key), getattr(log, key), rtol=1e-14)
     np.testing.assert_array_equal(back.forces, log.forces * [10.0, -20.0, 30.0, 40.0])
     about = back.description
@@ -570,7 +570,7 @@ def test_escape_codes_in_a_name_do_not_reach_the_terminal(tmp_path):
     assert len(message) < 900
 
 
-@pytest.mark.parametrize("name", ["time", "sliders", "forces", "pose", "payload"])
+@pytest.mark.parametrize("name", ["time", "joints", "forces", "pose", "payload"])
 def test_masked_values_are_refused(name):
     log = motion()
     values = np.ma.array(getattr(log, name))
@@ -616,13 +616,13 @@ def test_the_columns_of_cranks_are_angles_and_torques(tmp_path, turned):
 def test_degrees_are_found_by_name_and_told_by_size(tmp_path):
     robot = with_cranks(1, 2)
     log = motion(TRIPTERON, pose=False, payload=False)
-    log = replace(log, sliders=log.sliders * [1.0, 20.0, 20.0])
-    given = {"t": log.time, "rho1": log.sliders[:, 0]}
-    given |= {f"theta{j + 1} (deg)": np.degrees(log.sliders[:, j]) for j in (1, 2)}
+    log = replace(log, joints=log.joints * [1.0, 20.0, 20.0])
+    given = {"t": log.time, "rho1": log.joints[:, 0]}
+    given |= {f"theta{j + 1} (deg)": np.degrees(log.joints[:, j]) for j in (1, 2)}
     given |= {"force1": log.forces[:, 0]}
     given |= {f"torque{j + 1}_Nm": log.forces[:, j] for j in (1, 2)}
     back = read_log(saved(tmp_path, given), robot)
-    np.testing.assert_allclose(back.sliders, log.sliders, rtol=1e-14)
+    np.testing.assert_allclose(back.joints, log.joints, rtol=1e-14)
     assert "taken for the crank coordinates in deg" in back.findings[0].message
     assert "taken for the actuator torques in N m" in back.findings[1].message
     plain = renamed(given, {f"theta{j} (deg)": f"theta{j}" for j in (2, 3)})
@@ -632,7 +632,7 @@ def test_degrees_are_found_by_name_and_told_by_size(tmp_path):
         read_log(path, robot)
     for declared in ('unit = "deg"', 'unit = "m"\nangle_unit = "deg"'):
         path.with_suffix(".toml").write_text(f"[joints]\n{declared}\n")
-        np.testing.assert_allclose(read_log(path, robot).sliders, log.sliders, rtol=1e-14)
+        np.testing.assert_allclose(read_log(path, robot).joints, log.joints, rtol=1e-14)
 
 
 def test_a_currents_unit_holds_for_all_joints(tmp_path):
@@ -664,11 +664,11 @@ def test_a_currents_unit_holds_for_all_joints(tmp_path):
 def test_usual_variants_of_names_are_guessed_and_said(tmp_path, time, slider, force, scales, unit):
     log = motion()
     given = {time: log.time * scales[0]}
-    given |= {slider.format(j + 1): log.sliders[:, j] * scales[1] for j in range(4)}
+    given |= {slider.format(j + 1): log.joints[:, j] * scales[1] for j in range(4)}
     given |= {force.format(j + 1): log.forces[:, j] for j in range(4)}
     back = read_log(saved(tmp_path, given), QUADRUPTERON)
     np.testing.assert_allclose(back.time, log.time, rtol=1e-15)
-    np.testing.assert_allclose(back.sliders, log.sliders, rtol=1e-15)
+    np.testing.assert_allclose(back.joints, log.joints, rtol=1e-15)
     np.testing.assert_array_equal(back.forces, log.forces)
     assert back.description.force_unit == unit
     assert [finding.kind for finding in back.findings] == ["guessed"] * 3
@@ -696,7 +696,7 @@ def test_a_guessed_name_is_said_with_the_unit_declared(tmp_path):
     given |= {name: 1e3 * given[name] for name in names.values()}
     path = saved(tmp_path, given, toml='[sliders]\nunit = "mm"\n')
     back = read_log(path, QUADRUPTERON)
-    np.testing.assert_allclose(back.sliders, log.sliders, rtol=1e-15)
+    np.testing.assert_allclose(back.joints, log.joints, rtol=1e-15)
     (finding,) = back.findings
     assert "q1, q2, q3, q4 taken for the slider coordinates in mm" in finding.message
 

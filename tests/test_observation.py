@@ -34,8 +34,8 @@ def states_of(robot, count=60, payload=0):
     return States(
         np.arange(float(count)),
         sliders,
-        rates.sliders,
-        accelerations.sliders,
+        rates.joints,
+        accelerations.joints,
         pose,
         velocity,
         acceleration,
@@ -47,11 +47,11 @@ def states_of(robot, count=60, payload=0):
 
 TERMS = {
     "no friction": Terms(coulomb=False, viscous=False, offset=False),
-    "sliders": Terms(),
-    "joints alike": Terms(joints="shared"),
-    "joints each": Terms(joints="each"),
+    "joints": Terms(),
+    "joints alike": Terms(passive="shared"),
+    "joints each": Terms(passive="each"),
     "rotors": Terms(rotors=True),
-    "everything": Terms(joints="each", rotors=True),
+    "everything": Terms(passive="each", rotors=True),
 }
 
 
@@ -63,7 +63,7 @@ def test_a_model_names_every_column_once(name, kind):
     robot = model.robot
     n = len(robot.legs)
     joints = {"none": 0, "shared": 3 + robot.platform.turns, "each": 3 * n + robot.platform.turns}
-    extra = n * (terms.coulomb + terms.viscous + terms.offset) + joints[terms.joints]
+    extra = n * (terms.coulomb + terms.viscous + terms.offset) + joints[terms.passive]
     assert model.left_out == tuple(f"J_m{i + 1}" for i in range(n) if terms.rotors)
     assert len(set(model.names)) == len(model.names) == model.base.rank + extra
     assert len(model.units) == len(model.expressions) == len(model.names)
@@ -71,7 +71,7 @@ def test_a_model_names_every_column_once(name, kind):
     sliders = [("N", terms.coulomb), ("N s/m", terms.viscous), ("N", terms.offset)]
     assert model.units[model.base.rank :] == (
         *(unit for unit, taken in sliders for _ in range(n * taken)),
-        *("N m s",) * joints[terms.joints],
+        *("N m s",) * joints[terms.passive],
     )
     usual = {"m": "kg", "mgx": "kg m", "mgy": "kg m", "I": "kg m^2"}
     kinds = [name.split("_")[0] for name in model.base.names]
@@ -84,7 +84,7 @@ def test_the_columns_add_up_to_the_forces(name):
     model = model_of(name)
     at = states_of(robot)
     forces = pteron.inverse_dynamics(robot, at.pose, at.velocity, at.acceleration)
-    forces = forces + Friction.of(len(robot.legs)).forces(at.slider_rates)
+    forces = forces + Friction.of(len(robot.legs)).forces(at.joint_rates)
     assert relative_error(model.matrix(at) @ truth(model), forces) < 1e-10
 
 
@@ -129,7 +129,7 @@ def test_legs_that_share_their_values_have_fewer(name):
 def test_shared_joints_are_the_sums_of_each(name):
     n = len(CATALOG[name].legs)
     at = states_of(CATALOG[name])
-    shared, each = (model_of(name, Terms(joints=kind)) for kind in ("shared", "each"))
+    shared, each = (model_of(name, Terms(passive=kind)) for kind in ("shared", "each"))
     start = shared.base.rank + 3 * n
     parts = each.matrix(at)[..., start : start + 3 * n]
     sums = parts.reshape(60, n, n, 3).sum(axis=-2)
@@ -162,7 +162,7 @@ def test_a_rotor_joins_what_acts_like_it(name):
         assert any(rotor in expression for expression in driven.expressions)
         felt = driven.matrix(at) @ driven.share_of(rotor, 0.7)
         expected = np.zeros_like(felt)
-        expected[:, i] = 0.7 * at.slider_accelerations[:, i]
+        expected[:, i] = 0.7 * at.joint_accelerations[:, i]
         assert np.abs(felt - expected).max() < 1e-9 * np.abs(expected).max()
 
 
@@ -174,7 +174,7 @@ def test_a_payload_shows_its_mass_only_where_the_platform_does_not_turn():
 
 def test_terms_that_cannot_be_are_refused():
     with pytest.raises(ModelError, match="none, shared, each"):
-        Terms(joints="all")
+        Terms(passive="all")
 
 
 # Logs without noise
@@ -246,7 +246,7 @@ def test_slow_sliders_are_left_out_on_both_sides(derivatives):
         name, derivatives, processing=processing
     )
     pose, velocity, _ = motion(MECHANISMS[name], log.time)
-    rates = pteron.joint_rates(MECHANISMS[name], pose, velocity).sliders
+    rates = pteron.joint_rates(MECHANISMS[name], pose, velocity).joints
     stuck = np.abs(rates) < 0.95 * treatment.slow
     assert stuck.mean() > 0.03
     spoiled = replace(log, forces=log.forces + 50.0 * stuck)
@@ -328,7 +328,7 @@ def test_what_is_left_of_noise_has_the_size_of_the_noise(case):
 @pytest.mark.parametrize(("derivatives", "size"), [("central", 57), ("spline", 1000)])
 def test_pieces_give_the_equations_of_the_whole(derivatives, size):
     name = "tripteron"
-    log = log_of(CATALOG[name], slider_noise=1e-6 * (derivatives == "central"))
+    log = log_of(CATALOG[name], joint_noise=1e-6 * (derivatives == "central"))
     log = without(log, 2000, 2050)
     log = replace(log, payload=(np.arange(log.rows) > 2600).astype(int))
     wanted = Processing(derivatives=derivatives, cutoff=25.0, slow=0.2)
@@ -368,7 +368,7 @@ def test_a_payload_is_found_from_two_phases():
     log = replace(
         first,
         time=np.r_[first.time, 8.0 + second.time],
-        sliders=np.vstack([first.sliders, second.sliders]),
+        joints=np.vstack([first.joints, second.joints]),
         forces=np.vstack([first.forces, second.forces]),
         payload=np.repeat([0, 1], 4000),
     )
@@ -381,7 +381,7 @@ def test_a_payload_is_found_from_two_phases():
 
 def test_the_period_is_taken_from_the_description():
     robot = CATALOG["tripteron"]
-    log = log_of(robot, description=Description(period=4.0), slider_noise=1e-7)
+    log = log_of(robot, description=Description(period=4.0), joint_noise=1e-7)
     treatment = preprocessing_of(robot, log)
     equations = observations_of(model_of("tripteron"), log, treatment)
     assert treatment.derivatives == "periodic"

@@ -38,7 +38,7 @@ def recorded():
 
 def test_its_forces_are_those_of_the_model(recorded):
     _, built, friction, recording = recorded
-    poses = pteron.direct_kinematics(built, recording.sliders)[:, 0]
+    poses = pteron.direct_kinematics(built, recording.joints)[:, 0]
     jacobian = pteron.jacobian(built, poses)
     velocity = np.linalg.solve(jacobian, recording.rates[..., None])[..., 0]
     acceleration = np.linalg.solve(jacobian, recording.accelerations[..., None])[..., 0]
@@ -55,7 +55,7 @@ def test_it_is_identified_through_its_sensors(recorded):
 
     robot, built, friction, recording = recorded
     seen = plant.measured(recording, encoder=1e-6, force=0.01, jitter=1e-5, seed=0)
-    log = Log("plant", seen.time, seen.sliders, seen.forces)
+    log = Log("plant", seen.time, seen.joints, seen.forces)
     model = identification_model(robot)
     treatment = preprocessing_of(robot, log, Processing(derivatives="central"))
     found = weighted(observations_of(model, log, treatment))

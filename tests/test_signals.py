@@ -288,7 +288,7 @@ def test_blocks_tile_a_log_without_overlap_or_loss(size, margin, length):
     fresh = []
     for block in blocks(pieces(log, length), margin, size, 100.0):
         assert block.rows <= size + 2 * margin
-        numbers = block.sliders[:, 0]
+        numbers = block.joints[:, 0]
         assert np.array_equal(numbers, numbers[0] + np.arange(block.rows))
         assert block.first_row == numbers[0]
         fresh.append(numbers[margin : block.rows - margin])
@@ -301,7 +301,7 @@ def test_blocks_bridge_neither_gaps_nor_changes_of_the_payload(length):
     log = counted(200, gaps=(50,), payload=payload, first_row=1000)
     fresh = []
     for block in blocks(pieces(log, length), 4, 16, 100.0):
-        numbers = block.sliders[:, 0]
+        numbers = block.joints[:, 0]
         assert np.array_equal(numbers, numbers[0] + np.arange(block.rows))
         assert np.ptp(block.payload) == 0
         assert block.first_row == 1000 + numbers[0]
@@ -332,9 +332,9 @@ def test_states_are_those_of_the_motion(name):
     rates, accelerations = pteron.joint_rates(robot, pose, velocity, acceleration)
     sliders = pteron.inverse_kinematics(robot, pose)
     log = Log("log.csv", np.arange(200.0), sliders, sliders)
-    found = States.of_sliders(
+    found = States.of_joints(
         robot,
-        (sliders, rates.sliders, accelerations.sliders),
+        (sliders, rates.joints, accelerations.joints),
         log.time,
         assembly_mode(robot, log),
     )
@@ -347,8 +347,8 @@ def test_states_are_those_of_the_motion(name):
 def in_mode(robot, mode):
     """Return a log of poses in an assembly mode: the sign of the determinant tells it."""
     pose, _, _ = states(robot, 400)
-    regularity = numeric(robot, "regularity")(pose)
-    pose = pose[(regularity < 0.0) == bool(mode)]
+    type_ii = numeric(robot, "type_ii")(pose)
+    pose = pose[(type_ii < 0.0) == bool(mode)]
     assert len(pose) > 10
     sliders = pteron.inverse_kinematics(robot, pose)
     return Log("log.csv", np.arange(float(len(pose))), sliders, sliders, pose=pose)
@@ -384,9 +384,9 @@ def test_a_tripteron_has_one_assembly_mode():
 
 def unreachable(log, row):
     """Return a log with one row that no pose has."""
-    sliders = log.sliders.copy()
+    sliders = log.joints.copy()
     sliders[row] += [0.5, -0.5, 0.3, 0.4]
-    return replace(log, sliders=sliders)
+    return replace(log, joints=sliders)
 
 
 @pytest.mark.parametrize(("row", "first"), [(300, 0), (1900, 5000)])
@@ -417,7 +417,7 @@ def test_a_singular_sample_is_named():
     pose, velocity, acceleration = states(robot, 30)
     rates, accelerations = pteron.joint_rates(robot, pose, velocity, acceleration)
     sliders = pteron.inverse_kinematics(robot, pose)
-    motion_of = [sliders, rates.sliders, accelerations.sliders]
+    motion_of = [sliders, rates.joints, accelerations.joints]
     _, margin, _ = numeric(robot, "reach")(pose[17:18])
     leg = robot.legs[0]
     # Across the direction of leg 1, until the first leg is all but stretched.
@@ -430,14 +430,14 @@ def test_a_singular_sample_is_named():
     assert margin.min() > 0.0
     sliders[17] = pteron.inverse_kinematics(robot, pose[17] + low * across)
     with pytest.raises(DataError, match="row 1018: a leg is all but stretched or folded"):
-        States.of_sliders(robot, tuple(motion_of), np.arange(30.0), 0, first_row=1000)
+        States.of_joints(robot, tuple(motion_of), np.arange(30.0), 0, first_row=1000)
 
 
 @pytest.mark.parametrize(("derivatives", "margin"), [("central", 0), ("spline", 37)])
 def test_fresh_samples_of_blocks_tile_a_log(derivatives, margin):
     robot = CATALOG["tripteron"]
     # The knots of a spline are where a block says: noise falls on them in other ways.
-    log = log_of(robot, duration=4.0, slider_noise=1e-6 * (derivatives == "central"))
+    log = log_of(robot, duration=4.0, joint_noise=1e-6 * (derivatives == "central"))
     treatment = preprocessing_of(robot, log, Processing(derivatives=derivatives, cutoff=20.0))
     whole = list(samples(robot, log, treatment, margin=margin))
     assert len(whole) == 1
@@ -497,21 +497,21 @@ def test_uneven_samples_give_the_motion(derivatives):
 
 def test_the_data_choose_the_treatment():
     robot = CATALOG["quadrupteron"]
-    clean, noisy = log_of(robot), log_of(robot, slider_noise=1e-5)
+    clean, noisy = log_of(robot), log_of(robot, joint_noise=1e-5)
     assert preprocessing_of(robot, clean).derivatives == "spline"
     assert preprocessing_of(robot, noisy).derivatives == "central"
     known = replace(noisy, description=Description(period=4.0))
     periodic = preprocessing_of(robot, known)
     assert (periodic.derivatives, periodic.period) == ("periodic", 4.0)
     assert preprocessing_of(robot, known, rows=10**8).derivatives == "central"
-    assert preprocessing_of(robot, noisy).slider_noise == pytest.approx(1e-5, rel=0.1)
+    assert preprocessing_of(robot, noisy).joint_noise == pytest.approx(1e-5, rel=0.1)
 
 
 def test_speeds_that_count_as_slow_are_a_share_of_the_usual_ones():
     robot = CATALOG["quadrupteron"]
     log = log_of(robot)
     pose, velocity, _ = motion(robot, log.time)
-    usual = np.sqrt((pteron.joint_rates(robot, pose, velocity).sliders ** 2).mean(axis=0))
+    usual = np.sqrt((pteron.joint_rates(robot, pose, velocity).joints ** 2).mean(axis=0))
     for share in (0.0, 0.02, 0.3):
         slow = preprocessing_of(robot, log, Processing(slow=share)).slow
         assert slow == pytest.approx(share * usual, rel=0.01, abs=1e-15)
@@ -541,7 +541,7 @@ def test_a_treatment_that_cannot_be_is_refused(case):
 
 def test_the_longest_stretch_decides_the_treatment():
     robot = CATALOG["tripteron"]
-    log = log_of(robot, slider_noise=1e-5)
+    log = log_of(robot, joint_noise=1e-5)
     whole, cut = preprocessing_of(robot, log), preprocessing_of(robot, without(log, 400, 700))
     assert cut.rate == pytest.approx(whole.rate, rel=1e-9)
     assert cut.cutoff == pytest.approx(whole.cutoff, rel=0.5)

@@ -78,7 +78,7 @@ def compared(
     Samples of a slider that is slower than `least`, m/s, are left out.
     """
     rates, n = recording.rates, recording.rates.shape[1]
-    state = platform_state(robot, recording.sliders, rates, recording.accelerations)
+    state = platform_state(robot, recording.joints, rates, recording.accelerations)
     motion = state.pose, state.velocity, state.acceleration
     base = pteron.base_parameters(robot)
     each = np.eye(n)

@@ -130,7 +130,7 @@ class Bench:
             seed=seed,
         )
         name = "another motion" if held_out else "the motion"
-        return Log(name, seen.time, seen.sliders, seen.forces)
+        return Log(name, seen.time, seen.joints, seen.forces)
 
 
 @dataclass(frozen=True)

@@ -50,7 +50,7 @@ class Guides:
         n = len(self.coulomb)
         # Views: MuJoCo's arrays stay where they are.
         self.data = data
-        self.sliders, self.rates, self.accelerations = (
+        self.joints, self.rates, self.accelerations = (
             vector[joints::3] for vector in (data.qpos, data.qvel, data.qacc)
         )
         self.held = data.eq_active[n:]
@@ -85,5 +85,5 @@ class Guides:
             self.held[loose] = 0
         if stopped.any():
             self.sense[stopped] = 0.0
-            self.places[stopped] = self.sliders[stopped]
+            self.places[stopped] = self.joints[stopped]
             self.held[stopped] = 1

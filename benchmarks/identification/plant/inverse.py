@@ -45,5 +45,5 @@ def platform_state(
     jacobian = pteron.jacobian(robot, pose)
     velocity = np.linalg.solve(jacobian, rates[..., None])[..., 0]
     _, drift = pteron.joint_rates(robot, pose, velocity, np.zeros_like(pose))
-    acceleration = np.linalg.solve(jacobian, (accelerations - drift.sliders)[..., None])[..., 0]
+    acceleration = np.linalg.solve(jacobian, (accelerations - drift.joints)[..., None])[..., 0]
     return State(pose, velocity, acceleration)

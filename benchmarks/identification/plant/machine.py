@@ -163,14 +163,14 @@ class _Plant:
         self.guides = Guides(friction, model, data, m)
         self.damping = friction.joints * joint_damping(robot) if friction.joints else None
         # Views: MuJoCo's arrays stay where they are.
-        self.poses, self.sliders, self.rates = data.qpos[:m], data.qpos[m::3], data.qvel[m::3]
+        self.poses, self.joints, self.rates = data.qpos[:m], data.qpos[m::3], data.qvel[m::3]
         self.accelerations, self.applied = data.qacc[m::3], data.qfrc_applied[m::3]
         self.forces = np.zeros(m)
         self.sites = [[data.site(f"{a} {i}").id for i in range(m)] for a in ("leg", "platform")]
 
     def load(self, _model: Any, _data: Any) -> None:
         """Apply the actuators' forces and friction; MuJoCo calls it at every stage."""
-        self.forces = self.controller.forces(self.data.time, self.sliders, self.rates)
+        self.forces = self.controller.forces(self.data.time, self.joints, self.rates)
         if self.damping is not None:
             self.data.qfrc_applied[:] = -self.damping @ self.data.qvel
             self.applied += self.forces - self.guides.braking()
@@ -191,7 +191,7 @@ class _Plant:
         self.forward(self.model, self.data)
         leg, platform = (self.data.site_xpos[sites] for sites in self.sites)
         gap = float(np.linalg.norm(leg - platform, axis=-1).max())
-        state = self.sliders, self.rates, self.accelerations, self.forces, self.poses
+        state = self.joints, self.rates, self.accelerations, self.forces, self.poses
         sliders, rates, accelerations, forces, poses = (column.copy() for column in state)
         return sliders, rates, accelerations, forces, poses, gap
 
@@ -209,5 +209,5 @@ def _place(robot: pteron.Manipulator, data: Any, reference: Reference, start: fl
         upper, lower = (np.arctan2(*(axes.T @ link[i])[1::-1]) for link in links)
         turns = rates.upper_links[i], rates.lower_links[i]
         position += [sliders[i], upper, lower - upper]
-        motion += [rates.sliders[i], turns[0], turns[1] - turns[0]]
+        motion += [rates.joints[i], turns[0], turns[1] - turns[0]]
     data.qpos[:], data.qvel[:], data.time = position, motion, start

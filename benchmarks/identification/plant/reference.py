@@ -17,7 +17,7 @@ Reference = Callable[[Array], tuple[Array, Array, Array]]
 
 _ELBOW = 0.25
 _REGULARITY = 0.3
-"""What a motion keeps of the sines of the elbows' angles and of the regularity."""
+"""What a motion keeps of the sines of the elbows' angles and of the type_ii."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Fourier:
         """Return slider coordinates, rates and accelerations, (T, n) each."""
         pose, velocity, acceleration = self.platform(np.asarray(time, dtype=float))
         rates, accelerations = pteron.joint_rates(self.robot, pose, velocity, acceleration)
-        return pteron.inverse_kinematics(self.robot, pose), rates.sliders, accelerations.sliders
+        return pteron.inverse_kinematics(self.robot, pose), rates.joints, accelerations.joints
 
 
 def fourier_reference(
@@ -73,7 +73,7 @@ def fourier_reference(
     """Return a random lively motion about the home pose.
 
     All coefficients are scaled alike until the first of these stops them: an elbow whose sine is
-    0.25, a regularity of 0.3, a slider's limit, the greatest speed or acceleration of a slider.
+    0.25, a type_ii of 0.3, a slider's limit, the greatest speed or acceleration of a slider.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def _serves(motion: Fourier, time: Array, speed: float, acceleration: float) -> 
     reserve = pteron.workspace.reserve(motion.robot, pose)
     if (
         reserve.elbow_sines.min() < _ELBOW
-        or reserve.regularity.min() < _REGULARITY
+        or reserve.type_ii.min() < _REGULARITY
         or reserve.slider_clearances.min() < 0.0
     ):
         return False

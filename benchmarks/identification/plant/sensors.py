@@ -37,8 +37,8 @@ class Log:
     @property
     def columns(self) -> dict[str, Array]:
         """The columns of a log's file: t, rho1.., force1.. ."""
-        legs = range(self.sliders.shape[1])
-        sliders = {f"rho{i + 1}": self.sliders[:, i] for i in legs}
+        legs = range(self.joints.shape[1])
+        sliders = {f"rho{i + 1}": self.joints[:, i] for i in legs}
         forces = {f"force{i + 1}": self.forces[:, i] for i in legs}
         return {"t": self.time} | sliders | forces
 
@@ -83,7 +83,7 @@ def measured(
     late[[0, -1]] = 0.0
     # So near to a sample, the third derivative adds less than a nanometre.
     d = late[:, None]
-    sliders = recording.sliders + d * recording.rates + 0.5 * d**2 * recording.accelerations
+    sliders = recording.joints + d * recording.rates + 0.5 * d**2 * recording.accelerations
     if encoder > 0.0:
         sliders = encoder * np.round(sliders / encoder)
     # Local, so that the jumps of friction compensation do not ring.
