@@ -77,6 +77,8 @@ class Kernel(ABC):
         All inputs, the fixed ones too.
     inputs : tuple of Port
         What a call takes, in order.
+    made : dict
+        For a fixed input of which the code takes numbers that are made of it, what makes them.
     call : callable
         What `kernel(...)` runs: the same, some 0.1 us cheaper. It may change; do not keep it.
     """
@@ -99,6 +101,7 @@ class Kernel(ABC):
         self.outputs = outputs
         self.dtype = dtype
         self.threads = threads
+        self.made: dict[str, ca.Function] = {}
         self.call: Callable[..., Any] = self._evaluate
 
     def __repr__(self) -> str:
@@ -159,6 +162,10 @@ class Kernel(ABC):
                     f"{self.name}: {name!r} cannot be given by name; inputs that can: {known}"
                 )
         given = {port.name: value for port, value in zip(self.inputs, values, strict=True)}
+        for name in fixed.keys() & self.made.keys():
+            make = self.made[name]
+            whole = as_array(fixed[name], name, (make.size1_in(0),))
+            fixed = {**fixed, name: np.array(make(whole)).ravel()}
         return {**self.fixed, **fixed, **given}
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Any, Literal, Protocol, get_args
 
+import casadi as ca
 import numpy as np
 
 from pteron.equations.machine import numbers
@@ -12,6 +13,7 @@ from pteron.errors import ModelError
 from pteron.kernels.c import Compiled
 from pteron.kernels.exact import Exact
 from pteron.kernels.functions import Columns, Program, general_program, program, specialised
+from pteron.kernels.hoisting import hoisted
 from pteron.kernels.jax import Traced
 from pteron.kernels.kernel import Array, Kernel
 from pteron.kernels.numba import Jitted
@@ -28,6 +30,9 @@ TARGETS: dict[str, type[Kernel]] = {
 """The targets by name."""
 
 Grade = Literal["specialised", "parametric", "general"]
+
+_TRANSPARENT = ("jax", "exact")
+"""Targets whose numbers may be traced or fractions, and go into the code as they are given."""
 
 _DTYPES = {"vm": ("float64",), "numba": ("float64",), "exact": ("float64",)}
 
@@ -108,10 +113,10 @@ def compile(
     >>> robot = pteron.load("quadrupteron")
     >>> kernel = pteron.compile(robot, "inverse_dynamics")
     >>> kernel.operations, [port.name for port in kernel.inputs]
-    (385, ['pose', 'velocity', 'acceleration'])
+    (382, ['pose', 'velocity', 'acceleration'])
     >>> kernel = pteron.compile(robot, "inverse_dynamics", grade="parametric")
     >>> kernel.operations, [port.name for port in kernel.ports]
-    (417, ['pose', 'velocity', 'acceleration', 'parameters'])
+    (407, ['pose', 'velocity', 'acceleration', 'parameters'])
     """
     if target not in TARGETS:
         raise ModelError(f"target: {target!r} is not known; choose from {', '.join(TARGETS)}")
@@ -163,8 +168,13 @@ def _compiled(
             fixed[port.name] = parameters(robot)
         elif port.name == "base_parameters":
             fixed[port.name] = np.array(base_values)
+    made: dict[str, ca.Function] = {}
     if grade == "specialised" and fixed:
         built, fixed = specialised(built, fixed), {}
+    elif base_values is not None and target not in _TRANSPARENT and "base_parameters" in fixed:
+        # What depends on base parameters alone is worked out once.
+        built, made["base_parameters"] = hoisted(built, "base_parameters")
+        fixed["base_parameters"] = np.array(made["base_parameters"](base_values)).ravel()
     elif grade == "general":
         if wrench:
             raise ModelError('wrench: not with grade "general"; use "specialised" or "parametric"')
@@ -172,7 +182,9 @@ def _compiled(
         fixed["geometry"] = np.array(numbers(robot))
     for value in fixed.values():
         value.setflags(write=False)  # the kernel is shared by all who ask for it
-    return _made(TARGETS[target], built, fixed, dtype, threads)
+    kernel = _made(TARGETS[target], built, fixed, dtype, threads)
+    kernel.made.update(made)
+    return kernel
 
 
 def _made(

@@ -47,7 +47,7 @@ def cheapest_parameters(robot: Manipulator) -> BaseParameters:
     >>> robot = pteron.load("quadrupteron")
     >>> base = pteron.cheapest_parameters(robot)
     >>> base.rank, pteron.compile(robot, "inverse_dynamics", base=base).operations
-    (26, 330)
+    (26, 317)
     """
     columns = parameter_data(robot)
     grouping = _without_units(robot, base_parameters(robot))

@@ -14,6 +14,7 @@ from pteron.manipulator import Manipulator
 _PULL = 30.0
 """Gravity, m/s^2, beyond which another unit is likelier."""
 
+
 def doubts(robot: Manipulator) -> tuple[str, ...]:
     """Return what a person should look at again, one line each.
 
