@@ -22,7 +22,8 @@ JointsLike = ArrayLike
 
 PerCoordinate = Float[np.ndarray, "*batch m"]
 PerJoint = Float[np.ndarray, "*batch n"]
-Numbers = Float[np.ndarray, "*batch"]
+Numbers = Float[np.ndarray, "*batch"] | np.float64
+"""One number a state: NumPy makes a scalar of an array without axes wherever it computes."""
 Vectors = Float[np.ndarray, "*batch n 3"]
 Matrices = Float[np.ndarray, "*batch n m"]
 Poses = Float[np.ndarray, "*batch k m"]

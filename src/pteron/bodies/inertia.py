@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Protocol, Self
+from typing import ClassVar, Protocol, Self, runtime_checkable
 
 from pteron.bodies.vectors import number, numbers, positive
 from pteron.errors import ModelError
@@ -12,6 +12,7 @@ from pteron.errors import ModelError
 _ROUNDING = 1e-12
 
 
+@runtime_checkable
 class Inertia(Protocol):
     """What a body's inertia tells of itself: the kinds of its parameters, and their values."""
 

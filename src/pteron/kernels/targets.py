@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, Literal, Protocol, get_args
+from typing import Any, Literal, Protocol, get_args, runtime_checkable
 
 import casadi as ca
 import numpy as np
@@ -37,6 +37,7 @@ _TRANSPARENT = ("jax", "exact")
 _DTYPES = {"vm": ("float64",), "numba": ("float64",), "exact": ("float64",)}
 
 
+@runtime_checkable
 class Selects(Protocol):
     """A choice of base parameters, such as `pteron.BaseParameters`."""
 

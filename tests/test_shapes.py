@@ -1,0 +1,47 @@
+"""The shapes in the type hints of the public functions are those that come and go."""
+
+import subprocess
+import sys
+
+SCRIPT = """
+from jaxtyping import install_import_hook
+
+packages = ("kinematics", "dynamics", "motion", "workspace", "reduction.reduced")
+with install_import_hook([f"pteron.{name}" for name in packages], "beartype.beartype"):
+    import pteron
+    from pteron.motion import joint_points, pick_and_place
+    from pteron.workspace import reserve
+
+for name in ("quadrupteron", "delta"):
+    robot = pteron.load(name)
+    batch = pteron.random_poses(robot, 3)
+    base = pteron.base_parameters(robot, "qr")
+    for x in (batch, batch[0], batch[None]):
+        v = 0.0 * x
+        q = pteron.inverse_kinematics(robot, x)
+        pteron.direct_kinematics(robot, q)
+        for f in (
+            *(pteron.jacobian, pteron.link_vectors, pteron.link_jacobians, pteron.joint_screws),
+            *(pteron.mass_matrix, pteron.gravity_forces, pteron.potential_energy),
+            *(reserve, joint_points),
+        ):
+            f(robot, x)
+        for f in (
+            *(pteron.joint_rates, pteron.coriolis_matrix, pteron.bias_forces),
+            pteron.kinetic_energy,
+        ):
+            f(robot, x, v)
+        for f in (
+            *(pteron.joint_accelerations, pteron.inverse_dynamics, pteron.forward_dynamics),
+            pteron.regressor,
+        ):
+            f(robot, x, v, v)
+        pteron.inverse_dynamics(robot, x, v, v, wrench=v)
+        pteron.base_regressor(robot, base, x, v, v)
+    pick_and_place(robot, pteron.random_poses(robot, 1, type_i=0.5, type_ii=0.5)[0], samples=5)
+"""
+
+
+def test_public_functions_take_and_return_the_shapes_that_they_say():
+    done = subprocess.run([sys.executable, "-c", SCRIPT], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[-2000:]
