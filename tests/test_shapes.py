@@ -12,7 +12,7 @@ with install_import_hook([f"pteron.{name}" for name in packages], "beartype.bear
     from pteron.motion import joint_points, pick_and_place
     from pteron.workspace import reserve
 
-for name in ("quadrupteron", "delta"):
+for name, middle in (("quadrupteron", [0, 0, 0, 0]), ("delta", [0, 0, -0.8])):
     robot = pteron.load(name)
     batch = pteron.random_poses(robot, 3)
     base = pteron.base_parameters(robot, "qr")
@@ -38,7 +38,7 @@ for name in ("quadrupteron", "delta"):
             f(robot, x, v, v)
         pteron.inverse_dynamics(robot, x, v, v, wrench=v)
         pteron.base_regressor(robot, base, x, v, v)
-    pick_and_place(robot, pteron.random_poses(robot, 1, type_i=0.5, type_ii=0.5)[0], samples=5)
+    pick_and_place(robot, middle, samples=5)
 """
 
 
