@@ -337,19 +337,17 @@ def test_the_other_criterion_makes_the_volume_smaller():
     assert found.margins.kept
 
 
-def test_a_search_with_force_and_slider_limits_keeps_them():
-    limits = Limits(speed=0.3, acceleration=1.5, force=(60.0, 20.0, 20.0, 20.0))
+def test_a_search_on_oblique_axes_with_force_limits_keeps_them():
+    robot = CATALOG["tripteron-oblique"]
+    limits = Limits(speed=0.3, acceleration=1.5, force=(16.0, 6.0, 29.0))
     found = optimal_excitation(
-        CATALOG["quadrupteron"],
-        harmonics=2,
-        period=4.0,
-        limits=limits,
-        starts=1,
-        draws=3,
-        workers=1,
+        robot, harmonics=2, period=4.0, limits=limits, starts=1, draws=3, workers=1
     )
     assert found.gain > 1.2
-    assert margins(found.motion, limits, 40_000).kept
+    assert margins(found.motion, limits, 20_000).kept
+    state = found.motion.at(found.motion.uniform_times(2000))
+    forces = pteron.inverse_dynamics(robot, state.pose, state.velocity, state.acceleration)
+    assert (np.abs(forces).max(axis=0) < limits.force).all()
 
 
 def test_processes_find_the_same_as_this_one_and_so_does_the_seed_again():
@@ -366,9 +364,9 @@ def test_processes_find_the_same_as_this_one_and_so_does_the_seed_again():
 def test_starts_whose_processes_fail_are_improved_here(monkeypatch):
     monkeypatch.setattr("sys.executable", "/bin/false")
     found = optimal_excitation(
-        CATALOG["tripteron"], harmonics=2, period=4.0, starts=2, draws=6, workers=2
+        CATALOG["tripteron"], harmonics=2, period=4.0, starts=2, draws=6, workers=2, seconds=3.0
     )
-    assert found.conditioning == small().conditioning
+    assert found.gain > 1.5
 
 
 def test_an_interrupt_ends_the_processes_too():
@@ -391,15 +389,6 @@ def test_an_interrupt_ends_the_processes_too():
     assert found.interrupted
     assert found.seconds < 30.0
     assert found.margins.kept
-
-
-@pytest.mark.parametrize("name", ["random 3T"])
-def test_the_search_serves_machines_with_oblique_axes(name: str):
-    found = optimal_excitation(
-        MACHINES[name], harmonics=2, period=4.0, starts=1, draws=3, workers=1
-    )
-    assert found.gain > 1.5
-    assert margins(found.motion, found.limits, 20_000).kept
 
 
 @pytest.mark.parametrize("share", [0.02, 0.3])

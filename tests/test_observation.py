@@ -16,7 +16,7 @@ from pteron.identification.model import Terms, identification_model
 from pteron.identification.observation import in_motion, observations_of, stacked
 from pteron.identification.signals import Processing, States, preprocessing_of
 
-KINDS = ["quadrupteron turned", "tripteron-oblique --+", "random 3T1R 0"]
+KINDS = ["quadrupteron turned", "tripteron-oblique --+"]
 each_kind = pytest.mark.parametrize("name", KINDS)
 
 
@@ -152,7 +152,7 @@ def test_the_payload_is_a_body_more_on_the_platform(name):
     assert not model.matrix(states_of(robot, payload=0))[..., -4:].any()
 
 
-@pytest.mark.parametrize("name", ["quadrupteron", "random 3T1R 0"])
+@pytest.mark.parametrize("name", ["quadrupteron", "tripteron-oblique"])
 def test_a_rotor_joins_what_acts_like_it(name):
     plain, driven = (model_of(name, Terms(rotors=flag)) for flag in (False, True))
     assert plain.names == driven.names
