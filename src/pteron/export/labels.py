@@ -1,146 +1,186 @@
-"""Names for the intermediate quantities of a function, so that generated code can be read."""
+"""Names for the intermediate quantities of a function, so that generated code can be read.
+
+What the equations call by name is looked for among the values that the function computes: a node
+that equals a named quantity in several random states is that quantity, however the sums in it were
+regrouped to save operations.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from itertools import combinations_with_replacement
+from typing import Any
 
 import casadi as ca
+import numpy as np
 
-from pteron.equations.circles import squared_reach
-from pteron.equations.geometry import Expression, Geometry
-from pteron.equations.legs import closing_vector, leg_motion
-from pteron.equations.platforms import platform_motion
-from pteron.kernels import Graph, Program, graph_of
-from pteron.manipulator import Manipulator
+from pteron.bodies.motion import Expression
+from pteron.equations.lagrangian import mass_matrix
+from pteron.equations.machine import Machine, State
+from pteron.equations.virtual_work import generalized_forces, needed_forces
+from pteron.kernels import Array, Graph, Program
+from pteron.kernels.graph import CONSTANT, INPUT
 
-__all__ = ["Labelled", "labelled"]
+_SAME = 1e-12
+"""Relative difference below which two values are the same quantity."""
 
+Quantity = tuple[str, int, Expression]
+"""A name, the leg (from 1) whose quantity it is, or 0, and a scalar or a vector."""
 
-@dataclass(frozen=True)
-class Labelled:
-    """A program's graph, and what its nodes are called."""
-
-    program: Program
-    graph: Graph
-    names: dict[int, str]
-    """Of every node that computes something."""
+_AXES = {2: "ab", 3: "xyz", 4: ("x", "y", "z", "phi")}
+"""How components are told apart: a leg's plane has axes a and b."""
 
 
-def labelled(robot: Manipulator, given: Program) -> Labelled:
-    """Return the graph of a program with names for its nodes.
+def node_names(
+    machine: Machine, given: Program, graph: Graph, parameters: Expression, states: list[list[Array]]
+) -> dict[int, str]:
+    """Return a name for every node of a program's graph that computes something.
 
     Quantities that the equations know are called after them: `leg2_u_a` is a component of leg 2's
     closing vector in the axes of its plane, `c2_z` one of its platform point, and so on. What
     depends on one leg alone carries the leg's number; all else is numbered.
+
+    Parameters
+    ----------
+    machine : Machine
+        Whose function it is.
+    given : Program
+        The function.
+    graph : Graph
+        Its graph.
+    parameters : (N, 1)
+        The inertial parameters, in terms of the program's inputs.
+    states : list of list of array
+        Inputs of the program, in several states.
     """
     symbols = given.function.sx_in()
-    inputs = dict(zip((port.name for port in given.inputs), symbols, strict=True))
-    outputs = given.function.call(symbols)
-    known = _quantities(Geometry.of(robot), inputs) if "pose" in inputs else {}
-    merged = ca.cse([*outputs, *known.values()])
-    function = ca.Function(given.name, symbols, merged)
-    graph = graph_of(function, given.inputs)
-    count = len(outputs)
-    titles: dict[int, str] = {}
-    for name, nodes in zip(known, graph.outputs[count:], strict=True):
-        node = nodes[0] if nodes else None
-        if node is not None and graph.nodes[node].operation not in ("input", "constant"):
-            titles.setdefault(node, name)
-    pruned, places = _pruned(graph, count)
-    kept = {places[k]: name for k, name in titles.items() if k in places}
-    return Labelled(given, pruned, _named(pruned, kept, len(robot.legs)))
+    inputs = {port.name: symbol for port, symbol in zip(given.inputs, symbols, strict=True)}
+    names, legs, scalars = [], [], []
+    for name, leg, value in _quantities(machine, inputs, parameters):
+        parts = ca.vertsplit(ca.densify(value)) if value.shape[0] > 1 else [value]
+        axes = [f"_{axis}" for axis in _AXES.get(len(parts), map(str, range(len(parts))))]
+        for axis, part in zip(axes if len(parts) > 1 else [""], parts, strict=True):
+            names.append(name + axis)
+            legs.append(leg)
+            scalars.append(part)
+    known = ca.Function("known", symbols, [ca.vertcat(*scalars)])
+    wanted = np.hstack([np.array(known(*state)) for state in states])
+    return _named(graph, _matches(_values(graph, states), wanted), names, legs)
 
 
-def _quantities(g: Geometry, inputs: dict[str, Expression]) -> dict[str, Expression]:
-    """Return scalar expressions by name, in the order in which they are looked for."""
-    rest = ca.SX.zeros(g.freedom)
-    velocity = inputs.get("velocity", rest)
-    acceleration = inputs.get("acceleration", rest)
-    motion = platform_motion(g, inputs["pose"], velocity, acceleration)
-    found: dict[str, Expression] = {}
-    if motion.turn is not None:
-        found |= {"cos_phi": ca.cos(inputs["pose"][3]), "sin_phi": ca.sin(inputs["pose"][3])}
-    for i, (leg, point) in enumerate(zip(g.legs, motion.points, strict=True), start=1):
-        state = leg_motion(leg, point)
-        u = closing_vector(leg, point.position)
-        scalars = {"square": ca.dot(u, u), "delta": squared_reach(leg, u)}
-        scalars["root"] = ca.sqrt(scalars["delta"])
-        if "velocity" in inputs:
-            scalars |= {
-                "upper_rate": state.upper_rate,
-                "lower_rate": state.lower_rate,
-                "slider_rate": state.slider_rate,
-            }
-        if "acceleration" in inputs:
-            scalars |= {
-                "upper_acceleration": state.upper_acceleration,
-                "lower_acceleration": state.lower_acceleration,
-                "slider_acceleration": state.slider_acceleration,
-            }
-        vectors = {
-            "u": u,
-            "upper": state.position.l_u,
-            "lower": state.position.l_l,
-            "upper_row": state.position.upper_row,
-            "lower_row": state.position.lower_row,
-            "c": point.position,
+def _quantities(
+    machine: Machine, inputs: dict[str, Expression], parameters: Expression
+) -> Iterator[Quantity]:
+    """Yield what may have a name, those that are preferred first."""
+    if "pose" in inputs:
+        pose = inputs["pose"]
+        state = machine.state(pose, inputs.get("velocity"), inputs.get("acceleration"))
+        yield from _motion(machine, pose, state)
+        for carried in (True, False):  # the masses on the platform points
+            yield "load", 0, needed_forces(machine, state, parameters, carried)[1]
+        yield "generalized_force", 0, generalized_forces(machine, state, parameters)
+        mass = mass_matrix(machine, pose, parameters)
+        for i, j in combinations_with_replacement(range(machine.freedom), 2):
+            yield f"mass{i + 1}{j + 1}", 0, mass[i, j]
+    elif "joints" in inputs:
+        joints = inputs["joints"]
+        for i, (leg, q) in enumerate(zip(machine.legs, ca.vertsplit(joints), strict=True), 1):
+            for name, value in leg.locus(q)._asdict().items():
+                yield f"leg{i}_{name}", i, ca.SX(value)
+        for k, pose in enumerate(ca.horzsplit(machine.closure.poses(joints)), start=1):
+            for name, i, value in _motion(machine, pose, machine.state(pose)):
+                yield f"pose{k}_{name}", i, value
+
+
+def _motion(machine: Machine, pose: Expression, state: State) -> Iterator[Quantity]:
+    """Yield the motion of the platform's points, and what the legs answer to it."""
+    platform = state.platform
+    for name, coordinate in zip(machine.platform.coordinates, ca.vertsplit(pose), strict=True):
+        yield name, 0, coordinate
+    if platform.angle is not None:
+        yield "cos_phi", 0, ca.cos(platform.angle.angle)
+        yield "sin_phi", 0, ca.sin(platform.angle.angle)
+    for i, (equations, leg, point) in enumerate(
+        zip(machine.legs, state.legs, platform.points, strict=True), start=1
+    ):
+        found = equations.named(point, platform.angle) | {
+            "l_u": leg.links[0],
+            "l_l": leg.links[1],
+            "joint": leg.coordinate,
+            "joint_rate": leg.rate,
+            "joint_acceleration": leg.acceleration,
+            "divisor": leg.divisor,
         }
-        if "velocity" in inputs:
-            vectors |= {"dc": point.velocity}
-        if "acceleration" in inputs:
-            vectors |= {"ddu": state.closing_acceleration, "ddc": point.acceleration}
-        found |= {f"leg{i}_{name}": value for name, value in scalars.items()}
-        for name, vector in vectors.items():
-            # A platform point's coordinates may serve several legs, in whose plane they lie.
-            title = f"{name}{i}" if name.endswith("c") else f"leg{i}_{name}"
-            axes = "xyz" if vector.shape[0] == 3 else "ab"
-            found |= {f"{title}_{axes[k]}": ca.densify(vector)[k] for k in range(vector.shape[0])}
+        for name, value in found.items():
+            if value is not None:
+                yield f"leg{i}_{name}", i, value
+        # A platform point's coordinates may serve several legs.
+        for name, value in zip(("c", "dc", "ddc"), point, strict=True):
+            yield f"{name}{i}", 0, value
+
+
+def _values(graph: Graph, states: list[list[Array]]) -> Array:
+    """Return the values of the nodes, a row each, a column for each state."""
+    rows: list[Any] = []
+    with np.errstate(all="ignore"):
+        for node in graph.nodes:
+            if node.operation == INPUT:
+                i, j = node.arguments
+                rows.append(np.array([np.ravel(state[i])[j] for state in states]))
+            elif node.operation == CONSTANT:
+                rows.append(np.full(len(states), node.value))
+            else:
+                rows.append(_OPERATIONS[node.operation](*(rows[i] for i in node.arguments)))
+    return np.array(rows, dtype=float)
+
+
+_OPERATIONS: dict[str, Callable[..., Any]] = {
+    "add": np.add,
+    "sub": np.subtract,
+    "mul": np.multiply,
+    "div": np.divide,
+    "neg": np.negative,
+    "sqrt": np.sqrt,
+    "sin": np.sin,
+    "cos": np.cos,
+    "atan2": np.arctan2,
+    "fabs": np.abs,
+    "fmin": np.fmin,
+    "fmax": np.fmax,
+    "less": np.less,
+    "select": lambda test, value: np.where(test, value, 0.0),
+}
+
+
+def _matches(values: Array, wanted: Array) -> dict[int, int]:
+    """Return, for nodes that are a wanted quantity, its place: the first for each of them."""
+    found: dict[int, int] = {}
+    for place, row in enumerate(wanted):
+        if np.isfinite(row).all() and np.ptp(row) > 0.0:  # a constant says nothing
+            same = (np.abs(values - row) <= _SAME * np.abs(row)).all(axis=1)
+            for k in np.flatnonzero(same):
+                found.setdefault(int(k), place)
+                break
     return found
 
 
-def _pruned(graph: Graph, count: int) -> tuple[Graph, dict[int, int]]:
-    """Return the graph of the first outputs alone, and where its nodes went."""
-    needed = {k for nodes in graph.outputs[:count] for k in nodes}
-    for k in range(len(graph.nodes) - 1, -1, -1):
-        if k in needed and graph.nodes[k].operation != "input":
-            needed.update(graph.nodes[k].arguments)
-    places = {k: place for place, k in enumerate(sorted(needed))}
-    nodes = tuple(
-        node
-        if node.operation == "input"
-        else type(node)(
-            node.operation,
-            tuple(places[i] for i in node.arguments),
-            node.value,
-            node.shared,
-            node.outlying,
-        )
-        for node in (graph.nodes[k] for k in sorted(needed))
-    )
-    outputs = tuple(tuple(places[k] for k in nodes) for nodes in graph.outputs[:count])
-    return Graph(nodes, outputs), places
-
-
-def _named(graph: Graph, known: dict[int, str], legs: int) -> dict[int, str]:
+def _named(
+    graph: Graph, known: dict[int, int], names: list[str], legs: list[int]
+) -> dict[int, str]:
     """Return a name for every node: known ones, those of one leg, and the rest."""
     of_leg: list[frozenset[int]] = []
-    names: dict[int, str] = {}
-    counts = [0] * (legs + 1)
+    found: dict[int, str] = {}
+    counts: dict[str, int] = {}
     for k, node in enumerate(graph.nodes):
-        if node.operation in ("input", "constant"):
+        if node.operation in (INPUT, CONSTANT):
             of_leg.append(frozenset())
             continue
-        inherited = frozenset().union(*(of_leg[i] for i in node.arguments))
-        name = known.get(k, "")
-        own = {int(name[3])} if name.startswith("leg") else set()
-        of_leg.append(inherited | own)
+        own = {legs[known[k]]} - {0} if k in known else set()
+        of_leg.append(frozenset(own).union(*(of_leg[i] for i in node.arguments)))
         if k in known:
-            names[k] = known[k]
-        elif len(of_leg[k]) == 1:
-            (leg,) = of_leg[k]
-            counts[leg] += 1
-            names[k] = f"leg{leg}_{counts[leg]}"
+            found[k] = names[known[k]]
         else:
-            counts[0] += 1
-            names[k] = f"t{counts[0]}"
-    return names
+            stem = f"leg{min(of_leg[k])}_" if len(of_leg[k]) == 1 else "t"
+            counts[stem] = counts.get(stem, 0) + 1
+            found[k] = f"{stem}{counts[stem]}"
+    return found

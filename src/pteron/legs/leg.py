@@ -201,6 +201,10 @@ class LegEquations(ABC):
     def locus(self, q: Expression) -> Locus:
         """Return where c may be while the actuated joint is at q."""
 
+    def named(self, point: PointMotion, angle: AngleMotion | None) -> dict[str, Expression]:
+        """Return what of its motion generated code calls by name: scalars and columns."""
+        return {}
+
     def needs(
         self,
         point: PointMotion,

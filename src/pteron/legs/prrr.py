@@ -394,6 +394,22 @@ class PRRREquations(LegEquations):
             *last,
         ]
 
+    def named(self, point: PointMotion, angle: AngleMotion | None) -> dict[str, Expression]:
+        at = self._state(point)
+        u = at.l_u + at.l_l
+        delta = squared_reach(self.lu, self.ll, ca.dot(u, u))
+        root = ca.sqrt(delta)
+        found = {"u": u, "n2": ca.dot(u, u), "delta": delta, "root": root, "ddu": at.ddu}
+        found |= {"inverse_d": -2 * self.sigma / root, "links_dot": ca.dot(at.l_u, at.l_l)}
+        v = at.ddu
+        for letter, vector, link in (("u", at.l_u, at.upper), ("l", at.l_l, at.lower)):
+            found |= {f"theta_{letter}_{part}": value for part, value in link._asdict().items()}
+            found[f"theta_{letter}_rate2"] = square = link.rate * link.rate
+            found[f"along_{letter}"] = ca.dot(vector, at.ddu + square * vector)
+            found[f"plane_{letter}"] = vector
+            v = v + square * vector
+        return {**found, "v": v}
+
     def reach(self, c: Expression) -> Reach:
         u = ca.mtimes(self.across, c - self.r)
         n, delta = ca.sqrt(ca.dot(u, u)), squared_reach(self.lu, self.ll, ca.dot(u, u))
