@@ -4,18 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from importlib.metadata import version
 
+import casadi as ca
 import numpy as np
 
+from pteron.equations.machine import Machine
 from pteron.errors import ModelError
-from pteron.export.labels import Labelled, labelled
+from pteron.export.labels import node_names
 from pteron.kernels import FUNCTIONS as COMPILED
-from pteron.kernels import Array, Port, columns_of, compile, program, specialised
+from pteron.kernels import (
+    Array,
+    Graph,
+    Port,
+    Program,
+    columns_of,
+    graph_of,
+    program,
+    specialised,
+)
+from pteron.kernels.graph import CONSTANT
 from pteron.kinematics import inverse_kinematics, random_poses
 from pteron.manipulator import Manipulator, parameter_names, parameters
 from pteron.reduction import BaseParameters, cheapest_parameters
-
-__all__ = ["FUNCTIONS", "Exported", "Table", "chosen"]
 
 FUNCTIONS = (
     "inverse_kinematics",
@@ -32,15 +43,25 @@ _TRIALS = 40
 """Poses among which examples for the test program are looked for."""
 
 _SUMMARIES = {
-    "inverse_kinematics": "Slider coordinates of a pose.",
-    "direct_kinematics": "Every pose that slider coordinates allow, one a row; NaN where none.",
-    "closure_poses": "Every pose that solves the closures, one a row, in the legs' reach or not.",
-    "jacobian": "Jacobian: slider velocities = J velocity. It does not ask whether the legs reach.",
-    "inverse_dynamics": "Actuator forces of a motion, from the inertial parameters.",
-    "inverse_dynamics_base": "Actuator forces of a motion, from base parameters alone.",
-    "forward_dynamics": "Acceleration of the platform under actuator forces.",
+    "inverse_kinematics": "Joint coordinates of a pose.",
+    "direct_kinematics": "Every pose that the joint coordinates allow, one a row; NaN where it is "
+    "not real or not in reach.",
+    "closure_poses": "Every pose that the joint coordinates allow, one a row, in reach or not.",
+    "jacobian": "Jacobian: joint rates = J velocity.",
+    "inverse_dynamics": "Actuator forces of a motion, from the inertial parameters; friction is not "
+    "in them.",
+    "inverse_dynamics_base": "Actuator forces of a motion, from base parameters alone; friction is "
+    "not in them.",
+    "forward_dynamics": "Acceleration of the platform under actuator forces; friction is left out.",
     "regressor": "Regressor: actuator forces = regressor parameters.",
 }
+
+_MODES = "Each row is one assembly mode throughout."
+
+_NO_MODES = (
+    "Rows may change places at a singularity: follow the one nearest to the last pose. A leg may be "
+    "bent the other way in a row: then its inverse kinematics are not the joint coordinates given."
+)
 
 
 @dataclass(frozen=True)
@@ -54,15 +75,29 @@ class Table:
 
 
 @dataclass(frozen=True)
+class Example:
+    """A state, what a function returns for it, and its status: 0, or 1 out of reach."""
+
+    inputs: tuple[Array, ...]
+    results: tuple[Array, ...]
+    status: int
+
+
+@dataclass(frozen=True)
 class Exported:
     """One function: its graph with names, its ports, and states with their results."""
 
     name: str
     summary: str
-    labelled: Labelled
+    graph: Graph
+    names: dict[int, str]
+    """How the nodes of the graph that compute something are called."""
+    inputs: tuple[Port, ...]
     outputs: tuple[Port, ...]
+    meanings: dict[str, str]
+    """What the inputs and outputs mean, with their units."""
     tables: tuple[Table, ...]
-    examples: tuple[tuple[tuple[Array, ...], tuple[Array, ...]], ...]
+    examples: tuple[Example, ...]
 
     @property
     def several(self) -> bool:
@@ -72,11 +107,11 @@ class Exported:
     @property
     def operations(self) -> int:
         """Arithmetic operations."""
-        return len(self.labelled.graph.operations())
+        return len(self.graph.operations())
 
 
 def chosen(
-    robot: Manipulator, functions: Sequence[str], *, specialised: bool
+    robot: Manipulator, functions: str | Sequence[str], *, specialised: bool, wrench: bool
 ) -> tuple[Exported, ...]:
     """Return what is to be written.
 
@@ -87,43 +122,59 @@ def chosen(
     """
     names = [functions] if isinstance(functions, str) else list(dict.fromkeys(functions))
     allowed = sorted({*COMPILED, "inverse_dynamics_base"} - {"base_regressor"})
+    valid = f"choose from {', '.join(allowed)}"
     for name in names:
         if name not in allowed:
-            raise ModelError(
-                f"functions: {name!r} cannot be exported; choose from {', '.join(allowed)}"
-            )
+            raise ModelError(f"functions: {name!r} cannot be exported; {valid}")
     if not names:
-        raise ModelError(f"functions: none given; choose from {', '.join(allowed)}")
-    return tuple(_exported(robot, name, folded=specialised) for name in names)
+        raise ModelError(f"functions: none given; {valid}")
+    return tuple(_exported(robot, name, folded=specialised, wrench=wrench) for name in names)
 
 
-def _exported(robot: Manipulator, name: str, *, folded: bool) -> Exported:
-    base: BaseParameters | None = None
-    what = name
-    if name == "inverse_dynamics_base":
-        what, base = "inverse_dynamics", cheapest_parameters(robot)
-    kernel = compile(robot, what, base=base, grade="parametric")
-    given = program(robot, what, None if base is None else columns_of(base))
-    tables: tuple[Table, ...] = ()
-    if kernel.fixed and folded:
-        given = specialised(given, kernel.fixed)
-    elif kernel.fixed:
-        ((port, values),) = kernel.fixed.items()
-        tables = (_table(robot, port, values, base),)
+def _exported(robot: Manipulator, name: str, *, folded: bool, wrench: bool) -> Exported:
+    base = cheapest_parameters(robot) if name == "inverse_dynamics_base" else None
+    what = "inverse_dynamics" if base else name
+    loaded = wrench and what in ("inverse_dynamics", "forward_dynamics")
+    given = program(robot, what, columns_of(base) if base else None, wrench=loaded)
+    fixed = {
+        port.name: base.values() if base else parameters(robot)
+        for port in given.inputs
+        if port.shared
+    }
+    tables = tuple(_table(robot, port, values, base) for port, values in fixed.items())
+    if folded:
+        given, tables = specialised(given, fixed), ()
+    graph = graph_of(given.function, given.inputs)
+    machine = Machine.of(robot)
+    symbols = dict(
+        zip((port.name for port in given.inputs), given.function.sx_in(), strict=True)
+    )
+    values = {key: symbols.get(key, ca.SX(ca.DM(value))) for key, value in fixed.items()}
+    inertial = values.get("parameters", ca.SX(ca.DM(parameters(robot))))
+    if base:
+        inertial = ca.mtimes(ca.DM(base.selection), values["base_parameters"])
+    states = _states(robot, given.inputs, fixed)
     # Argument names must differ from those of the results.
     taken = {port.name for port in given.inputs}
     outputs = tuple(
-        replace(port, name=f"{port.name}_out" if port.name in taken else port.name)
+        replace(port, name=f"{port.name}_out") if port.name in taken else port
         for port in given.outputs
     )
-    found = labelled(robot, given)
+    summary = _SUMMARIES.get(name, f"{what.replace('_', ' ')}, as pteron.{what}.".capitalize())
+    if name in ("direct_kinematics", "closure_poses"):
+        summary += f" {_MODES if machine.closure.keeps_modes else _NO_MODES}"
+    elif "pose" in taken and not any(node.operation == "sqrt" for node in graph.nodes):
+        summary += " It does not ask whether the legs reach."
     return Exported(
         name,
-        _SUMMARIES.get(name, f"{what.replace('_', ' ')}, as pteron.{what}.".capitalize()),
-        found,
+        summary,
+        graph,
+        node_names(machine, given, graph, inertial, states[:3]),
+        given.inputs,
         outputs,
+        {port.name: _meaning(robot, port) for port in (*given.inputs, *outputs)},
         tables,
-        tuple(_examples(robot, found)),
+        tuple(_examples(given, graph, states)),
     )
 
 
@@ -131,70 +182,92 @@ def _table(robot: Manipulator, port: str, values: Array, base: BaseParameters | 
     if base is None:
         comment = "The machine's inertial parameters, in the paper's order; SI units."
         return Table(port, comment, parameter_names(robot), values)
-    comment = "What inverse_dynamics_base takes: base parameters, scaled by lengths and gravity."
-    return Table(port, comment, _meanings(robot, base), values)
+    comment = "The machine's base parameters, which inverse_dynamics_base takes; SI units."
+    return Table(port, comment, base.expressions(digits=6), values)
 
 
-def _meanings(robot: Manipulator, base: BaseParameters) -> tuple[str, ...]:
-    """Return each scaled base parameter as a sum of inertial parameters, as text."""
-    scale = program(robot, "inverse_dynamics", columns_of(base)).scale
-    if scale is None:
-        return base.expressions()
-    total = np.array(scale) @ base.grouping
-    names = parameter_names(robot)
-    meanings = []
-    for row in total:
-        largest = np.abs(row).max()
-        terms = [
-            f"{weight:+.6g} {name}"
-            for weight, name in zip(row, names, strict=True)
-            if abs(weight) > 1e-12 * largest
-        ]
-        meanings.append(" ".join(terms))
-    return tuple(meanings)
-
-
-def _examples(
-    robot: Manipulator, found: Labelled
-) -> list[tuple[tuple[Array, ...], tuple[Array, ...]]]:
-    """Return states and results for the test program: two in reach, one out of it."""
+def _states(
+    robot: Manipulator, ports: Sequence[Port], fixed: dict[str, Array]
+) -> list[list[Array]]:
+    """Return inputs at random poses in reach; the last are out of it."""
     rng = np.random.default_rng(1)
-    poses = random_poses(robot, _TRIALS, seed=rng)
-    examples: list[tuple[tuple[Array, ...], tuple[Array, ...]]] = []
-    for pose in poses:
-        example = _evaluated(
-            found, [_value(robot, port, pose, rng) for port in found.program.inputs]
+    states = []
+    for pose in random_poses(robot, _TRIALS, seed=rng):
+        known = {"pose": pose, **fixed}
+        if any(port.name == "joints" for port in ports):
+            known["joints"] = inverse_kinematics(robot, pose)
+        states.append(
+            [np.array(known.get(port.name, rng.normal(size=port.shape))) for port in ports]
         )
-        # Of two assembly modes one may be out of reach: such a result is not a number throughout.
-        if all(np.isfinite(value).all() for value in example[1]):
-            examples.append(example)
-        if len(examples) == 2:
-            break
-    inputs = [_value(robot, port, poses[0], rng) for port in found.program.inputs]
-    for value, port in zip(inputs, found.program.inputs, strict=True):
-        if port.name in ("pose", "sliders"):
-            value += 100.0 * np.arange(1, len(value) + 1)
-    return [*examples, _evaluated(found, inputs)]
+    far = 100.0 * np.arange(1, robot.freedom + 1)
+    beyond = [
+        value + far if port.name in ("pose", "joints") else value
+        for port, value in zip(ports, states[0], strict=True)
+    ]
+    return [*states, beyond]
 
 
-def _value(robot: Manipulator, port: Port, pose: Array, rng: np.random.Generator) -> Array:
-    if port.name == "pose":
-        return pose.copy()
-    if port.name == "sliders":
-        return np.array(inverse_kinematics(robot, pose))
-    if port.name == "parameters":
-        return parameters(robot)
-    if port.name == "base_parameters":
-        base = cheapest_parameters(robot)
-        kernel = compile(robot, "inverse_dynamics", base=base, grade="parametric")
-        return np.array(kernel.fixed["base_parameters"])
-    return rng.normal(size=port.shape)
+def _examples(given: Program, graph: Graph, states: list[list[Array]]) -> list[Example]:
+    """Return examples for the test program: two states in reach, preferably, and the last one."""
+    found = [_evaluated(given, graph, state) for state in states]
+    return [*[example for example in found[:-1] if example.status == 0][:2], found[-1]]
 
 
-def _evaluated(found: Labelled, inputs: list[Array]) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
-    results = found.program.function.call([*map(_column, inputs)])
-    return tuple(inputs), tuple(np.array(value).ravel("F") for value in results)
+def _evaluated(given: Program, graph: Graph, inputs: list[Array]) -> Example:
+    values = given.function.call([np.reshape(value, (-1, 1)) for value in inputs])
+    results = tuple(np.array(value).ravel("F") for value in values)
+    # Of several poses one will do; and what a machine has not is NaN throughout.
+    computed = [
+        value[[graph.nodes[k].operation != CONSTANT for k in nodes]]
+        for value, nodes in zip(results, graph.outputs, strict=True)
+    ]
+    finite = np.isfinite(np.concatenate(computed))
+    enough = finite.any() if given.name == "direct_kinematics" else finite.all()
+    return Example(tuple(inputs), results, 0 if enough else 1)
 
 
-def _column(value: Array) -> Array:
-    return np.asarray(value, dtype=float).reshape(-1, 1)
+def banner(robot: Manipulator, language: str) -> list[str]:
+    """Return the lines that begin a generated file."""
+    what = f"{len(robot.legs)} legs, {robot.platform.motion}"
+    gravity = ", ".join(f"{g:g}" for g in robot.gravity)
+    # A name is the user's: it must not end the comment that it stands in.
+    name = "".join(c if c.isalnum() or c in " _-.," else "?" for c in " ".join(robot.name.split()))
+    return [
+        f"{name} ({what}): {language}, generated by Pteron {version('pteron')}.",
+        "",
+        f"SI units and radians; gravity ({gravity}) m/s^2 in the base frame.",
+        "Do not edit: change the machine's file and generate anew.",
+    ]
+
+
+def _meaning(robot: Manipulator, port: Port) -> str:
+    """Return what an input or an output means, with its unit."""
+    lengths = ", ".join(name for name in robot.platform.coordinates if name != "phi")
+    joints = _by_leg([leg.joint.unit for leg in robot.legs])
+    forces = _by_leg([leg.joint.force_unit for leg in robot.legs])
+    angle, rate, second, moment = (
+        (", phi in rad", ", rad/s", ", rad/s^2", ", N m about k")
+        if robot.platform.turns
+        else ("", "", "", "")
+    )
+    texts = {
+        "pose": f"platform pose: {lengths} in m{angle}",
+        "poses": f"poses by rows: {lengths} in m{angle}",
+        "velocity": f"the pose's rate: m/s{rate}",
+        "acceleration": f"the pose's acceleration: m/s^2{second}",
+        "joints": f"joint coordinates, {joints}",
+        "forces": f"actuator forces, {forces}, positive the way the joint coordinates grow",
+        "wrench": f"wrench on the platform at P: N{moment}",
+        "parameters": "inertial parameters, in kg, kg m and kg m^2",
+        "base_parameters": "base parameters; see the table of the same name",
+        "jacobian": "joint rates per unit of the platform's rates",
+        "regressor": "actuator forces per unit of each parameter",
+        "type_ii": "type-II measure: 0 at a singularity",
+        "type_i": "type-I measure of each leg: 0 where it is stretched or folded, 1 at best",
+        "margin": "from each leg to the edge of its reach, m; negative beyond it",
+    }
+    return texts.get(port.name.removesuffix("_out"), "")
+
+
+def _by_leg(units: Sequence[str]) -> str:
+    return units[0] if len(set(units)) == 1 else f"{', '.join(units)} (leg by leg)"

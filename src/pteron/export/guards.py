@@ -1,0 +1,283 @@
+"""The statements of a graph in Structured Text, guarded so that none can trap.
+
+A controller may stop on the square root of a negative number, on a division by zero and on an
+overflow, so none of them can happen here. A radicand and a divisor are compared before they are
+used; and where the sizes of the factors do not rule out that a product leaves the range of LREAL,
+the larger factor is compared too. A comparison that fails puts a harmless number in place and
+clears a flag.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from pteron.kernels import Graph, Port
+from pteron.kernels.code import used_inputs
+from pteron.kernels.graph import CONSTANT, INPUT
+
+_PRINTED = {
+    "add": "{0} + {1}",
+    "sub": "{0} - {1}",
+    "mul": "{0} * {1}",
+    "div": "{0} / {1}",
+    "neg": "-{0}",
+    "sqrt": "SQRT({0})",
+    "sin": "SIN({0})",
+    "cos": "COS({0})",
+    "atan2": "ATAN2({0}, {1})",
+    "fabs": "ABS({0})",
+    "fmin": "MIN({0}, {1})",
+    "fmax": "MAX({0}, {1})",
+}
+
+INPUT_POWER, _DIVISOR, _FACTOR = 6, -20, 30
+"""Powers of ten: inputs and factors are not larger, divisors not smaller."""
+
+_ZERO = "0.0"
+
+_WORDS = """
+    abs abstract acos action add and andn any array asin at atan atan2 begin bool by byte cal
+    calc calcn case char concat configuration constant continue cos date date_and_time delete
+    dint div do dt dword else elsif en end_action end_case end_class end_configuration end_for
+    end_function end_function_block end_if end_interface end_method end_namespace end_program
+    end_property end_repeat end_resource end_step end_struct end_transition end_type end_union
+    end_var end_while eno eq exit exp expt extends f_edge false final find for from function
+    function_block functionblock ge goto gt if implements initial_step insert int interface
+    internal interval jmp ldate ldt le left len limit lint ln log lower_bound lreal lt ltime
+    ltod lword max method mid min mod move mul mux namespace ne neg non_retain not null of on or
+    orn overlap overload override persistent pointer priority private program property protected
+    public r r1 r_edge read_only read_write real ref reference repeat replace resource ret
+    retain return right rol ror s s1 sel shl shr sin single sint sizeof sqrt ss st step string
+    struct sub super tan task then this time time_of_day to tod transition true trunc type udint
+    uint ulint union until upper_bound using usint var var_access var_config var_external
+    var_global var_in_out var_input var_inst var_output var_stat var_temp wchar while with word
+    wstring xor
+"""
+
+_RESERVED = frozenset(_WORDS.split())
+"""What no variable may be called: keywords, types, standard functions, in lower case."""
+
+
+class Names:
+    """The names in use, which differ in more than case."""
+
+    def __init__(self) -> None:
+        self.taken = set(_RESERVED)
+        self._next: dict[str, int] = {}
+
+    def keep(self, name: str) -> None:
+        """Use a name as it is."""
+        if _identifier(name) != name:
+            raise ValueError(f"{name!r} cannot be a name in Structured Text")
+        if name.lower() in self.taken:
+            raise ValueError(f"{name!r} stands for something else in Structured Text")
+        self.taken.add(name.lower())
+
+    def numbered(self, stem: str, first: int = 1) -> str:
+        """Return the next of stem1, stem2 and so on that is free."""
+        number = self._next.get(stem, first)
+        while f"{stem}{number}".lower() in self.taken:
+            number += 1
+        self._next[stem] = number + 1
+        self.taken.add(f"{stem}{number}".lower())
+        return f"{stem}{number}"
+
+    def like(self, text: str) -> str:
+        """Return the text as a name, with a number where it is taken."""
+        name = _identifier(text)
+        if name.lower() in self.taken:
+            return self.numbered(f"{name}_", 2)
+        self.taken.add(name.lower())
+        return name
+
+
+def _identifier(text: str) -> str:
+    """Return a text as an identifier: no two underscores in a row, none at its end."""
+    name = re.sub(r"_+", "_", re.sub(r"[^A-Za-z0-9]", "_", text)).rstrip("_")
+    return name if name[:1].isalpha() or name[:1] == "_" else f"v{name}"
+
+
+class Statements:
+    """The statements of a graph, guarded; `largest` is the power of ten of the largest LREAL."""
+
+    def __init__(
+        self,
+        graph: Graph,
+        inputs: Sequence[Port],
+        names: Names,
+        labels: Mapping[int, str],
+        largest: float,
+    ) -> None:
+        self.graph = graph
+        self.used = [element(inputs[i], j) for i, j in used_inputs(graph)]
+        self.lines: list[str] = []
+        self.flags: set[str] = set()
+        self.temporaries: list[str] = []
+        self.names: list[str] = []
+        """How each node is written; NaN is not."""
+        self._spare, self._largest = names, largest
+        self._labels = {k: names.like(labels[k]) for k in sorted(labels)}
+        self._sizes: list[float] = []
+        self._divisors: dict[int, str] = {}
+        for k, node in enumerate(graph.nodes):
+            self._sizes.append(self._size(k))
+            if node.operation == INPUT:
+                self.names.append(element(inputs[node.arguments[0]], node.arguments[1]))
+            elif node.operation == CONSTANT:
+                self.names.append(_literal(node.value))
+            else:
+                self.names.append(self._state(k))
+
+    def number(self, k: int) -> str:
+        """Return how a node is written, which is a number."""
+        if not self.names[k] or self.graph.nodes[k].operation == "less":
+            raise ValueError("NaN and truth values have their place in a selection alone")
+        return self.names[k]
+
+    def _state(self, k: int) -> str:
+        """Add the statement of a node, and return how the node is written from then on."""
+        node = self.graph.nodes[k]
+        if node.operation == "select":
+            return self._select(k)
+        arguments = [self.number(i) for i in node.arguments]
+        if node.operation == "less":
+            return f"{arguments[0]} < {arguments[1]}"
+        if node.operation == "add" and _ZERO in arguments:
+            return arguments[1 - arguments.index(_ZERO)]
+        if node.operation == "div":
+            arguments[1] = self._divisor(node.arguments[1])
+        name = self._name(k)
+        value = _PRINTED[node.operation].format(*arguments)
+        if node.operation == "sqrt":
+            self._guard(f"{arguments[0]} >= 0.0", name, value, "1.0", "Reachable")
+        elif node.operation == "atan2":
+            test = " OR ".join(f"({argument} <> 0.0)" for argument in arguments)
+            self._guard(test, name, value, _ZERO, "Regular")
+        else:
+            self.lines.append(f"{name} := {value};")
+        return name
+
+    def _select(self, k: int) -> str:
+        """Add a selection: of NaN, which says that a leg does not reach, or of a number."""
+        test, value = self.graph.nodes[k].arguments
+        if self.graph.nodes[test].operation != "less":
+            raise ValueError("a selection without a comparison")
+        if not self.names[value]:
+            least, most = (self.names[i] for i in self.graph.nodes[test].arguments)
+            self.flags.add("Reachable")
+            self._choose(f"NOT ({least} >= {most})", ["Reachable := FALSE;"])
+            return _ZERO
+        name = self._name(k)
+        self._choose(
+            self.names[test], [f"{name} := {self.number(value)};"], [f"{name} := {_ZERO};"]
+        )
+        return name
+
+    def _name(self, k: int) -> str:
+        name = self._labels.get(k)
+        if name is None:
+            return self._temporary("t")
+        self.temporaries.append(name)
+        return name
+
+    def _size(self, k: int) -> float:
+        """Return the power of ten that a node cannot exceed, after the guards that this takes."""
+        size = self._bound(k)
+        while size > self._largest:
+            arguments = [
+                i
+                for i in self.graph.nodes[k].arguments
+                if self._sizes[i] > _FACTOR and self.graph.nodes[i].operation != CONSTANT
+            ]
+            if not arguments:
+                raise ValueError("a constant is too large for LREAL arithmetic")
+            worst = max(arguments, key=lambda i: self._sizes[i])
+            name = self._temporary("bounded")
+            test = f"ABS({self.names[worst]}) <= {power(_FACTOR)}"
+            self._guard(test, name, self.names[worst], _ZERO, "Regular")
+            self.names[worst], self._sizes[worst] = name, _FACTOR
+            size = self._bound(k)
+        return size
+
+    def _bound(self, k: int) -> float:
+        """Return the power of ten that a node cannot exceed, by the bounds of its arguments."""
+        node = self.graph.nodes[k]
+        if node.operation == INPUT:
+            return INPUT_POWER
+        if node.operation == CONSTANT:
+            return _magnitude(node.value)
+        sizes = [self._sizes[i] for i in node.arguments]
+        if node.operation in ("add", "sub"):
+            most = max(sizes)
+            if most == -math.inf:
+                return most
+            return most + math.log10(sum(10.0 ** (size - most) for size in sizes))
+        if node.operation == "mul":
+            return sum(sizes)
+        if node.operation == "div":
+            divisor = self.graph.nodes[node.arguments[1]]
+            constant = divisor.operation == CONSTANT and divisor.value != 0.0
+            return sizes[0] - (_magnitude(divisor.value) if constant else _DIVISOR)
+        if node.operation == "sqrt":
+            return max(sizes[0] / 2, 0.0)
+        if node.operation in ("sin", "cos", "atan2", "less"):
+            return math.log10(4.0)
+        if node.operation == "select":
+            return sizes[1]
+        return max(sizes)
+
+    def _divisor(self, k: int) -> str:
+        """Return how a node is written as a divisor, with its guard where it needs one."""
+        node = self.graph.nodes[k]
+        if node.operation == CONSTANT and node.value != 0.0:
+            return self.names[k]
+        if k not in self._divisors:
+            self._divisors[k] = self._temporary("divisor")
+            test = f"ABS({self.names[k]}) >= {power(_DIVISOR)}"
+            self._guard(test, self._divisors[k], self.names[k], "1.0", "Regular")
+        return self._divisors[k]
+
+    def _temporary(self, stem: str) -> str:
+        self.temporaries.append(self._spare.numbered(stem))
+        return self.temporaries[-1]
+
+    def _guard(self, test: str, name: str, value: str, otherwise: str, flag: str) -> None:
+        self.flags.add(flag)
+        self._choose(test, [f"{name} := {value};"], [f"{name} := {otherwise};", f"{flag} := FALSE;"])
+
+    def _choose(self, test: str, then: Sequence[str], otherwise: Sequence[str] = ()) -> None:
+        self.lines += [f"IF {test} THEN", *(f"    {line}" for line in then)]
+        if otherwise:
+            self.lines += ["ELSE", *(f"    {line}" for line in otherwise)]
+        self.lines.append("END_IF;")
+
+
+def element(port: Port, j: int) -> str:
+    """Return how an element of a port is written."""
+    if not port.shape:
+        return port.name
+    return f"{port.name}[{', '.join(str(i) for i in np.unravel_index(j, port.shape))}]"
+
+
+def power(exponent: int) -> str:
+    """Return a power of ten as an LREAL literal."""
+    return f"1.0E{exponent:+d}"
+
+
+def _magnitude(value: float) -> float:
+    """Return the power of ten of a number; of NaN, which is never computed with, that of 0."""
+    return math.log10(abs(value)) if abs(value) > 0.0 else -math.inf
+
+
+def _literal(value: float) -> str:
+    """Return an LREAL literal, in brackets if it has a sign; for NaN there is none."""
+    if math.isnan(value):
+        return ""
+    digits, _, exponent = repr(float(value)).partition("e")
+    text = digits if "." in digits else f"{digits}.0"
+    text += f"E{int(exponent)}" if exponent else ""
+    return f"({text})" if text.startswith("-") else text
