@@ -16,7 +16,7 @@ from typing import Literal, get_args
 from pteron import atomic
 from pteron.errors import ModelError
 from pteron.export.functions import FUNCTIONS, Example, Exported, banner, chosen
-from pteron.kernels import Port
+from pteron.kernels import Array, Port
 from pteron.kernels.code import C, c_constant, rendered, single_precision, statements
 from pteron.kernels.graph import CONSTANT, INPUT
 from pteron.manipulator import Manipulator
@@ -96,6 +96,7 @@ def export_c(
         "real": real,
         "f": "f" if single else "",
         "number": printer.number,
+        "rows": printer.rows,
         "tables": {table.name: table for item in exported for table in item.tables}.values(),
         "functions": printed,
         "helpers": [name for name in ("root", "ratio", "finite") if f"{prefix}_{name}(" in code],
@@ -145,6 +146,12 @@ class _Printer:
         if value != value:
             return f"(({self.real})NAN)"
         return c_constant(value, "float32" if self.real == "float" else "float64")
+
+    def rows(self, values: Array) -> str:
+        """Return literals, four a line."""
+        texts = [self.number(value) for value in values.ravel()]
+        rows = [", ".join(texts[k : k + 4]) for k in range(0, len(texts), 4)]
+        return ",\n    ".join(rows)
 
     def function(self, item: Exported) -> _Function:
         """Return one function in C."""
