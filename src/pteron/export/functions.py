@@ -56,11 +56,11 @@ _SUMMARIES = {
     "regressor": "Regressor: actuator forces = regressor parameters.",
 }
 
-_MODES = "Each row is one assembly mode throughout."
+_MODES = " Each row is one assembly mode throughout: a motion between singularities keeps its row."
 
-_NO_MODES = (
-    "Rows may change places at a singularity: follow the one nearest to the last pose. A leg may be "
-    "bent the other way in a row: then its inverse kinematics are not the joint coordinates given."
+_BRANCHES = (
+    " A leg may be bent the other way in a row: then its inverse kinematics are not the joint "
+    "coordinates given."
 )
 
 
@@ -146,9 +146,7 @@ def _exported(robot: Manipulator, name: str, *, folded: bool, wrench: bool) -> E
         given, tables = specialised(given, fixed), ()
     graph = graph_of(given.function, given.inputs)
     machine = Machine.of(robot)
-    symbols = dict(
-        zip((port.name for port in given.inputs), given.function.sx_in(), strict=True)
-    )
+    symbols = dict(zip((port.name for port in given.inputs), given.function.sx_in(), strict=True))
     values = {key: symbols.get(key, ca.SX(ca.DM(value))) for key, value in fixed.items()}
     inertial = values.get("parameters", ca.SX(ca.DM(parameters(robot))))
     if base:
@@ -162,7 +160,7 @@ def _exported(robot: Manipulator, name: str, *, folded: bool, wrench: bool) -> E
     )
     summary = _SUMMARIES.get(name, f"{what.replace('_', ' ')}, as pteron.{what}.".capitalize())
     if name in ("direct_kinematics", "closure_poses"):
-        summary += f" {_MODES if machine.closure.keeps_modes else _NO_MODES}"
+        summary += _MODES + ("" if machine.closure.keeps_modes else _BRANCHES)
     elif "pose" in taken and not any(node.operation == "sqrt" for node in graph.nodes):
         summary += " It does not ask whether the legs reach."
     return Exported(

@@ -247,7 +247,9 @@ class Statements:
 
     def _guard(self, test: str, name: str, value: str, otherwise: str, flag: str) -> None:
         self.flags.add(flag)
-        self._choose(test, [f"{name} := {value};"], [f"{name} := {otherwise};", f"{flag} := FALSE;"])
+        self._choose(
+            test, [f"{name} := {value};"], [f"{name} := {otherwise};", f"{flag} := FALSE;"]
+        )
 
     def _choose(self, test: str, then: Sequence[str], otherwise: Sequence[str] = ()) -> None:
         self.lines += [f"IF {test} THEN", *(f"    {line}" for line in then)]

@@ -32,7 +32,11 @@ _AXES = {2: "ab", 3: "xyz", 4: ("x", "y", "z", "phi")}
 
 
 def node_names(
-    machine: Machine, given: Program, graph: Graph, parameters: Expression, states: list[list[Array]]
+    machine: Machine,
+    given: Program,
+    graph: Graph,
+    parameters: Expression,
+    states: list[list[Array]],
 ) -> dict[int, str]:
     """Return a name for every node of a program's graph that computes something.
 
@@ -88,8 +92,8 @@ def _quantities(
             for name, value in leg.locus(q)._asdict().items():
                 yield f"leg{i}_{name}", i, ca.SX(value)
         for k, pose in enumerate(ca.horzsplit(machine.closure.poses(joints)), start=1):
-            for name, i, value in _motion(machine, pose, machine.state(pose)):
-                yield f"pose{k}_{name}", i, value
+            for name, _, value in _motion(machine, pose, machine.state(pose)):
+                yield f"pose{k}_{name}", 0, value  # of no leg alone: all of them make the pose
 
 
 def _motion(machine: Machine, pose: Expression, state: State) -> Iterator[Quantity]:
