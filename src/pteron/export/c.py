@@ -15,8 +15,8 @@ from typing import Literal, get_args
 
 from pteron import atomic
 from pteron.errors import ModelError
-from pteron.export.functions import FUNCTIONS, Example, Exported, banner, chosen
-from pteron.kernels import Array, Port
+from pteron.export.functions import FUNCTIONS, Exported, banner, chosen
+from pteron.kernels import Array
 from pteron.kernels.code import C, c_constant, rendered, single_precision, statements
 from pteron.kernels.graph import CONSTANT, INPUT
 from pteron.manipulator import Manipulator
@@ -86,20 +86,15 @@ def export_c(
         raise ModelError(f'real: {real!r} is neither "double" nor "float"')
     exported = chosen(robot, functions, specialised=specialised, wrench=wrench)
     prefix, single = prefix_of(robot), real == "float"
-    printer = _Printer(prefix, real)
-    printed = [printer.function(item) for item in exported]
-    code = "".join(line for each in printed for line in (*each.statements, *sum(each.failures, ())))
     values = {
         "banner": banner(robot, "C99"),
         "prefix": prefix,
         "upper": prefix.upper(),
         "real": real,
         "f": "f" if single else "",
-        "number": printer.number,
-        "rows": printer.rows,
+        "printer": _Printer(prefix, real),
         "tables": {table.name: table for item in exported for table in item.tables}.values(),
-        "functions": printed,
-        "helpers": [name for name in ("root", "ratio", "finite") if f"{prefix}_{name}(" in code],
+        "functions": exported,
         "largest": 3.4028234e38 if single else 1.7976931348623157e308,
         "tolerance": 1e-4 if single else 1e-10,
     }
@@ -121,21 +116,6 @@ def prefix_of(robot: Manipulator) -> str:
 
 
 @dataclass(frozen=True)
-class _Function:
-    """What the templates print of one function."""
-
-    name: str
-    comment: list[str]
-    prototype: str
-    statements: list[str]
-    failures: list[tuple[str, str]]
-    """Conditions, in the order in which they are asked, and the status that they mean."""
-    inputs: tuple[Port, ...]
-    outputs: tuple[Port, ...]
-    examples: tuple[Example, ...]
-
-
-@dataclass(frozen=True)
 class _Printer:
     prefix: str
     real: Real
@@ -153,21 +133,19 @@ class _Printer:
         rows = [", ".join(texts[k : k + 4]) for k in range(0, len(texts), 4)]
         return ",\n    ".join(rows)
 
-    def function(self, item: Exported) -> _Function:
-        """Return one function in C."""
-        lines, failures = self._body(item)
-        comment = [*textwrap.wrap(item.summary, _WIDTH), ""]
+    def comment(self, item: Exported) -> list[str]:
+        """Return the lines over a function's declaration."""
+        lines = [*textwrap.wrap(item.summary, _WIDTH), ""]
         for direction, ports in (("in", item.inputs), ("out", item.outputs)):
             for port in ports:
-                text = f"{direction:<3} {port.name} ({_shape(port)}): {item.meanings[port.name]}"
-                comment += textwrap.wrap(text.rstrip(": "), _WIDTH, subsequent_indent="      ")
-        comment += ["", f"{item.operations} arithmetic operations."]
-        prototype = self._prototype(item)
-        return _Function(
-            item.name, comment, prototype, lines, failures, item.inputs, item.outputs, item.examples
-        )
+                shape = " x ".join(map(str, port.shape)) or "1"
+                shape += ", by rows" if len(port.shape) > 1 else ""
+                text = f"{direction:<3} {port.name} ({shape}): {item.meanings[port.name]}"
+                lines += textwrap.wrap(text.rstrip(": "), _WIDTH, subsequent_indent="      ")
+        return [*lines, "", f"{item.operations} arithmetic operations."]
 
-    def _prototype(self, item: Exported) -> str:
+    def prototype(self, item: Exported) -> str:
+        """Return a function's declaration."""
         head = f"int {self.prefix}_{item.name}("
         pointer = f"{self.real} *{self.prefix.upper()}_RESTRICT"
         arguments = [f"const {pointer} {port.name}" for port in item.inputs]
@@ -185,8 +163,8 @@ class _Printer:
             "div": f"{self.prefix}_ratio({{0}}, {{1}})",
         }
 
-    def _body(self, item: Exported) -> tuple[list[str], list[tuple[str, str]]]:
-        """Return the statements of a function, and what makes it fail."""
+    def body(self, item: Exported) -> tuple[list[str], list[tuple[str, str]]]:
+        """Return the statements of a function, and conditions with the failures that they are."""
         graph, nodes = item.graph, item.graph.nodes
         names = [item.names.get(k, "") for k in range(len(nodes))]
         for k, node in enumerate(nodes):
@@ -222,11 +200,6 @@ class _Printer:
             regular = _all(f"({test} != 0)" for test in finite)
             failures.append((f"!({regular})", "NOT_FINITE"))
         return lines, failures
-
-
-def _shape(port: Port) -> str:
-    order = ", by rows" if len(port.shape) > 1 else ""
-    return (" x ".join(map(str, port.shape)) or "1") + order
 
 
 def _all(tests: Iterable[str]) -> str:

@@ -6,27 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 
-import casadi as ca
 import numpy as np
 
 from pteron.equations.machine import Machine
 from pteron.errors import ModelError
 from pteron.export.labels import node_names
 from pteron.kernels import FUNCTIONS as COMPILED
-from pteron.kernels import (
-    Array,
-    Graph,
-    Port,
-    Program,
-    columns_of,
-    graph_of,
-    program,
-    specialised,
-)
+from pteron.kernels import Array, Graph, Port, Program, columns_of, graph_of, program
+from pteron.kernels import specialised as with_values
 from pteron.kernels.graph import CONSTANT
 from pteron.kinematics import inverse_kinematics, random_poses
 from pteron.manipulator import Manipulator, parameter_names, parameters
-from pteron.reduction import BaseParameters, cheapest_parameters
+from pteron.reduction import cheapest_parameters
 
 FUNCTIONS = (
     "inverse_kinematics",
@@ -39,20 +30,15 @@ FUNCTIONS = (
 )
 """What is exported unless a choice is given."""
 
-_TRIALS = 40
-"""Poses among which examples for the test program are looked for."""
-
 _SUMMARIES = {
     "inverse_kinematics": "Joint coordinates of a pose.",
     "direct_kinematics": "Every pose that the joint coordinates allow, one a row; NaN where it is "
     "not real or not in reach.",
     "closure_poses": "Every pose that the joint coordinates allow, one a row, in reach or not.",
     "jacobian": "Jacobian: joint rates = J velocity.",
-    "inverse_dynamics": "Actuator forces of a motion, from the inertial parameters; friction is not "
-    "in them.",
-    "inverse_dynamics_base": "Actuator forces of a motion, from base parameters alone; friction is "
-    "not in them.",
-    "forward_dynamics": "Acceleration of the platform under actuator forces; friction is left out.",
+    "inverse_dynamics": "Actuator forces of a motion, from the inertial parameters; no friction.",
+    "inverse_dynamics_base": "Actuator forces of a motion, from base parameters; no friction.",
+    "forward_dynamics": "Acceleration of the platform under actuator forces; no friction.",
     "regressor": "Regressor: actuator forces = regressor parameters.",
 }
 
@@ -62,6 +48,11 @@ _BRANCHES = (
     " A leg may be bent the other way in a row: then its inverse kinematics are not the joint "
     "coordinates given."
 )
+
+
+_TABLE = "The machine's inertial parameters, in the paper's order; SI units."
+
+_BASE_TABLE = "The machine's base parameters, which inverse_dynamics_base takes; SI units."
 
 
 @dataclass(frozen=True)
@@ -128,29 +119,24 @@ def chosen(
             raise ModelError(f"functions: {name!r} cannot be exported; {valid}")
     if not names:
         raise ModelError(f"functions: none given; {valid}")
-    return tuple(_exported(robot, name, folded=specialised, wrench=wrench) for name in names)
+    return tuple(_exported(robot, name, specialised, wrench) for name in names)
 
 
-def _exported(robot: Manipulator, name: str, *, folded: bool, wrench: bool) -> Exported:
+def _exported(robot: Manipulator, name: str, specialised: bool, wrench: bool) -> Exported:
     base = cheapest_parameters(robot) if name == "inverse_dynamics_base" else None
     what = "inverse_dynamics" if base else name
     loaded = wrench and what in ("inverse_dynamics", "forward_dynamics")
     given = program(robot, what, columns_of(base) if base else None, wrench=loaded)
-    fixed = {
-        port.name: base.values() if base else parameters(robot)
-        for port in given.inputs
-        if port.shared
-    }
-    tables = tuple(_table(robot, port, values, base) for port, values in fixed.items())
-    if folded:
-        given, tables = specialised(given, fixed), ()
+    values = base.values() if base else parameters(robot)
+    fixed = {port.name: values for port in given.inputs if port.shared}
+    comment, names = (
+        (_BASE_TABLE, base.expressions(digits=6)) if base else (_TABLE, parameter_names(robot))
+    )
+    tables = tuple(Table(port, comment, names, value) for port, value in fixed.items())
+    if specialised:
+        given, tables = with_values(given, fixed), ()
     graph = graph_of(given.function, given.inputs)
     machine = Machine.of(robot)
-    symbols = dict(zip((port.name for port in given.inputs), given.function.sx_in(), strict=True))
-    values = {key: symbols.get(key, ca.SX(ca.DM(value))) for key, value in fixed.items()}
-    inertial = values.get("parameters", ca.SX(ca.DM(parameters(robot))))
-    if base:
-        inertial = ca.mtimes(ca.DM(base.selection), values["base_parameters"])
     states = _states(robot, given.inputs, fixed)
     # Argument names must differ from those of the results.
     taken = {port.name for port in given.inputs}
@@ -167,33 +153,23 @@ def _exported(robot: Manipulator, name: str, *, folded: bool, wrench: bool) -> E
         name,
         summary,
         graph,
-        node_names(machine, given, graph, inertial, states[:3]),
+        node_names(machine, given, graph, states[:3]),
         given.inputs,
         outputs,
         {port.name: _meaning(robot, port) for port in (*given.inputs, *outputs)},
         tables,
-        tuple(_examples(given, graph, states)),
+        tuple(_evaluated(given, graph, state) for state in states[1:]),
     )
-
-
-def _table(robot: Manipulator, port: str, values: Array, base: BaseParameters | None) -> Table:
-    if base is None:
-        comment = "The machine's inertial parameters, in the paper's order; SI units."
-        return Table(port, comment, parameter_names(robot), values)
-    comment = "The machine's base parameters, which inverse_dynamics_base takes; SI units."
-    return Table(port, comment, base.expressions(digits=6), values)
 
 
 def _states(
     robot: Manipulator, ports: Sequence[Port], fixed: dict[str, Array]
 ) -> list[list[Array]]:
-    """Return inputs at random poses in reach; the last are out of it."""
+    """Return inputs at three random poses in reach, and far out of it."""
     rng = np.random.default_rng(1)
     states = []
-    for pose in random_poses(robot, _TRIALS, seed=rng):
-        known = {"pose": pose, **fixed}
-        if any(port.name == "joints" for port in ports):
-            known["joints"] = inverse_kinematics(robot, pose)
+    for pose in random_poses(robot, 3, seed=rng):
+        known = {"pose": pose, "joints": inverse_kinematics(robot, pose), **fixed}
         states.append(
             [np.array(known.get(port.name, rng.normal(size=port.shape))) for port in ports]
         )
@@ -203,12 +179,6 @@ def _states(
         for port, value in zip(ports, states[0], strict=True)
     ]
     return [*states, beyond]
-
-
-def _examples(given: Program, graph: Graph, states: list[list[Array]]) -> list[Example]:
-    """Return examples for the test program: two states in reach, preferably, and the last one."""
-    found = [_evaluated(given, graph, state) for state in states]
-    return [*[example for example in found[:-1] if example.status == 0][:2], found[-1]]
 
 
 def _evaluated(given: Program, graph: Graph, inputs: list[Array]) -> Example:

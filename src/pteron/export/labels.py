@@ -8,16 +8,13 @@ regrouped to save operations.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from itertools import combinations_with_replacement
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from pteron.bodies.motion import Expression
-from pteron.equations.lagrangian import mass_matrix
-from pteron.equations.machine import Machine, State
-from pteron.equations.virtual_work import generalized_forces, needed_forces
+from pteron.equations.machine import Machine
 from pteron.kernels import Array, Graph, Program
 from pteron.kernels.graph import CONSTANT, INPUT
 
@@ -32,35 +29,18 @@ _AXES = {2: "ab", 3: "xyz", 4: ("x", "y", "z", "phi")}
 
 
 def node_names(
-    machine: Machine,
-    given: Program,
-    graph: Graph,
-    parameters: Expression,
-    states: list[list[Array]],
+    machine: Machine, given: Program, graph: Graph, states: list[list[Array]]
 ) -> dict[int, str]:
     """Return a name for every node of a program's graph that computes something.
 
     Quantities that the equations know are called after them: `leg2_u_a` is a component of leg 2's
     closing vector in the axes of its plane, `c2_z` one of its platform point, and so on. What
-    depends on one leg alone carries the leg's number; all else is numbered.
-
-    Parameters
-    ----------
-    machine : Machine
-        Whose function it is.
-    given : Program
-        The function.
-    graph : Graph
-        Its graph.
-    parameters : (N, 1)
-        The inertial parameters, in terms of the program's inputs.
-    states : list of list of array
-        Inputs of the program, in several states.
+    depends on one leg alone carries the leg's number; all else is numbered. `states` are inputs.
     """
     symbols = given.function.sx_in()
     inputs = {port.name: symbol for port, symbol in zip(given.inputs, symbols, strict=True)}
     names, legs, scalars = [], [], []
-    for name, leg, value in _quantities(machine, inputs, parameters):
+    for name, leg, value in _quantities(machine, inputs):
         parts = ca.vertsplit(ca.densify(value)) if value.shape[0] > 1 else [value]
         axes = [f"_{axis}" for axis in _AXES.get(len(parts), map(str, range(len(parts))))]
         for axis, part in zip(axes if len(parts) > 1 else [""], parts, strict=True):
@@ -72,32 +52,24 @@ def node_names(
     return _named(graph, _matches(_values(graph, states), wanted), names, legs)
 
 
-def _quantities(
-    machine: Machine, inputs: dict[str, Expression], parameters: Expression
-) -> Iterator[Quantity]:
+def _quantities(machine: Machine, inputs: dict[str, Expression]) -> Iterator[Quantity]:
     """Yield what may have a name, those that are preferred first."""
     if "pose" in inputs:
-        pose = inputs["pose"]
-        state = machine.state(pose, inputs.get("velocity"), inputs.get("acceleration"))
-        yield from _motion(machine, pose, state)
-        for carried in (True, False):  # the masses on the platform points
-            yield "load", 0, needed_forces(machine, state, parameters, carried)[1]
-        yield "generalized_force", 0, generalized_forces(machine, state, parameters)
-        mass = mass_matrix(machine, pose, parameters)
-        for i, j in combinations_with_replacement(range(machine.freedom), 2):
-            yield f"mass{i + 1}{j + 1}", 0, mass[i, j]
+        motion = (inputs.get(name) for name in ("pose", "velocity", "acceleration"))
+        yield from _motion(machine, *motion)
     elif "joints" in inputs:
         joints = inputs["joints"]
         for i, (leg, q) in enumerate(zip(machine.legs, ca.vertsplit(joints), strict=True), 1):
             for name, value in leg.locus(q)._asdict().items():
                 yield f"leg{i}_{name}", i, ca.SX(value)
         for k, pose in enumerate(ca.horzsplit(machine.closure.poses(joints)), start=1):
-            for name, _, value in _motion(machine, pose, machine.state(pose)):
+            for name, _, value in _motion(machine, pose):
                 yield f"pose{k}_{name}", 0, value  # of no leg alone: all of them make the pose
 
 
-def _motion(machine: Machine, pose: Expression, state: State) -> Iterator[Quantity]:
+def _motion(machine: Machine, pose: Expression, *rates: Expression) -> Iterator[Quantity]:
     """Yield the motion of the platform's points, and what the legs answer to it."""
+    state = machine.state(pose, *rates)
     platform = state.platform
     for name, coordinate in zip(machine.platform.coordinates, ca.vertsplit(pose), strict=True):
         yield name, 0, coordinate

@@ -121,39 +121,12 @@ def function_block(
     *,
     largest: float = _LREAL,
 ) -> str:
-    """Return a function block that computes a graph, as Structured Text.
+    """Return a FUNCTION_BLOCK that computes a graph, in ASCII if what is given is.
 
-    Arrays count from 0; matrices keep their rows. The outputs change only where `Valid` is TRUE.
-    `Status` says why not: 1, a radicand is negative (a leg does not reach); 2, a divisor is zero
-    or a number too large (a singularity); 3, an input is not a number or is beyond 1.0E+6.
-
-    Parameters
-    ----------
-    name : str
-        Of the function block.
-    graph : Graph
-        What it computes.
-    inputs, outputs : sequence of Port
-        Names and shapes, in the graph's order.
-    comments : sequence of str
-        Lines for the header.
-    descriptions : mapping of str to str, optional
-        What to say of an input or output, by name.
-    labels : mapping of int to str, optional
-        Names for nodes of the graph; the others are t1, t2 and so on.
-    largest : float
-        Power of ten of the largest number that the controller's LREAL holds.
-
-    Returns
-    -------
-    str
-        The text of one FUNCTION_BLOCK, in ASCII if what is given is.
-
-    Raises
-    ------
-    ValueError
-        If a name cannot be one in Structured Text or stands for two things, if the ports do not
-        fit the graph, or if a constant has no place in LREAL arithmetic.
+    `comments` are lines for its head, `descriptions` say what ports mean, `labels` what nodes are
+    called (the others are t1, t2 and so on); `largest` is the power of ten of the largest LREAL.
+    Arrays count from 0; matrices keep their rows. A name that cannot be one in Structured Text, or
+    stands for two things, is a ValueError, and so is a constant that LREAL does not hold.
     """
     names = Names()
     for kept in (name, "Valid", "Status", *dict(_STATUSES)):

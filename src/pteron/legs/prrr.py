@@ -402,12 +402,12 @@ class PRRREquations(LegEquations):
         found = {"u": u, "n2": ca.dot(u, u), "delta": delta, "root": root, "ddu": at.ddu}
         found |= {"inverse_d": -2 * self.sigma / root, "links_dot": ca.dot(at.l_u, at.l_l)}
         v = at.ddu
-        for letter, vector, link in (("u", at.l_u, at.upper), ("l", at.l_l, at.lower)):
+        for letter, l_b, link in (("u", at.l_u, at.upper), ("l", at.l_l, at.lower)):
             found |= {f"theta_{letter}_{part}": value for part, value in link._asdict().items()}
             found[f"theta_{letter}_rate2"] = square = link.rate * link.rate
-            found[f"along_{letter}"] = ca.dot(vector, at.ddu + square * vector)
-            found[f"plane_{letter}"] = vector
-            v = v + square * vector
+            found[f"along_{letter}"] = ca.dot(l_b, at.ddu + square * l_b)
+            found[f"plane_{letter}"] = l_b
+            v = v + square * l_b
         return {**found, "v": v}
 
     def reach(self, c: Expression) -> Reach:
