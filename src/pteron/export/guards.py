@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import chain, count
 
 import numpy as np
 
@@ -65,40 +66,16 @@ _RESERVED = frozenset(_WORDS.split())
 class Names:
     """The names in use, which differ in more than case."""
 
-    def __init__(self) -> None:
-        self.taken = set(_RESERVED)
-        self._next: dict[str, int] = {}
+    def __init__(self, kept: Iterable[str]) -> None:
+        self._taken = {*_RESERVED, *(name.lower() for name in kept)}
 
-    def keep(self, name: str) -> None:
-        """Use a name as it is."""
-        if _identifier(name) != name:
-            raise ValueError(f"{name!r} cannot be a name in Structured Text")
-        if name.lower() in self.taken:
-            raise ValueError(f"{name!r} stands for something else in Structured Text")
-        self.taken.add(name.lower())
-
-    def numbered(self, stem: str, first: int = 1) -> str:
-        """Return the next of stem1, stem2 and so on that is free."""
-        number = self._next.get(stem, first)
-        while f"{stem}{number}".lower() in self.taken:
-            number += 1
-        self._next[stem] = number + 1
-        self.taken.add(f"{stem}{number}".lower())
-        return f"{stem}{number}"
-
-    def like(self, text: str) -> str:
-        """Return the text as a name, with a number where it is taken."""
-        name = _identifier(text)
-        if name.lower() in self.taken:
-            return self.numbered(f"{name}_", 2)
-        self.taken.add(name.lower())
-        return name
-
-
-def _identifier(text: str) -> str:
-    """Return a text as an identifier: no two underscores in a row, none at its end."""
-    name = re.sub(r"_+", "_", re.sub(r"[^A-Za-z0-9]", "_", text)).rstrip("_")
-    return name if name[:1].isalpha() or name[:1] == "_" else f"v{name}"
+    def new(self, text: str) -> str:
+        """Return a text as an identifier, with a number behind it where that is taken."""
+        name = re.sub(r"[^A-Za-z0-9]+", "_", text).strip("_")
+        numbered = (f"{name}_{number}" for number in count(2))
+        found = next(n for n in chain([name], numbered) if n.lower() not in self._taken)
+        self._taken.add(found.lower())
+        return found
 
 
 class Statements:
@@ -120,7 +97,7 @@ class Statements:
         self.names: list[str] = []
         """How each node is written; NaN is not."""
         self._spare, self._largest = names, largest
-        self._labels = {k: names.like(labels[k]) for k in sorted(labels)}
+        self._labels = {k: names.new(labels[k]) for k in sorted(labels)}
         self._sizes: list[float] = []
         self._divisors: dict[int, str] = {}
         for k, node in enumerate(graph.nodes):
@@ -242,7 +219,7 @@ class Statements:
         return self._divisors[k]
 
     def _temporary(self, stem: str) -> str:
-        self.temporaries.append(self._spare.numbered(stem))
+        self.temporaries.append(self._spare.new(stem))
         return self.temporaries[-1]
 
     def _guard(self, test: str, name: str, value: str, otherwise: str, flag: str) -> None:

@@ -125,17 +125,12 @@ def function_block(
 
     `comments` are lines for its head, `descriptions` say what ports mean, `labels` what nodes are
     called (the others are t1, t2 and so on); `largest` is the power of ten of the largest LREAL.
-    Arrays count from 0; matrices keep their rows. A name that cannot be one in Structured Text, or
-    stands for two things, is a ValueError, and so is a constant that LREAL does not hold.
+    Arrays count from 0; matrices keep their rows. What is NaN in every state is never written. A
+    constant that LREAL does not hold is a ValueError.
     """
-    names = Names()
-    for kept in (name, "Valid", "Status", *dict(_STATUSES)):
-        names.keep(kept)
-    for port in (*inputs, *outputs):
-        names.keep(port.name)
-    for port, nodes in zip(outputs, graph.outputs, strict=True):
-        if len(nodes) != port.size:
-            raise ValueError(f"{port.name}: {len(nodes)} values for {port.size} elements")
+    names = Names(
+        [name, "Valid", "Status", *dict(_STATUSES), *(port.name for port in (*inputs, *outputs))]
+    )
     body = Statements(graph, inputs, names, labels or {}, largest)
     flags = [
         flag for flag, _ in _STATUSES if flag in body.flags or (flag == "Usable" and body.used)
@@ -157,6 +152,7 @@ def function_block(
             f"{element(port, j)} := {body.number(k)};"
             for port, nodes in zip(outputs, graph.outputs, strict=True)
             for j, k in enumerate(nodes)
+            if body.names[k]
         ],
         statuses=_STATUSES,
     )
