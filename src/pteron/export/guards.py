@@ -144,9 +144,8 @@ class Statements:
         if self.graph.nodes[test].operation != "less":
             raise ValueError("a selection without a comparison")
         if not self.names[value]:
-            least, most = (self.names[i] for i in self.graph.nodes[test].arguments)
             self.flags.add("Reachable")
-            self._choose(f"NOT ({least} >= {most})", ["Reachable := FALSE;"])
+            self._choose(self.names[test], ["Reachable := FALSE;"])
             return _ZERO
         name = self._name(k)
         self._choose(

@@ -11,8 +11,9 @@ file of this folder:
   reaches (`reach`) and where c lies for a given joint (`locus`).
 
 That is all: Jacobian, dynamics, regressor, energies, limits, drawings, logs, exported code follow.
-`examples/new_leg.py` is a complete kind of leg. `needs` and `transfers` may be overridden: a
-cheaper form of the same forces, and the mass transfers that explain base parameters in symbols.
+`examples/new_leg.py` is a complete kind of leg. `needs`, `transfers` and `named` may be
+overridden: a cheaper form of the same forces, the mass transfers that explain base parameters in
+symbols, and names in exported code.
 
 All vectors are in the base frame, columns (3, 1). An expression has no branch on a value: the side
 of an elbow is a quantity, +1 or -1.
