@@ -11,6 +11,28 @@ from itertools import product
 import blark.transform as tree
 from blark.parse import new_parser, parse_source_code
 
+_WORDS = """
+    abs abstract acos action add and andn any array asin at atan atan2 begin bool by byte cal
+    calc calcn case char concat configuration constant continue cos date date_and_time delete
+    dint div do dt dword else elsif en end_action end_case end_class end_configuration end_for
+    end_function end_function_block end_if end_interface end_method end_namespace end_program
+    end_property end_repeat end_resource end_step end_struct end_transition end_type end_union
+    end_var end_while eno eq exit exp expt extends f_edge false final find for from function
+    function_block functionblock ge goto gt if implements initial_step insert int interface
+    internal interval jmp ldate ldt le left len limit lint ln log lower_bound lreal lt ltime
+    ltod lword max method mid min mod move mul mux namespace ne neg non_retain not null of on or
+    orn overlap overload override persistent pointer priority private program property protected
+    public r r1 r_edge read_only read_write real ref reference repeat replace resource ret
+    retain return right rol ror s s1 sel shl shr sin single sint sizeof sqrt ss st step string
+    struct sub super tan task then this time time_of_day to tod transition true trunc type udint
+    uint ulint union until upper_bound using usint var var_access var_config var_external
+    var_global var_in_out var_input var_inst var_output var_stat var_temp wchar while with word
+    wstring xor
+"""
+
+_RESERVED = set(_WORDS.split())
+"""Keywords, types and standard functions, which no variable may be called."""
+
 _RULE = "function_block_type_declaration"
 _parser = None
 
@@ -46,6 +68,7 @@ class Block:
     def _declare(self, name, section, init):
         name = name.lower()
         assert name not in self._types, f"{name} is declared twice"
+        assert name not in _RESERVED, f"{name} stands for something else in Structured Text"
         assert init.value is None
         kind = init.spec
         places = [()]

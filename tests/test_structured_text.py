@@ -348,14 +348,14 @@ def test_text_can_be_read():
         given,
         comments=["Quadrupteron; SI units.", "Ends *) nothing, opens (* nothing. " + "word " * 50],
         descriptions={"pose": "x, y, z in m, phi in rad"},
-        labels={first: "leg1_u_x", second: "LEG1_U_X", third: "sin"},
+        labels={first: "leg1_u_x", second: "LEG1_U_X", third: "pose"},
     )
     lines = text.splitlines()
     assert max(map(len, lines)) <= 100
     assert text.isascii()
     assert "    pose : ARRAY[0..3] OF LREAL; (* x, y, z in m, phi in rad *)" in lines
     names = Block(read(text)).names("VAR")
-    assert {"leg1_u_x", "leg1_u_x_2", "sin_2", "t", "t_2"} <= set(names)
+    assert {"leg1_u_x", "leg1_u_x_2", "pose_2", "t", "t_2"} <= set(names)
 
 
 def test_every_function_can_be_a_block(tmp_path):

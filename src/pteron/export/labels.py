@@ -24,7 +24,7 @@ _SAME = 1e-12
 Quantity = tuple[str, int, Expression]
 """A name, the leg (from 1) whose quantity it is, or 0, and a scalar or a vector."""
 
-_AXES = {2: "ab", 3: "xyz", 4: ("x", "y", "z", "phi")}
+_AXES = {1: [""], 2: ["_a", "_b"], 3: ["_x", "_y", "_z"]}
 """How components are told apart: a leg's plane has axes a and b."""
 
 
@@ -41,12 +41,10 @@ def node_names(
     inputs = {port.name: symbol for port, symbol in zip(given.inputs, symbols, strict=True)}
     names, legs, scalars = [], [], []
     for name, leg, value in _quantities(machine, inputs):
-        parts = ca.vertsplit(ca.densify(value)) if value.shape[0] > 1 else [value]
-        axes = [f"_{axis}" for axis in _AXES.get(len(parts), map(str, range(len(parts))))]
-        for axis, part in zip(axes if len(parts) > 1 else [""], parts, strict=True):
-            names.append(name + axis)
-            legs.append(leg)
-            scalars.append(part)
+        parts = ca.vertsplit(ca.densify(value))
+        names += [name + axis for axis in _AXES[len(parts)]]
+        legs += [leg] * len(parts)
+        scalars += parts
     known = ca.Function("known", symbols, [ca.vertcat(*scalars)])
     wanted = np.hstack([np.array(known(*state)) for state in states])
     return _named(graph, _matches(_values(graph, states), wanted), names, legs)
@@ -55,8 +53,8 @@ def node_names(
 def _quantities(machine: Machine, inputs: dict[str, Expression]) -> Iterator[Quantity]:
     """Yield what may have a name, those that are preferred first."""
     if "pose" in inputs:
-        motion = (inputs.get(name) for name in ("pose", "velocity", "acceleration"))
-        yield from _motion(machine, *motion)
+        rates = (inputs.get(name) for name in ("velocity", "acceleration"))
+        yield from _motion(machine, inputs["pose"], *rates)
     elif "joints" in inputs:
         joints = inputs["joints"]
         for i, (leg, q) in enumerate(zip(machine.legs, ca.vertsplit(joints), strict=True), 1):

@@ -203,7 +203,7 @@ class LegEquations(ABC):
         """Return where c may be while the actuated joint is at q."""
 
     def named(self, point: PointMotion, angle: AngleMotion | None) -> dict[str, Expression]:
-        """Return what of its motion generated code calls by name: scalars and columns."""
+        """Return what exported code calls by name: scalars, or vectors (2, 1) or (3, 1)."""
         return {}
 
     def needs(
