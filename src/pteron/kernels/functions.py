@@ -386,7 +386,13 @@ def _built(
     for carried in (True, False):
         constants = {"parameters": ca.mtimes(selection, base), "carried": carried}
         extra = {"base_parameters": base}
-        forms.append(_program(machine, what, constants=constants, extra=extra, wrench=wrench))
+        options: dict[str, Any] = {
+            "constants": constants,
+            "extra": extra,
+            "wrench": wrench,
+            "plain": plain,
+        }
+        forms.append(_program(machine, what, **options))
     return min(forms, key=lambda form: count_operations(form.function))
 
 

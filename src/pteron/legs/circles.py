@@ -10,8 +10,11 @@ from fractions import Fraction
 from random import Random
 
 import casadi as ca
+import numpy as np
 
 from pteron.bodies.motion import Expression
+
+_ROUNDING = 1e-15
 
 
 def squared_reach(lu: Expression, ll: Expression, n2: Expression) -> Expression:
@@ -77,6 +80,19 @@ def plane_axis(d: Expression, i: int, sign: int) -> Expression:
     v = d + sign * unit[:, i]
     j = (i + 1) % 3
     return unit[:, j] - (v[j] / (1 + sign * d[i])) * v
+
+
+def plane_of(d: Expression, a: Expression) -> Expression:
+    """Return (3, 2): the axes a and d x a of the plane perpendicular to d.
+
+    Of numbers, what is 0, 1 or -1 but for rounding is taken for it: products with it cost nothing.
+    """
+    plane = ca.horzcat(a, ca.cross(d, a))
+    if not plane.is_constant():
+        return plane
+    values = np.array(ca.evalf(plane))
+    whole = np.round(values)
+    return ca.SX(ca.DM(np.where(np.abs(values - whole) < _ROUNDING, whole, values)))
 
 
 def perpendicular_to(d: Sequence[float]) -> list[float]:

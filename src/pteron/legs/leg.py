@@ -322,7 +322,7 @@ class LegKind(ABC):
 
     @property
     def extents(self) -> dict[str, tuple[str, float, float, str]]:
-        """Where a body's mass is expected: its TOML key, least and greatest x, and what is there."""
+        """Where a body's mass is expected: its TOML key, least and greatest x, what is there."""
         return {}
 
     @property

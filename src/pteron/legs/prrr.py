@@ -31,6 +31,7 @@ from pteron.legs.circles import (
     first_moment,
     links_from_triangle,
     perpendicular_to,
+    plane_of,
     quarter_turn,
     random_direction,
     second_derivative,
@@ -301,7 +302,7 @@ class PRRREquations(LegEquations):
     ) -> None:
         self.r, self.d, self.e = guide_point, direction, slider_direction
         self.lu, self.ll, self.sigma = upper_length, lower_length, elbow
-        self.plane = ca.horzcat(plane_axis, ca.cross(direction, plane_axis))
+        self.plane = plane_of(direction, plane_axis)
         self.aligned = bool((slider_direction - direction).is_zero())
         """Whether the slider moves along d, so that the leg's plane does not accelerate."""
         if self.aligned:

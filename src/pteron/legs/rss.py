@@ -30,6 +30,7 @@ from pteron.bodies.vectors import (
 )
 from pteron.legs.circles import (
     perpendicular_to,
+    plane_of,
     quarter_turn,
     random_direction,
     random_fraction,
@@ -283,7 +284,7 @@ class RSSEquations(LegEquations):
     ) -> None:
         self.r, self.d = guide_point, direction
         self.lu, self.ll, self.middle, self.sigma = upper_length, lower_length, middle, elbow
-        self.plane = ca.horzcat(plane_axis, ca.cross(direction, plane_axis))
+        self.plane = plane_of(direction, plane_axis)
         self.zero = ca.mtimes(self.plane.T, zero_direction)
 
     def _triangle(self, w: Expression) -> tuple[Expression, Expression, Expression]:
