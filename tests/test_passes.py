@@ -11,6 +11,7 @@ from mechanisms import CATALOG, relative_error, states
 
 from pteron.kernels import RationalField, count_operations, evaluate, program
 from pteron.kernels.passes import optimised
+from pteron.manipulator import parameter_names
 
 A, B, C, D, X, Y = SYMBOLS = [ca.SX.sym(name) for name in "abcdxy"]
 NAMES = [symbol.name() for symbol in SYMBOLS]
@@ -87,7 +88,7 @@ def test_programs_keep_their_values_in_fewer_operations(name, what):
     assert count_operations(found) < count_operations(plain.function)
     pose, velocity, acceleration = states(robot, 20)
     given = {"pose": pose.T, "velocity": velocity.T, "acceleration": acceleration.T}
-    given["parameters"] = np.random.default_rng(0).uniform(0.5, 1.0, 9 * len(robot.legs) + 4)
+    given["parameters"] = np.random.default_rng(0).uniform(0.5, 1.0, len(parameter_names(robot)))
     values = [given[port.name] for port in plain.inputs]
     expected, computed = (np.array(f(*values)).T for f in (plain.function, found))
     assert relative_error(computed, expected) < 1e-13
