@@ -16,6 +16,7 @@ from pteron.bodies.motion import Expression
 from pteron.equations.machine import Machine
 from pteron.equations.regressor import generalized_regressor
 from pteron.kernels import TARGETS, Kernel, Port, compile
+from pteron.kernels.passes import optimised
 from pteron.manipulator import parameters
 from pteron.reduction.cheapest import cheapest_parameters
 from pteron.reduction.result import BaseParameters
@@ -70,7 +71,7 @@ def model_forms(base: BaseParameters) -> dict[tuple[str, str], Kernel]:
         for name, (selection, numbers) in sets.items():
             symbols = ca.SX.sym("parameters", len(numbers))
             forces = build(inverse, bracket, selection, symbols)
-            function = ca.Function("forces", [x, dx, ddx, symbols], [ca.cse(forces)])
+            function = optimised(ca.Function("forces", [x, dx, ddx, symbols], [ca.cse(forces)]))
             kernels[form, name] = TARGETS["vm"](
                 f"{form}, {name}",
                 function,
