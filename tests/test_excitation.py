@@ -63,7 +63,7 @@ def small(criterion: str = "condition", space: str = "platform", robot: str = "t
         harmonics=2,
         period=4.0,
         criterion=criterion,
-        starts=2 if (criterion, space, robot) == ("condition", "platform", "tripteron") else 1,
+        starts=2 if criterion == "logdet" else 1,
         draws=6,
         workers=1,
     )
@@ -315,7 +315,7 @@ def test_the_measure_of_the_volume_is_the_log_det():
 
 @pytest.mark.parametrize(
     ("robot", "space", "gain"),
-    [("tripteron", "platform", 2.0), ("quadrupteron", "sliders", 3)],
+    [("tripteron", "platform", 2.0), ("tripteron", "sliders", 2.0)],
 )
 def test_the_search_finds_better_than_random_and_keeps_every_limit(robot, space, gain):
     found = small("condition", space, robot)
@@ -339,7 +339,7 @@ def test_the_other_criterion_makes_the_volume_smaller():
 
 def test_a_search_on_oblique_axes_with_force_limits_keeps_them():
     robot = CATALOG["tripteron-oblique"]
-    limits = Limits(speed=0.3, acceleration=1.5, force=(16.0, 6.0, 29.0))
+    limits = Limits(speed=0.3, acceleration=1.5, force=(10.0, 22.0, 31.0))
     found = optimal_excitation(
         robot, harmonics=2, period=4.0, limits=limits, starts=1, draws=3, workers=1
     )
@@ -352,10 +352,17 @@ def test_a_search_on_oblique_axes_with_force_limits_keeps_them():
 
 def test_processes_find_the_same_as_this_one_and_so_does_the_seed_again():
     again = optimal_excitation(
-        CATALOG["tripteron"], harmonics=2, period=4.0, starts=2, draws=6, workers=2
+        CATALOG["tripteron"],
+        harmonics=2,
+        period=4.0,
+        criterion="logdet",
+        starts=2,
+        draws=6,
+        workers=2,
     )
-    assert again.motion.coefficients == pytest.approx(small().motion.coefficients, abs=1e-9)
-    assert [s.draw for s in again.starts] == [s.draw for s in small().starts]
+    found = small("logdet")
+    assert again.motion.coefficients == pytest.approx(found.motion.coefficients, abs=1e-9)
+    assert [s.draw for s in again.starts] == [s.draw for s in found.starts]
     other = random_excitation(CATALOG["tripteron"], harmonics=2, seed=1)
     same = random_excitation(CATALOG["tripteron"], harmonics=2, seed=1)
     assert (other.coefficients == same.coefficients).all()
@@ -460,11 +467,11 @@ def test_what_the_search_cannot_do_is_refused(given: dict, words: str):
 
 
 def test_the_table_for_the_controller(tmp_path: Path):
-    found = small("condition", "sliders", "quadrupteron")
+    found = small("condition", "sliders")
     robot = found.motion.robot
     path = found.write_csv(tmp_path / "motion.csv", rate=50.0, periods=2)
     frame = pl.read_csv(path)
-    legs, pose = range(1, 5), robot.coordinates
+    legs, pose = range(1, 4), robot.coordinates
     assert frame.columns == [
         "t",
         *(f"rho{i}" for i in legs),

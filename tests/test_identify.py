@@ -110,26 +110,23 @@ def resting(robot, *, seed=3, rate=1000.0):
     return Log("rests", time, pteron.inverse_kinematics(robot, pose), forces)
 
 
-@pytest.mark.parametrize("period", [12.0])
-def test_kinks_of_a_motion_without_noise_do_no_harm(period):
+def test_kinks_of_a_motion_without_noise_do_no_harm():
     log, other = (
-        replace(resting(QUADRUPTERON, seed=seed), description=Description(period=period))
+        replace(resting(QUADRUPTERON, seed=seed), description=Description(period=12.0))
         for seed in (3, 4)
     )
     found = identify(QUADRUPTERON, log, held_out=other)
     assert np.abs(found.estimate.values - truth(found.model)).max() < 1e-9
 
 
-@pytest.mark.parametrize(("period", "start"), [(None, 1.7e9)])
-def test_stamps_far_from_zero_do_no_harm(start, period):
-    log = log_of(QUADRUPTERON, description=Description(period=period))
-    found = identify(QUADRUPTERON, replace(log, time=log.time + start))
+def test_stamps_far_from_zero_do_no_harm():
+    log = log_of(QUADRUPTERON)
+    found = identify(QUADRUPTERON, replace(log, time=log.time + 1.7e9))
     assert np.abs(found.estimate.values - truth(found.model)).max() < 1e-9
 
 
-@pytest.mark.parametrize("share", [0.3])
-def test_uneven_steps_do_no_harm_where_there_is_no_noise(share):
-    steps = 1.0 + share * np.random.default_rng(0).uniform(-1.0, 1.0, 8000)
+def test_uneven_steps_do_no_harm_where_there_is_no_noise():
+    steps = 1.0 + 0.3 * np.random.default_rng(0).uniform(-1.0, 1.0, 8000)
     found = identify(QUADRUPTERON, log_of(QUADRUPTERON, time=np.cumsum(steps) / 1000.0))
     rank = found.model.base.rank
     assert np.abs(found.estimate.values - truth(found.model))[:rank].max() < 1e-9
@@ -150,12 +147,10 @@ def test_forces_that_are_noise_are_not_trusted():
         identify(QUADRUPTERON, replace(log, forces=100.0 * noise))
 
 
-@pytest.mark.parametrize("slider", [2])
-def test_the_flipped_sign_of_a_slider_is_found(slider):
+def test_the_flipped_sign_of_a_slider_is_found():
     log = noisy(QUADRUPTERON)
-    signs = np.ones(4)
-    signs[slider] = -1.0
-    refused(replace(log, sliders=signs * log.sliders), f"rho{slider + 1} has the sign flipped")
+    signs = np.array([1.0, 1.0, -1.0, 1.0])
+    refused(replace(log, sliders=signs * log.sliders), "rho3 has the sign flipped")
 
 
 def test_without_other_logs_the_end_is_held_out_and_said():
@@ -264,36 +259,17 @@ def test_flipped_forces_are_found():
     assert reason == "columns"
 
 
-@pytest.mark.parametrize("actuator", [1])
-def test_one_flipped_force_is_found(actuator):
+def test_one_flipped_force_is_found():
     log = noisy(QUADRUPTERON)
-    signs = np.ones(4)
-    signs[actuator] = -1.0
-    refused(replace(log, forces=signs * log.forces), f"force{actuator + 1} has the sign flipped")
+    signs = np.array([1.0, -1.0, 1.0, 1.0])
+    refused(replace(log, forces=signs * log.forces), "force2 has the sign flipped")
 
 
-@pytest.mark.parametrize("pair", [(1, 3)])
-def test_swapped_forces_are_found(pair):
+def test_swapped_forces_are_found_and_swapped_sliders():
     log = noisy(QUADRUPTERON)
-    order = list(range(4))
-    order[pair[0]], order[pair[1]] = order[pair[1]], order[pair[0]]
-    names = f"force{pair[0] + 1} and force{pair[1] + 1} are swapped"
-    refused(replace(log, forces=log.forces[:, order]), names)
-
-
-@pytest.mark.parametrize("pair", [(0, 1)])
-def test_swapped_sliders_are_found(pair):
-    log = noisy(QUADRUPTERON)
-    order = list(range(4))
-    order[pair[0]], order[pair[1]] = order[pair[1]], order[pair[0]]
-    changed = replace(log, sliders=log.sliders[:, order])
-    refused(changed, f"rho{pair[0] + 1} and rho{pair[1] + 1}", "swapped")
-
-
-def test_swaps_are_found_on_three_legs_too():
-    robot = CATALOG["tripteron-oblique"]
-    log = noisy(robot)
-    refused(replace(log, forces=log.forces[:, [0, 2, 1]]), "force2 and force3", robot=robot)
+    order = [0, 3, 2, 1]
+    refused(replace(log, forces=log.forces[:, order]), "force2 and force4 are swapped")
+    refused(replace(log, sliders=log.sliders[:, order]), "rho2 and rho4", "swapped")
 
 
 def test_a_sound_log_is_not_accused():
