@@ -1,4 +1,4 @@
-"""Position, velocity and acceleration: closed legs, inverses, and differences, for every machine."""
+"""Position, velocity and acceleration: closed legs, inverses and differences, for every machine."""
 
 from dataclasses import replace
 from functools import lru_cache
@@ -44,7 +44,7 @@ def column(robot, what):
 
 
 def inner(a, b):
-    return (a * b).sum(axis=-1)
+    return np.multiply(a, b).sum(axis=-1)
 
 
 def twist(robot, velocities):
@@ -250,7 +250,7 @@ def test_direct_kinematics_is_nan_where_no_pose_is(name):
     np.testing.assert_allclose(error, 0.0, atol=1e-6)
 
 
-@settings(deadline=None, derandomize=True, max_examples=12)
+@settings(deadline=None, derandomize=True, max_examples=8)
 @given(st.integers(0, 10**6), st.sampled_from(["PPPP", "PPP", "RRR", "PRP", "RPR"]))
 def test_direct_kinematics_of_machines_with_nothing_special(seed, kinds):
     robot = random_machine(seed, kinds)
@@ -415,7 +415,9 @@ def test_measure_and_margin_vanish_together_at_the_edge_of_reach(name):
         # The measure is the root of what vanishes there; beyond, nothing is real.
         assert not reach(pose + (edge - 1e-13) * way)[1][leg] > 1e-5
         assert np.isnan(reach(pose + (edge + 1e-9) * way)[1][leg])
-        assert margins[0] <= edge * (1 + 1e-12), "the margin is the least way to the edge"
+        # The margin is the least way to the edge, by what a leg's plane sees of an oblique slider.
+        seen = [1 / abs(inner(g.e, g.direction)) if g.joint.unit == "m" else 1 for g in robot.legs]
+        assert margins[0] <= max(seen) * edge * (1 + 1e-12)
 
 
 @EVERY
@@ -425,7 +427,7 @@ def test_the_type_2_measure_is_the_determinant_of_unit_rows(name):
     measure = pteron.compile(robot, "type_ii")
     J = pteron.jacobian(robot, poses)
     if robot.platform.turns:
-        quarter = pteron.jacobian(robot, poses + [0, 0, 0, np.pi / 2])
+        quarter = pteron.jacobian(robot, poses + np.array([0, 0, 0, np.pi / 2]))
         first, second = np.linalg.det(J), np.linalg.det(quarter)
         expected = first / np.hypot(first, second)
     else:
@@ -469,7 +471,7 @@ def test_a_delta_whose_rods_lie_in_one_plane_is_singular():
         return float(pteron.compile(robot, "type_ii")([0.0, 0.0, z]))
 
     z = brentq(measure, -0.4, 0.4, xtol=1e-16)
-    upper, lower = pteron.link_vectors(robot, [0.0, 0.0, z])
+    lower = pteron.link_vectors(robot, [0.0, 0.0, z])[1]
     np.testing.assert_allclose(lower[:, 2], 0.0, atol=1e-14)
     rest = np.zeros(3)
     with pytest.raises(SingularPose, match=r"^pose: singular \(type II; measure") as caught:
@@ -554,11 +556,11 @@ def test_an_orthogonal_tripteron_is_isotropic_everywhere():
 @EVERY
 def test_random_poses_honour_the_measures(name):
     robot = MECHANISMS[name]
-    poses = pteron.random_poses(robot, 150, seed=9, type_i=0.4, type_ii=0.35)
-    assert poses.shape == (150, robot.freedom)
+    poses = pteron.random_poses(robot, 60, seed=9, type_i=0.4, type_ii=0.3)
+    assert poses.shape == (60, robot.freedom)
     least = pteron.compile(robot, "reach")(poses)[1].min()
     assert 0.4 <= least < 0.5, "the bound must be what bounds"
-    assert np.abs(pteron.compile(robot, "type_ii")(poses)).min() >= 0.35
+    assert np.abs(pteron.compile(robot, "type_ii")(poses)).min() >= 0.3
 
 
 @pytest.mark.parametrize("name", ["delta", "quadrupteron", "random PPP 0"])

@@ -124,7 +124,7 @@ class Reach(NamedTuple):
     """Whether, and how well, a leg reaches a point."""
 
     margin: Expression
-    """Metres to the edge of its reach; negative beyond it."""
+    """Metres to the edge of its reach, in the plane in which its links move; negative beyond it."""
     discriminant: Expression
     """The radicand of its closure: below 0 out of reach."""
     scale: Expression
