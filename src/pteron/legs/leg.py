@@ -105,8 +105,8 @@ class LegMotion(NamedTuple):
     division by it: it vanishes where the leg is singular (type I)."""
     divisor: Expression
     bodies: dict[str, BodyMotion]
-    """By letter: "p" (slider), "u" (upper link or crank), "l" (lower link or rod), whichever the leg
-    has. A lower link's reference point is the platform point, its x points there from the joint."""
+    """By letter: "p" (slider), "u" (upper link or crank), "l" (lower link or rod); those it has. A
+    lower link's reference point is the platform point, and its x points there from the joint."""
     chain: tuple[Joint, ...]
     """The joints from the base to the platform, all of them: their screws times their rates are the
     platform's twist. Their points, in this order, are what is drawn."""
@@ -138,7 +138,7 @@ class Reach(NamedTuple):
     scale: Expression
     """The discriminant over `scale` is the square of the type-I measure."""
     spread: Expression
-    """Metres; where it vanishes the elbow may be anywhere. Any positive length where it never may."""
+    """Metres; where it vanishes the elbow may be anywhere. Where it never may: any length."""
 
     @property
     def type_i(self) -> Expression:
