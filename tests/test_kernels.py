@@ -61,7 +61,7 @@ def kernel_of(robot, what, wrench=False):
 
 
 def values_for(robot, kernel, lead=()):
-    """Return inputs for a kernel that are not fixed: of poses in reach, and rates at random."""
+    """Return inputs for a kernel: poses in reach, and rates at random."""
     count = int(np.prod(lead, dtype=int))
     pose, velocity, acceleration = states(robot, count)
     known = {
@@ -74,8 +74,7 @@ def values_for(robot, kernel, lead=()):
         "joint_rates": velocity,
         "joint_accelerations": acceleration,
     }
-    names = [port.name for port in kernel.inputs if port.name not in kernel.fixed]
-    return [known[name].reshape(*lead, robot.freedom) for name in names]
+    return [known[port.name].reshape(*lead, robot.freedom) for port in kernel.inputs]
 
 
 PUBLIC = {
@@ -109,7 +108,13 @@ def test_every_function_compiles_and_gives_what_the_public_one_gives(name, what)
         assert kernel.name == what
         assert kernel.operations == count_operations(kernel.function) == walked(kernel.function)
         assert what in kernel.source
-        assert all(port.name in kernel.source for port in kernel.inputs)
+        inputs = {port.name for port in kernel.inputs}
+        assert {port.name for port in kernel.ports} - {"parameters"} == inputs
+        for port in kernel.ports:
+            own = len(pteron.parameters(robot)) if port.shared else robot.freedom
+            assert port.shape == (own,)
+            assert port.shared == (port.name == "parameters")
+            assert port.name in kernel.source
 
 
 def test_machines_of_one_geometry_share_a_program_but_not_their_parameters():
