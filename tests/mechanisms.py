@@ -86,8 +86,11 @@ LEGS = {"P": slider_leg, "R": crank_leg}
 def random_machine(seed, kinds):
     """Return a machine with nothing special about it, built around a pose that it reaches.
 
-    `kinds` holds a letter for each leg, P (P-R-R-R) or R (R-S-S): four legs turn the platform.
+    `kinds` holds a letter for each leg, P (P-R-R-R) or R (R-S-S): four legs turn the platform. Of
+    P-R-R-R legs alone it may say whether the platform turns.
     """
+    if isinstance(kinds, bool):
+        kinds = "PPPP" if kinds else "PPP"
     rng = np.random.default_rng(seed)
     axis = unit(rng)
     x_axis = unit(rng, axis)
@@ -115,19 +118,19 @@ def _turned(name, seed, **options):
 MECHANISMS = {
     **CATALOG,
     "quadrupteron +-+-": with_elbows(CATALOG["quadrupteron"], "+-+-"),
-    "tripteron-oblique --+": with_elbows(CATALOG["tripteron-oblique"], "--+"),
+    "quadrupteron-oblique +--+": with_elbows(CATALOG["quadrupteron-oblique"], "+--+"),
     "quadrupteron, gravity along x": replace(CATALOG["quadrupteron"], gravity=(9.81, 0.0, 0.0)),
     "tripteron, no gravity": replace(CATALOG["tripteron"], gravity=(0.0, 0.0, 0.0)),
     "quadrupteron turned": _turned("quadrupteron", 1),
     "tripteron on a wall": _turned("tripteron", 2, gravity=False),
     "delta on a wall": _turned("delta", 3, gravity=False),
-    **{
-        f"random {kinds} {seed}": random_machine(seed, kinds)
-        for kinds, seed in (
-            *(("PPPP", 0), ("PPPP", 1), ("PPP", 0)),
-            *(("RRR", 0), ("RRR", 1), ("PRR", 0), ("RPP", 0)),
-        )
-    },
+    "random 3T1R 0": random_machine(0, "PPPP"),
+    "random 3T1R 1": random_machine(1, "PPPP"),
+    "random 3T 0": random_machine(0, "PPP"),
+    "random RRR 0": random_machine(0, "RRR"),
+    "random RRR 1": random_machine(1, "RRR"),
+    "random PRR 0": random_machine(0, "PRR"),
+    "random RPP 0": random_machine(0, "RPP"),
 }
 
 

@@ -13,7 +13,7 @@ ENGINES = {"pinocchio": trees.Pinocchio, "mujoco": trees.MuJoCo}
 WITH_SLIDERS = [
     name for name, robot in MECHANISMS.items() if "p" in {b for g in robot.legs for b in g.bodies}
 ]
-CHOSEN = [*(name for name in CATALOG if name in WITH_SLIDERS), "random PPPP 0", "random RPP 0"]
+CHOSEN = [*(name for name in CATALOG if name in WITH_SLIDERS), "random 3T1R 0", "random RPP 0"]
 
 
 @pytest.mark.parametrize("name", WITH_SLIDERS)

@@ -206,7 +206,7 @@ def test_half_a_turn_is_pi_and_not_minus_pi():
 
 
 @pytest.mark.parametrize("shift", [0.0, 1e3])
-@pytest.mark.parametrize("name", ["quadrupteron", "quadrupteron turned", "random PPPP 0"])
+@pytest.mark.parametrize("name", ["quadrupteron", "quadrupteron turned", "random 3T1R 0"])
 def test_the_assembly_modes_meet_wherever_the_base_frame_lies(name, shift):
     offset = shift * np.array([0.6, -1.0, 0.7])
     legs = tuple(
@@ -563,7 +563,7 @@ def test_random_poses_honour_the_measures(name):
     assert np.abs(pteron.compile(robot, "type_ii")(poses)).min() >= 0.3
 
 
-@pytest.mark.parametrize("name", ["delta", "quadrupteron", "random PPP 0"])
+@pytest.mark.parametrize("name", ["delta", "quadrupteron", "random 3T 0"])
 def test_random_poses_are_spread_as_those_of_a_wider_search(name):
     robot = MECHANISMS[name]
     found = pteron.random_poses(robot, 2000, seed=2)

@@ -317,7 +317,7 @@ def test_the_catalogs_geometry_is_its_decimals():
     assert exact.gravity[2] == Surd(Fraction(-981, 100))
 
 
-@pytest.mark.parametrize("name", ["quadrupteron-oblique", "random PPPP 0", "delta"])
+@pytest.mark.parametrize("name", ["quadrupteron-oblique", "random 3T1R 0", "delta"])
 def test_a_unit_vector_across_d_in_a_field(name):
     exact = exact_geometry(MECHANISMS[name])
     factors = {f for s in exact.radicands for f in sympy.factorint(s)}
