@@ -1,9 +1,11 @@
 """Exact numbers, elimination modulo a prime, and geometry that stays exact when it is turned."""
 
 import math
+import random
 from dataclasses import replace
 from fractions import Fraction
 
+import casadi as ca
 import numpy as np
 import pytest
 import sympy
@@ -13,7 +15,7 @@ from mechanisms import CATALOG, MECHANISMS, random_machine
 from scipy.spatial.transform import Rotation
 
 import pteron
-from pteron.kernels import NoSquareRoot, PrimeField, RationalField
+from pteron.kernels import NoSquareRoot, PrimeField, RationalField, evaluate
 from pteron.reduction.configurations import is_square
 from pteron.reduction.elimination import dependencies, reconstruct, remainder
 from pteron.reduction.exact_geometry import exact_geometry
@@ -233,10 +235,12 @@ def product(a, b):
 
 def directions(robot, exact):
     """Return pairs of a unit vector in floats, in the exact frame, and in exact numbers."""
-    pairs = []
-    for leg, own in zip(robot.legs, exact.legs, strict=True):
-        pairs += [(exact.frame @ leg.direction, own.d), (exact.frame @ leg.e, own.e)]
-    return pairs
+    return [
+        (exact.frame @ q.value, own.values[q.name])
+        for leg, own in zip(robot.legs, exact.legs, strict=True)
+        for q in leg.quantities
+        if q.role == "direction"
+    ]
 
 
 def check_exactness(robot, exact):
@@ -257,9 +261,9 @@ def check_exactness(robot, exact):
     gravity = [float(g) for g in exact.gravity]
     np.testing.assert_allclose(gravity, exact.frame @ robot.gravity, rtol=0, atol=1e-5)
     for leg, own in zip(robot.legs, exact.legs, strict=True):
-        assert float(own.lu) == pytest.approx(leg.upper_length, rel=1e-11)
-        assert float(own.ll) == pytest.approx(leg.lower_length, rel=1e-11)
-        assert own.sigma == leg.elbow
+        assert float(own.lengths["lu"]) == pytest.approx(leg.upper_length, rel=1e-11)
+        assert float(own.lengths["ll"]) == pytest.approx(leg.lower_length, rel=1e-11)
+        assert own.values["elbow"] == (Surd(Fraction(leg.elbow)),)
 
 
 @pytest.mark.parametrize("name", MECHANISMS)
@@ -281,15 +285,16 @@ def test_a_turned_machine_keeps_its_exact_numbers(name, seed):
         for (_, c), (_, d) in zip(directions(robot, exact), directions(turned, moved), strict=True):
             assert product(a, c) == product(b, d)
     for own, other in zip(exact.legs, moved.legs, strict=True):
-        assert product(own.d, exact.gravity) == product(other.d, moved.gravity)
-        assert (own.lu, own.ll, own.s0[2]) == (other.lu, other.ll, other.s0[2])
-        assert product(own.s0, own.s0) == product(other.s0, other.s0)
+        assert product(own.direction, exact.gravity) == product(other.direction, moved.gravity)
+        s0, moved_s0 = own.platform_point, other.platform_point
+        assert (own.lengths, s0[2]) == (other.lengths, moved_s0[2])
+        assert product(s0, s0) == product(moved_s0, moved_s0)
 
 
 @settings(deadline=None, derandomize=True, max_examples=15)
-@given(st.integers(0, 10**6), st.booleans())
-def test_random_machines_are_approximated_with_unit_length(seed, turns):
-    robot = random_machine(seed, turns)
+@given(st.integers(0, 10**6), st.sampled_from(["PPPP", "PPP", "RRR", "RPR"]))
+def test_random_machines_are_approximated_with_unit_length(seed, kinds):
+    robot = random_machine(seed, kinds)
     check_exactness(robot, exact_geometry(robot))
 
 
@@ -308,21 +313,62 @@ def test_the_catalogs_geometry_is_its_decimals():
     exact = exact_geometry(CATALOG["quadrupteron"])
     assert exact.recognised == exact.approximated == exact.lost == ()
     first = exact.legs[0]
-    assert [str(v) for v in (first.lu, first.ll)] == ["203/1000", "223/1000"]
+    assert [str(v) for v in first.lengths.values()] == ["203/1000", "223/1000"]
     assert exact.gravity[2] == Surd(Fraction(-981, 100))
 
 
-@pytest.mark.parametrize("name", ["quadrupteron-oblique", "random 3T1R 0", "tripteron-oblique"])
-def test_the_plane_axis_is_a_unit_vector_across_d_in_a_field(name):
+@pytest.mark.parametrize("name", ["quadrupteron-oblique", "random 3T1R 0", "delta"])
+def test_a_unit_vector_across_d_in_a_field(name):
     exact = exact_geometry(MECHANISMS[name])
+    factors = {f for s in exact.radicands for f in sympy.factorint(s)}
     prime = next(
         p
-        for p in PRIMES
-        if all(is_square(f, p) for s in exact.radicands for f in sympy.factorint(s))
+        for p in sympy.primerange(10**9, 10**9 + 10**4)
+        if p % 4 == 3 and all(is_square(f, p) for f in factors)
     )
     field = PrimeField(prime)
     for leg in exact.legs:
-        a = leg.plane_axis(field)
-        d = [v.within(field) for v in leg.d]
+        values = leg.within(field)
+        a, d = values["plane_axis"], values["direction"]
         assert sum(x * x for x in a) % prime == 1
         assert sum(x * y for x, y in zip(a, d, strict=True)) % prime == 0
+
+
+KINDS = {type(leg).__name__: leg for leg in MECHANISMS["random PRR 0"].legs}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_leg_closes_without_a_root(kind):
+    """In fractions: its discriminant is a square, and the elbow on the side that is said."""
+    x, y, z = (tuple(Fraction(int(i == k)) for i in range(3)) for k in range(3))
+    for seed in range(10):
+        rng = random.Random(seed)
+        directions = {"direction": z, "slider_direction": z, "plane_axis": x, "zero_direction": y}
+        lengths = {"upper_length": (Fraction(2, 7),), "lower_length": (Fraction(3, 5),)}
+        w, sigma = type(KINDS[kind]).closing(directions | lengths, rng)
+        assert all(isinstance(value, Fraction) for value in w)
+        fields = {key: [float(v) for v in value] for key, value in directions.items()}
+        own = {key: value for key, value in fields.items() if hasattr(KINDS[kind], key)}
+        leg = replace(
+            KINDS[kind],
+            **own,
+            guide_point=(0.0, 0.0, 0.0),
+            upper_length=2 / 7,
+            lower_length=0.6,
+            elbow=sigma,
+        )
+        reach = leg.equations().reach([float(v) for v in w])
+        assert float(reach.discriminant) >= 0
+        # The root of what stands under the radical is rational.
+        exact = {
+            key: ca.SX.sym(key, len(value))
+            for key, value in ((q.name, q.value) for q in leg.quantities)
+        }
+        c = ca.SX.sym("c", 3)
+        root = ca.sqrt(type(leg.equations())(**exact).reach(c).discriminant)
+        function = ca.Function("root", [*exact.values(), c], [root])
+        values = {
+            q.name: [Fraction(v).limit_denominator(10**6) for v in q.value] for q in leg.quantities
+        }
+        ((found,),) = evaluate(function, RationalField(), [*values.values(), w])
+        assert found**2 == pytest.approx(float(reach.discriminant))

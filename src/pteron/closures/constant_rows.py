@@ -73,8 +73,11 @@ class ConstantRows(Closure):
     def measure(self, platform: PlatformMotion, legs: Sequence[LegMotion]) -> Expression:
         """Return N . j over its largest value, the cosine of the angle from the best orientation.
 
-        For 3T it is det D over the product of its rows' lengths.
+        For 3T it is det D over the product of its rows' lengths. Of a machine that is singular
+        everywhere only rounding is left of either, and it is 0.
         """
+        if self.rows.is_constant() and self.vanishes():
+            return ca.SX(0)
         if self.orientation is None:
             rows = ca.vertsplit(self.rows)
             return det3(self.rows) / (ca.norm_2(rows[0]) * ca.norm_2(rows[1]) * ca.norm_2(rows[2]))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import casadi as ca
 
 from pteron.bodies.motion import Expression
+from pteron.bodies.parameters import LEG_BODIES
 from pteron.closures.closure import nan_below_zero
 from pteron.equations.machine import Machine, State
 from pteron.legs.leg import Reach
@@ -57,9 +58,10 @@ def link_jacobians(state: State) -> tuple[list[Expression], list[Expression]]:
     """Return J_u and J_l of every leg, each (6, m); NaN for a link that a leg has not."""
     n = len(state.legs)
     none = ca.SX.nan(6, n)
+    _, *links = LEG_BODIES
     upper, lower = (
         [none if j is None else j for j in (body_jacobian(state, i, letter) for i in range(n))]
-        for letter in "ul"
+        for letter in links
     )
     return upper, lower
 

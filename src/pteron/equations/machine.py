@@ -11,8 +11,9 @@ from pteron.bodies.motion import Expression, Moments, moments_of
 from pteron.bodies.parameters import PLATFORM, PLATFORM_KINDS, Parameter, parameter_list
 from pteron.closures import KINDS as CLOSURES
 from pteron.closures import Closure
+from pteron.errors import ModelError
 from pteron.legs.leg import LegEquations, LegMotion
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, expect_manipulator
 from pteron.platforms import EQUATIONS, PlatformEquations
 from pteron.platforms.motion import PlatformMotion
 
@@ -47,6 +48,7 @@ class Machine:
     @classmethod
     def of(cls, robot: Manipulator) -> Machine:
         """Return one machine, in numbers."""
+        expect_manipulator(robot)
         legs = tuple(leg.equations() for leg in robot.legs)
         frame = [ca.SX(list(axis)) for axis in robot.platform.frame]
         points = [ca.SX(list(leg.platform_point)) for leg in robot.legs]
@@ -80,8 +82,14 @@ class Machine:
         gravity: Expression,
     ) -> Machine:
         platform = EQUATIONS[robot.platform.motion](frame, points)
-        closure = next(kind for kind in CLOSURES if kind.fits(legs, platform))
-        return cls(legs, platform, closure(legs, platform), gravity)
+        for kind in CLOSURES:
+            if kind.fits(legs, platform):
+                return cls(legs, platform, kind(legs, platform), gravity)
+        kinds = ", ".join(sorted({leg.type for leg in robot.legs}))
+        raise ModelError(
+            f"legs: no closure is known of {kinds} legs under a {robot.platform.motion} "
+            "platform; give it other legs or another motion"
+        )
 
     def state(
         self,

@@ -20,7 +20,7 @@ from pteron.equations.virtual_work import generalized_forces, inverse_dynamics
 from pteron.errors import ModelError
 from pteron.kernels.kernel import Port, count_operations
 from pteron.kernels.passes import optimised
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, expect_manipulator
 
 Outputs = dict[str, tuple[Expression, tuple[int, ...]]]
 """Each output's expression and its shape; a matrix is (rows, columns), a stack of them vertical."""
@@ -349,6 +349,7 @@ def specialised(given: Program, values: dict[str, NDArray[np.float64]]) -> Progr
 @lru_cache(maxsize=256)
 def bare(robot: Manipulator) -> Manipulator:
     """Return the machine with unit inertia, so that machines of one geometry share programs."""
+    expect_manipulator(robot)
     unit = {"m": 1.0, "mgx": 0.0, "mgy": 0.0, "I": 1.0}
 
     def plain(body: Any) -> Any:

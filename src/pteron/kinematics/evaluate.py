@@ -45,8 +45,7 @@ def evaluated(
     *results, status = numeric(robot, what, base=base, wrench=wrench).call(*values)
     good = status.item() if status.ndim == 0 else status.all()
     if not good or on_failure != "raise":
-        if on_failure not in ("raise", "nan"):
-            raise DataError(f'on_failure: {on_failure!r} is neither "raise" nor "nan"')
+        expect_choice(on_failure)
         if not good:
             if on_failure == "raise":
                 raise _failure(robot, what, values, status, wrench)
@@ -63,6 +62,12 @@ def unchecked(
     return results[0] if len(results) == 1 else tuple(results)
 
 
+def expect_choice(on_failure: str) -> None:
+    """Refuse what is no choice of what to do with a bad state."""
+    if on_failure not in ("raise", "nan"):
+        raise DataError(f'on_failure: {on_failure!r} is neither "raise" nor "nan"')
+
+
 def checked(
     robot: Manipulator, value: ArrayLike, name: str, on_failure: OnFailure = "raise"
 ) -> Array:
@@ -70,6 +75,7 @@ def checked(
 
     Under ``on_failure="nan"`` a row with a number that is not finite becomes NaN as a whole.
     """
+    expect_choice(on_failure)
     array = as_array(value, name, (robot.freedom,))
     good = np.isfinite(array)
     if good.all():

@@ -47,7 +47,7 @@ def random_poses(
     Raises
     ------
     DataError
-        If the count is negative.
+        If the count is no whole number, or negative.
     ModelError
         If the legs have next to no common reach.
 
@@ -57,6 +57,8 @@ def random_poses(
     >>> pteron.random_poses(pteron.load("quadrupteron"), 5).shape
     (5, 4)
     """
+    if isinstance(count, bool) or not isinstance(count, (int, np.integer)):
+        raise DataError(f"count: {count!r} given, a whole number expected")
     if count < 0:
         raise DataError(f"count: {count} given, 0 or more expected")
     rng = np.random.default_rng(seed)
@@ -92,7 +94,7 @@ def _drawn(
         _, measures, _, _ = numeric(robot, "reach")(poses)
         good = (measures >= type_i).all(axis=-1)
         if type_ii:
-            # Of a machine that is singular everywhere the measure is 0 or NaN: all poses count.
+            # Of a machine that is singular everywhere the measure is 0: all poses count.
             measure = np.abs(numeric(robot, "type_ii")(poses)[0])
             good &= (measure >= type_ii) | ~(measure > 0.0).any()
         found.append(poses[good])

@@ -10,6 +10,9 @@ file of this folder:
   motion of c and phi with the motion of its joint and of its bodies (`motion`), says how far it
   reaches (`reach`) and where c lies for a given joint (`locus`).
 
+Two lines bind them: `MyLeg.equations_class = MyEquations`, and `pteron.legs.KINDS[MyLeg.type] =
+MyLeg`, after which files may name the kind.
+
 That is all: Jacobian, dynamics, regressor, energies, limits, drawings, logs, exported code follow.
 `examples/new_leg.py` is a complete kind of leg. `needs`, `transfers` and `named` may be
 overridden: a cheaper form of the same forces, the mass transfers that explain base parameters in
@@ -63,10 +66,13 @@ the kind's first direction; a point in the platform frame; a length; an angle; +
 
 
 class Quantity(NamedTuple):
-    """A part of a leg's geometry that its equations need."""
+    """A part of a leg's geometry that its equations need, or that turns with the machine.
+
+    `LegEquations` takes them all by name, also those that it has no use for.
+    """
 
     name: str
-    """The field of the leg that holds it."""
+    """The field of the leg that holds it; one without a field turns with nothing."""
     role: Role
     value: Sequence[float]
     symbol: str = ""
@@ -99,9 +105,11 @@ class LegMotion(NamedTuple):
     division by it: it vanishes where the leg is singular (type I)."""
     divisor: Expression
     bodies: dict[str, BodyMotion]
-    """By letter: "p" (slider), "u" (upper link or crank), "l" (lower link or rod)."""
+    """By letter: "p" (slider), "u" (upper link or crank), "l" (lower link or rod); those it has. A
+    lower link's reference point is the platform point, and its x points there from the joint."""
     chain: tuple[Joint, ...]
-    """The joints from the base to the platform; their points are what is drawn."""
+    """The joints from the base to the platform, all of them: their screws times their rates are the
+    platform's twist. Their points, in this order, are what is drawn."""
     links: tuple[Expression | None, Expression | None] = (None, None)
     """l_u and l_l, where the leg has them."""
     turning: tuple[tuple[Expression, Expression] | None, ...] = (None, None)
@@ -124,13 +132,13 @@ class Reach(NamedTuple):
     """Whether, and how well, a leg reaches a point."""
 
     margin: Expression
-    """Metres to the edge of its reach; negative beyond it."""
+    """Metres to the edge of its reach, in the plane in which its links move; negative beyond it."""
     discriminant: Expression
     """The radicand of its closure: below 0 out of reach."""
     scale: Expression
     """The discriminant over `scale` is the square of the type-I measure."""
     spread: Expression
-    """Metres; where it vanishes the elbow may be anywhere."""
+    """Metres; where it vanishes the elbow may be anywhere. Where it never may: any length."""
 
     @property
     def type_i(self) -> Expression:
@@ -184,7 +192,7 @@ class LegEquations(ABC):
     """The equations of one leg, for one state."""
 
     kinds: ClassVar[Mapping[str, tuple[str, ...]]]
-    """The kinds of parameters of each body, by letter."""
+    """The kinds of parameters of each body, by letter: those of the leg's `bodies`."""
     rides: ClassVar[tuple[str, ...]] = ()
     """The bodies whose reference point is the platform point: their mass may be the platform's."""
     constant_row: Expression | None = None
@@ -309,7 +317,11 @@ class LegKind(ABC):
     @classmethod
     @abstractmethod
     def table(cls) -> dict[str, Any]:
-        """Return the TOML keys of its own: name -> (type, default), as pydantic takes them."""
+        """Return the TOML keys of its own: name -> (type, default), as pydantic takes them.
+
+        `...` is the default of what must be given. Every kind has `type`, `guide_point`,
+        `platform_point`, `elbow` and `limits` besides.
+        """
 
     @classmethod
     @abstractmethod

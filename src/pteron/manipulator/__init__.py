@@ -1,7 +1,12 @@
 """What a robot is: legs, platform and gravity as a value, its TOML files, and the catalog."""
 
 from pteron.manipulator.files import catalog, load, save
-from pteron.manipulator.manipulator import STANDARD_GRAVITY, Manipulator, working_modes
+from pteron.manipulator.manipulator import (
+    STANDARD_GRAVITY,
+    Manipulator,
+    expect_manipulator,
+    working_modes,
+)
 from pteron.manipulator.parameters import (
     parameter_data,
     parameter_names,
@@ -15,6 +20,7 @@ __all__ = [
     "STANDARD_GRAVITY",
     "Manipulator",
     "catalog",
+    "expect_manipulator",
     "load",
     "parameter_data",
     "parameter_names",

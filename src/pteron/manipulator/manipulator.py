@@ -100,6 +100,13 @@ class Manipulator:
         return self.platform.coordinates
 
 
+def expect_manipulator(robot: object) -> None:
+    """Refuse what is no manipulator, such as the name of one."""
+    if not isinstance(robot, Manipulator):
+        given = repr(robot) if isinstance(robot, str) else type(robot).__name__
+        raise ModelError(f"robot: {given} given, a Manipulator expected; pteron.load gives one")
+
+
 def _check_constraints(platform: Platform, legs: tuple[LegKind, ...]) -> None:
     """Refuse legs that leave the platform a rotation which its motion does not have.
 

@@ -123,7 +123,10 @@ def with_parameters(robot: Manipulator, values: ArrayLike) -> Manipulator:
     ModelError
         If their number is wrong, or if they belong to no real bodies.
     """
-    vector = np.asarray(values, dtype=float)
+    try:
+        vector = np.asarray(np.ma.filled(values, np.nan), dtype=float)
+    except (TypeError, ValueError):
+        raise ModelError("parameters: not an array of real numbers") from None
     listed = parameter_data(robot)
     if vector.shape != (len(listed),):
         raise ModelError(f"parameters: shape {vector.shape} given, ({len(listed)},) expected")

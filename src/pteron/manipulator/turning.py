@@ -37,7 +37,10 @@ def turned(robot: Manipulator, rotation: ArrayLike, *, gravity: bool = True) -> 
     ModelError
         If the matrix is not a rotation.
     """
-    matrix = np.asarray(rotation, dtype=float)
+    try:
+        matrix = np.asarray(rotation, dtype=float)
+    except (TypeError, ValueError):
+        raise ModelError("rotation: not an array of real numbers") from None
     if matrix.shape != (3, 3) or not np.allclose(matrix @ matrix.T, np.eye(3), atol=_TOLERANCE):
         raise ModelError(f"rotation: not an orthogonal 3x3 matrix: {matrix.tolist()}")
     if np.linalg.det(matrix) < 0:

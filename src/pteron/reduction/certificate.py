@@ -6,7 +6,27 @@ from abc import ABC, abstractmethod
 from dataclasses import asdict, dataclass
 from typing import Any
 
-__all__ = ["Certificate", "ExactCertificate", "NumericalCertificate"]
+ROUNDING = 1e-13
+"""Relative to the largest, what rounding alone leaves of a singular value: 1e-16 to 1e-14."""
+
+
+@dataclass(frozen=True)
+class NumericalRank:
+    """A rank in floating point, and the singular values between which it was decided."""
+
+    rank: int
+    smallest_kept: float
+    """Relative to the largest."""
+    largest_dropped: float
+
+    @property
+    def clear(self) -> bool:
+        """Whether all that was dropped is rounding."""
+        return self.largest_dropped <= ROUNDING
+
+    def __str__(self) -> str:
+        kept, dropped = f"{self.smallest_kept:.1e}", f"{self.largest_dropped:.1e}"
+        return f"{self.rank} (smallest singular value kept {kept}, largest dropped {dropped})"
 
 
 @dataclass(frozen=True)
@@ -34,6 +54,12 @@ class Certificate(ABC):
     def as_dict(self) -> dict[str, Any]:
         """Return the certificate as plain data."""
         return asdict(self)
+
+
+_UNCLEAR = (
+    f"WHAT WAS DROPPED IS MORE THAN ROUNDING ({ROUNDING:.0e}): it may be a weak effect, of which "
+    "method exact can tell. "
+)
 
 
 @dataclass(frozen=True)
@@ -70,7 +96,9 @@ class NumericalCertificate(Certificate):
             f"random states, columns scaled). Smallest value kept {self.smallest_kept:.1e}, "
             f"largest dropped {self.largest_dropped:.1e}, relative to the largest: a gap of "
             f"{self.gap:.0e}. "
-            f"Residual of the grouping {self.residual:.0e}. It confirms a rank, it proves none."
+            f"Residual of the grouping {self.residual:.0e}. "
+            + _UNCLEAR * (self.largest_dropped > ROUNDING)
+            + "It confirms a rank, it proves none."
         )
 
 
@@ -106,9 +134,9 @@ class ExactCertificate(Certificate):
         "rational", "algebraic" or "floating point": what the groupings are known as.
     recognised, approximated, lost, nearly : tuple of str
         How the machine's floats were made exact; see `ExactGeometry`.
-    numerical_rank : int or None
-        Where floats were approximated, and states in reach could be found: the rank that the
-        singular values of the regressor show.
+    numerical : NumericalRank or None
+        Where the exact numbers are not quite the machine's floats, or a relation is nearly met, and
+        states in reach could be found: the rank that the singular values of the regressor show.
     """
 
     primes: tuple[int, ...]
@@ -125,7 +153,12 @@ class ExactCertificate(Certificate):
     approximated: tuple[str, ...]
     lost: tuple[str, ...]
     nearly: tuple[str, ...]
-    numerical_rank: int | None
+    numerical: NumericalRank | None
+
+    @property
+    def numerical_rank(self) -> int | None:
+        """The rank in floating point, where it was asked for."""
+        return None if self.numerical is None else self.numerical.rank
 
     def summary(self) -> str:
         """Return the certificate in a few sentences."""
@@ -154,15 +187,20 @@ class ExactCertificate(Certificate):
             lines.append("Taken as exact: " + "; ".join(self.recognised) + ".")
         if self.approximated:
             lines.append("Approximated: " + "; ".join(self.approximated) + ".")
-        if self.numerical_rank is not None:
-            agrees = self.numerical_rank == self.rank
-            lines.append(
-                "The rank is that of the machine so approximated; in floating point that of the "
-                f"machine itself is {self.numerical_rank} too."
-                if agrees
-                else "The rank is that of the machine so approximated, but IN FLOATING POINT THAT "
-                f"OF THE MACHINE ITSELF IS {self.numerical_rank}: a special relation may be lost."
-            )
+        if self.numerical is not None:
+            found = f"that of the machine itself is {self.numerical}"
+            if self.numerical.rank != self.rank:
+                lines.append(
+                    "The rank is that of the machine in these exact numbers, but IN FLOATING POINT "
+                    f"{found}: a special relation may be lost."
+                )
+            elif not self.numerical.clear:
+                lines.append(
+                    f"In floating point {found}: WHAT WAS DROPPED IS MORE THAN ROUNDING "
+                    f"({ROUNDING:.0e}), so that floats do not confirm the rank."
+                )
+            else:
+                lines.append(f"In floating point {found}: the same.")
         if self.lost:
             lines.append("Not kept exactly: " + "; ".join(self.lost) + ".")
         if self.nearly:

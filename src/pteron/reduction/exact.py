@@ -21,7 +21,7 @@ from pteron.errors import ModelError, SingularPose
 from pteron.kernels import Array, PrimeField, bare
 from pteron.kinematics import is_singular_everywhere
 from pteron.manipulator import Manipulator
-from pteron.reduction.certificate import ExactCertificate
+from pteron.reduction.certificate import ExactCertificate, NumericalRank
 from pteron.reduction.configurations import (
     is_square,
     modular_rows,
@@ -148,16 +148,16 @@ def exact_grouping(
         approximated=geometry.approximated,
         lost=geometry.lost,
         nearly=geometry.nearly,
-        numerical_rank=_numerical_rank(robot, geometry, sharing, seed),
+        numerical=_numerical_rank(robot, geometry, sharing, seed),
     )
     return Grouping(tuple(sorted(kept)), given, certificate)
 
 
 def _numerical_rank(
     robot: Manipulator, geometry: ExactGeometry, sharing: Array, seed: int
-) -> int | None:
+) -> NumericalRank | None:
     """Return the rank in floating point where it can tell something, and states can be found."""
-    if not geometry.approximated:
+    if not (geometry.approximated or geometry.recognised or geometry.nearly):
         return None
     try:
         return numerical_rank(robot, sharing, seed)

@@ -10,7 +10,7 @@ from pteron.dynamics import regressor
 from pteron.kernels import Array
 from pteron.kinematics import random_poses
 from pteron.manipulator import Manipulator, parameter_data
-from pteron.reduction.certificate import NumericalCertificate
+from pteron.reduction.certificate import NumericalCertificate, NumericalRank
 from pteron.reduction.grouping import Grouping, Shares
 
 _TOLERANCE = 1e-10
@@ -63,10 +63,14 @@ def qr_grouping(robot: Manipulator, order: Sequence[int], sharing: Array, seed: 
     return _grouping("qr", kept, dropped, shares, matrix, scale, states, smallest, rest, 1.0)
 
 
-def numerical_rank(robot: Manipulator, sharing: Array, seed: int) -> int:
+def numerical_rank(robot: Manipulator, sharing: Array, seed: int) -> NumericalRank:
     """Return the rank that the singular values of the scaled regressor show."""
     values = np.linalg.svd(_scaled_regressor(robot, sharing, seed)[0], compute_uv=False)
-    return int((values > _TOLERANCE * values[0]).sum())
+    relative = values / values[0]
+    kept = relative > _TOLERANCE
+    return NumericalRank(
+        int(kept.sum()), float(relative[kept][-1]), float(relative[~kept].max(initial=0.0))
+    )
 
 
 def fitted_shares(

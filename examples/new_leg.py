@@ -1,0 +1,263 @@
+"""A kind of leg of one's own: P-S-S, a slider with a rod between ball joints; three make a Delta.
+
+It is written by `pteron.legs.leg` alone, with q = h - sigma sqrt(ll^2 - w.w + h^2), w = c - r and
+h = w.e; b = w - q e is the rod. Differentiated, (b.e) q' = b.c' and (b.e) q'' = b.c'' + b'.b'.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import cos, pi, sin
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, ClassVar
+
+import casadi as ca
+import numpy as np
+
+import pteron
+from pteron.bodies import tables
+from pteron.bodies.inertia import Inertia, PlanarInertia, PointMass, RodInertia
+from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, PointMotion
+from pteron.bodies.vectors import Vector, positive, unit_vector, vector
+from pteron.legs import KINDS
+from pteron.legs.leg import (
+    SLIDER,
+    Joint,
+    LegEquations,
+    LegKind,
+    LegMotion,
+    Quantity,
+    Reach,
+    ReachBound,
+    Sphere,
+    checked_elbow,
+    checked_limits,
+)
+
+
+@dataclass(frozen=True)
+class PSS(LegKind):
+    """Two parallel rods, whose bar keeps its direction, from a slider to a platform point."""
+
+    guide_point: Vector
+    slider_direction: Vector
+    bar_direction: Vector
+    platform_point: Vector
+    lower_length: float
+    slider_mass: float
+    lower: RodInertia
+    elbow: int = 1
+    limits: tuple[float, float] | None = None
+
+    type = "PSS"
+    joint = SLIDER
+
+    def __post_init__(self) -> None:
+        checked = {
+            "guide_point": vector(self.guide_point, "guide_point"),
+            "slider_direction": unit_vector(self.slider_direction, "slider_direction"),
+            "bar_direction": unit_vector(self.bar_direction, "bar_direction"),
+            "platform_point": vector(self.platform_point, "platform_point"),
+            "lower_length": positive(self.lower_length, "lower_length", "m"),
+            "slider_mass": positive(self.slider_mass, "slider.mass", "kg"),
+            "elbow": checked_elbow(self.elbow),
+            "limits": checked_limits(self.limits, "m"),
+        }
+        for key, value in checked.items():
+            object.__setattr__(self, key, value)
+
+    @property
+    def bodies(self) -> dict[str, Inertia]:
+        return {"p": PointMass(self.slider_mass), "l": self.lower}
+
+    def with_bodies(self, bodies: Mapping[str, Any]) -> "PSS":
+        return replace(self, slider_mass=bodies["p"].mass, lower=bodies["l"])
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        return (
+            Quantity("guide_point", "point", self.guide_point),
+            Quantity("slider_direction", "direction", self.slider_direction, "e"),
+            Quantity("bar_direction", "direction", self.bar_direction, "d"),
+            Quantity("lower_length", "length", (self.lower_length,), "ll"),
+            Quantity("elbow", "sign", (self.elbow,)),
+        )
+
+    def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
+        return (self.bar_direction,)
+
+    @property
+    def joint_axis(self) -> Vector:
+        return self.slider_direction
+
+    @property
+    def reach_bound(self) -> ReachBound:
+        return ReachBound(self.guide_point, self.slider_direction, self.lower_length)
+
+    @property
+    def reach_text(self) -> str:
+        return f"its rod reaches {self.lower_length:.4g} m from the guide"
+
+    @classmethod
+    def table(cls) -> dict[str, Any]:
+        return {
+            "slider_direction": (tables.Three, ...),
+            "bar_direction": (tables.Three, ...),
+            "lower_length": (tables.Number, ...),
+            "slider": (tables.Slider, ...),
+            "lower": (tables.RodBody, ...),
+        }
+
+    @classmethod
+    def of_table(cls, table: Any) -> "PSS":
+        return cls(
+            guide_point=table.guide_point,
+            slider_direction=table.slider_direction,
+            bar_direction=table.bar_direction,
+            platform_point=table.platform_point,
+            lower_length=table.lower_length,
+            slider_mass=table.slider.mass,
+            lower=table.lower.inertia_of("lower"),
+            elbow=table.elbow,
+            limits=table.limits,
+        )
+
+    def as_table(self) -> dict[str, Any]:
+        own = {key: getattr(self, key) for key in self.table() if key != "slider"}
+        return own | {"slider": PointMass(self.slider_mass)}
+
+
+class PSSEquations(LegEquations):
+    """The equations of a P-S-S leg; bar_direction is an axis of its joints, no more."""
+
+    kinds: ClassVar = {"p": PointMass.kinds, "l": RodInertia.kinds}
+    rides: ClassVar = ("l",)
+
+    def __init__(
+        self,
+        guide_point: Expression,
+        slider_direction: Expression,
+        bar_direction: Expression,
+        lower_length: Expression,
+        elbow: Expression,
+    ) -> None:
+        self.r, self.e, self.d = guide_point, slider_direction, bar_direction
+        self.ll, self.sigma = lower_length, elbow
+
+    def motion(self, point: PointMotion, angle: AngleMotion | None) -> LegMotion:
+        c, dc, ddc = point
+        w = c - self.r
+        h = ca.dot(w, self.e)
+        divisor = self.sigma * ca.sqrt(self.reach(c).discriminant)  # b . e
+        q = h - divisor
+        b = w - q * self.e
+        rate = ca.dot(b, dc) / divisor
+        db = dc - rate * self.e
+        acceleration = (ca.dot(b, ddc) + ca.dot(db, db)) / divisor
+        row = ca.horzcat(b.T, 0)
+
+        tip, n = self.r + q * self.e, b / self.ll
+        slides = ca.mtimes(self.e, row / divisor)
+        rides = ca.horzcat(ca.SX.eye(3), ca.SX(3, 1))
+        swing = (rides - slides) / self.ll  # d n / d (c, phi)
+        dn, ddn = db / self.ll, (ddc - acceleration * self.e) / self.ll
+        turning = ca.mtimes(ca.skew(n), swing)  # omega = n x n'
+        slider = BodyMotion(tip, slides, acceleration * self.e)
+        rod = BodyMotion(c, rides, ddc, ca.SX.eye(3), turning, n, ddx=ddn)
+
+        # Universal joints at the rod's ends: about d, and about d x n across it.
+        across = ca.cross(self.d, n)
+        size = ca.norm_2(across)
+        growth = ca.dot(across, ca.cross(self.d, dn)) / size**2
+        alpha, beta = ca.dot(dn, across) / size**2, -ca.dot(dn, self.d) / size
+        about_d = (
+            ca.mtimes(across.T, swing) / size**2,
+            alpha,
+            ca.dot(ddn, across) / size**2 - 2 * alpha * growth,
+        )
+        about_it = (
+            -ca.mtimes(self.d.T, swing) / size,
+            beta,
+            -ca.dot(ddn, self.d) / size - beta * growth,
+        )
+        chain = (
+            Joint("P", self.e, self.r, row / divisor, rate, acceleration),
+            Joint("R", self.d, tip, *about_d),
+            Joint("R", across / size, tip, *about_it),
+            Joint("R", across / size, c, *(-value for value in about_it)),
+            Joint("R", self.d, c, *(-value for value in about_d)),
+        )
+        bodies = {"p": slider, "l": rod}
+        return LegMotion(q, rate, acceleration, row, divisor, bodies, chain, links=(None, b))
+
+    def reach(self, c: Expression) -> Reach:
+        w = c - self.r
+        h = ca.dot(w, self.e)
+        discriminant = self.ll**2 - ca.dot(w, w) + h * h
+        margin = self.ll - ca.sqrt(ca.dot(w, w) - h * h)
+        return Reach(margin, discriminant, self.ll**2, self.ll)
+
+    def locus(self, q: Expression) -> Sphere:
+        return Sphere(self.r + q * self.e, self.ll)
+
+
+PSS.equations_class = PSSEquations
+KINDS[PSS.type] = PSS  # that is all: files may name it now
+
+
+def linear_delta() -> pteron.Manipulator:
+    """Return a machine with three vertical guides, 0.3 m from its axis."""
+    legs = []
+    for azimuth in (0.0, 2 * pi / 3, 4 * pi / 3):
+        x, y = cos(azimuth), sin(azimuth)  # outwards
+        leg = PSS(
+            guide_point=(0.3 * x, 0.3 * y, 0.0),
+            slider_direction=(0.0, 0.0, 1.0),
+            bar_direction=(-y, x, 0.0),
+            platform_point=(0.05 * x, 0.05 * y, 0.0),
+            lower_length=0.4,
+            slider_mass=0.8,
+            lower=RodInertia.of_body(0.2, (-0.2,), 0.0107),
+            elbow=-1,
+        )
+        legs.append(leg)
+    platform = pteron.Platform("3T", PlanarInertia.of_body(0.5, (0.0, 0.0), 1e-3))
+    return pteron.Manipulator("linear delta", platform, tuple(legs))
+
+
+def main() -> None:
+    """Check the machine against itself and print its base parameters."""
+    robot = linear_delta()
+    with TemporaryDirectory() as folder:
+        assert pteron.load(pteron.save(robot, Path(folder) / "linear-delta.toml")) == robot
+
+    rng = np.random.default_rng(0)
+    pose = pteron.random_poses(robot, 50, type_i=0.5, type_ii=0.3)
+    velocity, acceleration = rng.normal(size=(2, *pose.shape))
+    joints = pteron.inverse_kinematics(robot, pose)
+    back = pteron.direct_kinematics(robot, joints)
+    closed = np.nanmin(np.abs(back - pose[:, None]).max(axis=-1), axis=-1).max()
+    print(f"direct kinematics gives the pose back within {closed:.0e} m")
+
+    # The actuators' power is the rate of the bodies' energy, by differences of fourth order.
+    def energy(t: float) -> Any:
+        x, dx = pose + t * velocity + t**2 / 2 * acceleration, velocity + t * acceleration
+        return pteron.kinetic_energy(robot, x, dx) + pteron.potential_energy(robot, x)
+
+    dt = 4e-5
+    rate = (8 * (energy(dt) - energy(-dt)) - (energy(2 * dt) - energy(-2 * dt))) / (12 * dt)
+    forces = pteron.inverse_dynamics(robot, pose, velocity, acceleration)
+    power = (forces * pteron.joint_rates(robot, pose, velocity).actuated).sum(axis=-1)
+    off = np.abs(power - rate).max() / np.abs(power).max()
+    print(f"inverse dynamics balances the energy within {off:.0e} of the largest power")
+    assert closed < 1e-12
+    assert off < 1e-8
+
+    base = pteron.base_parameters(robot)
+    print(f"{base.rank} base parameters of {len(pteron.parameters(robot))}:")
+    print(*(f"    {line}" for line in base.expressions()), sep="\n")
+    assert base.rank == pteron.base_parameters(robot, "svd").rank == 7
+
+
+if __name__ == "__main__":
+    main()
