@@ -4,8 +4,7 @@ It is written by `pteron.legs.leg` alone, with q = h - sigma sqrt(ll^2 - w.w + h
 h = w.e; b = w - q e is the rod. Differentiated, (b.e) q' = b.c' and (b.e) q'' = b.c'' + b'.b'.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import cos, pi, sin
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,24 +14,13 @@ import casadi as ca
 import numpy as np
 
 import pteron
-from pteron.bodies import tables
-from pteron.bodies.inertia import Inertia, PlanarInertia, PointMass, RodInertia
+from pteron.bodies.inertia import PlanarInertia, PointMass, RodInertia
 from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, PointMotion
-from pteron.bodies.vectors import Vector, positive, unit_vector, vector
+from pteron.bodies.vectors import Vector
 from pteron.legs import KINDS
-from pteron.legs.leg import (
-    SLIDER,
-    Joint,
-    LegEquations,
-    LegKind,
-    LegMotion,
-    Quantity,
-    Reach,
-    ReachBound,
-    Sphere,
-    checked_elbow,
-    checked_limits,
-)
+from pteron.legs.kind import SLIDER, Key, LegKind, Quantity, ReachBound
+from pteron.legs.leg import Joint, LegEquations, LegMotion, Reach, Sphere
+from pteron.legs.rods import rod_body, universal_joints
 
 
 @dataclass(frozen=True)
@@ -52,26 +40,13 @@ class PSS(LegKind):
     type = "PSS"
     joint = SLIDER
 
-    def __post_init__(self) -> None:
-        checked = {
-            "guide_point": vector(self.guide_point, "guide_point"),
-            "slider_direction": unit_vector(self.slider_direction, "slider_direction"),
-            "bar_direction": unit_vector(self.bar_direction, "bar_direction"),
-            "platform_point": vector(self.platform_point, "platform_point"),
-            "lower_length": positive(self.lower_length, "lower_length", "m"),
-            "slider_mass": positive(self.slider_mass, "slider.mass", "kg"),
-            "elbow": checked_elbow(self.elbow),
-            "limits": checked_limits(self.limits, "m"),
-        }
-        for key, value in checked.items():
-            object.__setattr__(self, key, value)
-
-    @property
-    def bodies(self) -> dict[str, Inertia]:
-        return {"p": PointMass(self.slider_mass), "l": self.lower}
-
-    def with_bodies(self, bodies: Mapping[str, Any]) -> "PSS":
-        return replace(self, slider_mass=bodies["p"].mass, lower=bodies["l"])
+    keys: ClassVar = {
+        "slider_direction": Key("direction"),
+        "bar_direction": Key("direction"),
+        "lower_length": Key("length"),
+        "slider_mass": Key("slider", "p"),
+        "lower": Key("rod", "l"),
+    }
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -97,34 +72,6 @@ class PSS(LegKind):
     @property
     def reach_text(self) -> str:
         return f"its rod reaches {self.lower_length:.4g} m from the guide"
-
-    @classmethod
-    def table(cls) -> dict[str, Any]:
-        return {
-            "slider_direction": (tables.Three, ...),
-            "bar_direction": (tables.Three, ...),
-            "lower_length": (tables.Number, ...),
-            "slider": (tables.Slider, ...),
-            "lower": (tables.RodBody, ...),
-        }
-
-    @classmethod
-    def of_table(cls, table: Any) -> "PSS":
-        return cls(
-            guide_point=table.guide_point,
-            slider_direction=table.slider_direction,
-            bar_direction=table.bar_direction,
-            platform_point=table.platform_point,
-            lower_length=table.lower_length,
-            slider_mass=table.slider.mass,
-            lower=table.lower.inertia_of("lower"),
-            elbow=table.elbow,
-            limits=table.limits,
-        )
-
-    def as_table(self) -> dict[str, Any]:
-        own = {key: getattr(self, key) for key in self.table() if key != "slider"}
-        return own | {"slider": PointMass(self.slider_mass)}
 
 
 class PSSEquations(LegEquations):
@@ -158,36 +105,12 @@ class PSSEquations(LegEquations):
 
         tip, n = self.r + q * self.e, b / self.ll
         slides = ca.mtimes(self.e, row / divisor)
-        rides = ca.horzcat(ca.SX.eye(3), ca.SX(3, 1))
-        swing = (rides - slides) / self.ll  # d n / d (c, phi)
+        swing = (ca.horzcat(ca.SX.eye(3), ca.SX(3, 1)) - slides) / self.ll  # d n / d (c, phi)
         dn, ddn = db / self.ll, (ddc - acceleration * self.e) / self.ll
-        turning = ca.mtimes(ca.skew(n), swing)  # omega = n x n'
-        slider = BodyMotion(tip, slides, acceleration * self.e)
-        rod = BodyMotion(c, rides, ddc, ca.SX.eye(3), turning, n, ddx=ddn)
-
-        # Universal joints at the rod's ends: about d, and about d x n across it.
-        across = ca.cross(self.d, n)
-        size = ca.norm_2(across)
-        growth = ca.dot(across, ca.cross(self.d, dn)) / size**2
-        alpha, beta = ca.dot(dn, across) / size**2, -ca.dot(dn, self.d) / size
-        about_d = (
-            ca.mtimes(across.T, swing) / size**2,
-            alpha,
-            ca.dot(ddn, across) / size**2 - 2 * alpha * growth,
-        )
-        about_it = (
-            -ca.mtimes(self.d.T, swing) / size,
-            beta,
-            -ca.dot(ddn, self.d) / size - beta * growth,
-        )
-        chain = (
-            Joint("P", self.e, self.r, row / divisor, rate, acceleration),
-            Joint("R", self.d, tip, *about_d),
-            Joint("R", across / size, tip, *about_it),
-            Joint("R", across / size, c, *(-value for value in about_it)),
-            Joint("R", self.d, c, *(-value for value in about_d)),
-        )
-        bodies = {"p": slider, "l": rod}
+        slider = Joint("P", self.e, self.r, row / divisor, rate, acceleration)
+        chain = (slider, *universal_joints(self.d, tip, c, swing, (n, dn, ddn)))
+        slides = BodyMotion(tip, slides, acceleration * self.e)
+        bodies = {"p": slides, "l": rod_body(point, n, ddn, swing)}
         return LegMotion(q, rate, acceleration, row, divisor, bodies, chain, links=(None, b))
 
     def reach(self, c: Expression) -> Reach:

@@ -16,7 +16,7 @@ forces = pteron.inverse_dynamics(robot, cycle.pose, cycle.velocity, cycle.accele
 
 limits = np.array([leg.limits for leg in robot.legs])
 guides = np.array([leg.guide_point for leg in robot.legs])
-directions = np.array([leg.e for leg in robot.legs])
+directions = np.array([leg.joint_axis for leg in robot.legs])
 rails = guides[:, None, :] + limits[:, :, None] * directions[:, None, :]
 
 points = joint_points(robot, cycle.pose[len(cycle.time) // 8])

@@ -1,6 +1,6 @@
 """Kinds of legs, one file each; `legs.leg` is the page to read before writing another."""
 
-from pteron.legs.leg import LegKind
+from pteron.legs.kind import LegKind
 from pteron.legs.prrr import PRRR
 from pteron.legs.rss import RSS
 

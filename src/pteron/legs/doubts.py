@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from math import hypot, sqrt
 from typing import Any
 
-from pteron.legs.leg import LegKind
+from pteron.legs.kind import LegKind
 
 _LARGE = 10.0
 """Length, m, beyond which millimetres are likelier."""

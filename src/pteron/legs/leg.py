@@ -4,8 +4,8 @@ A leg makes one actuated joint follow one point of the platform. It knows the pl
 the motion of that point, c, and of the platform's angle, phi. A kind of leg is two classes in one
 file of this folder:
 
-- a frozen dataclass under `LegKind`: the leg's data, its TOML keys, its bodies, and what of its
-  geometry the equations need (`quantities`);
+- a frozen dataclass under `LegKind` (`legs.kind`): the leg's data with its TOML keys and bodies
+  (`keys`), and what of its geometry the equations need (`quantities`);
 - a class under `LegEquations`: built from these quantities, in numbers or in symbols, it answers a
   motion of c and phi with the motion of its joint and of its bodies (`motion`), says how far it
   reaches (`reach`) and where c lies for a given joint (`locus`).
@@ -25,15 +25,11 @@ of an elbow is a quantity, +1 or -1.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from fractions import Fraction
-from random import Random
-from typing import Any, ClassVar, Literal, NamedTuple, Self
+from collections.abc import Mapping
+from typing import ClassVar, Literal, NamedTuple
 
 import casadi as ca
 
-from pteron.bodies.inertia import Inertia
 from pteron.bodies.motion import (
     AngleMotion,
     BodyMotion,
@@ -42,41 +38,6 @@ from pteron.bodies.motion import (
     PointMotion,
     needed_wrench,
 )
-from pteron.bodies.vectors import Vector, numbers
-from pteron.errors import ModelError
-
-
-@dataclass(frozen=True)
-class ActuatedJoint:
-    """How an actuated joint is spoken of: names of its columns, units, and a noun for messages."""
-
-    noun: str
-    coordinate: str
-    unit: str
-    force: str
-    force_unit: str
-
-
-SLIDER = ActuatedJoint("slider", "rho", "m", "force", "N")
-CRANK = ActuatedJoint("crank", "theta", "rad", "torque", "N m")
-
-Role = Literal["point", "direction", "normal", "platform point", "length", "angle", "sign"]
-"""What a quantity is: a point or a unit vector in the base frame; a unit vector perpendicular to
-the kind's first direction; a point in the platform frame; a length; an angle; +1 or -1."""
-
-
-class Quantity(NamedTuple):
-    """A part of a leg's geometry that its equations need, or that turns with the machine.
-
-    `LegEquations` takes them all by name, also those that it has no use for.
-    """
-
-    name: str
-    """The field of the leg that holds it; one without a field turns with nothing."""
-    role: Role
-    value: Sequence[float]
-    symbol: str = ""
-    """How a length or a direction is written: "lu" becomes lu1 for leg 1."""
 
 
 class Joint(NamedTuple):
@@ -167,26 +128,6 @@ class Sphere(NamedTuple):
 
 Locus = Plane | Sphere
 
-Monomial = tuple[int, tuple[str, ...]]
-"""An integer times a product of the leg's length symbols."""
-
-
-class Transfer(NamedTuple):
-    """A combination of a leg's parameters that no force notices, in symbols of its lengths."""
-
-    reason: str
-    """Why, with {} where the leg's number goes."""
-    entries: Mapping[tuple[str, str], Monomial]
-    """By (kind, body letter) of the parameter."""
-
-
-class ReachBound(NamedTuple):
-    """Every platform point in reach is within `radius` of a point, or of a line through it."""
-
-    point: Vector
-    line: Vector | None
-    radius: float
-
 
 class LegEquations(ABC):
     """The equations of one leg, for one state."""
@@ -241,146 +182,3 @@ class LegEquations(ABC):
         none = ca.SX(1, mass.shape[1])
         force = ca.mtimes(point.acceleration - gravity, mass)
         return Needs(none, ca.vertcat(force, none), none)
-
-
-_EquationsClass = type[LegEquations]
-
-
-class LegKind(ABC):
-    """The data of one leg: a kind of leg is a frozen dataclass with these fields and its own.
-
-    Parameters
-    ----------
-    guide_point : vector
-        r, where the leg is fixed in the base frame: a point of the slider's guide, where its
-        coordinate is zero, or the centre of the crank's circle; m.
-    platform_point : vector
-        s0, from P to the platform point, in the platform frame, m.
-    elbow : {1, -1}
-        sigma, the side of the elbow: the leg's branch.
-    limits : (float, float), optional
-        Least and greatest joint coordinate, m or rad.
-    """
-
-    guide_point: Vector
-    platform_point: Vector
-    elbow: int
-    limits: tuple[float, float] | None
-
-    type: ClassVar[str]
-    """What the file's key `type` says."""
-    joint: ClassVar[ActuatedJoint]
-    equations_class: ClassVar[_EquationsClass]
-    __dataclass_fields__: ClassVar[dict[str, Any]]
-
-    @property
-    @abstractmethod
-    def bodies(self) -> dict[str, Inertia]:
-        """The inertia of its bodies, by letter in the order "p", "u", "l"."""
-
-    @abstractmethod
-    def with_bodies(self, bodies: Mapping[str, Any]) -> Self:
-        """Return the same leg with other inertia, by letter."""
-
-    @property
-    @abstractmethod
-    def quantities(self) -> tuple[Quantity, ...]:
-        """What of its geometry the equations need, but for the platform point."""
-
-    @abstractmethod
-    def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
-        """Return axes that span those about which the leg lets the platform turn.
-
-        `axis` is k of a platform that turns about it, or None.
-        """
-
-    @property
-    @abstractmethod
-    def joint_axis(self) -> Vector:
-        """The unit vector along which the slider moves, or about which the crank turns."""
-
-    @property
-    def lever(self) -> float:
-        """Metres that the actuated body's end moves per unit of the joint: 1 for a slider."""
-        return 1.0
-
-    @property
-    @abstractmethod
-    def reach_bound(self) -> ReachBound:
-        """A bound on the platform points in reach."""
-
-    @property
-    @abstractmethod
-    def reach_text(self) -> str:
-        """How far it reaches, as a clause for messages: "its links span 0.1 to 0.4 m"."""
-
-    @classmethod
-    @abstractmethod
-    def table(cls) -> dict[str, Any]:
-        """Return the TOML keys of its own: name -> (type, default), as pydantic takes them.
-
-        `...` is the default of what must be given. Every kind has `type`, `guide_point`,
-        `platform_point`, `elbow` and `limits` besides.
-        """
-
-    @classmethod
-    @abstractmethod
-    def of_table(cls, table: Any) -> Self:
-        """Build the leg from a table that has been read."""
-
-    @abstractmethod
-    def as_table(self) -> dict[str, Any]:
-        """Return the TOML keys of its own, for `save`."""
-
-    @property
-    def extents(self) -> dict[str, tuple[str, float, float, str]]:
-        """Where a body's mass is expected: its TOML key, least and greatest x, what is there."""
-        return {}
-
-    @property
-    def size(self) -> float:
-        """The length that its reach is measured by, m."""
-        return sum(float(q.value[0]) for q in self.quantities if q.role == "length")
-
-    def equations(self, values: Mapping[str, Expression] | None = None) -> LegEquations:
-        """Return its equations, for its own geometry or for other values of the quantities."""
-        if values is None:
-            values = {q.name: ca.SX(ca.DM(list(q.value))) for q in self.quantities}
-        return self.equations_class(**values)
-
-    def transfers(self, gravity: Vector) -> tuple[Transfer, ...]:
-        """Return the mass transfers within the leg, for gravity in the base frame."""
-        return ()
-
-    @classmethod
-    def closing(
-        cls, values: Mapping[str, Sequence[Fraction]], rng: Random
-    ) -> tuple[list[Fraction], int] | None:
-        """Return a random c - r in fractions that the leg closes without a root, and its elbow.
-
-        With it base parameters are proved in fractions as well as modulo a prime.
-        """
-        return None
-
-    def turned(self, turn: Any) -> Self:
-        """Return the leg with every base-frame vector v replaced by `turn(v)`."""
-        vectors = [q.name for q in self.quantities if q.role in ("point", "direction", "normal")]
-        given = {name: getattr(self, name, None) for name in vectors}
-        return replace(self, **{name: turn(v) for name, v in given.items() if v is not None})
-
-
-def checked_limits(limits: Sequence[float] | None, unit: str) -> tuple[float, float] | None:
-    """Return limits as two floats, the least first."""
-    if limits is None:
-        return None
-    low, high = numbers(limits, "limits", 2)
-    if low >= high:
-        raise ModelError(f"limits: {low:g} {unit} is not below {high:g} {unit}; give [least, most]")
-    return (low, high)
-
-
-def checked_elbow(elbow: object) -> int:
-    """Return the elbow's side, 1 or -1."""
-    if elbow not in (1, -1):
-        raise ModelError(f"elbow: {elbow!r} is neither 1 nor -1")
-    return 1 if elbow == 1 else -1

@@ -7,24 +7,21 @@ that the platform may turn against the leg.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from random import Random
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import casadi as ca
 
-from pteron.bodies.inertia import Inertia, PlanarInertia, PointMass
+from pteron.bodies.inertia import PlanarInertia, PointMass
 from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, PointMotion
 from pteron.bodies.vectors import (
     Vector,
     dot,
     norm,
     parallel,
-    positive,
     scaled,
-    unit_vector,
-    vector,
 )
 from pteron.errors import ModelError
 from pteron.legs.circles import (
@@ -37,21 +34,8 @@ from pteron.legs.circles import (
     second_derivative,
     squared_reach,
 )
-from pteron.legs.leg import (
-    SLIDER,
-    Joint,
-    LegEquations,
-    LegKind,
-    LegMotion,
-    Needs,
-    Plane,
-    Quantity,
-    Reach,
-    ReachBound,
-    Transfer,
-    checked_elbow,
-    checked_limits,
-)
+from pteron.legs.kind import SLIDER, Key, LegKind, Quantity, ReachBound, Transfer
+from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Plane, Reach
 from pteron.legs.two_bar import two_bar_needs
 
 _LEAST_SLIDE = 1e-6
@@ -104,41 +88,29 @@ class PRRR(LegKind):
     type = "PRRR"
     joint = SLIDER
 
+    keys: ClassVar = {
+        "direction": Key("direction"),
+        "slider_direction": Key("direction", default=None),
+        "upper_length": Key("length"),
+        "lower_length": Key("length"),
+        "slider_mass": Key("slider", "p"),
+        "upper": Key("planar", "u"),
+        "lower": Key("planar", "l"),
+    }
+
     def __post_init__(self) -> None:
-        direction = unit_vector(self.direction, "direction")
-        e = self.slider_direction
-        if e is not None:
-            e = unit_vector(e, "slider_direction")
-            if abs(dot(direction, e)) < _LEAST_SLIDE:
-                raise ModelError(
-                    f"slider_direction: {list(e)} is perpendicular to direction {list(direction)}, "
-                    "so that the slider cannot move the leg's plane; tilt one against the other"
-                )
-        checked = {
-            "guide_point": vector(self.guide_point, "guide_point"),
-            "direction": direction,
-            "platform_point": vector(self.platform_point, "platform_point"),
-            "upper_length": positive(self.upper_length, "upper_length", "m"),
-            "lower_length": positive(self.lower_length, "lower_length", "m"),
-            "slider_mass": positive(self.slider_mass, "slider.mass", "kg"),
-            "slider_direction": e,
-            "elbow": checked_elbow(self.elbow),
-            "limits": checked_limits(self.limits, "m"),
-        }
-        for key, value in checked.items():
-            object.__setattr__(self, key, value)
+        super().__post_init__()
+        if abs(dot(self.direction, self.e)) < _LEAST_SLIDE:
+            raise ModelError(
+                f"slider_direction: {list(self.e)} is perpendicular to direction "
+                f"{list(self.direction)}, so that the slider cannot move the leg's plane; tilt one "
+                "against the other"
+            )
 
     @property
     def e(self) -> Vector:
         """The slider's direction, also where it was left to its default."""
         return self.slider_direction or self.direction
-
-    @property
-    def bodies(self) -> dict[str, Inertia]:
-        return {"p": PointMass(self.slider_mass), "u": self.upper, "l": self.lower}
-
-    def with_bodies(self, bodies: Mapping[str, Any]) -> PRRR:
-        return replace(self, slider_mass=bodies["p"].mass, upper=bodies["u"], lower=bodies["l"])
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -168,47 +140,6 @@ class PRRR(LegKind):
     def reach_text(self) -> str:
         shortest = abs(self.upper_length - self.lower_length)
         return f"its links span {shortest:.4g} to {self.size:.4g} m across direction"
-
-    @classmethod
-    def table(cls) -> dict[str, Any]:
-        from pteron.bodies import tables
-
-        return {
-            "direction": (tables.Three, ...),
-            "slider_direction": (tables.Three | None, None),
-            "upper_length": (tables.Number, ...),
-            "lower_length": (tables.Number, ...),
-            "slider": (tables.Slider, ...),
-            "upper": (tables.PlanarBody, ...),
-            "lower": (tables.PlanarBody, ...),
-        }
-
-    @classmethod
-    def of_table(cls, table: Any) -> PRRR:
-        return cls(
-            guide_point=table.guide_point,
-            direction=table.direction,
-            platform_point=table.platform_point,
-            upper_length=table.upper_length,
-            lower_length=table.lower_length,
-            slider_mass=table.slider.mass,
-            upper=table.upper.inertia_of("upper"),
-            lower=table.lower.inertia_of("lower"),
-            slider_direction=table.slider_direction,
-            elbow=table.elbow,
-            limits=table.limits,
-        )
-
-    def as_table(self) -> dict[str, Any]:
-        return {
-            "direction": self.direction,
-            "slider_direction": self.slider_direction,
-            "upper_length": self.upper_length,
-            "lower_length": self.lower_length,
-            "slider": PointMass(self.slider_mass),
-            "upper": self.upper,
-            "lower": self.lower,
-        }
 
     @property
     def extents(self) -> dict[str, tuple[str, float, float, str]]:

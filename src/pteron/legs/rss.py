@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from random import Random
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import casadi as ca
 
-from pteron.bodies.inertia import Inertia, PlanarInertia, RodInertia
+from pteron.bodies.inertia import PlanarInertia, RodInertia
 from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, PointMotion
 from pteron.bodies.vectors import (
     Vector,
@@ -23,10 +23,7 @@ from pteron.bodies.vectors import (
     norm,
     parallel,
     perpendicular,
-    positive,
     scaled,
-    unit_vector,
-    vector,
 )
 from pteron.legs.circles import (
     perpendicular_to,
@@ -35,22 +32,10 @@ from pteron.legs.circles import (
     random_direction,
     random_fraction,
 )
-from pteron.legs.leg import (
-    CRANK,
-    Joint,
-    LegEquations,
-    LegKind,
-    LegMotion,
-    Needs,
-    Quantity,
-    Reach,
-    ReachBound,
-    Sphere,
-    Transfer,
-    checked_elbow,
-    checked_limits,
-)
+from pteron.legs.kind import CRANK, Key, LegKind, Quantity, ReachBound, Transfer
+from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Reach, Sphere
 from pteron.legs.prrr import ELBOW
+from pteron.legs.rods import rod_body, universal_joints
 
 
 @dataclass(frozen=True)
@@ -99,32 +84,20 @@ class RSS(LegKind):
     type = "RSS"
     joint = CRANK
 
+    keys: ClassVar = {
+        "direction": Key("direction"),
+        "zero_direction": Key("direction"),
+        "upper_length": Key("length"),
+        "lower_length": Key("length"),
+        "rods": Key("count", default=2),
+        "upper": Key("planar", "u"),
+        "lower": Key("rod", "l"),
+    }
+
     def __post_init__(self) -> None:
-        direction = unit_vector(self.direction, "direction")
-        checked = {
-            "guide_point": vector(self.guide_point, "guide_point"),
-            "direction": direction,
-            "zero_direction": perpendicular(
-                unit_vector(self.zero_direction, "zero_direction"),
-                direction,
-                "zero_direction",
-                "direction",
-            ),
-            "platform_point": vector(self.platform_point, "platform_point"),
-            "upper_length": positive(self.upper_length, "upper_length", "m"),
-            "lower_length": positive(self.lower_length, "lower_length", "m"),
-            "elbow": checked_elbow(self.elbow),
-            "limits": checked_limits(self.limits, "rad"),
-        }
-        for key, value in checked.items():
-            object.__setattr__(self, key, value)
-
-    @property
-    def bodies(self) -> dict[str, Inertia]:
-        return {"u": self.upper, "l": self.lower}
-
-    def with_bodies(self, bodies: Mapping[str, Any]) -> RSS:
-        return replace(self, upper=bodies["u"], lower=bodies["l"])
+        super().__post_init__()
+        zero = perpendicular(self.zero_direction, self.direction, "zero_direction", "direction")
+        object.__setattr__(self, "zero_direction", zero)
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -171,47 +144,6 @@ class RSS(LegKind):
             f"its rod of {self.lower_length:.4g} m starts from the circle of a crank of "
             f"{self.upper_length:.4g} m"
         )
-
-    @classmethod
-    def table(cls) -> dict[str, Any]:
-        from pteron.bodies import tables
-
-        return {
-            "direction": (tables.Three, ...),
-            "zero_direction": (tables.Three, ...),
-            "upper_length": (tables.Number, ...),
-            "lower_length": (tables.Number, ...),
-            "rods": (tables.Count, 2),
-            "upper": (tables.PlanarBody, ...),
-            "lower": (tables.RodBody, ...),
-        }
-
-    @classmethod
-    def of_table(cls, table: Any) -> RSS:
-        return cls(
-            guide_point=table.guide_point,
-            direction=table.direction,
-            zero_direction=table.zero_direction,
-            platform_point=table.platform_point,
-            upper_length=table.upper_length,
-            lower_length=table.lower_length,
-            upper=table.upper.inertia_of("upper"),
-            lower=table.lower.inertia_of("lower"),
-            elbow=table.elbow,
-            limits=table.limits,
-            rods=table.rods,
-        )
-
-    def as_table(self) -> dict[str, Any]:
-        return {
-            "direction": self.direction,
-            "zero_direction": self.zero_direction,
-            "upper_length": self.upper_length,
-            "lower_length": self.lower_length,
-            "rods": self.rods,
-            "upper": self.upper,
-            "lower": self.lower,
-        }
 
     @property
     def extents(self) -> dict[str, tuple[str, float, float, str]]:
@@ -333,11 +265,10 @@ class RSSEquations(LegEquations):
         dn = (point.velocity - at.rate * g) / self.ll
         ddn = (point.acceleration - at.acceleration * g + square * l_u) / self.ll
         c = point.position
-        omega_row, all_axes = ca.mtimes(ca.skew(n), swing), ca.SX.eye(3)
-        rod = BodyMotion(c, rides, point.acceleration, all_axes, omega_row, n, ddx=ddn)
+        rod = rod_body(point, n, ddn, swing)
 
         joint = Joint("R", self.d, self.r, row, at.rate, at.acceleration)
-        chain = (joint, *self._universal(joint, self.r + l_u, c, swing, (n, dn, ddn)))
+        chain = (joint, *universal_joints(self.d, self.r + l_u, c, swing, (n, dn, ddn), joint))
         return LegMotion(
             coordinate,
             at.rate,
@@ -349,51 +280,6 @@ class RSSEquations(LegEquations):
             (l_u, at.b),
             ((at.rate, at.acceleration), None),
         )
-
-    def _universal(
-        self,
-        crank: Joint,
-        tip: Expression,
-        c: Expression,
-        swing: Expression,
-        direction: tuple[Expression, ...],
-    ) -> list[Joint]:
-        """Return the universal joints at the rod's ends: about d, and about d x n across it.
-
-        With n' = omega x n and omega = alpha' d + beta' e, e = d x n / |d x n|: alpha' = n'.(d x n)
-        / |d x n|^2 and beta' = - n'.d / |d x n|. The bar at the platform does not turn.
-        """
-        n, dn, ddn = direction
-        across, turning = ca.cross(self.d, n), ca.cross(self.d, dn)
-        square = ca.dot(across, across)
-        size, growth = ca.sqrt(square), ca.dot(across, turning) / square
-        alpha, beta = ca.dot(dn, across) / square, -ca.dot(dn, self.d) / size
-        about_d = (
-            ca.mtimes(across.T, swing) / square,
-            alpha,
-            ca.dot(ddn, across) / square - 2 * alpha * growth,
-        )
-        about_e = (
-            -ca.mtimes(self.d.T, swing) / size,
-            beta,
-            -ca.dot(ddn, self.d) / size - beta * growth,
-        )
-        axis = across / size
-        knee = tuple(a - b for a, b in zip(about_d, crank[3:], strict=True))
-        return [
-            Joint("R", self.d, tip, *knee),
-            Joint("R", axis, tip, *about_e),
-            Joint("R", axis, c, *(-a for a in about_e)),
-            Joint("R", self.d, c, *(-a for a in about_d)),
-        ]
-
-    def named(self, point: PointMotion, angle: AngleMotion | None) -> dict[str, Expression]:
-        w, at = point.position - self.r, self._state(point)
-        u, h, quarter = self._triangle(w)
-        n2, root = ca.dot(u, u), ca.sqrt(quarter)
-        crank = {"plane_u": at.l_u, "g": at.g, "along": h / n2, "across": root / n2}
-        closing = {"w": w, "u": u, "n2": n2, "h": h, "quarter": quarter, "root": root}
-        return {**closing, **crank, "theta_rate2": at.rate * at.rate}
 
     def reach(self, c: Expression) -> Reach:
         w = c - self.r

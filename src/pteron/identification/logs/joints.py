@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.legs.leg import ActuatedJoint
+from pteron.legs.kind import ActuatedJoint
 from pteron.manipulator import Manipulator
 
 LENGTHS = ("m", "mm", "um")

@@ -14,7 +14,7 @@ from jaxtyping import Int
 
 from pteron.errors import DataError
 from pteron.identification.logs.description import Description
-from pteron.legs.leg import SLIDER, ActuatedJoint
+from pteron.legs.kind import SLIDER, ActuatedJoint
 from pteron.shapes import Numbers, PerCoordinate, PerJoint
 from pteron.tables import write_table
 

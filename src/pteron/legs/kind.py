@@ -1,0 +1,288 @@
+"""The data of a leg: what a kind of leg says of itself; `legs.leg` is the page to read first."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from random import Random
+from typing import Any, ClassVar, Literal, NamedTuple, Self
+
+import casadi as ca
+
+from pteron.bodies.inertia import Inertia, PointMass
+from pteron.bodies.motion import Expression
+from pteron.bodies.parameters import LEG_BODIES
+from pteron.bodies.vectors import Vector, numbers, positive, unit_vector, vector
+from pteron.errors import ModelError
+from pteron.legs.leg import LegEquations
+
+
+@dataclass(frozen=True)
+class ActuatedJoint:
+    """How an actuated joint is spoken of: names of its columns, units, and a noun for messages."""
+
+    noun: str
+    coordinate: str
+    unit: str
+    force: str
+    force_unit: str
+
+
+SLIDER = ActuatedJoint("slider", "rho", "m", "force", "N")
+CRANK = ActuatedJoint("crank", "theta", "rad", "torque", "N m")
+
+Role = Literal["point", "direction", "normal", "platform point", "length", "angle", "sign"]
+"""What a quantity is: a point or a unit vector in the base frame; a unit vector perpendicular to
+the kind's first direction; a point in the platform frame; a length; an angle; +1 or -1."""
+
+
+class Quantity(NamedTuple):
+    """A part of a leg's geometry that its equations need, or that turns with the machine.
+
+    `LegEquations` takes them all by name, also those that it has no use for.
+    """
+
+    name: str
+    """The field of the leg that holds it; one without a field turns with nothing."""
+    role: Role
+    value: Sequence[float]
+    symbol: str = ""
+    """How a length or a direction is written: "lu" becomes lu1 for leg 1."""
+
+
+class Key(NamedTuple):
+    """What a field of a leg, and its TOML key, holds."""
+
+    role: Literal["direction", "length", "count", "slider", "planar", "rod"]
+    """A unit vector, a length, a whole number, a slider's mass (TOML key `slider`), a body in a
+    plane, a rod."""
+    body: str = ""
+    """The letter of the body whose inertia it is: "p", "u" or "l"."""
+    default: Any = ...
+    """What stands where a file does not give it; `...` where it must."""
+
+
+Monomial = tuple[int, tuple[str, ...]]
+"""An integer times a product of the leg's length symbols."""
+
+
+class Transfer(NamedTuple):
+    """A combination of a leg's parameters that no force notices, in symbols of its lengths."""
+
+    reason: str
+    """Why, with {} where the leg's number goes."""
+    entries: Mapping[tuple[str, str], Monomial]
+    """By (kind, body letter) of the parameter."""
+
+
+class ReachBound(NamedTuple):
+    """Every platform point in reach is within `radius` of a point, or of a line through it."""
+
+    point: Vector
+    line: Vector | None
+    radius: float
+
+
+_EquationsClass = type[LegEquations]
+
+
+class LegKind(ABC):
+    """The data of one leg: a kind of leg is a frozen dataclass with these fields and its own.
+
+    Parameters
+    ----------
+    guide_point : vector
+        r, where the leg is fixed in the base frame: a point of the slider's guide, where its
+        coordinate is zero, or the centre of the crank's circle; m.
+    platform_point : vector
+        s0, from P to the platform point, in the platform frame, m.
+    elbow : {1, -1}
+        sigma, the side of the elbow: the leg's branch.
+    limits : (float, float), optional
+        Least and greatest joint coordinate, m or rad.
+    """
+
+    guide_point: Vector
+    platform_point: Vector
+    elbow: int
+    limits: tuple[float, float] | None
+
+    type: ClassVar[str]
+    """What the file's key `type` says."""
+    joint: ClassVar[ActuatedJoint]
+    keys: ClassVar[Mapping[str, Key]]
+    """The fields of its own, which are its TOML keys, and what they hold."""
+    equations_class: ClassVar[_EquationsClass]
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    def __post_init__(self) -> None:
+        checked: dict[str, Any] = {
+            "guide_point": vector(self.guide_point, "guide_point"),
+            "platform_point": vector(self.platform_point, "platform_point"),
+            "elbow": _checked_elbow(self.elbow),
+            "limits": _checked_limits(self.limits, self.joint.unit),
+        }
+        for name, key in self.keys.items():
+            value = getattr(self, name)
+            if value is None:
+                continue
+            if key.role == "direction":
+                checked[name] = unit_vector(value, name)
+            elif key.role == "length":
+                checked[name] = positive(value, name, "m")
+            elif key.role == "slider":
+                checked[name] = positive(value, "slider.mass", "kg")
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
+
+    @property
+    def bodies(self) -> dict[str, Inertia]:
+        """The inertia of its bodies, by letter in the order "p", "u", "l"."""
+        found: dict[str, Inertia] = {}
+        for name, key in self.keys.items():
+            if key.body:
+                value = getattr(self, name)
+                found[key.body] = PointMass(value) if key.role == "slider" else value
+        return {letter: found[letter] for letter in LEG_BODIES if letter in found}
+
+    def with_bodies(self, bodies: Mapping[str, Any]) -> Self:
+        """Return the same leg with other inertia, by letter."""
+        new = {}
+        for name, key in self.keys.items():
+            if key.body:
+                body = bodies[key.body]
+                new[name] = body.mass if key.role == "slider" else body
+        return replace(self, **new)
+
+    @property
+    @abstractmethod
+    def quantities(self) -> tuple[Quantity, ...]:
+        """What of its geometry the equations need, but for the platform point."""
+
+    @abstractmethod
+    def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
+        """Return axes that span those about which the leg lets the platform turn.
+
+        `axis` is k of a platform that turns about it, or None.
+        """
+
+    @property
+    @abstractmethod
+    def joint_axis(self) -> Vector:
+        """The unit vector along which the slider moves, or about which the crank turns."""
+
+    @property
+    def lever(self) -> float:
+        """Metres that the actuated body's end moves per unit of the joint: 1 for a slider."""
+        return 1.0
+
+    @property
+    @abstractmethod
+    def reach_bound(self) -> ReachBound:
+        """A bound on the platform points in reach."""
+
+    @property
+    @abstractmethod
+    def reach_text(self) -> str:
+        """How far it reaches, as a clause for messages: "its links span 0.1 to 0.4 m"."""
+
+    @classmethod
+    def table(cls) -> dict[str, Any]:
+        """Return the TOML keys of its own: name -> (type, default), as pydantic takes them."""
+        from pteron.bodies import tables
+
+        types: dict[str, Any] = {
+            "direction": tables.Three,
+            "length": tables.Number,
+            "count": tables.Count,
+            "slider": tables.Slider,
+            "planar": tables.PlanarBody,
+            "rod": tables.RodBody,
+        }
+        found = {}
+        for name, key in cls.keys.items():
+            kind = types[key.role]
+            optional = key.default is None
+            toml = "slider" if key.role == "slider" else name
+            found[toml] = (kind | None if optional else kind, key.default)
+        return found
+
+    @classmethod
+    def of_table(cls, table: Any) -> Self:
+        """Build the leg from a table that has been read."""
+        values: dict[str, Any] = {
+            name: getattr(table, name)
+            for name in ("guide_point", "platform_point", "elbow", "limits")
+        }
+        for name, key in cls.keys.items():
+            if key.role == "slider":
+                values[name] = table.slider.mass
+            elif key.body:
+                values[name] = getattr(table, name).inertia_of(name)
+            else:
+                values[name] = getattr(table, name)
+        return cls(**values)
+
+    def as_table(self) -> dict[str, Any]:
+        """Return the TOML keys of its own, for `save`."""
+        return {
+            "slider" if key.role == "slider" else name: self.bodies[key.body]
+            if key.body
+            else getattr(self, name)
+            for name, key in self.keys.items()
+        }
+
+    @property
+    def extents(self) -> dict[str, tuple[str, float, float, str]]:
+        """Where a body's mass is expected: its TOML key, least and greatest x, what is there."""
+        return {}
+
+    @property
+    def size(self) -> float:
+        """The length that its reach is measured by, m."""
+        return sum(float(q.value[0]) for q in self.quantities if q.role == "length")
+
+    def equations(self, values: Mapping[str, Expression] | None = None) -> LegEquations:
+        """Return its equations, for its own geometry or for other values of the quantities."""
+        if values is None:
+            values = {q.name: ca.SX(ca.DM(list(q.value))) for q in self.quantities}
+        return self.equations_class(**values)
+
+    def transfers(self, gravity: Vector) -> tuple[Transfer, ...]:
+        """Return the mass transfers within the leg, for gravity in the base frame."""
+        return ()
+
+    @classmethod
+    def closing(
+        cls, values: Mapping[str, Sequence[Fraction]], rng: Random
+    ) -> tuple[list[Fraction], int] | None:
+        """Return a random c - r in fractions that the leg closes without a root, and its elbow.
+
+        With it base parameters are proved in fractions as well as modulo a prime.
+        """
+        return None
+
+    def turned(self, turn: Any) -> Self:
+        """Return the leg with every base-frame vector v replaced by `turn(v)`."""
+        vectors = [q.name for q in self.quantities if q.role in ("point", "direction", "normal")]
+        given = {name: getattr(self, name, None) for name in vectors}
+        return replace(self, **{name: turn(v) for name, v in given.items() if v is not None})
+
+
+def _checked_limits(limits: Sequence[float] | None, unit: str) -> tuple[float, float] | None:
+    """Return limits as two floats, the least first."""
+    if limits is None:
+        return None
+    low, high = numbers(limits, "limits", 2)
+    if low >= high:
+        raise ModelError(f"limits: {low:g} {unit} is not below {high:g} {unit}; give [least, most]")
+    return (low, high)
+
+
+def _checked_elbow(elbow: object) -> int:
+    """Return the elbow's side, 1 or -1."""
+    if elbow not in (1, -1):
+        raise ModelError(f"elbow: {elbow!r} is neither 1 nor -1")
+    return 1 if elbow == 1 else -1

@@ -1,0 +1,55 @@
+"""A rod between two ball joints, whose bar at the platform keeps its direction."""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from pteron.bodies.motion import BodyMotion, Expression, PointMotion
+from pteron.legs.leg import Joint
+
+
+def rod_body(point: PointMotion, n: Expression, ddn: Expression, swing: Expression) -> BodyMotion:
+    """Return a rod in motion: its direction n towards the platform point, n'' and dn/d(c, phi).
+
+    `swing` is (3, 4). The rod's angular velocity is n x n', its reference point the platform point.
+    """
+    rides = ca.horzcat(ca.SX.eye(3), ca.SX(3, 1))
+    turning = ca.mtimes(ca.skew(n), swing)
+    return BodyMotion(point.position, rides, point.acceleration, ca.SX.eye(3), turning, n, ddx=ddn)
+
+
+def universal_joints(
+    d: Expression,
+    tip: Expression,
+    c: Expression,
+    swing: Expression,
+    direction: tuple[Expression, Expression, Expression],
+    before: Joint | None = None,
+) -> list[Joint]:
+    """Return the universal joints at a rod's ends, tip and c: about d, and about d x n across it.
+
+    With n' = omega x n and omega = alpha' d + beta' e, e = d x n / |d x n|: alpha' = n'.(d x n) /
+    |d x n|^2 and beta' = - n'.d / |d x n|. `direction` is n, n' and n''; `swing` (3, 4) is
+    dn/d(c, phi); `before` is a joint about d that turns the tip's side, such as a crank's.
+    """
+    n, dn, ddn = direction
+    across, turning = ca.cross(d, n), ca.cross(d, dn)
+    square = ca.dot(across, across)
+    size, growth = ca.sqrt(square), ca.dot(across, turning) / square
+    alpha, beta = ca.dot(dn, across) / square, -ca.dot(dn, d) / size
+    about_d = (
+        ca.mtimes(across.T, swing) / square,
+        alpha,
+        ca.dot(ddn, across) / square - 2 * alpha * growth,
+    )
+    about_e = (-ca.mtimes(d.T, swing) / size, beta, -ca.dot(ddn, d) / size - beta * growth)
+    knee = about_d
+    if before is not None:
+        knee = tuple(a - b for a, b in zip(about_d, before[3:], strict=True))
+    axis = across / size
+    return [
+        Joint("R", d, tip, *knee),
+        Joint("R", axis, tip, *about_e),
+        Joint("R", axis, c, *(-a for a in about_e)),
+        Joint("R", d, c, *(-a for a in about_d)),
+    ]
