@@ -9,6 +9,7 @@ import numpy as np
 
 from pteron.bodies.parameters import JOINED, OWN
 from pteron.kernels import Array, count_operations, program
+from pteron.kernels.hoisting import hoisted
 from pteron.manipulator import Manipulator, parameter_data
 from pteron.reduction.find import base_parameters
 from pteron.reduction.result import BaseParameters
@@ -50,16 +51,17 @@ def cheapest_parameters(robot: Manipulator) -> BaseParameters:
     (26, 319)
     """
     columns = parameter_data(robot)
-    grouping = _without_units(robot, base_parameters(robot))
+    base = base_parameters(robot)
+    grouping = _without_units(robot, base)
     candidates = [k for k, p in enumerate(columns) if (p.kind, p.body) not in JOINED]
     always = [k for k in candidates if (columns[k].kind, columns[k].body) in OWN]
     others = [k for k in candidates if k not in always]
-    best: tuple[int, tuple[int, ...]] | None = None
+    found = {base.kept}
     for order in (others, others[::-1]):
-        found = _improved(robot, grouping, _independent(grouping, always + order), candidates)
-        best = found if best is None or found[0] < best[0] else best
-    assert best is not None
-    return base_parameters(robot, keep=[columns[k].name for k in best[1]])
+        start = _independent(grouping, always + order)
+        found.add(_improved(robot, grouping, start, candidates)[1])
+    best = min(found, key=lambda kept: (_final_cost(robot, kept), kept))
+    return base_parameters(robot, keep=[columns[k].name for k in best])
 
 
 def _without_units(robot: Manipulator, base: BaseParameters) -> Array:
@@ -103,6 +105,12 @@ def _improved(
 
 
 def _cost(robot: Manipulator, kept: tuple[int, ...]) -> int:
+    """Return the operations before the pass that saves some, which would take far longer."""
     columns = tuple((column,) for column in kept)
-    # Plain counts find the same set as those after the pass, which takes far longer.
     return count_operations(program(robot, "inverse_dynamics", columns, plain=True).function)
+
+
+def _final_cost(robot: Manipulator, kept: tuple[int, ...]) -> int:
+    """Return the operations of the kernel: after the pass, base parameters made ready once."""
+    built = program(robot, "inverse_dynamics", tuple((column,) for column in kept))
+    return count_operations(hoisted(built, "base_parameters")[0].function)
