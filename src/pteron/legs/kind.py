@@ -126,7 +126,7 @@ class LegKind(ABC):
         }
         for name, key in self.keys.items():
             value = getattr(self, name)
-            if value is None:
+            if value is None and key.default is None:
                 continue
             if key.role == "direction":
                 checked[name] = unit_vector(value, name)
