@@ -1,10 +1,22 @@
 """Kinds of closures: how the legs' rows make up J, and back; `closures.closure` is the page."""
 
+from collections.abc import Sequence
+
 from pteron.closures.closure import Closure
 from pteron.closures.constant_rows import ConstantRows
 from pteron.closures.three_loci import ThreeLoci
+from pteron.legs.leg import LegEquations
+from pteron.platforms import PlatformEquations
 
 KINDS: tuple[type[Closure], ...] = (ConstantRows, ThreeLoci)
 """The kinds of closures; the first that fits a machine's legs and platform serves it."""
 
-__all__ = ["KINDS", "Closure"]
+
+def kind_for(
+    legs: Sequence[type[LegEquations]], platform: type[PlatformEquations]
+) -> type[Closure] | None:
+    """Return the kind of closure that serves machines of such legs and platform, if any."""
+    return next((kind for kind in KINDS if kind.fits(legs, platform)), None)
+
+
+__all__ = ["KINDS", "Closure", "kind_for"]

@@ -27,8 +27,8 @@ class Closure(ABC):
 
     @classmethod
     @abstractmethod
-    def fits(cls, legs: Sequence[LegEquations], platform: PlatformEquations) -> bool:
-        """Say whether this kind of closure serves such a machine."""
+    def fits(cls, legs: Sequence[type[LegEquations]], platform: type[PlatformEquations]) -> bool:
+        """Say whether this kind of closure serves machines of such legs and platform."""
 
     @property
     @abstractmethod

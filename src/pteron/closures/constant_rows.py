@@ -29,8 +29,8 @@ class ConstantRows(Closure):
     """Legs that all have a constant row, under a platform that does or does not turn."""
 
     @classmethod
-    def fits(cls, legs: Sequence[LegEquations], platform: PlatformEquations) -> bool:
-        return all(leg.constant_row is not None for leg in legs)
+    def fits(cls, legs: Sequence[type[LegEquations]], platform: type[PlatformEquations]) -> bool:
+        return all(leg.row_is_constant for leg in legs)
 
     def __init__(self, legs: Sequence[LegEquations], platform: PlatformEquations) -> None:
         super().__init__(legs, platform)

@@ -25,7 +25,7 @@ class ThreeLoci(Closure):
     modes = 2
 
     @classmethod
-    def fits(cls, legs: Sequence[LegEquations], platform: PlatformEquations) -> bool:
+    def fits(cls, legs: Sequence[type[LegEquations]], platform: type[PlatformEquations]) -> bool:
         return platform.coordinates == ("x", "y", "z")
 
     def measure(self, platform: PlatformMotion, legs: Sequence[LegMotion]) -> Expression:

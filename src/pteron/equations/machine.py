@@ -9,9 +9,7 @@ import casadi as ca
 
 from pteron.bodies.motion import Expression, Moments, moments_of
 from pteron.bodies.parameters import PLATFORM, PLATFORM_KINDS, Parameter, parameter_list
-from pteron.closures import KINDS as CLOSURES
-from pteron.closures import Closure
-from pteron.errors import ModelError
+from pteron.closures import Closure, kind_for
 from pteron.legs.leg import LegEquations, LegMotion
 from pteron.manipulator import Manipulator, expect_manipulator
 from pteron.platforms import EQUATIONS, PlatformEquations
@@ -82,14 +80,9 @@ class Machine:
         gravity: Expression,
     ) -> Machine:
         platform = EQUATIONS[robot.platform.motion](frame, points)
-        for kind in CLOSURES:
-            if kind.fits(legs, platform):
-                return cls(legs, platform, kind(legs, platform), gravity)
-        kinds = ", ".join(sorted({leg.type for leg in robot.legs}))
-        raise ModelError(
-            f"legs: no closure is known of {kinds} legs under a {robot.platform.motion} "
-            "platform; give it other legs or another motion"
-        )
+        closure = kind_for([type(leg) for leg in legs], type(platform))
+        assert closure is not None  # the manipulator has asked
+        return cls(legs, platform, closure(legs, platform), gravity)
 
     def state(
         self,

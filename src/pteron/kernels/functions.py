@@ -471,7 +471,7 @@ def _status(
     if {"reach", "rows"} & set(entry.needs):
         found = kinematics.reach(machine, symbols["pose"])
         for leg, at in zip(machine.legs, found, strict=True):
-            if "reach" in entry.needs or leg.constant_row is None:
+            if "reach" in entry.needs or not leg.row_is_constant:
                 least = -_TINY if entry.needs == ("reach",) else TYPE_I**2 * at.scale
                 status = ca.if_else(least < at.discriminant, status, 0)
     if "type II" in entry.needs:

@@ -123,7 +123,7 @@ def _bad_pose(
 ) -> PteronError:
     margin, type_i, spread, _ = numeric(robot, "reach")(pose)
     if "rows" in needs:
-        rest = [leg.constant_row is not None for leg in closure_of(robot).legs]
+        rest = [leg.row_is_constant for leg in closure_of(robot).legs]
         type_i[rest] = 1.0
     if np.isnan(type_i).any():
         i = int(np.isnan(type_i).argmax())

@@ -136,8 +136,10 @@ class LegEquations(ABC):
     """The kinds of parameters of each body, by letter: those of the leg's `bodies`."""
     rides: ClassVar[tuple[str, ...]] = ()
     """The bodies whose reference point is the platform point: their mass may be the platform's."""
-    constant_row: Expression | None = None
-    """dq/dc, (3, 1), if it does not depend on the pose (and q not on phi); see `closures`."""
+    row_is_constant: ClassVar[bool] = False
+    """Whether dq/dc does not depend on the pose, nor q on phi; see `closures`."""
+    constant_row: Expression
+    """dq/dc, (3, 1), where that is so."""
 
     @abstractmethod
     def motion(self, point: PointMotion, angle: AngleMotion | None) -> LegMotion:

@@ -220,6 +220,7 @@ class PRRREquations(LegEquations):
         "l": PlanarInertia.kinds,
     }
     rides: ClassVar = ("l",)
+    row_is_constant = True
 
     def __init__(
         self,

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.bodies.vectors import Vector, vector
+from pteron.closures import kind_for
 from pteron.errors import ModelError
 from pteron.legs import LegKind
-from pteron.platforms import Platform
+from pteron.platforms import EQUATIONS, Platform
 
 _VANISHING = 1e-9
 """Singular value of unit vectors below which they do not span another direction."""
@@ -79,6 +80,13 @@ class Manipulator:
             if not isinstance(leg, LegKind):
                 raise ModelError(f"legs[{i}]: {type(leg).__name__} given, a leg expected")
         _check_constraints(self.platform, legs)
+        kinds = [leg.equations_class for leg in legs]
+        if kind_for(kinds, EQUATIONS[self.platform.motion]) is None:
+            types = ", ".join(sorted({leg.type for leg in legs}))
+            raise ModelError(
+                f"legs: no closure is known of {types} legs under a {self.platform.motion} "
+                "platform; give it other legs or another motion"
+            )
         object.__setattr__(self, "legs", legs)
         object.__setattr__(self, "gravity", vector(self.gravity, "gravity"))
 
