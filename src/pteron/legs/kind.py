@@ -112,6 +112,10 @@ class LegKind(ABC):
     type: ClassVar[str]
     """What the file's key `type` says."""
     joint: ClassVar[ActuatedJoint]
+    names: ClassVar[Mapping[str, str]] = {"p": "slider", "u": "upper link", "l": "lower link"}
+    """What its bodies are called, by letter."""
+    account: ClassVar[str] = ""
+    """How it is built, in a few sentences for a report; vectors by their letters r, d, e, k, s0."""
     keys: ClassVar[Mapping[str, Key]]
     """The fields of its own, which are its TOML keys, and what they hold."""
     equations_class: ClassVar[_EquationsClass]

@@ -107,6 +107,16 @@ class Manipulator:
         """Names of the pose's coordinates: x, y, z and, for 3T1R, phi."""
         return self.platform.coordinates
 
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joint coordinates: rho1 of a slider, theta1 of a crank."""
+        return tuple(f"{leg.joint.coordinate}{i}" for i, leg in enumerate(self.legs, start=1))
+
+    @property
+    def force_names(self) -> tuple[str, ...]:
+        """Names of the actuator forces: force1 of a slider, torque1 of a crank."""
+        return tuple(f"{leg.joint.force}{i}" for i, leg in enumerate(self.legs, start=1))
+
 
 def expect_manipulator(robot: object) -> None:
     """Refuse what is no manipulator, such as the name of one."""

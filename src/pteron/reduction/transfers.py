@@ -99,6 +99,7 @@ def _platform_point(
     mass: Parameter,
     platform: Mapping[str, Parameter],
 ) -> Transfer:
+    name = robot.legs[group[0] - 1].names[mass.body]
     x: list[Monomial] = []
     y: list[Monomial] = []
     square: list[Monomial] = []
@@ -111,7 +112,7 @@ def _platform_point(
                 moment.append(Monomial(-1, (symbol,)))
                 square.append(Monomial(-1, (symbol, symbol)))
     return Transfer(
-        f"lower link{mass.suffix} and platform carry the platform point",
+        f"{name}{mass.suffix} and platform carry the platform point",
         {
             mass: _ONE,
             platform["m"]: (Monomial(-len(group)),),
