@@ -92,7 +92,7 @@ class PRRR(LegKind):
         "axes along d follow: between slider and upper link, upper and lower link, and at the "
         "platform point s0; where the platform turns, a fourth one about k lets it turn against "
         "the leg (PRRU), unless d is parallel to k and R3 does so itself. The slider coordinate "
-        "is ρ = d · (p + s − r), Eq. (4), divided by d · e where the slider is tilted."
+        "is rho = d . (p + s - r), Eq. (4), divided by d . e where the slider is tilted."
     )
 
     keys: ClassVar = {

@@ -83,9 +83,9 @@ class RSS(LegKind):
 
     type = "RSS"
     joint = CRANK
-    names = {"u": "crank", "l": "rod"}
+    names: ClassVar = {"u": "crank", "l": "rod"}
     account = (
-        "A crank turns about d through the guide point r; its angle θ is zero where it points "
+        "A crank turns about d through the guide point r; its angle theta is zero where it points "
         "along the zero direction, and counts by the right hand. A rod between two ball joints "
         "leads from its end to the platform point s0; parallel rods, which keep the platform from "
         "tilting, count as one with the sum of both."

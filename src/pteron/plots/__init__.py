@@ -17,7 +17,7 @@ from pteron.plots.comparison import (
     residual_time_figure,
 )
 from pteron.plots.forces import forces_figure, regularity_figure
-from pteron.plots.reach import reach_figure
+from pteron.plots.reach import measure_figure, reach_figure
 from pteron.plots.robot import outline, robot_figure
 
 __all__ = [
@@ -29,6 +29,7 @@ __all__ = [
     "errors_figure",
     "forces_figure",
     "histogram_figure",
+    "measure_figure",
     "outline",
     "reach_figure",
     "regularity_figure",

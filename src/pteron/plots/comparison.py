@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -11,6 +13,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from numpy.typing import NDArray
 
 from pteron.kernels import Array
+from pteron.legs.leg import SLIDER, ActuatedJoint
 from pteron.plots.canvas import (
     FONT_SIZE,
     GRID,
@@ -43,15 +46,18 @@ def comparison_figure(
     used: NDArray[np.bool_],
     *,
     leg: int,
+    joint: ActuatedJoint = SLIDER,
 ) -> Figure:
     """Return an actuator's measured and predicted force over time, and their difference below.
 
-    Time (T,) is in s, forces (T,) in N, the last one without friction and offset. Samples that are
-    not `used` (T,) do not count and are shaded. `leg`, from 0, gives the colour.
+    Time (T,) is in s, forces (T,) in N or N m, the last one without friction and offset. Samples
+    that are not `used` (T,) do not count and are shaded. `leg`, from 0, gives the colour, `joint`
+    the words and units.
     """
     figure = blank(4.4, 3.1)
-    color = LEG_COLORS[leg]
-    forces, rest = stack(figure, "time (s)", ["force (N)", "residual (N)"], [2.1, 1.0])
+    color, unit = LEG_COLORS[leg], joint.force_unit
+    labels = [f"{joint.force} ({unit})", f"residual ({unit})"]
+    forces, rest = stack(figure, "time (s)", labels, [2.1, 1.0])
     forces.plot(time, measured, color=MUTED, alpha=0.45, linewidth=4.0, solid_capstyle="round")
     forces.plot(time, without_friction, color=MUTED, linewidth=1.0, linestyle=(0, (2.5, 1.8)))
     forces.plot(time, predicted, color=color, linewidth=1.3)
@@ -102,15 +108,21 @@ def errors_figure(errors: Array, without_friction: Array, floor: Array) -> Figur
     return figure
 
 
-def residual_time_figure(time: Array, residuals: Array, used: NDArray[np.bool_]) -> Figure:
+def residual_time_figure(
+    time: Array,
+    residuals: Array,
+    used: NDArray[np.bool_],
+    joints: Sequence[ActuatedJoint] | None = None,
+) -> Figure:
     """Return the residuals of all actuators over a whole recording, one above the other.
 
-    Time (T,) is in s, residuals (T, n) in N. Samples that are not `used` (T, n) do not count: they
-    are grey, and may lie outside.
+    Time (T,) is in s, residuals (T, n) in N or N m, as the joints have them. Samples that are not
+    `used` (T, n) do not count: they are grey, and may lie outside.
     """
     n = residuals.shape[1]
     figure = blank(4.8, 0.5 + 0.8 * n)
-    panels = stack(figure, "time (s)", [f"{i + 1}  (N)" for i in range(n)])
+    units = [joint.force_unit for joint in joints or [SLIDER] * n]
+    panels = stack(figure, "time (s)", [f"{i}  ({unit})" for i, unit in enumerate(units, start=1)])
     edges = np.unique(np.linspace(0, len(time), min(_COLUMNS, len(time)) + 1).astype(int))
     starts = edges[:-1]
     middle = np.add.reduceat(time, starts) / np.diff(edges)
@@ -128,15 +140,22 @@ def residual_time_figure(time: Array, residuals: Array, used: NDArray[np.bool_])
 
 
 def residual_speed_figure(
-    speed: Array, residuals: Array, used: NDArray[np.bool_], *, leg: int
+    speed: Array,
+    residuals: Array,
+    used: NDArray[np.bool_],
+    *,
+    leg: int,
+    joint: ActuatedJoint = SLIDER,
 ) -> Figure:
-    """Return an actuator's residuals over its slider's speed: friction that is missing shows here.
+    """Return an actuator's residuals over its joint's speed: friction that is missing shows here.
 
-    Speeds (T,) are in m/s, residuals (T,) in N. Samples that are not `used` (T,) do not count: they
-    are grey, and may lie outside. `leg`, from 0, gives the colour.
+    Speeds (T,) are in m/s or rad/s, residuals (T,) in N or N m. Samples that are not `used` (T,) do
+    not count: they are grey, and may lie outside. `leg`, from 0, gives the colour, `joint` the
+    words and units.
     """
     figure = blank(3.1, 2.4)
-    axes = plain_axes(figure, "slider speed (m/s)", "residual (N)")
+    words = f"{joint.noun} speed ({joint.unit}/s)", f"residual ({joint.force_unit})"
+    axes = plain_axes(figure, *words)
     axes.axhline(0.0, color=MUTED, linewidth=0.8)
     step = max(len(speed) // _DOTS, 1)
     some = slice(step // 2, None, step)
@@ -145,7 +164,7 @@ def residual_speed_figure(
     middle, mean = _means(speed[used], residuals[used])
     axes.plot(middle, mean, color=PAPER, linewidth=4.2, solid_capstyle="round", zorder=4)
     axes.plot(middle, mean, color=INK, linewidth=1.8, solid_capstyle="round", zorder=5)
-    # What does not count may lie outside: a stuck slider would make the rest a line.
+    # What does not count may lie outside: a stuck joint would make the rest a line.
     counted = residuals[used] if used.any() else residuals
     size = float(np.quantile(np.abs(counted), 0.998)) or 1.0
     axes.set_ylim(-2.0 * size, 2.0 * size)

@@ -31,7 +31,7 @@ def forces_figure(
     turning_point: float | None = None,
     ylabel: str = "actuator force (N)",
 ) -> Figure:
-    """Return the forces (T, n) of all legs, N, over time (T,), s.
+    """Return the forces (T, n) of all legs, N or N m, over time (T,), s.
 
     The way back begins at the turning point, s. Other quantities of the legs look the same, under
     another label.
@@ -53,31 +53,31 @@ def forces_figure(
 
 def regularity_figure(
     angles: Array,
-    regularity: Array,
+    type_ii: Array,
     singular: Array,
     *,
     home: float | None = None,
     used: tuple[float, float] | None = None,
 ) -> Figure:
-    """Return abs(det J), relative to its largest value, over phi.
+    """Return the size of the type-II measure over phi, where it depends on nothing else.
 
     The angles (A,) ascend; the singular orientations, phi of the home pose, and the least and
     greatest phi that a motion uses are marked. All are in rad.
     """
     figure = blank(5.4, 2.9)
-    axes = plain_axes(figure, "orientation φ (degrees)", "|det J| / max |det J|")
+    axes = plain_axes(figure, "orientation φ (degrees)", "type-II measure")
     degrees = np.degrees(angles)
     if used is not None:
         low, high = (float(angle) for angle in np.degrees(used))
         axes.axvspan(low, high, color=GRID, alpha=0.6, linewidth=0.0, zorder=0.5)
         remark(axes, "used by the cycle", (low + high) / 2.0, 0.04, MUTED)
-    axes.plot(degrees, np.abs(regularity), color=REACH, linewidth=2.0, zorder=3)
+    axes.plot(degrees, np.abs(type_ii), color=REACH, linewidth=2.0, zorder=3)
     for angle in np.degrees(singular):
         axes.axvline(angle, color=WARNING, linewidth=1.2, linestyle=(0, (4, 2)))
         text = f"singular, {angle:.1f}°".replace("-", "\u2212")
         remark(axes, text, float(angle), inf, WARNING, 3.0)
     if home is not None:
-        at, value = float(np.degrees(home)), float(np.interp(home, angles, np.abs(regularity)))
+        at, value = float(np.degrees(home)), float(np.interp(home, angles, np.abs(type_ii)))
         spot(axes, at, value, INK, PAPER, 6.0, zorder=4)
         remark(axes, "home", at, value, INK, -12.0)
     axes.set_xlim(float(degrees[0]), float(degrees[-1]))

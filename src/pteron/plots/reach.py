@@ -1,17 +1,31 @@
-"""Maps of the reach: slices of poses, coloured by what they are good for."""
+"""Maps of the reach: slices of poses, coloured by what they are good for, and how good."""
 
 from __future__ import annotations
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
+from scipy.ndimage import distance_transform_edt  # type: ignore[import-untyped]
 
 from pteron.kernels import Array
-from pteron.plots.canvas import INK, LEG_COLORS, MUTED, PAPER, REACH, blank, plain_axes, spot
-from pteron.workspace import BEYOND_LIMITS, ReachSlice
+from pteron.plots.canvas import (
+    FONT_SIZE,
+    INK,
+    LEG_COLORS,
+    MUTED,
+    PAPER,
+    REACH,
+    blank,
+    plain_axes,
+    spot,
+)
+from pteron.workspace import BEYOND_LIMITS, REACHABLE, ReachSlice
 
 _BANDS = 4
 """Shades of the margin inside the reach."""
+
+_TENTHS = [tenth / 10.0 for tenth in range(10)]
 
 _TIE = 1e-9
 """Metres."""
@@ -46,18 +60,53 @@ def reach_figure(cut: ReachSlice, *, path: Array | None = None) -> Figure:
         if margin.min() < 0.0 < margin.max():
             edge = axes.contour(first, second, margin, levels=[0.0], colors=[LEG_COLORS[i]])
             edge.set(linestyles=[_DASHES[i]], linewidths=1.6)
+    _finish(axes, cut, path)
+    return figure
+
+
+def measure_figure(cut: ReachSlice, measure: Array, *, path: Array | None = None) -> Figure:
+    """Return the map of a measure (B, A) between 0 and 1 on a slice, where it is in reach.
+
+    The shade deepens with the measure, by tenths; every second line is named.
+    """
+    figure = blank(3.9, 3.9)
+    axes = plain_axes(figure, f"{cut.plane[0]} (mm)", f"{cut.plane[1]} (mm)")
+    axes.grid(visible=False)
+    first, second = 1e3 * cut.first, 1e3 * cut.second
+    # Drawn beyond the edge of the reach and cut off there, so that the edge is smooth.
+    nearest = distance_transform_edt(np.isnan(measure), return_indices=True)[1]
+    whole = measure[tuple(nearest)]
+    inside = np.ma.masked_where(cut.status != REACHABLE, whole)
+    drawn = [
+        axes.contourf(first, second, whole, levels=[level, 2.0], colors=[REACH], alpha=0.11)
+        for level in _TENTHS
+        if level < whole.max()
+    ]
+    named = [level for level in _TENTHS[::2] if inside.min() < level < inside.max()]
+    if named:
+        lines = axes.contour(first, second, inside, levels=named, colors=[INK], linewidths=0.7)
+        axes.clabel(lines, fmt="%.1f", fontsize=FONT_SIZE - 1.0, colors=[INK])
+    edge = axes.contour(first, second, cut.margin, levels=[0.0], colors=[MUTED], linewidths=1.0)
+    for one in drawn:
+        one.set_clip_path(edge.get_paths()[0], axes.transData)
+    _finish(axes, cut, path)
+    return figure
+
+
+def _finish(axes: Axes, cut: ReachSlice, path: Array | None) -> None:
+    """Draw a motion's path and the slice's centre, and set the scales."""
     i, j = ("xyz".index(letter) for letter in cut.plane)
     if path is not None:
         for color, width in ((PAPER, 3.2), (INK, 1.4)):
             (line,) = axes.plot(1e3 * path[:, i], 1e3 * path[:, j], color=color, linewidth=width)
             line.set_solid_capstyle("round")
     spot(axes, 1e3 * cut.center[i], 1e3 * cut.center[j], INK, PAPER, 6.0, zorder=5)
+    first, second = 1e3 * cut.first, 1e3 * cut.second
     axes.set_aspect("equal")
     axes.set(xlim=(first[0], first[-1]), ylim=(second[0], second[-1]))
     step = _nice(max(first[-1] - first[0], second[-1] - second[0]) / 6.0)
     axes.xaxis.set_major_locator(MultipleLocator(step))
     axes.yaxis.set_major_locator(MultipleLocator(step))
-    return figure
 
 
 def _nice(step: float) -> float:

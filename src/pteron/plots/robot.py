@@ -1,24 +1,28 @@
-"""The machine in space: rails, sliders, links, platform and frames."""
+"""The machine in space: guides and cranks, links, platform and frames."""
 
 from __future__ import annotations
 
-from itertools import product
+from collections.abc import Sequence
+from itertools import pairwise, product
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from pteron.kernels import Array
-from pteron.motion import JointPoints
+from pteron.motion import Guide, JointPoints
 from pteron.plots.canvas import INK, LEG_COLORS, MUTED, PAPER, REACH, blank
 from pteron.plots.space import Space, upright
 
 _PLATFORM_AXES = ("x\u2032", "y\u2032", "z\u2032")
 """x, y and z with a prime."""
 
+_AXLE = 0.03
+"""Half the length of a crank's axle, as a share of the machine's size."""
+
 
 def robot_figure(
     points: JointPoints,
-    rails: Array,
+    guides: Sequence[Guide],
     *,
     gravity: Array | None = None,
     path: Array | None = None,
@@ -26,20 +30,25 @@ def robot_figure(
 ) -> Figure:
     """Return the machine in one pose, with the vertical upwards.
 
-    The guides' ends `rails` (n, 2, 3) and the `path` (T, 3) of P are in m. Gravity (3,) is drawn as
-    an arrow; without it the platform frame's z points up. The `angle` stands, in words, beside the
-    platform frame's x axis.
+    The points are those of one pose, the guides those of `pteron.motion.joint_guides`; the `path`
+    (T, 3) of P is in m. Gravity (3,) is drawn as an arrow; without it the platform frame's z points
+    up. The `angle` stands, in words, beside the platform frame's x axis.
     """
     figure = blank(5.6, 4.4)
     space = Space(figure, points.axes[2] if gravity is None else -gravity)
 
-    corners = np.vstack([points.sliders, points.elbows, points.platform_points, *rails])
+    paths = [guide.path for guide in guides if guide.slides]
+    corners = np.vstack([*points.links, *paths])
     turned = corners @ space.rotation.T
     low, high = turned.min(axis=0), turned.max(axis=0)
     size = float((high - low).max())
     space.ground(low, high)
-    for i, ends in enumerate(rails):
-        _draw_leg(space, points, ends, i, size)
+    base = [line[0] for line, guide in zip(points.links, guides, strict=True) if not guide.slides]
+    if len(base) > 1:
+        space.faces([np.array(base)], MUTED, 0.18)
+        space.line(np.array([*base, base[0]]), MUTED, 2.0, raised=-0.02)
+    for i, guide in enumerate(guides):
+        _draw_leg(space, points, guide, i, size)
     _draw_platform(space, points, size, angle)
     if path is not None:
         space.line(path, INK, 1.2, raised=1.0, style=(0, (1.5, 1.2)))
@@ -55,20 +64,24 @@ def outline(points: JointPoints) -> list[int]:
     return [int(i) for i in np.argsort(np.arctan2(arms @ y, arms @ x), kind="stable")]
 
 
-def _draw_leg(space: Space, points: JointPoints, ends: Array, i: int, size: float) -> None:
-    color = LEG_COLORS[i]
-    slider, elbow, platform = points.sliders[i], points.elbows[i], points.platform_points[i]
-    along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
-    space.line(ends, MUTED, 3.4, raised=-0.01)
-    for end in ends:
-        space.mark(end, MUTED, MUTED, 3.0, raised=-0.01)
-    space.line(np.array([slider, elbow]), color, 4.6)
-    space.line(np.array([elbow, platform]), color, 3.0)
-    space.faces(_block(slider, along, size), color, 0.95)
-    for joint in (slider, elbow, platform):
+def _draw_leg(space: Space, points: JointPoints, guide: Guide, i: int, size: float) -> None:
+    color, line = LEG_COLORS[i], points.links[i]
+    if guide.slides:
+        space.line(guide.path, MUTED, 3.4, raised=-0.01)
+        for end in guide.path:
+            space.mark(end, MUTED, MUTED, 3.0, raised=-0.01)
+        space.faces(_block(line[0], guide.axis, size), color, 0.95)
+    else:
+        space.line(guide.path, MUTED, 0.9, raised=-0.01, style=(0, (2.0, 2.0)))
+        axle = _AXLE * size * guide.axis
+        space.line(np.array([line[0] - axle, line[0] + axle]), MUTED, 6.0, raised=-0.01)
+    for k, ends in enumerate(pairwise(line)):
+        space.line(np.array(ends), color, 4.6 if k == 0 else 3.0)
+    for joint in line:
         space.mark(joint, PAPER, color, 5.0)
-    away = space.beside(slider - points.reference, along)
-    space.text(slider + 0.075 * size * away, str(i + 1), color, bold=True)
+    along = guide.axis if guide.slides else line[1] - line[0]
+    away = space.beside(line[0] - points.reference, along)
+    space.text(line[0] + 0.075 * size * away, str(i + 1), color, bold=True)
 
 
 def _block(center: Array, along: Array, size: float) -> list[Array]:

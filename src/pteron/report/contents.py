@@ -2,29 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from pteron.dynamics import inverse_dynamics
+from pteron.equations.machine import closure_of
 from pteron.kernels import Array, numeric
 from pteron.kinematics import jacobian, joint_rates, singular_orientations
 from pteron.manipulator import Manipulator
-from pteron.motion import JointPoints, PickAndPlace, joint_points, pick_and_place
+from pteron.motion import (
+    Guide,
+    JointPoints,
+    PickAndPlace,
+    joint_guides,
+    joint_points,
+    pick_and_place,
+)
 from pteron.reduction import BaseParameters, base_parameters
 from pteron.report.costs import Cost, costs
 from pteron.workspace import (
     BEYOND_LIMITS,
+    JointRanges,
     ReachSlice,
     ReachVolume,
     Reserve,
-    SliderRanges,
     home_pose,
+    joint_ranges,
     reach_slice,
     reach_volume,
     reserve,
-    slider_ranges,
 )
 from pteron.workspace.doubts import doubts
 
@@ -38,17 +47,17 @@ _ANGLES = 361
 _RIM = 0.08
 """Share of the reach's greatest width that the slices show around it."""
 
-_BARE_RAIL = 0.25
-"""Length of a guide without limits, beyond what the cycle uses, as a share of the longest leg."""
+_FINE = 121
+"""Points along each side of a measure's slice."""
 
 
 @dataclass(frozen=True)
 class JacobianAtHome:
     """The Jacobian (n, m) at the home pose, Eq. (10), and its condition number.
 
-    The number is that of J with the angle's column divided by `radius`, the root mean square
-    distance of the platform points from the platform's axis, so that no unit is mixed with another;
-    a platform that does not turn has none.
+    The number is that of J with a crank's row times its length and the angle's column divided by
+    `radius`, the root mean square distance of the platform points from the platform's axis, so that
+    no unit is mixed with another; a platform that does not turn has no radius.
     """
 
     matrix: Array
@@ -58,23 +67,32 @@ class JacobianAtHome:
 
 @dataclass(frozen=True)
 class Orientations:
-    """How well the sliders hold the platform over phi: det J over its largest value, shape (A,).
+    """The type-II measure (A,) over phi, where it depends on nothing else.
 
     `singular` has the type-II singular orientations; angles are in rad.
     """
 
     angles: Array
-    regularity: Array
+    type_ii: Array
     singular: Array
+
+
+@dataclass(frozen=True)
+class Measures:
+    """Both measures (B, A) on a slice, the least of the legs for type I; NaN out of reach."""
+
+    cut: ReachSlice
+    type_i: Array
+    type_ii: Array
 
 
 @dataclass(frozen=True)
 class Report:
     """All that a page says about a machine; the cycle has T samples.
 
-    The cycle keeps the reserve `least`; its forces and slider speeds (T, n) are in N and m/s. The
-    guides' ends `rails` (n, 2, 3), m, are the sliders' limits, or a little more than the cycle
-    needs. The slices go through the home pose and are all of one width.
+    The cycle keeps the reserve `least`; its forces and joint speeds (T, n) are in N and m/s, or
+    N m and rad/s. The slices go through the home pose and are all of one width. Of `orientations`
+    and `measures` there is what the type-II measure depends on; neither where J is constant.
     """
 
     robot: Manipulator
@@ -85,36 +103,37 @@ class Report:
     cycle: PickAndPlace
     points: JointPoints
     home_points: JointPoints
-    rails: Array
+    guides: tuple[Guide, ...]
     forces: Array
-    slider_speeds: Array
-    sliders: SliderRanges
+    joint_speeds: Array
+    joints: JointRanges
     slices: tuple[ReachSlice, ...]
     volume: ReachVolume
     jacobian: JacobianAtHome
     orientations: Orientations | None
+    measures: Measures | None
     base: BaseParameters
     costs: tuple[Cost, ...]
 
     @property
     def limited(self) -> bool:
-        """Whether a slice shows poses that only the sliders' limits forbid."""
+        """Whether a slice shows poses that only the joints' limits forbid."""
         return any(bool((cut.status == BEYOND_LIMITS).any()) for cut in self.slices)
 
     @property
     def peak_forces(self) -> Array:
-        """Largest size of each leg's force over the cycle, N."""
+        """Largest size of each leg's force over the cycle, N or N m."""
         return np.asarray(np.abs(self.forces).max(axis=0))
 
     @property
     def rms_forces(self) -> Array:
-        """Root mean square of each leg's force over the cycle, N."""
+        """Root mean square of each leg's force over the cycle, N or N m."""
         return np.asarray(np.sqrt((self.forces[:-1] ** 2).mean(axis=0)))
 
     @property
     def peak_speeds(self) -> Array:
-        """Largest speed of each slider over the cycle, m/s."""
-        return np.asarray(np.abs(self.slider_speeds).max(axis=0))
+        """Largest speed of each joint over the cycle, m/s or rad/s."""
+        return np.asarray(np.abs(self.joint_speeds).max(axis=0))
 
 
 def contents(robot: Manipulator) -> Report:
@@ -124,7 +143,6 @@ def contents(robot: Manipulator) -> Report:
     # A machine with little reserve anywhere moves where it has half of its best.
     least = min(_LEAST_RESERVE, float(at_home.smallest) / 2.0)
     cycle = pick_and_place(robot, home, samples=_SAMPLES, least=least)
-    sliders = slider_ranges(robot, cycle.pose)
     volume = reach_volume(robot, home)
     base = base_parameters(robot)
     return Report(
@@ -136,14 +154,15 @@ def contents(robot: Manipulator) -> Report:
         cycle=cycle,
         points=joint_points(robot, cycle.pose),
         home_points=joint_points(robot, home),
-        rails=_rails(robot, sliders),
+        guides=joint_guides(robot, cycle.pose),
         forces=inverse_dynamics(robot, cycle.pose, cycle.velocity, cycle.acceleration),
-        slider_speeds=joint_rates(robot, cycle.pose, cycle.velocity).sliders,
-        sliders=sliders,
+        joint_speeds=joint_rates(robot, cycle.pose, cycle.velocity).actuated,
+        joints=joint_ranges(robot, cycle.pose),
         slices=_slices(robot, home, volume.box),
         volume=volume,
         jacobian=_jacobian(robot, home),
         orientations=_orientations(robot, home),
+        measures=_measures(robot, home, volume.box),
         base=base,
         costs=costs(base),
     )
@@ -151,38 +170,55 @@ def contents(robot: Manipulator) -> Report:
 
 def _slices(robot: Manipulator, home: Array, box: Array) -> tuple[ReachSlice, ...]:
     """Return squares of one width through the home pose, so that the pictures share a scale."""
-    middle = box.mean(axis=0)
     half = (0.5 + _RIM) * float((box[1] - box[0]).max())
-    found = []
-    for plane in _PLANES:
-        x, y = (float(middle["xyz".index(letter)]) for letter in plane)
-        extent = x - half, x + half, y - half, y + half
-        found.append(reach_slice(robot, home, plane, extent=extent))
-    return tuple(found)
+    return tuple(
+        reach_slice(robot, home, plane, extent=_extent(box, plane, [half] * 3)) for plane in _PLANES
+    )
 
 
-def _rails(robot: Manipulator, ranges: SliderRanges) -> Array:
-    longest = max(leg.upper_length + leg.lower_length for leg in robot.legs)
-    ends = []
-    for leg, low, high in zip(robot.legs, ranges.least, ranges.greatest, strict=True):
-        spare = _BARE_RAIL * longest
-        limits = leg.slider_limits or (float(low) - spare, float(high) + spare)
-        ends.append([np.array(leg.guide_point) + rho * np.array(leg.e) for rho in limits])
-    return np.array(ends)
+def _extent(box: Array, plane: str, half: Sequence[float]) -> tuple[float, float, float, float]:
+    """Return the sides of a rectangle about the middle of a box."""
+    i, j = ("xyz".index(letter) for letter in plane)
+    x, y = (float(box[:, k].mean()) for k in (i, j))
+    return x - half[i], x + half[i], y - half[j], y + half[j]
+
+
+def _measures(robot: Manipulator, home: Array, box: Array) -> Measures | None:
+    """Return the measures on the upright plane of home, where the type-II measure varies in it."""
+    closure = closure_of(robot)
+    if closure.orientation is not None or closure.vanishes() is False:
+        return None
+    plane = _upright_plane(robot)
+    half = (0.5 + _RIM) * (box[1] - box[0])
+    cut = reach_slice(robot, home, plane, extent=_extent(box, plane, half.tolist()), points=_FINE)
+    poses = np.tile(home, (*cut.status.shape, 1))
+    i, j = ("xyz".index(letter) for letter in plane)
+    poses[..., i], poses[..., j] = np.meshgrid(cut.first, cut.second)
+    type_i = numeric(robot, "reach")(poses)[1].min(axis=-1)
+    type_ii = np.abs(numeric(robot, "type_ii")(poses)[0])
+    return Measures(cut, type_i, np.where(np.isnan(type_i), np.nan, type_ii))
+
+
+def _upright_plane(robot: Manipulator) -> Literal["xy", "xz", "yz"]:
+    """Return the plane of the base frame that holds the vertical best, x before y."""
+    vertical = np.abs(robot.gravity if any(robot.gravity) else robot.platform.axis)
+    return "xy" if vertical[1] > vertical[2] else "xz"
 
 
 def _jacobian(robot: Manipulator, home: Array) -> JacobianAtHome:
     matrix = jacobian(robot, home)
+    metres = matrix * np.array([[leg.lever] for leg in robot.legs])
     if not robot.platform.turns:
-        return JacobianAtHome(matrix, None, float(np.linalg.cond(matrix)))
+        return JacobianAtHome(matrix, None, float(np.linalg.cond(metres)))
     points = np.array([leg.platform_point[:2] for leg in robot.legs])
     radius = float(np.sqrt((points**2).sum(axis=-1).mean()))
-    return JacobianAtHome(matrix, radius, float(np.linalg.cond(matrix / [1.0, 1.0, 1.0, radius])))
+    return JacobianAtHome(matrix, radius, float(np.linalg.cond(metres / [1.0, 1.0, 1.0, radius])))
 
 
 def _orientations(robot: Manipulator, home: Array) -> Orientations | None:
-    if not robot.platform.turns:
+    if closure_of(robot).orientation is None:
         return None
     poses = np.tile(home, (_ANGLES, 1))
     poses[:, 3] = angles = np.linspace(-np.pi, np.pi, _ANGLES)
-    return Orientations(angles, numeric(robot, "regularity")(poses), singular_orientations(robot))
+    measure = np.abs(numeric(robot, "type_ii")(poses)[0])
+    return Orientations(angles, measure, singular_orientations(robot))

@@ -58,12 +58,12 @@ def dense_operations(base: BaseParameters, kept: Sequence[int]) -> int:
     """Return the operations of Eq. (15) for some of its columns, every matrix taken as full.
 
     A product (a, b) (b, c) counts a c (2 b - 1), an elimination with c right sides about
-    2 m^3 / 3 + 2 m^2 c. Columns are the sliders', those of the links, and four of the platform.
+    2 m^3 / 3 + 2 m^2 c. A leg's body that is a mass alone has a Jacobian of one row, other bodies
+    one of six; the platform's columns need no product.
     """
     m: int = base.robot.freedom
-    platform: int = base.selection.shape[0] - 4
-    sliders = sum(k < m for k in kept)
-    links = sum(m <= k < platform for k in kept)
-    products = m * sliders * (2 * m - 1) + m * links * (2 * 6 - 1)
+    own = [parameter for parameter in (base.parameters[k] for k in kept) if parameter.legs]
+    alone = sum(base.robot.legs[p.legs[0] - 1].bodies[p.body].kinds == ("m",) for p in own)
+    products = m * alone * (2 * m - 1) + m * (len(own) - alone) * (2 * 6 - 1)
     elimination = round(2.0 * m * m * m / 3.0) + 2 * m * m * len(kept)
     return products + elimination + m * (2 * len(kept) - 1)

@@ -73,20 +73,21 @@ def checked_folder(path: str | Path) -> Path:
 
 def numbers(report: Report) -> dict[str, Any]:
     """Return the numbers of a report as plain data in SI units and radians."""
-    robot, cycle, ranges = report.robot, report.cycle, report.sliders
+    robot, cycle, ranges = report.robot, report.cycle, report.joints
     orientations = report.orientations
     return {
         "robot": robot.name,
         "motion": robot.platform.motion,
         "coordinates": list(robot.coordinates),
+        "joints": [vars(leg.joint) for leg in robot.legs],
         "elbows": [leg.elbow for leg in robot.legs],
         "gravity": list(robot.gravity),
         "doubts": list(report.doubts),
         "home": {
             "pose": report.home.tolist(),
-            "elbow_sines": report.reserve.elbow_sines.tolist(),
-            "regularity": float(report.reserve.regularity),
-            "slider_clearances": report.reserve.slider_clearances.tolist(),
+            "type_i": report.reserve.type_i.tolist(),
+            "type_ii": float(report.reserve.type_ii),
+            "clearances": report.reserve.clearances.tolist(),
             "reserve": float(report.reserve.smallest),
             "jacobian": report.jacobian.matrix.tolist(),
             "condition_number": report.jacobian.condition,
@@ -112,8 +113,8 @@ def numbers(report: Report) -> dict[str, Any]:
             "forces": report.forces.tolist(),
             "peak_forces": report.peak_forces.tolist(),
             "rms_forces": report.rms_forces.tolist(),
-            "peak_slider_speeds": report.peak_speeds.tolist(),
-            "sliders": {
+            "peak_speeds": report.peak_speeds.tolist(),
+            "joints": {
                 "least": ranges.least.tolist(),
                 "greatest": ranges.greatest.tolist(),
                 "limits": [None if limits is None else list(limits) for limits in ranges.limits],
