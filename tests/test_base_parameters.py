@@ -311,8 +311,8 @@ def test_unknown_choices_are_refused():
     robot = pteron.load("quadrupteron")
     with pytest.raises(pteron.ModelError, match="method: 'lu'"):
         pteron.base_parameters(robot, "lu")
-    with pytest.raises(pteron.ModelError, match="form: 'html'"):
-        pteron.base_parameters(robot).expressions("html")
+    with pytest.raises(pteron.ModelError, match="form: 'word'"):
+        pteron.base_parameters(robot).expressions("word")
     with pytest.raises(pteron.ModelError, match='use method="exact"'):
         pteron.base_parameters(robot, "svd").expressions(symbols=True)
     other = pteron.base_parameters(pteron.load("tripteron"))

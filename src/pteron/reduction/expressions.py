@@ -1,17 +1,22 @@
-"""Base parameters as text, SymPy and LaTeX."""
+"""Base parameters as text, SymPy, LaTeX and HTML."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
 from sympy import Add, Float, Integer, Mul, Rational, Symbol, factor, latex
+from sympy.printing.str import StrPrinter
 
 from pteron.bodies.parameters import Parameter
 from pteron.reduction.grouping import Share, Shares
 
 Terms = Mapping[int, Share]
+
+_MINUS = "\u2212"
+_NARROW = "\u202f"
 
 _FACTORED = 60
 """Operations up to which a share is factored, to be read; longer ones only cost minutes."""
@@ -23,30 +28,68 @@ def terms_of(kept: int, given: Shares) -> dict[int, Share]:
     return own | {j: given[j][kept] for j in sorted(given) if given[j].get(kept, 0) != 0}
 
 
-def as_text(names: Sequence[str], terms: Terms, digits: int) -> str:
+def as_text(columns: Sequence[Parameter], terms: Terms, digits: int) -> str:
     """Return a base parameter such as ``m_p1 + m_u1 + 20.11 I_l1``."""
+
+    def product(column: int, share: Share) -> tuple[bool, str]:
+        minus, size = _written(share, digits, str)
+        size = size.replace("**", "^")
+        return minus, f"{size} {columns[column].name}" if size else columns[column].name
+
+    return _sum(terms, product)
+
+
+def as_html(columns: Sequence[Parameter], terms: Terms, digits: int) -> str:
+    """Return a base parameter in HTML, in the paper's notation; each term stays on one line."""
+
+    def product(column: int, share: Share) -> tuple[bool, str]:
+        minus, size = _written(share, digits, html_share)
+        name = html_name(columns[column])
+        gap = " " if _is_symbolic(share) else _NARROW
+        return minus, f"{size}{gap}{name}" if size else name
+
+    return _sum(terms, product).replace("-", _MINUS)
+
+
+def as_latex(columns: Sequence[Parameter], terms: Terms, digits: int) -> str:
+    """Return a base parameter in LaTeX, in the paper's notation."""
+
+    def product(column: int, share: Share) -> tuple[bool, str]:
+        if _is_symbolic(share):
+            minus, value = _signed(share)
+            size = latex(value, symbol_names=_geometry_names(share))
+            size = rf"\left({size}\right)" if value.is_Add or size.startswith("-") else size
+        else:
+            minus, size = _written(share, digits, str)
+        name = _latex_name(columns[column])
+        return minus, f"{size}\\, {name}" if size else name
+
+    return _sum(terms, product)
+
+
+def _sum(terms: Terms, product: Callable[[int, Share], tuple[bool, str]]) -> str:
+    """Return a sum whose terms are signs and products."""
     text = ""
     for column, share in terms.items():
-        value, exact = _plain(share)
-        rounded = f"{abs(value):.{digits}g}"
-        size = f"({exact.lstrip('-')}) " if exact else "" if rounded == "1" else f"{rounded} "
-        minus = exact.startswith("-") if exact else value < 0
-        joint = ("- " if minus else "+ ") if text else ("-" if minus else "")
-        text += f" {joint}{size}{names[column]}" if text else f"{joint}{size}{names[column]}"
+        minus, term = product(column, share)
+        joint = (" - " if minus else " + ") if text else ("-" if minus else "")
+        text += joint + term
     return text
 
 
-def _plain(share: Share) -> tuple[float, str]:
-    """Return a share's value, and its text where it holds geometric symbols."""
+def _written(share: Share, digits: int, write: Callable[[Any], str]) -> tuple[bool, str]:
+    """Return a share's sign and size: empty for one, in brackets where it holds symbols."""
     if not _is_symbolic(share):
-        return float(share), ""
-    minus, size = _signed(share)
-    top, bottom = size.as_numer_denom()
-    # A sum needs brackets under a sign or over a denominator, and must not show its own sign.
-    text = f"({top})" if top.is_Add else str(top)
+        value = float(share)
+        size = f"{abs(value):.{digits}g}"
+        return value < 0, "" if size == "1" else size
+    minus, quotient = _signed(share)
+    top, bottom = quotient.as_numer_denom()
+    # A sum needs brackets under a sign or over a denominator.
+    text = f"({write(top)})" if top.is_Add else write(top)
     if bottom != 1:
-        text += f"/({bottom})" if bottom.is_Mul or bottom.is_Add else f"/{bottom}"
-    return 0.0, ("-" if minus else "") + text.replace("**", "^")
+        text += f"/({write(bottom)})" if bottom.is_Mul or bottom.is_Add else f"/{write(bottom)}"
+    return minus, f"({text})"
 
 
 def _is_symbolic(share: Share) -> bool:
@@ -65,26 +108,6 @@ def as_sympy(names: Sequence[str], terms: Terms) -> Any:
     return Add(*(Mul(_sympified(share), Symbol(names[j])) for j, share in terms.items()))
 
 
-def as_latex(columns: Sequence[Parameter], terms: Terms, digits: int) -> str:
-    """Return a base parameter in LaTeX, in the paper's notation."""
-    text = ""
-    for column, share in terms.items():
-        if _is_symbolic(share):
-            minus, value = _signed(share)
-            size = latex(value, symbol_names=_geometry_names(share))
-            size = rf"\left({size}\right)" if value.is_Add or size.startswith("-") else size
-        else:
-            value = float(share)
-            rounded = f"{abs(value):.{digits}g}"
-            size = "" if rounded == "1" else rounded
-            minus = value < 0
-        joint = ("- " if minus else "+ ") if text else ("-" if minus else "")
-        name = _latex_name(columns[column])
-        body = f"{size}\\, {name}" if size else name
-        text += f" {joint}{body}" if text else f"{joint}{body}"
-    return text
-
-
 def _sympified(share: Share) -> Any:
     if isinstance(share, Fraction):
         return Rational(share.numerator, share.denominator)
@@ -98,6 +121,25 @@ def _latex_name(parameter: Parameter) -> str:
     if parameter.length_power == 1:
         return rf"m_{{{body}}}\gamma_{{{body},{parameter.kind[-1]}}}"
     return f"{parameter.kind}_{{{body}}}"
+
+
+def html_name(parameter: Parameter) -> str:
+    """Return a parameter's name in HTML, as the paper writes it."""
+    body = parameter.body + parameter.suffix
+    if parameter.length_power == 1:
+        return f"<i>m\u03b3</i><sub>{parameter.kind[-1]},{body}</sub>"
+    return f"<i>{parameter.kind}</i><sub>{body}</sub>"
+
+
+class _HtmlPrinter(StrPrinter):  # type: ignore[misc]
+    def _print_Symbol(self, symbol: Any) -> str:  # noqa: N802
+        return f"<i>{symbol.name[0]}</i><sub>{symbol.name[1:]}</sub>"
+
+
+def html_share(share: Any) -> str:
+    """Return an expression of geometric symbols in HTML: lu1 is l with the index u1."""
+    text = _HtmlPrinter().doprint(share)
+    return re.sub(r"\*\*(\d+)", r"<sup>\1</sup>", text).replace("*", _NARROW)
 
 
 def _geometry_names(share: Any) -> dict[Any, str]:

@@ -17,12 +17,12 @@ from pteron.manipulator import Manipulator
 from pteron.manipulator import parameters as values_of
 from pteron.reduction.certificate import Certificate, ExactCertificate
 from pteron.reduction.exact_geometry import exact_geometry
-from pteron.reduction.expressions import as_latex, as_sympy, as_text, terms_of
+from pteron.reduction.expressions import as_html, as_latex, as_sympy, as_text, terms_of
 from pteron.reduction.grouping import Grouping, Shares
 from pteron.reduction.symbols import named_values, symbolic_shares
 from pteron.reduction.transfers import Transfer
 
-Form = Literal["text", "sympy", "latex"]
+Form = Literal["text", "sympy", "latex", "html"]
 
 
 @dataclass(frozen=True)
@@ -146,14 +146,14 @@ class BaseParameters:
 
         Parameters
         ----------
-        form : {"text", "sympy", "latex"}
-            Strings to read, SymPy expressions, or LaTeX.
+        form : {"text", "sympy", "latex", "html"}
+            Strings to read, SymPy expressions, LaTeX, or HTML.
         symbols : bool
             Whether coefficients are written in symbols of the geometry (1/ll1^2, lu1/ll1^2, ...)
             instead of numbers. `geometry_values` says what they stand for; lengths that are equal
             share a symbol. Relations that no mass transfer explains stay numbers.
         digits : int
-            Significant digits of numbers in text and LaTeX; SymPy keeps fractions exact.
+            Significant digits of numbers; SymPy keeps fractions exact.
 
         Returns
         -------
@@ -170,9 +170,8 @@ class BaseParameters:
         sums = [terms_of(column, shares) for column in self.kept]
         if form == "sympy":
             return tuple(as_sympy(self.columns, terms) for terms in sums)
-        if form == "latex":
-            return tuple(as_latex(self.parameters, terms, digits) for terms in sums)
-        return tuple(as_text(self.columns, terms, digits) for terms in sums)
+        write = {"text": as_text, "latex": as_latex, "html": as_html}[form]
+        return tuple(write(self.parameters, terms, digits) for terms in sums)
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything as plain data, fractions as text."""
