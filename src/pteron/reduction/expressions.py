@@ -43,8 +43,8 @@ def as_html(columns: Sequence[Parameter], terms: Terms, digits: int) -> str:
     """Return a base parameter in HTML, in the paper's notation; each term stays on one line."""
 
     def product(column: int, share: Share) -> tuple[bool, str]:
-        minus, size = _written(share, digits, html_share)
-        name = html_name(columns[column])
+        minus, size = _written(share, digits, _html_share)
+        name = _html_name(columns[column])
         gap = " " if _is_symbolic(share) else _NARROW
         return minus, f"{size}{gap}{name}" if size else name
 
@@ -123,7 +123,7 @@ def _latex_name(parameter: Parameter) -> str:
     return f"{parameter.kind}_{{{body}}}"
 
 
-def html_name(parameter: Parameter) -> str:
+def _html_name(parameter: Parameter) -> str:
     """Return a parameter's name in HTML, as the paper writes it."""
     body = parameter.body + parameter.suffix
     if parameter.length_power == 1:
@@ -131,13 +131,18 @@ def html_name(parameter: Parameter) -> str:
     return f"<i>{parameter.kind}</i><sub>{body}</sub>"
 
 
+def html_symbol(name: str) -> str:
+    """Return a geometric symbol in HTML: lu1 is l with the index u1."""
+    return f"<i>{name[0]}</i><sub>{name[1:]}</sub>"
+
+
 class _HtmlPrinter(StrPrinter):  # type: ignore[misc]
     def _print_Symbol(self, symbol: Any) -> str:  # noqa: N802
-        return f"<i>{symbol.name[0]}</i><sub>{symbol.name[1:]}</sub>"
+        return html_symbol(symbol.name)
 
 
-def html_share(share: Any) -> str:
-    """Return an expression of geometric symbols in HTML: lu1 is l with the index u1."""
+def _html_share(share: Any) -> str:
+    """Return an expression of geometric symbols in HTML."""
     text = _HtmlPrinter().doprint(share)
     return re.sub(r"\*\*(\d+)", r"<sup>\1</sup>", text).replace("*", _NARROW)
 

@@ -8,13 +8,17 @@ from typing import Any
 
 import numpy as np
 from markupsafe import Markup, escape
+from matplotlib.figure import Figure
 
 import pteron
+from pteron.bodies.inertia import Inertia
 from pteron.errors import ModelError
 from pteron.kernels import Array
-from pteron.manipulator import parameter_names, parameter_units
+from pteron.legs import LegKind
+from pteron.manipulator import Manipulator
 from pteron.plots import (
     forces_figure,
+    measure_figure,
     outline,
     reach_figure,
     regularity_figure,
@@ -22,8 +26,10 @@ from pteron.plots import (
     svg,
 )
 from pteron.reduction import BaseParameters
+from pteron.reduction.expressions import html_symbol
 from pteron.report.contents import Report
-from pteron.report.typeset import expression, fixed, geometric, resource, template, triple
+from pteron.report.joints import coordinate, force, nouns, speed
+from pteron.report.typeset import fixed, resource, template, triple
 
 _FRAMES = 120
 """Frames of the moving picture; it repeats, so that the cycle's last sample is left out."""
@@ -37,10 +43,11 @@ _LONGEST = 200
 def page(report: Report) -> str:
     """Return the page of a report, as HTML without any reference to another file or address."""
     robot = report.robot
-    units = dict(zip(parameter_names(robot), parameter_units(robot), strict=True))
+    joints = [leg.joint for leg in robot.legs]
     made = template(
         "page.html.j2",
         degrees=lambda angle, places=1: fixed(float(np.degrees(angle)), places),
+        lettered=lettered,
         mm=lambda metres, places=1: fixed(1e3 * float(metres), places),
         signed=lambda text: re.sub(r"(?<![\w.-])-(?=\d)", "\u2212", text),
         triple=triple,
@@ -54,9 +61,19 @@ def page(report: Report) -> str:
         robot=robot,
         cycle=report.cycle,
         legs=range(len(robot.legs)),
+        kinds=kinds(robot),
+        geometry=geometry(robot),
+        bodies=bodies(robot),
+        letters=_letters(robot),
+        reasons=_reasons(robot),
+        coordinate=coordinate(joints),
+        force=force(joints),
+        speed=speed(joints),
+        joint=nouns(joints),
         figures=_figures(report),
-        units=[units.get(name, "") for name in report.base.names],
+        units=[report.base.parameters[k].unit for k in report.base.kept],
         values=report.base.values(),
+        sums=[Markup(line) for line in report.base.expressions("html")],
         symbols=in_symbols(report.base),
         version=pteron.__version__,
         style=resource("page.css"),
@@ -65,63 +82,165 @@ def page(report: Report) -> str:
     )
 
 
+def lettered(text: str) -> Markup:
+    """Return an account of a leg with its vectors bold and its Greek letters Greek."""
+    safe = str(escape(text)).replace(" . ", " \u00b7 ").replace(" - ", " \u2212 ")
+    safe = safe.replace("rho", "\u03c1").replace("theta", "\u03b8")
+    safe = re.sub(r"(?<![;'])\b([rdekps])\b", r"<b>\1</b>", safe)
+    return Markup(re.sub(r"\bs0\b", "<b>s</b><sub>0</sub>", safe))
+
+
+def kinds(robot: Manipulator) -> list[tuple[LegKind, list[int]]]:
+    """Return one leg of each kind, and the legs of that kind, from 1."""
+    found: dict[str, list[int]] = {}
+    for i, leg in enumerate(robot.legs, start=1):
+        found.setdefault(leg.type, []).append(i)
+    return [(robot.legs[members[0] - 1], members) for members in found.values()]
+
+
+def geometry(robot: Manipulator) -> list[tuple[str, bool, list[str]]]:
+    """Return the columns of the legs' geometry: heading, whether of numbers, a text for each leg.
+
+    Points and lengths are in mm; what a leg has not is a dash.
+    """
+    roles = {
+        **{q.name: q.role for leg in robot.legs for q in leg.quantities if hasattr(leg, q.name)},
+        "platform_point": "platform point",
+    }
+    order = ("point", "direction", "normal", "platform point", "length", "angle")
+    columns = []
+    shown = [name for name, role in roles.items() if role in order]
+    for name in sorted(shown, key=lambda name: order.index(roles[name])):
+        role, texts = roles[name], []
+        for leg in robot.legs:
+            given = {q.name: q.value for q in leg.quantities}.get(name)
+            value = getattr(leg, name, None)
+            value = given if value is None else value
+            if value is None:
+                texts.append("\u2013")
+            elif role in ("length", "angle"):
+                texts.append(fixed((1e3 if role == "length" else 1.0) * float(np.ravel(value)[0])))
+            else:
+                texts.append(triple(value, 1e3 if "point" in role else 1.0))
+        columns.append((name.replace("_", " "), role in ("length", "angle"), texts))
+    return columns
+
+
+def bodies(robot: Manipulator) -> list[tuple[str, int | None, dict[str, float]]]:
+    """Return every body: its name, its leg, from 0, and its mass, centre of mass and moment I."""
+    found: list[tuple[str, int | None, Inertia]] = [
+        (leg.names[letter], i, inertia)
+        for i, leg in enumerate(robot.legs)
+        for letter, inertia in leg.bodies.items()
+    ]
+    rows: list[tuple[str, int | None, dict[str, float]]] = []
+    for name, i, inertia in (*found, ("platform", None, robot.platform.inertia)):
+        values = dict(zip(inertia.kinds, inertia.values, strict=True))
+        centers = {k: values[k] / values["m"] for k in ("mgx", "mgy") if k in values}
+        rows.append((name, i, values | centers))
+    return rows
+
+
+def _letters(robot: Manipulator) -> list[tuple[str, str]]:
+    """Return what the letters of the legs' bodies stand for."""
+    found: dict[str, list[str]] = {}
+    for leg in robot.legs:
+        for letter in leg.bodies:
+            found.setdefault(letter, []).append(leg.names[letter])
+    return [(letter, " or ".join(dict.fromkeys(names))) for letter, names in found.items()]
+
+
+def _reasons(robot: Manipulator) -> list[str]:
+    """Return why parameters group, as the legs and the platform have it."""
+    own = [transfer.reason for leg in robot.legs for transfer in leg.transfers(robot.gravity)]
+    rides = [
+        f"{leg.names[letter]} and platform carry the platform point"
+        for leg in robot.legs
+        for letter in leg.equations_class.rides
+    ]
+    return list(dict.fromkeys(reason.format("") for reason in (*own, *rides)))
+
+
 def _figures(report: Report) -> dict[str, Any]:
-    """Return the pictures as SVG: `robot`, `forces`, three of `reach`, and `regularity`."""
+    """Return the pictures as SVG.
+
+    `robot`, `forces`, three of `reach`; and `orientations`, or two of `measures`, or neither.
+    """
     robot, cycle, at = report.robot, report.cycle, report.orientations
     gravity = np.array(robot.gravity)
     path = cycle.pose[: len(cycle.time) // 2 + 1, :3]
     machine = robot_figure(
         report.home_points,
-        report.rails,
+        report.guides,
         gravity=gravity if gravity.any() else None,
         path=path,
         angle=f"φ = {fixed(float(np.degrees(report.home[3])), 0)}°" if robot.platform.turns else "",
     )
-    forces = forces_figure(cycle.time, report.forces, turning_point=cycle.duration / 2.0)
-    reach = []
-    for cut in report.slices:
-        title = f"Positions in reach in the {cut.plane[0]}-{cut.plane[1]} plane"
-        figure = reach_figure(cut, path=path)
-        reach.append(Markup(svg(figure, name=f"reach{cut.plane}", title=title)))
-    regularity = None
+    label = f"actuator {force([leg.joint for leg in robot.legs]).axis}"
+    half = cycle.duration / 2.0
+    forces = forces_figure(cycle.time, report.forces, turning_point=half, ylabel=label)
+    made: dict[str, Any] = {
+        "robot": _inline(machine, "robot", f"{robot.name} in its home pose"),
+        "forces": _inline(forces, "forces", "Actuator forces over the pick-and-place cycle"),
+        "reach": [
+            _inline(
+                reach_figure(cut, path=path),
+                f"reach{cut.plane}",
+                f"Positions in reach in the {cut.plane[0]}-{cut.plane[1]} plane",
+            )
+            for cut in report.slices
+        ],
+    }
     if at is not None:
         turns = cycle.pose[:, 3]
         used, home = (float(turns.min()), float(turns.max())), float(report.home[3])
-        figure = regularity_figure(at.angles, at.regularity, at.singular, home=home, used=used)
-        title = "Determinant of the Jacobian over the orientation"
-        regularity = Markup(svg(figure, name="regularity", title=title))
-    title = "Actuator forces over the pick-and-place cycle"
-    return {
-        "robot": Markup(svg(machine, name="robot", title=f"{robot.name} in its home pose")),
-        "forces": Markup(svg(forces, name="forces", title=title)),
-        "reach": reach,
-        "regularity": regularity,
-    }
+        figure = regularity_figure(at.angles, at.type_ii, at.singular, home=home, used=used)
+        title = "The type-II measure over the orientation"
+        made["orientations"] = _inline(figure, "orientations", title)
+    if report.measures is not None:
+        cut = report.measures.cut
+        made["measures"] = [
+            _inline(
+                measure_figure(cut, measure, path=path),
+                f"measure{name}",
+                f"The type-{name} measure in the {cut.plane[0]}-{cut.plane[1]} plane",
+            )
+            for name, measure in (("I", report.measures.type_i), ("II", report.measures.type_ii))
+        ]
+    return made
+
+
+def _inline(figure: Figure, name: str, title: str) -> Markup:
+    return Markup(svg(figure, name=name, title=title))
 
 
 def scene(report: Report) -> dict[str, Any]:
     """Return the machine and the frames of its motion as plain lists.
 
-    Everything is in the base frame, in m, rad, s and N.
+    Everything is in the base frame, in m, rad, s, N and N m; a leg's `chains` in a frame are the
+    points of its line, a `guide` the way of its slider or of its crank's end.
     """
     cycle, points = report.cycle, report.points
     step = (len(cycle.time) - 1) // _FRAMES
     frames = slice(0, _FRAMES * step, step)
+    lines = [_plain(line[frames]) for line in points.links]
+    shown = coordinate([leg.joint for leg in report.robot.legs])
     return {
         "up": _plain(cycle.up),
         "gravity": any(report.robot.gravity),
         "duration": round(cycle.duration, _DECIMALS),
-        "rails": _plain(report.rails),
-        "directions": _plain(np.array([leg.e for leg in report.robot.legs])),
+        "guides": [_plain(guide.path) for guide in report.guides],
+        "slides": [guide.slides for guide in report.guides],
+        "directions": _plain(np.array([guide.axis for guide in report.guides])),
         "outline": outline(report.home_points),
         "time": _plain(cycle.time[frames]),
         "pose": _plain(cycle.pose[frames]),
         "axes": _plain(points.axes[frames]),
-        "sliders": _plain(points.sliders[frames]),
-        "elbows": _plain(points.elbows[frames]),
-        "platform": _plain(points.platform_points[frames]),
+        "chains": [list(legs) for legs in zip(*lines, strict=True)],
         "coordinates": _plain(points.coordinates[frames]),
+        "factors": shown.factors,
         "forces": _plain(report.forces[frames]),
+        "units": [leg.joint.force_unit for leg in report.robot.legs],
     }
 
 
@@ -140,9 +259,12 @@ def in_symbols(base: BaseParameters) -> dict[str, list[Any]] | None:
         return None
     if max(map(len, lines)) > _LONGEST:
         return None
-    used = set(re.findall(r"\b(?:l[ul]\d|s\d[xy])\b", " ".join(lines)))
-    values = base.geometry_values.items()
+    used = {s.name for line in base.expressions("sympy", symbols=True) for s in line.free_symbols}
     return {
-        "sums": [geometric(expression(line)) for line in lines],
-        "lengths": [(geometric(escape(name)), value) for name, value in values if name in used],
+        "sums": [Markup(line) for line in base.expressions("html", symbols=True)],
+        "lengths": [
+            (Markup(html_symbol(name)), value)
+            for name, value in base.geometry_values.items()
+            if name in used
+        ],
     }

@@ -8,7 +8,7 @@
   document.documentElement.classList.add("scripted");
   const play = document.getElementById("play"), seek = document.getElementById("seek");
   const clock = document.getElementById("clock"), pace = document.getElementById("pace");
-  const frames = data.time.length, legs = data.rails.length;
+  const frames = data.time.length, legs = data.guides.length;
   const calm = window.matchMedia("(prefers-reduced-motion: reduce)");
 
   const add = (a, b, t = 1) => [a[0] + t * b[0], a[1] + t * b[1], a[2] + t * b[2]];
@@ -22,12 +22,17 @@
   const basis = [side, cross(up, side), up];
   const upright = (p) => basis.map((axis) => dot(axis, p));
   const deep = (value) => (typeof value[0] === "number" ? upright(value) : value.map(deep));
-  const rails = deep(data.rails), directions = deep(data.directions), axes = deep(data.axes);
-  const sliders = deep(data.sliders), elbows = deep(data.elbows), platform = deep(data.platform);
+  const guides = deep(data.guides), directions = deep(data.directions), axes = deep(data.axes);
+  // Of each frame and leg, the points where its bodies meet, from the slider or the crank's centre.
+  const chains = deep(data.chains), slides = data.slides;
+  const first = chains.map((lines) => lines.map((chain) => chain[0]));
+  const platform = chains.map((lines) => lines.map((chain) => chain[chain.length - 1]));
   const position = data.pose.map((pose) => upright(pose.slice(0, 3)));
   const baseAxes = deep([[1, 0, 0], [0, 1, 0], [0, 0, 1]]);
 
-  const cloud = rails.flat().concat(sliders.flat(), elbows.flat(), platform.flat());
+  const rails = guides.filter((_, i) => slides[i]);
+  const base = first[0].filter((_, i) => !slides[i]);
+  const cloud = rails.flat().concat(chains.flat(2));
   const low = [0, 1, 2].map((k) => Math.min(...cloud.map((p) => p[k])));
   const high = [0, 1, 2].map((k) => Math.max(...cloud.map((p) => p[k])));
   const size = Math.max(...[0, 1, 2].map((k) => high[k] - low[k]));
@@ -35,7 +40,9 @@
   const gridLow = [0, 1].map((k) => Math.floor(low[k] / step) * step);
   const gridHigh = [0, 1].map((k) => Math.ceil(high[k] / step) * step);
   const center = [(gridLow[0] + gridHigh[0]) / 2, (gridLow[1] + gridHigh[1]) / 2, (floor + high[2]) / 2];
-  const peak = Math.max(1e-9, ...data.forces.flat().map(Math.abs));
+  // Bars of one unit share a scale.
+  const peaks = data.units.map((unit) =>
+    Math.max(1e-9, ...data.forces.flatMap((row) => row.filter((_, i) => data.units[i] === unit).map(Math.abs))));
 
   const start = { yaw: -0.95, pitch: 0.4, zoom: 1 };
   const camera = { ...start };
@@ -72,7 +79,7 @@
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     // The size that holds the machine from any side, at the pitch it starts with.
     const corners = [gridLow, [gridLow[0], gridHigh[1]], gridHigh, [gridHigh[0], gridLow[1]]].map((p) => [...p, floor]);
-    const outer = rails.flat().concat(sliders[0], elbows[0], corners);
+    const outer = rails.flat().concat(chains[0].flat(), corners);
     let wide = 0, top = 0, bottom = 0;
     for (let turn = 0; turn < 12; turn++) {
       for (const p of outer) {
@@ -163,10 +170,10 @@
     const drop = (p) => [p[0], p[1], floor];
     pen.lineJoin = "round"; pen.lineCap = "round"; pen.strokeStyle = colors.shade; pen.fillStyle = colors.shade;
     for (let i = 0; i < legs; i++) {
-      path([sliders[k][i], elbows[k][i], platform[k][i]].map(drop));
-      pen.lineWidth = Math.max(2, 0.016 * size * pixel(drop(elbows[k][i]))[3]); pen.stroke();
-      path(rails[i].map(drop)); pen.lineWidth = 2; pen.stroke();
+      path(chains[k][i].map(drop));
+      pen.lineWidth = Math.max(2, 0.016 * size * pixel(drop(platform[k][i]))[3]); pen.stroke();
     }
+    for (const rail of rails) { path(rail.map(drop)); pen.lineWidth = 2; pen.stroke(); }
     path(data.outline.map((i) => drop(platform[k][i]))); pen.closePath(); pen.fill();
   }
 
@@ -180,14 +187,20 @@
       items.push([depth - nearer * size, run]);
     };
     for (let i = 0; i < legs; i++) {
-      const color = colors.legs[i], a = sliders[k][i], b = elbows[k][i], c = platform[k][i];
-      // In two halves, split at the slider: a long rail has no one distance.
-      for (const end of rails[i]) put([end, a], () => line(end, a, colors.rail, Math.max(2.5, 0.011 * size * pixel(end)[3])), -0.02);
-      put([a], () => solid(box(a, directions[i], [0.036 * size, 0.02 * size, 0.02 * size]), color));
-      put([a, b], () => rod(a, b, color, 0.022 * size));
-      put([b, c], () => rod(b, c, color, 0.015 * size));
-      for (const p of [a, b, c]) put([p], () => ball(p, color, 0.011 * size), 0.012);
+      const color = colors.legs[i], chain = chains[k][i], a = chain[0];
+      if (slides[i]) {
+        // In two halves, split at the slider: a long rail has no one distance.
+        for (const end of guides[i]) put([end, a], () => line(end, a, colors.rail, Math.max(2.5, 0.011 * size * pixel(end)[3])), -0.02);
+        put([a], () => solid(box(a, directions[i], [0.036 * size, 0.02 * size, 0.02 * size]), color));
+      } else {
+        guides[i].slice(1).forEach((p, j) => { if (j % 2) put([p], () => line(guides[i][j], p, colors.rail, 1.2), -0.02); });
+        const axle = [-0.035, 0.035].map((t) => add(a, directions[i], t * size));
+        put([a], () => line(...axle, colors.rail, Math.max(3, 0.026 * size * pixel(a)[3])), -0.01);
+      }
+      chain.slice(1).forEach((p, j) => put([chain[j], p], () => rod(chain[j], p, color, (j ? 0.015 : 0.022) * size)));
+      for (const p of chain) put([p], () => ball(p, color, 0.011 * size), 0.012);
     }
+    if (base.length > 1) put(base, () => face(base, colors.rail, 0.25), -0.03);
     const plate = data.outline.map((i) => platform[k][i]);
     put(plate, () => solid(prism(plate, axes[k][2], 0.014 * size), colors.reach, 0.85));
     for (const corner of plate) put([position[k], corner], () => line(position[k], corner, colors.reach, Math.max(2, 0.009 * size * pixel(corner)[3])));
@@ -198,7 +211,8 @@
     const p = position[k];
     axes[k].forEach((axis, j) => line(p, add(p, axis, (j < 2 ? 0.1 : 0.07) * size), colors.ink, 1.6));
     for (let i = 0; i < legs; i++) {
-      const a = pixel(sliders[k][i]), ahead = pixel(add(sliders[k][i], directions[i], 0.1)), from = pixel(p);
+      const at = first[k][i], along = slides[i] ? directions[i] : unit(add(chains[k][i][1], at, -1));
+      const a = pixel(at), ahead = pixel(add(at, along, 0.1)), from = pixel(p);
       const across = unit([a[1] - ahead[1], ahead[0] - a[0], 0]);
       const sign = across[0] * (a[0] - from[0]) + across[1] * (a[1] - from[1]) < 0 ? -1 : 1;
       const gap = sign * (0.034 * size * a[3] + 11);
@@ -214,10 +228,10 @@
   const put = (id, text) => { document.getElementById(id).textContent = text; };
   function readout(k) {
     for (let i = 0; i < legs; i++) {
-      const force = data.forces[k][i], share = (50 * Math.abs(force)) / peak;
+      const force = data.forces[k][i], share = (50 * Math.abs(force)) / peaks[i];
       const bar = document.getElementById("bar" + i);
       bar.style.width = share + "%"; bar.style.left = (force < 0 ? 50 - share : 50) + "%";
-      put("force" + i, minus(force, 1)); put("rho" + i, minus(1e3 * data.coordinates[k][i], 1));
+      put("force" + i, minus(force, 1)); put("joint" + i, minus(data.factors[i] * data.coordinates[k][i], 1));
     }
     data.pose[k].forEach((value, j) => put("pose" + j, minus(value * (j < 3 ? 1e3 : 180 / Math.PI), 1)));
     put("clock", data.time[k].toFixed(2) + " s");

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from matplotlib.figure import Figure
 import pteron
 from pteron.identification import Identification
 from pteron.identification.result import AT_THE_FLOOR, LARGE, SMALL
+from pteron.legs.leg import ActuatedJoint
 from pteron.plots import (
     autocorrelation_figure,
     certainty_figure,
@@ -24,6 +26,7 @@ from pteron.plots import (
     svg,
 )
 from pteron.report.identification.contents import Contents, Shown, contents
+from pteron.report.identification.names import expression
 from pteron.report.identification.values import measured
 from pteron.report.typeset import resource, significant, template
 
@@ -35,6 +38,7 @@ def page(result: Identification, model_file: str | None = None) -> str:
     """
     made = template(
         "identification/page.html.j2",
+        expression=expression,
         measured=lambda row: measured(row.value, row.half),
         percent=_percent,
         prose=_prose,
@@ -69,13 +73,15 @@ def _percent(share: float) -> str:
 def figures(found: Contents) -> dict[str, Any]:
     """Return the pictures as SVG; those of residuals are None where an estimator keeps none."""
     rows = found.parameters
+    joints = [leg.joint for leg in found.result.robot.legs]
     names = [row.name for row in rows]
     ratios, weak = np.array([row.ratio for row in rows]), np.array([row.weak for row in rows])
     made: dict[str, Any] = {
         "held_out": [
-            _panels(one, f"held{k}", speed=k == 1) for k, one in enumerate(found.drawn, start=1)
+            _panels(one, f"held{k}", joints, speed=k == 1)
+            for k, one in enumerate(found.drawn, start=1)
         ],
-        "fitted": _panels(found.fitted[0], "fitted", speed=not found.drawn),
+        "fitted": _panels(found.fitted[0], "fitted", joints, speed=not found.drawn),
         "histogram": None,
         "autocorrelation": None,
         "certainty": _inline(
@@ -100,7 +106,9 @@ def figures(found: Contents) -> dict[str, Any]:
     return made
 
 
-def _panels(shown: Shown, name: str, *, speed: bool) -> dict[str, Any]:
+def _panels(
+    shown: Shown, name: str, joints: Sequence[ActuatedJoint], *, speed: bool
+) -> dict[str, Any]:
     """Return the pictures of one recording; those over speed only where they are asked for."""
     p, part = shown.prediction, shown.stretch
     rest = p.measured - p.predicted
@@ -109,15 +117,17 @@ def _panels(shown: Shown, name: str, *, speed: bool) -> dict[str, Any]:
     for i in range(p.measured.shape[1]):
         given, predicted, rigid = (one[:, i] for one in series)
         used = p.used[part, i]
-        figure = comparison_figure(p.time[part], given, predicted, rigid, used, leg=i)
+        look: Any = {"leg": i, "joint": joints[i]}
+        figure = comparison_figure(p.time[part], given, predicted, rigid, used, **look)
         title = f"Measured and predicted force of actuator {i + 1} in {shown.name}"
         forces.append(_inline(figure, f"{name}forces{i + 1}", title))
         if speed:
-            figure = residual_speed_figure(p.speed[:, i], rest[:, i], p.used[:, i], leg=i)
-            title = f"Residual of actuator {i + 1} over its slider's speed in {shown.name}"
+            over = p.speed[:, i], rest[:, i], p.used[:, i]
+            figure = residual_speed_figure(*over, **look)
+            title = f"Residual of actuator {i + 1} over its joint's speed in {shown.name}"
             over_speed.append(_inline(figure, f"{name}speed{i + 1}", title))
     errors = errors_figure(p.nrms, p.nrms_without_friction, p.floor)
-    time = residual_time_figure(p.time, rest, p.used)
+    time = residual_time_figure(p.time, rest, p.used, joints)
     title = f"Residuals of all actuators over time in {shown.name}"
     return {
         "shown": shown,
