@@ -69,7 +69,7 @@ def measure_figure(cut: ReachSlice, measure: Array, *, path: Array | None = None
 
     The shade deepens with the measure, by tenths; every second line is named.
     """
-    figure = blank(3.9, 3.9)
+    figure = blank(3.9, 0.6 + 3.3 * float(np.ptp(cut.second) / np.ptp(cut.first)))
     axes = plain_axes(figure, f"{cut.plane[0]} (mm)", f"{cut.plane[1]} (mm)")
     axes.grid(visible=False)
     first, second = 1e3 * cut.first, 1e3 * cut.second

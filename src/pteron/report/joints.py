@@ -8,6 +8,7 @@ from math import pi
 
 from pteron.legs.leg import ActuatedJoint
 
+_NARROW = "\u202f"
 _SYMBOLS = {"rho": "\u03c1", "theta": "\u03b8"}
 _SHOWN = {"m": ("mm", 1e3), "rad": ("°", 180.0 / pi)}
 """The unit in which people read it, and how many of it make one."""
@@ -29,7 +30,8 @@ class Quantity:
     @property
     def heading(self) -> str:
         """The name, with the unit if all have the same."""
-        return f"{self.name} ({self.shared})" if self.shared else self.name
+        unit = self.shared.replace(" ", _NARROW)
+        return f"{self.name} ({unit})" if unit else self.name
 
     @property
     def axis(self) -> str:

@@ -121,7 +121,7 @@ def geometry(robot: Manipulator) -> list[tuple[str, bool, list[str]]]:
             elif role in ("length", "angle"):
                 texts.append(fixed((1e3 if role == "length" else 1.0) * float(np.ravel(value)[0])))
             else:
-                texts.append(triple(value, 1e3 if "point" in role else 1.0))
+                texts.append(triple(value, 1e3) if "point" in role else triple(value, digits=3))
         columns.append((name.replace("_", " "), role in ("length", "angle"), texts))
     return columns
 
@@ -158,7 +158,8 @@ def _reasons(robot: Manipulator) -> list[str]:
         for leg in robot.legs
         for letter in leg.equations_class.rides
     ]
-    return list(dict.fromkeys(reason.format("") for reason in (*own, *rides)))
+    still = [] if robot.platform.turns else ["the platform does not turn"]
+    return list(dict.fromkeys(reason.format("") for reason in (*own, *rides, *still)))
 
 
 def _figures(report: Report) -> dict[str, Any]:

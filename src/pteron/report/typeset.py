@@ -45,14 +45,14 @@ def fixed(value: float, places: int = 1) -> str:
     return text.replace("-", _MINUS)
 
 
-def compact(value: float) -> str:
-    """Return a number with at most four significant digits and no needless zeros."""
-    return "0" if abs(value) < 1e-9 else f"{value:.4g}".replace("-", _MINUS)
+def compact(value: float, digits: int = 4) -> str:
+    """Return a number with at most so many significant digits and no needless zeros."""
+    return "0" if abs(value) < 1e-9 else f"{value:.{digits}g}".replace("-", _MINUS)
 
 
-def triple(values: Iterable[float], factor: float = 1.0) -> str:
+def triple(values: Iterable[float], factor: float = 1.0, digits: int = 4) -> str:
     """Return a vector, each component as `compact` has it."""
-    return f"({', '.join(compact(factor * value) for value in values)})"
+    return f"({', '.join(compact(factor * value, digits) for value in values)})"
 
 
 def resource(name: str) -> Markup:

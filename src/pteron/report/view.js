@@ -30,9 +30,8 @@
   const position = data.pose.map((pose) => upright(pose.slice(0, 3)));
   const baseAxes = deep([[1, 0, 0], [0, 1, 0], [0, 0, 1]]);
 
-  const rails = guides.filter((_, i) => slides[i]);
-  const base = first[0].filter((_, i) => !slides[i]);
-  const cloud = rails.flat().concat(chains.flat(2));
+  const rails = guides.filter((_, i) => slides[i]), base = first[0].filter((_, i) => !slides[i]);
+  const cloud = guides.flat().concat(chains.flat(2));
   const low = [0, 1, 2].map((k) => Math.min(...cloud.map((p) => p[k])));
   const high = [0, 1, 2].map((k) => Math.max(...cloud.map((p) => p[k])));
   const size = Math.max(...[0, 1, 2].map((k) => high[k] - low[k]));
@@ -79,7 +78,7 @@
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     // The size that holds the machine from any side, at the pitch it starts with.
     const corners = [gridLow, [gridLow[0], gridHigh[1]], gridHigh, [gridHigh[0], gridLow[1]]].map((p) => [...p, floor]);
-    const outer = rails.flat().concat(chains[0].flat(), corners);
+    const outer = cloud.concat(corners);
     let wide = 0, top = 0, bottom = 0;
     for (let turn = 0; turn < 12; turn++) {
       for (const p of outer) {
