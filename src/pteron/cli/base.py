@@ -68,27 +68,16 @@ def _show(found: BaseParameters, *, symbols: bool) -> None:
         show(*(plain(line) for line in expressions), "", *closing)
         return
     made = table("", "base parameter", "value", "unit", numbers=("", "value"))
-    for i, (line, value, unit) in enumerate(
-        zip(expressions, found.values(), _units(found), strict=True), start=1
+    for i, (line, value, column) in enumerate(
+        zip(expressions, found.values(), found.kept, strict=True), start=1
     ):
-        made.add_row(str(i), plain(line), f"{value:.5g}", unit)
+        made.add_row(str(i), plain(line), f"{value:.5g}", found.parameters[column].unit)
     show(
         f"[bold]{plain(found.robot.name)}[/bold]: {found.rank} base parameters of "
         f"{len(found.columns)} inertial parameters",
         made,
         *closing,
     )
-
-
-def _units(found: BaseParameters) -> list[str]:
-    from pteron.manipulator import parameter_names, parameter_units
-
-    robot = found.robot
-    of_kind = {
-        name.split("_")[0]: unit
-        for name, unit in zip(parameter_names(robot), parameter_units(robot), strict=True)
-    }
-    return [of_kind[name.split("_")[0]] for name in found.names]
 
 
 def _meanings(found: BaseParameters, *, symbols: bool) -> list[str]:

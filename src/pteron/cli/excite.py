@@ -29,17 +29,21 @@ def excite(
     ] = "platform",
     harmonics: Annotated[int, option("harmonics", "How many.")] = 5,
     period: Annotated[float, option("period", "In s.")] = 5.0,
-    speed: Annotated[float, option("speed", "The sliders' limit, m/s.")] = 1.0,
-    acceleration: Annotated[float, option("acceleration", "The sliders' limit, m/s^2.")] = 10.0,
+    speed: Annotated[float, option("speed", "The joints' limit, m/s or rad/s.")] = 1.0,
+    acceleration: Annotated[
+        float, option("acceleration", "The joints' limit, the same per s.")
+    ] = 10.0,
     force: Annotated[
         float | None,
-        option("force", "The actuators' limit, N; none if left out.", show_default=False),
+        option("force", "The actuators' limit, N or N m; none if left out.", show_default=False),
     ] = None,
     elbow_sine: Annotated[float, option("elbow-sine", "Least sine of every elbow's angle.")] = 0.25,
     regularity: Annotated[
         float, option("regularity", "Least abs(det J), of its largest value.")
     ] = 0.3,
-    clearance: Annotated[float, option("clearance", "Of the sliders from their ends, m.")] = 0.005,
+    clearance: Annotated[
+        float, option("clearance", "Of the joints from their limits, m or rad.")
+    ] = 0.005,
     criterion: Annotated[
         Literal["condition", "logdet"], option("criterion", "What is made small.")
     ] = "condition",
@@ -59,7 +63,7 @@ def excite(
 
     It keeps every limit throughout the period, and does not begin at rest. The file has the columns
     t rho1 ... x y z phi and their rates (d..., dd...), and force1 ... by the machine's nominal
-    inertia. The period and the assembly mode go to a TOML file beside it, for the evaluation of the
+    inertia (theta1 ... and torque1 ... of cranks). The period and the assembly mode go to a TOML file beside it, for the evaluation of the
     log.
 
     Ctrl-C ends the search and keeps the best until then.

@@ -36,7 +36,10 @@ Derivatives = Literal["periodic", "central", "spline"]
 def identify(
     logs: Annotated[
         list[str],
-        Argument(metavar="LOG...", help="Recorded motions, .csv or .parquet: t rho1.. force1.."),
+        Argument(
+            metavar="LOG...",
+            help="Recorded motions, .csv or .parquet: t rho1.. force1.. (cranks: theta1.. torque1..)",
+        ),
     ],
     robot: Annotated[str, option("robot", "The machine as it is drawn.", "ROBOT")],
     out: Annotated[str, option("out", "The folder to write it to.", "DIR")],

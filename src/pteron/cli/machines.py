@@ -12,7 +12,8 @@ from pteron.cli.screen import complain, note, plain, show, show_json, spinner, t
 from pteron.errors import ModelError, PteronError
 
 if TYPE_CHECKING:
-    from pteron.manipulator import Leg, Manipulator
+    from pteron.legs import LegKind
+    from pteron.manipulator import Manipulator
 
 _FAULTY = 2
 
@@ -26,9 +27,9 @@ def catalog(json: Json = False) -> None:
     if json:
         show_json(found)
         return
-    made = table("name", "motion", "pose", "legs", "elbows", numbers=("legs",))
+    made = table("name", "motion", "pose", "legs", "elbows")
     for one in found:
-        pose, legs = " ".join(one["coordinates"]), str(one["legs"])
+        pose, legs = " ".join(one["coordinates"]), f"{one['legs']} {' '.join(one['types'])}"
         made.add_row(one["name"], one["motion"], pose, legs, one["working_mode"])
     show(made)
 
@@ -38,6 +39,7 @@ def _machine(robot: Manipulator) -> dict[str, Any]:
         "name": robot.name,
         "motion": robot.platform.motion,
         "coordinates": list(robot.coordinates),
+        "types": list(dict.fromkeys(leg.type for leg in robot.legs)),
         "working_mode": signs(robot),
     }
 
@@ -92,28 +94,30 @@ def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
     }
 
 
-def _leg(leg: Leg) -> dict[str, Any]:
+def _leg(leg: LegKind) -> dict[str, Any]:
     return {
-        "direction": list(leg.direction),
-        "slider_direction": list(leg.e),
-        "upper_length": leg.upper_length,
-        "lower_length": leg.lower_length,
+        "type": leg.type,
+        "joint": leg.joint.noun,
+        "axis": list(leg.joint_axis),
+        "lengths": {q.name: q.value[0] for q in leg.quantities if q.role == "length"},
         "elbow": leg.elbow,
-        "slider_limits": list(leg.slider_limits) if leg.slider_limits else None,
+        "limits": list(leg.limits) if leg.limits else None,
+        "unit": leg.joint.unit,
     }
 
 
 def _show(robot: Manipulator, found: dict[str, Any]) -> None:
-    numbers = ("leg", "upper (m)", "lower (m)")
-    made = table("leg", "direction", "upper (m)", "lower (m)", "slider (m)", numbers=numbers)
+    headings = ("leg", "type", "joint", "its axis", "lengths (m)", "limits")
+    made = table(*headings, numbers=("leg",))
     for i, leg in enumerate(found["legs"], start=1):
-        limits = leg["slider_limits"]
+        limits = leg["limits"]
         made.add_row(
             str(i),
-            _vector(leg["direction"]),
-            f"{leg['upper_length']:g}",
-            f"{leg['lower_length']:g}",
-            "no limits" if limits is None else "{:g} to {:g}".format(*limits),
+            leg["type"],
+            leg["joint"],
+            _vector(leg["axis"], 3),
+            ", ".join(f"{length:g}" for length in leg["lengths"].values()),
+            "none" if limits is None else "{:g} to {:g} {}".format(*limits, leg["unit"]),
         )
     turns = ", ".join(f"{math.degrees(angle):.4g}" for angle in found["singular_orientations"])
     work = "[green]This machine can work.[/green]"
@@ -130,5 +134,5 @@ def _show(robot: Manipulator, found: dict[str, Any]) -> None:
     )
 
 
-def _vector(values: Any) -> str:
-    return f"({', '.join(f'{round(value, 4) + 0.0:g}' for value in values)})"
+def _vector(values: Any, places: int = 4) -> str:
+    return f"({', '.join(f'{round(value, places) + 0.0:g}' for value in values)})"

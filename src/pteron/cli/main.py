@@ -126,7 +126,7 @@ def pteron(
     context: Context,
     version: Annotated[bool, Option("--version", help="Print the version and exit.")] = False,
 ) -> None:
-    """Kinematics, dynamics and base parameters of parallel manipulators (Quadrupteron, Tripteron).
+    """Kinematics, dynamics and base parameters of parallel manipulators (Quadrupteron, Delta, ...).
 
     SI units and radians everywhere.
     """
@@ -146,7 +146,7 @@ _add(report, "pteron report quadrupteron --out report")
 _add(
     inverse,
     "pteron inverse quadrupteron 0.01 0.02 -0.03 0.1",
-    "pteron inverse tripteron --table poses.csv --out sliders.csv",
+    "pteron inverse tripteron --table poses.csv --out joints.csv",
     cls=NumbersCommand,
 )
 _add(

@@ -47,32 +47,37 @@ def inverse(
     on_failure: OnFailure = "raise",
     json: Json = False,
 ) -> None:
-    """Compute the sliders' coordinates at poses.
+    """Compute the joint coordinates at poses.
 
     A table has the columns x y z phi (x y z for 3T); the result has its columns and rho1, rho2, ...
+    of sliders, m, or theta1, theta2, ... of cranks, rad.
     """
     from pteron.kinematics import inverse_kinematics
 
     machine = load_robot(robot)
     columns = machine.coordinates
     rows = given_rows(table, pose, "pose", columns)
-    added = [f"rho{i}" for i in range(1, machine.freedom + 1)]
+    added = machine.joint_names
     check_destination(out, table, rows.table, added)
-    sliders = rows.served(
+    joints = rows.served(
         machine,
         lambda poses: inverse_kinematics(machine, poses, on_failure=on_failure),
         columns,
         on_failure,
     )
-    result = rows.table.extended(dict(zip(added, sliders.T, strict=True)))
-    deliver(result, added, out=out, as_json=json, single=rows.single)
+    result = rows.table.extended(dict(zip(added, joints.T, strict=True)))
+    deliver(machine, result, added, out=out, as_json=json, single=rows.single)
 
 
 def direct(
     robot: Robot,
-    sliders: Annotated[
+    joints: Annotated[
         list[str] | None,
-        Argument(metavar="SLIDERS", help="rho1 rho2 ..., one a leg; m.", show_default=False),
+        Argument(
+            metavar="JOINTS",
+            help="One a leg: rho of a slider, m; theta of a crank, rad.",
+            show_default=False,
+        ),
     ] = None,
     table: TableFile = None,
     out: Out = None,
@@ -80,24 +85,24 @@ def direct(
         Failure | None,
         option(
             "on-failure",
-            "Stop where no pose has the sliders, or leave the row empty; raise for sliders typed "
-            "here, nan for a table.",
+            "Stop where no pose has the joint coordinates, or leave the row empty; raise for those "
+            "typed here, nan for a table.",
             show_default=False,
         ),
     ] = None,
     json: Json = False,
 ) -> None:
-    """Compute every pose that has the sliders' coordinates: all assembly modes.
+    """Compute every pose that has the joint coordinates: all assembly modes.
 
-    A table has the columns rho1, rho2, ...; the result has one row for each real pose, with the
+    A table has the columns rho1, theta2, ... as the machine's joints are; the result has one row for each real pose, with the
     table's row (from 1) and its columns, the assembly mode (from 1) and x y z phi. Where there is
     no real pose, these are empty.
     """
     from pteron.kinematics import direct_kinematics
 
     machine = load_robot(robot)
-    columns = [f"rho{i}" for i in range(1, machine.freedom + 1)]
-    rows = given_rows(table, sliders, "sliders", columns)
+    columns = machine.joint_names
+    rows = given_rows(table, joints, "joints", columns)
     failure: Failure = on_failure or ("raise" if rows.single else "nan")
     added = ["row", "mode", *machine.coordinates]
     check_destination(out, table, rows.table, added)
@@ -109,7 +114,7 @@ def direct(
     )
     result = _modes(rows.table, poses, machine.coordinates)
     shown = added[1:] if rows.single else added
-    deliver(result, shown, out=out, as_json=json)
+    deliver(machine, result, shown, out=out, as_json=json)
 
 
 def _modes(table: Table, poses: NDArray[Any], coordinates: tuple[str, ...]) -> Table:
@@ -155,7 +160,7 @@ def forces(
 
     A table has the columns x y z phi dx dy dz dphi ddx ddy ddz ddphi (3T: without the angles) and,
     if a wrench acts on the platform, fx fy fz mk (3T: fx fy fz); the result has its columns and
-    force1, force2, ...
+    force1, force2, ... of sliders, N, or torque1, torque2, ... of cranks, N m.
     """
     from pteron.dynamics import inverse_dynamics
 
@@ -171,7 +176,7 @@ def forces(
     else:
         rows = _typed_row(typed, motion, loads)
     columns = [*motion, *(loads if set(loads) & set(rows.table.columns) else ())]
-    added = [f"force{i}" for i in range(1, m + 1)]
+    added = machine.force_names
     check_destination(out, table, rows.table, added)
 
     def serve(values: NDArray[Any]) -> NDArray[Any]:
@@ -180,7 +185,7 @@ def forces(
 
     found = rows.served(machine, serve, columns, on_failure)
     result = rows.table.extended(dict(zip(added, found.T, strict=True)))
-    deliver(result, added, out=out, as_json=json, single=rows.single)
+    deliver(machine, result, added, out=out, as_json=json, single=rows.single)
 
 
 def _typed_row(typed: list[str | None], motion: list[str], loads: tuple[str, ...]) -> Rows:

@@ -37,7 +37,7 @@ def report(
         cycle = {key: value for key, value in found["cycle"].items() if key not in _SERIES}
         show_json({"page": str(page), **found, "cycle": cycle})
         return
-    show(_machine(found), _legs(found["cycle"]), _costs(found["costs"]))
+    show(_machine(found), _legs(found["cycle"], found["joints"]), _costs(found["costs"]))
     show(f"Written to {plain(str(page))}")
 
 
@@ -55,12 +55,13 @@ def _machine(found: dict[str, Any]) -> Table:
     return made
 
 
-def _legs(cycle: dict[str, Any]) -> Table:
-    headings = ("leg", "peak force (N)", "RMS (N)", "peak speed (m/s)")
+def _legs(cycle: dict[str, Any], joints: list[dict[str, str]]) -> Table:
+    headings = ("leg", "peak force", "RMS force", "peak speed")
     made = table(*headings, numbers=headings)
-    columns = (cycle[key] for key in ("peak_forces", "rms_forces", "peak_slider_speeds"))
-    for i, values in enumerate(zip(*columns, strict=True), start=1):
-        made.add_row(str(i), *(f"{value:.3f}" for value in values))
+    columns = (cycle[key] for key in ("peak_forces", "rms_forces", "peak_speeds"))
+    for i, (peak, rms, speed) in enumerate(zip(*columns, strict=True), start=1):
+        force, rate = joints[i - 1]["force_unit"], f"{joints[i - 1]['unit']}/s"
+        made.add_row(str(i), f"{peak:.3f} {force}", f"{rms:.3f} {force}", f"{speed:.3f} {rate}")
     return made
 
 

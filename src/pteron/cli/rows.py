@@ -24,8 +24,7 @@ LONG = 200_000
 SHOWN_ROWS = 40
 """More rows than that are no reading for a person."""
 
-_UNITS = {"row": "", "mode": "", "phi": "rad"}
-_DECIMALS = {"m": 6, "rad": 6, "N": 4}
+_DECIMALS = {"m": 6, "rad": 6, "N": 4, "N m": 4}
 
 
 @dataclass(frozen=True)
@@ -150,7 +149,13 @@ def check_destination(
 
 
 def deliver(
-    result: Table, shown: Sequence[str], *, out: str | None, as_json: bool, single: bool = False
+    robot: Manipulator,
+    result: Table,
+    shown: Sequence[str],
+    *,
+    out: str | None,
+    as_json: bool,
+    single: bool = False,
 ) -> None:
     """Write a result with all its columns to a file or a program, or show some to a person.
 
@@ -172,7 +177,7 @@ def deliver(
         write(text[1:-1] if single else text)
         write("\n")
     elif is_terminal():
-        _show(result, shown, single=single)
+        _show(robot, result, shown, single=single)
     else:
         for text in result.text():
             write(text)
@@ -180,9 +185,10 @@ def deliver(
             note(f"Printed {_count(len(result))}{without}")
 
 
-def _show(result: Table, shown: Sequence[str], *, single: bool) -> None:
+def _show(robot: Manipulator, result: Table, shown: Sequence[str], *, single: bool) -> None:
     """Print the first rows for a person, with units."""
-    units = [_UNITS.get(name, "N" if name.startswith("force") else "m") for name in shown]
+    known = column_units(robot)
+    units = [known.get(name, "") for name in shown]
     headings = [f"{n} ({unit})" if unit else n for n, unit in zip(shown, units, strict=True)]
     numbered = ["row"] if not single and "mode" not in shown else []
     made = table(*numbered, *headings, numbers=("row", *headings))
@@ -193,6 +199,16 @@ def _show(result: Table, shown: Sequence[str], *, single: bool) -> None:
     show(made)
     if len(result) > SHOWN_ROWS:
         note(f"{SHOWN_ROWS} of {_count(len(result))} shown; --out FILE writes them all")
+
+
+def column_units(robot: Manipulator) -> dict[str, str]:
+    """Return the units of a machine's pose coordinates, joint coordinates and forces."""
+    joints = [leg.joint for leg in robot.legs]
+    return {
+        **{name: "rad" if name == "phi" else "m" for name in robot.coordinates},
+        **{name: j.unit for name, j in zip(robot.joint_names, joints, strict=True)},
+        **{name: j.force_unit for name, j in zip(robot.force_names, joints, strict=True)},
+    }
 
 
 def _text(cell: float | int | None, unit: str) -> str:
