@@ -30,12 +30,10 @@ def excite(
     harmonics: Annotated[int, option("harmonics", "How many.")] = 5,
     period: Annotated[float, option("period", "In s.")] = 5.0,
     speed: Annotated[float, option("speed", "The joints' limit, m/s or rad/s.")] = 1.0,
-    acceleration: Annotated[
-        float, option("acceleration", "The joints' limit, the same per s.")
-    ] = 10.0,
+    acceleration: Annotated[float, option("acceleration", "Their limit, the same per s.")] = 10.0,
     force: Annotated[
         float | None,
-        option("force", "The actuators' limit, N or N m; none if left out.", show_default=False),
+        option("force", "The actuators' limit, N or N m.", show_default=False),
     ] = None,
     elbow_sine: Annotated[float, option("elbow-sine", "Least sine of every elbow's angle.")] = 0.25,
     regularity: Annotated[
@@ -63,7 +61,7 @@ def excite(
 
     It keeps every limit throughout the period, and does not begin at rest. The file has the columns
     t rho1 ... x y z phi and their rates (d..., dd...), and force1 ... by the machine's nominal
-    inertia (theta1 ... and torque1 ... of cranks). The period and the assembly mode go to a TOML file beside it, for the evaluation of the
+    inertia; theta1 ... and torque1 ... of cranks. The period and the assembly mode go to a TOML file beside it, for the evaluation of the
     log.
 
     Ctrl-C ends the search and keeps the best until then.

@@ -38,7 +38,7 @@ def identify(
         list[str],
         Argument(
             metavar="LOG...",
-            help="Recorded motions, .csv or .parquet: t rho1.. force1.. (cranks: theta1.. torque1..)",
+            help="Recorded motions, .csv or .parquet: t, joints, forces.",
         ),
     ],
     robot: Annotated[str, option("robot", "The machine as it is drawn.", "ROBOT")],

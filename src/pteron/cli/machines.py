@@ -107,15 +107,14 @@ def _leg(leg: LegKind) -> dict[str, Any]:
 
 
 def _show(robot: Manipulator, found: dict[str, Any]) -> None:
-    headings = ("leg", "type", "joint", "its axis", "lengths (m)", "limits")
+    headings = ("leg", "type", "joint's axis", "lengths (m)", "limits")
     made = table(*headings, numbers=("leg",))
     for i, leg in enumerate(found["legs"], start=1):
         limits = leg["limits"]
         made.add_row(
             str(i),
             leg["type"],
-            leg["joint"],
-            _vector(leg["axis"], 3),
+            _vector(leg["axis"], 2),
             ", ".join(f"{length:g}" for length in leg["lengths"].values()),
             "none" if limits is None else "{:g} to {:g} {}".format(*limits, leg["unit"]),
         )

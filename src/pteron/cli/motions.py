@@ -94,9 +94,9 @@ def direct(
 ) -> None:
     """Compute every pose that has the joint coordinates: all assembly modes.
 
-    A table has the columns rho1, theta2, ... as the machine's joints are; the result has one row for each real pose, with the
-    table's row (from 1) and its columns, the assembly mode (from 1) and x y z phi. Where there is
-    no real pose, these are empty.
+    A table has the columns rho1, theta2, ... as the machine's joints are; the result has one row
+    for each real pose, with the table's row (from 1) and its columns, the assembly mode (from 1)
+    and x y z phi. Where there is no real pose, these are empty.
     """
     from pteron.kinematics import direct_kinematics
 
