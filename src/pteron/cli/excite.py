@@ -24,7 +24,7 @@ def excite(
         str | None, option("out", "Write it to FILE.csv, and FILE.toml beside it.", "FILE")
     ] = None,
     space: Annotated[
-        Literal["platform", "sliders"],
+        Literal["platform", "joints"],
         option("space", "Whose coordinates the Fourier series are of."),
     ] = "platform",
     harmonics: Annotated[int, option("harmonics", "How many.")] = 5,
@@ -35,10 +35,8 @@ def excite(
         float | None,
         option("force", "The actuators' limit, N or N m.", show_default=False),
     ] = None,
-    elbow_sine: Annotated[float, option("elbow-sine", "Least sine of every elbow's angle.")] = 0.25,
-    regularity: Annotated[
-        float, option("regularity", "Least abs(det J), of its largest value.")
-    ] = 0.3,
+    type_i: Annotated[float, option("type-i", "Least type-I measure of every leg.")] = 0.25,
+    type_ii: Annotated[float, option("type-ii", "Least type-II measure.")] = 0.3,
     clearance: Annotated[
         float, option("clearance", "Of the joints from their limits, m or rad.")
     ] = 0.005,
@@ -61,8 +59,8 @@ def excite(
 
     It keeps every limit throughout the period, and does not begin at rest. The file has the columns
     t rho1 ... x y z phi and their rates (d..., dd...), and force1 ... by the machine's nominal
-    inertia; theta1 ... and torque1 ... of cranks. The period and the assembly mode go to a TOML file beside it, for the evaluation of the
-    log.
+    inertia; theta1 ... and torque1 ... of cranks. The period and the assembly mode go to a TOML
+    file beside it, for the evaluation of the log.
 
     Ctrl-C ends the search and keeps the best until then.
     """
@@ -88,7 +86,7 @@ def excite(
             space=space,
             harmonics=harmonics,
             period=period,
-            limits=Limits(speed, acceleration, force, elbow_sine, regularity, clearance),
+            limits=Limits(speed, acceleration, force, type_i, type_ii, clearance),
             criterion=criterion,
             starts=starts,
             draws=draws,

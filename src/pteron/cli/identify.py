@@ -28,7 +28,7 @@ _TERMS = ("coulomb", "viscous", "offset")
 
 
 Estimator = Literal["weighted", "ordinary", "huber", "total", "likelihood"]
-Joints = Literal["none", "shared", "each"]
+Passive = Literal["none", "shared", "each"]
 Derivatives = Literal["periodic", "central", "spline"]
 """The library's own, which are slow to import."""
 
@@ -60,7 +60,9 @@ def identify(
     without: Annotated[
         str | None, option("without", "Leave out: coulomb,viscous,offset.", "TERMS")
     ] = None,
-    joints: Annotated[Joints, option("joints", "Viscous friction in the passive joints.")] = "none",
+    joints: Annotated[
+        Passive, option("joints", "Viscous friction in the passive joints.")
+    ] = "none",
     rotors: Annotated[bool, option("rotors", "With the inertia of the motors.")] = False,
     payload: Annotated[bool, option("payload", "With the payload carried.")] = False,
     shared: Annotated[
@@ -132,7 +134,7 @@ def identify(
     _show(result, files)
 
 
-def _terms(without: str | None, joints: Joints, *, rotors: bool, payload: bool) -> Terms:
+def _terms(without: str | None, joints: Passive, *, rotors: bool, payload: bool) -> Terms:
     from pteron.identification import Terms
 
     left_out = [] if without is None else [name.strip() for name in without.split(",")]
@@ -140,7 +142,7 @@ def _terms(without: str | None, joints: Joints, *, rotors: bool, payload: bool) 
         if name not in _TERMS:
             raise DataError(f"--without: {name!r} is not one of {', '.join(_TERMS)}")
     friction = {name: name not in left_out for name in _TERMS}
-    return Terms(**friction, joints=joints, payload=payload, rotors=rotors)
+    return Terms(**friction, passive=joints, payload=payload, rotors=rotors)
 
 
 def _bounds(boxes: list[str] | None, machine: Manipulator) -> Bounds | None:

@@ -102,6 +102,11 @@ class Model:
         return tuple(term for term in self._terms if term.name not in self.left_out)
 
     @cached_property
+    def joining_terms(self) -> tuple[Term, ...]:
+        """The terms that join others."""
+        return tuple(term for term in self._terms if term.name in self.left_out)
+
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the values, the base parameters first."""
         return (*self.base.names, *(term.name for term in self.kept_terms))

@@ -44,7 +44,7 @@ def as_html(columns: Sequence[Parameter], terms: Terms, digits: int) -> str:
 
     def product(column: int, share: Share) -> tuple[bool, str]:
         minus, size = _written(share, digits, _html_share)
-        name = _html_name(columns[column])
+        name = html_name(columns[column])
         gap = " " if _is_symbolic(share) else _NARROW
         return minus, f"{size}{gap}{name}" if size else name
 
@@ -123,7 +123,7 @@ def _latex_name(parameter: Parameter) -> str:
     return f"{parameter.kind}_{{{body}}}"
 
 
-def _html_name(parameter: Parameter) -> str:
+def html_name(parameter: Parameter) -> str:
     """Return a parameter's name in HTML, as the paper writes it."""
     body = parameter.body + parameter.suffix
     if parameter.length_power == 1:

@@ -11,6 +11,7 @@ from markupsafe import Markup, escape
 from matplotlib.figure import Figure
 
 import pteron
+from pteron.equations.machine import closure_of
 from pteron.identification import Identification
 from pteron.identification.result import AT_THE_FLOOR, LARGE, SMALL
 from pteron.legs.leg import ActuatedJoint
@@ -26,8 +27,8 @@ from pteron.plots import (
     svg,
 )
 from pteron.report.identification.contents import Contents, Shown, contents
-from pteron.report.identification.names import expression
 from pteron.report.identification.values import measured
+from pteron.report.joints import force, nouns
 from pteron.report.typeset import resource, significant, template
 
 
@@ -38,19 +39,23 @@ def page(result: Identification, model_file: str | None = None) -> str:
     """
     made = template(
         "identification/page.html.j2",
-        expression=expression,
         measured=lambda row: measured(row.value, row.half),
         percent=_percent,
         prose=_prose,
     )
     found = contents(result)
+    joints = [leg.joint for leg in result.robot.legs]
     return made.render(
         found=found,
         result=result,
         robot=result.robot,
         estimate=result.estimate,
         bodies=result.consistency,
-        legs=range(len(result.robot.legs)),
+        legs=range(len(joints)),
+        joints=joints,
+        modes=closure_of(result.robot).modes,
+        force=force(joints),
+        nouns=nouns(joints),
         limits=(AT_THE_FLOOR, SMALL, LARGE),
         figures=figures(found),
         model_file=model_file,

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from math import floor, isfinite, log10
 from typing import Literal
 
 import numpy as np
+from markupsafe import Markup
 
-from pteron.identification import Identification
+from pteron.bodies.inertia import Inertia
+from pteron.bodies.parameters import PLATFORM
+from pteron.identification import Identification, Model
+from pteron.identification.model import Term
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
+from pteron.reduction.expressions import html_name
 from pteron.report.typeset import fixed, significant
 
 _STRONG = 0.95
@@ -19,8 +23,6 @@ _STRONG = 0.95
 
 _NORMAL = 1.959963984540054
 """Standard deviations to each side that hold 95 %."""
-
-_SHARED = re.compile(r"([pule])(\d*|\([\d,]+\))")
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,7 @@ class Parameter:
     """
 
     name: str
-    expression: str
+    expression: Markup
     unit: str
     value: float
     half: float
@@ -41,7 +43,7 @@ class Parameter:
     ratio: float
     cad: float | None
     status: Literal["essential", "dropped", "unseen"]
-    partner: str | None
+    partner: Markup | None
     correlation: float
 
     @property
@@ -54,6 +56,7 @@ def parameter_rows(result: Identification) -> tuple[Parameter, ...]:
     """Return the values of an identification, in the model's order."""
     estimate, model = result.estimate, result.model
     base = model.base.values(result.robot)
+    expressions, names = html_expressions(model), html_names(model)
     partners, strengths = _partners(estimate.correlation)
     found = []
     for k, name in enumerate(estimate.names):
@@ -64,7 +67,7 @@ def parameter_rows(result: Identification) -> tuple[Parameter, ...]:
         found.append(
             Parameter(
                 name=name,
-                expression=model.expressions[k],
+                expression=expressions[k],
                 unit=estimate.units[k],
                 value=value,
                 half=_NORMAL * deviation,
@@ -72,7 +75,7 @@ def parameter_rows(result: Identification) -> tuple[Parameter, ...]:
                 ratio=abs(value) / deviation if deviation > 0.0 else float("inf"),
                 cad=float(base[k]) if k < model.base.rank else None,
                 status=status,
-                partner=estimate.names[partners[k]] if abs(strengths[k]) > _STRONG else None,
+                partner=names[estimate.names[partners[k]]] if abs(strengths[k]) > _STRONG else None,
                 correlation=float(strengths[k]),
             )
         )
@@ -102,18 +105,51 @@ def measured(value: float, half: float) -> tuple[str, str]:
     return fixed(value, places), fixed(half, places)
 
 
+def html_expressions(model: Model) -> tuple[Markup, ...]:
+    """Return what each value of a model is, in HTML: base parameters as sums, the others by name."""
+    names = [_term_html(term) for term in model.kept_terms]
+    found = [*model.base.expressions("html"), *names]
+    terms = {term.name: _term_html(term) for term in model.joining_terms}
+    for name, shares in model.joins.items():
+        for kept, share in shares.items():
+            size = "" if abs(abs(share) - 1.0) < 1e-9 else f"{abs(share):.4g}\u202f"
+            sign = "\u2212" if share < 0.0 else "+"
+            found[model.names.index(kept)] += f" {sign} {size}{terms[name]}"
+    return tuple(Markup(text) for text in found)
+
+
+def html_names(model: Model) -> dict[str, Markup]:
+    """Return the names of a model's values in HTML."""
+    base = (html_name(model.base.parameters[column]) for column in model.base.kept)
+    found = (*base, *(_term_html(term) for term in model.kept_terms))
+    return {name: Markup(text) for name, text in zip(model.names, found, strict=True)}
+
+
+def _term_html(term: Term) -> str:
+    """Return the name of a term: Fv_R1_2 is F with the index v,R1,2."""
+    if term.kind == "offset":
+        return f"offset<sub>{term.name.removeprefix('offset')}</sub>"
+    head, *indices = term.name.split("_")
+    if term.kind in ("rotor", "payload"):
+        axis = [head[2:]] if head in ("mgx", "mgy") else []
+        letter = "m\u03b3" if axis else head
+        return f"<i>{letter}</i><sub>{','.join([*axis, *indices])}</sub>"
+    return f"<i>{head[0]}</i><sub>{','.join([head[1:], *indices])}</sub>"
+
+
 @dataclass(frozen=True)
 class Body:
     """A body as it was identified and as it was drawn.
 
-    Values are the mass, kg; for a link or the platform also the centre of mass, m, and the moment
-    of inertia about the body's reference point, kg m^2. A body on the border only just exists.
+    Values are the mass, kg; for a body that turns also the centre of mass, m, None where it has no
+    such coordinate, and the moment of inertia about the body's reference point, kg m^2. A body on
+    the border only just exists.
     """
 
     kind: str
     leg: int | None
-    identified: tuple[float, ...]
-    drawn: tuple[float, ...]
+    identified: tuple[float | None, ...]
+    drawn: tuple[float | None, ...]
     border: bool
 
 
@@ -122,29 +158,45 @@ def body_rows(result: Identification) -> tuple[Body, ...]:
     consistency = result.consistency
     if consistency is None:
         return ()
-    border = consistency.at_border
+    # A name at the border may stand for a body of several legs.
+    border = {
+        (p.body, leg)
+        for p in result.model.base.parameters
+        if p.owner in consistency.at_border
+        for leg in p.legs or (None,)
+    }
     identified, drawn = _bodies(consistency.robot), _bodies(result.robot)
+    names = {
+        (letter, i): leg.names[letter]
+        for i, leg in enumerate(result.robot.legs, start=1)
+        for letter in leg.bodies
+    }
     return tuple(
-        Body(kind, leg, values, drawn[key][2], any(_is(key, name) for name in border))
-        for key, (kind, leg, values) in identified.items()
+        Body(
+            names.get(key, "platform"),
+            None if key[1] is None else key[1] - 1,
+            values,
+            drawn[key],
+            key in border,
+        )
+        for key, values in identified.items()
     )
 
 
-def _is(key: str, name: str) -> bool:
-    """Say whether a body is one of those that share a name, such as u(2,4), or u of all legs."""
-    found = _SHARED.fullmatch(name)
-    if found is None:
-        return False
-    legs = re.findall(r"\d+", found[2])
-    return key[0] == found[1] and (not legs or key[1:] in legs)
+def _bodies(robot: Manipulator) -> dict[tuple[str, int | None], tuple[float | None, ...]]:
+    found: dict[tuple[str, int | None], Inertia] = {
+        (letter, i): inertia
+        for i, leg in enumerate(robot.legs, start=1)
+        for letter, inertia in leg.bodies.items()
+    }
+    found[PLATFORM, None] = robot.platform.inertia
+    return {key: _values(inertia) for key, inertia in found.items()}
 
 
-def _bodies(robot: Manipulator) -> dict[str, tuple[str, int | None, tuple[float, ...]]]:
-    found: dict[str, tuple[str, int | None, tuple[float, ...]]] = {}
-    for i, leg in enumerate(robot.legs):
-        found[f"p{i + 1}"] = "slider", i, (leg.slider_mass,)
-        for key, kind, body in (("u", "upper link", leg.upper), ("l", "lower link", leg.lower)):
-            found[f"{key}{i + 1}"] = kind, i, (body.mass, *body.center_of_mass, body.inertia)
-    body = robot.platform.inertia
-    found["e"] = "platform", None, (body.mass, *body.center_of_mass, body.inertia)
-    return found
+def _values(inertia: Inertia) -> tuple[float | None, ...]:
+    values = dict(zip(inertia.kinds, inertia.values, strict=True))
+    mass = values["m"]
+    if "I" not in values:
+        return (mass,)
+    center = (values[kind] / mass if kind in values else None for kind in ("mgx", "mgy"))
+    return (mass, *center, values["I"])
