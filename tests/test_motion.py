@@ -12,12 +12,16 @@ from mechanisms import BATCH_SHAPES, CATALOG, MECHANISMS, states
 from scipy.spatial.transform import Rotation
 
 import pteron
-from pteron.motion import joint_points, pick_and_place, scaled_to_reach
+from pteron.motion import joint_guides, joint_points, pick_and_place, scaled_to_reach
 from pteron.motion.cycle import Cycle
 from pteron.motion.laws import quintic
 from pteron.workspace import home_pose, reserve
 
-EVERY = pytest.mark.parametrize("name", MECHANISMS)
+NAMES = [
+    *("quadrupteron", "tripteron", "delta", "quadrupteron turned", "delta on a wall"),
+    *("tripteron, no gravity", "random PPPP 0", "random PRR 0"),
+]
+EVERY = pytest.mark.parametrize("name", NAMES)
 LEAST = 0.2
 
 
@@ -29,10 +33,6 @@ def home(name):
 @lru_cache
 def cycle(name):
     return pick_and_place(MECHANISMS[name], home(name), least=LEAST)
-
-
-def column(robot, name):
-    return np.array([getattr(leg, name) for leg in robot.legs])
 
 
 @given(st.floats(-0.5, 1.5), st.floats(0.0, 0.4), st.floats(0.6, 1.0))
@@ -88,9 +88,9 @@ def test_a_cycle_keeps_its_limits_between_the_samples(name):
         robot, home(name), scale=found.scale, direction=found.across, samples=20_011
     )
     kept = reserve(robot, dense.pose)
-    assert kept.elbow_sines.min() >= LEAST
-    assert kept.regularity.min() >= LEAST
-    assert kept.slider_clearances.min() >= 0.0
+    assert kept.type_i.min() >= LEAST
+    assert kept.type_ii.min() >= LEAST
+    assert kept.clearances.min() >= 0.0
     speed = np.linalg.norm(dense.acceleration[:, :3], axis=-1)
     assert 10.0 * (1.0 - 1e-5) < speed.max() < 10.0 * (1.0 + 1e-9)
 
@@ -104,9 +104,9 @@ def test_a_cycle_is_the_largest_that_fits(name):
             robot, home(name), scale=found.scale + 0.005, direction=found.across, samples=2001
         )
         kept = reserve(robot, larger.pose)
-        # The sliders' clearance is kept to a hair's breadth, the others to the least reserve.
-        tightest = min(kept.elbow_sines.min(), kept.regularity.min()) - LEAST
-        assert min(tightest, kept.slider_clearances.min()) < 1e-3
+        # The joints' clearance is kept to a hair's breadth, the others to the least reserve.
+        tightest = min(kept.type_i.min(), kept.type_ii.min()) - LEAST
+        assert min(tightest, kept.clearances.min()) < 1e-3
 
 
 @EVERY
@@ -148,18 +148,16 @@ def test_a_turned_machine_makes_the_turned_cycle(name):
     np.testing.assert_allclose(*forces, atol=1e-9)
 
 
-def test_sliders_limits_bound_the_cycle():
+def test_limits_bound_the_cycle():
     robot = MECHANISMS["quadrupteron"]
-    tight = replace(
-        robot, legs=tuple(replace(leg, slider_limits=(-0.05, 0.04)) for leg in robot.legs)
-    )
+    tight = replace(robot, legs=tuple(replace(leg, limits=(-0.05, 0.04)) for leg in robot.legs))
     scale, _ = scaled_to_reach(tight, home_pose(tight))
     assert scale < cycle("quadrupteron").scale
     found = pick_and_place(tight, home_pose(tight), samples=5001)
-    sliders = pteron.inverse_kinematics(tight, found.pose)
-    assert sliders.min() >= -0.05
-    assert sliders.max() <= 0.04
-    assert max(-0.05 - sliders.min(), sliders.max() - 0.04) > -2e-3, "a limit is what bounds it"
+    joints = pteron.inverse_kinematics(tight, found.pose)
+    assert joints.min() >= -0.05
+    assert joints.max() <= 0.04
+    assert max(-0.05 - joints.min(), joints.max() - 0.04) > -2e-3, "a limit is what bounds it"
 
 
 @pytest.mark.parametrize(
@@ -190,19 +188,37 @@ def test_joint_points_close_the_chains(name):
     robot = MECHANISMS[name]
     pose, _, _ = states(robot, 50)
     points = joint_points(robot, pose)
-    upper = points.elbows - points.sliders
-    lower = points.platform_points - points.elbows
-    for link, length in ((upper, "upper_length"), (lower, "lower_length")):
-        sizes = np.linalg.norm(link, axis=-1)
-        np.testing.assert_allclose(sizes, np.tile(column(robot, length), (50, 1)), rtol=1e-12)
-        np.testing.assert_allclose((link * column(robot, "direction")).sum(-1), 0.0, atol=1e-14)
-    way = points.sliders - column(robot, "guide_point")
-    np.testing.assert_allclose(
-        way, points.coordinates[..., None] * column(robot, "e"), rtol=1e-12, atol=1e-14
-    )
-    side = (np.cross(upper, lower) * column(robot, "direction")).sum(axis=-1)
-    # u x (elbow side) points along sigma d; l_u x l_l has the opposite sign.
-    assert (np.sign(side) == -column(robot, "elbow")).all()
+    for i, (leg, line) in enumerate(zip(robot.legs, points.links, strict=True)):
+        assert line.shape == (50, 3, 3)
+        np.testing.assert_allclose(line[:, -1], points.platform_points[:, i], atol=1e-15)
+        upper, lower = np.diff(line, axis=1).transpose(1, 0, 2)
+        np.testing.assert_allclose(np.linalg.norm(upper, axis=-1), leg.upper_length, rtol=1e-12)
+        np.testing.assert_allclose(np.linalg.norm(lower, axis=-1), leg.lower_length, rtol=1e-12)
+        np.testing.assert_allclose(upper @ leg.direction, 0.0, atol=1e-14)
+        side = np.cross(upper, lower) @ leg.direction
+        # u x (elbow side) points along sigma d; l_u x l_l has the opposite sign.
+        assert (np.sign(side) == -leg.elbow).all()
+
+
+@EVERY
+def test_guides_lead_where_the_joints_go(name):
+    robot = MECHANISMS[name]
+    poses, _, _ = states(robot, 50)
+    points = joint_points(robot, poses)
+    for i, (leg, guide) in enumerate(zip(robot.legs, joint_guides(robot, poses), strict=True)):
+        assert guide.slides == (leg.joint.noun == "slider")
+        ends = points.links[i][:, 0 if guide.slides else 1]
+        if leg.limits is None:
+            steps = np.linalg.norm(np.diff(guide.path, axis=0), axis=-1)
+            away = np.linalg.norm(ends[:, None] - guide.path, axis=-1).min(axis=-1)
+            assert away.max() <= steps.max()
+        center = guide.path[0] if guide.slides else np.array(leg.guide_point)
+        across = np.cross if guide.slides else np.dot
+        np.testing.assert_allclose(across(guide.path - center, guide.axis), 0.0, atol=1e-12)
+        if leg.limits is not None:
+            reached = guide.path[[0, -1]] - leg.guide_point
+            size = leg.lever if not guide.slides else np.abs(leg.limits)
+            np.testing.assert_allclose(np.linalg.norm(reached, axis=-1), size, rtol=1e-12)
 
 
 @EVERY
@@ -214,7 +230,7 @@ def test_the_platform_is_rigid_and_turns_about_its_axis(name):
     turn = Rotation.from_rotvec(np.multiply.outer(angle, robot.platform.axis)).as_matrix()
     frame = np.array(robot.platform.frame)
     np.testing.assert_allclose(points.axes, np.einsum("bij,kj->bki", turn, frame), atol=1e-14)
-    arms = column(robot, "platform_point") @ points.axes
+    arms = np.array([leg.platform_point for leg in robot.legs]) @ points.axes
     expected = points.reference[:, None] + arms
     np.testing.assert_allclose(points.platform_points, expected, atol=1e-14)
 
@@ -224,7 +240,7 @@ def test_joint_points_take_batches(shape):
     robot = MECHANISMS["quadrupteron"]
     pose = np.random.default_rng(1).uniform(-0.05, 0.05, (*shape, 4))
     points = joint_points(robot, pose)
-    assert points.sliders.shape == points.elbows.shape == (*shape, 4, 3)
+    assert points.chain.shape == (*shape, 4, 5, 3)
     assert points.platform_points.shape == (*shape, 4, 3)
     assert points.axes.shape == (*shape, 3, 3)
     assert points.reference.shape == (*shape, 3)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -58,19 +60,38 @@ def reserve(robot: Manipulator, pose: PoseLike) -> Reserve:
     >>> reserve(pteron.load("quadrupteron"), [0.0, 0.0, 0.0, 0.0]).type_i.round(3)
     array([1.   , 1.   , 0.991, 1.   ])
     """
+    facts = _facts(robot)
     margin, measure, _, _ = numeric(robot, "reach")(pose)
-    sizes = np.array([leg.size for leg in robot.legs])
-    type_i = np.where(margin < 0.0, margin / sizes, np.nan_to_num(measure))
-    if closure_of(robot).vanishes() is False and not robot.platform.turns:
+    type_i = np.where(margin < 0.0, margin / facts.sizes, np.nan_to_num(measure))
+    if facts.constant:
         type_ii = np.ones(type_i.shape[:-1])
     else:
         type_ii = np.nan_to_num(np.abs(numeric(robot, "type_ii")(pose)[0]))
     room = clearances(robot, numeric(robot, "joint_coordinates")(pose)[0])
-    half = np.array([_half_range(leg.limits) for leg in robot.legs])
-    shares = np.where(np.isinf(room), 1.0, room) / half
+    shares = np.where(np.isinf(room), 1.0, room / facts.half_ranges)
     shares = np.where(np.isnan(shares), np.minimum(type_i, 0.0), shares)
     smallest = np.minimum(np.minimum(type_i, shares).min(axis=-1), type_ii)
     return Reserve(type_i, type_ii, shares, smallest)
+
+
+class _Facts(NamedTuple):
+    """What a machine's reserves are measured by, (n,) each, and whether its J is constant."""
+
+    sizes: Array
+    low: Array
+    high: Array
+    half_ranges: Array
+    levers: Array
+    constant: bool
+
+
+@lru_cache(maxsize=64)
+def _facts(robot: Manipulator) -> _Facts:
+    low, high = np.array([leg.limits or (-np.inf, np.inf) for leg in robot.legs]).T
+    sizes, levers = np.array([(leg.size, leg.lever) for leg in robot.legs]).T
+    constant = closure_of(robot).vanishes() is False and not robot.platform.turns
+    half = np.where(np.isinf(low), 1.0, (high - low) / 2.0)
+    return _Facts(sizes, low, high, half, levers, constant)
 
 
 def clearances(robot: Manipulator, joints: Array) -> Array:
@@ -78,8 +99,8 @@ def clearances(robot: Manipulator, joints: Array) -> Array:
 
     It is negative beyond a limit, infinite without limits, and NaN where the coordinate is.
     """
-    low, high = np.array([leg.limits or (-np.inf, np.inf) for leg in robot.legs]).T
-    distances: Array = np.minimum(joints - low, high - joints)
+    facts = _facts(robot)
+    distances: Array = np.minimum(joints - facts.low, facts.high - joints)
     return distances
 
 
@@ -88,10 +109,6 @@ def room_to_limits(robot: Manipulator, poses: Array) -> Array:
 
     Infinite without limits, and out of reach, where a joint may have no coordinate.
     """
-    levers = np.array([leg.lever for leg in robot.legs])
-    room = clearances(robot, numeric(robot, "joint_coordinates")(poses)[0]) * levers
+    joints = numeric(robot, "joint_coordinates")(poses)[0]
+    room = clearances(robot, joints) * _facts(robot).levers
     return np.where(np.isnan(room), np.inf, room)
-
-
-def _half_range(limits: tuple[float, float] | None) -> float:
-    return 1.0 if limits is None else (limits[1] - limits[0]) / 2.0
