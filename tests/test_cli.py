@@ -15,6 +15,8 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+import rod_machines
+import tomlkit
 from typer.testing import CliRunner, Result
 
 import pteron
@@ -135,10 +137,10 @@ def test_help_loads_nothing_heavy():
     assert loaded & heavy == set()
 
 
-# Poses to sliders
+# Poses to joints
 
 
-def test_sliders_of_one_pose_with_negative_numbers():
+def test_joints_of_one_pose_with_negative_numbers():
     table = frame(done("inverse quadrupteron 0.01 -0.02 -3e-2 -.1"))
     assert table.columns == ["x", "y", "z", "phi", "rho1", "rho2", "rho3", "rho4"]
     expected = pteron.inverse_kinematics(pteron.load("quadrupteron"), [0.01, -0.02, -0.03, -0.1])
@@ -247,6 +249,38 @@ def test_a_person_sees_a_table_of_60_columns(monkeypatch: pytest.MonkeyPatch):
     text = run("direct quadrupteron 0.03 0.02 0.01 0.02").stdout
     assert "mode" in text
     assert "3.141593" in text
+
+
+@pytest.fixture(scope="module")
+def mixed(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Write the file of a machine with one slider and two cranks."""
+    path = tmp_path_factory.mktemp("machines") / "mixed.toml"
+    path.write_text(tomlkit.dumps(rod_machines.mixed()), encoding="utf-8")
+    return str(path)
+
+
+def test_columns_and_units_are_those_of_the_joints(mixed: str, monkeypatch: pytest.MonkeyPatch):
+    for robot, joints, forces in (
+        ("delta", "theta1 theta2 theta3", "torque1 torque2 torque3"),
+        (mixed, "rho1 theta2 theta3", "force1 torque2 torque3"),
+    ):
+        machine, pose = pteron.load(robot), [0.02, -0.01, -0.9]
+        row = json.loads(done(f"inverse {robot} 0.02 -0.01 -0.9 --json"))
+        found = [row[name] for name in joints.split()]
+        assert found == pteron.inverse_kinematics(machine, pose).tolist()
+        back = frame(done(f"direct {robot} {' '.join(map(str, found))}"))
+        assert back.columns == ["row", *joints.split(), "mode", "x", "y", "z"]
+        away = np.abs(back.select("x", "y", "z").to_numpy() - pose).max(axis=1)
+        assert away.min() < 1e-12
+        row = json.loads(done(f"forces {robot} --pose 0.02 -0.01 -0.9 --json"))
+        expected = pteron.inverse_dynamics(machine, pose, [0.0] * 3, [0.0] * 3)
+        assert [row[name] for name in forces.split()] == expected.tolist()
+    monkeypatch.setattr("pteron.cli.rows.is_terminal", lambda: True)
+    assert "rho1 (m)  theta2 (rad)" in done(f"inverse {mixed} 0 0 -0.9")
+    assert "force1 (N)  torque2 (N m)" in done(f"forces {mixed} --pose 0 0 -0.9")
+    assert "are these mm?" in refused("inverse delta 0 0 -900")
+    degrees = run(f"direct {mixed} --table -", "rho1,theta2,theta3\n0.1,30,0\n").stderr
+    assert "theta2, theta3 up to 30: are these degrees?" in degrees
 
 
 # Rows that fail
@@ -375,7 +409,7 @@ def test_values_in_other_units_are_doubted():
     assert "degrees?" in run("forces quadrupteron --pose 0 0 0 45").stderr
 
 
-# Sliders to poses
+# Joints to poses
 
 
 def test_all_assembly_modes_of_one_machine():
@@ -391,8 +425,8 @@ def test_all_assembly_modes_of_one_machine():
     assert [(row["row"], row["mode"]) for row in rows] == [(1, 1)]
 
 
-def test_sliders_without_a_pose_fail_alone_and_stay_empty_in_a_table():
-    refused("direct quadrupteron 9 0 0 0", "no pose has these slider coordinates")
+def test_joints_without_a_pose_fail_alone_and_stay_empty_in_a_table():
+    refused("direct quadrupteron 9 0 0 0", "no pose has these joint coordinates")
     text = "t,rho1,rho2,rho3,rho4\n1,9,0,0,0\n2,0,0.001,0,0\n"
     result = run("direct quadrupteron --table -", text)
     table = frame(result.stdout)
@@ -404,7 +438,7 @@ def test_sliders_without_a_pose_fail_alone_and_stay_empty_in_a_table():
     refused("direct quadrupteron --table - --on-failure raise", "row 1 (line 2), ", stdin=text)
 
 
-def test_sliders_and_poses_lead_back_to_each_other():
+def test_joints_and_poses_lead_back_to_each_other():
     motion(30).select("x", "y", "z", "phi").write_csv("poses.csv")
     sliders = done("inverse quadrupteron --table poses.csv")
     back = run("direct quadrupteron --table -", sliders)
@@ -444,19 +478,19 @@ def test_the_working_mode_may_be_chosen():
     assert "force1" in json.loads(done("forces tripteron --pose 0 0 0 --elbows --- --json"))
 
 
-@pytest.mark.parametrize("robot", ["quadrupteron", "tripteron-oblique"])
+@pytest.mark.parametrize("robot", ["quadrupteron", "delta"])
 def test_forces_of_a_table_with_and_without_a_wrench(robot: str):
     machine = pteron.load(robot)
     m = machine.freedom
     table = motion(20, robot)
     table.write_csv("motion.csv")
     states = np.split(table.to_numpy(), 3, axis=1)
-    forces = frame(done(f"forces {robot} --table motion.csv")).select("^force.$").to_numpy()
+    forces = frame(done(f"forces {robot} --table motion.csv"))[machine.force_names].to_numpy()
     np.testing.assert_array_equal(forces, pteron.inverse_dynamics(machine, *states))
     wrench = np.random.default_rng(2).normal(size=(20, m))
     loads = pl.DataFrame(wrench, schema=["fx", "fy", "fz", "mk"][:m])
     table.hstack(loads).write_csv("loaded.csv")
-    forces = frame(done(f"forces {robot} --table loaded.csv")).select("^force.$").to_numpy()
+    forces = frame(done(f"forces {robot} --table loaded.csv"))[machine.force_names].to_numpy()
     np.testing.assert_array_equal(forces, pteron.inverse_dynamics(machine, *states, wrench))
 
 
@@ -487,10 +521,12 @@ def test_columns_missing_from_a_motion_are_named():
 
 def test_a_singular_orientation_is_one_line():
     pose = f"0 0 0 {np.pi / 2}"
-    refused(f"forces quadrupteron --pose {pose}", "pose: singular orientation (type II)", "90 deg")
+    refused(
+        f"forces quadrupteron --pose {pose}", "pose: singular (type II; measure", "no longer hold"
+    )
     table = motion(4).with_columns(phi=pl.Series([0.0, 0.1, np.pi / 2, 0.0]), x=0.0, y=0.0, z=0.0)
     table.write_csv("motion.csv")
-    refused("forces quadrupteron --table motion.csv", "row 3 (line 4), pose: singular orientation")
+    refused("forces quadrupteron --table motion.csv", "row 3 (line 4), pose: singular (type II")
     result = run("forces quadrupteron --table motion.csv --on-failure nan")
     assert frame(result.stdout)["force1"].is_null().to_list() == [False, False, True, False]
 
@@ -506,9 +542,9 @@ def test_the_catalog_is_listed():
     assert max(map(len, text.splitlines())) <= 60
 
 
-@pytest.mark.parametrize("robot", ["quadrupteron", "tripteron"])
-def test_a_good_file_is_described(robot: str, monkeypatch: pytest.MonkeyPatch):
-    machine = pteron.load(robot)
+@pytest.mark.parametrize("robot", ["quadrupteron", "delta", "mixed"])
+def test_a_good_file_is_described(robot: str, mixed: str, monkeypatch: pytest.MonkeyPatch):
+    machine = pteron.load(mixed if robot == "mixed" else robot)
     pteron.save(machine, "robot.toml")
     monkeypatch.setattr("pteron.cli.screen.is_terminal", lambda: True)
     text = done("check robot.toml")
@@ -516,7 +552,9 @@ def test_a_good_file_is_described(robot: str, monkeypatch: pytest.MonkeyPatch):
     assert max(map(len, text.splitlines())) <= 60
     found = json.loads(done("check robot.toml --json"))
     assert found["motion"] == machine.platform.motion
-    assert len(found["legs"]) == machine.freedom
+    assert [leg["type"] for leg in found["legs"]] == [leg.type for leg in machine.legs]
+    assert found["legs"][1]["lengths"]["upper_length"] == machine.legs[1].upper_length
+    assert all(f" {leg.type} " in text for leg in machine.legs)
     assert found["working_mode"] == "".join("+-"[leg.elbow < 0] for leg in machine.legs)
     assert found["singular_orientations"] == pteron.singular_orientations(machine).tolist()
     assert np.isfinite(pteron.inverse_kinematics(machine, found["home_pose"])).all()
@@ -708,6 +746,7 @@ def test_base_parameters_as_asked_for():
     refused("base quadrupteron --method qr --symbols", "symbols", "exact")
     Path("cross.toml").write_text(symmetric())
     refused("base cross.toml", "singular at every pose")
+    assert "Exact rank 13 of 25" in done("base delta --symbols")
 
 
 def test_a_person_sees_base_parameters_with_values(monkeypatch: pytest.MonkeyPatch):

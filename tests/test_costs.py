@@ -10,7 +10,7 @@ from pteron.reduction import FORMS, model_forms
 from pteron.report import table1
 
 
-@pytest.mark.parametrize("name", ["quadrupteron", "tripteron-oblique"])
+@pytest.mark.parametrize("name", ["quadrupteron", "delta"])
 def test_every_form_gives_the_same_forces(name):
     robot = CATALOG[name]
     base = pteron.base_parameters(robot)
@@ -65,7 +65,8 @@ def test_a_regressor_needs_its_base():
     base = pteron.base_parameters(robot)
     motion = states(robot, 5)
     kernel = pteron.compile(robot, "base_regressor", base=base)
-    np.testing.assert_array_equal(kernel(*motion), pteron.base_regressor(robot, base, *motion))
+    found = pteron.base_regressor(robot, base, *motion)
+    np.testing.assert_allclose(kernel(*motion), found, rtol=1e-12, atol=1e-12)
     with pytest.raises(pteron.ModelError, match="base: missing"):
         pteron.compile(robot, "base_regressor")
     with pytest.raises(pteron.ModelError, match="has no use for it"):

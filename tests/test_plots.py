@@ -12,10 +12,11 @@ from mechanisms import MECHANISMS, random_machine
 from mpl_toolkits.mplot3d.art3d import Line3D, Poly3DCollection
 
 import pteron
-from pteron.motion import joint_points
+from pteron.motion import joint_guides, joint_points
 from pteron.plots import (
     LEG_COLORS,
     forces_figure,
+    measure_figure,
     outline,
     reach_figure,
     regularity_figure,
@@ -23,27 +24,31 @@ from pteron.plots import (
     svg,
 )
 from pteron.plots.space import upright
-from pteron.workspace import reach_slice
+from pteron.workspace import home_pose, reach_slice
 
-MACHINES = ["tripteron", "quadrupteron turned"]
-
-
-def rails(points):
-    return np.stack([points.sliders - 0.1, points.sliders + 0.1], axis=-2)
+MACHINES = ["tripteron", "quadrupteron turned", "delta", "random PRR 0"]
 
 
 def machine(name):
     robot = MECHANISMS[name]
-    points = joint_points(robot, pteron.random_poses(robot, 1, seed=2)[0])
-    gravity = np.array(robot.gravity)
-    return robot_figure(points, rails(points), gravity=gravity, angle="φ = 10°")
+    pose = pteron.random_poses(robot, 1, seed=2)[0]
+    points, guides = joint_points(robot, pose), joint_guides(robot, pose)
+    return robot_figure(points, guides, gravity=np.array(robot.gravity), angle="φ = 10°")
 
 
 def reach(name):
     robot = MECHANISMS[name]
-    center = pteron.random_poses(robot, 1, seed=2, bend=0.8)[0]
+    center = pteron.random_poses(robot, 1, seed=2, type_i=0.8)[0]
     path = np.linspace(center[:3], center[:3] + 0.05, 9)
     return reach_figure(reach_slice(robot, center, points=31), path=path)
+
+
+def measure(name):
+    robot = MECHANISMS[name]
+    cut = reach_slice(robot, home_pose(robot), "xz", points=31)
+    x, z = np.meshgrid(cut.first, cut.second)
+    values = np.where(cut.status < 1, 0.5 + 0.4 * np.cos(x + z), np.nan)
+    return measure_figure(cut, values, path=np.zeros((3, 3)))
 
 
 def forces(name):
@@ -61,6 +66,7 @@ def regularity():
 PICTURES = {
     "machine": (machine, "quadrupteron turned"),
     "reach": (reach, "quadrupteron"),
+    "measure": (measure, "delta"),
     "forces": (forces, "tripteron"),
     "regularity": (regularity,),
 }
@@ -131,12 +137,13 @@ def test_the_drawn_machine_is_not_distorted(name):
     n = MECHANISMS[name].freedom
     assert [text for text in texts if text.isdigit()] == [str(i + 1) for i in range(n)]
     assert {"x", "y", "z", "g"} < set(texts)
-    assert sum(isinstance(a, Poly3DCollection) for a in axes.get_children()) > n
+    sliders = sum(leg.joint.noun == "slider" for leg in MECHANISMS[name].legs)
+    assert sum(isinstance(a, Poly3DCollection) for a in axes.get_children()) > sliders
 
 
 def test_gravity_points_down_in_the_picture():
     for seed in range(5):
-        robot = random_machine(seed, True)
+        robot = random_machine(seed, "PPPP")
         gravity = np.array(robot.gravity)
         rotation = upright(-gravity)
         np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-15)
@@ -186,7 +193,8 @@ def test_singular_orientations_are_marked():
 
 
 def test_a_map_keeps_its_aspect():
-    axes = reach("quadrupteron").axes[0]
-    assert axes.get_aspect() == 1.0
-    assert axes.get_xlabel() == "x (mm)"
-    assert axes.get_ylabel() == "y (mm)"
+    for figure, plane in ((reach("quadrupteron"), "xy"), (measure("delta"), "xz")):
+        axes = figure.axes[0]
+        assert axes.get_aspect() == 1.0
+        assert axes.get_xlabel() == f"{plane[0]} (mm)"
+        assert axes.get_ylabel() == f"{plane[1]} (mm)"

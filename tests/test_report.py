@@ -19,9 +19,10 @@ from pteron.reduction import FORMS
 from pteron.report import write_report
 from pteron.report.contents import contents
 from pteron.report.costs import dense_operations
-from pteron.report.page import in_symbols, page
-from pteron.report.typeset import expression, fixed, significant, triple
+from pteron.report.page import in_symbols, lettered, page
+from pteron.report.typeset import fixed, significant, triple
 from pteron.report.write import checked_folder, numbers
+from pteron.workspace import REACHABLE, reserve
 
 HOSTILE = '</script><b onload="x">&\'{{ 7 * 6 }}'
 """A machine's name comes from a file that anyone may have written."""
@@ -40,6 +41,8 @@ MACHINES = {
         with_elbows(MECHANISMS["tripteron on a wall"], "+-+"), gravity=(0.0, 0.0, 0.0)
     ),
     "hostile": replace(with_limits(doubtful(CATALOG["tripteron"]), -0.05, 0.08), name=HOSTILE),
+    "delta": CATALOG["delta"],
+    "mixed": MECHANISMS["random PRR 0"],
 }
 EVERY = pytest.mark.parametrize("name", MACHINES)
 
@@ -128,7 +131,8 @@ def test_the_page_is_whole_and_needs_nothing_else(name):
     wanted = set(re.findall(r'getElementById\("(\w+)"\)', found.scripts[None]))
     assert wanted <= set(found.ids)
     assert found.counts["canvas"] == 1
-    assert found.counts["svg"] == (6 if MACHINES[name].platform.turns else 5)
+    singular = {"quadrupteron": 1, "delta": 2, "mixed": 2}.get(name, 0)
+    assert found.counts["svg"] == 5 + singular
     assert found.counts["h1"] == 1
 
 
@@ -172,24 +176,21 @@ def test_the_moving_picture_is_the_machine(name):
     robot, data = MACHINES[name], scene(name)
     frames = len(data["time"])
     assert 60 <= frames <= 120
-    n = robot.freedom
-    sliders, elbows, platform = (np.array(data[key]) for key in ("sliders", "elbows", "platform"))
-    assert sliders.shape == elbows.shape == platform.shape == (frames, n, 3)
-    for link, length in ((elbows - sliders, "upper_length"), (platform - elbows, "lower_length")):
-        expected = np.tile([getattr(leg, length) for leg in robot.legs], (frames, 1))
-        np.testing.assert_allclose(np.linalg.norm(link, axis=-1), expected, atol=3e-6)
+    chains = np.array(data["chains"])
+    assert chains.shape == (frames, robot.freedom, 3, 3)
+    lengths = [(leg.upper_length, leg.lower_length) for leg in robot.legs]
+    links = np.linalg.norm(np.diff(chains, axis=2), axis=-1)
+    np.testing.assert_allclose(links, np.tile(lengths, (frames, 1, 1)), atol=3e-6)
     pose = np.array(data["pose"])
     np.testing.assert_allclose(
-        pteron.inverse_kinematics(robot, pose), data["coordinates"], atol=5e-6
+        pteron.inverse_kinematics(robot, pose), data["coordinates"], atol=5e-5
     )
-    assert sorted(data["outline"]) == list(range(n))
-    rails = np.array(data["rails"])
-    low, high = rails[None, :, 0], rails[None, :, 1]
-    along = ((sliders - low) * (high - low)).sum(-1) / ((high - low) ** 2).sum(-1)
-    assert along.min() >= 0.0
-    assert along.max() <= 1.0
-    on_rail = low + along[..., None] * (high - low)
-    np.testing.assert_allclose(on_rail, sliders, atol=3e-6)
+    assert sorted(data["outline"]) == list(range(robot.freedom))
+    assert data["slides"] == [leg.joint.noun == "slider" for leg in robot.legs]
+    for i, slides in enumerate(data["slides"]):
+        path, at = np.array(data["guides"][i]), chains[:, i, 0 if slides else 1]
+        step = np.linalg.norm(np.diff(path, axis=0), axis=-1).max()
+        assert np.linalg.norm(at[:, None] - path, axis=-1).min(axis=-1).max() <= step
     gravity = np.array(robot.gravity)
     assert data["gravity"] == bool(gravity.any())
     if gravity.any():
@@ -219,11 +220,14 @@ def test_the_numbers_are_the_librarys(name):
     mean = np.trapezoid(forces**2, cycle["time"], axis=0) / cycle["duration"]
     np.testing.assert_allclose(np.sqrt(mean), cycle["rms_forces"])
     speeds = (pteron.jacobian(robot, state[0]) @ state[1][..., None])[..., 0]
-    np.testing.assert_allclose(np.abs(speeds).max(axis=0), cycle["peak_slider_speeds"], atol=1e-12)
-    sliders = pteron.inverse_kinematics(robot, state[0])
-    np.testing.assert_array_equal(cycle["sliders"]["least"], sliders.min(axis=0))
-    np.testing.assert_array_equal(cycle["sliders"]["greatest"], sliders.max(axis=0))
-    assert all(cycle["sliders"]["within"])
+    np.testing.assert_allclose(np.abs(speeds).max(axis=0), cycle["peak_speeds"], atol=1e-12)
+    joints = pteron.inverse_kinematics(robot, state[0])
+    np.testing.assert_array_equal(cycle["joints"]["least"], joints.min(axis=0))
+    np.testing.assert_array_equal(cycle["joints"]["greatest"], joints.max(axis=0))
+    assert all(cycle["joints"]["within"])
+    assert [joint["force_unit"] for joint in data["joints"]] == [
+        leg.joint.force_unit for leg in robot.legs
+    ]
     home = data["home"]
     np.testing.assert_array_equal(home["jacobian"], pteron.jacobian(robot, home["pose"]))
     assert home["reserve"] > 0.4
@@ -243,6 +247,10 @@ def test_the_page_shows_the_numbers(name):
     found, text = report(name), read(name).text
     for value in (*found.peak_forces, *found.rms_forces, *found.peak_speeds):
         assert significant(float(value)) in text
+    joints = {leg.joint.noun: leg.joint.force_unit for leg in found.robot.legs}
+    for noun in ("slider", "crank"):
+        assert (noun in text.replace("the slider is tilted", "")) == (noun in joints)
+    assert ("torque" in text) == ("crank" in joints)
     assert significant(found.jacobian.condition, 4) in text
     for i, value in enumerate(found.base.values(), start=1):
         assert significant(float(value), 4) in text
@@ -250,7 +258,8 @@ def test_the_page_shows_the_numbers(name):
     for cost in found.costs:
         assert str(cost.operations) in text
         assert cost.note in text
-    assert ("Possible, but unlikely" in text) == bool(found.doubts) == (name == "hostile")
+    doubtful = name in ("hostile", "mixed")
+    assert ("Possible, but unlikely" in text) == bool(found.doubts) == doubtful
     assert all(doubt.replace("-", "\u2212") in text for doubt in found.doubts)
 
 
@@ -265,6 +274,18 @@ def test_costs_come_in_pairs_with_percentages_of_the_counts():
     # By hand: 4 x 4 by 4 x 4 sliders, 8 links of 4 x 6 by 6 x 4, elimination, D P.
     products = 4 * 4 * 7 + 8 * (4 * 4 * 11)
     assert dense_operations(found.base, range(40)) == products + 43 + 2 * 16 * 40 + 4 * 79
+
+
+def test_measures_are_shown_where_they_depend_on_the_position():
+    assert report("quadrupteron").measures is report("hostile").measures is None
+    found = report("delta").measures
+    assert found.cut.plane == "xz", "upright"
+    inside = found.cut.status == REACHABLE
+    poses = np.stack(np.meshgrid(found.cut.first, found.cut.second), axis=-1)[inside]
+    expected = reserve(CATALOG["delta"], np.insert(poses, 1, report("delta").home[1], axis=-1))
+    np.testing.assert_allclose(found.type_i[inside], expected.type_i.min(axis=-1), rtol=1e-12)
+    np.testing.assert_allclose(found.type_ii[inside], expected.type_ii, rtol=1e-12)
+    assert "depends on the position" in read("delta").text
 
 
 def test_the_slices_share_a_scale():
@@ -291,7 +312,7 @@ def test_the_condition_number_mixes_no_units():
 
 
 def test_symbols_stand_for_their_numbers():
-    for base in (report("quadrupteron").base, pteron.base_parameters(CATALOG["tripteron-oblique"])):
+    for base in (report("quadrupteron").base, report("delta").base):
         found = in_symbols(base)
         names = [re.sub("<[^>]*>", "", line) for line, _ in found["lengths"]]
         values = {n: v for n, (_, v) in zip(names, found["lengths"], strict=True)}
@@ -344,6 +365,9 @@ def test_numbers_as_people_read_them():
     assert significant(float("inf")) == "∞"
     assert fixed(-0.04) == "0.0"
     assert triple((1 / 3, -1e-17, 2.0)) == "(0.3333, 0, 2)"
-    assert str(expression("I_e")) == "<i>I</i><sub>e</sub>"
-    assert str(expression("m_e - 625 I_e")).startswith("<i>m</i><sub>e</sub> \u2212 625\u202f<i>I")
-    assert "<b>" not in expression("<b> m_p1")
+    last = report("quadrupteron").base.expressions("html")[-1]
+    assert last == "<i>m</i><sub>e</sub> \u2212 625\u202f<i>I</i><sub>e</sub>"
+    account = "its point s0 is p - r . d, rho"
+    assert lettered(account) == (
+        "its point <b>s</b><sub>0</sub> is <b>p</b> \u2212 <b>r</b> \u00b7 <b>d</b>, \u03c1"
+    )

@@ -106,7 +106,7 @@ def measured(value: float, half: float) -> tuple[str, str]:
 
 
 def html_expressions(model: Model) -> tuple[Markup, ...]:
-    """Return what each value of a model is, in HTML: base parameters as sums, the others by name."""
+    """Return what each value of a model is, in HTML: sums of parameters, or names of terms."""
     names = [_term_html(term) for term in model.kept_terms]
     found = [*model.base.expressions("html"), *names]
     terms = {term.name: _term_html(term) for term in model.joining_terms}
