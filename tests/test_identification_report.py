@@ -14,7 +14,7 @@ from mechanisms import CATALOG
 from test_report import HOSTILE, Reader, strict
 
 import pteron
-from pteron.identification import Terms, identify
+from pteron.identification import Terms, identification_model, identify
 from pteron.plots import certainty_figure, comparison_figure, errors_figure, residual_speed_figure
 from pteron.report.identification import (
     measured,
@@ -25,7 +25,8 @@ from pteron.report.identification import (
 )
 from pteron.report.identification.contents import contents, short_sources, shortened
 from pteron.report.identification.page import page
-from pteron.report.typeset import expression, significant
+from pteron.report.identification.values import html_expressions, html_names
+from pteron.report.typeset import significant
 
 NOISE = {"duration": 5.0, "rate": 400.0, "joint_noise": 2e-7, "force_noise": 0.05}
 
@@ -53,14 +54,14 @@ def result(name):
             feasible=False,
             distance=7.3,
             p_value=1e-4,
-            at_border=("u1", "l", "p(2,3)", "total mass <= 4"),
+            at_border=("u1", "l1", "l2", "l3", "u2", "u3", "total mass <= 4"),
             cad_feasible=False,
             cad_violations=(violation,),
             nearest_to="nothing",
         )
         held = (one_sample(found.held_out[0]),)
         return replace(found, consistency=consistency, consistency_share=0.43, held_out=held)
-    robot = CATALOG["quadrupteron" if name == "quadrupteron" else "tripteron"]
+    robot = CATALOG["quadrupteron" if name == "quadrupteron" else "delta"]
     shape = NOISE | {"duration": 12.0} if name == "quadrupteron" else NOISE
     fit = replace(log_of(robot, **shape, seed=3), source="/home/someone/logs/a.csv")
     if name == "quadrupteron":
@@ -150,14 +151,14 @@ def test_the_page_shows_the_numbers(name):
     if consistency is None:
         assert "No model of real bodies" in text
     else:
-        for mass in (leg.slider_mass for leg in consistency.robot.legs):
-            assert significant(mass, 4) in text
+        for leg in consistency.robot.legs:
+            for inertia in leg.bodies.values():
+                assert significant(inertia.mass, 4) in text
     assert ("CAD model itself is not real" in text) == (name == "unreal")
     if name == "unreal":
         assert "7.3 standard deviations away (p = 0.00010)" in text
         assert "by 0.0012 for \u22120.3" in text
         assert "by 43 % of what" in text
-        # u1, all three lower links, and sliders 2 and 3.
         assert html(name).count('<span class="chip weak">border</span>') == 6
 
 
@@ -193,7 +194,7 @@ def test_the_stretch_drawn_is_where_the_model_misses_most():
 
 def test_a_recording_of_one_sample_is_not_drawn():
     assert contents(result("no bodies")).drawn == ()
-    assert "Over the slider's speed: a.csv, fitted" in read("no bodies").text
+    assert "Over the joint's speed: a.csv, fitted" in read("no bodies").text
 
 
 def test_autocorrelations_are_those_of_the_estimate():
@@ -256,14 +257,18 @@ def test_a_model_file_replaces_nothing_that_was_read(tmp_path, monkeypatch):
 
 
 def test_names_as_people_read_them():
-    assert str(expression("mgx_u2 - 5.9 I_l2")).startswith(
-        "<i>m\u03b3</i><sub>x,u2</sub> \u2212 5.9"
-    )
-    assert expression("Fc1") == "<i>F</i><sub>c1</sub>"
-    assert expression("Fv_R1_2") == "<i>F</i><sub>v,R1,2</sub>"
-    assert expression("Fv_R4") == "<i>F</i><sub>v,R4</sub>"
-    assert expression("m_L") == "<i>m</i><sub>L</sub>"
-    assert "<b>" not in expression("<b> m_p1")
+    terms = Terms(passive="each", rotors=True, payload=True)
+    model = identification_model(CATALOG["quadrupteron"], terms)
+    found = html_names(model)
+    assert found["mgx_u2"] == "<i>m\u03b3</i><sub>x,u2</sub>"
+    assert found["Fc1"] == "<i>F</i><sub>c1</sub>"
+    assert found["Fv_R1_2"] == "<i>F</i><sub>v,R1,2</sub>"
+    assert found["Fv_R4"] == "<i>F</i><sub>v,R4</sub>"
+    assert found["offset3"] == "offset<sub>3</sub>"
+    assert found["mgx_L"] == "<i>m\u03b3</i><sub>x,L</sub>"
+    first = html_expressions(model)[0]
+    assert first.startswith("<i>m</i><sub>p1</sub> + <i>m</i><sub>u1</sub> + 20.11\u202f<i>I</i>")
+    assert "<i>J</i><sub>m2</sub>" in html_expressions(model)[1], "a rotor joins its slider"
     names = short_sources(result("hostile"))
     assert shortened(["x/1.csv: row 7, log.csv"], names) == ("x/1.csv: row 7, log.csv",)
     assert short_sources(result("quadrupteron")) == {"/home/someone/logs/a.csv": "a.csv"}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -19,7 +20,7 @@ import pteron
 from pteron.cli import identify as command
 from pteron.cli.screen import stages
 from pteron.identification import METHODS, write_log
-from pteron.identification.model import Joints
+from pteron.identification.model import Passive
 from pteron.identification.signals import Derivatives
 
 FILES = ["identification.html", "identification.json"]
@@ -99,6 +100,20 @@ def test_json_is_what_is_in_the_file():
 
 
 @QUICK
+def test_cranks_are_identified_too():
+    joints = tuple(leg.joint for leg in CATALOG["delta"].legs)
+    write_log(replace(log("delta"), symbols=joints), "fit.csv")
+    assert Path("fit.csv").read_text().startswith("t,theta1,theta2,theta3,torque1,torque2,torque3")
+    found = strict(done("identify fit.csv --robot delta --out out --json"))
+    units = dict(zip(found["estimate"]["names"], found["estimate"]["units"], strict=True))
+    assert (units["I_u1"], units["Fc1"], units["Fv1"]) == ("kg m^2", "N m", "N m s")
+    true = pteron.base_parameters(CATALOG["delta"]).values()
+    estimate = found["estimate"]
+    values, deviations = (np.array(estimate[k])[:13] for k in ("values", "standard_deviations"))
+    assert (np.abs(values - true) < 6.0 * deviations).all()
+
+
+@QUICK
 def test_options_reach_the_work():
     write_log(log("tripteron"), "a.csv")
     write_log(log("tripteron", 7), "b.csv")
@@ -129,7 +144,7 @@ def test_options_reach_the_work():
 
 def test_choices_are_those_of_the_library():
     assert set(command.Estimator.__args__) == set(METHODS)
-    assert set(command.Joints.__args__) == set(Joints.__args__)
+    assert set(command.Passive.__args__) == set(Passive.__args__)
     assert set(command.Derivatives.__args__) == set(Derivatives.__args__)
 
 
