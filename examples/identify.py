@@ -21,11 +21,11 @@ def recorded(seed: int) -> Log:
     )
     time = np.arange(10_000) / 1000.0
     state = motion.at(time)
-    rho, rates, _ = motion.joints(time)
+    joints, rates, _ = motion.joints(time)
     forces = pteron.inverse_dynamics(built, state.pose, state.velocity, state.acceleration)
     forces += 5.0 * np.sign(rates) + 3.0 * rates
     noise = 0.01 * np.sqrt((forces**2).mean(axis=0)) * rng.normal(size=forces.shape)
-    return Log(f"motion {seed}", time, np.round(rho / 1e-6) * 1e-6, forces + noise)
+    return Log(f"motion {seed}", time, np.round(joints / 1e-6) * 1e-6, forces + noise)
 
 
 found = identify(drawn, recorded(1), held_out=recorded(2))

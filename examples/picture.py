@@ -6,7 +6,7 @@ Writes `quadrupteron.png` and `forces.png` to the folder it is run in.
 import numpy as np
 
 import pteron
-from pteron.motion import joint_points, pick_and_place
+from pteron.motion import joint_guides, joint_points, pick_and_place
 from pteron.plots import forces_figure, robot_figure
 from pteron.workspace import home_pose
 
@@ -14,13 +14,9 @@ robot = pteron.load("quadrupteron")
 cycle = pick_and_place(robot, home_pose(robot))
 forces = pteron.inverse_dynamics(robot, cycle.pose, cycle.velocity, cycle.acceleration)
 
-limits = np.array([leg.limits for leg in robot.legs])
-guides = np.array([leg.guide_point for leg in robot.legs])
-directions = np.array([leg.joint_axis for leg in robot.legs])
-rails = guides[:, None, :] + limits[:, :, None] * directions[:, None, :]
-
 points = joint_points(robot, cycle.pose[len(cycle.time) // 8])
-machine = robot_figure(points, rails, gravity=np.array(robot.gravity), path=cycle.pose[:, :3])
+guides = joint_guides(robot, cycle.pose)
+machine = robot_figure(points, guides, gravity=np.array(robot.gravity), path=cycle.pose[:, :3])
 machine.savefig("quadrupteron.png", dpi=160, facecolor="white")
 forces_figure(cycle.time, forces, turning_point=cycle.duration / 2).savefig("forces.png", dpi=160)
 

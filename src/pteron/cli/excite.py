@@ -14,6 +14,8 @@ from pteron.errors import OutputError
 if TYPE_CHECKING:
     from pteron.identification.excitation import Excitation
 
+_MEASURES = {"type_i": "type-I measure", "type_ii": "type-II measure"}
+
 _STEPS = 1000
 """Steps of the progress bar."""
 
@@ -127,7 +129,7 @@ def _margins(found: Excitation) -> Table:
     headings = ("least margin", "leg", "at (s)")
     made = table("limit", *headings, numbers=headings)
     for margin in found.margins:
-        name = margin.limit.replace("_", " ")
+        name = _MEASURES.get(margin.limit, margin.limit.replace("_", " "))
         made.add_row(
             f"{name} ({margin.unit})" if margin.unit else name,
             f"{margin.least:.4g}",

@@ -166,7 +166,7 @@ def body_rows(result: Identification) -> tuple[Body, ...]:
         for leg in p.legs or (None,)
     }
     identified, drawn = _bodies(consistency.robot), _bodies(result.robot)
-    names = {
+    names: dict[tuple[str, int | None], str] = {
         (letter, i): leg.names[letter]
         for i, leg in enumerate(result.robot.legs, start=1)
         for letter in leg.bodies
