@@ -10,7 +10,7 @@ from pteron.kernels import Array
 from pteron.kinematics import inverse_kinematics
 from pteron.kinematics.evaluate import evaluated
 from pteron.legs import LegKind
-from pteron.legs.leg import SLIDER
+from pteron.legs.kind import SLIDER
 from pteron.manipulator import Manipulator
 from pteron.shapes import PerJoint, PoseLike
 

@@ -13,7 +13,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from numpy.typing import NDArray
 
 from pteron.kernels import Array
-from pteron.legs.leg import SLIDER, ActuatedJoint
+from pteron.legs.kind import SLIDER, ActuatedJoint
 from pteron.plots.canvas import (
     FONT_SIZE,
     GRID,

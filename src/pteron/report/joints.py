@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import pi
 
-from pteron.legs.leg import ActuatedJoint
+from pteron.legs.kind import ActuatedJoint
 
 _NARROW = "\u202f"
 _SYMBOLS = {"rho": "\u03c1", "theta": "\u03b8"}

@@ -14,7 +14,7 @@ import pteron
 from pteron.equations.machine import closure_of
 from pteron.identification import Identification
 from pteron.identification.result import AT_THE_FLOOR, LARGE, SMALL
-from pteron.legs.leg import ActuatedJoint
+from pteron.legs.kind import ActuatedJoint
 from pteron.plots import (
     autocorrelation_figure,
     certainty_figure,
