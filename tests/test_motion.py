@@ -19,7 +19,7 @@ from pteron.workspace import home_pose, reserve
 
 NAMES = [
     *("quadrupteron", "tripteron", "delta", "quadrupteron turned", "delta on a wall"),
-    *("tripteron, no gravity", "random PPPP 0", "random PRR 0"),
+    *("tripteron, no gravity", "random 3T1R 0", "random PRR 0"),
 ]
 EVERY = pytest.mark.parametrize("name", NAMES)
 LEAST = 0.2

@@ -22,7 +22,7 @@ from pteron.workspace import (
 
 NAMES = [
     *("quadrupteron", "tripteron-oblique", "delta", "quadrupteron turned", "delta on a wall"),
-    *("random PPPP 0", "random RRR 0", "random PRR 0"),
+    *("random 3T1R 0", "random RRR 0", "random PRR 0"),
 ]
 EVERY = pytest.mark.parametrize("name", NAMES)
 
@@ -212,6 +212,17 @@ def test_slices_that_cannot_be_are_refused():
     far = with_limits(robot, 5.0, 6.0)
     with pytest.raises(pteron.ModelError, match="no position is in reach"):
         reach_slice(far, [0.0, 0.0, 0.0])
+
+
+def test_a_reach_without_an_end_is_refused():
+    robot = MECHANISMS["tripteron"]
+    along = np.ones(3) / np.sqrt(3.0)
+    legs = [replace(leg, slider_direction=along, limits=None) for leg in robot.legs]
+    endless = replace(robot, legs=tuple(legs))
+    pose = pteron.random_poses(endless, 1)[0]
+    with pytest.raises(pteron.ModelError, match=r"has no end: .* give the legs limits"):
+        bounding_box(endless, pose)
+    assert np.ptp(bounding_box(with_limits(endless, -0.5, 0.5), pose), axis=0).max() < 3.0
 
 
 @EVERY

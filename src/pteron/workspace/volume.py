@@ -22,6 +22,9 @@ _STARTS = 5
 _FAR = 1e3
 """What stands for no limit, m: the optimiser wants finite numbers."""
 
+_ENDLESS = 10.0
+"""A reach that is so many times the size of the machine has no end."""
+
 _SLACK = 1e-8
 """Metres by which the optimiser may overstep a bound."""
 
@@ -72,7 +75,7 @@ def bounding_box(robot: Manipulator, pose: PoseLike) -> Array:
     Raises
     ------
     ModelError
-        If no position is in reach at this orientation.
+        If no position is in reach at this orientation, or the reach has no end.
 
     Examples
     --------
@@ -113,6 +116,11 @@ def bounding_box(robot: Manipulator, pose: PoseLike) -> Array:
             sides[side, axis] = sign * min(
                 _furthest(room, p, sign * np.eye(3)[axis]) for p in firsts
             )
+    if not (np.abs(sides - center) <= _ENDLESS * radius).all():
+        raise ModelError(
+            f"{robot.name}: the reach has no end: the guides let the platform move along them for "
+            "ever; give the legs limits"
+        )
     return sides
 
 
