@@ -104,7 +104,7 @@ def resting(robot, *, seed=3, rate=1000.0):
     )
     pose, velocity, acceleration = law[..., None] * step
     pose = pose + corners[start] + home_pose(robot)
-    rates = pteron.joint_rates(robot, pose, velocity).joints
+    rates = pteron.joint_rates(robot, pose, velocity).actuated
     forces = pteron.inverse_dynamics(robot, pose, velocity, acceleration)
     forces = forces + Friction.of(len(robot.legs)).forces(rates)
     return Log("rests", time, pteron.inverse_kinematics(robot, pose), forces)
@@ -326,7 +326,7 @@ def test_motion_along_one_axis_names_what_is_not_seen():
 def test_the_log_of_another_machine_is_refused_by_its_row():
     log = log_of(QUADRUPTERON)
     away = replace(log, joints=log.joints + np.array([0.0, 0.3, 0.0, -0.3]))
-    refused(away, "no pose of quadrupteron has the sliders", "row", "another machine")
+    refused(away, "no pose of quadrupteron has the joints", "row", "another machine")
 
 
 def test_a_log_too_short_says_how_much_is_needed():

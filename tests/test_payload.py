@@ -15,7 +15,7 @@ from pteron.identification.logs.description import Description
 from pteron.identification.model import Terms
 from pteron.identification.payload import identify_payload
 from pteron.identification.signals import Processing
-from pteron.kernels import numeric
+from pteron.kinematics.evaluate import unchecked
 from pteron.workspace import home_pose
 
 RANDOM = ["random 3T 0"]
@@ -65,14 +65,14 @@ def clean(name, seed, load):
     time, q = motion(name, seed)
     phase = (np.arange(len(time)) >= len(time) // 2).astype(int)
     empty, full = (pteron.inverse_dynamics(r, *q) for r in (robot, laden(robot, load)))
-    rates = pteron.joint_rates(robot, q[0], q[1]).joints
+    rates = pteron.joint_rates(robot, q[0], q[1]).actuated
     legs = np.arange(len(robot.legs))
     forces = np.where(phase[:, None] == 1, full, empty)
     forces += 2.0 * (1.0 + 0.1 * legs) * np.sign(rates) + (1.0 + 0.2 * legs) * rates + 0.3 * legs
     sliders = pteron.inverse_kinematics(robot, q[0])
     mode = None
     if robot.platform.turns:
-        mode = 1 + int(numeric(robot, "type_ii")(q[0, 0]) < 0.0)
+        mode = 1 + int(unchecked(robot, "type_ii", q[0, 0]) < 0.0)
     return time, sliders, forces, phase, mode
 
 

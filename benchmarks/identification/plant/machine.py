@@ -45,7 +45,7 @@ class Recording:
     ----------
     time : array, shape (T,)
         s, from 0.
-    sliders, rates, accelerations : array, shape (T, n)
+    joints, rates, accelerations : array, shape (T, n)
         m, m/s and m/s^2.
     forces : array, shape (T, n)
         What the actuators applied at these instants, N.
@@ -56,7 +56,7 @@ class Recording:
     """
 
     time: Array
-    sliders: Array
+    joints: Array
     rates: Array
     accelerations: Array
     forces: Array
@@ -209,5 +209,5 @@ def _place(robot: pteron.Manipulator, data: Any, reference: Reference, start: fl
         upper, lower = (np.arctan2(*(axes.T @ link[i])[1::-1]) for link in links)
         turns = rates.upper_links[i], rates.lower_links[i]
         position += [sliders[i], upper, lower - upper]
-        motion += [rates.joints[i], turns[0], turns[1] - turns[0]]
+        motion += [rates.actuated[i], turns[0], turns[1] - turns[0]]
     data.qpos[:], data.qvel[:], data.time = position, motion, start
