@@ -1,11 +1,15 @@
 """Friction of the passive joints, and the platform's motion from that of the sliders."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from differences import along
+from logs_of_motions import machine
 from mechanisms import BATCH_SHAPES, MECHANISMS, relative_error, states
 
 import pteron
+from pteron.equations.friction import passive_joints
 from pteron.kinematics.evaluate import unchecked
 
 SOME = [
@@ -14,20 +18,22 @@ SOME = [
     "tripteron",
     "random 3T1R 1",
     "random 3T 0",
+    "delta",
+    "mixed",
 ]
 each_mechanism = pytest.mark.parametrize("name", SOME)
 
 
 def passive_rates(robot, pose, velocity):
-    """Return the rates (R, 3 n + 1 or 3 n) of what has a column: R1, R2, R3 of each leg, one R4."""
-    motion = pteron.joint_rates(robot, pose, velocity)
-    legs = motion.passive[..., :3].reshape(len(pose), -1)
-    return np.hstack([legs, velocity[:, 3:]])
+    """Return the rates of what has a column: the passive joints of each leg, and the platform."""
+    passive = pteron.joint_rates(robot, pose, velocity).passive
+    legs, numbers = np.array(passive_joints(robot)).T - 1
+    return np.hstack([passive[:, legs, numbers], velocity[:, 3:]])
 
 
 @each_mechanism
 def test_a_column_of_passive_friction_does_the_work_of_its_joint(name):
-    robot = MECHANISMS[name]
+    robot = machine(name)
     pose, velocity, _ = states(robot, 50)
     columns = unchecked(robot, "passive_friction", pose, velocity)
     rates = passive_rates(robot, pose, velocity)
@@ -40,7 +46,7 @@ def test_a_column_of_passive_friction_does_the_work_of_its_joint(name):
 @each_mechanism
 def test_a_column_is_the_rate_times_its_slope_by_the_sliders(name):
     # F = q' dq'/drho': virtual work along any motion, not only along the present one.
-    robot = MECHANISMS[name]
+    robot = machine(name)
     n = len(robot.legs)
     pose, velocity, _ = states(robot, 20)
     columns = unchecked(robot, "passive_friction", pose, velocity)
@@ -60,7 +66,7 @@ def test_a_column_is_the_rate_times_its_slope_by_the_sliders(name):
 
 @each_mechanism
 def test_motion_of_the_platform_inverts_that_of_the_sliders(name):
-    robot = MECHANISMS[name]
+    robot = machine(name)
     pose, velocity, acceleration = states(robot, 100)
     rates = pteron.joint_rates(robot, pose, velocity)
     accelerations = pteron.joint_accelerations(robot, pose, velocity, acceleration)

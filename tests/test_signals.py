@@ -380,7 +380,9 @@ def test_a_declared_mode_comes_first_and_that_of_home_last(name):
 def test_a_tripteron_has_one_assembly_mode():
     robot = CATALOG["tripteron"]
     log = log_of(robot, duration=1.0)
-    assert assembly_mode(robot, replace(log, description=Description(assembly_mode=2))) == 0
+    assert assembly_mode(robot, log) == 0
+    with pytest.raises(DataError, match="assembly_mode = 2; tripteron has 1$"):
+        assembly_mode(robot, replace(log, description=Description(assembly_mode=2)))
 
 
 def unreachable(log, row):

@@ -24,19 +24,19 @@ import plant
 import pteron
 from pteron import atomic
 from pteron.identification import (
-    Observations,
     Estimate,
     Log,
     Model,
+    Observations,
     Preprocessing,
     column_errors,
-    observations_of,
     huber,
     identification_model,
     maximum_likelihood,
+    observations_of,
     ordinary,
-    total,
     preprocessing_of,
+    total,
     weighted,
 )
 from pteron.identification.prediction import predict

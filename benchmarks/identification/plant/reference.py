@@ -74,7 +74,7 @@ def fourier_reference(
     """Return a random lively motion about the home pose.
 
     All coefficients are scaled alike until the first of these stops them: a type-I measure of
-    0.25, a type-II measure of 0.3, a slider's limit, the greatest speed or acceleration of a slider.
+    0.25, a type-II measure of 0.3, a slider's limit, the greatest speed or acceleration of one.
 
     Parameters
     ----------
