@@ -47,11 +47,8 @@ def motion(name, seed):
         s, c = np.sin(w * time)[:, None], np.cos(w * time)[:, None]
         q += [a * s + b * c, w * (a * c - b * s), -w * w * (a * s + b * c)]
     # The mixed machine is four times as large as the others.
-    q *= (
-        (4.0 if name == "mixed" else 1.0)
-        * np.array([0.05, 0.05, 0.05, 0.3])[:m]
-        / np.abs(q[0]).max(axis=0)
-    )
+    size = 0.2 if name == "mixed" else 0.05
+    q *= np.array([size, size, size, 0.3])[:m] / np.abs(q[0]).max(axis=0)
     q[0] += home_pose(robot)
     return time, q
 

@@ -381,7 +381,7 @@ def test_a_tripteron_has_one_assembly_mode():
     robot = CATALOG["tripteron"]
     log = log_of(robot, duration=1.0)
     assert assembly_mode(robot, log) == 0
-    with pytest.raises(DataError, match="assembly_mode = 2; tripteron has 1$"):
+    with pytest.raises(DataError, match=r"assembly_mode = 2; tripteron has 1$"):
         assembly_mode(robot, replace(log, description=Description(assembly_mode=2)))
 
 
