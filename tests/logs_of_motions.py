@@ -1,17 +1,34 @@
 """Synthetic logs: a machine's own dynamics along a motion, friction, noise and gaps at will."""
 
+import tempfile
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
+import rod_machines
+import tomlkit
+from mechanisms import MECHANISMS
 
 import pteron
 from pteron.identification.logs import Description, Log
 from pteron.workspace import home_pose
 
 
+@lru_cache
+def machine(name):
+    """Return a machine that the tests share: one of `MECHANISMS`, or of `rod_machines`."""
+    if name in MECHANISMS:
+        return MECHANISMS[name]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "machine.toml"
+        path.write_text(tomlkit.dumps(rod_machines.MACHINES[name][0]), encoding="utf-8")
+        return pteron.load(path)
+
+
 @dataclass(frozen=True)
 class Friction:
-    """Coulomb and viscous friction and offset of n sliders, (n,) each."""
+    """Coulomb and viscous friction and offset of n joints, (n,) each."""
 
     coulomb: np.ndarray
     viscous: np.ndarray
@@ -72,14 +89,16 @@ def log_of(
     if time is None:
         time = np.arange(round(duration * rate)) / rate
     pose, velocity, acceleration = motion(robot, time, seed=seed, **shape)
-    sliders = pteron.inverse_kinematics(robot, pose)
+    joints = pteron.inverse_kinematics(robot, pose)
     rates = pteron.joint_rates(robot, pose, velocity).actuated
     forces = pteron.inverse_dynamics(robot, pose, velocity, acceleration)
     forces = forces + (friction or Friction.of(len(robot.legs))).forces(rates)
     rng = np.random.default_rng(noise_seed)
-    sliders = sliders + joint_noise * rng.normal(size=sliders.shape)
+    joints = joints + joint_noise * rng.normal(size=joints.shape)
     forces = forces + force_noise * rng.normal(size=forces.shape)
-    return Log("log.csv", time, sliders, forces, description=description or Description())
+    about = description or Description()
+    symbols = tuple(leg.joint for leg in robot.legs)
+    return Log("log.csv", time, joints, forces, description=about, symbols=symbols)
 
 
 def truth(model):

@@ -5,12 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from mechanisms import CATALOG, MECHANISMS, states
+from logs_of_motions import machine
+from mechanisms import CATALOG, states
 from scipy.optimize import minimize
 from scipy.stats import chi2
 
 import pteron
+from pteron.bodies.parameters import body_places
 from pteron.identification.consistency import Bounds, Consistency, consistent_model, real_bodies
+from pteron.manipulator import parameter_data
 
 pytest.importorskip("cvxpy")
 
@@ -21,6 +24,8 @@ SOME = [
     "tripteron",
     "random 3T1R 1",
     "random 3T 0",
+    "delta",
+    "mixed",
 ]
 BASES = {}
 
@@ -43,21 +48,24 @@ def disturbed(robot, seed, by=0.2):
     """Return parameters of real bodies, each up to `by` off in mass, centre and inertia."""
     rng = np.random.default_rng(seed)
     values = pteron.parameters(robot)
-    n = len(robot.legs)
-    values[:n] *= rng.uniform(1 - by, 1 + by, n)
-    for body in values[n:].reshape(-1, 4):
-        about_center = body[3] - (body[1] ** 2 + body[2] ** 2) / body[0]
-        center = body[1:3] / body[0] * rng.uniform(1 - by, 1 + by, 2)
-        body[0] *= rng.uniform(1 - by, 1 + by)
-        body[1:3] = body[0] * center
-        body[3] = about_center * rng.uniform(1 - by, 1 + by) + body[0] * center @ center
+    # A slider has a mass, a rod m, mgx and I, other bodies all four.
+    for place in body_places(parameter_data(robot)).values():
+        m, *moments = values[list(place.values())]
+        mass = m * rng.uniform(1 - by, 1 + by)
+        if moments:
+            *first, inertia = moments
+            about_center = inertia - np.dot(first, first) / m
+            first = mass * np.array(first) / m * rng.uniform(1 - by, 1 + by, len(first))
+            about_center *= rng.uniform(1 - by, 1 + by)
+            moments = [*first, about_center + first @ first / mass]
+        values[list(place.values())] = [mass, *moments]
     assert real_bodies(robot, values) == ()
     return values
 
 
 @pytest.mark.parametrize("name", SOME)
 def test_exact_values_give_the_cad_model_back(name):
-    robot = MECHANISMS[name]
+    robot = machine(name)
     base = base_of(robot)
     result = consistent_model(robot, base, base.values())
     assert isinstance(result, Consistency)
@@ -71,7 +79,7 @@ def test_exact_values_give_the_cad_model_back(name):
 
 @pytest.mark.parametrize("name", SOME)
 def test_a_wrong_cad_model_does_not_keep_the_forces_from_being_right(name):
-    robot = MECHANISMS[name]
+    robot = machine(name)
     base = base_of(robot)
     prior = disturbed(robot, 3)
     for cad in (prior, pteron.with_parameters(robot, prior), None):
@@ -92,7 +100,7 @@ def test_a_wrong_cad_model_does_not_keep_the_forces_from_being_right(name):
 
 @pytest.mark.parametrize(("name", "groups"), [("tripteron", True), ("random 3T1R 0", [(1, 3)])])
 def test_legs_that_share_parameters_keep_sharing_them(name, groups):
-    robot = MECHANISMS[name]
+    robot = machine(name)
     base = base_of(robot, groups)
     legs = range(len(robot.legs)) if groups is True else [0, 2]
     first = robot.legs[0]
@@ -341,7 +349,7 @@ def test_input_is_checked():
 @pytest.mark.parametrize(("noise", "seed"), [(0.5, 0), (10.0, 1), (100.0, 2)])
 def test_forces_differ_from_the_free_fit_by_little_of_the_residual(name, seed, noise):
     """Below 5 % of the residual, with noise (N) that leaves the free fit real, or far from it."""
-    robot = MECHANISMS[name]
+    robot = machine(name)
     base = base_of(robot)
     count = 3000
     matrix = pteron.base_regressor(robot, base, *states(robot, count, seed)).reshape(-1, base.rank)

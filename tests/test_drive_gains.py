@@ -123,7 +123,7 @@ def test_what_was_found_can_be_read_and_declared():
     assert not any(name.endswith("_L") for name in found.estimate.names)
     data = found.as_dict()
     assert data["gains"] == found.gains.tolist()
-    assert data["unit"] == "N/A"
+    assert set(data["units"]) == {"N/A"}
     # The currents' noise is what was put on them.
     size = np.sqrt((current_log("tripteron").forces ** 2).mean(axis=0))
     np.testing.assert_allclose(found.residual, NOISE[1] * size, rtol=0.15)

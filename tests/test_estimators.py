@@ -396,7 +396,7 @@ def test_too_few_rows_are_refused(estimator):
 @pytest.mark.parametrize("threshold", [0.0, -1.0, float("nan")])
 def test_a_threshold_that_cannot_be_is_refused(threshold):
     with pytest.raises(DataError, match="threshold"):
-        huber(drawn(15), threstype_ii=threshold)
+        huber(drawn(15), threshold=threshold)
 
 
 # Essential parameters

@@ -15,6 +15,7 @@ import casadi as ca
 import numpy as np
 import polars as pl
 import pytest
+from logs_of_motions import machine
 from mechanisms import CATALOG, random_machine, with_elbows
 from typer.testing import CliRunner
 
@@ -58,7 +59,7 @@ def drawn(name: str, space: str, seed: int = 1) -> FourierMotion:
 def small(criterion: str = "condition", space: str = "platform", robot: str = "tripteron"):
     """Return a search small enough for a test."""
     return optimal_excitation(
-        CATALOG[robot],
+        machine(robot),
         space=space,
         harmonics=2,
         period=4.0,
@@ -95,9 +96,10 @@ def test_platform_and_sliders_are_one_motion(name: str, space: str):
     time = np.linspace(0.0, 4.0, 23)
     state, (rho, drho, ddrho) = motion.at(time), motion.joints(time)
     assert pteron.inverse_kinematics(robot, state.pose) == pytest.approx(rho, abs=1e-12)
-    rates, seconds = pteron.joint_rates(robot, state.pose, state.velocity, state.acceleration)
-    assert rates.joints == pytest.approx(drho, abs=1e-11)
-    assert seconds.joints == pytest.approx(ddrho, abs=1e-10)
+    rates = pteron.joint_rates(robot, state.pose, state.velocity)
+    seconds = pteron.joint_accelerations(robot, state.pose, state.velocity, state.acceleration)
+    assert rates.actuated == pytest.approx(drho, abs=1e-11)
+    assert seconds.actuated == pytest.approx(ddrho, abs=1e-10)
 
 
 @each_space
@@ -315,14 +317,19 @@ def test_the_measure_of_the_volume_is_the_log_det():
 
 @pytest.mark.parametrize(
     ("robot", "space", "gain"),
-    [("tripteron", "platform", 2.0), ("quadrupteron", "joints", 3)],
+    [
+        ("tripteron", "platform", 2.0),
+        ("quadrupteron", "joints", 3),
+        ("delta", "platform", 2.0),
+        ("mixed", "joints", 3.0),
+    ],
 )
 def test_the_search_finds_better_than_random_and_keeps_every_limit(robot, space, gain):
     found = small("condition", space, robot)
     assert found.gain > gain
     assert found.margins.kept
     assert margins(found.motion, found.limits, 40_000).kept
-    assert found.conditioning == conditioning(found.motion, pteron.base_parameters(CATALOG[robot]))
+    assert found.conditioning == conditioning(found.motion, pteron.base_parameters(machine(robot)))
     assert found.draws == 6
     for start in found.starts:
         assert start.after.scaled <= start.before.scaled

@@ -1,12 +1,16 @@
 """Friction of the passive joints, and the platform's motion from that of the sliders."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from differences import along
+from logs_of_motions import machine
 from mechanisms import BATCH_SHAPES, MECHANISMS, relative_error, states
 
 import pteron
-from pteron.kernels import numeric
+from pteron.equations.friction import passive_joints
+from pteron.kinematics.evaluate import unchecked
 
 SOME = [
     "quadrupteron turned",
@@ -14,24 +18,26 @@ SOME = [
     "tripteron",
     "random 3T1R 1",
     "random 3T 0",
+    "delta",
+    "mixed",
 ]
 each_mechanism = pytest.mark.parametrize("name", SOME)
 
 
 def passive_rates(robot, pose, velocity):
-    """Return the rates (R, 3 n + 1 or 3 n) of what has a column: R1, R2, R3 of each leg, one R4."""
-    motion = pteron.joint_rates(robot, pose, velocity)
-    legs = motion.revolute[..., :3].reshape(len(pose), -1)
-    return np.hstack([legs, velocity[:, 3:]])
+    """Return the rates of what has a column: the passive joints of each leg, and the platform."""
+    passive = pteron.joint_rates(robot, pose, velocity).passive
+    legs, numbers = np.array(passive_joints(robot)).T - 1
+    return np.hstack([passive[:, legs, numbers], velocity[:, 3:]])
 
 
 @each_mechanism
 def test_a_column_of_passive_friction_does_the_work_of_its_joint(name):
-    robot = MECHANISMS[name]
+    robot = machine(name)
     pose, velocity, _ = states(robot, 50)
-    columns = numeric(robot, "passive_friction")(pose, velocity)
+    columns = unchecked(robot, "passive_friction", pose, velocity)
     rates = passive_rates(robot, pose, velocity)
-    sliders = pteron.joint_rates(robot, pose, velocity).joints
+    sliders = pteron.joint_rates(robot, pose, velocity).actuated
     power = np.einsum("rnc,rn->rc", columns, sliders)
     assert columns.shape == (50, len(robot.legs), rates.shape[1])
     assert relative_error(power, rates**2) < 1e-11
@@ -40,13 +46,13 @@ def test_a_column_of_passive_friction_does_the_work_of_its_joint(name):
 @each_mechanism
 def test_a_column_is_the_rate_times_its_slope_by_the_sliders(name):
     # F = q' dq'/drho': virtual work along any motion, not only along the present one.
-    robot = MECHANISMS[name]
+    robot = machine(name)
     n = len(robot.legs)
     pose, velocity, _ = states(robot, 20)
-    columns = numeric(robot, "passive_friction")(pose, velocity)
+    columns = unchecked(robot, "passive_friction", pose, velocity)
     rates = passive_rates(robot, pose, velocity)
-    sliders = pteron.joint_rates(robot, pose, velocity).joints
-    invert = numeric(robot, "platform_motion")
+    sliders = pteron.joint_rates(robot, pose, velocity).actuated
+    invert = partial(unchecked, robot, "platform_motion")
     for j in range(n):
 
         def moved(steps, j=j):
@@ -60,10 +66,11 @@ def test_a_column_is_the_rate_times_its_slope_by_the_sliders(name):
 
 @each_mechanism
 def test_motion_of_the_platform_inverts_that_of_the_sliders(name):
-    robot = MECHANISMS[name]
+    robot = machine(name)
     pose, velocity, acceleration = states(robot, 100)
-    rates, accelerations = pteron.joint_rates(robot, pose, velocity, acceleration)
-    back = numeric(robot, "platform_motion")(pose, rates.joints, accelerations.joints)
+    rates = pteron.joint_rates(robot, pose, velocity)
+    accelerations = pteron.joint_accelerations(robot, pose, velocity, acceleration)
+    back = unchecked(robot, "platform_motion", pose, rates.actuated, accelerations.actuated)
     assert relative_error(back[0], velocity) < 1e-10
     assert relative_error(back[1], acceleration) < 1e-10
 
@@ -73,10 +80,10 @@ def test_columns_broadcast(shape):
     robot = MECHANISMS["quadrupteron-oblique"]
     count = int(np.prod(shape))
     pose, velocity, _ = states(robot, max(count, 1))
-    flat = numeric(robot, "passive_friction")(pose, velocity)[:count]
+    flat = unchecked(robot, "passive_friction", pose, velocity)[:count]
     batch = pose[:count].reshape(*shape, 4), velocity[:count].reshape(*shape, 4)
     assert np.array_equal(
-        numeric(robot, "passive_friction")(*batch), flat.reshape(*shape, *flat.shape[1:])
+        unchecked(robot, "passive_friction", *batch), flat.reshape(*shape, *flat.shape[1:])
     )
 
 
@@ -85,6 +92,6 @@ def test_a_joint_at_rest_asks_for_nothing():
     robot = MECHANISMS["tripteron"]
     pose, velocity, _ = states(robot, 10)
     direction = np.array(robot.legs[0].direction)
-    columns = numeric(robot, "passive_friction")(pose, velocity[:, :1] * direction)
+    columns = unchecked(robot, "passive_friction", pose, velocity[:, :1] * direction)
     assert np.abs(columns[..., :3]).max() < 1e-14 * np.abs(columns).max()
     assert np.abs(columns[..., 3:]).max() > 1e-3

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 import polars as pl
 import pytest
+from logs_of_motions import machine
 from mechanisms import CATALOG
 
 import pteron
 from pteron.errors import DataError, OutputError
 from pteron.identification.logs import (
     Description,
-    JointSymbols,
     KnownPayload,
     Log,
     find_description,
@@ -27,7 +26,6 @@ from pteron.identification.logs import (
     write_description,
     write_log,
 )
-from pteron.manipulator import Leg, Manipulator
 
 QUADRUPTERON = CATALOG["quadrupteron"]
 TRIPTERON = CATALOG["tripteron"]
@@ -275,7 +273,7 @@ def test_sliders_in_another_unit_are_refused_until_it_is_declared(tmp_path, fact
     path = saved(tmp_path, given)
     with pytest.raises(DataError, match=rf'row 1, column rho1: .*\[joints\] unit = "{unit}"'):
         read_log(path, QUADRUPTERON)
-    table = "joints" if unit == "mm" else "joints"  # as older files say
+    table = "joints" if unit == "mm" else "sliders"  # as older files say
     path.with_suffix(".toml").write_text(f'[{table}]\nunit = "{unit}"\n')
     back = read_log(path, QUADRUPTERON)
     np.testing.assert_allclose(back.joints, log.joints, rtol=1e-15)
@@ -583,23 +581,15 @@ def test_masked_values_are_refused(name):
 # Cranks --------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Crank(Leg):
-    """A leg whose joint is spoken of as a crank, whatever it is."""
-
-    joint: ClassVar[JointSymbols] = JointSymbols("crank", "theta", "rad", "torque", "N m")
+# Of the machines' own lengths; the numbers of a log need not be a motion.
+CRANKS = {"delta": (0, 1, 2), "mixed": (1, 2)}
+each_machine = pytest.mark.parametrize("name", CRANKS)
 
 
-def with_cranks(*turned: int) -> Manipulator:
-    """Return the Tripteron with legs, from 0, that are spoken of as cranks."""
-    legs = [Crank(**vars(leg)) if j in turned else leg for j, leg in enumerate(TRIPTERON.legs)]
-    return replace(TRIPTERON, legs=tuple(legs))
-
-
-@pytest.mark.parametrize("turned", [(0, 1, 2), (1, 2)], ids=["cranks", "mixed"])
-def test_the_columns_of_cranks_are_angles_and_torques(tmp_path, turned):
-    robot = with_cranks(*turned)
-    log = replace(motion(TRIPTERON, pose=False), joints=joint_symbols(robot))
+@each_machine
+def test_the_columns_of_cranks_are_angles_and_torques(tmp_path, name):
+    robot, turned = machine(name), CRANKS[name]
+    log = replace(motion(TRIPTERON, pose=False), symbols=joint_symbols(robot))
     path = write_log(log, tmp_path / "motion.csv")
     stems = ["theta" if j in turned else "rho" for j in range(3)]
     header = path.read_text().partition("\n")[0].split(",")
@@ -614,7 +604,7 @@ def test_the_columns_of_cranks_are_angles_and_torques(tmp_path, turned):
 
 
 def test_degrees_are_found_by_name_and_told_by_size(tmp_path):
-    robot = with_cranks(1, 2)
+    robot = machine("mixed")
     log = motion(TRIPTERON, pose=False, payload=False)
     log = replace(log, joints=log.joints * [1.0, 20.0, 20.0])
     given = {"t": log.time, "rho1": log.joints[:, 0]}
@@ -636,8 +626,8 @@ def test_degrees_are_found_by_name_and_told_by_size(tmp_path):
 
 
 def test_a_currents_unit_holds_for_all_joints(tmp_path):
-    robot = with_cranks(1, 2)
-    log = replace(motion(TRIPTERON, pose=False), joints=joint_symbols(robot))
+    robot = machine("mixed")
+    log = replace(motion(TRIPTERON, pose=False), symbols=joint_symbols(robot))
     log = replace(log, description=Description(column_force_unit="A"))
     path = write_log(log, tmp_path / "motion.csv")
     assert read_log(path, robot).description.force_unit == "A"

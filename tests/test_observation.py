@@ -5,7 +5,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from logs_of_motions import Friction, log_of, motion, pieces, truth, without
+from logs_of_motions import Friction, log_of, machine, motion, pieces, truth, without
 from mechanisms import CATALOG, MECHANISMS, relative_error, states
 
 import pteron
@@ -22,20 +22,21 @@ each_kind = pytest.mark.parametrize("name", KINDS)
 
 @lru_cache(maxsize=32)
 def model_of(name, terms=Terms()):  # noqa: B008
-    return identification_model(MECHANISMS[name], terms)
+    return identification_model(machine(name), terms)
 
 
 def states_of(robot, count=60, payload=0):
     """Return random states as the equations see them."""
     pose, velocity, acceleration = states(robot, count)
-    rates, accelerations = pteron.joint_rates(robot, pose, velocity, acceleration)
+    rates = pteron.joint_rates(robot, pose, velocity)
+    accelerations = pteron.joint_accelerations(robot, pose, velocity, acceleration)
     sliders = pteron.inverse_kinematics(robot, pose)
     phases = np.full(count, payload)
     return States(
         np.arange(float(count)),
         sliders,
-        rates.joints,
-        accelerations.joints,
+        rates.actuated,
+        accelerations.actuated,
         pose,
         velocity,
         acceleration,
@@ -152,11 +153,11 @@ def test_the_payload_is_a_body_more_on_the_platform(name):
     assert not model.matrix(states_of(robot, payload=0))[..., -4:].any()
 
 
-@pytest.mark.parametrize("name", ["quadrupteron", "tripteron-oblique"])
+@pytest.mark.parametrize("name", ["quadrupteron", "tripteron-oblique", "mixed"])
 def test_a_rotor_joins_what_acts_like_it(name):
     plain, driven = (model_of(name, Terms(rotors=flag)) for flag in (False, True))
     assert plain.names == driven.names
-    at = states_of(MECHANISMS[name])
+    at = states_of(machine(name))
     for i in range(len(driven.robot.legs)):
         rotor = f"J_m{i + 1}"
         assert any(rotor in expression for expression in driven.expressions)
@@ -246,7 +247,7 @@ def test_slow_sliders_are_left_out_on_both_sides(derivatives):
         name, derivatives, processing=processing
     )
     pose, velocity, _ = motion(MECHANISMS[name], log.time)
-    rates = pteron.joint_rates(MECHANISMS[name], pose, velocity).joints
+    rates = pteron.joint_rates(MECHANISMS[name], pose, velocity).actuated
     stuck = np.abs(rates) < 0.95 * treatment.slow
     assert stuck.mean() > 0.03
     spoiled = replace(log, forces=log.forces + 50.0 * stuck)

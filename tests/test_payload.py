@@ -5,7 +5,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from mechanisms import MECHANISMS
+from logs_of_motions import machine
 
 import pteron
 from pteron.errors import DataError
@@ -15,10 +15,10 @@ from pteron.identification.logs.description import Description
 from pteron.identification.model import Terms
 from pteron.identification.payload import identify_payload
 from pteron.identification.signals import Processing
-from pteron.kernels import numeric
+from pteron.kinematics.evaluate import unchecked
 from pteron.workspace import home_pose
 
-RANDOM = ["random 3T 0"]
+SOME = ["quadrupteron", "random 3T 0", "mixed"]
 CENTRAL = Processing(derivatives="central")
 
 LOAD = pteron.PlanarInertia(0.35, (0.006, -0.009), 0.0011)
@@ -30,13 +30,13 @@ PERIOD, RATE = 3.0, 500.0
 
 @lru_cache
 def base_of(name):
-    return pteron.base_parameters(MECHANISMS[name])
+    return pteron.base_parameters(machine(name))
 
 
 @lru_cache
 def motion(name, seed):
     """Return two periods of a smooth motion about the home pose: time, and three derivatives."""
-    robot = MECHANISMS[name]
+    robot = machine(name)
     rng = np.random.default_rng(seed)
     time = np.arange(round(2 * PERIOD * RATE)) / RATE
     m = 4 if robot.platform.turns else 3
@@ -46,7 +46,9 @@ def motion(name, seed):
         a, b = rng.normal(size=(2, m)) / h
         s, c = np.sin(w * time)[:, None], np.cos(w * time)[:, None]
         q += [a * s + b * c, w * (a * c - b * s), -w * w * (a * s + b * c)]
-    q *= np.array([0.05, 0.05, 0.05, 0.3])[:m] / np.abs(q[0]).max(axis=0)
+    # The mixed machine is four times as large as the others.
+    size = 0.2 if name == "mixed" else 0.05
+    q *= np.array([size, size, size, 0.3])[:m] / np.abs(q[0]).max(axis=0)
     q[0] += home_pose(robot)
     return time, q
 
@@ -61,18 +63,18 @@ def laden(robot, load=LOAD):
 @lru_cache
 def clean(name, seed, load):
     """Return time, sliders, forces without noise, phase (the second half laden) and mode."""
-    robot = MECHANISMS[name]
+    robot = machine(name)
     time, q = motion(name, seed)
     phase = (np.arange(len(time)) >= len(time) // 2).astype(int)
     empty, full = (pteron.inverse_dynamics(r, *q) for r in (robot, laden(robot, load)))
-    rates = pteron.joint_rates(robot, q[0], q[1]).joints
+    rates = pteron.joint_rates(robot, q[0], q[1]).actuated
     legs = np.arange(len(robot.legs))
     forces = np.where(phase[:, None] == 1, full, empty)
     forces += 2.0 * (1.0 + 0.1 * legs) * np.sign(rates) + (1.0 + 0.2 * legs) * rates + 0.3 * legs
     sliders = pteron.inverse_kinematics(robot, q[0])
     mode = None
     if robot.platform.turns:
-        mode = 1 + int(numeric(robot, "type_ii")(q[0, 0]) < 0.0)
+        mode = 1 + int(unchecked(robot, "type_ii", q[0, 0]) < 0.0)
     return time, sliders, forces, phase, mode
 
 
@@ -101,13 +103,13 @@ def expected(payload):
 @pytest.mark.parametrize(
     ("name", "processing"),
     [
-        *((name, None) for name in ("quadrupteron", *RANDOM)),
+        *((name, None) for name in SOME),
         ("quadrupteron-oblique", CENTRAL),
     ],
 )
 def test_it_is_exact_without_noise(name, processing):
     found = identify_payload(
-        MECHANISMS[name], make_log(name), processing=processing, base=base_of(name)
+        machine(name), make_log(name), processing=processing, base=base_of(name)
     )
     np.testing.assert_allclose(found.values, expected(found), rtol=1e-9)
     assert found.real
@@ -122,7 +124,7 @@ def test_it_is_exact_without_noise(name, processing):
 
 def test_a_turning_platform_feels_all_four_values():
     found = identify_payload(
-        MECHANISMS["quadrupteron"], make_log("quadrupteron"), base=base_of("quadrupteron")
+        machine("quadrupteron"), make_log("quadrupteron"), base=base_of("quadrupteron")
     )
     assert found.names == ("m_L", "mgx_L", "mgy_L", "I_L")
     assert (found.mass, *found.first_moment, found.inertia) == tuple(found.values)
@@ -132,9 +134,7 @@ def test_a_turning_platform_feels_all_four_values():
 
 
 def test_a_platform_that_does_not_turn_feels_the_mass_alone():
-    found = identify_payload(
-        MECHANISMS["tripteron"], make_log("tripteron"), base=base_of("tripteron")
-    )
+    found = identify_payload(machine("tripteron"), make_log("tripteron"), base=base_of("tripteron"))
     assert found.names == ("m_L",)
     assert found.mass == pytest.approx(LOAD.mass, rel=1e-9)
     assert found.first_moment is None
@@ -148,8 +148,8 @@ def test_a_platform_that_does_not_turn_feels_the_mass_alone():
 def test_two_logs_say_what_one_with_both_phases_says(name):
     log = make_log(name, noise=NOISE)
     arguments = {"processing": CENTRAL, "base": base_of(name)}
-    both = identify_payload(MECHANISMS[name], log, **arguments)
-    two = identify_payload(MECHANISMS[name], *halves(log), **arguments)
+    both = identify_payload(machine(name), log, **arguments)
+    two = identify_payload(machine(name), *halves(log), **arguments)
     # Each of two logs finds its own cut-offs, no more.
     assert (np.abs(two.values - both.values) < 1.5 * both.deviations).all()
     np.testing.assert_allclose(two.deviations, both.deviations, rtol=0.6)
@@ -160,7 +160,7 @@ def test_standard_deviations_cover_the_error(name):
     errors = []
     for draw in range(3):
         log = make_log(name, seed=2, noise=NOISE, draw=draw)
-        found = identify_payload(MECHANISMS[name], log, base=base_of(name))
+        found = identify_payload(machine(name), log, base=base_of(name))
         errors.append((found.values - expected(found)) / found.deviations)
         assert found.deviations[0] < 0.03 * LOAD.mass
     assert np.abs(errors).max() < 4.0
@@ -176,8 +176,8 @@ def test_another_estimator_forgives_outliers():
         "processing": Processing(derivatives="central", band=240.0, cutoff=40.0),
         "base": base_of("tripteron"),
     }
-    robust = identify_payload(MECHANISMS["tripteron"], log, estimator=huber, **arguments)
-    plain = identify_payload(MECHANISMS["tripteron"], log, **arguments)
+    robust = identify_payload(machine("tripteron"), log, estimator=huber, **arguments)
+    plain = identify_payload(machine("tripteron"), log, **arguments)
     assert robust.estimate.method == "huber"
     assert robust.deviations[0] < 0.5 * plain.deviations[0]
     assert abs(robust.mass - LOAD.mass) < 4.0 * robust.deviations[0]
@@ -187,7 +187,7 @@ def test_values_of_no_real_body_are_told():
     # As much taken off one side of the platform as the moment of inertia allows.
     log = make_log("quadrupteron", load=LOAD)
     less = replace(log, payload=1 - log.payload)
-    found = identify_payload(MECHANISMS["quadrupteron"], less, base=base_of("quadrupteron"))
+    found = identify_payload(machine("quadrupteron"), less, base=base_of("quadrupteron"))
     assert found.mass == pytest.approx(-LOAD.mass, rel=1e-9)
     assert found.felt
     assert not found.real
@@ -198,15 +198,15 @@ def test_values_of_no_real_body_are_told():
 def test_a_payload_that_was_not_there_is_not_felt(name):
     nothing = pteron.PlanarInertia(1e-9, (0.0, 0.0), 1e-12)
     log = make_log(name, load=nothing, noise=NOISE)
-    found = identify_payload(MECHANISMS[name], *halves(log), base=base_of(name))
+    found = identify_payload(machine(name), *halves(log), base=base_of(name))
     assert not found.felt
     assert "No payload is felt" in found.summary()
-    assert identify_payload(MECHANISMS[name], make_log(name, noise=NOISE), base=base_of(name)).felt
+    assert identify_payload(machine(name), make_log(name, noise=NOISE), base=base_of(name)).felt
 
 
 def test_terms_may_be_left_out():
     found = identify_payload(
-        MECHANISMS["tripteron"],
+        machine("tripteron"),
         make_log("tripteron"),
         terms=Terms(offset=False),
         base=base_of("tripteron"),
@@ -251,5 +251,5 @@ def short_phase(log):
 def test_logs_that_do_not_show_a_payload_are_refused(change, message):
     logs = change(make_log("tripteron"))
     with pytest.raises(DataError, match=message) as caught:
-        identify_payload(MECHANISMS["tripteron"], *logs, base=base_of("tripteron"))
+        identify_payload(machine("tripteron"), *logs, base=base_of("tripteron"))
     assert "\n" not in str(caught.value)

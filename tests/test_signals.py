@@ -28,7 +28,7 @@ from pteron.identification.signals import (
 )
 from pteron.identification.signals.blocks import blocks
 from pteron.identification.signals.derivatives import LOST
-from pteron.kernels import numeric
+from pteron.kinematics.evaluate import unchecked
 from pteron.workspace import home_pose
 
 RATE = 1000.0
@@ -329,12 +329,13 @@ each_kind = pytest.mark.parametrize(
 def test_states_are_those_of_the_motion(name):
     robot = MECHANISMS[name]
     pose, velocity, acceleration = motion(robot, np.linspace(0.0, 4.0, 200))
-    rates, accelerations = pteron.joint_rates(robot, pose, velocity, acceleration)
+    rates = pteron.joint_rates(robot, pose, velocity)
+    accelerations = pteron.joint_accelerations(robot, pose, velocity, acceleration)
     sliders = pteron.inverse_kinematics(robot, pose)
     log = Log("log.csv", np.arange(200.0), sliders, sliders)
     found = States.of_joints(
         robot,
-        (sliders, rates.joints, accelerations.joints),
+        (sliders, rates.actuated, accelerations.actuated),
         log.time,
         assembly_mode(robot, log),
     )
@@ -347,7 +348,7 @@ def test_states_are_those_of_the_motion(name):
 def in_mode(robot, mode):
     """Return a log of poses in an assembly mode: the sign of the determinant tells it."""
     pose, _, _ = states(robot, 400)
-    type_ii = numeric(robot, "type_ii")(pose)
+    type_ii = unchecked(robot, "type_ii", pose)
     pose = pose[(type_ii < 0.0) == bool(mode)]
     assert len(pose) > 10
     sliders = pteron.inverse_kinematics(robot, pose)
@@ -379,7 +380,9 @@ def test_a_declared_mode_comes_first_and_that_of_home_last(name):
 def test_a_tripteron_has_one_assembly_mode():
     robot = CATALOG["tripteron"]
     log = log_of(robot, duration=1.0)
-    assert assembly_mode(robot, replace(log, description=Description(assembly_mode=2))) == 0
+    assert assembly_mode(robot, log) == 0
+    with pytest.raises(DataError, match=r"assembly_mode = 2; tripteron has 1$"):
+        assembly_mode(robot, replace(log, description=Description(assembly_mode=2)))
 
 
 def unreachable(log, row):
@@ -397,7 +400,7 @@ def test_a_sample_without_a_pose_is_named_in_any_block(row, first):
     treatment = replace(treatment, derivatives="central", cutoff=None, band=100.0)
     broken = unreachable(log, row)
     for given in (broken, pieces(broken, 333)):
-        with pytest.raises(LogError, match=": no pose of quadrupteron has the sliders") as caught:
+        with pytest.raises(LogError, match=": no pose of quadrupteron has the joints") as caught:
             list(samples(robot, given, treatment, block=250))
         assert caught.value.reason == "no pose"
         assert caught.value.place == f"log.csv: row {first + row + 1}"
@@ -415,10 +418,11 @@ def test_a_wrong_mode_is_told_from_a_wrong_machine():
 def test_a_singular_sample_is_named():
     robot = CATALOG["tripteron"]
     pose, velocity, acceleration = states(robot, 30)
-    rates, accelerations = pteron.joint_rates(robot, pose, velocity, acceleration)
+    rates = pteron.joint_rates(robot, pose, velocity)
+    accelerations = pteron.joint_accelerations(robot, pose, velocity, acceleration)
     sliders = pteron.inverse_kinematics(robot, pose)
-    motion_of = [sliders, rates.joints, accelerations.joints]
-    _, margin, _ = numeric(robot, "reach")(pose[17:18])
+    motion_of = [sliders, rates.actuated, accelerations.actuated]
+    _, margin, _ = unchecked(robot, "reach", pose[17:18])
     leg = robot.legs[0]
     # Across the direction of leg 1, until the first leg is all but stretched.
     across = np.eye(3)[int(np.argmin(np.abs(leg.direction)))]
@@ -511,7 +515,7 @@ def test_speeds_that_count_as_slow_are_a_share_of_the_usual_ones():
     robot = CATALOG["quadrupteron"]
     log = log_of(robot)
     pose, velocity, _ = motion(robot, log.time)
-    usual = np.sqrt((pteron.joint_rates(robot, pose, velocity).joints ** 2).mean(axis=0))
+    usual = np.sqrt((pteron.joint_rates(robot, pose, velocity).actuated ** 2).mean(axis=0))
     for share in (0.0, 0.02, 0.3):
         slow = preprocessing_of(robot, log, Processing(slow=share)).slow
         assert slow == pytest.approx(share * usual, rel=0.01, abs=1e-15)

@@ -24,6 +24,8 @@ PerCoordinate = Float[np.ndarray, "*batch m"]
 PerJoint = Float[np.ndarray, "*batch n"]
 Numbers = Float[np.ndarray, "*batch"] | np.float64
 """One number a state: NumPy makes a scalar of an array without axes wherever it computes."""
+Series = Float[np.ndarray, " T"]
+"""One number for each of T samples."""
 Vectors = Float[np.ndarray, "*batch n 3"]
 Matrices = Float[np.ndarray, "*batch n m"]
 Poses = Float[np.ndarray, "*batch k m"]

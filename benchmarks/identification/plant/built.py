@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 import pteron
+from plant.model import legs_of
 
 __all__ = ["as_built"]
 
@@ -34,7 +35,7 @@ def as_built(robot: pteron.Manipulator, seed: int = 0, spread: float = 0.2) -> p
             upper=built(leg.upper),
             lower=built(leg.lower),
         )
-        for leg in robot.legs
+        for leg in legs_of(robot)
     )
     platform = replace(robot.platform, inertia=built(robot.platform.inertia))
     return replace(robot, legs=legs, platform=platform)

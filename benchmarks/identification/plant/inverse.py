@@ -44,6 +44,6 @@ def platform_state(
         pose = poses[..., 0, :]
     jacobian = pteron.jacobian(robot, pose)
     velocity = np.linalg.solve(jacobian, rates[..., None])[..., 0]
-    _, drift = pteron.joint_rates(robot, pose, velocity, np.zeros_like(pose))
-    acceleration = np.linalg.solve(jacobian, (accelerations - drift.joints)[..., None])[..., 0]
+    drift = pteron.joint_accelerations(robot, pose, velocity, np.zeros_like(pose))
+    acceleration = np.linalg.solve(jacobian, (accelerations - drift.actuated)[..., None])[..., 0]
     return State(pose, velocity, acceleration)

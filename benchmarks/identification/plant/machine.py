@@ -25,7 +25,7 @@ import pteron
 from plant.controller import Controller
 from plant.friction import Friction, Guides
 from plant.inverse import platform_state
-from plant.model import Array, joint_damping, leg_axes, mujoco_model
+from plant.model import Array, joint_damping, leg_axes, legs_of, mujoco_model
 from plant.reference import Reference
 
 __all__ = ["Recording", "simulate"]
@@ -45,7 +45,7 @@ class Recording:
     ----------
     time : array, shape (T,)
         s, from 0.
-    sliders, rates, accelerations : array, shape (T, n)
+    joints, rates, accelerations : array, shape (T, n)
         m, m/s and m/s^2.
     forces : array, shape (T, n)
         What the actuators applied at these instants, N.
@@ -56,7 +56,7 @@ class Recording:
     """
 
     time: Array
-    sliders: Array
+    joints: Array
     rates: Array
     accelerations: Array
     forces: Array
@@ -204,10 +204,10 @@ def _place(robot: pteron.Manipulator, data: Any, reference: Reference, start: fl
     position, motion = [*pose], [*velocity]
     sliders = pteron.inverse_kinematics(robot, pose)
     links = pteron.link_vectors(robot, pose)
-    for i, leg in enumerate(robot.legs):
+    for i, leg in enumerate(legs_of(robot)):
         axes = leg_axes(leg)
         upper, lower = (np.arctan2(*(axes.T @ link[i])[1::-1]) for link in links)
         turns = rates.upper_links[i], rates.lower_links[i]
         position += [sliders[i], upper, lower - upper]
-        motion += [rates.joints[i], turns[0], turns[1] - turns[0]]
+        motion += [rates.actuated[i], turns[0], turns[1] - turns[0]]
     data.qpos[:], data.qvel[:], data.time = position, motion, start

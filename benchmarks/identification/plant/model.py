@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 import pteron
 
-__all__ = ["Array", "joint_damping", "leg_axes", "mujoco_model"]
+__all__ = ["Array", "joint_damping", "leg_axes", "legs_of", "mujoco_model"]
 
 Array = NDArray[np.float64]
 """Floats of any shape."""
@@ -30,6 +30,14 @@ off the closed loops by step^2, gave force errors of 3e-4 whatever the step; at 
 """
 
 _PARALLEL = 1.0 - 1e-12
+
+
+def legs_of(robot: pteron.Manipulator) -> list[pteron.Leg]:
+    """Return the legs; this plant is built of P-R-R-R legs alone."""
+    legs = [leg for leg in robot.legs if isinstance(leg, pteron.Leg)]
+    if len(legs) < len(robot.legs):
+        raise NotImplementedError("the plant is built of P-R-R-R legs alone")
+    return legs
 
 
 def leg_axes(leg: pteron.Leg) -> Array:
@@ -76,7 +84,7 @@ def mujoco_model(robot: pteron.Manipulator, step: float) -> Any:
         platform.add_joint(type=hinge, axis=robot.platform.axis)
     frame = np.column_stack(robot.platform.frame)
     pull, impedance = [-(_RATE**2), -2.0 * _RATE], [_IMPEDANCE, _IMPEDANCE, 1e-3, 0.5, 2.0]
-    for i, leg in enumerate(robot.legs):
+    for i, leg in enumerate(legs_of(robot)):
         axes = leg_axes(leg)
         slider = spec.worldbody.add_body(
             pos=leg.guide_point,
@@ -122,7 +130,7 @@ def joint_damping(robot: pteron.Manipulator) -> Array:
     """
     n, m = len(robot.legs), robot.freedom
     rows = []
-    for i, leg in enumerate(robot.legs):
+    for i, leg in enumerate(legs_of(robot)):
         upper, relative, turn = np.eye(3 * n + m)[[m + 3 * i + 1, m + 3 * i + 2, m - 1]]
         lower = upper + relative
         along = float(np.dot(leg.direction, robot.platform.axis))

@@ -15,9 +15,9 @@ __all__ = ["Fourier", "Reference", "fourier_reference"]
 Reference = Callable[[Array], tuple[Array, Array, Array]]
 """From times (T,) to slider coordinates, rates and accelerations, (T, n) each; it is hashable."""
 
-_ELBOW = 0.25
-_REGULARITY = 0.3
-"""What a motion keeps of the sines of the elbows' angles and of the type_ii."""
+_TYPE_I = 0.25
+_TYPE_II = 0.3
+"""The least type-I and type-II measures of a motion."""
 
 
 @dataclass(frozen=True)
@@ -57,8 +57,9 @@ class Fourier:
     def __call__(self, time: Array) -> tuple[Array, Array, Array]:
         """Return slider coordinates, rates and accelerations, (T, n) each."""
         pose, velocity, acceleration = self.platform(np.asarray(time, dtype=float))
-        rates, accelerations = pteron.joint_rates(self.robot, pose, velocity, acceleration)
-        return pteron.inverse_kinematics(self.robot, pose), rates.joints, accelerations.joints
+        rates = pteron.joint_rates(self.robot, pose, velocity)
+        accelerations = pteron.joint_accelerations(self.robot, pose, velocity, acceleration)
+        return pteron.inverse_kinematics(self.robot, pose), rates.actuated, accelerations.actuated
 
 
 def fourier_reference(
@@ -72,8 +73,8 @@ def fourier_reference(
 ) -> Fourier:
     """Return a random lively motion about the home pose.
 
-    All coefficients are scaled alike until the first of these stops them: an elbow whose sine is
-    0.25, a type_ii of 0.3, a slider's limit, the greatest speed or acceleration of a slider.
+    All coefficients are scaled alike until the first of these stops them: a type-I measure of
+    0.25, a type-II measure of 0.3, a slider's limit, the greatest speed or acceleration of one.
 
     Parameters
     ----------
@@ -117,9 +118,9 @@ def _serves(motion: Fourier, time: Array, speed: float, acceleration: float) -> 
     pose, _, _ = motion.platform(time)
     reserve = pteron.workspace.reserve(motion.robot, pose)
     if (
-        reserve.elbow_sines.min() < _ELBOW
-        or reserve.type_ii.min() < _REGULARITY
-        or reserve.slider_clearances.min() < 0.0
+        reserve.type_i.min() < _TYPE_I
+        or reserve.type_ii.min() < _TYPE_II
+        or reserve.clearances.min() < 0.0
     ):
         return False
     _, rates, accelerations = motion(time)

@@ -21,7 +21,7 @@ class Log:
     ----------
     time : array, shape (T,)
         s.
-    sliders : array, shape (T, n)
+    joints : array, shape (T, n)
         m.
     forces : array, shape (T, n)
         N.
@@ -30,7 +30,7 @@ class Log:
     """
 
     time: Array
-    sliders: Array
+    joints: Array
     forces: Array
     noise: Array
 

@@ -20,6 +20,9 @@ def export(
     specialised: Annotated[
         bool, option("specialised", "C: fold the inertial parameters in.")
     ] = False,
+    wrench: Annotated[
+        bool, option("wrench", "Dynamics take a wrench on the platform too.")
+    ] = False,
     elbows: Elbows = None,
     json: Json = False,
 ) -> None:
@@ -39,9 +42,9 @@ def export(
         if c is not None:
             real: Real = "float" if single else "double"
             chosen = function or FUNCTIONS
-            files += export_c(machine, chosen, c, real=real, specialised=specialised)
+            files += export_c(machine, chosen, c, real=real, specialised=specialised, wrench=wrench)
         if st is not None:
-            files += export_st(machine, function or BLOCKS, st)
+            files += export_st(machine, function or BLOCKS, st, wrench=wrench)
     if json:
         show_json({"robot": machine.name, "files": [str(path) for path in files]})
         return

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations, product
-from typing import Literal
 
 import numpy as np
 
@@ -31,12 +30,12 @@ _Choice = tuple[tuple[int, ...], tuple[int, ...]]
 
 @dataclass(frozen=True)
 class Fault:
-    """Columns of forces that are not what they are called.
+    """Columns of forces, or of joints, that are not what they are called.
 
     Attributes
     ----------
-    kind : {"force", "rho"}
-        Which columns.
+    names : tuple of str
+        What the columns are called: force1 ..., or rho1 ..., at cranks torque1 ... and theta1 ... .
     order : tuple of int
         Which of them, from 0, belongs to each actuator.
     signs : tuple of int
@@ -45,7 +44,7 @@ class Fault:
         Error of the fit relative to the forces, as it is and when mended.
     """
 
-    kind: Literal["force", "rho"]
+    names: tuple[str, ...]
     order: tuple[int, ...]
     signs: tuple[int, ...]
     before: float
@@ -55,19 +54,19 @@ class Fault:
         """Return what is wrong and what to do, as part of a sentence."""
         parts = []
         n = len(self.order)
-        flipped = [k + 1 for k in range(n) if self.signs[k] < 0]
-        moved = [k + 1 for k in range(n) if self.order[k] != k]
+        flipped = [k for k in range(n) if self.signs[k] < 0]
+        moved = [k for k in range(n) if self.order[k] != k]
         if moved:
-            names = _listed([f"{self.kind}{k}" for k in moved])
+            names = _listed([self.names[k] for k in moved])
             verb = "are swapped" if len(moved) == 2 else "are in another order"
             parts.append(f"{names} {verb}")
             if len(moved) > 2:
-                order = ", ".join(f"{self.kind}{k + 1}" for k in self.order)
+                order = ", ".join(self.names[k] for k in self.order)
                 parts[-1] += f" (they should be {order})"
         if len(flipped) == n:
             parts.append("the forces, or all joints, have the sign flipped")
         elif flipped:
-            names = _listed([f"{self.kind}{self.order[k - 1] + 1}" for k in flipped])
+            names = _listed([self.names[self.order[k]] for k in flipped])
             parts.append(f"{names} {'has' if len(flipped) == 1 else 'have'} the sign flipped")
         return " and ".join(parts)
 
@@ -101,7 +100,8 @@ def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> Fault 
         sign = tuple(-s for s in sign)
     if (order, sign) == choices[0]:
         return None
-    return Fault("force", tuple(order), sign, before, after)
+    names = tuple(f"{leg.joint.force}{i}" for i, leg in enumerate(model.robot.legs, start=1))
+    return Fault(names, tuple(order), sign, before, after)
 
 
 def _errors(observations: Observations, choices: Sequence[_Choice]) -> list[float]:
@@ -132,6 +132,7 @@ def exchanged_joints(
     """
     n = log.joints.shape[1]
     best: Fault | None = None
+    names = tuple(f"{leg.joint.coordinate}{i}" for i, leg in enumerate(model.robot.legs, start=1))
     usual, upright = tuple(range(n)), (1,) * n
     choices = [(usual, tuple(-1 if k == i else 1 for k in range(n))) for i in range(n)]
     # Few exchanges first: of two orders that do as well, the simpler one is meant.
@@ -145,7 +146,7 @@ def exchanged_joints(
             continue  # no poses in this order
         (error,) = _errors(observations, [(usual, upright)])
         if error * _DECISIVE < (before if best is None else best.after * _DECISIVE):
-            best = Fault("rho", order, signs, before, error)
+            best = Fault(names, order, signs, before, error)
     return best
 
 

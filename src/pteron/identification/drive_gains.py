@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import count
 from typing import Any
@@ -41,7 +42,7 @@ class DriveGains:
     Attributes
     ----------
     gains : array, shape (n,)
-        By maximum likelihood, newtons per `unit`; negative for a drive that pushes backwards.
+        By maximum likelihood, N or N m per `unit`; negative for a drive that pushes backwards.
     deviations : array, shape (n,)
         Standard deviations, for a payload that is known exactly: its relative error is one of all
         gains beside these.
@@ -81,7 +82,7 @@ class DriveGains:
         triples = zip(self.gains, self.deviations, self.total_least_squares, strict=True)
         for i, (gain, deviation, start) in enumerate(triples, 1):
             lines.append(
-                f"  g{i}  {gain:.6g} +- {deviation:.2g} N/{self.unit} "
+                f"  g{i}  {gain:.6g} +- {deviation:.2g} {self.estimate.units[i - 1]} "
                 f"(total least squares {start:.6g})"
             )
         left = ", ".join(f"{value:.2g}" for value in self.residual)
@@ -97,7 +98,7 @@ class DriveGains:
             "gains": self.gains.tolist(),
             "standard_deviations": self.deviations.tolist(),
             "total_least_squares": self.total_least_squares.tolist(),
-            "unit": f"N/{self.unit}",
+            "units": list(self.estimate.units[: len(self.gains)]),
             "residual": self.residual.tolist(),
             "condition_number": self.condition,
             "gap": self.gap,
@@ -178,7 +179,8 @@ def identify_drive_gains(
     )
     observations = observations.columns(range(len(plain.names)))
     start, condition, gap = _total(observations, carried, log.source)
-    estimate = _likely(observations, carried, start, unit, log.source)
+    units = [f"{leg.joint.force_unit}/{unit}" for leg in robot.legs]
+    estimate = _likely(observations, carried, start, units, log.source)
     n = observations.actuators
     return DriveGains(
         gains=estimate.values[:n],
@@ -250,12 +252,12 @@ def _total(observations: Observations, carried: Array, source: str) -> tuple[Arr
 
 
 def _likely(
-    observations: Observations, carried: Array, start: Array, unit: str, source: str
+    observations: Observations, carried: Array, start: Array, units: Sequence[str], source: str
 ) -> Estimate:
     """Return g and beta of greatest likelihood, the noise being in the currents alone."""
     n = observations.actuators
     names = (*(f"g{i}" for i in range(1, n + 1)), *observations.names)
-    units = (*(f"N/{unit}" for _ in range(n)), *observations.units)
+    named = (*units, *observations.units)
     # In 1 / g the currents are bilinear: what is left out of each step is only a product.
     values = np.r_[1.0 / start[:n], start[n:]]
     for iteration in count(1):
@@ -266,7 +268,7 @@ def _likely(
         )
         # J v = current - f(v0) + J v0, and J v0 = f(v0) + (W beta) / g.
         images = observations.forces + inverse * (force - carried)
-        linear = replace(observations, names=names, units=units, matrix=tangent, forces=images)
+        linear = replace(observations, names=names, units=named, matrix=tangent, forces=images)
         noise = actuator_noise(linear, values)
         step = qr_factor(linear, 1.0 / noise).values() - values
         values = values + step

@@ -133,15 +133,14 @@ def check_columns(model: Model, one: Recording, preprocessing: Preprocessing) ->
 def _check_forces(one: Recording) -> None:
     """Refuse a recording of currents whose gains are not known, or of values that are no forces."""
     if isinstance(one.log, Log):
-        names = tuple(f"force{k + 1}" for k in range(one.log.forces.shape[1]))
-        check_strength(one.log.forces, names, one.source, one.log.first_row)
+        check_strength(one.log.forces, one.log.force_names, one.source, one.log.first_row)
     unit = one.head().description.force_unit
     if unit != "N":
         raise LogError(
             "currents",
             one.source,
-            f"its forces are in {unit}; declare gains (N per {unit}) in its description, or find "
-            "them with identify_drive_gains",
+            f"its forces are in {unit}; declare gains (N, at a crank N m, per {unit}) in its "
+            "description, or find them with identify_drive_gains",
         )
 
 

@@ -106,7 +106,7 @@ def identify(
     # Read the logs, and hold some rows out
     read = _reader(report, "Reading")
     whole, others = (
-        [recording(log, read) for log in _sequence(given)] for given in (logs, held_out)
+        [recording(log, read) for log in _sequence(given, robot)] for given in (logs, held_out)
     )
     check_recordings(whole, others, wanted)
     fit, check = (whole, others) if others else _divided(whole, wanted.period)
@@ -180,8 +180,13 @@ def identify(
     )
 
 
-def _sequence(logs: Logs) -> list[Log | LogFile]:
-    return [logs] if isinstance(logs, Log | LogFile) else list(logs)
+def _sequence(logs: Logs, robot: Manipulator) -> list[Log | LogFile]:
+    """Return the logs, with the names of the machine's joints where they have none."""
+    symbols = tuple(leg.joint for leg in robot.legs)
+    return [
+        replace(one, symbols=symbols) if isinstance(one, Log) and one.symbols is None else one
+        for one in ([logs] if isinstance(logs, Log | LogFile) else logs)
+    ]
 
 
 def _reader(report: Stage, task: str) -> Callable[[int], None]:
@@ -204,7 +209,7 @@ def _divided(
 
 
 def _reflected(fit: Sequence[Recording]) -> dict[str, float]:
-    """Return what the rotors of known drives weigh on the joints, J r^2 in kg, by name."""
+    """Return what the rotors of known drives weigh on the joints, J r^2, by name."""
     description = fit[0].head().description
     if description.rotor_inertia is None or description.ratio is None:
         return {}
@@ -268,14 +273,14 @@ def _real_bodies(
 
 def _notes(model: Model, estimate: Estimate, rotors: dict[str, float]) -> list[str]:
     """Return what else is to be known of an estimate."""
-    notes = []
+    notes, units = [], {term.name: term.unit for term in model.all_terms}
     if not estimate.converged:
         notes.append(
             f"The estimator {estimate.method} has not settled in {estimate.iterations} iterations: "
             "values and intervals may be off; choose another estimator, or record longer."
         )
     notes += [
-        f"{name} = {mass:.6g} kg is known, and no part of the real bodies."
+        f"{name} = {mass:.6g} {units[name]} is known, and no part of the real bodies."
         for name, mass in rotors.items()
     ]
     for name, shares in model.joins.items():

@@ -42,7 +42,7 @@ class Terms:
         The inertia of each motor, reflected through its drive: J_m = J r^2 with J of the rotor and
         r in rad/m (kg), or in rad/rad at a crank (kg m^2). Its column is q'': at a crank it joins
         I_u, on a level guide the mass of its slider, m_p; on any other guide, where gravity pulls
-        at m_p but not at a rotor, it joins m_p and the offset. `Model.joins` and the expressions say so.
+        at m_p but not at a rotor, m_p and the offset. `Model.joins` and the expressions say so.
     """
 
     coulomb: bool = True
@@ -97,14 +97,39 @@ class Model:
         return self.base.robot
 
     @cached_property
+    def all_terms(self) -> tuple[Term, ...]:
+        """The terms, those that join others too."""
+        joints = [leg.joint for leg in self.robot.legs]
+        found: list[Term] = []
+        for i, joint in enumerate(joints, start=1):
+            if self.terms.coulomb:
+                found.append(Term("coulomb", f"Fc{i}", joint.force_unit))
+        for i, joint in enumerate(joints, start=1):
+            if self.terms.viscous:
+                unit = "N s/m" if joint.unit == "m" else "N m s"
+                found.append(Term("viscous", f"Fv{i}", unit))
+        for i, joint in enumerate(joints, start=1):
+            if self.terms.offset:
+                found.append(Term("offset", f"offset{i}", joint.force_unit))
+        found += [Term("passive", name, "N m s") for name in self._passive]
+        for i, joint in enumerate(joints, start=1):
+            if self.terms.rotors:
+                found.append(Term("rotor", f"J_m{i}", "kg" if joint.unit == "m" else "kg m^2"))
+        if self.terms.payload:
+            units = ("kg", "kg m", "kg m", "kg m^2")
+            pairs = zip(PLATFORM_KINDS, units, strict=True)
+            found += [Term("payload", f"{kind}_L", unit) for kind, unit in pairs]
+        return tuple(found)
+
+    @cached_property
     def kept_terms(self) -> tuple[Term, ...]:
         """The terms that are values of their own, after the base parameters."""
-        return tuple(term for term in self._terms if term.name not in self.left_out)
+        return tuple(term for term in self.all_terms if term.name not in self.left_out)
 
     @cached_property
     def joining_terms(self) -> tuple[Term, ...]:
         """The terms that join others."""
-        return tuple(term for term in self._terms if term.name in self.left_out)
+        return tuple(term for term in self.all_terms if term.name in self.left_out)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -146,33 +171,8 @@ class Model:
 
     @property
     def _kept(self) -> list[int]:
-        names = (*self.base.names, *(term.name for term in self._terms))
+        names = (*self.base.names, *(term.name for term in self.all_terms))
         return [k for k, name in enumerate(names) if name not in self.left_out]
-
-    @property
-    def _terms(self) -> list[Term]:
-        """The terms, before dependent ones are left out."""
-        joints = [leg.joint for leg in self.robot.legs]
-        found: list[Term] = []
-        for i, joint in enumerate(joints, start=1):
-            if self.terms.coulomb:
-                found.append(Term("coulomb", f"Fc{i}", joint.force_unit))
-        for i, joint in enumerate(joints, start=1):
-            if self.terms.viscous:
-                unit = "N s/m" if joint.unit == "m" else "N m s"
-                found.append(Term("viscous", f"Fv{i}", unit))
-        for i, joint in enumerate(joints, start=1):
-            if self.terms.offset:
-                found.append(Term("offset", f"offset{i}", joint.force_unit))
-        found += [Term("passive", name, "N m s") for name in self._passive]
-        for i, joint in enumerate(joints, start=1):
-            if self.terms.rotors:
-                found.append(Term("rotor", f"J_m{i}", "kg" if joint.unit == "m" else "kg m^2"))
-        if self.terms.payload:
-            units = ("kg", "kg m", "kg m", "kg m^2")
-            pairs = zip(PLATFORM_KINDS, units, strict=True)
-            found += [Term("payload", f"{kind}_L", unit) for kind, unit in pairs]
-        return found
 
     @property
     def _passive(self) -> dict[str, list[int]]:

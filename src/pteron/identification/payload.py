@@ -45,7 +45,7 @@ class Payload:
     estimate : Estimate
         The fit of everything: base parameters, friction and offsets first, the payload last.
     residual : array, shape (n,)
-        Standard deviation of what is left of each actuator's forces, N, before the filter.
+        Standard deviation of what is left of each actuator's forces, N or N m, before the filter.
     """
 
     mass: float | None
@@ -105,7 +105,7 @@ class Payload:
             lines.append(f"Not felt by the actuators: {', '.join(hidden)}.")
         lines.append(self._opinion())
         left = ", ".join(f"{value:.2g}" for value in self.residual)
-        lines.append(f"Left of the actuator forces: {left} N.")
+        lines.append(f"Left of the actuator forces: {left} (N, at a crank N m).")
         return "\n".join(lines)
 
     def _opinion(self) -> str:

@@ -10,8 +10,8 @@ import numpy as np
 import polars as pl
 from numpy.typing import ArrayLike, NDArray
 
-from pteron.shapes import OnFailure
 from pteron.errors import DataError, shown
+from pteron.shapes import OnFailure
 
 _ROWS_AT_A_TIME = 10_000
 

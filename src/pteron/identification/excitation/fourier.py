@@ -123,7 +123,7 @@ class FourierMotion:
             k = int(np.argmax(lost))
             raise UnreachablePose(
                 f"time {times[k]:g} s: no pose has the joint coordinates "
-                f"{found.joints[k].tolist()} m; make the motion smaller",
+                f"{found.joints[k].tolist()} (m, rad at a crank); make the motion smaller",
                 leg=0,
                 shortfall=float("nan"),
                 index=(k,),

@@ -15,7 +15,7 @@ from jaxtyping import Int
 from pteron.errors import DataError
 from pteron.identification.logs.description import Description
 from pteron.legs.kind import SLIDER, ActuatedJoint
-from pteron.shapes import Numbers, PerCoordinate, PerJoint
+from pteron.shapes import PerCoordinate, PerJoint, Series
 from pteron.tables import write_table
 
 GAP = 1.5
@@ -85,7 +85,7 @@ class Log:
     step : float, optional
         The usual time step of the file, s; the median step of these samples if it is not given.
     symbols : tuple of ActuatedJoint, optional
-        What the joint of each leg is called; they are joints if it is not given.
+        What the joint of each leg is called; they are sliders if it is not given.
 
     Raises
     ------
@@ -94,7 +94,7 @@ class Log:
     """
 
     source: str
-    time: Numbers
+    time: Series
     joints: PerJoint
     forces: PerJoint
     pose: PerCoordinate | None = None
@@ -145,6 +145,20 @@ class Log:
         edges = [0, *(int(i) for i in gaps), self.rows]
         return tuple(slice(a, b) for a, b in pairwise(edges))
 
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """The columns of joint coordinates: rho1 ..., theta1 ... at cranks."""
+        return tuple(f"{one.coordinate}{j}" for j, one in enumerate(self._symbols, start=1))
+
+    @property
+    def force_names(self) -> tuple[str, ...]:
+        """The columns of actuator forces: force1 ..., torque1 ... at cranks."""
+        return tuple(f"{one.force}{j}" for j, one in enumerate(self._symbols, start=1))
+
+    @property
+    def _symbols(self) -> tuple[ActuatedJoint, ...]:
+        return self.symbols or (SLIDER,) * self.joints.shape[1]
+
     def place(self, index: int) -> str:
         """Return where in its file a sample is, its row counted from 1."""
         return f"{self.source}: row {self.first_row + index + 1}"
@@ -189,13 +203,10 @@ def write_log(log: Log, path: str | Path) -> Path:
         If the file cannot be written; one that was there is left as it was.
     """
     unit = log.description.force_unit
-    columns = {"t": log.time}
-    joints = log.symbols or (SLIDER,) * log.joints.shape[1]
-    for j, joint in enumerate(joints):
-        columns[f"{joint.coordinate}{j + 1}"] = log.joints[:, j]
-    for j, joint in enumerate(joints):
-        stem = "current" if unit == "A" else joint.force
-        columns[f"{stem}{j + 1}" + (f" ({unit})" if unit in ("V", "%") else "")] = log.forces[:, j]
+    columns = {"t": log.time} | dict(zip(log.joint_names, log.joints.T, strict=True))
+    for j, name in enumerate(log.force_names):
+        stem = f"current{j + 1}" if unit == "A" else name
+        columns[stem + (f" ({unit})" if unit in ("V", "%") else "")] = log.forces[:, j]
     if log.pose is not None:
         columns |= dict(zip(_POSE[: log.pose.shape[1]], log.pose.T, strict=True))
     if log.payload is not None:

@@ -273,9 +273,9 @@ def _checked_series(log: Log, period: float | None) -> FourierSeries:
         raise LogError(
             "not repeating",
             log.source,
-            f"does not repeat after its period of {period:g} s: rho{worst + 1} is "
-            f"{series.noise[worst]:.2g} m (rms) off; correct the period in the log's description, "
-            "or leave it out",
+            f"does not repeat after its period of {period:g} s: {log.joint_names[worst]} "
+            f"is {series.noise[worst]:.2g} (rms, m or rad) off; correct the "
+            "period in the log's description, or leave it out",
         )
     return series
 
