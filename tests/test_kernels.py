@@ -399,6 +399,26 @@ def test_text_that_is_not_unicode_keeps_the_old_file(tmp_path):
     assert list(tmp_path.iterdir()) == [file]
 
 
+def test_of_several_files_all_are_written_or_none(tmp_path, monkeypatch):
+    texts = {"one.h": "new", "one.c": "new"}
+    (tmp_path / "one.h").write_text("old")
+    opened, room = os.fdopen, iter([True, False])
+
+    def full(*arguments):
+        if next(room):
+            return opened(*arguments)
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fdopen", full)
+        with pytest.raises(OutputError, match=r"one\.c: cannot be written \(No space left"):
+            atomic.write_texts(tmp_path, texts)
+    assert [path.name for path in tmp_path.iterdir()] == ["one.h"]
+    assert (tmp_path / "one.h").read_text() == "old"
+    assert atomic.write_texts(tmp_path, texts) == [tmp_path / name for name in texts]
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["new", "new"]
+
+
 def test_folders_are_made_or_refused(tmp_path):
     folder = tmp_path / "one" / "two"
     assert atomic.make_folder(folder) == folder

@@ -4,18 +4,28 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 
 from pteron.errors import OutputError
 
 
+def write_texts(folder: str | Path, texts: Mapping[str, str]) -> list[Path]:
+    """Write files to `folder` in UTF-8, by their names: all of them, or none.
+
+    Raises
+    ------
+    OutputError
+        If the folder cannot be made or written, or a text is none in UTF-8; files that were there
+        are left as they were.
+    """
+    target = make_folder(folder)
+    return _write({target / name: _encoded(target / name, text) for name, text in texts.items()})
+
+
 def write_text(path: str | Path, text: str) -> Path:
     """Write `text` to `path` in UTF-8, through a temporary file beside it and a rename."""
-    try:
-        data = text.encode("utf-8")
-    except UnicodeEncodeError as error:
-        raise OutputError(f"{path}: cannot be written in UTF-8 ({error.reason})") from None
-    return write_bytes(path, data)
+    return write_bytes(path, _encoded(path, text))
 
 
 def write_bytes(path: str | Path, data: bytes) -> Path:
@@ -26,19 +36,7 @@ def write_bytes(path: str | Path, data: bytes) -> Path:
     OutputError
         If the folder is missing or cannot be written; a file that was there is left as it was.
     """
-    target = Path(path)
-    temporary = None
-    try:
-        handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        Path(temporary).chmod(0o666 & ~_umask())
-        Path(temporary).replace(target)
-    except OSError as error:
-        if temporary is not None:
-            Path(temporary).unlink(missing_ok=True)
-        raise OutputError(f"{target}: cannot be written ({error.strerror or error})") from None
-    return target
+    return _write({Path(path): data})[0]
 
 
 def make_folder(path: str | Path) -> Path:
@@ -57,6 +55,32 @@ def make_folder(path: str | Path) -> Path:
     except OSError as error:
         reason = "it is a file" if folder.is_file() else error.strerror or str(error)
         raise OutputError(f"{folder}: cannot be written to as a folder ({reason})") from None
+
+
+def _write(files: Mapping[Path, bytes]) -> list[Path]:
+    """Write every file beside its place before the first is renamed: a full disk loses nothing."""
+    written: dict[Path, Path] = {}
+    try:
+        for target, data in files.items():
+            handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+            written[target] = Path(name)
+            with os.fdopen(handle, "wb") as file:
+                file.write(data)
+            written[target].chmod(0o666 & ~_umask())
+        for target, temporary in written.items():
+            temporary.replace(target)
+    except OSError as error:
+        for temporary in written.values():
+            temporary.unlink(missing_ok=True)
+        raise OutputError(f"{target}: cannot be written ({error.strerror or error})") from None
+    return list(written)
+
+
+def _encoded(path: str | Path, text: str) -> bytes:
+    try:
+        return text.encode("utf-8")
+    except UnicodeEncodeError as error:
+        raise OutputError(f"{path}: cannot be written in UTF-8 ({error.reason})") from None
 
 
 def _umask() -> int:

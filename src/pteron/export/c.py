@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
-from pteron import atomic
+from pteron.atomic import write_texts
 from pteron.errors import ModelError
 from pteron.export.functions import FUNCTIONS, Exported, banner, chosen
 from pteron.kernels import Array
@@ -105,8 +105,7 @@ def export_c(
         "CMakeLists.txt": "CMakeLists.txt.j2",
     }
     texts = {file: rendered("pteron.export", name, **values) for file, name in files.items()}
-    target = atomic.make_folder(folder)
-    return [atomic.write_text(target / file, text) for file, text in texts.items()]
+    return write_texts(folder, texts)
 
 
 def prefix_of(robot: Manipulator) -> str:

@@ -10,7 +10,7 @@ import textwrap
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
-from pteron import atomic
+from pteron.atomic import write_texts
 from pteron.export.c import prefix_of
 from pteron.export.functions import Exported, banner, chosen
 from pteron.export.guards import INPUT_POWER, Names, Statements, element, power
@@ -85,15 +85,13 @@ def export_st(
     names = [functions] if isinstance(functions, str) else functions
     closures = ["closure_poses" if name == "direct_kinematics" else name for name in names]
     prefix = _camel(prefix_of(robot))
-    texts = {
+    blocks = {
         f"{prefix}_{_camel(item.name)}": item
         for item in chosen(robot, closures, specialised=specialised, wrench=wrench)
     }
-    target = atomic.make_folder(folder)
-    return [
-        atomic.write_text(target / f"{name}.st", _block(robot, name, item))
-        for name, item in texts.items()
-    ]
+    return write_texts(
+        folder, {f"{name}.st": _block(robot, name, item) for name, item in blocks.items()}
+    )
 
 
 def _block(robot: Manipulator, name: str, item: Exported) -> str:

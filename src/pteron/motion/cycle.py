@@ -11,8 +11,6 @@ from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.motion.laws import quintic
 
-__all__ = ["ACROSS", "LIFT", "Cycle", "across_directions", "up"]
-
 LIFT = 0.025
 """Height of the standard cycle, m."""
 

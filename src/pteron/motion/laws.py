@@ -6,8 +6,6 @@ import numpy as np
 
 from pteron.kernels import Array
 
-__all__ = ["quintic"]
-
 
 def quintic(tau: Array, begin: float, end: float) -> tuple[Array, Array, Array]:
     """Return a move from 0 to 1 within [begin, end], and its first two derivatives.

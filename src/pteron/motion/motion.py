@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 from pteron.kernels import Array
 
-__all__ = ["Motion"]
-
 
 @dataclass(frozen=True)
 class Motion:

@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pteron.atomic import make_folder, write_text
+from pteron.atomic import write_texts
 from pteron.errors import OutputError
 from pteron.manipulator import Manipulator
 
@@ -48,9 +48,8 @@ def write_report(robot: Manipulator, folder: str | Path) -> Path:
 
     target = checked_folder(folder)
     report = contents(robot)
-    html, data = page(report), json.dumps(numbers(report), indent=1, allow_nan=False)
-    write_text(make_folder(target) / "report.json", data + "\n")
-    return write_text(target / "report.html", html)
+    data = json.dumps(numbers(report), indent=1, allow_nan=False)
+    return write_texts(target, {"report.html": page(report), "report.json": data + "\n"})[0]
 
 
 def checked_folder(path: str | Path) -> Path:

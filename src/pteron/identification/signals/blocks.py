@@ -9,8 +9,6 @@ import numpy as np
 
 from pteron.identification.logs import Log, joined
 
-__all__ = ["blocks"]
-
 _GAP = 1.5
 """Steps of time between two samples that miss none; beyond it a new stretch begins."""
 
