@@ -133,7 +133,7 @@ def test_the_angle_does_not_jump_where_home_is_at_half_a_turn():
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"space": "joints"}, "space: 'joints'"),
+        ({"space": "sliders"}, "space: 'sliders'"),
         ({"period": 0.0}, "period: 0.0 s"),
         ({"sines": np.zeros((2, 3))}, "same number of harmonics"),
         ({"center": np.zeros(4)}, "center"),
@@ -455,7 +455,7 @@ def test_time_cuts_the_search_and_a_result_is_there_all_the_same():
         ({"workers": 0}, "workers: 0"),
         ({"seconds": -1.0}, "seconds: -1"),
         ({"harmonics": 0}, "harmonics: 0"),
-        ({"space": "joints"}, "space: 'joints'"),
+        ({"space": "sliders"}, "space: 'sliders'"),
     ],
 )
 def test_what_the_search_cannot_do_is_refused(given: dict, words: str):
