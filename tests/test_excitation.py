@@ -346,7 +346,7 @@ def test_the_other_criterion_makes_the_volume_smaller():
 
 def test_a_search_on_oblique_axes_with_force_limits_keeps_them():
     robot = CATALOG["tripteron-oblique"]
-    limits = Limits(speed=0.3, acceleration=1.5, force=(16.0, 6.0, 29.0))
+    limits = Limits(speed=0.3, acceleration=1.5, force=(11.0, 24.0, 33.0))
     found = optimal_excitation(
         robot, harmonics=2, period=4.0, limits=limits, starts=1, draws=3, workers=1
     )
