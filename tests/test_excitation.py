@@ -133,7 +133,7 @@ def test_the_angle_does_not_jump_where_home_is_at_half_a_turn():
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"space": "joints"}, "space: 'joints'"),
+        ({"space": "sliders"}, "space: 'sliders'"),
         ({"period": 0.0}, "period: 0.0 s"),
         ({"sines": np.zeros((2, 3))}, "same number of harmonics"),
         ({"center": np.zeros(4)}, "center"),
@@ -346,7 +346,7 @@ def test_the_other_criterion_makes_the_volume_smaller():
 
 def test_a_search_on_oblique_axes_with_force_limits_keeps_them():
     robot = CATALOG["tripteron-oblique"]
-    limits = Limits(speed=0.3, acceleration=1.5, force=(16.0, 6.0, 29.0))
+    limits = Limits(speed=0.3, acceleration=1.5, force=(11.0, 24.0, 33.0))
     found = optimal_excitation(
         robot, harmonics=2, period=4.0, limits=limits, starts=1, draws=3, workers=1
     )
@@ -455,7 +455,7 @@ def test_time_cuts_the_search_and_a_result_is_there_all_the_same():
         ({"workers": 0}, "workers: 0"),
         ({"seconds": -1.0}, "seconds: -1"),
         ({"harmonics": 0}, "harmonics: 0"),
-        ({"space": "joints"}, "space: 'joints'"),
+        ({"space": "sliders"}, "space: 'sliders'"),
     ],
 )
 def test_what_the_search_cannot_do_is_refused(given: dict, words: str):

@@ -90,8 +90,8 @@ def test_a_noisy_log_is_judged_by_another_motion():
 def test_a_delta_is_identified_from_a_noisy_log():
     robot = machine("delta")
     built = as_built(robot)
-    # A pick-and-place robot moves fast; 1 % of its torques is noise, and its friction unknown.
-    fast = {"size": 0.25, "harmonics": 6, "period": 2.0, "duration": 10.0, "rate": 1000.0}
+    # 1 % of the torques is noise.
+    fast = {"size": 0.15, "harmonics": 6, "period": 2.0, "duration": 6.0, "rate": 1000.0}
     clean = log_of(built, **fast)
     noise = {"joint_noise": 1e-5, "force_noise": 0.01 * np.sqrt((clean.forces**2).mean())}
     log, other = (log_of(built, **fast, **noise, seed=k, noise_seed=k) for k in (0, 1))
