@@ -23,6 +23,7 @@ _HERE = Path(__file__).parent
 _SCRIPTS = {
     "Fewest operations": "operations.py",
     "Fastest": "speed.py",
+    "Public functions": "public_calls.py",
     "Second start": "startup.py",
     "Memory traffic": "memory_traffic.py",
     "The paper's 41 %": "paper_claim.py",

@@ -14,14 +14,15 @@ from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from time import perf_counter
-from timeit import Timer
-from typing import Any
 
 import numpy as np
 from measuring import (
     Array,
     Contestant,
     States,
+    a_call,
+    a_sweep,
+    compiled,
     contest,
     print_ratio,
     print_times,
@@ -34,7 +35,7 @@ from peers import Peer, peers
 
 import pteron
 from pteron.export import Real
-from pteron.kernels import Kernel, numeric
+from pteron.kernels import Kernel
 from pteron.kernels.c import compiler
 
 _CPP = "Pinocchio, C++, usual flags"
@@ -48,9 +49,6 @@ _MUJOCO_CLOSED = "MuJoCo, C, loops closed by constraints"
 _PUBLIC = "pteron.inverse_dynamics"
 _UNDER_IT = "pteron c, parametric"
 """The kernel that the public function evaluates."""
-
-_SECONDS = 0.02
-"""Length of a round of single calls from Python."""
 
 
 def main() -> None:
@@ -74,7 +72,7 @@ def single_calls(robot: pteron.Manipulator, others: list[Peer]) -> None:
     ours: dict[str, Callable[..., Array]] = dict(
         kernels(robot, ("vm", "numba", "c", "c, parametric", "c, base"))
     )
-    ours[_PUBLIC] = public(robot)
+    ours[_PUBLIC] = compiled(robot, pteron.inverse_dynamics)
     for name, function in ours.items():
         forces = np.array([function(*state) for state in zip(*states, strict=True)])
         error = relative_error(forces, expected)
@@ -125,8 +123,9 @@ def batches(robot: pteron.Manipulator, others: list[Peer]) -> None:
     parallel: list[Contestant] = []
     options = ("", ", base", ", 2 threads", ", base, 2 threads", ", float32", ", base, float32")
     names = ("vm", "numba", "c, parametric", *(f"c{option}" for option in options))
-    error = relative_error(public(robot)(*states), expected)
-    contestants.append(Contestant(_PUBLIC, a_sweep(public(robot), states), error))
+    public = compiled(robot, pteron.inverse_dynamics)
+    error = relative_error(public(*states), expected)
+    contestants.append(Contestant(_PUBLIC, a_sweep(public, states), error))
     for name, kernel in kernels(robot, names).items():
         given = [np.ascontiguousarray(value, dtype=kernel.dtype) for value in states]
         error = relative_error(kernel(*given).astype(float), expected)
@@ -170,40 +169,10 @@ def kernels(robot: pteron.Manipulator, names: Sequence[str]) -> dict[str, Kernel
     return found
 
 
-def public(robot: pteron.Manipulator) -> Callable[..., Array]:
-    """Return the public function, once it runs C code where there is a compiler."""
-    states = random_states(robot, 2_000)
-    deadline = perf_counter() + (60.0 if compiler() else 0.0)
-    while not numeric(robot, "inverse_dynamics").is_compiled and perf_counter() < deadline:
-        pteron.inverse_dynamics(robot, *states)
-    return partial(pteron.inverse_dynamics, robot)
-
-
 def reference(robot: pteron.Manipulator, states: States) -> Array:
     """Return the forces by the virtual machine, which the peers' own forces then confirm."""
     forces: Array = pteron.compile(robot, "inverse_dynamics", "vm")(*states)
     return forces
-
-
-def a_call(function: Callable[..., Any], states: Sequence[Any]) -> Callable[[], float]:
-    """Return what times a round of calls with one state."""
-    one = [value[0] for value in states]
-    names = dict(zip(("f", "x", "dx", "ddx"), (function, *one), strict=True))
-    timer = Timer("f(x, dx, ddx)", globals=names)
-    timer.timeit(100)
-    count = max(1, int(_SECONDS / (timer.timeit(100) / 100)))
-    return lambda: timer.timeit(count) / count
-
-
-def a_sweep(kernel: Callable[..., Any], given: Sequence[Array]) -> Callable[[], float]:
-    """Return what times one call with the whole batch, its result's memory included."""
-
-    def seconds() -> float:
-        begin = perf_counter()
-        kernel(*given)
-        return (perf_counter() - begin) / len(given[0])
-
-    return seconds
 
 
 def jax_sweep(robot: pteron.Manipulator, states: States, expected: Array) -> Contestant:

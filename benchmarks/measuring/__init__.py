@@ -5,16 +5,25 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from time import perf_counter
+from timeit import Timer
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 import pteron
+from pteron.kernels import numeric
+from pteron.kernels.c import compiler
 
 __all__ = [
     "Array",
     "Contestant",
     "States",
+    "a_call",
+    "a_sweep",
+    "compiled",
     "contest",
     "print_ratio",
     "print_times",
@@ -25,6 +34,9 @@ __all__ = [
 
 Array = NDArray[np.float64]
 """Floats of any shape."""
+
+_SECONDS = 0.02
+"""Length of a round of single calls from Python."""
 
 States = tuple[Array, Array, Array]
 """Pose, velocity and acceleration, each (B, m)."""
@@ -65,6 +77,35 @@ def relative_error(found: Array, expected: Array) -> float:
     """Return the largest error of any state, relative to the state's largest force."""
     scale = np.abs(expected).max(axis=-1, keepdims=True)
     return float((np.abs(found - expected) / scale).max())
+
+
+def compiled(robot: pteron.Manipulator, function: Callable[..., Array]) -> Callable[..., Array]:
+    """Return a public function of this machine, once it runs C code where there is a compiler."""
+    states = random_states(robot, 2_000)[: 3 if function is pteron.inverse_dynamics else 1]
+    deadline = perf_counter() + (60.0 if compiler() else 0.0)
+    while not numeric(robot, function.__name__).is_compiled and perf_counter() < deadline:
+        function(robot, *states)
+    return partial(function, robot)
+
+
+def a_call(function: Callable[..., Any], inputs: Sequence[Any]) -> Callable[[], float]:
+    """Return what times a round of calls with one state."""
+    names = {"f": function} | {f"x{i}": value[0] for i, value in enumerate(inputs)}
+    timer = Timer(f"f({', '.join(list(names)[1:])})", globals=names)
+    timer.timeit(100)
+    count = max(1, int(_SECONDS / (timer.timeit(100) / 100)))
+    return lambda: timer.timeit(count) / count
+
+
+def a_sweep(kernel: Callable[..., Any], given: Sequence[Array]) -> Callable[[], float]:
+    """Return what times one call with the whole batch, its result's memory included."""
+
+    def seconds() -> float:
+        begin = perf_counter()
+        kernel(*given)
+        return (perf_counter() - begin) / len(given[0])
+
+    return seconds
 
 
 def contest(contestants: Sequence[Contestant], rounds: int) -> dict[str, Array]:
