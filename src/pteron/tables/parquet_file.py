@@ -25,8 +25,6 @@ class ParquetFile:
 
     Attributes
     ----------
-    source : str
-        As given.
     columns : tuple of str
         Names of the columns.
     rows_estimate : int

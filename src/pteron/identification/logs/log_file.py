@@ -27,7 +27,7 @@ from pteron.identification.logs.sizes import (
 )
 from pteron.identification.logs.time_stamps import TimeStamps
 from pteron.manipulator import Manipulator
-from pteron.tables import CsvFile, ParquetFile, open_table
+from pteron.tables import CsvFile, Dialect, ParquetFile, open_table
 
 _FEWEST = 50
 _AHEAD = 10_000
@@ -236,7 +236,7 @@ def open_log(
         beside.check(robot)
     except DataError as error:
         raise DataError(f"{shown(str(origin), bare=True, longest=1000)}: {error}") from None
-    file = open_table(path, noun="log", dialect=beside.csv, describable=True)
+    file = open_table(path, noun="log", dialect=beside.csv or Dialect())
     return LogFile(file, robot, beside)
 
 
