@@ -159,6 +159,10 @@ def test_parquet_holds_what_it_likes(tmp_path: Path):
         table.numbers(["x", "y"])
     with pytest.raises(DataError, match=r"column flag holds Boolean"):
         table.numbers(["flag"])
+    for value in (np.inf, np.nan, "far"):
+        pl.DataFrame({"x": [value]}).write_parquet(file)
+        with pytest.raises(DataError, match=f"row 1, column x: '{value}' given"):
+            read_table(file).numbers(["x"])
     with pytest.raises(DataError, match=r"no column z .*add what is missing"):
         table.numbers(["z"])
 

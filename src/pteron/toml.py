@@ -222,11 +222,13 @@ def _schema(model: Any) -> _Node:
 def _at(node: _Node, location: tuple[int | str, ...]) -> _Node:
     """Return what is expected at a location."""
     for part in location:
+        inner: Any
         if isinstance(part, int):
-            node = (node.get("prefixItems", []) + [node.get("items", {})] * (part + 1))[part]
+            several = node.get("prefixItems", [])
+            inner = several[part] if part < len(several) else node.get("items")
         else:
-            node = node.get("properties", {}).get(part, node.get("additionalProperties"))
-        node = node if isinstance(node, dict) else {}
+            inner = node.get("properties", {}).get(part, node.get("additionalProperties"))
+        node = inner if isinstance(inner, dict) else {}
     return node
 
 

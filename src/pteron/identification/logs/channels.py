@@ -73,18 +73,9 @@ class _Extreme:
 
 
 class Channel:
-    """What has been seen of one joint coordinate or force.
+    """What has been seen of one force, or of the coordinate of `joint`, counted from 0.
 
-    Parameters
-    ----------
-    column, source : str
-        What messages call it, and the file.
-    spans : array, shape (n,)
-        What the travel of each joint is compared with, m or rad.
-    joint : int, optional
-        Which joint's coordinate this is, from 0; a force if it is not given.
-    limits : (float, float), optional
-        Declared saturation of a force.
+    The travel of each joint is compared with `spans`, (n,); `limits` are a force's, as declared.
     """
 
     def __init__(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -89,7 +90,7 @@ class LogFile:
         """
         if rows < 1:
             raise DataError(f"rows: {rows} given; a piece has at least 1 row")
-        stamps = TimeStamps(self._step, *self._columns.time.shown, self.source)
+        stamps = TimeStamps(self._step, self._columns.time.shown[0], self.source)
         channels = self._channels()
         n = self._robot.freedom
         low, high = np.full(n, np.inf), np.full(n, -np.inf)
@@ -98,8 +99,8 @@ class LogFile:
             piece = self._piece(values, first)
             stamps.take(piece.time)
             both = np.hstack([piece.joints, piece.forces])
-            for j, channel in enumerate(channels):
-                channel.take(np.ascontiguousarray(both[:, j]), piece.joints)
+            for channel, column in zip(channels, np.ascontiguousarray(both.T), strict=True):
+                channel.take(column, piece.joints)
             low = np.minimum(low, piece.joints.min(axis=0))
             high = np.maximum(high, piece.joints.max(axis=0))
             first += piece.rows
@@ -177,25 +178,20 @@ class LogFile:
                 "length says nothing; record a longer one"
             )
         column = self._columns.time
-        time = _in_si(ahead[:, 0], *column.units)
+        time = _in_si(ahead[:, 0], column.units[0])
         # A fault in the order of time is told with its row, before any step is judged.
-        TimeStamps(1.0, *column.shown, self.source).take(time)
+        TimeStamps(1.0, column.shown[0], self.source).take(time)
         step = float(np.median(np.diff(time)))
         if not column.said:
-            check_step(step, *column.shown, self.source)
+            check_step(step, column.shown[0], self.source)
         return step
 
     def _channels(self) -> list[Channel]:
-        spans, c = joint_spans(self._robot), self._columns
+        spans, source, c = joint_spans(self._robot), self.source, self._columns
         limits = self.description.limits or (None,)
-        joints, forces = enumerate(c.joints.shown), enumerate(c.forces.shown)
-        return [
-            *(Channel(name, self.source, spans, joint=j) for j, name in joints),
-            *(
-                Channel(name, self.source, spans, limits=limits[j % len(limits)])
-                for j, name in forces
-            ),
-        ]
+        joints = [Channel(name, source, spans, joint=j) for j, name in enumerate(c.joints.shown)]
+        forces = zip(c.forces.shown, cycle(limits), strict=False)
+        return joints + [Channel(name, source, spans, limits=pair) for name, pair in forces]
 
 
 def _in_si(values: Values, unit: str) -> Values:
@@ -208,36 +204,16 @@ def open_log(
 ) -> LogFile:
     """Open a log to read it in pieces: its columns are found, its first rows checked.
 
-    Parameters
-    ----------
-    path : str or path
-        A CSV or Parquet file; its ending says which.
-    robot : Manipulator
-        The machine it belongs to.
-    description : Description or path, optional
-        What is known beside the numbers; the TOML file of the same stem where it is not given.
-
-    Returns
-    -------
-    LogFile
-
-    Raises
-    ------
-    DataError
-        As `read_log`.
+    Parameters and errors are those of `read_log`.
     """
-    beside = find_description(path) if description is None else description
-    if beside is None:
-        beside = Description()
-    origin = path
-    if not isinstance(beside, Description):
-        origin, beside = beside, read_description(beside)
+    given = (find_description(path) or Description()) if description is None else description
+    origin, about = (path, given) if isinstance(given, Description) else (given, None)
+    about = about or read_description(origin)
     try:
-        beside.check(robot)
+        about.check(robot)
     except DataError as error:
         raise DataError(f"{shown(str(origin), bare=True, longest=1000)}: {error}") from None
-    file = open_table(path, noun="log", dialect=beside.csv or Dialect())
-    return LogFile(file, robot, beside)
+    return LogFile(open_table(path, noun="log", dialect=about.csv or Dialect()), robot, about)
 
 
 def read_log(
