@@ -60,10 +60,7 @@ def test_a_csv_file_is_read_however_it_was_written(given, content: bytes):
         (b"x,y\n1,\xff\n", "not UTF-8 text"),
         ("x,y\n1,2\n".encode("utf-16"), "not UTF-8 text"),
         (b"x,y,x\n1,2,3\n", "two columns are called 'x'"),
-        (
-            b"x,\ry\n1,2\n",
-            "its header is not CSV (a carriage return in the midst of a line); check",
-        ),
+        (b"x,\ry\n1,2\n", "row 1 (line 2) has 1 cells"),
         (b'x,"y\n1,2\n', "its header is not CSV (unexpected end of data); check its quotes"),
         (b"x;y\n1,5;2\n", "its cells look separated by semicolons, with decimal commas; separate"),
     ],
@@ -162,6 +159,10 @@ def test_parquet_holds_what_it_likes(tmp_path: Path):
         table.numbers(["x", "y"])
     with pytest.raises(DataError, match=r"column flag holds Boolean"):
         table.numbers(["flag"])
+    for value in (np.inf, np.nan, "far"):
+        pl.DataFrame({"x": [value]}).write_parquet(file)
+        with pytest.raises(DataError, match=f"row 1, column x: '{value}' given"):
+            read_table(file).numbers(["x"])
     with pytest.raises(DataError, match=r"no column z .*add what is missing"):
         table.numbers(["z"])
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -13,10 +12,8 @@ from pteron.errors import PteronError, shown
 if TYPE_CHECKING:
     from pydantic import ValidationError
 
-Item = Callable[[str, int], str]
-"""Names an item of a list, from its key and its number, counted from 1: "leg 2"."""
-
 _Model = TypeVar("_Model")
+_Node = dict[str, Any]
 
 _LARGEST = 1 << 24
 _PARTS = 16
@@ -51,14 +48,7 @@ _LONG_KEY = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{_PARTS}}}")
 def read_toml(path: str | Path, error: type[PteronError], absent: str) -> dict[str, Any]:
     """Return what a TOML file holds.
 
-    Parameters
-    ----------
-    path : str or path
-        The file.
-    error : type
-        What is raised: a `ModelError` for a manipulator, a `DataError` for a log.
-    absent : str
-        What the message says if there is no such file.
+    `error` is what is raised, `absent` what its message says if there is no such file.
 
     Raises
     ------
@@ -77,16 +67,7 @@ def read_toml(path: str | Path, error: type[PteronError], absent: str) -> dict[s
 
 
 def parsed_toml(data: bytes, source: str, error: type[PteronError]) -> dict[str, Any]:
-    """Return what a TOML text holds.
-
-    Parameters
-    ----------
-    data : bytes
-        The text in UTF-8; a byte order mark before it is passed over.
-    source : str
-        What messages call it.
-    error : type
-        What is raised.
+    """Return what a TOML text in UTF-8 holds; `source` is what messages call it.
 
     Raises
     ------
@@ -117,31 +98,10 @@ def parsed_toml(data: bytes, source: str, error: type[PteronError]) -> dict[str,
     raise error(f"{source}: not a TOML file ({reason})")
 
 
-def _item(key: str, number: int) -> str:
-    return f"{key}, item {number}"
-
-
 def validated(
-    model: type[_Model],
-    document: dict[str, Any],
-    source: str,
-    error: type[PteronError],
-    item: Item = _item,
+    model: type[_Model], document: dict[str, Any], source: str, error: type[PteronError]
 ) -> _Model:
-    """Return what a document says as an instance of a pydantic model.
-
-    Parameters
-    ----------
-    model : type
-        A pydantic model or dataclass.
-    document : dict
-        What the file holds.
-    source : str
-        What messages call the file.
-    error : type
-        What is raised.
-    item : callable, optional
-        Names an item of a list.
+    """Return what a document says as an instance of a pydantic model or dataclass.
 
     Raises
     ------
@@ -153,7 +113,7 @@ def validated(
     try:
         return TypeAdapter(model).validate_python(document)
     except ValidationError as fault:
-        raise error(told(source, fault_lines(fault, model, item))) from None
+        raise error(told(source, fault_lines(fault, model))) from None
 
 
 def told(source: str, lines: list[str]) -> str:
@@ -164,18 +124,11 @@ def told(source: str, lines: list[str]) -> str:
     return "\n  ".join([f"{source}: {len(lines)} faults", *lines[:_MANY], *more])
 
 
-def fault_lines(error: ValidationError, model: Any, item: Item = _item) -> list[str]:
+def fault_lines(error: ValidationError, model: Any) -> list[str]:
     r"""Return a line for every fault that pydantic found: the key, what was given and expected.
 
-    Parameters
-    ----------
-    error : ValidationError
-        Of a file's content.
-    model : type
-        The pydantic model or dataclass that refused it. Aliases with a dot, such as
-        ``"time.unit"``, are understood as keys of tables.
-    item : callable, optional
-        Names an item of a list; by default ``"legs, item 2"``.
+    `model` is the pydantic model or dataclass that refused a file's content. Aliases with a dot,
+    such as ``"time.unit"``, are understood as keys of tables.
 
     Examples
     --------
@@ -186,51 +139,51 @@ def fault_lines(error: ValidationError, model: Any, item: Item = _item) -> list[
     >>> try:
     ...     Machine.model_validate({"gravity": 9.81, "legs": [{}, {"mass": "x"}], "nam": "a"})
     ... except ValidationError as error:
-    ...     lines = fault_lines(error, Machine, lambda key, number: f"leg {number}")
-    >>> print(*lines, sep="\n")
+    ...     print(*fault_lines(error, Machine), sep="\n")
     gravity: 9.81 given, a list of 3 numbers expected
-    leg 2: mass: 'x' given, a number expected
+    legs, item 2: mass: 'x' given, a number expected
     nam: unknown key; the valid ones there are gravity, legs
     """
-    schema = _Schema(model)
+    schema = _schema(model)
     lines = []
     for fault in error.errors(include_url=False):
         location = fault["loc"]
         # What a list of fixed length lacks is a fault of the list.
         if fault["type"] == "missing" and location and isinstance(location[-1], int):
             location = location[:-1]
-        key = _key(location, item)
+        key = _key(location)
         lines.append(f"{key}: " * bool(key) + _fault(fault, schema, location))
     return list(dict.fromkeys(lines))
 
 
 def table_keys(model: Any) -> tuple[str, ...]:
     """Return the keys of a model; of aliases with a dot, the tables."""
-    return _Schema(model).keys((), "")
+    return _keys(_schema(model), "")
 
 
-def _key(location: tuple[int | str, ...], item: Item) -> str:
-    named, key = list[str](), ""
+def _key(location: tuple[int | str, ...]) -> str:
+    key, link = "", ""
     for part in location:
         if isinstance(part, int):
-            named.append(item(key, part + 1) if key else f"item {part + 1}")
-            key = ""
+            key += f"{link.replace('.', ', ')}item {part + 1}"
+            link = ": "
         else:
-            key += ("." if key else "") + shown(part, bare=True)
-    return ": ".join([*named, key] if key else named)
+            key += link + shown(part, bare=True)
+            link = "."
+    return key
 
 
-def _fault(fault: Any, schema: _Schema, location: tuple[int | str, ...]) -> str:
+def _fault(fault: Any, schema: _Node, location: tuple[int | str, ...]) -> str:
     kind, given, context = fault["type"], shown(fault["input"]), fault.get("ctx", {})
     if kind == "value_error":
         return str(context["error"])
     if kind in ("extra_forbidden", "unexpected_keyword_argument"):
         table, dot, _ = str(location[-1]).rpartition(".")
-        valid = schema.keys(location[:-1], table + dot)
+        valid = _keys(_at(schema, location[:-1]), table + dot)
         if location[-1] in valid:
             return f"{given} given, a table expected"
         return f"unknown key; the valid ones there are {', '.join(valid)}"
-    expected = schema.words(location)
+    expected = _words(_at(schema, location))
     if kind == "missing" and fault["loc"] == location:
         return f"missing; the file must give {expected or 'it'}"
     if kind in _BOUNDS:
@@ -244,46 +197,52 @@ def _fault(fault: Any, schema: _Schema, location: tuple[int | str, ...]) -> str:
     return f"{given} given, {expected} expected"
 
 
-class _Schema:
-    """What a model expects at a location, from its JSON schema."""
+def _schema(model: Any) -> _Node:
+    """Return the JSON schema of a model, in which nothing stands for another part of it."""
+    from pydantic import TypeAdapter
 
-    def __init__(self, model: Any) -> None:
-        from pydantic import TypeAdapter
+    whole = TypeAdapter(model).json_schema(by_alias=True)
 
-        self._whole = TypeAdapter(model).json_schema(by_alias=True)
-
-    def keys(self, location: tuple[int | str, ...], table: str) -> tuple[str, ...]:
-        """Return the keys that are valid there; `table` is what aliases begin with."""
-        names = self._at(location).get("properties", {})
-        inner = (name.removeprefix(table) for name in names if name.startswith(table))
-        return tuple(dict.fromkeys(name.partition(".")[0] for name in inner))
-
-    def words(self, location: tuple[int | str, ...]) -> str:
-        """Return what is expected there; empty where there are no words for it."""
-        return self._words(self._at(location))
-
-    def _words(self, node: dict[str, Any]) -> str:
-        if node.get("type") != "array":
-            return _WORDS.get(node.get("type", ""), "")
-        several = node.get("prefixItems", [])
-        item = self._words(self._resolved(several[0] if several else node.get("items", {})))
-        count = f"{len(several)} " if several else ""
-        return f"a list of {count}{item.removeprefix('a ')}s" if item else "a list"
-
-    def _at(self, location: tuple[int | str, ...]) -> dict[str, Any]:
-        node = self._resolved(self._whole)
-        for part in location:
-            if isinstance(part, int):
-                several = node.get("prefixItems", [])
-                inner = several[part] if part < len(several) else node.get("items")
-            else:
-                inner = node.get("properties", {}).get(part, node.get("additionalProperties"))
-            node = self._resolved(inner if isinstance(inner, dict) else {})
-        return node
-
-    def _resolved(self, node: dict[str, Any]) -> dict[str, Any]:
-        """Return a part of the schema itself, where another stands for it or may be null."""
+    def resolved(node: Any) -> Any:
+        if isinstance(node, list):
+            return [resolved(one) for one in node]
+        if not isinstance(node, dict):
+            return node
         if "$ref" in node:
-            return self._resolved(self._whole["$defs"][node["$ref"].rpartition("/")[2]])
+            return resolved(whole["$defs"][node["$ref"].rpartition("/")[2]])
         others = [one for one in node.get("anyOf", []) if one.get("type") != "null"]
-        return self._resolved(others[0]) if len(others) == 1 else node
+        if len(others) == 1:
+            return resolved(others[0])
+        return {key: resolved(value) for key, value in node.items() if key != "$defs"}
+
+    found: _Node = resolved(whole)
+    return found
+
+
+def _at(node: _Node, location: tuple[int | str, ...]) -> _Node:
+    """Return what is expected at a location."""
+    for part in location:
+        inner: Any
+        if isinstance(part, int):
+            several = node.get("prefixItems", [])
+            inner = several[part] if part < len(several) else node.get("items")
+        else:
+            inner = node.get("properties", {}).get(part, node.get("additionalProperties"))
+        node = inner if isinstance(inner, dict) else {}
+    return node
+
+
+def _keys(node: _Node, table: str) -> tuple[str, ...]:
+    """Return the keys that are valid in a table; `table` is what aliases begin with."""
+    inner = (k.removeprefix(table) for k in node.get("properties", {}) if k.startswith(table))
+    return tuple(dict.fromkeys(name.partition(".")[0] for name in inner))
+
+
+def _words(node: _Node) -> str:
+    """Return what is expected in words; empty where there are none for it."""
+    if node.get("type") != "array":
+        return _WORDS.get(node.get("type", ""), "")
+    several = node.get("prefixItems", [])
+    item = _words(several[0] if several else node.get("items", {}))
+    count = f"{len(several)} " if several else ""
+    return f"a list of {count}{item.removeprefix('a ')}s" if item else "a list"

@@ -52,7 +52,7 @@ class Dialect:
         if self.header_lines is not None and self.header_lines < 1:
             raise DataError(f"header_lines: {self.header_lines} given, at least 1 expected")
         try:
-            codecs.lookup(self.encoding)
+            "".encode(self.encoding)
         except (LookupError, ValueError):
             raise DataError(
                 f"encoding: {shown(self.encoding)} is no text encoding that Python knows"
@@ -69,9 +69,7 @@ class CsvFile:
     source : str
         What messages call it.
     dialect : Dialect, optional
-        How it is written.
-    describable : bool
-        Whether a TOML file beside it may declare its dialect, so that messages advise it.
+        How it is written; messages then advise to declare another in the TOML file beside it.
     block : int
         Bytes read at a time.
 
@@ -96,28 +94,19 @@ class CsvFile:
         source: str,
         dialect: Dialect | None = None,
         *,
-        describable: bool = False,
         block: int = BLOCK,
     ) -> None:
-        self.source = source
-        self._data = data
-        self._dialect = dialect or Dialect()
-        self._describable = describable
-        self._block = block
-        self._old_line_ends = False
+        self.source, self._data, self._block = source, data, block
+        self._dialect, self._describable = dialect or Dialect(), dialect is not None
         head = next(self._text(_HEAD), b"")
-        # Old spreadsheets end lines with CR alone.
-        self._old_line_ends = b"\n" not in head and b"\r" in head
-        if self._old_line_ends:
-            head = head.replace(b"\r", b"\n")
         self.columns, self._start, self._first_line = self._header(head)
         header, sample = head[: self._start], head[self._start :]
         rows = sample.count(b"\n")
         size = len(data) if isinstance(data, bytes) else data.stat().st_size
         self.rows_estimate = round((size - self._start) * rows / len(sample)) if rows else None
-        other_dialect = self._other_dialect(header.decode(), sample.partition(b"\n")[0])
-        self.hint = other_dialect or "the first line must name the columns"
-        self._mend = other_dialect or "mend the row"
+        other = self._other_dialect(header.decode(), sample.partition(b"\n")[0])
+        self.hint = other or "the first line must name the columns"
+        self._mend = other or "mend the row"
 
     def tables(self, columns: Sequence[str] | None = None) -> Iterator[Table]:
         """Yield the cells as text, a block of rows at a time; blank lines are skipped.
@@ -134,7 +123,7 @@ class CsvFile:
         """
         names = [name for name in self.columns if columns is None or name in columns]
         row, line, rest = 0, self._first_line, b""
-        for chunk, following in pairwise(chain(self._body(), [None])):
+        for chunk, following in pairwise(chain(self._text(self._block, self._start), [None])):
             assert chunk is not None
             whole = rest + chunk
             cut = len(whole) if following is None else _end_of_records(whole)
@@ -148,41 +137,32 @@ class CsvFile:
                 line_of = partial(self._line_of, block, line)
                 yield Table(self.source, frame, self.hint, row, line_of, self._dialect.decimal)
             row += len(frame)
-            line += block.count(b"\n") + block.count(b"\r") - block.count(b"\r\n")
+            line += block.count(b"\n")
 
-    def _text(self, size: int) -> Iterator[bytes]:
-        """Yield the file's text in UTF-8, so many bytes of the file at a time."""
-        encoding = codecs.lookup(self._dialect.encoding).name
-        decode = None if encoding == "utf-8" else codecs.getincrementaldecoder(encoding)().decode
-        mark = codecs.BOM_UTF8
-        data = self._data
+    def _text(self, size: int, start: int = 0) -> Iterator[bytes]:
+        """Yield the text from `start` on, in UTF-8 and with the line ends of Unix, in pieces."""
+        decoder = codecs.getincrementaldecoder(self._dialect.encoding)()
+        decode = io.IncrementalNewlineDecoder(decoder, translate=True).decode
+        data, mark = self._data, "\ufeff"
         with io.BytesIO(data) if isinstance(data, bytes) else data.open("rb") as file:
-            while chunk := file.read(size):
-                if decode is not None:
-                    try:
-                        chunk = decode(chunk).encode()
-                    except UnicodeError:
-                        raise self._not_text() from None
-                chunk, mark = chunk.removeprefix(mark), b""
-                yield chunk.replace(b"\r", b"\n") if self._old_line_ends else chunk
-
-    def _body(self) -> Iterator[bytes]:
-        skipped = self._start
-        for chunk in self._text(self._block):
-            yield chunk[skipped:]
-            skipped = max(skipped - len(chunk), 0)
+            for chunk, following in pairwise(chain(iter(partial(file.read, size), b""), [b""])):
+                try:
+                    text = decode(chunk, not following)
+                except UnicodeError:
+                    raise self._not_text() from None
+                whole, mark = text.removeprefix(mark).encode(), ""
+                yield whole[start:]
+                start = max(start - len(whole), 0)
 
     def _header(self, head: bytes) -> tuple[tuple[str, ...], int, int]:
         """Return the columns' names, where the rows begin, and on which line."""
         lines = io.BytesIO(head).readlines()
         above = self._dialect.header_lines or 1
         records = csv.reader(
-            map(_header_line, lines[above - 1 :]), delimiter=self._dialect.separator, strict=True
+            map(bytes.decode, lines[above - 1 :]), delimiter=self._dialect.separator, strict=True
         )
         try:
             names = next((tuple(c.strip() for c in cells) for cells in records if _any(cells)), ())
-        except UnicodeDecodeError:
-            raise self._not_text() from None
         except csv.Error as error:
             raise DataError(
                 f"{self.source}: its header is not CSV ({error}); check its quotes and line ends"
@@ -219,10 +199,10 @@ class CsvFile:
         """Return the cells as Polars reads them, or None where it might read them otherwise.
 
         Polars fills short rows and takes blank lines for rows, which separators that are not there
-        tell; and it is lenient with quotes and line ends.
+        tell; and it is lenient with quotes.
         """
         separator, last = self._dialect.separator, len(self.columns) - 1
-        if not last or b'"' in block or block.count(b"\r") != block.count(b"\r\n"):
+        if not last or b'"' in block:
             return None
         wanted = [self.columns.index(name) for name in names]
         schema = {str(j): pl.String for j in range(last + 1)}
@@ -247,8 +227,6 @@ class CsvFile:
                         f"({listed(names)}); {self._mend}"
                     )
                 rows.append([cell or None for cell in cells])
-        except UnicodeDecodeError:
-            raise self._not_text(f" behind row {row}" if row else "") from None
         except csv.Error as error:
             raise DataError(
                 f"{self.source}: behind row {row + len(rows)} is not CSV ({error}); check its "
@@ -258,8 +236,8 @@ class CsvFile:
 
     def _records(self, block: bytes, line: int) -> Iterator[tuple[int, list[str]]]:
         """Yield the records that are not blank, each with the line it begins on."""
-        text = io.TextIOWrapper(io.BytesIO(block), encoding="utf-8", newline="")
-        reader = csv.reader(text, delimiter=self._dialect.separator, strict=True)
+        lines = map(bytes.decode, io.BytesIO(block))
+        reader = csv.reader(lines, delimiter=self._dialect.separator, strict=True)
         begins = line
         for cells in reader:
             if _any(cells):
@@ -269,18 +247,12 @@ class CsvFile:
     def _line_of(self, block: bytes, line: int, index: int) -> int:
         return next(islice(self._records(block, line), index, None))[0]
 
-    def _not_text(self, where: str = "") -> DataError:
+    def _not_text(self) -> DataError:
         declare = "; or declare its encoding in a TOML file beside it: [csv] encoding = ..."
         return DataError(
-            f"{self.source}: not {self._dialect.encoding.upper()} text{where}; save it as CSV in "
-            f"UTF-8{declare if self._describable else ''}"
+            f"{self.source}: not {self._dialect.encoding.upper()} text; save it as CSV in UTF-8"
+            f"{declare if self._describable else ''}"
         )
-
-
-def _header_line(line: bytes) -> str:
-    if b"\r" in line.rstrip(b"\r\n"):
-        raise csv.Error("a carriage return in the midst of a line")
-    return line.decode("utf-8")
 
 
 def _any(cells: Sequence[str]) -> bool:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import io
 import sys
-from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import polars as pl
@@ -24,11 +24,7 @@ _LONGEST_PATH = 1000
 
 
 def open_table(
-    path: str | Path,
-    *,
-    noun: str = "table",
-    dialect: Dialect | None = None,
-    describable: bool = False,
+    path: str | Path, *, noun: str = "table", dialect: Dialect | None = None
 ) -> CsvFile | ParquetFile:
     """Open a CSV or Parquet file whose rows are read a block at a time.
 
@@ -39,9 +35,7 @@ def open_table(
     noun : str
         What messages call such files.
     dialect : Dialect, optional
-        How a CSV file is written.
-    describable : bool
-        Whether a TOML file beside it may declare that.
+        How a CSV file is written, where a TOML file beside it may declare that.
 
     Raises
     ------
@@ -60,7 +54,7 @@ def open_table(
                 f"{source}: is no regular file, and a {noun} is read twice; save it as a file"
             )
         if file.suffix.lower() == ".csv":
-            return CsvFile(file, source, dialect, describable=describable)
+            return CsvFile(file, source, dialect)
         return ParquetFile(file, source)
 
 
@@ -103,20 +97,16 @@ def read_table(path: str | Path) -> Table:
 
 
 def _joined(tables: list[Table]) -> Table:
-    first = tables[0]
     if len(tables) == 1:
-        return first
-    starts = [table.first_row for table in tables]
+        return tables[0]
 
     def line_of(index: int) -> int:
-        table = tables[bisect_right(starts, index) - 1]
+        table = next(one for one in reversed(tables) if one.first_row <= index)
         assert table.line_of is not None
         return table.line_of(index - table.first_row)
 
     frame = pl.concat([table.frame for table in tables])
-    return Table(
-        first.source, frame, first.hint, line_of=line_of if first.line_of is not None else None
-    )
+    return replace(tables[0], frame=frame, line_of=tables[0].line_of and line_of)
 
 
 @contextmanager

@@ -14,25 +14,7 @@ _ROWS = 262_144
 
 
 class ParquetFile:
-    """A Parquet file that is open for reading; each pass over its tables reads it anew.
-
-    Parameters
-    ----------
-    path : path
-        A regular file.
-    source : str
-        What messages call it.
-
-    Attributes
-    ----------
-    source : str
-        As given.
-    columns : tuple of str
-        Names of the columns.
-    rows_estimate : int
-        How many rows it has.
-    hint : str
-        What to do where a column is missing.
+    """A Parquet file, open for reading as a `CsvFile` is; `rows_estimate` is exact.
 
     Raises
     ------

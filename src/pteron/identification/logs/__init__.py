@@ -4,13 +4,12 @@ Nothing is repaired: what cannot be a motion of the machine is refused, with its
 what looks odd is stated as a finding.
 """
 
-from pteron.identification.logs.description import Description, KnownPayload
+from pteron.identification.logs.description import Description, KnownPayload, joint_symbols
 from pteron.identification.logs.description_file import (
     find_description,
     read_description,
     write_description,
 )
-from pteron.identification.logs.joints import joint_symbols
 from pteron.identification.logs.log import Finding, Log, joined, write_log
 from pteron.identification.logs.log_file import LogFile, open_log, read_log
 

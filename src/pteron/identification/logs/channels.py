@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter  # type: ignore[import-untyped]
 
 from pteron.errors import DataError
-from pteron.identification.logs.log import Finding
+from pteron.identification.logs.log import Finding, Kind
 
 _CLIPPED_ROWS = 3
 _CLIPPED_RUNS = 2
@@ -37,43 +37,45 @@ class _Run:
 
     value: float
     start: int
+    stop: int
     least: Values
     greatest: Values
 
 
 @dataclass
-class _Extreme:
-    """How often the greatest value so far was held."""
+class _Tally:
+    """How often something was seen, and in which row and with what first."""
 
+    count: int = 0
+    row: int = 0
+    first: tuple[float, ...] = ()
+
+    def add(self, count: int, row: int, *first: float) -> None:
+        if count and not self.count:
+            self.row, self.first = row, first
+        self.count += count
+
+
+@dataclass
+class _Extreme:
+    """How often the greatest value so far, or the least, was held."""
+
+    word: str
+    sign: float
     value: float = -np.inf
     runs: int = 0
-    rows: int = 0
-    first: int = 0
+    rows: _Tally = field(default_factory=_Tally)
 
-    def raise_to(self, value: float) -> None:
-        if value > self.value:
-            self.value, self.runs, self.rows = value, 0, 0
-
-    def count(self, start: int, rows: int) -> None:
-        if not self.runs:
-            self.first = start
-        self.runs += 1
-        self.rows += rows
+    def look(self, values: Values) -> None:
+        greatest = float((self.sign * values).max())
+        if greatest > self.value:
+            self.value, self.runs, self.rows = greatest, 0, _Tally()
 
 
 class Channel:
-    """What has been seen of one joint coordinate or force.
+    """What has been seen of one force, or of the coordinate of `joint`, counted from 0.
 
-    Parameters
-    ----------
-    column, source : str
-        What messages call it, and the file.
-    spans : array, shape (n,)
-        What the travel of each joint is compared with, m or rad.
-    joint : int, optional
-        Which joint's coordinate this is, from 0; a force if it is not given.
-    limits : (float, float), optional
-        Declared saturation of a force.
+    The travel of each joint is compared with `spans`, (n,); `limits` are a force's, as declared.
     """
 
     def __init__(
@@ -85,55 +87,44 @@ class Channel:
         joint: int | None = None,
         limits: tuple[float, float] | None = None,
     ) -> None:
-        self._column = column
-        self._source = source
+        self._column, self._source = column, source
         self._moved = _MOVED * spans
-        self._joint = joint
-        self._limits = limits
+        if joint is not None:
+            self._moved[joint] = np.inf
+        self._is_force, self._limits = joint is None, limits
         self._rows = 0
         self._run: _Run | None = None
-        self._high, self._low = _Extreme(), _Extreme()
-        self._frozen = 0
-        self._first_frozen = (0, 0, 0.0)
-        self._beyond = 0
-        self._first_beyond = 0
-        self._spikes = _Spikes(column, source, _FORCES if joint is None else _JOINTS)
+        self._extremes = (_Extreme("greatest", 1.0), _Extreme("least", -1.0))
+        self._frozen, self._beyond, self._spikes = _Tally(), _Tally(), _Tally()
 
     def take(self, values: Values, joints: Values) -> None:
         """Look at the next piece: this channel, (rows,), and all joint coordinates, (rows, n)."""
-        self._spikes.take(values)
-        self._high.raise_to(float(values.max()))
-        self._low.raise_to(float(-values.min()))
+        self._take_spikes(values)
+        for extreme in self._extremes:
+            extreme.look(values)
         if self._limits is not None:
-            self._compare(values, *self._limits)
-        starts = np.concatenate([[0], np.flatnonzero(values[1:] != values[:-1]) + 1])
-        firsts = starts + self._rows
+            low, high = self._limits
+            room = _ROUNDING * max(abs(low), abs(high))
+            beyond = (values <= low + room) | (values >= high - room)
+            self._beyond.add(int(beyond.sum()), self._rows + int(np.argmax(beyond)))
+        starts = np.flatnonzero(np.diff(values, prepend=np.nan))
+        lengths = np.diff(starts, append=len(values))
         held = values[starts]
-        last = joints[starts[-1] :]
-        run = _Run(float(held[-1]), int(firsts[-1]), last.min(axis=0), last.max(axis=0))
-        open_run = self._run
-        if open_run is not None and open_run.value != held[0]:
-            self._close(open_run, self._rows)
-        elif open_run is not None:
-            firsts[0] = open_run.start
-            first = joints[: starts[1] if len(starts) > 1 else None]
-            open_run.least = np.minimum(open_run.least, first.min(axis=0))
-            open_run.greatest = np.maximum(open_run.greatest, first.max(axis=0))
-            if len(starts) == 1:
-                run = open_run
-            else:
-                self._close(open_run, int(firsts[1]))
-        # The first run is closed above where it began in an earlier piece.
-        begun_here = 1 if len(starts) > 1 and firsts[0] < self._rows else 0
-        lengths = np.diff(firsts)
-        for i in np.flatnonzero(lengths >= _CLIPPED_ROWS):
-            if i >= begun_here:
-                part = joints[starts[i] : starts[i + 1]]
-                closed = _Run(float(held[i]), int(firsts[i]), part[0], part[0])
-                if lengths[i] > _FROZEN_ROWS:
-                    closed.least, closed.greatest = part.min(axis=0), part.max(axis=0)
-                self._close(closed, int(firsts[i + 1]))
-        self._run = run
+        extreme_held = np.isin(held, [one.sign * one.value for one in self._extremes])
+        telling = (lengths > _FROZEN_ROWS) | extreme_held & (lengths >= _CLIPPED_ROWS)
+        # The first may go on with the run of the piece before, the last is still open.
+        telling[[0, -1]] = True
+        for i in np.flatnonzero(telling):
+            start, stop, last = int(starts[i]), int(starts[i] + lengths[i]), self._run
+            least, greatest = joints[start:stop].min(axis=0), joints[start:stop].max(axis=0)
+            run = _Run(float(held[i]), self._rows + start, self._rows + stop, least, greatest)
+            if last is not None and i == 0 and last.value == run.value:
+                run.start = last.start
+                run.least = np.minimum(last.least, least)
+                run.greatest = np.maximum(last.greatest, greatest)
+            elif last is not None:
+                self._close(last)
+            self._run = run
         self._rows += len(values)
 
     def finish(self) -> tuple[Finding, ...]:
@@ -151,108 +142,66 @@ class Channel:
                     f"{self._rows} rows: dead channel; record it again, or correct which columns "
                     "are read"
                 )
-            self._close(self._run, self._rows)
+            self._close(self._run)
             self._run = None
+        column = f"column {self._column}"
         found = []
-        if self._frozen:
-            start, stop, value = self._first_frozen
+        if self._frozen.count:
+            stop, value = self._frozen.first
             message = (
-                f"{self._source}: column {self._column} holds {value:g} in rows {start + 1} to "
-                f"{stop} while other joints move: frozen channel"
+                f"{column} holds {value:g} in rows {self._frozen.row + 1} to {stop:.0f} while "
+                f"other joints move: frozen channel{_more(self._frozen, 'stretches')}"
             )
-            if self._frozen > 1:
-                message += f" ({self._frozen} such stretches in all)"
-            found.append(Finding("frozen", message, start + 1, self._column, self._frozen))
-        if self._joint is None:
-            found += self._clipped()
-        found += self._spikes.findings()
-        return tuple(found)
-
-    def _compare(self, values: Values, low: float, high: float) -> None:
-        room = _ROUNDING * max(abs(low), abs(high))
-        beyond = (values <= low + room) | (values >= high - room)
-        count = int(np.count_nonzero(beyond))
-        if count and not self._beyond:
-            self._first_beyond = self._rows + int(np.argmax(beyond))
-        self._beyond += count
-
-    def _close(self, run: _Run, stop: int) -> None:
-        rows = stop - run.start
-        if rows >= _CLIPPED_ROWS:
-            for extreme, value in ((self._high, run.value), (self._low, -run.value)):
-                if value == extreme.value:
-                    extreme.count(run.start, rows)
-        if rows > _FROZEN_ROWS:
-            moved = run.greatest - run.least > self._moved
-            if np.delete(moved, [] if self._joint is None else [self._joint]).any():
-                if not self._frozen:
-                    self._first_frozen = (run.start, stop, run.value)
-                self._frozen += 1
-
-    def _clipped(self) -> list[Finding]:
-        if self._limits is not None:
-            if not self._beyond:
-                return []
+            found.append(self._finding("frozen", message, self._frozen))
+        if self._limits is not None and self._beyond.count:
             low, high = self._limits
             message = (
-                f"{self._source}: column {self._column} is at or beyond its limits {low:g} and "
-                f"{high:g} in {self._beyond} rows, first in row {self._first_beyond + 1}: clipped"
+                f"{column} is at or beyond its limits {low:g} and {high:g} in "
+                f"{self._beyond.count} rows, first in row {self._beyond.row + 1}: clipped"
             )
-            row = self._first_beyond + 1
-            return [Finding("clipped", message, row, self._column, self._beyond)]
-        found = []
-        for extreme, word, sign in ((self._high, "greatest", 1), (self._low, "least", -1)):
-            if extreme.runs >= _CLIPPED_RUNS:
-                message = (
-                    f"{self._source}: column {self._column} holds its {word} value "
-                    f"{sign * extreme.value:g} in {extreme.runs} stretches, {extreme.rows} rows in "
-                    f"all, first from row {extreme.first + 1}: clipped"
-                )
-                row = extreme.first + 1
-                found.append(Finding("clipped", message, row, self._column, extreme.rows))
-        return found
+            found.append(self._finding("clipped", message, self._beyond))
+        if self._limits is None and self._is_force:
+            for one in self._extremes:
+                if one.runs >= _CLIPPED_RUNS:
+                    message = (
+                        f"{column} holds its {one.word} value {one.sign * one.value:g} in "
+                        f"{one.runs} stretches, {one.rows.count} rows in all, first from row "
+                        f"{one.rows.row + 1}: clipped"
+                    )
+                    found.append(self._finding("clipped", message, one.rows))
+        if self._spikes.count:
+            message = (
+                f"row {self._spikes.row + 1}, {column}: {self._spikes.first[0]:g} stands out from "
+                f"its neighbours: spike{_more(self._spikes, 'samples')}"
+            )
+            found.append(self._finding("spike", message, self._spikes))
+        return tuple(found)
+
+    def _take_spikes(self, values: Values) -> None:
+        """Count single samples far from their neighbours, which a piece's outermost lack."""
+        if len(values) <= _WINDOW:
+            return
+        apart = np.abs(values - median_filter(values, _WINDOW, mode="nearest"))
+        low, high = np.percentile(values, _SHARES)
+        usual = _USUAL * np.percentile(apart, _SHARES[1])
+        share = _FORCES if self._is_force else _JOINTS
+        found = np.flatnonzero(apart > max(usual, share * (high - low)))
+        if len(found):
+            self._spikes.add(len(found), self._rows + int(found[0]), float(values[found[0]]))
+
+    def _close(self, run: _Run) -> None:
+        rows = run.stop - run.start
+        for extreme in self._extremes:
+            if rows >= _CLIPPED_ROWS and run.value == extreme.sign * extreme.value:
+                extreme.runs += 1
+                extreme.rows.add(rows, run.start)
+        if rows > _FROZEN_ROWS and (run.greatest - run.least > self._moved).any():
+            self._frozen.add(1, run.start, run.stop, run.value)
+
+    def _finding(self, kind: Kind, message: str, tally: _Tally) -> Finding:
+        message = f"{self._source}: {message}"
+        return Finding(kind, message, tally.row + 1, self._column, tally.count)
 
 
-class _Spikes:
-    """The spikes of one channel.
-
-    Parameters
-    ----------
-    column, source : str
-        What messages call it, and the file.
-    share : float
-        Distance from the median, as a share of the channel's usual span, beyond which it is no
-        motion.
-    """
-
-    def __init__(self, column: str, source: str, share: float) -> None:
-        self._column = column
-        self._source = source
-        self._share = share
-        self._rows = 0
-        self._count = 0
-        self._first = (0, 0.0)
-
-    def take(self, values: NDArray[np.float64]) -> None:
-        """Look at the next piece, shape (rows,); its first and last samples have no neighbours."""
-        if len(values) > _WINDOW:
-            apart = np.abs(values - median_filter(values, _WINDOW, mode="nearest"))
-            low, high = np.percentile(values, _SHARES)
-            usual = _USUAL * np.percentile(apart, _SHARES[1])
-            found = np.flatnonzero(apart > max(usual, self._share * (high - low)))
-            if len(found) and not self._count:
-                self._first = (self._rows + int(found[0]), float(values[found[0]]))
-            self._count += len(found)
-        self._rows += len(values)
-
-    def findings(self) -> tuple[Finding, ...]:
-        """Return what was found, once all pieces are taken."""
-        if not self._count:
-            return ()
-        row, value = self._first
-        more = f" ({self._count} such samples in all)" if self._count > 1 else ""
-        message = (
-            f"{self._source}: row {row + 1}, column {self._column}: {value:g} stands out from its "
-            f"neighbours: spike{more}"
-        )
-        return (Finding("spike", message, row + 1, self._column, self._count),)
+def _more(tally: _Tally, what: str) -> str:
+    return f" ({tally.count} such {what} in all)" if tally.count > 1 else ""

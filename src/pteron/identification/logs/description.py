@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import fields
 from functools import wraps
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, TypeVar, get_args
 
 from pydantic import (
     AfterValidator,
@@ -19,7 +19,7 @@ from pydantic import (
 from pydantic.dataclasses import dataclass
 
 from pteron.errors import DataError, shown
-from pteron.identification.logs.joints import joint_symbols, units_of
+from pteron.legs.kind import ActuatedJoint
 from pteron.manipulator import Manipulator
 from pteron.tables import Dialect
 from pteron.toml import fault_lines, told
@@ -78,6 +78,16 @@ def _raises_data_errors(cls: _Class) -> _Class:
 
     cls.__init__ = __init__  # type: ignore[misc]
     return cls
+
+
+def joint_symbols(robot: Manipulator) -> tuple[ActuatedJoint, ...]:
+    """Return how the actuated joint of each leg is spoken of."""
+    return tuple(leg.joint for leg in robot.legs)
+
+
+def _units_of(joint: ActuatedJoint) -> tuple[str, ...]:
+    """Return the units in which a joint's coordinate may stand in a file."""
+    return get_args(LengthUnit if joint.unit == "m" else AngleUnit)
 
 
 @_raises_data_errors
@@ -232,7 +242,7 @@ class Description:
         """Return the unit declared for each joint of a machine, None where nothing is."""
         declared = (self.joint_angle_unit, self.joint_unit)
         return tuple(
-            next((unit for unit in declared if unit in units_of(joint)), None)
+            next((unit for unit in declared if unit in _units_of(joint)), None)
             for joint in joint_symbols(robot)
         )
 
@@ -260,7 +270,7 @@ class Description:
             )
         joints = joint_symbols(robot)
         for key, unit, known in (
-            ("joints.unit", self.joint_unit, [one for j in joints for one in units_of(j)]),
+            ("joints.unit", self.joint_unit, [one for j in joints for one in _units_of(j)]),
             ("forces.unit", self.column_force_unit, [*_OF_DRIVES, *(j.force_unit for j in joints)]),
         ):
             if unit is not None and unit not in known:

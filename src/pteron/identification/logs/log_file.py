@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -13,26 +14,27 @@ from numpy.typing import NDArray
 from pteron.errors import DataError, shown
 from pteron.identification.logs.channels import Channel
 from pteron.identification.logs.columns import find_columns
-from pteron.identification.logs.description import Description
+from pteron.identification.logs.description import Description, joint_symbols
 from pteron.identification.logs.description_file import find_description, read_description
-from pteron.identification.logs.joints import in_si, joint_symbols
 from pteron.identification.logs.log import Log, joined
 from pteron.identification.logs.sizes import (
+    check_bounds,
     check_forces,
-    check_joints,
-    check_pose,
     check_step,
+    joint_bounds,
     joint_spans,
+    pose_bounds,
     standstill,
 )
 from pteron.identification.logs.time_stamps import TimeStamps
 from pteron.manipulator import Manipulator
-from pteron.tables import CsvFile, ParquetFile, open_table
+from pteron.tables import CsvFile, Dialect, ParquetFile, open_table
 
 _FEWEST = 50
 _AHEAD = 10_000
 """Rows looked at when a log is opened: the usual step is their median."""
 _PIECE = 1 << 18
+_PER_UNIT = {"ms": 1e3, "us": 1e6, "mm": 1e3, "um": 1e6}
 
 Values = NDArray[np.float64]
 
@@ -56,23 +58,17 @@ class LogFile:
         self, file: CsvFile | ParquetFile, robot: Manipulator, description: Description
     ) -> None:
         self.source = source = file.source
-        self._robot = robot
-        self._file = file
-        self._columns = find_columns(file.columns, robot, description, source, file.hint)
+        self._robot, self._file = robot, file
+        self._columns = c = find_columns(file.columns, robot, description, source, file.hint)
         if description.column_force_unit is None and description.gains is None:
-            unit: Any = self._columns.force_unit
+            unit: Any = c.forces.units[0]
             description = replace(description, column_force_unit=unit)
         self.description = description
         self.rows_estimate = file.rows_estimate
-        self.findings = self._columns.findings
-        c = self._columns
-        self._names = (c.time, *c.joints, *c.forces, *c.pose, *([c.payload] if c.payload else []))
-        # As messages may show them: a name may hold anything.
-        self._time, self._payload = shown(c.time, bare=True), shown(c.payload or "", bare=True)
-        self._joints, self._forces, self._pose = (
-            tuple(shown(name, bare=True) for name in names)
-            for names in (c.joints, c.forces, c.pose)
-        )
+        self.findings = c.findings
+        self._groups = (c.time, c.joints, c.forces, c.pose, c.payload)
+        self._names = tuple(name for group in self._groups for name in group.names)
+        self._bounds = joint_bounds(robot), pose_bounds(robot)
         self._step = self._usual_step()
 
     def pieces(
@@ -94,7 +90,7 @@ class LogFile:
         """
         if rows < 1:
             raise DataError(f"rows: {rows} given; a piece has at least 1 row")
-        stamps = TimeStamps(self._step, self._time, self.source)
+        stamps = TimeStamps(self._step, self._columns.time.shown[0], self.source)
         channels = self._channels()
         n = self._robot.freedom
         low, high = np.full(n, np.inf), np.full(n, -np.inf)
@@ -103,8 +99,8 @@ class LogFile:
             piece = self._piece(values, first)
             stamps.take(piece.time)
             both = np.hstack([piece.joints, piece.forces])
-            for j, channel in enumerate(channels):
-                channel.take(np.ascontiguousarray(both[:, j]), piece.joints)
+            for channel, column in zip(channels, np.ascontiguousarray(both.T), strict=True):
+                channel.take(column, piece.joints)
             low = np.minimum(low, piece.joints.min(axis=0))
             high = np.maximum(high, piece.joints.max(axis=0))
             first += piece.rows
@@ -112,8 +108,7 @@ class LogFile:
                 progress(piece.rows)
             yield piece
         found = [finding for channel in channels for finding in channel.finish()]
-        units = self._columns.joint_units
-        found += standstill(high - low, self._robot, units, self._joints, self.source)
+        found += standstill(high - low, self._robot, self._columns.joints, self.source)
         self.findings = (*self._columns.findings, *stamps.findings(), *found)
 
     def read(self, progress: Callable[[int], None] | None = None) -> Log:
@@ -136,32 +131,28 @@ class LogFile:
             yield np.concatenate(held)
 
     def _piece(self, values: Values, first: int) -> Log:
-        c, n = self._columns, self._robot.freedom
-        joints = np.column_stack(
-            [in_si(values[:, 1 + j], unit) for j, unit in enumerate(c.joint_units)]
+        c, source = self._columns, self.source
+        edges = np.cumsum([len(group.names) for group in self._groups])[:-1]
+        time, joints, forces, pose, payload = (
+            np.ascontiguousarray(
+                np.transpose([_in_si(*both) for both in zip(part.T, group.units, strict=True)])
+            )
+            for group, part in zip(self._groups, np.split(values, edges, axis=1), strict=True)
         )
-        check_joints(joints, self._robot, c.joint_units, self._joints, self.source, first)
-        forces = np.ascontiguousarray(values[:, 1 + n : 1 + 2 * n])
+        of_joints, of_pose = self._bounds
+        check_bounds(joints, of_joints, c.joints, source, first)
         if self.description.gains is not None:
             forces = forces * np.array(self.description.gains)
-        check_forces(forces, self._forces, self.source, first)
-        pose = None
-        if c.pose:
-            units = [
-                c.angle_unit if one == "phi" else c.length_unit for one in self._robot.coordinates
-            ]
-            pose = np.column_stack(
-                [in_si(values[:, 1 + 2 * n + j], unit) for j, unit in enumerate(units)]
-            )
-            both = c.length_unit, c.angle_unit
-            check_pose(pose, self._robot, both, self._pose, self.source, first)
+        check_forces(forces, c.forces.shown, source, first)
+        if c.pose.names:
+            check_bounds(pose, of_pose, c.pose, source, first)
         return Log(
-            source=self.source,
-            time=in_si(values[:, 0], c.time_unit),
+            source=source,
+            time=time[:, 0],
             joints=joints,
             forces=forces,
-            pose=pose,
-            payload=None if c.payload is None else self._phases(values[:, -1], first),
+            pose=pose if c.pose.names else None,
+            payload=self._phases(payload[:, 0], first) if c.payload.names else None,
             description=self.description,
             first_row=first,
             step=self._step,
@@ -173,8 +164,8 @@ class LogFile:
         if bad.any():
             i = int(np.argmax(bad))
             raise DataError(
-                f"{self.source}: row {first + i + 1}, column {self._payload}: {values[i]:g} given; "
-                "0 (without payload) or 1 (with) was expected"
+                f"{self.source}: row {first + i + 1}, column {self._columns.payload.shown[0]}: "
+                f"{values[i]:g} given; 0 (without payload) or 1 (with) was expected"
             )
         return values.astype(np.int64)
 
@@ -186,23 +177,26 @@ class LogFile:
                 f"{self.source}: {given} rows given, at least {_FEWEST} expected: a motion of that "
                 "length says nothing; record a longer one"
             )
-        time = in_si(ahead[:, 0], self._columns.time_unit)
+        column = self._columns.time
+        time = _in_si(ahead[:, 0], column.units[0])
         # A fault in the order of time is told with its row, before any step is judged.
-        TimeStamps(1.0, self._time, self.source).take(time)
+        TimeStamps(1.0, column.shown[0], self.source).take(time)
         step = float(np.median(np.diff(time)))
-        if not self._columns.unit_of_time_known:
-            check_step(step, self._time, self.source)
+        if not column.said:
+            check_step(step, column.shown[0], self.source)
         return step
 
     def _channels(self) -> list[Channel]:
-        spans, limits = joint_spans(self._robot), self.description.limits
-        channels = [
-            Channel(name, self.source, spans, joint=j) for j, name in enumerate(self._joints)
-        ]
-        for j, name in enumerate(self._forces):
-            pair = None if limits is None else limits[j % len(limits)]
-            channels.append(Channel(name, self.source, spans, limits=pair))
-        return channels
+        spans, source, c = joint_spans(self._robot), self.source, self._columns
+        limits = self.description.limits or (None,)
+        joints = [Channel(name, source, spans, joint=j) for j, name in enumerate(c.joints.shown)]
+        forces = zip(c.forces.shown, cycle(limits), strict=False)
+        return joints + [Channel(name, source, spans, limits=pair) for name, pair in forces]
+
+
+def _in_si(values: Values, unit: str) -> Values:
+    """Return times or lengths in s or m, angles in rad, anything else as it is."""
+    return np.radians(values) if unit == "deg" else values / _PER_UNIT.get(unit, 1.0)
 
 
 def open_log(
@@ -210,36 +204,16 @@ def open_log(
 ) -> LogFile:
     """Open a log to read it in pieces: its columns are found, its first rows checked.
 
-    Parameters
-    ----------
-    path : str or path
-        A CSV or Parquet file; its ending says which.
-    robot : Manipulator
-        The machine it belongs to.
-    description : Description or path, optional
-        What is known beside the numbers; the TOML file of the same stem where it is not given.
-
-    Returns
-    -------
-    LogFile
-
-    Raises
-    ------
-    DataError
-        As `read_log`.
+    Parameters and errors are those of `read_log`.
     """
-    beside = find_description(path) if description is None else description
-    if beside is None:
-        beside = Description()
-    origin = path
-    if not isinstance(beside, Description):
-        origin, beside = beside, read_description(beside)
+    given = (find_description(path) or Description()) if description is None else description
+    origin, about = (path, given) if isinstance(given, Description) else (given, None)
+    about = about or read_description(origin)
     try:
-        beside.check(robot)
+        about.check(robot)
     except DataError as error:
         raise DataError(f"{shown(str(origin), bare=True, longest=1000)}: {error}") from None
-    file = open_table(path, noun="log", dialect=beside.csv, describable=True)
-    return LogFile(file, robot, beside)
+    return LogFile(open_table(path, noun="log", dialect=about.csv or Dialect()), robot, about)
 
 
 def read_log(

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pteron.errors import DataError
-from pteron.identification.logs.joints import joint_symbols
+from pteron.identification.logs.columns import Group
+from pteron.identification.logs.description import joint_symbols
 from pteron.identification.logs.log import Finding
 from pteron.legs import LegKind
 from pteron.manipulator import Manipulator
@@ -23,49 +26,59 @@ _STANDSTILL = 1e-3
 _SMALLER = ((1e3, "mm"), (1e6, "um"))
 
 
-def size_of(robot: Manipulator) -> float:
-    """Return the extent of a machine, m: between its guide points, along a leg and its platform."""
-    points = np.array([leg.guide_point for leg in robot.legs])
-    apart = np.linalg.norm(points[:, None] - points, axis=-1).max()
-    reach = max(leg.size + float(np.linalg.norm(leg.platform_point)) for leg in robot.legs)
-    return float(apart + reach)
+class Bound(NamedTuple):
+    """How large a coordinate may be: a few times its usual size, m; two turns if it is None."""
+
+    usual: float | None
+    owner: str
+    """What has that size, for messages."""
+    key: str
+    """Of its unit, in the description."""
 
 
-def joint_spans(robot: Manipulator) -> NDArray[np.float64]:
-    """Return what a travel of each joint is compared with, (n,): the machine's size, m; 1 rad."""
-    size = size_of(robot)
-    return np.array([size if joint.unit == "m" else 1.0 for joint in joint_symbols(robot)])
-
-
-def check_joints(
-    joints: NDArray[np.float64],
-    robot: Manipulator,
-    units: tuple[str, ...],
-    columns: tuple[str, ...],
-    source: str,
-    first_row: int,
-) -> None:
-    """Raise a `DataError` where joint coordinates, (rows, n) in SI, are too large for the machine.
+def joint_bounds(robot: Manipulator) -> list[Bound]:
+    """Return how far each joint may travel.
 
     A joint cannot leave the others far behind: its coordinate is bound by its limits, or by the
     machine's size, along a guide that may be oblique to the leg's plane. A crank makes few turns.
     """
-    for j, (leg, joint) in enumerate(zip(robot.legs, joint_symbols(robot), strict=True)):
-        values = joints[:, j]
-        travel = _BEYOND * _travel_of(leg, robot) if joint.unit == "m" else _TURNS
-        beyond = np.abs(values) > travel
+    owner, key = "the joint of this machine travels", "[joints] unit"
+    return [
+        Bound(_travel_of(leg, robot) if leg.joint.unit == "m" else None, owner, key)
+        for leg in robot.legs
+    ]
+
+
+def pose_bounds(robot: Manipulator) -> list[Bound]:
+    """Return how large each coordinate of a measured pose may be."""
+    far = max(float(np.linalg.norm(leg.guide_point)) for leg in robot.legs)
+    size = _size_of(robot) + far + max(_farthest(leg.limits) for leg in robot.legs)
+    length = Bound(size, "the machine extends", "[pose] length_unit")
+    angle = Bound(None, "", "[pose] angle_unit")
+    return [angle if one == "phi" else length for one in robot.coordinates]
+
+
+def check_bounds(
+    values: NDArray[np.float64], bounds: Sequence[Bound], group: Group, source: str, first_row: int
+) -> None:
+    """Raise a `DataError` where coordinates, (rows, n) in SI, are too large for the machine."""
+    for j, (usual, owner, key) in enumerate(bounds):
+        beyond = np.abs(values[:, j]) > (_TURNS if usual is None else _BEYOND * usual)
         if not beyond.any():
             continue
-        i = int(np.argmax(beyond))
-        place = f"{source}: row {first_row + i + 1}, column {columns[j]}"
-        if joint.unit != "m":
-            raise DataError(f"{place}: {_turned(values[i], units[j], 'joints', 'unit')}")
-        usual = travel / _BEYOND
-        advice = _advice("joints", "unit", units[j], float(np.abs(values).max()), usual)
-        raise DataError(
-            f"{place}: {values[i]:g} m, read as {units[j]}, but the joint of this machine travels "
-            f"about {usual:.2g} m; {advice}"
-        )
+        i, unit = int(np.argmax(beyond)), group.units[j]
+        place = f"{source}: row {first_row + i + 1}, column {group.shown[j]}: {values[i, j]:g}"
+        if usual is None:
+            raise DataError(
+                f"{place} rad, read as {unit}, is over two turns; {_declare('degrees', key, 'deg')}"
+            )
+        advice, peak = "check the unit, and that the log belongs to this machine", np.inf
+        if unit == "m":
+            peak = float(np.abs(values[:, j]).max())
+        for factor, smaller in reversed(_SMALLER):
+            if peak / factor <= _BEYOND * usual:
+                advice = _declare(smaller, key, smaller)
+        raise DataError(f"{place} m, read as {unit}, but {owner} about {usual:.2g} m; {advice}")
 
 
 def check_forces(
@@ -81,40 +94,20 @@ def check_forces(
         )
 
 
-def check_pose(
-    pose: NDArray[np.float64],
-    robot: Manipulator,
-    units: tuple[str, str],
-    columns: tuple[str, ...],
-    source: str,
-    first_row: int,
-) -> None:
-    """Raise a `DataError` where measured poses, (rows, m), are too large for the machine."""
-    far = max(float(np.linalg.norm(leg.guide_point)) for leg in robot.legs)
-    size = size_of(robot) + far + max(_farthest(leg.limits) for leg in robot.legs)
-    for j, column in enumerate(columns):
-        turns = robot.coordinates[j] == "phi"
-        largest = _TURNS if turns else _BEYOND * size
-        beyond = np.abs(pose[:, j]) > largest
-        if not beyond.any():
-            continue
-        i = int(np.argmax(beyond))
-        place = f"{source}: row {first_row + i + 1}, column {column}"
-        if turns:
-            raise DataError(f"{place}: {_turned(pose[i, j], units[1], 'pose', 'angle_unit')}")
-        peak = float(np.abs(pose[:, j]).max())
-        raise DataError(
-            f"{place}: {pose[i, j]:g} m, read as {units[0]}, but the machine extends about "
-            f"{size:.2g} m; {_advice('pose', 'length_unit', units[0], peak, size)}"
-        )
+def check_step(step: float, column: str, source: str) -> None:
+    """Raise a `DataError` if a median step, s, of no declared unit is too long for a motion."""
+    if step <= _LONGEST_STEP:
+        return
+    likely = "ms" if step < 1e2 else "us"
+    raise DataError(
+        f"{source}: column {column}: the median step is {step:g} s, where a motion is sampled at "
+        f"under {_LONGEST_STEP:g} s; {_declare(likely, '[time] unit', likely)}; if these are "
+        'seconds, unit = "s"'
+    )
 
 
 def standstill(
-    travelled: NDArray[np.float64],
-    robot: Manipulator,
-    units: tuple[str, ...],
-    columns: tuple[str, ...],
-    source: str,
+    travelled: NDArray[np.float64], robot: Manipulator, group: Group, source: str
 ) -> tuple[Finding, ...]:
     """Return a finding where no joint moves by a thousandth of its span: the unit may be wrong.
 
@@ -127,47 +120,36 @@ def standstill(
     joint = joint_symbols(robot)[j]
     machine = f", where the machine extends about {spans[j]:.2g} m" if joint.unit == "m" else ""
     message = (
-        f"{source}: the {joint.noun}s, read as {units[j]}, travel at most {travelled[j]:.2g} "
+        f"{source}: the {joint.noun}s, read as {group.units[j]}, travel at most {travelled[j]:.2g} "
         f"{joint.unit}{machine}; check their unit"
     )
-    return (Finding("units", message, column=columns[j]),)
+    return (Finding("units", message, column=group.shown[j]),)
 
 
-def check_step(step: float, column: str, source: str) -> None:
-    """Raise a `DataError` if a median step, s, of no declared unit is too long for a motion."""
-    if step <= _LONGEST_STEP:
-        return
-    likely = "ms" if step < 1e2 else "us"
-    raise DataError(
-        f"{source}: column {column}: the median step is {step:g} s, where a motion is sampled at "
-        f'under {_LONGEST_STEP:g} s; if the file holds {likely}, say so: [time] unit = "{likely}" '
-        'in a TOML file beside it; if these are seconds, unit = "s"'
-    )
+def joint_spans(robot: Manipulator) -> NDArray[np.float64]:
+    """Return what a travel of each joint is compared with, (n,): the machine's size, m; 1 rad."""
+    size = _size_of(robot)
+    return np.array([size if leg.joint.unit == "m" else 1.0 for leg in robot.legs])
+
+
+def _size_of(robot: Manipulator) -> float:
+    """Return the extent of a machine, m: between its guide points, along a leg and its platform."""
+    points = np.array([leg.guide_point for leg in robot.legs])
+    apart = np.linalg.norm(points[:, None] - points, axis=-1).max()
+    reach = max(leg.size + float(np.linalg.norm(leg.platform_point)) for leg in robot.legs)
+    return float(apart + reach)
 
 
 def _travel_of(leg: LegKind, robot: Manipulator) -> float:
     if leg.limits is not None:
         return _farthest(leg.limits)
     # Along a guide that is oblique to the leg's reach the slider travels farther.
-    return size_of(robot) * max(leg.reach_bound.radius / leg.size, 1.0)
+    return _size_of(robot) * max(leg.reach_bound.radius / leg.size, 1.0)
 
 
 def _farthest(limits: tuple[float, float] | None) -> float:
     return 0.0 if limits is None else max(abs(limit) for limit in limits)
 
 
-def _turned(value: float, unit: str, table: str, key: str) -> str:
-    return (
-        f"{value:g} rad, read as {unit}, is over two turns; if the file holds degrees, say so: "
-        f'[{table}] {key} = "deg" in a TOML file beside it'
-    )
-
-
-def _advice(table: str, key: str, unit: str, peak: float, size: float) -> str:
-    for factor, smaller in _SMALLER:
-        if unit == "m" and peak / factor <= _BEYOND * size:
-            return (
-                f"if the file holds {smaller}, say so: [{table}] {key} = "
-                f'"{smaller}" in a TOML file beside it'
-            )
-    return "check the unit, and that the log belongs to this machine"
+def _declare(held: str, key: str, unit: str) -> str:
+    return f'if the file holds {held}, say so: {key} = "{unit}" in a TOML file beside it'

@@ -13,22 +13,10 @@ _JITTER = 0.01
 
 
 class TimeStamps:
-    """What has been seen of a log's time stamps.
-
-    Parameters
-    ----------
-    step : float
-        The usual step, s.
-    column : str
-        What the file calls the column.
-    source : str
-        What messages call the file.
-    """
+    """What has been seen of a log's time stamps; `step` is the usual one, s."""
 
     def __init__(self, step: float, column: str, source: str) -> None:
-        self._step = step
-        self._column = column
-        self._source = source
+        self._step, self._column, self._source = step, column, source
         self._last: float | None = None
         self._rows = 0
         self._gaps = 0
@@ -52,7 +40,12 @@ class TimeStamps:
         if (steps <= 0.0).any():
             i = int(np.argmax(steps <= 0.0))
             earlier = float(time[i - 1] if i else before[0])
-            raise DataError(self._fault(self._rows + i, earlier, float(time[i])))
+            what = "is repeated" if time[i] == earlier else "runs backward"
+            raise DataError(
+                f"{self._source}: row {self._rows + i + 1}, column {self._column}: time {what} "
+                f"({time[i]:.12g} s behind {earlier:.12g} s); put the rows in order, each with its "
+                "own time"
+            )
         gaps = steps > GAP * self._step
         if gaps.any():
             if not self._gaps:
@@ -74,11 +67,11 @@ class TimeStamps:
         if self._gaps:
             row, start, step = self._first_gap
             lost = int(self._lost(np.array([step]))[0])
-            gaps = "1 gap" if self._gaps == 1 else f"{self._gaps} gaps"
             message = (
-                f"{self._source}: {gaps}, {self._missing} samples missing in all; the first is "
-                f"before row {row + 1}, behind t = {start:.9g} s: {lost} missing (a step of "
-                f"{step:.6g} s where {self._step:.6g} s is usual)"
+                f"{self._source}: {self._gaps} gap{'s' * (self._gaps > 1)}, {self._missing} "
+                f"samples missing in all; the first is before row {row + 1}, behind t = "
+                f"{start:.9g} s: {lost} missing (a step of {step:.6g} s where {self._step:.6g} s "
+                "is usual)"
             )
             found.append(Finding("gap", message, row + 1, self._column, self._gaps))
         if self._uneven:
@@ -93,10 +86,3 @@ class TimeStamps:
 
     def _lost(self, steps: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.maximum(np.rint(steps / self._step) - 1.0, 1.0)
-
-    def _fault(self, row: int, earlier: float, later: float) -> str:
-        what = "is repeated" if later == earlier else "runs backward"
-        return (
-            f"{self._source}: row {row + 1}, column {self._column}: time {what} ({later:.12g} s "
-            f"behind {earlier:.12g} s); put the rows in order, each with its own time"
-        )
