@@ -515,7 +515,13 @@ def test_the_command_writes_both_files_and_a_table(tmp_path: Path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     result = run(f"excite tripteron {QUICK} --out motion.csv --rate 100")
     assert (result.exit_code, result.stderr) == (0, "")
-    for words in ("best of 4 random", "of length 1", "elbow sine", "speed (m/s)", "motion.toml"):
+    for words in (
+        "best of 4 random",
+        "of length 1",
+        "type-I measure",
+        "speed (m/s)",
+        "motion.toml",
+    ):
         assert words in result.stdout
     assert len(pl.read_csv("motion.csv")) == 400
     # What belongs to the log of the motion is understood where logs are read.
@@ -524,7 +530,7 @@ def test_the_command_writes_both_files_and_a_table(tmp_path: Path, monkeypatch):
 
 def test_the_command_prints_json(tmp_path: Path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    result = run(f"excite quadrupteron {QUICK} --space sliders --seconds 2 --elbows +-+- --json")
+    result = run(f"excite quadrupteron {QUICK} --space joints --seconds 2 --elbows +-+- --json")
     assert (result.exit_code, result.stderr) == (0, "")
     found = json.loads(result.stdout)
     assert found["conditioning"]["scaled"] <= found["random"]["scaled"]
@@ -539,10 +545,10 @@ def test_the_command_prints_json(tmp_path: Path, monkeypatch):
     ("line", "words"),
     [
         ("excite tripteron --out there/motion.csv", "no folder there"),
-        ("excite tripteron --elbow-sine 0.9999", "type_i of at least 0.9999 is impossible"),
+        ("excite tripteron --type-i 0.9999", "type_i of at least 0.9999 is impossible"),
         ("excite tripteron --speed -1", "speed -1"),
         ("excite tripteron --period -1", "period: -1"),
-        ("excite tripteron --space joints", "'joints' is not one of"),
+        ("excite tripteron --space sliders", "'sliders' is not one of"),
     ],
 )
 def test_the_command_refuses_in_one_line(line: str, words: str, tmp_path: Path, monkeypatch):

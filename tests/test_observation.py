@@ -16,7 +16,7 @@ from pteron.identification.model import Terms, identification_model
 from pteron.identification.observation import in_motion, observations_of, stacked
 from pteron.identification.signals import Processing, States, preprocessing_of
 
-KINDS = ["quadrupteron turned", "tripteron-oblique --+"]
+KINDS = ["quadrupteron turned", "delta on a wall"]
 each_kind = pytest.mark.parametrize("name", KINDS)
 
 
@@ -181,7 +181,7 @@ def test_terms_that_cannot_be_are_refused():
 # Logs without noise
 
 WAYS = {"periodic": 1e-9, "spline": 1e-8, "central": 1e-8}
-SOME = ["quadrupteron", "tripteron-oblique --+"]
+SOME = ["quadrupteron", "tripteron-oblique"]
 
 
 def equations_and_truth(name, derivatives="central", *, processing=None, **log):
@@ -206,7 +206,7 @@ def test_a_log_without_noise_gives_the_values(name, derivatives):
     assert np.abs(equations.forces - equations.matrix @ values).max() < WAYS[derivatives] * usual
 
 
-@pytest.mark.parametrize("name", ["tripteron-oblique --+"])
+@pytest.mark.parametrize("name", ["tripteron-oblique"])
 @pytest.mark.parametrize(("rate", "period"), [(50.0, 4.0), (500.0, 3.7013)])
 def test_a_period_need_not_be_a_number_of_samples(name, rate, period):
     _, _, equations, values = equations_and_truth(name, "periodic", rate=rate, period=period)
@@ -241,7 +241,7 @@ def test_a_gap_that_no_other_period_fills_is_refused():
 @pytest.mark.parametrize("derivatives", WAYS)
 def test_slow_sliders_are_left_out_on_both_sides(derivatives):
     # Friction that is wrong only at low speed must not be felt at all.
-    name = "tripteron-oblique --+"
+    name = "tripteron-oblique"
     processing = Processing(slow=0.2)
     log, treatment, equations, values = equations_and_truth(
         name, derivatives, processing=processing

@@ -321,7 +321,7 @@ def test_short_stretches_yield_nothing():
 
 
 each_kind = pytest.mark.parametrize(
-    "name", ["quadrupteron ----", "tripteron on a wall", "random 3T1R 1"]
+    "name", ["quadrupteron +-+-", "tripteron on a wall", "random 3T1R 1"]
 )
 
 
