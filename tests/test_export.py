@@ -37,7 +37,7 @@ SLIDER = pteron.Leg(
 )
 ROBOTS = {
     "quadrupteron": ROBOT,
-    "oblique": replace(MECHANISMS["tripteron-oblique --+"], name="oblique"),
+    "oblique": replace(MECHANISMS["quadrupteron-oblique +--+"], name="oblique"),
     "delta": DELTA,
     "mixed": replace(DELTA, name="mixed", legs=(SLIDER, *DELTA.legs[1:])),
 }

@@ -288,6 +288,14 @@ class RSSEquations(LegEquations):
             ((at.rate, at.acceleration), None),
         )
 
+    def named(self, point: PointMotion, angle: AngleMotion | None) -> dict[str, Expression]:
+        w, at = point.position - self.r, self._state(point)
+        u, h, quarter = self._triangle(w)
+        n2, root = ca.dot(u, u), ca.sqrt(quarter)
+        crank = {"plane_u": at.l_u, "g": at.g, "along": h / n2, "across": root / n2}
+        closing = {"w": w, "u": u, "n2": n2, "h": h, "quarter": quarter, "root": root}
+        return {**closing, **crank, "theta_rate2": at.rate * at.rate}
+
     def reach(self, c: Expression) -> Reach:
         w = c - self.r
         u, _, quarter = self._triangle(w)
