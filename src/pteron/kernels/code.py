@@ -95,6 +95,8 @@ def statements(
     lines = []
     for k in nodes:
         node = graph.nodes[k]
+        if node.operation not in printed:
+            raise ValueError(f"operation {node.operation} has no printer")
         value = printed[node.operation].format(*(names[i] for i in node.arguments))
         lines.append(form.format(names[k], value))
     return lines

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from fractions import Fraction
-from functools import lru_cache
 from math import isnan, isqrt
 from typing import Generic, Protocol, TypeVar
 
 import casadi as ca
 
-__all__ = ["Field", "NoSquareRoot", "PrimeField", "RationalField", "evaluate"]
+from pteron.kernels.graph import CONSTANT, Node, graph_of
 
 Element = TypeVar("Element")
 
@@ -129,78 +128,43 @@ def evaluate(
     ZeroDivisionError
         If a denominator vanishes.
     """
-    zero, one, two = field.number(0), field.number(1), field.number(2)
-    unary: dict[int, Callable[[Element], Element]] = {
-        ca.OP_SQ: lambda a: field.multiply(a, a),
-        ca.OP_NEG: lambda a: field.subtract(zero, a),
-        ca.OP_TWICE: lambda a: field.add(a, a),
-        ca.OP_INV: lambda a: field.divide(one, a),
-        ca.OP_SQRT: field.square_root,
-        ca.OP_ASSIGN: lambda a: a,
-        ca.OP_SIN: lambda t: field.divide(
-            field.multiply(two, t), field.add(one, field.multiply(t, t))
-        ),
-        ca.OP_COS: lambda t: field.divide(
-            field.subtract(one, field.multiply(t, t)), field.add(one, field.multiply(t, t))
-        ),
-    }
-    binary: dict[int, Callable[[Element, Element], Element]] = {
-        ca.OP_ADD: field.add,
-        ca.OP_SUB: field.subtract,
-        ca.OP_MUL: field.multiply,
-        ca.OP_DIV: field.divide,
-    }
-    work = [zero] * function.sz_w()
-    outputs = [[zero] * function.nnz_out(i) for i in range(function.n_out())]
-    if isinstance(field, RationalField):
+    zero, one = field.number(0), field.number(1)
+
+    def sine(t: Element) -> Element:
+        return field.divide(field.add(t, t), field.add(one, field.multiply(t, t)))
+
+    def cosine(t: Element) -> Element:
+        square = field.multiply(t, t)
+        return field.divide(field.subtract(one, square), field.add(one, square))
+
+    def select(test: Element, value: Element) -> Element:
         # What is left out of range is NaN in floats; an exact number it is not.
-        binary[ca.OP_LT] = lambda a, b: one if a < b else zero
-    tape, constants = _tape(function)
-    for op, first, second, target in tape:
-        if op in binary:
-            work[target] = binary[op](work[first], work[second])
-        elif op in unary:
-            work[target] = unary[op](work[first])
-        elif op == ca.OP_IF_ELSE_ZERO:
-            if work[first] != zero:
-                raise NoSquareRoot("out of reach")
-            work[target] = zero
-        elif op == ca.OP_INPUT:
-            work[target] = inputs[first][second]
-        elif op == ca.OP_OUTPUT:
-            outputs[first][second] = work[target]
-        else:
-            work[target] = field.number(constants[first])
-    return outputs
+        if test != zero:
+            raise NoSquareRoot("out of reach")
+        return zero
 
-
-@lru_cache(maxsize=64)
-def _tape(function: ca.Function) -> tuple[list[tuple[int, int, int, int]], list[Fraction]]:
-    """Return the instructions as (operation, first, second, work slot), and the constants.
-
-    An input's pair is (argument, element), an output's (result, element), a constant's first its
-    place in the list. Asking CasADi for them costs more than the arithmetic, hence the cache.
-    """
-    tape: list[tuple[int, int, int, int]] = []
-    constants: list[Fraction] = []
-    exact = {
-        *(ca.OP_ADD, ca.OP_SUB, ca.OP_MUL, ca.OP_DIV, ca.OP_SQ, ca.OP_NEG, ca.OP_TWICE),
-        *(ca.OP_INV, ca.OP_SQRT, ca.OP_ASSIGN, ca.OP_SIN, ca.OP_COS),
-        *(ca.OP_LT, ca.OP_IF_ELSE_ZERO),
+    operations: dict[str, Callable[..., Element]] = {
+        "add": field.add,
+        "sub": field.subtract,
+        "mul": field.multiply,
+        "div": field.divide,
+        "neg": lambda a: field.subtract(zero, a),
+        "sqrt": field.square_root,
+        "sin": sine,
+        "cos": cosine,
+        "select": select,
     }
-    for k in range(function.n_instructions()):
-        op = function.instruction_id(k)
-        source, target = function.instruction_input(k), function.instruction_output(k)
-        if op == ca.OP_OUTPUT:
-            tape.append((op, target[0], target[1], source[0]))
-        elif op == ca.OP_INPUT:
-            tape.append((op, source[0], source[1], target[0]))
-        elif op == ca.OP_CONST:
-            tape.append((op, len(constants), 0, target[0]))
-            value = function.instruction_constant(k)
-            constants.append(Fraction(0 if isnan(value) else value))
-        elif op in exact:
-            tape.append((op, source[0], source[-1], target[0]))
-        else:
-            raise ValueError(f"operation {op} of {function.name()} is not exact in a field")
-    return tape, constants
+    if isinstance(field, RationalField):
+        operations["less"] = lambda a, b: one if a < b else zero
+
+    def rule(node: Node, arguments: list[Element]) -> Element:
+        if node.operation == CONSTANT:
+            return field.number(Fraction(0 if isnan(node.value) else node.value))
+        if node.operation not in operations:
+            raise ValueError(
+                f"operation {node.operation} of {function.name()} is not exact in a field"
+            )
+        return operations[node.operation](*arguments)
+
+    graph = graph_of(function)
+    return graph.results(graph.values(lambda i, j: inputs[i][j], rule))
