@@ -47,12 +47,12 @@ def written(graph: TermGraph, roots: list[int], function: ca.Function) -> ca.Fun
     found: dict[int, tuple[Any, int]] = {}
 
     def signed(value: int) -> tuple[Any, int]:
-        expression, sign = found[abs(value)]
-        return expression, sign * sign_of(value)
+        size, sign = found[abs(value)]
+        return size, sign * sign_of(value)
 
     def plain(value: int) -> Any:
-        expression, sign = signed(value)
-        return expression if sign > 0 else -expression
+        size, sign = signed(value)
+        return size if sign > 0 else -size
 
     for k in order:
         kind, operands = graph.nodes[k][0], graph.operands(k)
@@ -99,8 +99,8 @@ def _sum(terms: list[tuple[Any, int]], wanted: int) -> tuple[Any, int]:
     turn = -1 if positive == 0 or (wanted < 0 and positive < len(terms)) else 1
     first, *rest = sorted(terms, key=lambda item: -turn * item[1])
     total = first[0]
-    for expression, sign in rest:
-        total = total + expression if sign == turn else total - expression
+    for term, sign in rest:
+        total = total + term if sign == turn else total - term
     return total, turn
 
 
@@ -111,8 +111,8 @@ def _product(
     # CasADi turns a product with 1/x into a quotient, which is slower, but leaves -1/x alone.
     one = 1 if wanted > 0 else -1
     (total, sign), *rest = above or [(one, one)]
-    for expression, turn in rest:
-        total, sign = total * expression, sign * turn
-    for expression, turn in below:
-        total, sign = total / expression, sign * turn
+    for factor, turn in rest:
+        total, sign = total * factor, sign * turn
+    for factor, turn in below:
+        total, sign = total / factor, sign * turn
     return total, sign
