@@ -16,7 +16,7 @@ import numpy as np
 from pteron.bodies.motion import Expression
 from pteron.equations.machine import Machine
 from pteron.kernels import Array, Graph, Program
-from pteron.kernels.graph import CONSTANT, INPUT
+from pteron.kernels.graph import CONSTANT, INPUT, Node
 
 _SAME = 1e-12
 """Relative difference below which two values are the same quantity."""
@@ -95,17 +95,16 @@ def _motion(machine: Machine, pose: Expression, *rates: Expression) -> Iterator[
 
 def _values(graph: Graph, states: list[list[Array]]) -> Array:
     """Return the values of the nodes, a row each, a column for each state."""
-    rows: list[Any] = []
+
+    def rule(node: Node, arguments: list[Array]) -> Array:
+        if node.operation == CONSTANT:
+            return np.full(len(states), node.value)
+        return np.asarray(_OPERATIONS[node.operation](*arguments), dtype=float)
+
     with np.errstate(all="ignore"):
-        for node in graph.nodes:
-            if node.operation == INPUT:
-                i, j = node.arguments
-                rows.append(np.array([np.ravel(state[i])[j] for state in states]))
-            elif node.operation == CONSTANT:
-                rows.append(np.full(len(states), node.value))
-            else:
-                rows.append(_OPERATIONS[node.operation](*(rows[i] for i in node.arguments)))
-    return np.array(rows, dtype=float)
+        return np.array(
+            graph.values(lambda i, j: np.array([np.ravel(state[i])[j] for state in states]), rule)
+        )
 
 
 _OPERATIONS: dict[str, Callable[..., Any]] = {

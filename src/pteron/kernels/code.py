@@ -67,21 +67,17 @@ def names_of(
     graph: Graph,
     inputs: Callable[[int, int], str],
     constant: Callable[[float], str],
-    labels: Mapping[int, str] | None = None,
 ) -> list[str]:
-    """Return how each node is written: an input's name, a literal, a label or `t` and a number."""
-    names = []
-    count = 0
-    for k, node in enumerate(graph.nodes):
+    """Return how each node is written: an input's name, a literal, or `t` and a number."""
+    names: list[str] = []
+    numbers = count(1)
+    for node in graph.nodes:
         if node.operation == INPUT:
             names.append(inputs(node.arguments[0], node.arguments[1]))
         elif node.operation == CONSTANT:
             names.append(constant(node.value))
-        elif labels and k in labels:
-            names.append(labels[k])
         else:
-            count += 1
-            names.append(f"t{count}")
+            names.append(f"t{next(numbers)}")
     return names
 
 

@@ -7,6 +7,7 @@ root must exist in the field, or `NoSquareRoot` is raised.
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from math import isnan, isqrt
@@ -48,25 +49,11 @@ class Field(Protocol, Generic[Element]):
 class RationalField:
     """The rational numbers, as `fractions.Fraction`."""
 
-    def number(self, value: Fraction | int) -> Fraction:
-        """Return the number itself."""
-        return Fraction(value)
-
-    def add(self, a: Fraction, b: Fraction) -> Fraction:
-        """Return a + b."""
-        return a + b
-
-    def subtract(self, a: Fraction, b: Fraction) -> Fraction:
-        """Return a - b."""
-        return a - b
-
-    def multiply(self, a: Fraction, b: Fraction) -> Fraction:
-        """Return a b."""
-        return a * b
-
-    def divide(self, a: Fraction, b: Fraction) -> Fraction:
-        """Return a / b."""
-        return a / b
+    number = staticmethod(Fraction)
+    add = staticmethod(operator.add)
+    subtract = staticmethod(operator.sub)
+    multiply = staticmethod(operator.mul)
+    divide = staticmethod(operator.truediv)
 
     def square_root(self, a: Fraction) -> Fraction:
         """Return the positive square root of a perfect square."""
