@@ -7,8 +7,7 @@ regrouped to save operations.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Iterator
 
 import casadi as ca
 import numpy as np
@@ -16,7 +15,7 @@ import numpy as np
 from pteron.bodies.motion import Expression
 from pteron.equations.machine import Machine
 from pteron.kernels import Array, Graph, Program
-from pteron.kernels.graph import CONSTANT, INPUT, Node
+from pteron.kernels.graph import CONSTANT, INPUT, expression
 
 _SAME = 1e-12
 """Relative difference below which two values are the same quantity."""
@@ -45,9 +44,11 @@ def node_names(
         names += [name + axis for axis in _AXES[len(parts)]]
         legs += [leg] * len(parts)
         scalars += parts
-    known = ca.Function("known", symbols, [ca.vertcat(*scalars)])
-    wanted = np.hstack([np.array(known(*state)) for state in states])
-    return _named(graph, _matches(_values(graph, states), wanted), names, legs)
+    elements = [symbol.nonzeros() for symbol in symbols]
+    nodes = graph.values(lambda i, j: elements[i][j], expression)
+    both = ca.Function("both", symbols, [ca.vertcat(*nodes), ca.vertcat(*scalars)])
+    values, wanted = (np.hstack(found) for found in zip(*(both(*s) for s in states), strict=True))
+    return _named(graph, _matches(values, wanted), names, legs)
 
 
 def _quantities(machine: Machine, inputs: dict[str, Expression]) -> Iterator[Quantity]:
@@ -91,38 +92,6 @@ def _motion(machine: Machine, pose: Expression, *rates: Expression) -> Iterator[
         # A platform point's coordinates may serve several legs.
         for name, value in zip(("c", "dc", "ddc"), point, strict=True):
             yield f"{name}{i}", 0, value
-
-
-def _values(graph: Graph, states: list[list[Array]]) -> Array:
-    """Return the values of the nodes, a row each, a column for each state."""
-
-    def rule(node: Node, arguments: list[Array]) -> Array:
-        if node.operation == CONSTANT:
-            return np.full(len(states), node.value)
-        return np.asarray(_OPERATIONS[node.operation](*arguments), dtype=float)
-
-    with np.errstate(all="ignore"):
-        return np.array(
-            graph.values(lambda i, j: np.array([np.ravel(state[i])[j] for state in states]), rule)
-        )
-
-
-_OPERATIONS: dict[str, Callable[..., Any]] = {
-    "add": np.add,
-    "sub": np.subtract,
-    "mul": np.multiply,
-    "div": np.divide,
-    "neg": np.negative,
-    "sqrt": np.sqrt,
-    "sin": np.sin,
-    "cos": np.cos,
-    "atan2": np.arctan2,
-    "fabs": np.abs,
-    "fmin": np.fmin,
-    "fmax": np.fmax,
-    "less": np.less,
-    "select": lambda test, value: np.where(test, value, 0.0),
-}
 
 
 def _matches(values: Array, wanted: Array) -> dict[int, int]:

@@ -1,4 +1,4 @@
-"""Exact arithmetic for CasADi graphs: in the rational numbers, and in a prime field.
+"""Exact arithmetic for CasADi graphs, in the rationals and prime fields; target `exact`.
 
 `evaluate` walks the instructions of an SX function with numbers of a field instead of floats. An
 angle is given by the tangent t of its half, so that its sine and cosine are rational. A square
@@ -11,11 +11,15 @@ import operator
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from math import isnan, isqrt
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike
 
+from pteron.errors import DataError
 from pteron.kernels.graph import CONSTANT, Node, graph_of
+from pteron.kernels.kernel import Kernel, unmasked
 
 Element = TypeVar("Element")
 
@@ -155,3 +159,35 @@ def evaluate(
 
     graph = graph_of(function)
     return graph.results(graph.values(lambda i, j: inputs[i][j], rule))
+
+
+class Exact(Kernel):
+    """A kernel in fractions.
+
+    It takes one state: integers, fractions and floats (as the fractions they are), and returns
+    fractions. An angle phi is given as tan(phi / 2), so that its sine and cosine are rational.
+    `NoSquareRoot` says that a root is not rational, `ZeroDivisionError` that a denominator
+    vanishes.
+    """
+
+    @property
+    def source(self) -> str:
+        """The instructions, one a line, as CasADi prints them."""
+        return str(self.function.str(True))
+
+    def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
+        given = self._by_name(values, fixed)
+        inputs = []
+        for port in self.ports:
+            array = np.asarray(unmasked(given[port.name], port.name), dtype=object)
+            if array.shape != port.shape:
+                raise DataError(
+                    f"{port.name}: shape {array.shape} given, {port.shape} expected: one state"
+                )
+            inputs.append([Fraction(value) for value in array.ravel().tolist()])
+        found = evaluate(self.function, RationalField(), inputs)
+        results = tuple(
+            np.array(value, dtype=object).reshape(port.shape)
+            for value, port in zip(found, self.outputs, strict=True)
+        )
+        return results[0] if len(results) == 1 else results

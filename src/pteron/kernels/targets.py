@@ -11,7 +11,7 @@ import numpy as np
 from pteron.equations.machine import numbers
 from pteron.errors import ModelError
 from pteron.kernels.c import Compiled
-from pteron.kernels.exact import Exact
+from pteron.kernels.fields import Exact
 from pteron.kernels.functions import Columns, Program, general_program, program, specialised
 from pteron.kernels.hoisting import hoisted
 from pteron.kernels.jax import Traced
