@@ -47,7 +47,8 @@ def node_names(
     elements = [symbol.nonzeros() for symbol in symbols]
     nodes = graph.values(lambda i, j: elements[i][j], expression)
     both = ca.Function("both", symbols, [ca.vertcat(*nodes), ca.vertcat(*scalars)])
-    values, wanted = (np.hstack(found) for found in zip(*(both(*s) for s in states), strict=True))
+    computed = [[np.array(part) for part in both(*state)] for state in states]
+    values, wanted = (np.hstack(parts) for parts in zip(*computed, strict=True))
     return _named(graph, _matches(values, wanted), names, legs)
 
 
