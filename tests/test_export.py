@@ -12,7 +12,7 @@ from tempfile import mkdtemp
 
 import numpy as np
 import pytest
-from mechanisms import CATALOG, MECHANISMS, states
+from mechanisms import CATALOG, states, with_elbows
 from typer.testing import CliRunner
 
 import pteron
@@ -37,7 +37,7 @@ SLIDER = pteron.Leg(
 )
 ROBOTS = {
     "quadrupteron": ROBOT,
-    "oblique": replace(MECHANISMS["quadrupteron-oblique +--+"], name="oblique"),
+    "oblique": replace(with_elbows(CATALOG["tripteron-oblique"], "--+"), name="oblique"),
     "delta": DELTA,
     "mixed": replace(DELTA, name="mixed", legs=(SLIDER, *DELTA.legs[1:])),
 }

@@ -32,7 +32,7 @@ SEVERAL = (
     "quadrupteron +-+-",
     "quadrupteron, gravity along x",
     "tripteron on a wall",
-    "quadrupteron-oblique +--+",
+    "tripteron-oblique",
     "random 3T 0",
     "random 3T1R 0",
 )

@@ -17,8 +17,16 @@ from pteron.atomic import write_texts
 from pteron.errors import ModelError
 from pteron.export.functions import FUNCTIONS, Exported, banner, chosen
 from pteron.kernels import Array
-from pteron.kernels.code import C, c_constant, rendered, single_precision, statements
-from pteron.kernels.graph import CONSTANT, INPUT
+from pteron.kernels.code import (
+    C,
+    c_constant,
+    names_of,
+    rendered,
+    single_precision,
+    statements,
+    used_inputs,
+)
+from pteron.kernels.graph import CONSTANT
 from pteron.manipulator import Manipulator
 
 Real = Literal["double", "float"]
@@ -165,12 +173,8 @@ class _Printer:
     def body(self, item: Exported) -> tuple[list[str], list[tuple[str, str]]]:
         """Return the statements of a function, and conditions with the failures that they are."""
         graph, nodes = item.graph, item.graph.nodes
-        names = [item.names.get(k, "") for k in range(len(nodes))]
-        for k, node in enumerate(nodes):
-            if node.operation == INPUT:
-                names[k] = f"{item.inputs[node.arguments[0]].name}[{node.arguments[1]}]"
-            elif node.operation == CONSTANT:
-                names[k] = self.number(node.value)
+        names = names_of(graph, lambda i, j: f"{item.inputs[i].name}[{j}]", self.number)
+        names = [item.names.get(k, name) for k, name in enumerate(names)]
         guarded = self._operations()
         plain = guarded | {"div": C["div"]}
         lines, radicands = [], []
@@ -187,8 +191,7 @@ class _Printer:
                 lines.append(f"{port.name}[{j}] = {names[k]};")
                 if nodes[k].operation != CONSTANT:
                     finite.append(f"{self.prefix}_finite({port.name}[{j}])")
-        read = {i for k in graph.operations() for i in nodes[k].arguments}.union(*graph.outputs)
-        used = {nodes[k].arguments[0] for k in read if nodes[k].operation == INPUT}
+        used = {i for i, _ in used_inputs(graph)}
         lines += [f"(void){port.name};" for i, port in enumerate(item.inputs) if i not in used]
         if item.several:  # one pose that is real will do
             rows = finite[:: item.outputs[0].shape[1]]

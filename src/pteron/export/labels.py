@@ -7,8 +7,7 @@ regrouped to save operations.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Iterator
 
 import casadi as ca
 import numpy as np
@@ -16,7 +15,7 @@ import numpy as np
 from pteron.bodies.motion import Expression
 from pteron.equations.machine import Machine
 from pteron.kernels import Array, Graph, Program
-from pteron.kernels.graph import CONSTANT, INPUT
+from pteron.kernels.graph import CONSTANT, INPUT, expression
 
 _SAME = 1e-12
 """Relative difference below which two values are the same quantity."""
@@ -45,9 +44,12 @@ def node_names(
         names += [name + axis for axis in _AXES[len(parts)]]
         legs += [leg] * len(parts)
         scalars += parts
-    known = ca.Function("known", symbols, [ca.vertcat(*scalars)])
-    wanted = np.hstack([np.array(known(*state)) for state in states])
-    return _named(graph, _matches(_values(graph, states), wanted), names, legs)
+    elements = [symbol.nonzeros() for symbol in symbols]
+    nodes = graph.values(lambda i, j: elements[i][j], expression)
+    both = ca.Function("both", symbols, [ca.vertcat(*nodes), ca.vertcat(*scalars)])
+    computed = [[np.array(part) for part in both(*state)] for state in states]
+    values, wanted = (np.hstack(parts) for parts in zip(*computed, strict=True))
+    return _named(graph, _matches(values, wanted), names, legs)
 
 
 def _quantities(machine: Machine, inputs: dict[str, Expression]) -> Iterator[Quantity]:
@@ -91,39 +93,6 @@ def _motion(machine: Machine, pose: Expression, *rates: Expression) -> Iterator[
         # A platform point's coordinates may serve several legs.
         for name, value in zip(("c", "dc", "ddc"), point, strict=True):
             yield f"{name}{i}", 0, value
-
-
-def _values(graph: Graph, states: list[list[Array]]) -> Array:
-    """Return the values of the nodes, a row each, a column for each state."""
-    rows: list[Any] = []
-    with np.errstate(all="ignore"):
-        for node in graph.nodes:
-            if node.operation == INPUT:
-                i, j = node.arguments
-                rows.append(np.array([np.ravel(state[i])[j] for state in states]))
-            elif node.operation == CONSTANT:
-                rows.append(np.full(len(states), node.value))
-            else:
-                rows.append(_OPERATIONS[node.operation](*(rows[i] for i in node.arguments)))
-    return np.array(rows, dtype=float)
-
-
-_OPERATIONS: dict[str, Callable[..., Any]] = {
-    "add": np.add,
-    "sub": np.subtract,
-    "mul": np.multiply,
-    "div": np.divide,
-    "neg": np.negative,
-    "sqrt": np.sqrt,
-    "sin": np.sin,
-    "cos": np.cos,
-    "atan2": np.arctan2,
-    "fabs": np.abs,
-    "fmin": np.fmin,
-    "fmax": np.fmax,
-    "less": np.less,
-    "select": lambda test, value: np.where(test, value, 0.0),
-}
 
 
 def _matches(values: Array, wanted: Array) -> dict[int, int]:

@@ -17,7 +17,7 @@ import subprocess
 import sys
 import sysconfig
 from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from importlib.machinery import EXTENSION_SUFFIXES, ExtensionFileLoader
 from pathlib import Path
 from types import ModuleType
@@ -28,9 +28,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pteron.errors import ModelError
-from pteron.kernels.c_module import module_source
 from pteron.kernels.cache import digest, entry, find
-from pteron.kernels.graph import graph_of
+from pteron.kernels.code import (
+    C,
+    Language,
+    c_constant,
+    module_values,
+    rendered,
+    single_precision,
+)
+from pteron.kernels.graph import Graph, graph_of
 from pteron.kernels.kernel import SHARE, Array, ArrayKernel, Port
 
 _FLAGS = (
@@ -71,6 +78,41 @@ def _version(command: tuple[str, ...]) -> str:
 
 def _run(command: Sequence[str], *more: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([*command, *more], capture_output=True, text=True, check=False)
+
+
+def module_source(
+    name: str,
+    graph: Graph,
+    inputs: Sequence[Port],
+    outputs: Sequence[Port],
+    dtype: str,
+    block: int = 32,
+) -> str:
+    """Return the C of a module whose `bind` and `run` evaluate a graph, in blocks of states.
+
+    The arrays of the caller are read as they lie in memory.
+    """
+    printed = single_precision(C) if dtype == "float32" else C
+    language = Language(
+        printed
+        | {
+            "sin": "sincos_({0}).sine",
+            "cos": "sincos_({0}).cosine",
+            "fmin": "fmin_({0}, {1})",
+            "fmax": "fmax_({0}, {1})",
+        },
+        form="const real {0} = {1};",
+        near_form="const double {0} = {1};",
+        constant=partial(c_constant, dtype=dtype),
+        pair="const pair a{0} = sincos_({1});",
+        parts={"sin": "a{0}.sine", "cos": "a{0}.cosine"},
+        cell="in[{0}][k]",
+        stored="out[{0}][k] = {1};",
+        returned="{0}[{1}] = {2};",
+    )
+    values = module_values(name, graph, inputs, outputs, language)
+    real = "float" if dtype == "float32" else "double"
+    return rendered("pteron.kernels", "module.c.j2", real=real, block=block, **values)
 
 
 class Code:

@@ -6,13 +6,14 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import count
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pteron.kernels.graph import CONSTANT, INPUT, Graph, graph_of
 from pteron.kernels.kernel import Port
-from pteron.kernels.sincos import near
+from pteron.kernels.sincos import LIMIT, near
 
 if TYPE_CHECKING:
     import jinja2
@@ -66,21 +67,17 @@ def names_of(
     graph: Graph,
     inputs: Callable[[int, int], str],
     constant: Callable[[float], str],
-    labels: Mapping[int, str] | None = None,
 ) -> list[str]:
-    """Return how each node is written: an input's name, a literal, a label or `t` and a number."""
-    names = []
-    count = 0
-    for k, node in enumerate(graph.nodes):
+    """Return how each node is written: an input's name, a literal, or `t` and a number."""
+    names: list[str] = []
+    numbers = count(1)
+    for node in graph.nodes:
         if node.operation == INPUT:
             names.append(inputs(node.arguments[0], node.arguments[1]))
         elif node.operation == CONSTANT:
             names.append(constant(node.value))
-        elif labels and k in labels:
-            names.append(labels[k])
         else:
-            count += 1
-            names.append(f"t{count}")
+            names.append(f"t{next(numbers)}")
     return names
 
 
@@ -95,6 +92,8 @@ def statements(
     lines = []
     for k in nodes:
         node = graph.nodes[k]
+        if node.operation not in printed:
+            raise ValueError(f"operation {node.operation} has no printer")
         value = printed[node.operation].format(*(names[i] for i in node.arguments))
         lines.append(form.format(names[k], value))
     return lines
@@ -107,47 +106,90 @@ def used_inputs(graph: Graph) -> list[tuple[int, int]]:
 
 
 @dataclass(frozen=True)
-class Stages:
-    """How a batch is computed: what is done once, what ahead of the long loop, what inside."""
+class Language:
+    """How a module that evaluates batches is written; see `module_values`."""
 
-    shared: list[int]
-    """Nodes that depend on shared inputs alone."""
-    angles: list[tuple[int, list[int]]]
-    """Inputs whose sine or cosine is asked for, each with the nodes of these."""
-    rest: list[int]
-    rows: dict[tuple[int, int], int]
-    """The row of a block that holds an element of a batched input, by (port, element)."""
-    results: list[tuple[Port, int, int]]
-    """Port, element and node of each number that goes out."""
-
-    @classmethod
-    def of(cls, graph: Graph, inputs: Sequence[Port], outputs: Sequence[Port]) -> Stages:
-        """Sort the nodes of a graph."""
-        nodes, operations = graph.nodes, graph.operations()
-        used = [(i, j) for i, j in used_inputs(graph) if not inputs[i].shared]
-        angles: dict[int, list[int]] = {}
-        for k in operations:
-            if nodes[k].outlying:
-                angles.setdefault(nodes[k].arguments[0], []).append(k)
-        return cls(
-            [k for k in operations if nodes[k].shared],
-            list(angles.items()),
-            [k for k in operations if not nodes[k].shared and not nodes[k].outlying],
-            {pair: row for row, pair in enumerate(used)},
-            [
-                (port, j, k)
-                for port, places in zip(outputs, graph.outputs, strict=True)
-                for j, k in enumerate(places)
-            ],
-        )
+    printed: Mapping[str, str]
+    """Operations, to which math functions of numbers that are not vectors belong."""
+    form: str
+    """A statement: {0} the name, {1} the value."""
+    near_form: str
+    """The same where numbers are of double precision."""
+    constant: Callable[[float], str]
+    pair: str
+    """The statement that finds sine and cosine number {0} of {1}."""
+    parts: Mapping[str, str]
+    """What they are called."""
+    cell: str
+    """An element of a block: {0} its row."""
+    stored: str
+    """The statement that puts {1} in row {0} of the results; `returned` in element {1} of {0}."""
+    returned: str
 
 
-def near_statements(printed: Mapping[str, str], form: str) -> tuple[list[str], list[str]]:
-    """Return the statements of `sincos.near` for `angle`, and the names of its two results."""
-    graph = graph_of(near(), (Port("angle", (1,)),))
-    names = names_of(graph, lambda i, j: "angle", c_constant)
-    lines = statements(graph, graph.operations(), names, printed, form)
-    return lines, [names[nodes[0]] for nodes in graph.outputs]
+def module_values(
+    name: str, graph: Graph, inputs: Sequence[Port], outputs: Sequence[Port], language: Language
+) -> dict[str, Any]:
+    """Return what a module's template needs: statements for one state, and for a block of them.
+
+    In a block the inputs' elements have a row each, and behind them an angle's sine and cosine:
+    these are found ahead of the long loop, and what depends on shared inputs alone once.
+    """
+    nodes, operations = graph.nodes, graph.operations()
+    printed, form = language.printed, language.form
+    used = [(i, j) for i, j in used_inputs(graph) if not inputs[i].shared]
+    rows = {pair: row for row, pair in enumerate(used)}
+    of_angle: dict[int, list[int]] = {}
+    for k in operations:
+        if nodes[k].outlying:
+            of_angle.setdefault(nodes[k].arguments[0], []).append(k)
+    shared = [k for k in operations if nodes[k].shared]
+    rest = [k for k in operations if not nodes[k].shared and not nodes[k].outlying]
+    results = [
+        (port, j, k)
+        for port, places in zip(outputs, graph.outputs, strict=True)
+        for j, k in enumerate(places)
+    ]
+
+    names = names_of(graph, lambda i, j: f"{inputs[i].name}[{j}]", language.constant)
+    one = []
+    for number, (angle, found) in enumerate(of_angle.items(), 1):
+        one.append(language.pair.format(number, names[angle]))
+        for k in found:
+            names[k] = language.parts[nodes[k].operation].format(number)
+    one += statements(graph, shared + rest, names, printed, form)
+    one += [language.returned.format(f"{port.name}_out", j, names[k]) for port, j, k in results]
+
+    def input_name(i: int, j: int) -> str:
+        return f"{inputs[i].name}[{j}]" if inputs[i].shared else language.cell.format(rows[i, j])
+
+    names = names_of(graph, input_name, language.constant)
+    once = statements(graph, shared, names, printed, form)
+    angles = []
+    for row, (angle, found) in zip(count(len(rows), 2), of_angle.items(), strict=False):
+        sine, cosine = language.cell.format(row), language.cell.format(row + 1)
+        angles.append((names[angle], sine, cosine))
+        for k in found:
+            names[k] = sine if nodes[k].operation == "sin" else cosine
+    body = statements(graph, rest, names, printed, form)
+    body += [language.stored.format(row, names[k]) for row, (_, _, k) in enumerate(results)]
+
+    close = graph_of(near())
+    near_names = names_of(close, lambda i, j: "angle", c_constant)
+    return {
+        "name": name,
+        "limit": LIMIT,
+        "near": statements(close, close.operations(), near_names, C, language.near_form),
+        "near_results": [near_names[places[0]] for places in close.outputs],
+        "inputs": inputs,
+        "outputs": outputs,
+        "one": one,
+        "shared": once,
+        "angles": angles,
+        "body": body,
+        "rows": [(row, inputs[i], j) for (i, j), row in rows.items()],
+        "results": [(row, port, j) for row, (port, j, _) in enumerate(results)],
+    }
 
 
 def rendered(package: str, template: str, **values: Any) -> str:

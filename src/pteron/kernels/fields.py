@@ -1,4 +1,4 @@
-"""Exact arithmetic for CasADi graphs: in the rational numbers, and in a prime field.
+"""Exact arithmetic for CasADi graphs, in the rationals and prime fields; target `exact`.
 
 `evaluate` walks the instructions of an SX function with numbers of a field instead of floats. An
 angle is given by the tangent t of its half, so that its sine and cosine are rational. A square
@@ -7,15 +7,19 @@ root must exist in the field, or `NoSquareRoot` is raised.
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Sequence
 from fractions import Fraction
-from functools import lru_cache
 from math import isnan, isqrt
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike
 
-__all__ = ["Field", "NoSquareRoot", "PrimeField", "RationalField", "evaluate"]
+from pteron.errors import DataError
+from pteron.kernels.graph import CONSTANT, Node, graph_of
+from pteron.kernels.kernel import Kernel, unmasked
 
 Element = TypeVar("Element")
 
@@ -49,25 +53,11 @@ class Field(Protocol, Generic[Element]):
 class RationalField:
     """The rational numbers, as `fractions.Fraction`."""
 
-    def number(self, value: Fraction | int) -> Fraction:
-        """Return the number itself."""
-        return Fraction(value)
-
-    def add(self, a: Fraction, b: Fraction) -> Fraction:
-        """Return a + b."""
-        return a + b
-
-    def subtract(self, a: Fraction, b: Fraction) -> Fraction:
-        """Return a - b."""
-        return a - b
-
-    def multiply(self, a: Fraction, b: Fraction) -> Fraction:
-        """Return a b."""
-        return a * b
-
-    def divide(self, a: Fraction, b: Fraction) -> Fraction:
-        """Return a / b."""
-        return a / b
+    number = staticmethod(Fraction)
+    add = staticmethod(operator.add)
+    subtract = staticmethod(operator.sub)
+    multiply = staticmethod(operator.mul)
+    divide = staticmethod(operator.truediv)
 
     def square_root(self, a: Fraction) -> Fraction:
         """Return the positive square root of a perfect square."""
@@ -129,78 +119,75 @@ def evaluate(
     ZeroDivisionError
         If a denominator vanishes.
     """
-    zero, one, two = field.number(0), field.number(1), field.number(2)
-    unary: dict[int, Callable[[Element], Element]] = {
-        ca.OP_SQ: lambda a: field.multiply(a, a),
-        ca.OP_NEG: lambda a: field.subtract(zero, a),
-        ca.OP_TWICE: lambda a: field.add(a, a),
-        ca.OP_INV: lambda a: field.divide(one, a),
-        ca.OP_SQRT: field.square_root,
-        ca.OP_ASSIGN: lambda a: a,
-        ca.OP_SIN: lambda t: field.divide(
-            field.multiply(two, t), field.add(one, field.multiply(t, t))
-        ),
-        ca.OP_COS: lambda t: field.divide(
-            field.subtract(one, field.multiply(t, t)), field.add(one, field.multiply(t, t))
-        ),
-    }
-    binary: dict[int, Callable[[Element, Element], Element]] = {
-        ca.OP_ADD: field.add,
-        ca.OP_SUB: field.subtract,
-        ca.OP_MUL: field.multiply,
-        ca.OP_DIV: field.divide,
-    }
-    work = [zero] * function.sz_w()
-    outputs = [[zero] * function.nnz_out(i) for i in range(function.n_out())]
-    if isinstance(field, RationalField):
+    zero, one = field.number(0), field.number(1)
+
+    def sine(t: Element) -> Element:
+        return field.divide(field.add(t, t), field.add(one, field.multiply(t, t)))
+
+    def cosine(t: Element) -> Element:
+        square = field.multiply(t, t)
+        return field.divide(field.subtract(one, square), field.add(one, square))
+
+    def select(test: Element, value: Element) -> Element:
         # What is left out of range is NaN in floats; an exact number it is not.
-        binary[ca.OP_LT] = lambda a, b: one if a < b else zero
-    tape, constants = _tape(function)
-    for op, first, second, target in tape:
-        if op in binary:
-            work[target] = binary[op](work[first], work[second])
-        elif op in unary:
-            work[target] = unary[op](work[first])
-        elif op == ca.OP_IF_ELSE_ZERO:
-            if work[first] != zero:
-                raise NoSquareRoot("out of reach")
-            work[target] = zero
-        elif op == ca.OP_INPUT:
-            work[target] = inputs[first][second]
-        elif op == ca.OP_OUTPUT:
-            outputs[first][second] = work[target]
-        else:
-            work[target] = field.number(constants[first])
-    return outputs
+        if test != zero:
+            raise NoSquareRoot("out of reach")
+        return zero
 
-
-@lru_cache(maxsize=64)
-def _tape(function: ca.Function) -> tuple[list[tuple[int, int, int, int]], list[Fraction]]:
-    """Return the instructions as (operation, first, second, work slot), and the constants.
-
-    An input's pair is (argument, element), an output's (result, element), a constant's first its
-    place in the list. Asking CasADi for them costs more than the arithmetic, hence the cache.
-    """
-    tape: list[tuple[int, int, int, int]] = []
-    constants: list[Fraction] = []
-    exact = {
-        *(ca.OP_ADD, ca.OP_SUB, ca.OP_MUL, ca.OP_DIV, ca.OP_SQ, ca.OP_NEG, ca.OP_TWICE),
-        *(ca.OP_INV, ca.OP_SQRT, ca.OP_ASSIGN, ca.OP_SIN, ca.OP_COS),
-        *(ca.OP_LT, ca.OP_IF_ELSE_ZERO),
+    operations: dict[str, Callable[..., Element]] = {
+        "add": field.add,
+        "sub": field.subtract,
+        "mul": field.multiply,
+        "div": field.divide,
+        "neg": lambda a: field.subtract(zero, a),
+        "sqrt": field.square_root,
+        "sin": sine,
+        "cos": cosine,
+        "select": select,
     }
-    for k in range(function.n_instructions()):
-        op = function.instruction_id(k)
-        source, target = function.instruction_input(k), function.instruction_output(k)
-        if op == ca.OP_OUTPUT:
-            tape.append((op, target[0], target[1], source[0]))
-        elif op == ca.OP_INPUT:
-            tape.append((op, source[0], source[1], target[0]))
-        elif op == ca.OP_CONST:
-            tape.append((op, len(constants), 0, target[0]))
-            value = function.instruction_constant(k)
-            constants.append(Fraction(0 if isnan(value) else value))
-        elif op in exact:
-            tape.append((op, source[0], source[-1], target[0]))
-        else:
-            raise ValueError(f"operation {op} of {function.name()} is not exact in a field")
-    return tape, constants
+    if isinstance(field, RationalField):
+        operations["less"] = lambda a, b: one if a < b else zero
+
+    def rule(node: Node, arguments: list[Element]) -> Element:
+        if node.operation == CONSTANT:
+            return field.number(Fraction(0 if isnan(node.value) else node.value))
+        if node.operation not in operations:
+            raise ValueError(
+                f"operation {node.operation} of {function.name()} is not exact in a field"
+            )
+        return operations[node.operation](*arguments)
+
+    graph = graph_of(function)
+    return graph.results(graph.values(lambda i, j: inputs[i][j], rule))
+
+
+class Exact(Kernel):
+    """A kernel in fractions.
+
+    It takes one state: integers, fractions and floats (as the fractions they are), and returns
+    fractions. An angle phi is given as tan(phi / 2), so that its sine and cosine are rational.
+    `NoSquareRoot` says that a root is not rational, `ZeroDivisionError` that a denominator
+    vanishes.
+    """
+
+    @property
+    def source(self) -> str:
+        """The instructions, one a line, as CasADi prints them."""
+        return str(self.function.str(True))
+
+    def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
+        given = self._by_name(values, fixed)
+        inputs = []
+        for port in self.ports:
+            array = np.asarray(unmasked(given[port.name], port.name), dtype=object)
+            if array.shape != port.shape:
+                raise DataError(
+                    f"{port.name}: shape {array.shape} given, {port.shape} expected: one state"
+                )
+            inputs.append([Fraction(value) for value in array.ravel().tolist()])
+        found = evaluate(self.function, RationalField(), inputs)
+        results = tuple(
+            np.array(value, dtype=object).reshape(port.shape)
+            for value, port in zip(found, self.outputs, strict=True)
+        )
+        return results[0] if len(results) == 1 else results

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, Literal
 
 import casadi as ca
@@ -22,8 +22,11 @@ from pteron.kernels.kernel import Port, count_operations
 from pteron.kernels.passes import optimised
 from pteron.manipulator import Manipulator, expect_manipulator
 
-Outputs = dict[str, tuple[Expression, tuple[int, ...]]]
-"""Each output's expression and its shape; a matrix is (rows, columns), a stack of them vertical."""
+Output = Expression | list[Expression] | tuple[Expression, tuple[int, ...]]
+"""An expression, some of one shape to be stacked, or one whose shape is given: else a column is a
+vector."""
+
+Outputs = dict[str, Output]
 
 Need = Literal["rows", "reach", "type I", "type II"]
 """What a pose must be: in reach, not singular of type I, of type II; "rows" asks for the first two
@@ -42,6 +45,10 @@ _HUGE = 1e75
 _TINY = 1e-300
 
 
+Symbols = dict[str, Any]
+"""What an entry builds with, by name: the inputs, and what a caller puts in place of some."""
+
+
 @dataclass(frozen=True)
 class Program:
     """A named CasADi function of one state, with its ports."""
@@ -55,180 +62,131 @@ class Program:
 @dataclass(frozen=True)
 class _Entry:
     inputs: tuple[str, ...]
-    build: Callable[[Machine, dict[str, Expression]], Outputs]
+    build: Callable[[Machine, Symbols], Outputs]
     needs: tuple[Need, ...] = ()
     """What a pose must be for the result to count, in the order in which it is told."""
 
 
-def _state(m: Machine, v: dict[str, Expression]) -> Any:
+def _state(m: Machine, v: Symbols) -> Any:
     return m.state(v["pose"], v.get("velocity"), v.get("acceleration"))
 
 
-def _coordinates(m: Machine, v: dict[str, Expression]) -> Outputs:
-    return {"joints": (kinematics.inverse_position(m, v["pose"]), (m.freedom,))}
-
-
-def _position(m: Machine, v: dict[str, Expression]) -> Outputs:
+def _position(m: Machine, v: Symbols) -> Outputs:
     # A slider's coordinate exists out of reach too; a machine that cannot be there has none.
     beyond = kinematics.beyond_reach(m, v["pose"])
-    return {"joints": (kinematics.inverse_position(m, v["pose"]) + beyond, (m.freedom,))}
+    return {"joints": kinematics.inverse_position(m, v["pose"]) + beyond}
 
 
-def _links(m: Machine, v: dict[str, Expression]) -> Outputs:
+def _links(m: Machine, v: Symbols) -> Outputs:
     l_u, l_l = kinematics.link_vectors(_state(m, v))
-    return {"l_u": (l_u, (m.freedom, 3)), "l_l": (l_l, (m.freedom, 3))}
+    return {"l_u": l_u, "l_l": l_l}
 
 
-def _direct(m: Machine, v: dict[str, Expression]) -> Outputs:
-    poses = kinematics.direct_position(m, v["joints"]).T
+def _poses(m: Machine, v: Symbols, *, reached: bool) -> Outputs:
+    poses = kinematics.direct_position(m, v["joints"], reached=reached).T
     return {"poses": (poses, poses.shape)}
 
 
-def _closures(m: Machine, v: dict[str, Expression]) -> Outputs:
-    poses = kinematics.direct_position(m, v["joints"], reached=False).T
-    return {"poses": (poses, poses.shape)}
-
-
-def _reach(m: Machine, v: dict[str, Expression]) -> Outputs:
-    found, shape = kinematics.reach(m, v["pose"]), (m.freedom,)
+def _reach(m: Machine, v: Symbols) -> Outputs:
+    found = kinematics.reach(m, v["pose"])
     return {
-        "margin": (ca.vertcat(*(leg.margin for leg in found)), shape),
-        "type_i": (ca.vertcat(*(leg.type_i for leg in found)), shape),
-        "spread": (ca.vertcat(*(leg.spread for leg in found)), shape),
+        name: ca.vertcat(*(getattr(leg, name) for leg in found))
+        for name in ("margin", "type_i", "spread")
     }
 
 
-def _points(m: Machine, v: dict[str, Expression]) -> Outputs:
-    points = kinematics.chain_points(_state(m, v))
-    return {"points": (ca.vertcat(*points), (m.freedom, *points[0].shape))}
-
-
-def _platform_points(m: Machine, v: dict[str, Expression]) -> Outputs:
+def _platform_points(m: Machine, v: Symbols) -> Outputs:
     points = m.platform.motion(v["pose"], *[ca.SX.zeros(m.freedom)] * 2).points
-    return {"points": (ca.vertcat(*(point.position.T for point in points)), (m.freedom, 3))}
+    return {"points": ca.vertcat(*(point.position.T for point in points))}
 
 
-def _discriminants(m: Machine, v: dict[str, Expression]) -> Outputs:
+def _discriminants(m: Machine, v: Symbols) -> Outputs:
     found = kinematics.reach(m, v["pose"])
-    return {"discriminants": (ca.vertcat(*(leg.discriminant for leg in found)), (m.freedom,))}
+    return {"discriminants": ca.vertcat(*(leg.discriminant for leg in found))}
 
 
-def _squared_type_i(m: Machine, v: dict[str, Expression]) -> Outputs:
+def _squared_type_i(m: Machine, v: Symbols) -> Outputs:
     # Finite and smooth out of reach too, where it is negative.
     found = kinematics.reach(m, v["pose"])
-    squares = ca.vertcat(*(leg.discriminant / leg.scale for leg in found))
-    return {"squares": (squares, (m.freedom,))}
+    return {"squares": ca.vertcat(*(leg.discriminant / leg.scale for leg in found))}
 
 
-def _type_ii(m: Machine, v: dict[str, Expression]) -> Outputs:
+def _type_ii(m: Machine, v: Symbols) -> Outputs:
     state = _state(m, v)
-    return {"type_ii": (m.closure.measure(state.platform, state.legs), ())}
+    return {"type_ii": m.closure.measure(state.platform, state.legs)}
 
 
-def _jacobian(m: Machine, v: dict[str, Expression]) -> Outputs:
-    return {"jacobian": (kinematics.jacobian(_state(m, v)), (m.freedom, m.freedom))}
-
-
-def _link_jacobians(m: Machine, v: dict[str, Expression]) -> Outputs:
+def _link_jacobians(m: Machine, v: Symbols) -> Outputs:
     upper, lower = kinematics.link_jacobians(_state(m, v))
-    shape = (m.freedom, 6, m.freedom)
-    return {"upper": (ca.vertcat(*upper), shape), "lower": (ca.vertcat(*lower), shape)}
+    return {"upper": upper, "lower": lower}
 
 
-def _screws(m: Machine, v: dict[str, Expression]) -> Outputs:
-    rows = [screws.T for screws in joint_screws(_state(m, v))]
-    return {"screws": (ca.vertcat(*rows), (m.freedom, *rows[0].shape))}
+def _joint_motion(m: Machine, v: Symbols) -> Outputs:
+    state, order = _state(m, v), int("acceleration" in v)
+    chain = kinematics.chain_motion(state, order)
+    links = kinematics.link_turning(state, order)
+    passive = chain[:, 1:]
+    return {
+        "actuated": chain[:, 0],
+        "upper_links": links[:, 0],
+        "lower_links": links[:, 1],
+        "passive": (passive, passive.shape),
+    }
 
 
-def _joint_motion(order: int) -> Callable[[Machine, dict[str, Expression]], Outputs]:
-    def build(m: Machine, v: dict[str, Expression]) -> Outputs:
-        state = _state(m, v)
-        chain = kinematics.chain_motion(state, order)
-        links = kinematics.link_turning(state, order)
-        n, joints = chain.shape
-        return {
-            "actuated": (chain[:, 0], (n,)),
-            "upper_links": (links[:, 0], (n,)),
-            "lower_links": (links[:, 1], (n,)),
-            "passive": (chain[:, 1:], (n, joints - 1)),
-        }
-
-    return build
-
-
-def _platform_motion(m: Machine, v: dict[str, Expression]) -> Outputs:
+def _platform_motion(m: Machine, v: Symbols) -> Outputs:
     velocity, acceleration = kinematics.platform_rates(
         m, v["pose"], v["joint_rates"], v["joint_accelerations"]
     )
-    return {"velocity": (velocity, (m.freedom,)), "acceleration": (acceleration, (m.freedom,))}
+    return {"velocity": velocity, "acceleration": acceleration}
 
 
-def _passive_friction(m: Machine, v: dict[str, Expression]) -> Outputs:
+def _passive_friction(m: Machine, v: Symbols) -> Outputs:
     forces = passive_friction(m, _state(m, v))
     return {"forces": (forces, forces.shape)}
 
 
-def _inverse_dynamics(m: Machine, v: dict[str, Expression]) -> Outputs:
+def _inverse_dynamics(m: Machine, v: Symbols) -> Outputs:
     carried = v.get("carried", True)
     forces = inverse_dynamics(m, _state(m, v), v["parameters"], v.get("wrench"), carried=carried)
-    return {"forces": (forces, (m.freedom,))}
+    return {"forces": forces}
 
 
-def _forward_dynamics(m: Machine, v: dict[str, Expression]) -> Outputs:
+def _forward_dynamics(m: Machine, v: Symbols) -> Outputs:
     wrench = v.get("wrench", ca.SX.zeros(m.freedom))
     acceleration = lagrangian.forward_dynamics(
         m, v["pose"], v["velocity"], v["forces"], v["parameters"], wrench
     )
-    return {"acceleration": (acceleration, (m.freedom,))}
+    return {"acceleration": acceleration}
 
 
-def _mass_matrix(m: Machine, v: dict[str, Expression]) -> Outputs:
-    matrix = lagrangian.mass_matrix(m, v["pose"], v["parameters"])
-    return {"mass": (matrix, (m.freedom, m.freedom))}
+def _coriolis_matrix(m: Machine, v: Symbols) -> Outputs:
+    return {"coriolis": lagrangian.coriolis_matrix(m, v["pose"], v["velocity"], v["parameters"])}
 
 
-def _coriolis_matrix(m: Machine, v: dict[str, Expression]) -> Outputs:
-    matrix = lagrangian.coriolis_matrix(m, v["pose"], v["velocity"], v["parameters"])
-    return {"coriolis": (matrix, (m.freedom, m.freedom))}
+def _kinetic_energy(m: Machine, v: Symbols) -> Outputs:
+    return {"energy": lagrangian.kinetic_energy(m, v["pose"], v["velocity"], v["parameters"])}
 
 
-def _forces_without_acceleration(name: str) -> Callable[[Machine, dict[str, Expression]], Outputs]:
-    def build(m: Machine, v: dict[str, Expression]) -> Outputs:
-        return {name: (generalized_forces(m, _state(m, v), v["parameters"]), (m.freedom,))}
-
-    return build
+def _forces(m: Machine, v: Symbols) -> Expression:
+    """Return the forces of a state that lacks an acceleration, and perhaps a velocity."""
+    return generalized_forces(m, _state(m, v), v["parameters"])
 
 
-def _kinetic_energy(m: Machine, v: dict[str, Expression]) -> Outputs:
-    energy = lagrangian.kinetic_energy(m, v["pose"], v["velocity"], v["parameters"])
-    return {"energy": (energy, ())}
-
-
-def _potential_energy(m: Machine, v: dict[str, Expression]) -> Outputs:
-    return {"energy": (lagrangian.potential_energy(m, v["pose"], v["parameters"]), ())}
-
-
-def _regressor(m: Machine, v: dict[str, Expression]) -> Outputs:
+def _regressor(m: Machine, v: Symbols) -> Outputs:
     selection = v.get("selection", ca.SX.eye(len(m.parameters)))
     matrix = inverse_dynamics(m, _state(m, v), selection)
     return {"regressor": (matrix, matrix.shape)}
 
 
-def _paper_regressor(m: Machine, v: dict[str, Expression]) -> Outputs:
-    matrix = regressor.paper_regressor(m, _state(m, v))
-    return {"regressor": (matrix, matrix.shape)}
-
-
-def _paper_terms(m: Machine, v: dict[str, Expression]) -> Outputs:
+def _paper_terms(m: Machine, v: Symbols) -> Outputs:
     parts = regressor.terms(m, _state(m, v))
-    links, n = len(parts.links), m.freedom
-    padded = [ca.horzcat(link, ca.SX(6, 4 - link.shape[1])) for link in parts.links]
     return {
-        "jacobian": (parts.jacobian, (n, n)),
-        "sliders": (parts.sliders, (n, n)),
-        "link_jacobians": (ca.vertcat(*parts.link_jacobians), (links, 6, n)),
-        "links": (ca.vertcat(*padded), (links, 6, 4)),
-        "platform": (parts.platform, (n, 4)),
+        "jacobian": parts.jacobian,
+        "sliders": parts.sliders,
+        "link_jacobians": list(parts.link_jacobians),
+        "links": [ca.horzcat(link, ca.SX(6, 4 - link.shape[1])) for link in parts.links],
+        "platform": parts.platform,
     }
 
 
@@ -239,38 +197,56 @@ _HELD: tuple[Need, ...] = ("reach", "type I", "type II")
 
 _TABLE: dict[str, _Entry] = {
     "inverse_kinematics": _Entry(_POSE, _position, ("reach",)),
-    "joint_coordinates": _Entry(_POSE, _coordinates),
+    "joint_coordinates": _Entry(
+        _POSE, lambda m, v: {"joints": kinematics.inverse_position(m, v["pose"])}
+    ),
     "link_vectors": _Entry(_POSE, _links, ("reach",)),
-    "direct_kinematics": _Entry(("joints",), _direct),
-    "closure_poses": _Entry(("joints",), _closures),
+    "direct_kinematics": _Entry(("joints",), partial(_poses, reached=True)),
+    "closure_poses": _Entry(("joints",), partial(_poses, reached=False)),
     "reach": _Entry(_POSE, _reach),
-    "joint_points": _Entry(_POSE, _points, ("reach",)),
+    "joint_points": _Entry(
+        _POSE, lambda m, v: {"points": kinematics.chain_points(_state(m, v))}, ("reach",)
+    ),
     "platform_points": _Entry(_POSE, _platform_points),
     "discriminants": _Entry(_POSE, _discriminants),
     "squared_type_i": _Entry(_POSE, _squared_type_i),
     "type_ii": _Entry(_POSE, _type_ii),
-    "jacobian": _Entry(_POSE, _jacobian, ("rows",)),
+    "jacobian": _Entry(
+        _POSE, lambda m, v: {"jacobian": kinematics.jacobian(_state(m, v))}, ("rows",)
+    ),
     "link_jacobians": _Entry(_POSE, _link_jacobians, _BENT),
-    "joint_screws": _Entry(_POSE, _screws, _BENT),
-    "joint_rates": _Entry(_RATE, _joint_motion(0), _BENT),
-    "joint_accelerations": _Entry(_MOTION, _joint_motion(1), _BENT),
+    "joint_screws": _Entry(
+        _POSE, lambda m, v: {"screws": [s.T for s in joint_screws(_state(m, v))]}, _BENT
+    ),
+    "joint_rates": _Entry(_RATE, _joint_motion, _BENT),
+    "joint_accelerations": _Entry(_MOTION, _joint_motion, _BENT),
     "platform_motion": _Entry(
         ("pose", "joint_rates", "joint_accelerations"), _platform_motion, _HELD
     ),
     "passive_friction": _Entry(_RATE, _passive_friction, _HELD),
     "inverse_dynamics": _Entry((*_MOTION, "parameters"), _inverse_dynamics, _HELD),
     "forward_dynamics": _Entry((*_RATE, "forces", "parameters"), _forward_dynamics, _BENT),
-    "mass_matrix": _Entry((*_POSE, "parameters"), _mass_matrix, _BENT),
+    "mass_matrix": _Entry(
+        (*_POSE, "parameters"),
+        lambda m, v: {"mass": lagrangian.mass_matrix(m, v["pose"], v["parameters"])},
+        _BENT,
+    ),
     "coriolis_matrix": _Entry((*_RATE, "parameters"), _coriolis_matrix, _BENT),
-    "bias_forces": _Entry((*_RATE, "parameters"), _forces_without_acceleration("bias"), _BENT),
+    "bias_forces": _Entry((*_RATE, "parameters"), lambda m, v: {"bias": _forces(m, v)}, _BENT),
     "gravity_forces": _Entry(
-        (*_POSE, "parameters"), _forces_without_acceleration("gravity"), _BENT
+        (*_POSE, "parameters"), lambda m, v: {"gravity": _forces(m, v)}, _BENT
     ),
     "kinetic_energy": _Entry((*_RATE, "parameters"), _kinetic_energy, _BENT),
-    "potential_energy": _Entry((*_POSE, "parameters"), _potential_energy, ("reach",)),
+    "potential_energy": _Entry(
+        (*_POSE, "parameters"),
+        lambda m, v: {"energy": lagrangian.potential_energy(m, v["pose"], v["parameters"])},
+        ("reach",),
+    ),
     "regressor": _Entry(_MOTION, _regressor, _HELD),
     "base_regressor": _Entry(_MOTION, _regressor, _HELD),
-    "paper_regressor": _Entry(_MOTION, _paper_regressor, _HELD),
+    "paper_regressor": _Entry(
+        _MOTION, lambda m, v: {"regressor": regressor.paper_regressor(m, _state(m, v))}, _HELD
+    ),
     "paper_terms": _Entry(_MOTION, _paper_terms, _BENT),
 }
 
@@ -383,17 +359,18 @@ def _built(
         return _program(machine, what, constants={"selection": selection}, guarded=guarded)
     base = ca.SX.sym("base_parameters", len(columns))
     # A mass on a platform point may be the leg's or the platform's, whichever costs less.
-    forms = []
-    for carried in (True, False):
-        constants = {"parameters": ca.mtimes(selection, base), "carried": carried}
-        extra = {"base_parameters": base}
-        options: dict[str, Any] = {
-            "constants": constants,
-            "extra": extra,
-            "wrench": wrench,
-            "plain": plain,
-        }
-        forms.append(_program(machine, what, **options))
+    given, extra = ca.mtimes(selection, base), {"base_parameters": base}
+    forms = [
+        _program(
+            machine,
+            what,
+            constants={"parameters": given, "carried": carried},
+            extra=extra,
+            wrench=wrench,
+            plain=plain,
+        )
+        for carried in (True, False)
+    ]
     return min(forms, key=lambda form: count_operations(form.function))
 
 
@@ -416,7 +393,7 @@ def _program(
     machine: Machine,
     what: str,
     vector: Expression | None = None,
-    constants: dict[str, Expression] | None = None,
+    constants: Symbols | None = None,
     extra: dict[str, Expression] | None = None,
     wrench: bool = False,
     guarded: bool = False,
@@ -431,9 +408,11 @@ def _program(
     symbols = {
         name: ca.SX.sym(name, count if name == "parameters" else machine.freedom) for name in asked
     } | (extra or {})
-    outputs = entry.build(machine, symbols | (constants or {}))
+    built = entry.build(machine, symbols | (constants or {}))
+    outputs = {name: _shaped(output) for name, output in built.items()}
     if guarded:
-        outputs["status"] = (_status(machine, entry, symbols, outputs), ())
+        results = [expression for expression, _ in outputs.values()]
+        outputs["status"] = _status(machine, entry, symbols, results), ()
     # A matrix goes out transposed: CasADi stores columns, NumPy rows.
     dense = [ca.densify(expression).T for expression, _ in outputs.values()]
     if vector is not None:
@@ -450,12 +429,21 @@ def _program(
     return Program(what, function, inputs, ports)
 
 
+def _shaped(output: Output) -> tuple[Expression, tuple[int, ...]]:
+    """Return an output's expression and its shape; one that is stacked is vertical."""
+    if isinstance(output, tuple):
+        return output
+    if isinstance(output, list):
+        return ca.vertcat(*output), (len(output), *output[0].shape)
+    rows, columns = output.shape
+    return output, (rows, columns) if columns > 1 else (rows,) if rows > 1 else ()
+
+
 def _status(
-    machine: Machine, entry: _Entry, symbols: dict[str, Expression], outputs: Outputs
+    machine: Machine, entry: _Entry, symbols: dict[str, Expression], results: list[Expression]
 ) -> Expression:
     """Return 1 where everything holds that the result needs, else 0; also for NaN."""
     states = [symbol for name, symbol in symbols.items() if name not in _SHARED]
-    results = [expression for expression, _ in outputs.values()]
     sums = [
         sum(
             ca.fabs(v)

@@ -1,49 +1,50 @@
-"""A CasADi function as a list of named operations, which the printers turn into code.
+"""A CasADi function as a list of named operations: what printers, fields and passes walk through.
 
-A printer needs no more than this: single-assignment nodes in order, and what goes where. Nodes
+They need no more than this: single-assignment nodes in order, and what goes where. Nodes
 are sorted into stages, so that what depends on shared inputs alone is done once for a batch, and
 sines and cosines of the inputs leave the loop that a compiler vectorises.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TypeVar
 
 import casadi as ca
 
+from pteron.bodies.motion import Expression
 from pteron.kernels.kernel import Port
+
+Value = TypeVar("Value")
 
 INPUT, CONSTANT = "input", "constant"
 
-_OPERATIONS = {
-    ca.OP_ADD: "add",
-    ca.OP_SUB: "sub",
-    ca.OP_MUL: "mul",
-    ca.OP_DIV: "div",
-    ca.OP_NEG: "neg",
-    ca.OP_SQRT: "sqrt",
-    ca.OP_SIN: "sin",
-    ca.OP_COS: "cos",
-    ca.OP_ATAN2: "atan2",
-    ca.OP_FABS: "fabs",
-    ca.OP_FLOOR: "floor",
-    ca.OP_FMIN: "fmin",
-    ca.OP_FMAX: "fmax",
-    ca.OP_SQ: "sq",
-    ca.OP_TWICE: "twice",
-    ca.OP_LT: "less",
-    ca.OP_LE: "less_equal",
-    ca.OP_EQ: "equal",
-    ca.OP_NE: "unequal",
-    ca.OP_NOT: "not",
-    ca.OP_AND: "and",
-    ca.OP_OR: "or",
-    ca.OP_IF_ELSE_ZERO: "select",
+_CODES = {
+    "add": ca.OP_ADD,
+    "sub": ca.OP_SUB,
+    "mul": ca.OP_MUL,
+    "div": ca.OP_DIV,
+    "neg": ca.OP_NEG,
+    "sqrt": ca.OP_SQRT,
+    "sin": ca.OP_SIN,
+    "cos": ca.OP_COS,
+    "atan2": ca.OP_ATAN2,
+    "fabs": ca.OP_FABS,
+    "floor": ca.OP_FLOOR,
+    "fmin": ca.OP_FMIN,
+    "fmax": ca.OP_FMAX,
+    "less": ca.OP_LT,
+    "less_equal": ca.OP_LE,
+    "equal": ca.OP_EQ,
+    "unequal": ca.OP_NE,
+    "not": ca.OP_NOT,
+    "and": ca.OP_AND,
+    "or": ca.OP_OR,
+    "select": ca.OP_IF_ELSE_ZERO,
 }
-
-_UNARY = frozenset({"neg", "sqrt", "sin", "cos", "fabs", "floor", "not"})
+_NAMES = {code: name for name, code in _CODES.items()}
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,7 @@ class Node:
     """One value: an operation on earlier nodes, an input's element, or a constant."""
 
     operation: str
+    """A name, or for operations that have none CasADi's number."""
     arguments: tuple[int, ...] = ()
     """Earlier nodes; for an input its port and element."""
     value: float = 0.0
@@ -72,16 +74,29 @@ class Graph:
         """Return the nodes that compute something, in order."""
         return [k for k, node in enumerate(self.nodes) if node.operation not in (INPUT, CONSTANT)]
 
+    def values(
+        self, inputs: Callable[[int, int], Value], rule: Callable[[Node, list[Value]], Value]
+    ) -> list[Value]:
+        """Return a value for each node, by a rule from its arguments' values.
 
-@lru_cache(maxsize=128)
-def graph_of(function: ca.Function, inputs: tuple[Port, ...]) -> Graph:
-    """Return the graph of an SX function; `inputs` say which of its arguments are shared.
+        `inputs` gives those of the inputs, by port and element.
+        """
+        found: list[Value] = []
+        for node in self.nodes:
+            if node.operation == INPUT:
+                found.append(inputs(*node.arguments))
+            else:
+                found.append(rule(node, [found[k] for k in node.arguments]))
+        return found
 
-    Raises
-    ------
-    ValueError
-        If the function holds an operation that the printers do not know.
-    """
+    def results(self, values: Sequence[Value]) -> list[list[Value]]:
+        """Return the elements of each output, of the nodes' values."""
+        return [[values[k] for k in nodes] for nodes in self.outputs]
+
+
+@lru_cache(maxsize=256)
+def graph_of(function: ca.Function, inputs: tuple[Port, ...] = ()) -> Graph:
+    """Return the graph of an SX function; `inputs` say which of its arguments are shared."""
     nodes: list[Node] = []
     slots: dict[int, int] = {}
     seen: dict[tuple[str, tuple[int, ...], str], int] = {}
@@ -94,33 +109,52 @@ def graph_of(function: ca.Function, inputs: tuple[Port, ...]) -> Graph:
             nodes.append(node)
         return seen[key]
 
+    def constant(value: float) -> int:
+        return add(Node(CONSTANT, value=value, shared=True))
+
     for k in range(function.n_instructions()):
         code = function.instruction_id(k)
         source, target = function.instruction_input(k), function.instruction_output(k)
-        if code == ca.OP_INPUT:
-            place = (source[0], source[1])
-            slots[target[0]] = add(Node(INPUT, place, shared=inputs[source[0]].shared))
-        elif code == ca.OP_CONST:
-            value = float(function.instruction_constant(k))
-            slots[target[0]] = add(Node(CONSTANT, value=value, shared=True))
-        elif code == ca.OP_OUTPUT:
+        if code == ca.OP_OUTPUT:
             outputs[target[0]][target[1]] = slots[source[0]]
+        elif code == ca.OP_INPUT:
+            shared = bool(inputs) and inputs[source[0]].shared
+            slots[target[0]] = add(Node(INPUT, (source[0], source[1]), shared=shared))
+        elif code == ca.OP_CONST:
+            slots[target[0]] = constant(float(function.instruction_constant(k)))
         elif code == ca.OP_ASSIGN:
             slots[target[0]] = slots[source[0]]
-        elif code in _OPERATIONS:
-            slots[target[0]] = add(_node(_OPERATIONS[code], [slots[i] for i in source], nodes))
         else:
-            raise ValueError(f"operation {code} of {function.name()} has no printer")
+            arguments = tuple(slots[i] for i in source)
+            # Twice x is x + x, a square x x, to the same bit.
+            if code in (ca.OP_TWICE, ca.OP_SQ):
+                code, arguments = (ca.OP_ADD if code == ca.OP_TWICE else ca.OP_MUL), arguments * 2
+            elif code == ca.OP_INV:
+                code, arguments = ca.OP_DIV, (constant(1.0), *arguments)
+            shared = all(nodes[i].shared for i in arguments)
+            outlying = code in (ca.OP_SIN, ca.OP_COS) and nodes[arguments[0]].operation == INPUT
+            name = _NAMES.get(code, str(code))
+            slots[target[0]] = add(Node(name, arguments, 0.0, shared, outlying and not shared))
     return Graph(tuple(nodes), tuple(map(tuple, outputs)))
 
 
-def _node(operation: str, arguments: list[int], nodes: Sequence[Node]) -> Node:
-    """Return the node of an operation; a square is x x and twice x is x + x, to the same bit."""
-    if operation in ("sq", "twice"):
-        operation, arguments = ("mul" if operation == "sq" else "add"), [arguments[0]] * 2
-    if operation in _UNARY:
-        arguments = arguments[:1]
-    shared = all(nodes[i].shared for i in arguments)
-    of_input = nodes[arguments[0]].operation == INPUT
-    outlying = operation in ("sin", "cos") and of_input and not shared
-    return Node(operation, tuple(arguments), shared=shared, outlying=outlying)
+def expression(node: Node, arguments: Sequence[Expression]) -> Expression:
+    """Return what a node that is no input stands for in CasADi."""
+    if node.operation == CONSTANT:
+        return ca.SX(node.value)
+    make = ca.SX.unary if len(arguments) == 1 else ca.SX.binary
+    return make(_CODES.get(node.operation) or int(node.operation), *arguments)
+
+
+def function_like(
+    given: ca.Function,
+    elements: Sequence[Sequence[Expression]],
+    inputs: Sequence[Expression] | None = None,
+) -> ca.Function:
+    """Return a function with the names and the sparsities of another, its outputs' elements new."""
+    outputs = [
+        ca.SX(given.sparsity_out(i), ca.vertcat(*values)) for i, values in enumerate(elements)
+    ]
+    arguments = given.sx_in() if inputs is None else inputs
+    names = given.name_in(), given.name_out()
+    return ca.Function(given.name(), arguments, ca.cse(outputs), *names)

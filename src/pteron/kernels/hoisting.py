@@ -8,6 +8,7 @@ import casadi as ca
 
 from pteron.bodies.motion import Expression
 from pteron.kernels.functions import Program
+from pteron.kernels.graph import Node, expression, function_like, graph_of
 
 
 def hoisted(program: Program, name: str) -> tuple[Program, ca.Function]:
@@ -19,42 +20,29 @@ def hoisted(program: Program, name: str) -> tuple[Program, ca.Function]:
     function = program.function
     place = function.name_in().index(name)
     symbols = function.sx_in()
-    slots: dict[int, tuple[Expression, bool]] = {}
+    ports = [replace(port, shared=port.name == name) for port in program.inputs]
+    graph = graph_of(function, tuple(ports))
     numbers: dict[int, tuple[Expression, Expression]] = {}
-    outputs = [[ca.SX(0)] * function.nnz_out(i) for i in range(function.n_out())]
 
-    def outside(slot: int) -> Expression:
-        """Return a value as the first function sees it."""
-        value, alone = slots[slot]
-        if not alone or value.is_constant():
+    def outside(k: int, value: Expression) -> Expression:
+        """Return a node's value as the first function sees it."""
+        if not graph.nodes[k].shared or value.is_constant():
             return value
-        key = int(value.element_hash())
-        if key not in numbers:
-            numbers[key] = value, ca.SX.sym(f"n{len(numbers)}")
-        return numbers[key][1]
+        return numbers.setdefault(k, (value, ca.SX.sym(f"n{len(numbers)}")))[1]
 
-    for k in range(function.n_instructions()):
-        code = function.instruction_id(k)
-        source, target = function.instruction_input(k), function.instruction_output(k)
-        if code == ca.OP_INPUT:
-            slots[target[0]] = symbols[source[0]].nonzeros()[source[1]], source[0] == place
-        elif code == ca.OP_CONST:
-            slots[target[0]] = ca.SX(function.instruction_constant(k)), True
-        elif code == ca.OP_OUTPUT:
-            outputs[target[0]][target[1]] = outside(source[0])
-        else:
-            alone = all(slots[i][1] for i in source)
-            values = [slots[i][0] if alone else outside(i) for i in source]
-            make = ca.SX.unary if len(source) == 1 else ca.SX.binary
-            slots[target[0]] = make(code, *values), alone
-    kept = list(numbers.values())
+    def rule(node: Node, values: list[Expression]) -> Expression:
+        if not node.shared:
+            values = [outside(k, v) for k, v in zip(node.arguments, values, strict=True)]
+        return expression(node, values)
+
+    values = graph.values(lambda i, j: symbols[i].nonzeros()[j], rule)
+    results = [[outside(k, values[k]) for k in nodes] for nodes in graph.outputs]
+    made = ca.Function(
+        name, [symbols[place]], [ca.densify(ca.vertcat(*(v for v, _ in numbers.values())))]
+    )
     inputs = list(symbols)
-    inputs[place] = ca.vertcat(*(symbol for _, symbol in kept))
-    results = [
-        ca.SX(function.sparsity_out(i), ca.vertcat(*values)) for i, values in enumerate(outputs)
-    ]
-    first = ca.Function(function.name(), inputs, results, function.name_in(), function.name_out())
+    inputs[place] = ca.vertcat(*(symbol for _, symbol in numbers.values()))
     ports = list(program.inputs)
-    ports[place] = replace(ports[place], shape=(len(kept),))
-    made = ca.Function(name, [symbols[place]], [ca.densify(ca.vertcat(*(v for v, _ in kept)))])
+    ports[place] = replace(ports[place], shape=(len(numbers),))
+    first = function_like(function, results, inputs)
     return replace(program, function=first, inputs=tuple(ports)), made

@@ -21,10 +21,9 @@ from numpy.typing import ArrayLike
 
 from pteron.errors import ModelError
 from pteron.kernels.cache import digest, entry, find
-from pteron.kernels.code import PYTHON, Stages, names_of, near_statements, rendered, statements
+from pteron.kernels.code import PYTHON, Language, module_values, rendered
 from pteron.kernels.graph import Graph, graph_of
 from pteron.kernels.kernel import Array, ArrayKernel, Port
-from pteron.kernels.sincos import LIMIT
 
 _FILE = "kernel.py"
 
@@ -118,52 +117,16 @@ def _load(path: Path, name: str) -> ModuleType:
 
 
 def _source(name: str, graph: Graph, inputs: Sequence[Port], outputs: Sequence[Port]) -> str:
-    printed = PYTHON | {"sin": "sine({0})", "cos": "cosine({0})"}
-    near, near_results = near_statements(PYTHON, "{0} = {1}")
-    stages = Stages.of(graph, inputs, outputs)
-
-    names = names_of(graph, lambda i, j: f"{inputs[i].name}[{j}]", _constant)
-    one = []
-    for number, (angle, nodes) in enumerate(stages.angles):
-        one.append(f"s{number}, c{number} = sincos({names[angle]})")
-        for k in nodes:
-            names[k] = f"{graph.nodes[k].operation[0]}{number}"
-    one += statements(graph, stages.shared + stages.rest, names, printed, "{0} = {1}")
-    one += [f"{port.name}_out[{j}] = {names[k]}" for port, j, k in stages.results]
-
-    def input_name(i: int, j: int) -> str:
-        return f"{inputs[i].name}[{j}]" if inputs[i].shared else f"i{stages.rows[i, j]}"
-
-    names = names_of(graph, input_name, _constant)
-    shared = statements(graph, stages.shared, names, printed, "{0} = {1}")
-    angles = []
-    body = [f"i{row} = block[{row}, k]" for row in stages.rows.values()]
-    for number, (angle, nodes) in enumerate(stages.angles):
-        i, j = graph.nodes[angle].arguments
-        angles.append(stages.rows[i, j])
-        for k in nodes:
-            values = "sines" if graph.nodes[k].operation == "sin" else "cosines"
-            body.append(f"{names[k]} = {values}[{number}, k]")
-    body += statements(graph, stages.rest, names, printed, "{0} = {1}")
-    body += [f"result[{row}, k] = {names[k]}" for row, (_, _, k) in enumerate(stages.results)]
-    return rendered(
-        "pteron.kernels",
-        "numba.py.j2",
-        name=name,
-        width=_BLOCK,
-        limit=LIMIT,
-        near=near,
-        near_results=near_results,
-        inputs=inputs,
-        outputs=outputs,
-        one=one,
-        shared=shared,
-        angles=angles,
-        body=body,
-        rows=[(row, inputs[i], j) for (i, j), row in stages.rows.items()],
-        results=[(row, port, j) for row, (port, j, _) in enumerate(stages.results)],
+    language = Language(
+        PYTHON | {"sin": "sine({0})", "cos": "cosine({0})"},
+        form="{0} = {1}",
+        near_form="{0} = {1}",
+        constant=lambda value: f"({value!r})" if value < 0 else repr(value),
+        pair="s{0}, c{0} = sincos({1})",
+        parts={"sin": "s{0}", "cos": "c{0}"},
+        cell="block[{0}, k]",
+        stored="result[{0}, k] = {1}",
+        returned="{0}[{1}] = {2}",
     )
-
-
-def _constant(value: float) -> str:
-    return f"({value!r})" if value < 0 else repr(value)
+    values = module_values(name, graph, inputs, outputs, language)
+    return rendered("pteron.kernels", "numba.py.j2", width=_BLOCK, **values)

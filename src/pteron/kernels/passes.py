@@ -38,7 +38,7 @@ from pteron.kernels.translation import read, written
 def optimised(function: ca.Function) -> ca.Function:
     """Return an SX function of the same inputs, outputs and values with fewer operations.
 
-    Where nothing is saved, or an operation is unknown, it is the function given.
+    Where nothing is saved it is the function given.
 
     Examples
     --------
@@ -50,8 +50,6 @@ def optimised(function: ca.Function) -> ca.Function:
     (5, 4)
     """
     given = read(function)
-    if given is None:
-        return function
     (graph, roots), best, least = given, given, _cost(*given)
     while True:
         for step in (_flattened, _factored, _shared):
@@ -85,7 +83,7 @@ def _flattened(old: TermGraph, roots: list[int]) -> tuple[TermGraph, list[int]]:
 
     def rule(new: TermGraph, k: int, values: list[int]) -> int:
         kind = old.nodes[k][0]
-        if kind == ca.OP_INV and uses[k] == 1:
+        if kind == "reciprocal" and uses[k] == 1:
             return new.inverse(values[0])
         if kind not in ("sum", "product"):
             return old.copied(new, k, values)

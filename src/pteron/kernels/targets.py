@@ -11,7 +11,7 @@ import numpy as np
 from pteron.equations.machine import numbers
 from pteron.errors import ModelError
 from pteron.kernels.c import Compiled
-from pteron.kernels.exact import Exact
+from pteron.kernels.fields import Exact
 from pteron.kernels.functions import Columns, Program, general_program, program, specialised
 from pteron.kernels.hoisting import hoisted
 from pteron.kernels.jax import Traced
@@ -197,14 +197,9 @@ def _made(
     function = built.function
     if order != sorted(order):
         symbols = function.sx_in()
-        outputs = function.call(symbols)
-        function = type(function)(
-            built.name,
-            [symbols[k] for k in order],
-            outputs,
-            [port.name for port in inputs],
-            [port.name for port in built.outputs],
-        )
+        given = [symbols[k] for k in order]
+        names = [port.name for port in inputs], [port.name for port in built.outputs]
+        function = ca.Function(built.name, given, function.call(symbols), *names)
     return kind(built.name, function, inputs, built.outputs, fixed, dtype, threads)
 
 

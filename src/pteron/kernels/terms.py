@@ -11,11 +11,9 @@ from collections.abc import Callable, Iterable
 from math import isfinite
 from typing import Any
 
-import casadi as ca
-
 Node = tuple[Any, ...]
 """("input", port, element), ("constant", c) with c >= 0, ("sum", *values), ("product", *nodes),
-("inverse", node) or, for every other operation, (its CasADi code, *values)."""
+("inverse", node), ("reciprocal", node) or, for every other operation, (its name, *values)."""
 
 Rule = Callable[["TermGraph", int, list[int]], int]
 """Makes, in a new graph, the value of a node of an old one from its operands' new values."""
@@ -98,14 +96,14 @@ class TermGraph:
     def reciprocal(self, value: int) -> int:
         """Return 1/x as an operation of its own."""
         c = self.constant_of(value)
-        return self.constant(1.0 / c) if c else sign_of(value) * self.add(ca.OP_INV, abs(value))
+        return self.constant(1.0 / c) if c else sign_of(value) * self.add("reciprocal", abs(value))
 
     def inverse(self, value: int) -> int:
         """Return 1/x as a factor: the reciprocal where there is one, or else a division."""
         c = self.constant_of(value)
         if c:
             return self.constant(1.0 / c)
-        there = self.numbers.get((ca.OP_INV, abs(value)))
+        there = self.numbers.get(("reciprocal", abs(value)))
         return sign_of(value) * (there or self.add("inverse", abs(value)))
 
     def operands(self, k: int) -> tuple[int, ...]:
@@ -150,7 +148,7 @@ class TermGraph:
         kind = self.nodes[k][0]
         if kind in ("sum", "product"):
             return new.sum(values) if kind == "sum" else new.product(values)
-        if kind in ("inverse", ca.OP_INV):
+        if kind in ("inverse", "reciprocal"):
             return new.inverse(values[0]) if kind == "inverse" else new.reciprocal(values[0])
         return new.add(kind, *values) if values else new.add(*self.nodes[k])
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property, lru_cache
-from typing import Any
 
 import casadi as ca
 
+from pteron.bodies.motion import Expression
+from pteron.kernels.graph import Node, expression, function_like, graph_of
 from pteron.kernels.kernel import Array, ArrayKernel
 from pteron.kernels.sincos import LIMIT, near
 
@@ -41,29 +42,18 @@ class VirtualMachine(ArrayKernel):
 @lru_cache(maxsize=256)
 def _lowered(function: ca.Function) -> ca.Function:
     """Return the function with the sines and cosines that every target has."""
-    inputs = function.sx_in()
-    outputs = [ca.SX(function.sparsity_out(i)) for i in range(function.n_out())]
-    entries = [symbol.nz for symbol in inputs]
-    slots: dict[int, Any] = {}
-    for k in range(function.n_instructions()):
-        code = function.instruction_id(k)
-        source, target = function.instruction_input(k), function.instruction_output(k)
-        if code == ca.OP_INPUT:
-            slots[target[0]] = entries[source[0]][source[1]]
-        elif code == ca.OP_CONST:
-            slots[target[0]] = ca.SX(function.instruction_constant(k))
-        elif code == ca.OP_OUTPUT:
-            outputs[target[0]].nz[target[1]] = slots[source[0]]
-        elif code in (ca.OP_SIN, ca.OP_COS):
-            angle = slots[source[0]]
-            far = ca.SX.unary(code, angle)
-            close = near()(angle)[0 if code == ca.OP_SIN else 1]
-            slots[target[0]] = ca.if_else(ca.fabs(angle) <= LIMIT, close, far)
-        elif len(source) == 1:
-            slots[target[0]] = ca.SX.unary(code, slots[source[0]])
-        else:
-            slots[target[0]] = ca.SX.binary(code, *(slots[i] for i in source))
-    return ca.Function(function.name(), inputs, ca.cse(outputs))
+    entries = [symbol.nonzeros() for symbol in function.sx_in()]
+
+    def rule(node: Node, arguments: list[Expression]) -> Expression:
+        value = expression(node, arguments)
+        if node.operation not in ("sin", "cos"):
+            return value
+        close = near()(*arguments)[node.operation == "cos"]
+        return ca.if_else(ca.fabs(arguments[0]) <= LIMIT, close, value)
+
+    graph = graph_of(function)
+    values = graph.values(lambda i, j: entries[i][j], rule)
+    return function_like(function, graph.results(values))
 
 
 @lru_cache(maxsize=256)

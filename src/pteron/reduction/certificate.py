@@ -183,10 +183,8 @@ class ExactCertificate(Certificate):
                 "No transfer explains, but this machine's special geometry adds, what is grouped "
                 f"of {', '.join(self.unexplained)}."
             )
-        if self.recognised:
-            lines.append("Taken as exact: " + "; ".join(self.recognised) + ".")
-        if self.approximated:
-            lines.append("Approximated: " + "; ".join(self.approximated) + ".")
+        lines += _listed("Taken as exact", self.recognised)
+        lines += _listed("Approximated", self.approximated)
         if self.numerical is not None:
             found = f"that of the machine itself is {self.numerical}"
             if self.numerical.rank != self.rank:
@@ -201,8 +199,10 @@ class ExactCertificate(Certificate):
                 )
             else:
                 lines.append(f"In floating point {found}: the same.")
-        if self.lost:
-            lines.append("Not kept exactly: " + "; ".join(self.lost) + ".")
-        if self.nearly:
-            lines.append("Nearly special, and perhaps meant to be: " + "; ".join(self.nearly) + ".")
+        lines += _listed("Not kept exactly", self.lost)
+        lines += _listed("Nearly special, and perhaps meant to be", self.nearly)
         return "\n".join(lines)
+
+
+def _listed(head: str, items: tuple[str, ...]) -> list[str]:
+    return [f"{head}: {'; '.join(items)}."] if items else []

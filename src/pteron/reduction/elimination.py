@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from fractions import Fraction
 from math import isqrt
 
-__all__ = ["dependencies", "reconstruct", "remainder"]
-
 
 def dependencies(
     rows: Sequence[Sequence[int]], order: Sequence[int], prime: int

@@ -14,7 +14,7 @@ from operator import add
 from typing import TypeVar
 
 import numpy as np
-from sympy import factorint, isprime
+from sympy import Integer, factorint, isprime
 
 from pteron.bodies.parameters import Parameter
 from pteron.errors import ModelError, SingularPose
@@ -23,11 +23,11 @@ from pteron.kinematics import is_singular_everywhere
 from pteron.manipulator import Manipulator
 from pteron.reduction.certificate import ExactCertificate, NumericalRank
 from pteron.reduction.configurations import (
+    degree_bound,
     is_square,
     modular_rows,
     rational_rows,
 )
-from pteron.reduction.degrees import degree_bound
 from pteron.reduction.elimination import dependencies, reconstruct, remainder
 from pteron.reduction.exact_geometry import ExactGeometry, exact_geometry
 from pteron.reduction.grouping import Grouping, Shares
@@ -170,11 +170,9 @@ def _modular(
 ) -> dict[int, int]:
     """Return a transfer's null vector modulo a prime, by column."""
     field = PrimeField(prime)
-    symbols = {name: value.within(field) for name, value in geometry.symbols().items()}
-    entries = transfer.evaluate(
-        symbols, lambda n: field.number(Fraction(n)), field.add, field.multiply
-    )
-    return {columns.index(column): value for column, value in entries.items() if value}
+    symbols = {name: Integer(value.within(field)) for name, value in geometry.symbols().items()}
+    entries = {columns.index(c): int(v) % prime for c, v in transfer.evaluate(symbols).items()}
+    return {column: value for column, value in entries.items() if value}
 
 
 def _unexplained(

@@ -64,8 +64,8 @@ class ExactLeg:
     @property
     def numbers(self) -> list[Surd]:
         """All numbers in one list."""
-        return [number for value in self.values.values() for number in value] + [
-            *self.platform_point
+        return [
+            number for value in (*self.values.values(), self.platform_point) for number in value
         ]
 
     def within(self, field: Field[Element]) -> dict[str, list[Element]]:
@@ -172,9 +172,8 @@ def exact_geometry(robot: Manipulator) -> ExactGeometry:
     legs = tuple(_exact_leg(robot, i, frame, exact, notes) for i in range(len(robot.legs)))
     gravity: ExactVector = (ZERO, ZERO, ZERO)
     if size > 0.0:
-        x, y, z = exact["gravity"]
         scale = Fraction(size).limit_denominator(10**6) or Fraction(size)
-        gravity = (x.times(scale), y.times(scale), z.times(scale))
+        gravity = _times(exact["gravity"], scale)
     distinct = {
         name: vector
         for name, vector in unit.items()
@@ -295,13 +294,8 @@ def _best_frame(robot: Manipulator, vectors: list[Array]) -> Array:
 
 def _simplicity(frame: Array, vectors: list[Array]) -> int:
     """Return how many components are simple; zeros count twice, rational ones more than roots."""
-    score = 0
-    for vector in vectors:
-        for c in frame @ vector:
-            simple = direction_cosine(float(c))
-            if simple is not None:
-                score += 3 if simple.q == 0 else 2 if simple.s == 1 else 1
-    return score
+    found = (direction_cosine(float(c)) for vector in vectors for c in frame @ vector)
+    return sum(3 if c.q == 0 else 2 if c.s == 1 else 1 for c in found if c is not None)
 
 
 def _exact_directions(given: dict[str, Array], notes: _Notes) -> dict[str, ExactVector]:
@@ -311,8 +305,7 @@ def _exact_directions(given: dict[str, Array], notes: _Notes) -> dict[str, Exact
         for earlier, kept in exact.items():
             if np.linalg.norm(np.cross(vector, given[earlier])) < _PARALLEL:
                 sense = Fraction(round(float(vector @ given[earlier])))
-                x, y, z = kept
-                exact[name] = (x.times(sense), y.times(sense), z.times(sense))
+                exact[name] = _times(kept, sense)
                 error = float(np.linalg.norm(vector - float(sense) * given[earlier]))
                 if error > _NOISE:
                     notes.recognised.append(f"{name} parallel to {earlier} (off by {error:.0e})")
@@ -320,6 +313,11 @@ def _exact_directions(given: dict[str, Array], notes: _Notes) -> dict[str, Exact
         else:
             exact[name] = notes.direction(name, vector)
     return exact
+
+
+def _times(vector: ExactVector, factor: Fraction) -> ExactVector:
+    x, y, z = vector
+    return x.times(factor), y.times(factor), z.times(factor)
 
 
 def _stereographic(given: Array) -> ExactVector:
@@ -343,15 +341,11 @@ def _stereographic(given: Array) -> ExactVector:
 
 
 def _lost_right_angles(given: dict[str, Array], exact: dict[str, ExactVector]) -> list[str]:
-    names = list(given)
-    lost = []
-    for i, a in enumerate(names):
-        for b in names[i + 1 :]:
-            if abs(float(given[a] @ given[b])) < _PARALLEL and not _perpendicular(
-                exact[a], exact[b]
-            ):
-                lost.append(f"{a} at a right angle to {b}")
-    return lost
+    return [
+        f"{a} at a right angle to {b}"
+        for (a, u), (b, v) in combinations(given.items(), 2)
+        if abs(float(u @ v)) < _PARALLEL and not _perpendicular(exact[a], exact[b])
+    ]
 
 
 def _near_relations(given: dict[str, Array]) -> list[str]:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
-from sympy import Add, Float, Integer, Mul, Rational, Symbol, factor, latex
+from sympy import Add, Mul, Symbol, factor, latex, sympify
 from sympy.printing.str import StrPrinter
 
 from pteron.bodies.parameters import Parameter
@@ -105,15 +105,7 @@ def _signed(share: Any) -> tuple[bool, Any]:
 
 def as_sympy(names: Sequence[str], terms: Terms) -> Any:
     """Return a base parameter as a SymPy sum; fractions stay exact."""
-    return Add(*(Mul(_sympified(share), Symbol(names[j])) for j, share in terms.items()))
-
-
-def _sympified(share: Share) -> Any:
-    if isinstance(share, Fraction):
-        return Rational(share.numerator, share.denominator)
-    if isinstance(share, float):
-        return Float(share)
-    return Integer(share) if isinstance(share, int) else share
+    return Add(*(Mul(sympify(share), Symbol(names[j])) for j, share in terms.items()))
 
 
 def _latex_name(parameter: Parameter) -> str:

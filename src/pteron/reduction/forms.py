@@ -25,15 +25,12 @@ Form = Callable[[Expression, Expression, Expression, Expression], Expression]
 """Of J^-T (n, m), the bracket of Eq. (15) (m, N), selection (N, K) and parameters (K, 1)."""
 
 
-def _regressor(j: Expression, bracket: Expression, s: Expression, p: Expression) -> Expression:
-    return ca.mtimes(ca.mtimes(j, ca.mtimes(bracket, s)), p)
-
-
-def _regressor_late(j: Expression, bracket: Expression, s: Expression, p: Expression) -> Expression:
-    return ca.mtimes(j, ca.mtimes(ca.mtimes(bracket, s), p))
-
-
-_GRAPHS: dict[str, Form] = {"regressor": _regressor, "regressor, J^-T last": _regressor_late}
+_GRAPHS: dict[str, Form] = {
+    "regressor": lambda j, bracket, s, p: ca.mtimes(ca.mtimes(j, ca.mtimes(bracket, s)), p),
+    "regressor, J^-T last": lambda j, bracket, s, p: ca.mtimes(
+        j, ca.mtimes(ca.mtimes(bracket, s), p)
+    ),
+}
 
 FORMS = (*_GRAPHS, "factored")
 """The forms by name."""

@@ -11,8 +11,6 @@ import numpy as np
 from pteron.kernels import Array
 from pteron.reduction.certificate import Certificate
 
-__all__ = ["Grouping", "Share", "Shares"]
-
 Share = Fraction | float | Any
 """A fraction where it is known as one, a SymPy number where it holds roots, else a float."""
 

@@ -37,18 +37,8 @@ def svd_grouping(robot: Manipulator, order: Sequence[int], sharing: Array, seed:
     dropped = _independent(null.T, list(reversed(order)), len(order) - rank)[0]
     kept = sorted(set(order) - set(dropped))
     shares = -np.linalg.solve(null[dropped].T, null[kept].T).T if dropped else np.empty((rank, 0))
-    return _grouping(
-        "svd",
-        kept,
-        dropped,
-        shares,
-        matrix,
-        scale,
-        states,
-        values[rank - 1],
-        values[rank:],
-        values[0],
-    )
+    gap = values[rank - 1] / values[0], np.max(values[rank:], initial=0.0) / values[0]
+    return _grouping("svd", kept, dropped, shares, matrix, scale, states, gap)
 
 
 def qr_grouping(robot: Manipulator, order: Sequence[int], sharing: Array, seed: int) -> Grouping:
@@ -58,9 +48,8 @@ def qr_grouping(robot: Manipulator, order: Sequence[int], sharing: Array, seed: 
     kept = sorted(kept)
     dropped = [column for column in order if column not in kept]
     shares = _least_squares(matrix, kept, dropped)
-    smallest: float = min(norms[column] for column in kept)
-    rest = np.array([norms[column] for column in dropped])
-    return _grouping("qr", kept, dropped, shares, matrix, scale, states, smallest, rest, 1.0)
+    gap = min(norms[k] for k in kept), max((norms[k] for k in dropped), default=0.0)
+    return _grouping("qr", kept, dropped, shares, matrix, scale, states, gap)
 
 
 def numerical_rank(robot: Manipulator, sharing: Array, seed: int) -> NumericalRank:
@@ -138,10 +127,9 @@ def _grouping(
     matrix: Array,
     scale: Array,
     states: int,
-    smallest: float,
-    rest: Array,
-    largest: float,
+    gap: tuple[float, float],
 ) -> Grouping:
+    """Assemble the grouping; `gap` is the smallest value kept and the largest one dropped."""
     misfit = matrix[:, dropped] - matrix[:, kept] @ shares
     certificate = NumericalCertificate(
         method=method,
@@ -149,8 +137,8 @@ def _grouping(
         columns=matrix.shape[1],
         states=states,
         tolerance=_TOLERANCE,
-        smallest_kept=float(smallest / largest),
-        largest_dropped=float(np.max(rest, initial=0.0) / largest),
+        smallest_kept=float(gap[0]),
+        largest_dropped=float(gap[1]),
         residual=float(np.abs(misfit).max(initial=0.0)),
     )
     return Grouping(tuple(kept), _given(kept, dropped, shares, scale), certificate)
@@ -158,10 +146,11 @@ def _grouping(
 
 def _given(kept: list[int], dropped: list[int], shares: Array, scale: Array) -> Shares:
     """Undo the scaling of the columns; shares that are rounding only are left out."""
-    given: Shares = {}
-    for j, column in enumerate(dropped):
-        given[column] = {}
-        for i, k in enumerate(kept):
-            if abs(shares[i, j]) > _TOLERANCE and np.isfinite(scale[column]):
-                given[column][k] = float(shares[i, j] * scale[column] / scale[k])
-    return given
+    return {
+        column: {
+            k: float(shares[i, j] * scale[column] / scale[k])
+            for i, k in enumerate(kept)
+            if abs(shares[i, j]) > _TOLERANCE and np.isfinite(scale[column])
+        }
+        for j, column in enumerate(dropped)
+    }

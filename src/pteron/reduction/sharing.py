@@ -46,16 +46,11 @@ def share(robot: Manipulator, groups: list[tuple[int, ...]]) -> tuple[tuple[Para
     """Return the columns, and the matrix (N, columns) that adds parameters into them."""
     everything = parameter_data(robot)
     columns = parameter_data(robot, groups)
-    matrix = np.array(
-        [
-            [
-                float(p.kind == c.kind and p.body == c.body and set(p.legs) <= set(c.legs))
-                for c in columns
-            ]
-            for p in everything
-        ]
-    )
-    return columns, matrix
+
+    def joins(p: Parameter, c: Parameter) -> bool:
+        return (p.kind, p.body) == (c.kind, c.body) and set(p.legs) <= set(c.legs)
+
+    return columns, np.array([[float(joins(p, c)) for c in columns] for p in everything])
 
 
 def default_order(columns: Sequence[Parameter]) -> list[int]:

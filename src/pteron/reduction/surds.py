@@ -15,8 +15,6 @@ from sympy import factorint
 
 from pteron.kernels import Field
 
-__all__ = ["Surd", "direction_cosine", "length"]
-
 Element = TypeVar("Element")
 
 

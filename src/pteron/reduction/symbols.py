@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
-from sympy import Integer, Rational, Symbol, sqrt
+from sympy import Integer, Symbol, sqrt, sympify
 from sympy.polys.matrices import DomainMatrix
 
 from pteron.bodies.parameters import Parameter
@@ -35,11 +35,7 @@ def named_values(geometry: ExactGeometry) -> dict[str, Any]:
 
 def algebraic_values(geometry: ExactGeometry) -> dict[str, Any]:
     """Return the values of the geometric symbols as exact SymPy numbers."""
-    return {name: _number(value) for name, value in geometry.symbols().items()}
-
-
-def _number(value: Surd) -> Any:
-    return Rational(value.q.numerator, value.q.denominator) * sqrt(value.s)
+    return {name: sympify(value.q) * sqrt(value.s) for name, value in geometry.symbols().items()}
 
 
 def symbolic_shares(
@@ -66,14 +62,11 @@ def symbolic_shares(
     """
     dropped = [j for j in range(len(columns)) if j not in kept]
     order = [*dropped, *kept]
-    rows = []
-    for transfer in found:
-        values = transfer.evaluate(
-            symbols, lambda n: Rational(n), lambda a, b: a + b, lambda a, b: a * b
-        )
-        rows.append([values.get(columns[j], Rational(0)) for j in order])
-    for vector in extra:
-        rows.append([_rational(vector.get(j, Fraction(0))) for j in order])
+    vectors: list[Mapping[int, Any]] = [
+        {columns.index(column): entry for column, entry in transfer.evaluate(symbols).items()}
+        for transfer in found
+    ]
+    rows = [[sympify(vector.get(j, 0)) for j in order] for vector in (*vectors, *extra)]
     matrix = DomainMatrix.from_list_sympy(len(rows), len(order), rows, extension=True).to_field()
     reduced, pivots = matrix.rref()
     if pivots != tuple(range(len(dropped))):
@@ -87,7 +80,3 @@ def symbolic_shares(
         }
         for row, j in enumerate(dropped)
     }
-
-
-def _rational(value: Fraction) -> Any:
-    return Rational(value.numerator, value.denominator)

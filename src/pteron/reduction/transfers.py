@@ -7,27 +7,14 @@ base parameters in symbols.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any
+
+from sympy import Add, Integer, Mul, Symbol
 
 from pteron.bodies.parameters import PLATFORM, Parameter
 from pteron.manipulator import Manipulator
-
-Value = TypeVar("Value")
-
-
-@dataclass(frozen=True)
-class Monomial:
-    """An integer times a product of geometric symbols."""
-
-    factor: int
-    symbols: tuple[str, ...] = ()
-
-
-Polynomial = tuple[Monomial, ...]
-
-_ONE: Polynomial = (Monomial(1),)
 
 
 @dataclass(frozen=True)
@@ -39,30 +26,17 @@ class Transfer:
     reason : str
         Why it is one, for a reader.
     entries : dict
-        By column, in symbols `lu1`, `ll1`, `s1x`, `s1y`, ... of each leg's geometry.
+        By column, SymPy polynomials in symbols `lu1`, `ll1`, `s1x`, `s1y`, ... of each leg's
+        geometry.
     """
 
     reason: str
-    entries: Mapping[Parameter, Polynomial]
+    entries: Mapping[Parameter, Any]
 
-    def evaluate(
-        self,
-        symbols: Mapping[str, Value],
-        number: Callable[[int], Value],
-        add: Callable[[Value, Value], Value],
-        multiply: Callable[[Value, Value], Value],
-    ) -> dict[Parameter, Value]:
-        """Return the entries with values put for the symbols, in any arithmetic."""
-        values = {}
-        for column, polynomial in self.entries.items():
-            total = number(0)
-            for monomial in polynomial:
-                term = number(monomial.factor)
-                for symbol in monomial.symbols:
-                    term = multiply(term, symbols[symbol])
-                total = add(total, term)
-            values[column] = total
-        return values
+    def evaluate(self, values: Mapping[str, Any]) -> dict[Parameter, Any]:
+        """Return the entries with numbers, or SymPy expressions, put for the symbols."""
+        put = {Symbol(name): value for name, value in values.items()}
+        return {column: entry.xreplace(put) for column, entry in self.entries.items()}
 
 
 def transfers(robot: Manipulator, columns: Sequence[Parameter]) -> list[Transfer]:
@@ -79,7 +53,7 @@ def transfers(robot: Manipulator, columns: Sequence[Parameter]) -> list[Transfer
             sizes = {tuple(q.value for q in leg.quantities if q.symbol in symbols) for leg in legs}
             if len(sizes) == 1 and all(transfer in others for others in own):
                 entries = {
-                    place[key]: (Monomial(factor, tuple(f"{s}{group[0]}" for s in names)),)
+                    place[key]: Mul(factor, *(Symbol(f"{s}{group[0]}") for s in names))
                     for key, (factor, names) in transfer.entries.items()
                 }
                 found.append(Transfer(transfer.reason.format(suffix), entries))
@@ -89,7 +63,7 @@ def transfers(robot: Manipulator, columns: Sequence[Parameter]) -> list[Transfer
     if not robot.platform.turns:
         reason = "the platform does not turn"
         turning = (p for p in columns if p.body == PLATFORM and p.kind != "m")
-        found += [Transfer(reason, {p: _ONE}) for p in turning]
+        found += [Transfer(reason, {p: Integer(1)}) for p in turning]
     return found
 
 
@@ -100,24 +74,17 @@ def _platform_point(
     platform: Mapping[str, Parameter],
 ) -> Transfer:
     name = robot.legs[group[0] - 1].names[mass.body]
-    x: list[Monomial] = []
-    y: list[Monomial] = []
-    square: list[Monomial] = []
+    points = []
     for leg in group:
-        for axis, moment, value in zip(
-            "xy", (x, y), robot.legs[leg - 1].platform_point, strict=False
-        ):
-            if value != 0.0:
-                symbol = f"s{leg}{axis}"
-                moment.append(Monomial(-1, (symbol,)))
-                square.append(Monomial(-1, (symbol, symbol)))
+        given = zip("xy", robot.legs[leg - 1].platform_point, strict=False)
+        points.append([Symbol(f"s{leg}{axis}") * int(value != 0.0) for axis, value in given])
     return Transfer(
         f"{name}{mass.suffix} and platform carry the platform point",
         {
-            mass: _ONE,
-            platform["m"]: (Monomial(-len(group)),),
-            platform["mgx"]: tuple(x),
-            platform["mgy"]: tuple(y),
-            platform["I"]: tuple(square),
+            mass: Integer(1),
+            platform["m"]: Integer(-len(group)),
+            platform["mgx"]: -Add(*(x for x, _ in points)),
+            platform["mgy"]: -Add(*(y for _, y in points)),
+            platform["I"]: -Add(*(x**2 + y**2 for x, y in points)),
         },
     )
