@@ -35,6 +35,12 @@ class Inertia(Protocol):
         """
 
 
+def with_center(inertia: Inertia) -> dict[str, float]:
+    """Return a body's values by kind, its centre of mass (m) in place of the first moments."""
+    values = dict(zip(inertia.kinds, inertia.values, strict=True))
+    return values | {k: values[k] / values["m"] for k in ("mgx", "mgy") if k in values}
+
+
 @dataclass(frozen=True)
 class PointMass:
     """The inertia of a slider, which does not turn: its mass in kg."""

@@ -15,7 +15,6 @@ from pteron.bodies.motion import Expression
 from pteron.equations import kinematics, lagrangian, regressor
 from pteron.equations.friction import passive_friction
 from pteron.equations.machine import Machine
-from pteron.equations.screws import joint_screws
 from pteron.equations.virtual_work import generalized_forces, inverse_dynamics
 from pteron.errors import ModelError
 from pteron.kernels.kernel import Port, count_operations
@@ -136,7 +135,7 @@ def _link_jacobians(m: Machine, v: dict[str, Expression]) -> Outputs:
 
 
 def _screws(m: Machine, v: dict[str, Expression]) -> Outputs:
-    rows = [screws.T for screws in joint_screws(_state(m, v))]
+    rows = [screws.T for screws in kinematics.joint_screws(_state(m, v))]
     return {"screws": (ca.vertcat(*rows), (m.freedom, *rows[0].shape))}
 
 
