@@ -35,6 +35,12 @@ class Inertia(Protocol):
         """
 
 
+def with_center(inertia: Inertia) -> dict[str, float]:
+    """Return a body's values by kind, its centre of mass (m) in place of the first moments."""
+    values = dict(zip(inertia.kinds, inertia.values, strict=True))
+    return values | {k: values[k] / values["m"] for k in ("mgx", "mgy") if k in values}
+
+
 @dataclass(frozen=True)
 class PointMass:
     """The inertia of a slider, which does not turn: its mass in kg."""
@@ -58,7 +64,54 @@ class PointMass:
 
 
 @dataclass(frozen=True)
-class RodInertia:
+class _TurningInertia:
+    """The inertia of a body that turns; its first moment has as many axes as its kinds name."""
+
+    mass: float
+    first_moment: tuple[float, ...]
+    inertia: float
+
+    kinds: ClassVar[tuple[str, ...]]
+
+    def __post_init__(self) -> None:
+        mass = positive(self.mass, "mass", "kg")
+        moment = numbers(self.first_moment, "first_moment", len(self.kinds) - 2)
+        inertia = number(self.inertia, "inertia")
+        least = sum(h * h for h in moment) / mass
+        if inertia < least * (1.0 - _ROUNDING) or inertia <= 0.0:
+            raise ModelError(
+                f"inertia: {inertia:g} kg m^2 belongs to no real body; with this mass and centre "
+                f"of mass, and about the reference point, it must be above {least:g} kg m^2"
+            )
+        for key, value in (("mass", mass), ("first_moment", moment), ("inertia", inertia)):
+            object.__setattr__(self, key, value)
+
+    @classmethod
+    def of_body(cls, mass: float, center_of_mass: Sequence[float], inertia: float) -> Self:
+        """Build the inertia from the centre of mass (m) instead of the first moment (kg m)."""
+        mass = positive(mass, "mass", "kg")
+        center = numbers(center_of_mass, "center_of_mass", len(cls.kinds) - 2)
+        return cls(mass, tuple(mass * x for x in center), inertia)
+
+    @classmethod
+    def of_values(cls, values: Sequence[float]) -> Self:
+        """Build it from m, m gamma_x, ... and I, in the order of its kinds."""
+        mass, *moment, inertia = values
+        return cls(mass, tuple(moment), inertia)
+
+    @property
+    def center_of_mass(self) -> tuple[float, ...]:
+        """Position of the centre of mass in the body's frame, m."""
+        return tuple(h / self.mass for h in self.first_moment)
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """m, m gamma_x, ... and I, in the order of its kinds and of the paper's Eq. (16)."""
+        return (self.mass, *self.first_moment, self.inertia)
+
+
+@dataclass(frozen=True)
+class RodInertia(_TurningInertia):
     """The inertia of a rod between two ball joints, about its **platform end**.
 
     x points from the tip of the actuated body to the platform point, so that a usual rod has a
@@ -80,41 +133,11 @@ class RodInertia:
         If no real rod has this inertia: the mass must be positive and I m >= (m gamma_x)^2.
     """
 
-    mass: float
-    first_moment: tuple[float]
-    inertia: float
-
     kinds: ClassVar = ("m", "mgx", "I")
-
-    def __post_init__(self) -> None:
-        _check(self, 1)
-
-    @classmethod
-    def of_body(cls, mass: float, center_of_mass: Sequence[float], inertia: float) -> RodInertia:
-        """Build the inertia from the centre of mass (m) instead of the first moment (kg m)."""
-        mass = positive(mass, "mass", "kg")
-        (x,) = numbers(center_of_mass, "center_of_mass", 1)
-        return cls(mass, (mass * x,), inertia)
-
-    @classmethod
-    def of_values(cls, values: Sequence[float]) -> RodInertia:
-        """Build it from (m, m gamma_x, I)."""
-        mass, hx, inertia = values
-        return cls(mass, (hx,), inertia)
-
-    @property
-    def center_of_mass(self) -> tuple[float]:
-        """Position of the centre of mass along the rod, m."""
-        return (self.first_moment[0] / self.mass,)
-
-    @property
-    def values(self) -> tuple[float, ...]:
-        """(m, m gamma_x, I)."""
-        return (self.mass, *self.first_moment, self.inertia)
 
 
 @dataclass(frozen=True)
-class PlanarInertia:
+class PlanarInertia(_TurningInertia):
     """The inertia of a link or of the platform about its reference point, in its own frame.
 
     The reference point of an upper link or a crank is on R1, with x along the link; that of a
@@ -142,48 +165,4 @@ class PlanarInertia:
     (0.027104, 0.0032)
     """
 
-    mass: float
-    first_moment: tuple[float, float]
-    inertia: float
-
     kinds: ClassVar = ("m", "mgx", "mgy", "I")
-
-    def __post_init__(self) -> None:
-        _check(self, 2)
-
-    @classmethod
-    def of_body(cls, mass: float, center_of_mass: Sequence[float], inertia: float) -> PlanarInertia:
-        """Build the inertia from the centre of mass (m) instead of the first moment (kg m)."""
-        mass = positive(mass, "mass", "kg")
-        x, y = numbers(center_of_mass, "center_of_mass", 2)
-        return cls(mass, (mass * x, mass * y), inertia)
-
-    @classmethod
-    def of_values(cls, values: Sequence[float]) -> PlanarInertia:
-        """Build it from (m, m gamma_x, m gamma_y, I)."""
-        mass, hx, hy, inertia = values
-        return cls(mass, (hx, hy), inertia)
-
-    @property
-    def center_of_mass(self) -> tuple[float, float]:
-        """Position of the centre of mass in the body's frame, m."""
-        return (self.first_moment[0] / self.mass, self.first_moment[1] / self.mass)
-
-    @property
-    def values(self) -> tuple[float, ...]:
-        """(m, m gamma_x, m gamma_y, I), the order of the paper's Eq. (16)."""
-        return (self.mass, *self.first_moment, self.inertia)
-
-
-def _check(body: RodInertia | PlanarInertia, axes: int) -> None:
-    mass = positive(body.mass, "mass", "kg")
-    moment = numbers(body.first_moment, "first_moment", axes)
-    inertia = number(body.inertia, "inertia")
-    least = sum(h * h for h in moment) / mass
-    if inertia < least * (1.0 - _ROUNDING) or inertia <= 0.0:
-        raise ModelError(
-            f"inertia: {inertia:g} kg m^2 belongs to no real body; with this mass and centre "
-            f"of mass, and about the reference point, it must be above {least:g} kg m^2"
-        )
-    for key, value in (("mass", mass), ("first_moment", moment), ("inertia", inertia)):
-        object.__setattr__(body, key, value)

@@ -6,7 +6,7 @@ where a file is read, since pydantic would slow the start of those who read none
 
 from __future__ import annotations
 
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -32,46 +32,40 @@ class Slider(Table):
     mass: Number
 
 
-class PlanarBody(Table):
+class _Body(Table):
+    mass: Number
+    center_of_mass: Any = None
+    first_moment: Any = None
+    inertia: Number
+
+    kind: ClassVar[type[PlanarInertia] | type[RodInertia]]
+
+    def inertia_of(self, key: str) -> Any:
+        """Build the inertia; `key` goes before what an error names."""
+        try:
+            if (self.center_of_mass is None) == (self.first_moment is None):
+                given = "neither" if self.first_moment is None else "both"
+                raise ModelError(
+                    f"center_of_mass: {given} it and first_moment given; give one of the two"
+                )
+            if self.first_moment is not None:
+                return self.kind(self.mass, self.first_moment, self.inertia)
+            return self.kind.of_body(self.mass, self.center_of_mass, self.inertia)
+        except ModelError as error:
+            raise ModelError(f"{key}.{error}" if key else str(error)) from None
+
+
+class PlanarBody(_Body):
     """`{ mass, inertia, center_of_mass or first_moment }` of a body in a plane."""
 
-    mass: Number
+    kind = PlanarInertia
     center_of_mass: Two | None = None
     first_moment: Two | None = None
-    inertia: Number
-
-    def inertia_of(self, key: str) -> PlanarInertia:
-        """Build the inertia; `key` goes before what an error names."""
-        return _built(self, PlanarInertia, key)
 
 
-class RodBody(Table):
+class RodBody(_Body):
     """The same of a rod, whose vectors have one component."""
 
-    mass: Number
+    kind = RodInertia
     center_of_mass: One | None = None
     first_moment: One | None = None
-    inertia: Number
-
-    def inertia_of(self, key: str) -> RodInertia:
-        """Build the inertia; `key` goes before what an error names."""
-        return _built(self, RodInertia, key)
-
-
-_Inertia = TypeVar("_Inertia", PlanarInertia, RodInertia)
-
-
-def _built(body: PlanarBody | RodBody, kind: type[_Inertia], key: str) -> _Inertia:
-    try:
-        if (body.center_of_mass is None) == (body.first_moment is None):
-            given = "neither" if body.first_moment is None else "both"
-            raise ModelError(
-                f"center_of_mass: {given} it and first_moment given; give one of the two"
-            )
-        moment: Any = body.first_moment
-        center: Any = body.center_of_mass
-        if moment is not None:
-            return kind(body.mass, moment, body.inertia)
-        return kind.of_body(body.mass, center, body.inertia)
-    except ModelError as error:
-        raise ModelError(f"{key}.{error}" if key else str(error)) from None

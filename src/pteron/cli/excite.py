@@ -34,8 +34,7 @@ def excite(
     speed: Annotated[float, option("speed", "The joints' limit, m/s or rad/s.")] = 1.0,
     acceleration: Annotated[float, option("acceleration", "Their limit, the same per s.")] = 10.0,
     force: Annotated[
-        float | None,
-        option("force", "The actuators' limit, N or N m.", show_default=False),
+        float | None, option("force", "The actuators' limit, N or N m.", show_default=False)
     ] = None,
     type_i: Annotated[float, option("type-i", "Least type-I measure of every leg.")] = 0.25,
     type_ii: Annotated[float, option("type-ii", "Least type-II measure.")] = 0.3,

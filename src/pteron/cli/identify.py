@@ -36,10 +36,7 @@ Derivatives = Literal["periodic", "central", "spline"]
 def identify(
     logs: Annotated[
         list[str],
-        Argument(
-            metavar="LOG...",
-            help="Recorded motions, .csv or .parquet: t, joints, forces.",
-        ),
+        Argument(metavar="LOG...", help="Recorded motions, .csv or .parquet: t, joints, forces."),
     ],
     robot: Annotated[str, option("robot", "The machine as it is drawn.", "ROBOT")],
     out: Annotated[str, option("out", "The folder to write it to.", "DIR")],

@@ -18,14 +18,7 @@ from pteron.cli.arguments import (
     option,
     parsed_numbers,
 )
-from pteron.cli.rows import (
-    Rows,
-    check_destination,
-    deliver,
-    given_rows,
-    rows_of_table,
-    single_row,
-)
+from pteron.cli.rows import Rows, check_destination, deliver, given_rows, rows_of_table, single_row
 from pteron.errors import DataError
 
 if TYPE_CHECKING:

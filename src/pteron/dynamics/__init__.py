@@ -1,6 +1,6 @@
 """Dynamics in numbers: batched, validated, documented."""
 
-from pteron.dynamics.forces import forward_dynamics, inverse_dynamics
+from pteron.dynamics.forces import forward_dynamics, inverse_dynamics, regressor
 from pteron.dynamics.model import (
     bias_forces,
     coriolis_matrix,
@@ -9,7 +9,6 @@ from pteron.dynamics.model import (
     mass_matrix,
     potential_energy,
 )
-from pteron.dynamics.regressor import regressor
 
 __all__ = [
     "bias_forces",

@@ -118,3 +118,23 @@ def platform_rates(
     velocity = machine.closure.rates(rates, at_rest.platform, at_rest.legs)
     drift = ca.vertcat(*(leg.acceleration for leg in machine.state(pose, velocity).legs))
     return velocity, machine.closure.rates(accelerations - drift, at_rest.platform, at_rest.legs)
+
+
+def joint_screws(state: State) -> list[Expression]:
+    """Return the unit screws of every leg's joints about P, from the base to the platform, Eq. (8).
+
+    Each is (6, j), rows omega, then v; NaN for a joint that a leg has not. Where d is parallel to
+    k, R4 of a P-R-R-R leg coincides with R3.
+    """
+    p = state.platform.body.position
+    longest = max(len(leg.chain) for leg in state.legs)
+    screws = []
+    for leg in state.legs:
+        columns = []
+        for joint in leg.chain:
+            if joint.kind == "P":
+                columns.append(ca.vertcat(ca.SX(3, 1), joint.axis))
+            else:
+                columns.append(ca.vertcat(joint.axis, ca.cross(joint.point - p, joint.axis)))
+        screws.append(ca.horzcat(*columns, ca.SX.nan(6, longest - len(columns))))
+    return screws

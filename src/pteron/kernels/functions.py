@@ -15,7 +15,6 @@ from pteron.bodies.motion import Expression
 from pteron.equations import kinematics, lagrangian, regressor
 from pteron.equations.friction import passive_friction
 from pteron.equations.machine import Machine
-from pteron.equations.screws import joint_screws
 from pteron.equations.virtual_work import generalized_forces, inverse_dynamics
 from pteron.errors import ModelError
 from pteron.kernels.kernel import Port, count_operations
@@ -216,7 +215,7 @@ _TABLE: dict[str, _Entry] = {
     ),
     "link_jacobians": _Entry(_POSE, _link_jacobians, _BENT),
     "joint_screws": _Entry(
-        _POSE, lambda m, v: {"screws": [s.T for s in joint_screws(_state(m, v))]}, _BENT
+        _POSE, lambda m, v: {"screws": [s.T for s in kinematics.joint_screws(_state(m, v))]}, _BENT
     ),
     "joint_rates": _Entry(_RATE, _joint_motion, _BENT),
     "joint_accelerations": _Entry(_MOTION, _joint_motion, _BENT),

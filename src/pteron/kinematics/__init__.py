@@ -1,11 +1,6 @@
 """Kinematics in numbers: batched, validated, documented."""
 
-from pteron.kinematics.joints import (
-    JointMotion,
-    joint_accelerations,
-    joint_rates,
-    joint_screws,
-)
+from pteron.kinematics.joints import JointMotion, joint_accelerations, joint_rates, joint_screws
 from pteron.kinematics.position import (
     assembly_modes,
     direct_kinematics,

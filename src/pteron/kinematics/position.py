@@ -12,15 +12,7 @@ from pteron.kernels import Array
 from pteron.kinematics.evaluate import checked, evaluated
 from pteron.kinematics.singularities import EVERYWHERE, is_singular_everywhere
 from pteron.manipulator import Manipulator
-from pteron.shapes import (
-    JointsLike,
-    Matrices,
-    OnFailure,
-    PerJoint,
-    PoseLike,
-    Poses,
-    Vectors,
-)
+from pteron.shapes import JointsLike, Matrices, OnFailure, PerJoint, PoseLike, Poses, Vectors
 
 _SAME_JOINT = 1e-6
 """m or rad within which a pose gives the joints back: far above rounding, even near a singularity,

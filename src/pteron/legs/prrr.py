@@ -16,13 +16,7 @@ import casadi as ca
 
 from pteron.bodies.inertia import PlanarInertia, PointMass
 from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, PointMotion
-from pteron.bodies.vectors import (
-    Vector,
-    dot,
-    norm,
-    parallel,
-    scaled,
-)
+from pteron.bodies.vectors import Vector, dot, norm, parallel, scaled
 from pteron.errors import ModelError
 from pteron.legs.circles import (
     first_moment,
@@ -221,11 +215,7 @@ class PRRREquations(LegEquations):
     and d x a, as two-vectors, wherever that is enough.
     """
 
-    kinds: ClassVar = {
-        "p": PointMass.kinds,
-        "u": PlanarInertia.kinds,
-        "l": PlanarInertia.kinds,
-    }
+    kinds: ClassVar = {"p": PointMass.kinds, "u": PlanarInertia.kinds, "l": PlanarInertia.kinds}
     rides: ClassVar = ("l",)
     row_is_constant = True
 

@@ -17,14 +17,7 @@ import casadi as ca
 
 from pteron.bodies.inertia import PlanarInertia, RodInertia
 from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, PointMotion
-from pteron.bodies.vectors import (
-    Vector,
-    cross,
-    norm,
-    parallel,
-    perpendicular,
-    scaled,
-)
+from pteron.bodies.vectors import Vector, cross, norm, parallel, perpendicular, scaled
 from pteron.legs.circles import (
     perpendicular_to,
     plane_of,

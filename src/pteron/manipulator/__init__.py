@@ -5,6 +5,7 @@ from pteron.manipulator.manipulator import (
     STANDARD_GRAVITY,
     Manipulator,
     expect_manipulator,
+    turned,
     working_modes,
 )
 from pteron.manipulator.parameters import (
@@ -14,7 +15,6 @@ from pteron.manipulator.parameters import (
     parameters,
     with_parameters,
 )
-from pteron.manipulator.turning import turned
 
 __all__ = [
     "STANDARD_GRAVITY",

@@ -13,6 +13,7 @@ from io import StringIO
 from typing import Any
 
 import matplotlib as mpl
+from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -123,7 +124,7 @@ def remark(axes: Axes, text: str, x: float, y: float, color: str, rise: float = 
     )
 
 
-def svg(figure: Figure, *, name: str, title: str) -> str:
+def svg(figure: Figure, *, name: str, title: str) -> Markup:
     """Return a figure as one `<svg>` element for an HTML page.
 
     It holds no date, no random identifier and no address, and its colours are CSS variables with
@@ -155,4 +156,4 @@ def svg(figure: Figure, *, name: str, title: str) -> str:
         f'style="--width: {width}px; aspect-ratio: {width} / {height}">'
         f"<title>{escape(title)}</title>"
     )
-    return head + text[text.index(">") + 1 :]
+    return Markup(head + text[text.index(">") + 1 :])

@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 from markupsafe import Markup, escape
-from matplotlib.figure import Figure
 
 import pteron
-from pteron.bodies.inertia import Inertia
+from pteron.bodies.inertia import Inertia, with_center
 from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.legs import LegKind
@@ -133,12 +132,8 @@ def bodies(robot: Manipulator) -> list[tuple[str, int | None, dict[str, float]]]
         for i, leg in enumerate(robot.legs)
         for letter, inertia in leg.bodies.items()
     ]
-    rows: list[tuple[str, int | None, dict[str, float]]] = []
-    for name, i, inertia in (*found, ("platform", None, robot.platform.inertia)):
-        values = dict(zip(inertia.kinds, inertia.values, strict=True))
-        centers = {k: values[k] / values["m"] for k in ("mgx", "mgy") if k in values}
-        rows.append((name, i, values | centers))
-    return rows
+    found.append(("platform", None, robot.platform.inertia))
+    return [(name, i, with_center(inertia)) for name, i, inertia in found]
 
 
 def _letters(robot: Manipulator) -> list[tuple[str, str]]:
@@ -181,13 +176,13 @@ def _figures(report: Report) -> dict[str, Any]:
     half = cycle.duration / 2.0
     forces = forces_figure(cycle.time, report.forces, turning_point=half, ylabel=label)
     made: dict[str, Any] = {
-        "robot": _inline(machine, "robot", f"{robot.name} in its home pose"),
-        "forces": _inline(forces, "forces", "Actuator forces over the pick-and-place cycle"),
+        "robot": svg(machine, name="robot", title=f"{robot.name} in its home pose"),
+        "forces": svg(forces, name="forces", title="Actuator forces over the pick-and-place cycle"),
         "reach": [
-            _inline(
+            svg(
                 reach_figure(cut, path=path),
-                f"reach{cut.plane}",
-                f"Positions in reach in the {cut.plane[0]}-{cut.plane[1]} plane",
+                name=f"reach{cut.plane}",
+                title=f"Positions in reach in the {'-'.join(cut.plane)} plane",
             )
             for cut in report.slices
         ],
@@ -197,22 +192,18 @@ def _figures(report: Report) -> dict[str, Any]:
         used, home = (float(turns.min()), float(turns.max())), float(report.home[3])
         figure = regularity_figure(at.angles, at.type_ii, at.singular, home=home, used=used)
         title = "The type-II measure over the orientation"
-        made["orientations"] = _inline(figure, "orientations", title)
+        made["orientations"] = svg(figure, name="orientations", title=title)
     if report.measures is not None:
         cut = report.measures.cut
         made["measures"] = [
-            _inline(
+            svg(
                 measure_figure(cut, measure, path=path),
-                f"measure{name}",
-                f"The type-{name} measure in the {cut.plane[0]}-{cut.plane[1]} plane",
+                name=f"measure{name}",
+                title=f"The type-{name} measure in the {'-'.join(cut.plane)} plane",
             )
             for name, measure in (("I", report.measures.type_i), ("II", report.measures.type_ii))
         ]
     return made
-
-
-def _inline(figure: Figure, name: str, title: str) -> Markup:
-    return Markup(svg(figure, name=name, title=title))
 
 
 def scene(report: Report) -> dict[str, Any]:

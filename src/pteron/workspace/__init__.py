@@ -1,9 +1,8 @@
 """Where a machine can work: its reserves, its home pose, its reach and its joints' ranges."""
 
 from pteron.workspace.home import home_pose
-from pteron.workspace.joints import JointRanges, joint_ranges
 from pteron.workspace.reach import BEYOND_LIMITS, REACHABLE, ReachSlice, reach_slice
-from pteron.workspace.reserve import Reserve, reserve
+from pteron.workspace.reserve import JointRanges, Reserve, joint_ranges, reserve
 from pteron.workspace.volume import ReachVolume, bounding_box, reach_volume
 
 __all__ = [

@@ -121,9 +121,7 @@ def reach_slice(
     missed = np.isnan(measures).any(axis=-1)
     room = room_to_limits(robot, poses).min(axis=-1)
     status = np.where(
-        missed,
-        leg_margins.argmin(axis=-1) + 1,
-        np.where(room < 0.0, BEYOND_LIMITS, REACHABLE),
+        missed, leg_margins.argmin(axis=-1) + 1, np.where(room < 0.0, BEYOND_LIMITS, REACHABLE)
     )
     margin = np.fmin(leg_margins.min(axis=-1), room)
     return ReachSlice(plane, pose, first, second, status, margin, leg_margins)

@@ -1,4 +1,4 @@
-"""How far a pose is from everything that ends the machine's work, in numbers between 0 and 1."""
+"""How far poses are from all that ends the machine's work, and what of its range a joint uses."""
 
 from __future__ import annotations
 
@@ -7,9 +7,12 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pteron.equations.machine import closure_of
+from pteron.errors import DataError
 from pteron.kernels import Array, numeric
+from pteron.kinematics import inverse_kinematics
 from pteron.manipulator import Manipulator
 from pteron.shapes import Numbers, PerJoint, PoseLike
 
@@ -112,3 +115,63 @@ def room_to_limits(robot: Manipulator, poses: Array) -> Array:
     joints = numeric(robot, "joint_coordinates")(poses)[0]
     room = clearances(robot, joints) * _facts(robot).levers
     return np.where(np.isnan(room), np.inf, room)
+
+
+@dataclass(frozen=True)
+class JointRanges:
+    """The part of its range that each joint uses.
+
+    Attributes
+    ----------
+    least, greatest : array, shape (n,)
+        Of the joint coordinate, m or rad.
+    limits : tuple of ((float, float) or None)
+        What the machine allows; None where it does not say.
+    within : array of bool, shape (n,)
+        Whether the range lies within the limits; True where there are none.
+    """
+
+    least: Array
+    greatest: Array
+    limits: tuple[tuple[float, float] | None, ...]
+    within: NDArray[np.bool_]
+
+
+def joint_ranges(robot: Manipulator, poses: PoseLike) -> JointRanges:
+    """Return the least and the greatest joint coordinate over poses.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    poses : array, shape (..., m)
+        At least one pose, m and rad.
+
+    Returns
+    -------
+    JointRanges
+
+    Raises
+    ------
+    DataError
+        If there is no pose.
+    UnreachablePose
+        If a leg does not reach a pose.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.workspace import joint_ranges
+    >>> ranges = joint_ranges(pteron.load("tripteron"), [[0.0, 0.1, 0.0], [0.1, 0.0, 0.0]])
+    >>> ranges.greatest, bool(ranges.within.all())
+    (array([0.1, 0.1, 0. ]), True)
+    """
+    joints = inverse_kinematics(robot, poses).reshape(-1, robot.freedom)
+    if not len(joints):
+        raise DataError("poses: none given, at least one expected")
+    return JointRanges(
+        joints.min(axis=0),
+        joints.max(axis=0),
+        tuple(leg.limits for leg in robot.legs),
+        np.asarray((clearances(robot, joints) >= 0.0).all(axis=0)),
+    )

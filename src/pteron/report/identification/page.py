@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from markupsafe import Markup, escape
-from matplotlib.figure import Figure
 
 import pteron
 from pteron.equations.machine import closure_of
@@ -89,25 +88,24 @@ def figures(found: Contents) -> dict[str, Any]:
         "fitted": _panels(found.fitted[0], "fitted", joints, speed=not found.drawn),
         "histogram": None,
         "autocorrelation": None,
-        "certainty": _inline(
+        "certainty": svg(
             certainty_figure(names, ratios, weak, found.result.model.base.rank),
-            "certainty",
-            "Size of each value over its standard deviation",
+            name="certainty",
+            title="Size of each value over its standard deviation",
         ),
-        "correlation": _inline(
+        "correlation": svg(
             correlation_figure(names, found.result.estimate.correlation),
-            "correlation",
-            "Correlations of the identified values",
+            name="correlation",
+            title="Correlations of the identified values",
         ),
     }
     if np.isfinite(found.residuals).any():
         figure = histogram_figure(found.residuals)
         title = "Distribution of the residuals against the normal one"
-        made["histogram"] = _inline(figure, "histogram", title)
+        made["histogram"] = svg(figure, name="histogram", title=title)
         figure = autocorrelation_figure(found.correlations, found.bound)
-        made["autocorrelation"] = _inline(
-            figure, "autocorrelation", "Autocorrelation of the residuals"
-        )
+        title = "Autocorrelation of the residuals"
+        made["autocorrelation"] = svg(figure, name="autocorrelation", title=title)
     return made
 
 
@@ -125,23 +123,20 @@ def _panels(
         look: Any = {"leg": i, "joint": joints[i]}
         figure = comparison_figure(p.time[part], given, predicted, rigid, used, **look)
         title = f"Measured and predicted force of actuator {i + 1} in {shown.name}"
-        forces.append(_inline(figure, f"{name}forces{i + 1}", title))
+        forces.append(svg(figure, name=f"{name}forces{i + 1}", title=title))
         if speed:
             over = p.speed[:, i], rest[:, i], p.used[:, i]
             figure = residual_speed_figure(*over, **look)
             title = f"Residual of actuator {i + 1} over its joint's speed in {shown.name}"
-            over_speed.append(_inline(figure, f"{name}speed{i + 1}", title))
+            over_speed.append(svg(figure, name=f"{name}speed{i + 1}", title=title))
     errors = errors_figure(p.nrms, p.nrms_without_friction, p.floor)
     time = residual_time_figure(p.time, rest, p.used, joints)
-    title = f"Residuals of all actuators over time in {shown.name}"
+    title = f"Errors of the prediction of {shown.name}"
+    over_time = f"Residuals of all actuators over time in {shown.name}"
     return {
         "shown": shown,
         "forces": forces,
         "speed": over_speed,
-        "errors": _inline(errors, f"{name}errors", f"Errors of the prediction of {shown.name}"),
-        "time": _inline(time, f"{name}time", title),
+        "errors": svg(errors, name=f"{name}errors", title=title),
+        "time": svg(time, name=f"{name}time", title=over_time),
     }
-
-
-def _inline(figure: Figure, name: str, title: str) -> Markup:
-    return Markup(svg(figure, name=name, title=title))

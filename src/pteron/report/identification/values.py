@@ -9,12 +9,11 @@ from typing import Literal
 import numpy as np
 from markupsafe import Markup
 
-from pteron.bodies.inertia import Inertia
+from pteron.bodies.inertia import Inertia, with_center
 from pteron.bodies.parameters import PLATFORM
 from pteron.identification import Identification, Model
 from pteron.identification.model import Term
 from pteron.kernels import Array
-from pteron.manipulator import Manipulator
 from pteron.reduction.expressions import html_name
 from pteron.report.typeset import fixed, significant
 
@@ -165,38 +164,16 @@ def body_rows(result: Identification) -> tuple[Body, ...]:
         if p.owner in consistency.at_border
         for leg in p.legs or (None,)
     }
-    identified, drawn = _bodies(consistency.robot), _bodies(result.robot)
-    names: dict[tuple[str, int | None], str] = {
-        (letter, i): leg.names[letter]
-        for i, leg in enumerate(result.robot.legs, start=1)
-        for letter in leg.bodies
-    }
-    return tuple(
-        Body(
-            names.get(key, "platform"),
-            None if key[1] is None else key[1] - 1,
-            values,
-            drawn[key],
-            key in border,
-        )
-        for key, values in identified.items()
-    )
-
-
-def _bodies(robot: Manipulator) -> dict[tuple[str, int | None], tuple[float | None, ...]]:
-    found: dict[tuple[str, int | None], Inertia] = {
-        (letter, i): inertia
-        for i, leg in enumerate(robot.legs, start=1)
-        for letter, inertia in leg.bodies.items()
-    }
-    found[PLATFORM, None] = robot.platform.inertia
-    return {key: _values(inertia) for key, inertia in found.items()}
+    found, drawn = consistency.robot, result.robot
+    rows = [
+        Body(leg.names[letter], i - 1, _values(one), _values(old), (letter, i) in border)
+        for i, (leg, other) in enumerate(zip(found.legs, drawn.legs, strict=True), start=1)
+        for (letter, one), old in zip(leg.bodies.items(), other.bodies.values(), strict=True)
+    ]
+    body, cad = (_values(robot.platform.inertia) for robot in (found, drawn))
+    return (*rows, Body("platform", None, body, cad, (PLATFORM, None) in border))
 
 
 def _values(inertia: Inertia) -> tuple[float | None, ...]:
-    values = dict(zip(inertia.kinds, inertia.values, strict=True))
-    mass = values["m"]
-    if "I" not in values:
-        return (mass,)
-    center = (values[kind] / mass if kind in values else None for kind in ("mgx", "mgy"))
-    return (mass, *center, values["I"])
+    values = with_center(inertia)
+    return tuple(map(values.get, ("m", "mgx", "mgy", "I"))) if "I" in values else (values["m"],)
