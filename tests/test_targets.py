@@ -31,8 +31,9 @@ SEVERAL = (
     "quadrupteron-oblique",
     "quadrupteron +-+-",
     "quadrupteron, gravity along x",
-    "tripteron on a wall",
     "tripteron-oblique",
+    "delta on a wall",
+    "mixed",
     "random 3T 0",
     "random 3T1R 0",
 )
@@ -50,28 +51,28 @@ def values_of(robot, what, count=131):
     """Return inputs of a function: motions in reach, and a few rows that are not."""
     pose, velocity, acceleration = states(robot, count)
     pose = pose.copy()
-    sliders = pteron.inverse_kinematics(robot, pose)
+    joints = pteron.inverse_kinematics(robot, pose)
     pose[3, 0] += 9.0
     pose[7, :3] = 50.0
     pose[11, 2] = np.nan
     pose[12, -1] += 2e5
-    sliders[5] *= [9.0, -9.0, 5.0, 90.0][: robot.freedom]
+    joints[5] *= [9.0, -9.0, 5.0, 90.0][: robot.freedom]
     known = {
         "pose": pose,
         "velocity": velocity,
         "acceleration": acceleration,
         "forces": acceleration,
         "wrench": velocity,
-        "sliders": sliders,
-        "slider_rates": velocity,
-        "slider_accelerations": acceleration,
+        "joints": joints,
+        "joint_rates": velocity,
+        "joint_accelerations": acceleration,
     }
     return tuple(known[port.name] for port in compiled(robot, what, "vm").inputs)
 
 
 def well_inside(robot, kernel):
     """Return inputs away from singularities, which single precision holds exactly."""
-    pose = pteron.random_poses(robot, 300, seed=5, bend=0.7, hold=0.5)
+    pose = pteron.random_poses(robot, 300, seed=5, type_i=0.7, type_ii=0.5)
     rates = np.random.default_rng(5).normal(size=(2, *pose.shape))
     return [value.astype(np.float32) for value in (pose, *rates)][: len(kernel.inputs)]
 
@@ -145,6 +146,8 @@ def test_c_on_other_modes_layouts_and_gravity(name):
         ("quadrupteron-oblique", "direct_kinematics"),
         ("quadrupteron-oblique", DYNAMICS),
         ("tripteron", DYNAMICS),
+        ("delta", "direct_kinematics"),
+        ("mixed", DYNAMICS),
     ],
 )
 def test_numba_returns_the_same_bits(name, what):
@@ -152,7 +155,7 @@ def test_numba_returns_the_same_bits(name, what):
     assert_agrees(MECHANISMS[name], what, "numba")
 
 
-@pytest.mark.parametrize("name", ["quadrupteron-oblique", "tripteron", "quadrupteron +-+-"])
+@pytest.mark.parametrize("name", ["quadrupteron-oblique", "tripteron", "delta"])
 def test_general_code_serves_every_machine_of_a_topology(name):
     robot = MECHANISMS[name]
     values = values_of(robot, DYNAMICS)
@@ -162,7 +165,7 @@ def test_general_code_serves_every_machine_of_a_topology(name):
     if compiler() is not None:
         fast = compiled(robot, DYNAMICS, "c", grade="general")
         assert_same_bits(fast(*values), expected)
-        other = random_machine(3, robot.platform.turns)
+        other = random_machine(3, "P" * robot.freedom)
         assert compiled(other, DYNAMICS, "c", grade="general").source == fast.source
 
 
@@ -255,8 +258,8 @@ def test_jax_is_a_pure_function_that_jits_maps_and_differentiates():
     slopes = jax.jacrev(lambda p: kernel(*motion, parameters=p))(values)
     regressor = pteron.regressor(ROBOT, *motion)
     np.testing.assert_allclose(slopes, regressor, atol=1e-12 * np.abs(regressor).max())
-    sliders = compiled(ROBOT, "inverse_kinematics", "jax")
-    rates = jax.jvp(sliders, (pose,), (velocity,))[1]
+    joints = compiled(ROBOT, "inverse_kinematics", "jax")
+    rates = jax.jvp(joints, (pose,), (velocity,))[1]
     expected = (pteron.jacobian(ROBOT, pose) @ velocity[..., None])[..., 0]
     assert_close(rates, expected, 1e-12)
 
