@@ -12,7 +12,8 @@ from pteron.kinematics.evaluate import unchecked
 from pteron.reduction import BaseParameters
 
 _ROWS = 100
-"""Rows of a matrix that are decomposed at a time."""
+"""Rows that are decomposed at a time: so few that the linear algebra library stays in one thread;
+several, on a machine that is busy, can take a hundred times as long."""
 
 
 @dataclass(frozen=True)
@@ -120,11 +121,7 @@ def stacked_regressor(motion: FourierMotion, base: BaseParameters, times: Array)
 
 
 def _qr_factor(matrix: Array) -> Array:
-    """Return R of the QR decomposition, some rows at a time.
-
-    On blocks so small the linear algebra library stays in one thread; several, on a machine that is
-    busy, can take a hundred times as long.
-    """
+    """Return R of the QR decomposition, some rows at a time."""
     p = matrix.shape[1]
     factor: Array = np.zeros((p, p))
     for start in range(0, len(matrix), _ROWS):
