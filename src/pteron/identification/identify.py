@@ -162,7 +162,6 @@ def identify(
     for name, mass in rotors.items():
         known += model.share_of(name, mass)
     consistency, share, missing = _real_bodies(model, estimate, known, observations, cad, bounds)
-    notes = [*_notes(model, estimate, rotors), *missing]
     advice = doubts(model, estimate, known, consistency, cad)
     if hidden or essential.dropped:
         weak = ", ".join(dict.fromkeys((*hidden, *essential.dropped)))
@@ -184,7 +183,7 @@ def identify(
         verdict=replace(verdict, next_steps=(*verdict.next_steps, *advice)),
         unseen=hidden,
         findings=tuple(f for one in (*whole, *others) for f in one.findings),
-        notes=tuple(notes),
+        notes=(*_notes(model, estimate, rotors), *missing),
     )
 
 

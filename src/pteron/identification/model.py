@@ -237,11 +237,10 @@ def identification_model(
     (('Fc1', 'Fc2', 'Fc3', 'Fv1'), ('N', 'N', 'N', 'N s/m'))
     """
     model = Model(base or base_parameters(robot), terms or Terms())
-    columns = model._everything(_probes(robot))
-    flat = columns.reshape(-1, columns.shape[-1])
+    names = model.names
+    flat = model._everything(_probes(robot)).reshape(-1, len(names))
     lengths = np.linalg.norm(flat, axis=0)
     lengths = np.where(lengths > 0.0, lengths, 1.0)
-    names = model.names
     factor: Array = np.linalg.qr(flat / lengths)[1]
     # The diagonal of R is what is left of each column once those before it are taken out of it.
     rest = np.abs(np.diag(factor))

@@ -97,8 +97,7 @@ def conditioning(
     count = samples or 40 * motion.harmonics
     matrix = stacked_regressor(motion, base, motion.uniform_times(count))
     if not np.isfinite(matrix).all():
-        worst = float("inf")
-        return Conditioning(worst, worst, worst, -worst)
+        return Conditioning(np.inf, np.inf, np.inf, -np.inf)
     # Scaling columns commutes with it: R of W = Q R has the condition numbers of W.
     factor = _qr_factor(matrix)
     lengths = np.linalg.norm(factor, axis=0)
