@@ -26,8 +26,8 @@ from pteron.identification.signals import (
     uniform,
     white_noise,
 )
-from pteron.identification.signals.blocks import blocks
 from pteron.identification.signals.derivatives import LOST
+from pteron.identification.signals.samples import blocks
 from pteron.kinematics.evaluate import unchecked
 from pteron.workspace import home_pose
 

@@ -30,18 +30,10 @@ _Choice = tuple[tuple[int, ...], tuple[int, ...]]
 
 @dataclass(frozen=True)
 class Fault:
-    """Columns of forces, or of joints, that are not what they are called.
+    """Columns of forces, or of joints, that are not what their `names` say.
 
-    Attributes
-    ----------
-    names : tuple of str
-        What the columns are called: force1 ..., or rho1 ..., at cranks torque1 ... and theta1 ... .
-    order : tuple of int
-        Which of them, from 0, belongs to each actuator.
-    signs : tuple of int
-        1, or -1 for a column whose sign is flipped.
-    before, after : float
-        Error of the fit relative to the forces, as it is and when mended.
+    `order` is which of them, from 0, belongs to each actuator, a sign is -1 where it is flipped;
+    `before` and `after` mending they leave such errors of the fit relative to the forces.
     """
 
     names: tuple[str, ...]
@@ -55,14 +47,12 @@ class Fault:
         parts = []
         n = len(self.order)
         flipped = [k for k in range(n) if self.signs[k] < 0]
-        moved = [k for k in range(n) if self.order[k] != k]
-        if moved:
-            names = _listed([self.names[k] for k in moved])
-            verb = "are swapped" if len(moved) == 2 else "are in another order"
-            parts.append(f"{names} {verb}")
-            if len(moved) > 2:
-                order = ", ".join(self.names[k] for k in self.order)
-                parts[-1] += f" (they should be {order})"
+        moved = [name for k, name in enumerate(self.names) if self.order[k] != k]
+        if len(moved) == 2:
+            parts.append(f"{_listed(moved)} are swapped")
+        elif moved:
+            order = ", ".join(self.names[k] for k in self.order)
+            parts.append(f"{_listed(moved)} are in another order (they should be {order})")
         if len(flipped) == n:
             parts.append("the forces, or all joints, have the sign flipped")
         elif flipped:
@@ -74,9 +64,7 @@ class Fault:
 def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> Fault | None:
     """Return the exchange of columns, or of signs, that explains a log's forces far better.
 
-    All n! 2^n orders and signs of the forces are tried, all orders of the joints, and their signs
-    one by one. Signs of all forces at once are settled by the machine's inertia, which is positive.
-    None where nothing makes the error three times smaller, or the inertia positive.
+    None where nothing makes the error three times smaller, or the machine's inertia positive.
     """
     # Without the mask of slow joints, which belongs to the order that is in question.
     plain = replace(preprocessing, slow=np.zeros_like(preprocessing.slow))
@@ -88,8 +76,9 @@ def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> Fault 
     errors = _errors(observations, choices)
     before = errors[0]
     best = int(np.argmin(errors))
-    order, sign = choices[best] if errors[best] * _DECISIVE < before else choices[0]
-    after = min(errors[best], before) if (order, sign) != choices[0] else before
+    if not errors[best] * _DECISIVE < before:
+        best = 0
+    (order, sign), after = choices[best], errors[best]
     swapped = exchanged_joints(model, log, plain, before)
     # Exchanged forces can do some of what exchanged joints do.
     if swapped is not None and swapped.after < 0.7 * after:
@@ -100,21 +89,18 @@ def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> Fault 
         sign = tuple(-s for s in sign)
     if (order, sign) == choices[0]:
         return None
-    names = tuple(f"{leg.joint.force}{i}" for i, leg in enumerate(model.robot.legs, start=1))
-    return Fault(names, tuple(order), sign, before, after)
+    return Fault(model.robot.force_names, order, sign, before, after)
 
 
 def _errors(observations: Observations, choices: Sequence[_Choice]) -> list[float]:
-    """Return the error of the fit relative to the forces, for each order and signs of these.
-
-    One factorisation serves all: the error is what the projection on the columns leaves.
-    """
+    """Return the error of the fit relative to the forces, for each order and signs of these."""
     step = max(len(observations.forces) // _ROWS, 1)
     matrix, forces = observations.matrix[::step], observations.forces[::step]
     flat = matrix.reshape(-1, matrix.shape[-1])
     lengths = np.linalg.norm(flat, axis=0)
     basis = np.linalg.qr(flat / np.where(lengths > 0.0, lengths, 1.0))[0]
     found = []
+    # One factorisation serves all: the error is what the projection on the columns leaves.
     for order, signs in choices:
         given = (forces[:, list(order)] * np.array(signs)).ravel()
         image = basis.T @ given
@@ -126,13 +112,9 @@ def _errors(observations: Observations, choices: Sequence[_Choice]) -> list[floa
 def exchanged_joints(
     model: Model, log: Log, preprocessing: Preprocessing, before: float
 ) -> Fault | None:
-    """Return the order of the joints, or the sign of one, that explains the forces far better.
-
-    `before` is the error of the fit relative to the forces as they are.
-    """
+    """Return the order of the joints, or the sign of one, that makes the error `before` small."""
     n = log.joints.shape[1]
     best: Fault | None = None
-    names = tuple(f"{leg.joint.coordinate}{i}" for i, leg in enumerate(model.robot.legs, start=1))
     usual, upright = tuple(range(n)), (1,) * n
     choices = [(usual, tuple(-1 if k == i else 1 for k in range(n))) for i in range(n)]
     # Few exchanges first: of two orders that do as well, the simpler one is meant.
@@ -146,7 +128,7 @@ def exchanged_joints(
             continue  # no poses in this order
         (error,) = _errors(observations, [(usual, upright)])
         if error * _DECISIVE < (before if best is None else best.after * _DECISIVE):
-            best = Fault(names, order, signs, before, error)
+            best = Fault(model.robot.joint_names, order, signs, before, error)
     return best
 
 

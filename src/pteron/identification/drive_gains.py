@@ -215,11 +215,9 @@ def _unit(logs: list[Log]) -> str:
 
 
 def _total(observations: Observations, carried: Array, source: str) -> tuple[Array, float, float]:
-    """Return g and beta by total least squares, with the condition number and the gap.
-
-    The columns W are exact, as in the likelihood: noise is in the currents alone. Else the weakest
-    of dozens of inertial parameters would pass for the null vector.
-    """
+    """Return g and beta by total least squares, with the condition number and the gap."""
+    # The columns W are exact, as in the likelihood: noise is in the currents alone. Else the
+    # weakest of dozens of inertial parameters would pass for the null vector.
     n, p = observations.actuators, len(observations.names)
     currents = observations.forces[..., None] * np.eye(n)
     homogeneous = replace(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import combinations, product
 
 from pteron.errors import DataError
 from pteron.identification.diagnosis import column_fault, exchanged_joints
@@ -39,15 +40,43 @@ def check_recordings(
 ) -> None:
     """Refuse recordings of currents, of values that are no forces, and what is given twice."""
     for one in (*whole, *others):
-        _check_forces(one)
-    _check_apart(whole, others)
-    _check_period(whole, wanted.period)
+        if isinstance(one.log, Log):
+            check_strength(one.log.forces, one.log.force_names, one.source, one.log.first_row)
+        unit = one.head().description.force_unit
+        if unit != "N":
+            raise LogError(
+                "currents",
+                one.source,
+                f"its forces are in {unit}; declare gains (N, at a crank N m, per {unit}) in its "
+                "description, or find them with identify_drive_gains",
+            )
+    for one, other in combinations(whole, 2):
+        if same(one, other):
+            raise LogError(
+                "twice", other.source, f"the same samples as {one.source}; give them once"
+            )
+    for one, other in product(whole, others):
+        if same(one, other):
+            raise LogError(
+                "twice",
+                other.source,
+                "is held out, but the same samples are fitted; hold out another motion, or "
+                "nothing: then the end of each log is",
+            )
+    for log in (one.log for one in whole):
+        period = wanted.period
+        if isinstance(log, Log) and period and log.duration < period * (1.0 - 1e-3):
+            raise LogError(
+                "too short",
+                log.source,
+                f"period: {period:g} s given, but it lasts {log.duration:g} s; give the time "
+                "after which the motion repeats, or none",
+            )
 
 
 def check_payload(fit: Sequence[Recording]) -> None:
     """Refuse recordings that do not tell when a payload is carried."""
-    heads = [one.head() for one in fit]
-    if all(head.payload is None for head in heads):
+    if all(one.head().payload is None for one in fit):
         raise LogError(
             "no payload",
             fit[0].source,
@@ -59,14 +88,13 @@ def check_payload(fit: Sequence[Recording]) -> None:
 def preprocessing_for(robot: Manipulator, one: Recording, wanted: Processing) -> Preprocessing:
     """Return how a recording is to be preprocessed, from its beginning."""
     head = one.head()
-    rows = one.rows
     period = wanted.period or head.description.period
     # What lasts less than a period is no periodic log.
     if wanted.derivatives is None and period is not None and head.duration < 0.999 * period:
         head = replace(head, description=replace(head.description, period=None))
         wanted = replace(wanted, period=None)
-    if not isinstance(one.log, Log):
-        rows = max(rows, 1 << 30)  # a file that is read in pieces is never fitted in one
+    # A file that is read in pieces is never fitted in one.
+    rows = one.rows if isinstance(one.log, Log) else 1 << 30
     return preprocessing_of(robot, head, wanted, rows=rows)
 
 
@@ -79,9 +107,7 @@ def fit_observations(
     except LogError as error:
         if error.reason != "no pose":
             raise
-        head = one.head()
-        some = head.part(0, min(head.rows, _LOOK))
-        swap = exchanged_joints(model, some, preprocessing, _EXPLAINED)
+        swap = exchanged_joints(model, one.head().part(0, _LOOK), preprocessing, _EXPLAINED)
         if swap is None:
             raise
         error.args = (f"{error}; or {swap.message()}: then every row has a pose",)
@@ -113,9 +139,7 @@ def estimated(
 
 def check_columns(model: Model, one: Recording, preprocessing: Preprocessing) -> None:
     """Refuse a log whose columns, exchanged or with other signs, would be explained far better."""
-    head = one.head()
-    head = head.part(0, min(head.rows, _LOOK))
-    fault = column_fault(model, head, preprocessing)
+    fault = column_fault(model, one.head().part(0, _LOOK), preprocessing)
     if fault is None:
         return
     if fault.after < fault.before:
@@ -128,49 +152,3 @@ def check_columns(model: Model, one: Recording, preprocessing: Preprocessing) ->
         f"{fault.message()}{why}; correct the columns, or declare their order and gains in the "
         "log's description",
     )
-
-
-def _check_forces(one: Recording) -> None:
-    """Refuse a recording of currents whose gains are not known, or of values that are no forces."""
-    if isinstance(one.log, Log):
-        check_strength(one.log.forces, one.log.force_names, one.source, one.log.first_row)
-    unit = one.head().description.force_unit
-    if unit != "N":
-        raise LogError(
-            "currents",
-            one.source,
-            f"its forces are in {unit}; declare gains (N, at a crank N m, per {unit}) in its "
-            "description, or find them with identify_drive_gains",
-        )
-
-
-def _check_apart(whole: Sequence[Recording], others: Sequence[Recording]) -> None:
-    """Refuse a recording that is given twice: what was fitted is no evidence."""
-    for i, one in enumerate(whole):
-        for other in whole[i + 1 :]:
-            if same(one, other):
-                raise LogError(
-                    "twice", other.source, f"the same samples as {one.source}; give them once"
-                )
-        for other in others:
-            if same(one, other):
-                raise LogError(
-                    "twice",
-                    other.source,
-                    "is held out, but the same samples are fitted; hold out another motion, or "
-                    "nothing: then the end of each log is",
-                )
-
-
-def _check_period(whole: Sequence[Recording], period: float | None) -> None:
-    for one in whole:
-        head = one.head()
-        if period is None or not isinstance(one.log, Log):
-            continue
-        if head.duration < period * (1.0 - 1e-3):
-            raise LogError(
-                "too short",
-                one.source,
-                f"period: {period:g} s given, but it lasts {head.duration:g} s; give the time "
-                "after which the motion repeats, or none",
-            )

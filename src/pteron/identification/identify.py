@@ -13,7 +13,6 @@ from pteron.identification.consistency import Bounds, Consistency, MissingSolver
 from pteron.identification.errors import LogError
 from pteron.identification.estimators import (
     ESTIMATORS,
-    Essential,
     Estimate,
     essential_parameters,
     weighted,
@@ -109,7 +108,9 @@ def identify(
         [recording(log, read) for log in _sequence(given, robot)] for given in (logs, held_out)
     )
     check_recordings(whole, others, wanted)
-    fit, check = (whole, others) if others else _divided(whole, wanted.period)
+    halves = [] if others else [divided(one, wanted.period) for one in whole]
+    fit = [first for first, _ in halves] or whole
+    check = others or [second for _, second in halves]
 
     # Build the model
     base = base_parameters(robot, shared=shared)
@@ -161,8 +162,14 @@ def identify(
     for name, mass in rotors.items():
         known += model.share_of(name, mass)
     consistency, share, missing = _real_bodies(model, estimate, known, observations, cad, bounds)
-    notes = [*_notes(model, estimate, rotors), *missing]
-    advice = [*_advice(hidden, essential), *doubts(model, estimate, known, consistency, cad)]
+    advice = doubts(model, estimate, known, consistency, cad)
+    if hidden or essential.dropped:
+        weak = ", ".join(dict.fromkeys((*hidden, *essential.dropped)))
+        advice.insert(
+            0,
+            f"Weak with this motion: {weak}. A motion from pteron excite, faster or longer, would "
+            "show more of them.",
+        )
     return Identification(
         robot=robot,
         model=model,
@@ -176,7 +183,7 @@ def identify(
         verdict=replace(verdict, next_steps=(*verdict.next_steps, *advice)),
         unseen=hidden,
         findings=tuple(f for one in (*whole, *others) for f in one.findings),
-        notes=tuple(notes),
+        notes=(*_notes(model, estimate, rotors), *missing),
     )
 
 
@@ -198,14 +205,6 @@ def _reader(report: Stage, task: str) -> Callable[[int], None]:
         report(task, done, done)
 
     return tell
-
-
-def _divided(
-    whole: Sequence[Recording], period: float | None
-) -> tuple[list[Recording], list[Recording]]:
-    """Return what of each recording is fitted, and what is held out."""
-    pairs = [divided(one, period or one.head().description.period) for one in whole]
-    return [first for first, _ in pairs], [second for _, second in pairs]
 
 
 def _reflected(fit: Sequence[Recording]) -> dict[str, float]:
@@ -286,13 +285,3 @@ def _notes(model: Model, estimate: Estimate, rotors: dict[str, float]) -> list[s
     for name, shares in model.joins.items():
         notes.append(f"{name} joins {' and '.join(shares) or 'nothing: it does not act'}.")
     return notes
-
-
-def _advice(hidden: tuple[str, ...], essential: Essential) -> tuple[str, ...]:
-    if not hidden and not essential.dropped:
-        return ()
-    weak = ", ".join(dict.fromkeys((*hidden, *essential.dropped)))
-    return (
-        f"Weak with this motion: {weak}. A motion from pteron excite, faster or longer, would "
-        "show more of them.",
-    )

@@ -99,22 +99,18 @@ class Model:
     @cached_property
     def all_terms(self) -> tuple[Term, ...]:
         """The terms, those that join others too."""
-        joints = [leg.joint for leg in self.robot.legs]
+        joints = list(enumerate((leg.joint for leg in self.robot.legs), start=1))
+        slides = {i: joint.unit == "m" for i, joint in joints}
         found: list[Term] = []
-        for i, joint in enumerate(joints, start=1):
-            if self.terms.coulomb:
-                found.append(Term("coulomb", f"Fc{i}", joint.force_unit))
-        for i, joint in enumerate(joints, start=1):
-            if self.terms.viscous:
-                unit = "N s/m" if joint.unit == "m" else "N m s"
-                found.append(Term("viscous", f"Fv{i}", unit))
-        for i, joint in enumerate(joints, start=1):
-            if self.terms.offset:
-                found.append(Term("offset", f"offset{i}", joint.force_unit))
+        if self.terms.coulomb:
+            found += [Term("coulomb", f"Fc{i}", joint.force_unit) for i, joint in joints]
+        if self.terms.viscous:
+            found += [Term("viscous", f"Fv{i}", "N s/m" if slides[i] else "N m s") for i in slides]
+        if self.terms.offset:
+            found += [Term("offset", f"offset{i}", joint.force_unit) for i, joint in joints]
         found += [Term("passive", name, "N m s") for name in self._passive]
-        for i, joint in enumerate(joints, start=1):
-            if self.terms.rotors:
-                found.append(Term("rotor", f"J_m{i}", "kg" if joint.unit == "m" else "kg m^2"))
+        if self.terms.rotors:
+            found += [Term("rotor", f"J_m{i}", "kg" if slides[i] else "kg m^2") for i in slides]
         if self.terms.payload:
             units = ("kg", "kg m", "kg m", "kg m^2")
             pairs = zip(PLATFORM_KINDS, units, strict=True)
@@ -167,12 +163,9 @@ class Model:
 
     def matrix(self, states: States) -> Array:
         """Return the regressor (R, n, p) of states: N or N m per unit of each value."""
-        return np.ascontiguousarray(self._everything(states)[..., self._kept])
-
-    @property
-    def _kept(self) -> list[int]:
         names = (*self.base.names, *(term.name for term in self.all_terms))
-        return [k for k, name in enumerate(names) if name not in self.left_out]
+        kept = [k for k, name in enumerate(names) if name not in self.joins]
+        return np.ascontiguousarray(self._everything(states)[..., kept])
 
     @property
     def _passive(self) -> dict[str, list[int]]:
@@ -244,11 +237,10 @@ def identification_model(
     (('Fc1', 'Fc2', 'Fc3', 'Fv1'), ('N', 'N', 'N', 'N s/m'))
     """
     model = Model(base or base_parameters(robot), terms or Terms())
-    columns = model._everything(_probes(robot))
-    flat = columns.reshape(-1, columns.shape[-1])
+    names = model.names
+    flat = model._everything(_probes(robot)).reshape(-1, len(names))
     lengths = np.linalg.norm(flat, axis=0)
     lengths = np.where(lengths > 0.0, lengths, 1.0)
-    names = model.names
     factor: Array = np.linalg.qr(flat / lengths)[1]
     # The diagonal of R is what is left of each column once those before it are taken out of it.
     rest = np.abs(np.diag(factor))

@@ -18,7 +18,7 @@ from pteron.identification.errors import LogError
 from pteron.identification.logs import Log
 from pteron.identification.model import Model
 from pteron.identification.signals import Preprocessing, States
-from pteron.identification.signals.derivatives import FourierFit
+from pteron.identification.signals.derivatives import EVEN, FourierFit
 from pteron.identification.signals.fourier import (
     Projection,
     fitted_series,
@@ -30,9 +30,6 @@ from pteron.kernels import Array
 
 _LEAST_SHARE = 0.3
 """Noise of an equation, relative to the usual, below which it is made of hardly any samples."""
-
-_EVEN = 1e-3
-"""Deviation from even steps, in steps, that is a matter of how stamps were written."""
 
 
 @dataclass(frozen=True)
@@ -153,11 +150,9 @@ def stacked(parts: Sequence[Observations]) -> Observations:
 
 
 def in_motion(rates: Array, slow: Array, rows: int, *, wraps: bool = False) -> Array:
-    """Return 1 where a joint (R, n) moves, 0 where its friction is not known.
+    """Return 1 where a joint (R, n) moves, 0 where its friction is not known, and `rows` around it.
 
-    Dry friction turns with the rate, and acceleration jumps with it: what is slow is left out, and
-    the rows before and after it. Both sides are multiplied with the result before the parallel
-    filter: what is left out is out on both.
+    Both sides of F = W beta are multiplied with it before the parallel filter.
     """
     moves = (np.abs(rates) >= slow).astype(float)
     size, mode = 2 * rows + 1, "wrap" if wraps else "nearest"
@@ -166,11 +161,11 @@ def in_motion(rates: Array, slow: Array, rows: int, *, wraps: bool = False) -> A
 
 def _filtered(model: Model, block: Samples, preprocessing: Preprocessing) -> Observations:
     decimation = preprocessing.decimation
-    states, forces = block.states, block.forces
-    inner = slice(preprocessing.settling, len(states) - preprocessing.settling)
-    moving = in_motion(states.joint_rates, preprocessing.slow, preprocessing.settling)
+    settling = preprocessing.settling
+    inner = slice(settling, len(block.states) - settling)
+    moving = in_motion(block.states.joint_rates, preprocessing.slow, settling)
     moving = (moving * block.smooth[:, None])[inner]
-    states, forces = states.part(inner), forces[inner]
+    states, forces = block.states.part(inner), block.forces[inner]
     kept = decimation.centers(len(states))
     return _assembled(
         model,
@@ -227,11 +222,9 @@ def _phases(log: Log, rate: float, fit: FourierFit) -> list[Log]:
 def _periodic(
     model: Model, log: Log, preprocessing: Preprocessing, fit: FourierFit
 ) -> Observations:
-    """Return the observations of one period, with noise averaged over all that were recorded.
-
-    The parallel filter keeps the harmonics up to the band, on both sides, and as many rows as
-    these have coefficients: a projection, so that white noise stays white.
-    """
+    """Return the observations of one period, with noise averaged over all that were recorded."""
+    # The parallel filter keeps the harmonics up to the band, on both sides, and as many rows as
+    # these have coefficients: a projection, so that white noise stays white.
     period, rate = fit.period, preprocessing.rate
     start = float(log.time[0])
     periods = int((log.duration + 1.0 / rate) / period + 1e-3)
@@ -258,7 +251,7 @@ def _periodic(
 
     places = (log.time - start) * (per_period / period)
     used = moving[np.round(places).astype(int) % per_period]
-    if log.rows == periods * per_period and np.abs(places - np.arange(log.rows)).max() <= _EVEN:
+    if log.rows == periods * per_period and np.abs(places - np.arange(log.rows)).max() <= EVEN:
         # All periods have their samples at the same instants: one stands for all.
         matrix = _projected(regressor(fine, moving, log.first_row), count)
         forces = fitted_series(log.time, used * log.forces, period, highest=harmonics / period)

@@ -191,8 +191,7 @@ def identify_payload(
     estimate = estimator(observations_with_payload(model, without, with_payload, processing))
     names = tuple(name for name in estimate.names if name in _NAMES)
     chosen = [estimate.names.index(name) for name in names]
-    found = dict(zip(names, (float(value) for value in estimate.values[chosen]), strict=True))
-    mass, hx, hy, inertia = (found.get(name) for name in _NAMES)
+    mass, hx, hy, inertia = (estimate.value(n) if n in names else None for n in _NAMES)
     return Payload(
         mass=mass,
         first_moment=None if hx is None or hy is None else (hx, hy),
@@ -207,23 +206,15 @@ def identify_payload(
 def observations_with_payload(
     model: Model, without: Log, with_payload: Log | None, processing: Processing | None
 ) -> Observations:
-    """Return the observations of a log with both phases, or of two logs, as one.
-
-    Raises
-    ------
-    LogError
-        If a phase is missing, or nothing of it is left between the filters' edges.
-    """
+    """Return the observations of a log with both phases, or of two logs, as one."""
     if with_payload is None:
         logs = [without]
         _check_phases(without)
     else:
         logs = [_in_phase(without, 0), _in_phase(with_payload, 1)]
+    plans = [preprocessing_of(model.robot, log, processing) for log in logs]
     observations = stacked(
-        [
-            observations_of(model, log, preprocessing_of(model.robot, log, processing))
-            for log in logs
-        ]
+        [observations_of(model, *pair) for pair in zip(logs, plans, strict=True)]
     )
     seen = (observations.gain > 0.0).any(axis=1)
     for phase, called in ((0, "without payload"), (1, "with payload")):

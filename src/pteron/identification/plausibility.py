@@ -86,20 +86,15 @@ def left_over(estimate: Estimate, preprocessing: Sequence[Preprocessing]) -> str
 
 
 def has_negative_inertia(model: Model, values: Array) -> bool:
-    """Say whether values (p,) give a machine whose kinetic energy is negative.
-
-    x''^T M x'', the product of accelerations and the forces that they need, is positive for every
-    real machine, whatever its CAD says.
-    """
-    robot = model.robot
-    rng = np.random.default_rng(0)
+    """Say whether values (p,) give a machine whose kinetic energy is negative."""
+    # x''^T M x'' is positive for every real machine, whatever its CAD says.
+    robot, rng = model.robot, np.random.default_rng(0)
     pose = random_poses(robot, _PROBES, seed=rng, type_i=0.3, type_ii=0.3)
     acceleration = rng.normal(size=pose.shape)
     rest = np.zeros_like(pose)
-    base = values[: model.base.rank]
     needed = base_regressor(robot, model.base, pose, rest, acceleration)
     still = base_regressor(robot, model.base, pose, rest, rest)
-    forces = (needed - still) @ base
+    forces = (needed - still) @ values[: model.base.rank]
     jacobians = unchecked(robot, "jacobian", pose)
     products = np.einsum("rn,rnm,rm->r", forces, jacobians, acceleration)
     return bool((products < 0.0).mean() > 0.5)
@@ -108,8 +103,7 @@ def has_negative_inertia(model: Model, values: Array) -> bool:
 def unseen(model: Model, deviations: Array) -> tuple[tuple[str, ...], bool]:
     """Return the base parameters that a log cannot show, and whether they are too many.
 
-    Those whose standard deviation, among the (p,) of all values, is larger than what they are
-    usually made of: the sizes of the CAD's parameters, added up as they are grouped.
+    Their standard deviation, among the (p,) of all values, is larger than what they are made of.
     """
     base = model.base
     hidden = deviations[: base.rank] > _usual(model, parameters(model.robot))

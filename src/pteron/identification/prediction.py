@@ -117,11 +117,6 @@ def predict(
     """Return how well a model with values (p,) predicts a recording, preprocessed in its way.
 
     `progress` is called with the number of rows just read.
-
-    Raises
-    ------
-    LogError
-        If a sample has no pose or is next to a singularity, or the recording is too short.
     """
     n = len(model.robot.legs)
     plain = values.copy()
@@ -144,8 +139,7 @@ def predict(
             (error**2).sum(axis=0),
         ]
         counts += used.sum(axis=0)
-        first = -total % step
-        rows = slice(first, None, step)
+        rows = slice(-total % step, None, step)
         columns = states.time, measured, predicted, without, states.joint_rates, used
         shown.append(np.column_stack([column[rows] for column in columns]))
         total += len(states)

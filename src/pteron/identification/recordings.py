@@ -31,14 +31,9 @@ _FIT = 0.7
 
 @dataclass(frozen=True)
 class Recording:
-    """A log, or some rows of it, that can be read more than once.
+    """A log, or its rows `start` to `stop`, that can be read more than once.
 
-    Attributes
-    ----------
-    log : Log or LogFile
-        Where the samples are.
-    start, stop : int
-        The rows that are meant, from 0; `stop` may lie beyond the last.
+    Rows count from 0; `stop` may lie beyond the last.
     """
 
     log: Log | LogFile
@@ -104,10 +99,8 @@ def recording(log: Log | LogFile, progress: Callable[[int], None] | None = None)
 
 def same(one: Recording, other: Recording) -> bool:
     """Say whether two recordings hold the same samples."""
-    first, second = one.head(), other.head()
-    return np.array_equal(first.forces, second.forces) and np.array_equal(
-        first.joints, second.joints
-    )
+    a, b = one.head(), other.head()
+    return np.array_equal(a.forces, b.forces) and np.array_equal(a.joints, b.joints)
 
 
 def _since(time: Array) -> Array:
@@ -136,16 +129,12 @@ def _since(time: Array) -> Array:
 def divided(whole: Recording, period: float | None) -> tuple[Recording, Recording]:
     """Return the part of a recording to fit, and the part to hold out: its end.
 
-    At a whole number of periods, where the motion is periodic.
-
-    Raises
-    ------
-    DataError
-        If it is too short to be divided.
+    At a whole number of periods, where the motion is periodic: with `period`, or as it is declared.
     """
     cut = whole.start + int(_FIT * whole.rows)
-    if period is not None and isinstance(whole.log, Log):
-        log = whole.log
+    log = whole.log
+    period = period or log.description.period
+    if period is not None and isinstance(log, Log):
         whole_periods = int((log.duration + 1.0 / log.rate) / period + 1e-3)
         if whole_periods >= 2:
             share = min(max(round(_FIT * whole_periods), 1), whole_periods - 1)

@@ -29,14 +29,8 @@ _LEAST_MARGIN = 1e-6
 class Bodies:
     """The free parameters, those that legs share counted once, and the bodies they describe.
 
-    Attributes
-    ----------
-    columns : tuple of Parameter
-        The free parameters.
-    sharing : array, shape (N, columns)
-        parameters = sharing @ free parameters.
-    extents : array, shape (bodies, 2)
-        Least and greatest x of each body, m: its length makes its parameters comparable.
+    All N parameters are `sharing` @ free parameters; `extents` (bodies, 2) are the least and
+    greatest x of each body, m: its length makes its parameters comparable.
     """
 
     columns: tuple[Parameter, ...]
@@ -62,11 +56,10 @@ class Bodies:
     def cones(self) -> tuple[list[int], Array, Array, Array, Array]:
         """The bodies that turn, and what takes their m, hx, hy and I out of the columns."""
         turning = [b for b, place in enumerate(self.places.values()) if "I" in place]
-        unit = np.eye(len(self.columns))
         rows = {kind: np.zeros((len(turning), len(self.columns))) for kind in LENGTH_POWERS}
         for row, place in enumerate(p for p in self.places.values() if "I" in p):
             for kind, column in place.items():
-                rows[kind][row] = unit[column]
+                rows[kind][row, column] = 1.0
         return turning, rows["m"], rows["mgx"], rows["mgy"], rows["I"]
 
     def scale(self, masses: Array) -> Array:
@@ -83,10 +76,9 @@ class Bodies:
         return np.asarray((self.sharing / self.sharing.sum(axis=0)).T @ values)
 
     def least(self, scaled: Array) -> Array:
-        """Return how far inside each body is, from scaled free parameters.
+        """Return the least eigenvalue of each [[m, |h|], [|h|, I]], or the mass that does not turn.
 
-        The least eigenvalue of [[m, |h|], [|h|, I]]: no real body has a negative one. Of a body
-        that does not turn it is its mass.
+        No real body has a negative one.
         """
         turning, *rows = self.cones
         m, hx, hy, inertia = (row @ scaled for row in rows)
@@ -181,12 +173,8 @@ def real_bodies(robot: Manipulator, values: ArrayLike | None = None) -> tuple[st
 class Target:
     """Minimise |matrix @ z - right| over the scaled free parameters z = free / scale.
 
-    Attributes
-    ----------
-    scale : array, shape (columns,)
-        Units of z: a mass of each body, and its length.
-    margins : array, shape (bodies,)
-        How far inside its cone each body is kept.
+    `scale` is made of a mass of each body and its length; `margins` (bodies,) are how far inside
+    its cone each body is kept.
     """
 
     kind: Literal["CAD", "nothing"]
@@ -212,11 +200,9 @@ def cad_target(bodies: Bodies, cad: Array) -> Target:
 def plain_target(bodies: Bodies, base: BaseParameters, values: Array) -> Target:
     """Return the deviation from uniform rods and a uniform disc, all of about one mass.
 
-    Shapes are relative to the body's own mass, so that no mass is guessed: with c and k of a rod
-    (1/2, 1/3) or a disc (0, 1/2), in lengths of the body, the sum over bodies of
-    (m - mean)^2 + (hx - c m)^2 + hy^2 + (I - k m)^2. It is strictly convex, so that the answer
-    is one, also where the forces leave a parameter entirely free (the platform's inertia of a
-    Tripteron); an analytic centre would not exist there.
+    It sums (m - mean)^2 + (hx - c m)^2 + hy^2 + (I - k m)^2 over bodies, with c and k of a rod
+    (1/2, 1/3) or a disc (0, 1/2), in lengths of the body: strictly convex, so that the answer is
+    one, also where the forces leave a parameter entirely free (a Tripteron's platform's inertia).
     """
     kept = (base.parameters[column] for column in base.kept)
     masses = [abs(v) for v, p in zip(values, kept, strict=True) if p.kind == "m"]

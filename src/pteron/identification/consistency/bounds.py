@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -97,28 +97,27 @@ class Bounds:
         """
         columns = parameter_data(robot)
         places = body_places(columns)
-        rows: list[tuple[dict[int, float], float, str]] = []
+        unit = np.eye(len(columns))
+        rows: list[tuple[Array, float, str]] = []
         for side, sign, sense in ((self.lower, -1.0, ">="), (self.upper, 1.0, "<=")):
             for key, limit in side.items():
                 if not np.isfinite(limit):
                     raise ModelError(f"bounds: {key}: {limit} is not a number")
                 known = {p.name: f"{p.kind}_{p.body}" for p in columns}
                 for name in _matching(key, known, "parameter"):
-                    column = list(known).index(name)
-                    rows.append(({column: sign}, sign * limit, f"{name} {sense} {limit:g}"))
+                    row = sign * unit[list(known).index(name)]
+                    rows.append((row, sign * limit, f"{name} {sense} {limit:g}"))
         for key, box in self.boxes.items():
             turning = {p.owner: p.body for p in columns if p.kind == "I"}
             for body in _matching(key, turning, "body"):
-                rows.extend(_box_rows(body, places[body], box))
+                place = {kind: unit[column] for kind, column in places[body].items()}
+                rows += [(row, 0.0, f"box of {body}: {what}") for row, what in _box(place, box)]
         if self.total_mass is not None:
-            masses = [place["m"] for place in places.values()]
+            total = sum(unit[place["m"]] for place in places.values())
             low, high = self.total_mass
-            rows.append((dict.fromkeys(masses, -1.0), -low, f"total mass >= {low:g}"))
-            rows.append((dict.fromkeys(masses, 1.0), high, f"total mass <= {high:g}"))
-        matrix = np.zeros((len(rows), len(columns)))
-        for k, (terms, _, _) in enumerate(rows):
-            for column, coefficient in terms.items():
-                matrix[k, column] = coefficient
+            rows.append((-total, -low, f"total mass >= {low:g}"))
+            rows.append((total, high, f"total mass <= {high:g}"))
+        matrix = np.array([row for row, _, _ in rows]).reshape(len(rows), len(columns))
         return Limits(
             matrix, np.array([right for _, right, _ in rows]), tuple(name for _, _, name in rows)
         )
@@ -132,19 +131,13 @@ def _matching(key: str, known: Mapping[str, str], what: str) -> list[str]:
     return found
 
 
-def _box_rows(
-    body: str, place: Mapping[str, int], box: Box
-) -> list[tuple[dict[int, float], float, str]]:
-    (x0, x1), (y0, y1) = box
-    text = f"box of {body}"
-    rows: list[tuple[dict[int, float], float, str]] = []
-    inertia, least = {place["I"]: 1.0}, 0.0
-    for axis, moment, low, high in (("x", "mgx", x0, x1), ("y", "mgy", y0, y1)):
-        if moment in place:
-            m, h = place["m"], place[moment]
-            rows.append(({m: low, h: -1.0}, 0.0, f"{text}: centre of mass {axis} >= {low:g}"))
-            rows.append(({m: -high, h: 1.0}, 0.0, f"{text}: centre of mass {axis} <= {high:g}"))
-            inertia[h] = -(low + high)
+def _box(place: Mapping[str, Array], box: Box) -> Iterator[tuple[Array, str]]:
+    """Yield rows that are at most 0 for a body inside a box, and what each one says."""
+    inertia, least = place["I"], 0.0
+    for axis, (low, high) in zip("xy", box, strict=True):
+        if (moment := place.get(f"mg{axis}")) is not None:
+            yield low * place["m"] - moment, f"centre of mass {axis} >= {low:g}"
+            yield moment - high * place["m"], f"centre of mass {axis} <= {high:g}"
+            inertia = inertia - (low + high) * moment
             least += low * high
-    inertia[place["m"]] = least
-    return [*rows, (inertia, 0.0, f"{text}: inertia that mass inside can have")]
+    yield inertia + least * place["m"], "inertia that mass inside can have"

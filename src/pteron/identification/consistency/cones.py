@@ -22,16 +22,9 @@ _SOLVED = ("optimal", "optimal_inaccurate")
 
 @dataclass(frozen=True)
 class RealBodies:
-    """The set of scaled free parameters z that real bodies can have.
+    """The set of scaled free parameters z that real bodies can have, where matrix @ z <= right.
 
-    Attributes
-    ----------
-    bodies : Bodies
-        Which of them belong to which body.
-    margins : array, shape (bodies,)
-        How far inside its cone a body shall be, times the depth asked for.
-    matrix, right : arrays, shapes (limits, columns) and (limits,)
-        Further limits, matrix @ z <= right.
+    Times the depth asked for, `margins` (bodies,) are how far inside its cone each body shall be.
     """
 
     bodies: Bodies
@@ -79,8 +72,7 @@ def closest(
 ) -> tuple[Array, Array] | None:
     """Return z in the set with the least |r|, where matrix @ z = values + spread @ r, or None.
 
-    `spread` is a square root of the values' covariance, and |r| is in standard deviations. With z
-    comes how hard each body, then each limit, holds r back: the multipliers' sizes.
+    With z comes how hard each body, then each limit, holds r back: the multipliers' sizes.
     """
     cp = _cvxpy()
     size = np.linalg.norm(matrix, axis=1)

@@ -111,7 +111,11 @@ def consistent_model(
         raise ModelError(
             f"base: made for {base.robot.name}, which has other parameters than {robot.name}"
         )
-    vector = _checked_values(values, base.rank)
+    vector = np.asarray(values, dtype=float)
+    if vector.shape != (base.rank,):
+        raise DataError(f"values: shape {vector.shape} given, ({base.rank},) expected")
+    if not np.isfinite(vector).all():
+        raise DataError("values: not all are finite numbers; identify the parameters again")
     root = None if covariance is None else _square_root(covariance, base.rank)
     bodies = bodies_of(base)
     limits = (bounds or Bounds()).limits(robot)
@@ -124,10 +128,13 @@ def consistent_model(
             prior, _HOLDS * np.abs(limits.matrix) @ units
         )
 
-    real = _real(bodies, target, limits)
+    matrix = limits.matrix @ bodies.sharing * target.scale
+    lengths = np.linalg.norm(matrix, axis=1)
+    real = RealBodies(bodies, target.margins, matrix / lengths[:, None], limits.right / lengths)
     grouping = base.grouping @ bodies.sharing * target.scale
     sizes = np.linalg.norm(grouping, axis=1)
-    inverse, free = _solutions(grouping / sizes[:, None])
+    left, singular, right = np.linalg.svd(grouping / sizes[:, None])
+    inverse, free = right[: base.rank].T / singular @ left.T, right[base.rank :].T
 
     depth = widest(real, inverse @ (vector / sizes), free, _DEEPEST)
     feasible = depth is not None and depth >= _SHALLOW
@@ -140,7 +147,10 @@ def consistent_model(
             real, np.zeros(free.shape[0]), np.eye(free.shape[0]), 1.0, target.matrix, target.right
         )
         if deep is None:
-            raise ModelError(_nothing_real(limits))
+            raise ModelError(
+                "bounds: no real bodies keep them all, whatever the identified values are; "
+                f"loosen some of: {', '.join(limits.names)}"
+            )
         least = closest(real, grouping, vector, spread, _SHALLOW)
         if least is None:
             raise ModelError(_TOO_FAR)
@@ -185,16 +195,6 @@ def consistent_model(
     )
 
 
-def _checked_values(values: ArrayLike, rank: int) -> Array:
-    """Return identified values (rank,) as a checked array."""
-    vector = np.asarray(values, dtype=float)
-    if vector.shape != (rank,):
-        raise DataError(f"values: shape {vector.shape} given, ({rank},) expected")
-    if not np.isfinite(vector).all():
-        raise DataError("values: not all are finite numbers; identify the parameters again")
-    return vector
-
-
 def _square_root(covariance: ArrayLike, rank: int) -> Array:
     """Return the lower triangular square root of a covariance (rank, rank), after checking it."""
     matrix = np.asarray(covariance, dtype=float)
@@ -235,20 +235,6 @@ def _prior(robot: Manipulator, cad: Manipulator | ArrayLike | str | None) -> Arr
     return parameters_of(robot, parameters(cad) if isinstance(cad, Manipulator) else cad, "cad")
 
 
-def _real(bodies: Bodies, target: Target, limits: Limits) -> RealBodies:
-    """Return the set of real bodies within the limits, each limit's row of size one."""
-    matrix = limits.matrix @ bodies.sharing * target.scale
-    sizes = np.linalg.norm(matrix, axis=1)
-    return RealBodies(bodies, target.margins, matrix / sizes[:, None], limits.right / sizes)
-
-
-def _solutions(grouping: Array) -> tuple[Array, Array]:
-    """Return the pseudoinverse (columns, rank), and a basis of what the forces do not show."""
-    left, singular, right = np.linalg.svd(grouping)
-    rank = len(singular)
-    return right[:rank].T / singular @ left.T, right[rank:].T
-
-
 def _certify(
     robot: Manipulator,
     bodies: Bodies,
@@ -270,18 +256,9 @@ def _certify(
         raise ModelError(f"consistency: the solver's answer does not hold ({'; '.join(failed)})")
 
 
-def _nothing_real(limits: Limits) -> str:
-    return (
-        "bounds: no real bodies keep them all, whatever the identified values are; "
-        f"loosen some of: {', '.join(limits.names)}"
-    )
-
-
 def _inside(bodies: Bodies, point: Array, deep: Array, margins: Array) -> Array:
-    """Return the point, moved towards a deep one as little as its bodies need to be real.
-
-    Values that are thousands of deviations off leave the solver little accuracy at the border.
-    """
+    """Return the point, moved towards a deep one as little as its bodies need to be real."""
+    # Values that are thousands of deviations off leave the solver little accuracy at the border.
     for part in (0.0, *np.logspace(-12, 0, 37)):
         moved = (1.0 - part) * point + part * deep
         if (bodies.least(moved) >= 0.5 * margins).all():

@@ -72,20 +72,15 @@ class Consistency:
         lines = []
         if self.feasible:
             lines.append("Fit: real bodies have the identified base parameters exactly.")
-        elif self.metric == "covariance":
-            lines.append(
-                "Fit: no real bodies within the bounds have the identified base parameters; the "
-                f"closest are {self.distance:.2g} standard deviations away "
-                f"(p = {self.p_value:.2g})."
-            )
         else:
+            unit, away = "", "away, relative to their size (no covariance was given)"
+            if self.metric == "covariance":
+                unit = " standard deviations"
+                away = f"standard deviations away (p = {self.p_value:.2g})"
             lines.append(
                 "Fit: no real bodies within the bounds have the identified base parameters; the "
-                f"closest are {self.distance:.2g} away, relative to their size (no covariance "
-                "was given)."
+                f"closest are {self.distance:.2g} {away}."
             )
-        if not self.feasible:
-            unit = " standard deviations" if self.metric == "covariance" else ""
             moved = np.abs(self.shifts)
             order = [k for k in np.argsort(-moved)[:5] if moved[k] > 0.01 * moved.max()]
             for k in order:
@@ -96,9 +91,9 @@ class Consistency:
             lines.append("CAD: the CAD model itself is not real or not within the bounds:")
             lines += [f"  {violation}" for violation in self.cad_violations]
             lines.append("  It served as a target only; this says nothing against the fit.")
-        if self.nearest_to == "CAD":
-            lines.append("What the forces do not show is as near as can be to the CAD model.")
-        else:
-            lines.append("What the forces do not show is near uniform rods and a uniform disc.")
+        near = "as near as can be to the CAD model"
+        if self.nearest_to == "nothing":
+            near = "near uniform rods and a uniform disc"
+        lines.append(f"What the forces do not show is {near}.")
         lines.append(f"Residual of the base parameters: {self.residual:.1e} (relative).")
         return "\n".join(lines)

@@ -90,8 +90,7 @@ def essential_parameters(
 
 def _wald(values: np.ndarray, covariance: np.ndarray, chosen: list[int]) -> float:
     b = values[chosen]
-    scale = np.sqrt(np.diag(covariance)[chosen])
-    scale = np.where(scale > 0.0, scale, np.finfo(float).tiny)
+    scale = np.maximum(np.sqrt(np.diag(covariance)[chosen]), np.finfo(float).tiny)
     c = covariance[np.ix_(chosen, chosen)] / np.outer(scale, scale)
     u = b / scale
     return float(u @ np.linalg.solve(c, u))

@@ -12,9 +12,8 @@ from scipy.stats import chi2  # type: ignore[import-untyped]
 
 from pteron.identification.estimators.qr import QrFactor
 from pteron.identification.observation import Observations
+from pteron.identification.signals.fourier import row_blocks
 from pteron.kernels import Array
-
-_BLOCK = 1 << 14
 
 _LAGS = 20
 _MOST_LAGS = 100
@@ -63,9 +62,6 @@ class Estimate:
         Standard deviation of each actuator's residuals, N, of the samples before the filter.
     whiteness : Whiteness
         Whether the residuals are white.
-    correlated : bool
-        Whether the test says that they are not; the covariance allows for correlation in any case
-        (Newey and West).
     condition : float
         Condition number of the regressor with its columns scaled to unit length.
     rows : int
@@ -85,12 +81,16 @@ class Estimate:
     covariance: Array = field(repr=False)
     noise: Array
     whiteness: Whiteness
-    correlated: bool
     condition: float
     rows: int
     iterations: int = 1
     converged: bool = True
     residuals: Array = field(repr=False, default_factory=lambda: np.empty((0, 0)))
+
+    @property
+    def correlated(self) -> bool:
+        """Whether residuals are not white; the covariance allows for it anyway (Newey, West)."""
+        return not self.whiteness.white
 
     @property
     def deviations(self) -> Array:
@@ -147,8 +147,7 @@ class Estimate:
 def residuals_of(observations: Observations, values: Array) -> Array:
     """Return F - W values (R, n)."""
     rest = np.empty_like(observations.forces)
-    for start in range(0, len(rest), _BLOCK):
-        rows = slice(start, start + _BLOCK)
+    for rows in row_blocks(len(rest)):
         rest[rows] = observations.forces[rows] - observations.matrix[rows] @ values
     return rest
 
@@ -168,15 +167,13 @@ def estimate_of(
 ) -> Estimate:
     """Return the estimate that an estimator found.
 
-    `values` (p,) and their `covariance` (p, p), for white residuals, come from `factor`, that of
-    the observations with rows times `weights`, (R, n) or (n,). `scores` (R, n) are weighted
-    residuals that stand for the plain ones in a covariance that allows for their correlation;
-    `inverse` (p, p) is that of the weighted normal equations, where it is not that of `factor`.
+    `covariance` is that for white residuals, and `factor` that of the rows times `weights`, (R, n)
+    or (n,). `scores` (R, n) are weighted residuals that stand for the plain ones in a covariance
+    that allows for their correlation, and `inverse` (p, p) is the weighted normal equations' own.
     """
     rest = residuals_of(observations, values)
     share = factor.degrees / factor.rows
     noise = np.sqrt((rest**2).sum(axis=0) / np.maximum(observations.used, 1) / share)
-    test = whiteness(rest, observations.gain > 0.0)
     # Whatever the test says: in a short log it does not see all correlation that matters.
     weighted = weights**2 * rest if scores is None else scores
     rows = np.einsum("rnp,rn->rp", observations.matrix, weighted, optimize=True)
@@ -191,8 +188,7 @@ def estimate_of(
         values,
         covariance * np.outer(worse, worse),
         noise,
-        test,
-        not test.white,
+        whiteness(rest, observations.gain > 0.0),
         factor.condition,
         factor.rows,
         iterations,
@@ -225,8 +221,7 @@ def long_run_covariance(scores: Array, inverse: Array, degrees: float) -> Array:
     """Return the covariance (p, p) of values whose residuals are correlated in time.
 
     It is the sandwich of Newey and West, with Bartlett's weights, of `scores` (R, p), W^T times the
-    weighted residuals of each row, and `inverse` (p, p), (W^T W)^-1 of the weighted equations.
-    `degrees` is the share of the equations that is not spent on the values.
+    weighted residuals of each row; `degrees` is the share of equations not spent on the values.
     """
     rows = len(scores)
     lags = min(int(np.ceil(1.3 * np.sqrt(rows))), _MOST_LAGS)

@@ -20,7 +20,6 @@ from pteron.identification.signals.derivatives import Curve
 from pteron.kernels import Array
 
 _NAME = "likelihood"
-
 _RENEWED = 2
 """Iterations that compute the forces' slopes anew: they change with the motion only a little."""
 
@@ -108,7 +107,8 @@ def maximum_likelihood(
         step = inverse @ (w.T @ rest - coupling.T @ solved[:, -1])
         motion_step = solved[:, -1] - solved[:, :-1] @ step
         values = values + step
-        curve = curve.with_coefficients(curve.coefficients + motion_step.reshape(measured.shape))
+        shifted = curve.coefficients + motion_step.reshape(measured.shape)
+        curve = replace(curve, coefficients=shifted)
         # What is left of the forces, less what the values and the motion took.
         left = (rest - w @ step - s @ motion_step).reshape(weights.shape) * noise
         spent = 1.0 - len(values) / observations.rows

@@ -24,33 +24,21 @@ _TAKES_PART = 0.05
 
 @dataclass(frozen=True)
 class QrFactor:
-    """The triangular factor R of [W F], with the columns of W scaled to unit length.
-
-    Attributes
-    ----------
-    factor : array, shape (p, p)
-        R of the scaled W.
-    image : array, shape (p,)
-        Q^T F.
-    rest : float
-        Sum of the squares that no values explain.
-    scale : array, shape (p,)
-        Lengths of W's columns: values = solution / scale.
-    rows : int
-        Equations that went in.
-    names : tuple of str
-        What the values are called.
-    source : str
-        What messages call the log.
-    """
+    """The triangular factor R of [W F], with the columns of W scaled to unit length."""
 
     factor: Array
+    """R of the scaled W (p, p)."""
     image: Array
+    """Q^T F (p,)."""
     rest: float
+    """Sum of the squares that no values explain."""
     scale: Array
+    """Lengths (p,) of W's columns: values = solution / scale."""
     rows: int
+    """Equations that went in."""
     names: tuple[str, ...]
     source: str
+    """What messages call the log."""
 
     @property
     def condition(self) -> float:
@@ -72,14 +60,7 @@ class QrFactor:
         return np.asarray((inverse @ inverse.T) / np.outer(self.scale, self.scale))
 
     def check_seen(self) -> None:
-        """Refuse observations that do not determine the values.
-
-        Raises
-        ------
-        LogError
-            If there are fewer equations than values, or some combinations of values leave the
-            forces as they are; it names these values.
-        """
+        """Refuse, with a LogError that names them, observations that leave values open."""
         if self.degrees <= 0:
             raise LogError(
                 "too short",
@@ -135,11 +116,10 @@ def qr_factor(
 def _blocks(
     observations: Observations, weights: Array | None, block: int
 ) -> Iterator[tuple[Array, Array]]:
-    p = len(observations.names)
     for start in range(0, len(observations.forces), block):
         rows = slice(start, start + block)
         matrix, forces = observations.matrix[rows], observations.forces[rows]
         if weights is not None:
             factors = weights if weights.ndim == 1 else weights[rows]
             matrix, forces = factors[..., None] * matrix, factors * forces
-        yield matrix.reshape(-1, p), forces.reshape(-1)
+        yield matrix.reshape(-1, matrix.shape[-1]), forces.reshape(-1)

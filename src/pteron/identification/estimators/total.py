@@ -29,15 +29,13 @@ _CONSTANT = ("coulomb", "offset")
 
 
 class SmallestCorrections(NamedTuple):
-    """The solution of mixed total least squares.
-
-    `values` (p,) are infinite or wrong where `share` is 0: that of the forces in the last right
-    singular vector. `sizes` are the singular values, in units of the noise.
-    """
+    """The solution of mixed total least squares."""
 
     values: Array
     sizes: Array
+    """The singular values, in units of the noise."""
     share: float
+    """That of the forces in the last right singular vector; the values are wrong where it is 0."""
 
 
 def smallest_corrections(upper: Array, exact: int, noise: Array) -> SmallestCorrections:
@@ -45,9 +43,8 @@ def smallest_corrections(upper: Array, exact: int, noise: Array) -> SmallestCorr
 
     `upper` is the triangular factor (p + 1, p + 1) of W, its `exact` columns without noise first,
     and F. `noise` are the standard deviations of the p - `exact` noisy columns and of the forces.
-    An orthogonal factor takes the exact columns out (Van Huffel and Vandewalle): what it leaves
-    below them does not know them.
     """
+    # The orthogonal factor takes the exact columns out (Van Huffel and Vandewalle).
     _, sizes, directions = np.linalg.svd(upper[exact:, exact:] / noise)
     last = directions[-1]
     with np.errstate(all="ignore"):
@@ -117,10 +114,9 @@ def total(
         left = factor.rest + ((factor.image - factor.factor @ (factor.scale * values)) ** 2).sum()
         variance = left / factor.degrees
         converged = given is None or variance == 0.0
-        if converged:
-            break
-        before, forces = forces, np.sqrt(max(variance - through, _LEAST_SHARE * variance))
-        converged = bool(abs(forces / before - 1.0) < _SETTLED)
+        if not converged:
+            before, forces = forces, np.sqrt(max(variance - through, _LEAST_SHARE * variance))
+            converged = bool(abs(forces / before - 1.0) < _SETTLED)
         if converged:
             break
     # First-order perturbation: noise of variance s^2 in all entries, and its own bias taken out.
@@ -128,8 +124,8 @@ def total(
     effective = least / factor.degrees * (forces**2 + through)
     normal = (factor.scale[:, None] * factor.factor.T) @ (factor.factor * factor.scale)
     normal = normal - least * np.diag(errors**2)
-    covariance = effective * np.linalg.inv(normal / np.outer(factor.scale, factor.scale))
-    covariance = covariance / np.outer(factor.scale, factor.scale)
+    lengths = np.outer(factor.scale, factor.scale)
+    covariance = effective * np.linalg.inv(normal / lengths) / lengths
     return estimate_of(
         "total",
         observations,

@@ -12,7 +12,8 @@ from pteron.kinematics.evaluate import unchecked
 from pteron.reduction import BaseParameters
 
 _ROWS = 100
-"""Rows of a matrix that are decomposed at a time."""
+"""Rows that are decomposed at a time: so few that the linear algebra library stays in one thread;
+several, on a machine that is busy, can take a hundred times as long."""
 
 
 @dataclass(frozen=True)
@@ -96,8 +97,7 @@ def conditioning(
     count = samples or 40 * motion.harmonics
     matrix = stacked_regressor(motion, base, motion.uniform_times(count))
     if not np.isfinite(matrix).all():
-        worst = float("inf")
-        return Conditioning(worst, worst, worst, -worst)
+        return Conditioning(np.inf, np.inf, np.inf, -np.inf)
     # Scaling columns commutes with it: R of W = Q R has the condition numbers of W.
     factor = _qr_factor(matrix)
     lengths = np.linalg.norm(factor, axis=0)
@@ -120,11 +120,7 @@ def stacked_regressor(motion: FourierMotion, base: BaseParameters, times: Array)
 
 
 def _qr_factor(matrix: Array) -> Array:
-    """Return R of the QR decomposition, some rows at a time.
-
-    On blocks so small the linear algebra library stays in one thread; several, on a machine that is
-    busy, can take a hundred times as long.
-    """
+    """Return R of the QR decomposition, some rows at a time."""
     p = matrix.shape[1]
     factor: Array = np.zeros((p, p))
     for start in range(0, len(matrix), _ROWS):

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from pteron.errors import DataError, ModelError
-from pteron.identification.excitation.fourier import FourierMotion, Space, home
+from pteron.identification.excitation.fourier import FourierMotion, Space
 from pteron.identification.excitation.limits import Limits, check_rest, relative_margins
+from pteron.identification.signals.states import home
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator
@@ -94,15 +97,17 @@ def random_excitation(
     n = robot.freedom
     offset = _SPREAD * size * rng.uniform(-1.0, 1.0, n)
     shape = rng.normal(size=(2 * harmonics, n)) * sizes(robot, space)
+
+    def still(pose: Array) -> FourierMotion:
+        center = pose if space == "platform" else unchecked(robot, "joint_coordinates", pose)
+        return FourierMotion(robot, space, period, center, *np.zeros((2, harmonics, n)))
+
     for _ in range(_HALVINGS):
-        center = _center(robot, space, middle + offset)
-        still = _motion(robot, space, period, center, 0.0 * shape)
-        if is_clear(still, limits, 2, _COARSE_CLEAR):
-            break
+        rest = still(middle + offset)
+        if is_clear(rest, limits, 2, _COARSE_CLEAR):
+            return _largest(rest, shape, limits)
         offset = 0.5 * offset
-    else:
-        still = _motion(robot, space, period, _center(robot, space, middle), 0.0 * shape)
-    return _largest(still, shape, limits)
+    return _largest(still(middle), shape, limits)
 
 
 def sizes(robot: Manipulator, space: Space) -> Array:
@@ -123,48 +128,42 @@ def is_clear(motion: FourierMotion, limits: Limits, samples: int, clear: float =
 
 
 def within_limits(motion: FourierMotion, limits: Limits) -> FourierMotion | None:
-    """Return the motion shrunk about its center, as little as it takes to keep the limits.
+    """Return the motion shrunk about its center as little as it takes to keep the limits, or None.
 
-    They are then kept between samples too. None if shrinking does not help: a motion around a place
-    that a leg cannot reach would have to cross it.
+    None is enough around a place that a leg cannot reach.
     """
-    samples = _FINE * motion.harmonics
+
+    def kept(scale: float) -> bool:
+        return is_clear(_scaled(motion, scale), limits, _FINE * motion.harmonics)
+
     high = 1.0
     for low in _SCALES:
-        if is_clear(_scaled(motion, low), limits, samples):
+        if kept(low):
             break
         high = low
     else:
         return None
     while high - low > _RESOLUTION * (1.0 - low):
-        middle = 0.5 * (low + high)
-        if is_clear(_scaled(motion, middle), limits, samples):
-            low = middle
-        else:
-            high = middle
+        low, high = _halved(kept, low, high)
     return _scaled(motion, low)
 
 
 def _largest(still: FourierMotion, shape: Array, limits: Limits) -> FourierMotion:
     """Return the motion of that shape about a center, as large as it can be."""
-    center = still.center
-    samples = _COARSE * still.harmonics
 
     def sized(scale: float) -> FourierMotion:
-        return still.with_coefficients(np.vstack([center, scale * shape]))
+        return still.with_coefficients(np.vstack([still.center, scale * shape]))
 
-    high = 1.0
+    def kept(scale: float) -> bool:
+        return is_clear(sized(scale), limits, _COARSE * still.harmonics, _COARSE_CLEAR)
+
+    low, high = 0.0, 1.0
     for _ in range(_DOUBLINGS):
-        if not is_clear(sized(high), limits, samples, _COARSE_CLEAR):
+        if not kept(high):
             break
         high *= 2.0
-    low = 0.0
     for _ in range(_BISECTIONS):
-        middle = 0.5 * (low + high)
-        if is_clear(sized(middle), limits, samples, _COARSE_CLEAR):
-            low = middle
-        else:
-            high = middle
+        low, high = _halved(kept, low, high)
     found = within_limits(sized(low), limits)
     if found is None or low == 0.0:
         raise ModelError(
@@ -174,19 +173,13 @@ def _largest(still: FourierMotion, shape: Array, limits: Limits) -> FourierMotio
     return found
 
 
+def _halved(kept: Callable[[float], bool], low: float, high: float) -> tuple[float, float]:
+    """Return the half of an interval of scales in which the largest one that is kept lies."""
+    middle = 0.5 * (low + high)
+    return (middle, high) if kept(middle) else (low, middle)
+
+
 def _scaled(motion: FourierMotion, scale: float) -> FourierMotion:
     coefficients = motion.coefficients
     coefficients[1:] *= scale
     return motion.with_coefficients(coefficients)
-
-
-def _center(robot: Manipulator, space: Space, pose: Array) -> Array:
-    center: Array = pose if space == "platform" else unchecked(robot, "joint_coordinates", pose)
-    return center
-
-
-def _motion(
-    robot: Manipulator, space: Space, period: float, center: Array, shape: Array
-) -> FourierMotion:
-    half = len(shape) // 2
-    return FourierMotion(robot, space, period, center, shape[:half], shape[half:])

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pteron.errors import DataError, UnreachablePose
-from pteron.identification.signals.states import home_mode
+from pteron.identification.signals.states import home, home_mode
 from pteron.kernels import Array, as_array
 from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator
 from pteron.motion import Motion
-from pteron.workspace import home_pose
 
 Space = Literal["platform", "joints"]
 """Whose coordinates the series are of: the platform's pose, or the joints'."""
@@ -158,7 +155,12 @@ def states(motion: FourierMotion, times: Array) -> State:
         rows @ motion.coefficients for rows in basis(times, motion.harmonics, motion.period)
     )
     if motion.space == "platform":
-        return State(q, dq, ddq, *_joints(robot, q, dq, ddq))
+        # A slider's motion is finite out of the legs' reach too; that of the links is not.
+        joints = unchecked(robot, "joint_coordinates", q)
+        rates = unchecked(robot, "joint_rates", q, dq)[0]
+        return State(
+            q, dq, ddq, joints, rates, unchecked(robot, "joint_accelerations", q, dq, ddq)[0]
+        )
     poses = unchecked(robot, "closure_poses", q)
     pose: Array = poses[:, motion.mode, :].copy()
     if robot.platform.turns:
@@ -178,21 +180,6 @@ def basis(times: Array, harmonics: int, period: float) -> tuple[Array, Array, Ar
         np.hstack([one, cosines, sines]),
         np.hstack([zero, -w * sines, w * cosines]),
         np.hstack([zero, -w * w * cosines, -w * w * sines]),
-    )
-
-
-@lru_cache(maxsize=64)
-def home(robot: Manipulator) -> tuple[float, ...]:
-    """Return the home pose, which takes a search the first time."""
-    return tuple(home_pose(robot).tolist())
-
-
-def _joints(robot: Manipulator, pose: Array, rate: Array, second: Array) -> Sequence[Array]:
-    # A slider's motion is finite out of the legs' reach too; that of the links is not.
-    return (
-        unchecked(robot, "joint_coordinates", pose),
-        unchecked(robot, "joint_rates", pose, rate)[0],
-        unchecked(robot, "joint_accelerations", pose, rate, second)[0],
     )
 
 

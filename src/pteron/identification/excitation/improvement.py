@@ -31,16 +31,15 @@ _CHECKED = 200
 
 @dataclass(frozen=True)
 class Round:
-    """A round of the search: how sharp the measure is in each stage, and exchanges after them.
-
-    The blunt measure has wide valleys, the sharp one is all but the condition number. In an
-    exchange, instants where limits are violated between the samples join the program. In a thorough
-    round exchanges go on when a motion that keeps the limits has been found.
-    """
+    """A round of the search."""
 
     doublings: tuple[int, ...]
+    """Sharpness of each stage's measure: the blunt one has wide valleys, the sharp one is all but
+    the condition number."""
     exchanges: int
+    """Further stages: instants where limits are violated between samples join the program."""
     thorough: bool
+    """Whether exchanges go on when a motion that keeps the limits has been found."""
 
     @property
     def stages(self) -> int:
@@ -57,46 +56,28 @@ ROUNDS = {
 
 @dataclass(frozen=True, eq=False)
 class Improvement:
-    """How far the improvement of one start has come.
-
-    Attributes
-    ----------
-    number : int
-        Which of the starts it is.
-    setting : Setting
-        What is optimised.
-    plan : Round
-        In which stages.
-    safe : FourierMotion
-        The last motion found that keeps all limits; the start at first.
-    seconds : float
-        What is left of its time.
-    stage : int
-        How many stages are done.
-    current : FourierMotion or None
-        Where the next stage begins: it need not keep the limits; None for `safe`.
-    watched : tuple of str
-        The limits that the program keeps, by name.
-    instants : array, shape (E,)
-        Where it keeps them beside its own samples, s.
-    improved : bool
-        Whether the last stage found a motion that keeps all limits.
-    ended, finished : bool
-        Whether there is nothing more to do, and whether it was done thoroughly.
-    """
+    """How far the improvement of one start has come."""
 
     number: int
     setting: Setting
     plan: Round
     safe: FourierMotion
+    """The last motion found that keeps all limits; the start at first."""
     seconds: float
+    """What is left of its time."""
     stage: int = 0
+    """How many stages are done."""
     current: FourierMotion | None = None
+    """Where the next stage begins: it need not keep the limits; None for `safe`."""
     watched: tuple[str, ...] = ()
+    """The limits that the program keeps, by name."""
     instants: Array = field(default_factory=lambda: np.empty(0))
+    """Where it keeps them beside its own samples (E,), s."""
     improved: bool = False
+    """Whether the last stage found a motion that keeps all limits."""
     ended: bool = False
     finished: bool = False
+    """Whether it was done thoroughly."""
 
     def next(self) -> Improvement:
         """Do one stage."""
@@ -138,8 +119,7 @@ class Improvement:
 def improved(starts: Sequence[Improvement], workers: int) -> Generator[Improvement, None, None]:
     """Yield every start after each of its stages, done by so many processes; by this one if one.
 
-    A start whose process fails is improved here, after the others. When the iteration is given up
-    the processes are ended at once.
+    A start whose process fails is improved here; where the iteration is given up, all are ended.
     """
     if workers > 1:
         failed: list[Improvement] = []

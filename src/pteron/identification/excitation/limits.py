@@ -222,14 +222,13 @@ def margins(motion: FourierMotion, limits: Limits, samples: int = 4000) -> Margi
 
 
 def relative_margins(motion: FourierMotion, limits: Limits, times: Array) -> dict[str, Array]:
-    """Return the margins at times (T,), each over its limit's size: (T, n), or (T, 1).
-
-    Sizes are 1 for the two measures, half its range for a joint, else the limit itself.
-    """
-    return {
-        name: values / _size(motion.robot, limits, name)
-        for name, values in _margins_of(motion.robot, limits, states(motion, times)).items()
-    }
+    """Return the margins at times (T,), each over its limit's size: (T, n), or (T, 1)."""
+    robot = motion.robot
+    # Half its range for a joint, 1 for the two measures, else the limit itself.
+    sizes = {name: per_joint(limits, name, robot) for name in PER_JOINT}
+    sizes["joint_clearance"] = joint_sizes(robot)
+    found = _margins_of(robot, limits, states(motion, times))
+    return {name: values / sizes.get(name, 1.0) for name, values in found.items()}
 
 
 def check_rest(robot: Manipulator, home: Array, limits: Limits) -> None:
@@ -239,16 +238,15 @@ def check_rest(robot: Manipulator, home: Array, limits: Limits) -> None:
     rows = State(*(value[None] for value in rest))
     for name, values in _margins_of(robot, limits, rows).items():
         leg = int(values[0].argmin())
-        if values[0, leg] > 0.0:
+        left = values[0, leg]
+        if left > 0.0:
             continue
         whose = "the platform" if name == "type_ii" else f"leg {leg + 1}"
         given = getattr(limits, name)
-        wanted = f"at most {given}" if name == "force" else f"at least {given:g}"
-        has = (
-            per_joint(limits, name, robot)[leg] - values[0, leg]
-            if name == "force"
-            else (given + values[0, leg])
-        )
+        if name == "force":
+            wanted, has = f"at most {given}", per_joint(limits, name, robot)[leg] - left
+        else:
+            wanted, has = f"at least {given:g}", given + left
         raise ModelError(
             f"limits: {name} of {wanted} {unit_of(robot, name, leg)}".rstrip()
             + f" is impossible: {whose} of {robot.name} has {has:.4g} at rest in the home pose, "
@@ -271,9 +269,3 @@ def _margins_of(robot: Manipulator, limits: Limits, state: State) -> dict[str, A
         forces = unchecked(robot, "inverse_dynamics", *motion)
         found["force"] = per_joint(limits, "force", robot) - np.abs(forces)
     return {name: np.where(np.isnan(values), -np.inf, values) for name, values in found.items()}
-
-
-def _size(robot: Manipulator, limits: Limits, name: str) -> Array:
-    if name in PER_JOINT:
-        return per_joint(limits, name, robot)
-    return joint_sizes(robot) if name == "joint_clearance" else np.ones(1)

@@ -11,9 +11,9 @@ import numpy as np
 
 from pteron.bodies.motion import Expression
 from pteron.identification.excitation.draws import sizes
-from pteron.identification.excitation.fourier import Space, basis, home
+from pteron.identification.excitation.fourier import Space, basis
 from pteron.identification.excitation.limits import Limits, joint_sizes, per_joint
-from pteron.identification.signals.states import home_mode
+from pteron.identification.signals.states import home, home_mode
 from pteron.kernels import Array, Columns, program
 from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator, parameters
@@ -48,15 +48,6 @@ class Setting:
     criterion: Criterion
 
 
-@dataclass(frozen=True)
-class _Path:
-    """The limits as one function of a state of the coordinates, with bounds (g,) on its values."""
-
-    function: ca.Function
-    low: Array
-    high: Array
-
-
 def minimised(
     setting: Setting,
     start: Array,
@@ -67,10 +58,8 @@ def minimised(
 ) -> Array | None:
     """Return coefficients (2 H + 1, n) that are better, but need not keep the limits.
 
-    It begins at `start` (2 H + 1, n), a motion that keeps the limits, and stops after so many
-    seconds; None if it could not begin. `doublings` is the sharpness of the measure (see
-    `measure`). The limits `watched` by name are kept; the fewer, the faster; `extra` (E,) are
-    instants (s) beside the regular ones at which they are.
+    None if it could not begin at `start` (2 H + 1, n). `doublings` is the sharpness of `measure`.
+    The limits `watched` by name are kept, at the `extra` instants (E,) too; the fewer, the faster.
     """
     n, rows = setting.robot.freedom, 2 * setting.harmonics + 1
     count = max(_SAMPLES * setting.harmonics, 3 * _SAMPLES)
@@ -79,8 +68,8 @@ def minimised(
     size = sizes(setting.robot, setting.space)
     coefficients = ca.mtimes(ca.reshape(z, rows, n), ca.diag(ca.DM(size)))
     guarded = np.concatenate([times, extra])
-    path = _path(setting, watched)
-    bounded = path.function.map(len(guarded))(*_along(setting, coefficients, guarded))
+    path, low, high = _path(setting, watched)
+    bounded = path.map(len(guarded))(*_along(setting, coefficients, guarded))
     blocks = _regressor(setting).map(count)(*_along(setting, coefficients, times))
     information = ca.mtimes(blocks, blocks.T) / count
     nlp = {"x": z, "f": measure(information, setting.criterion, doublings), "g": ca.vec(bounded)}
@@ -88,8 +77,8 @@ def minimised(
     try:
         found = solver(
             x0=ca.vec(ca.DM(start / size)),
-            lbg=np.tile(path.low, len(guarded)),
-            ubg=np.tile(path.high, len(guarded)),
+            lbg=np.tile(low, len(guarded)),
+            ubg=np.tile(high, len(guarded)),
         )
     except RuntimeError:
         return None
@@ -137,8 +126,11 @@ def _regressor(setting: Setting) -> ca.Function:
 
 
 @lru_cache(maxsize=32)
-def _path(setting: Setting, watched: tuple[str, ...]) -> _Path:
-    """Return the limits: squared sines, which stay finite and smooth out of reach, and the rest."""
+def _path(setting: Setting, watched: tuple[str, ...]) -> tuple[ca.Function, Array, Array]:
+    """Return limits as a function of q, q' and q'', and the least and greatest values (g,) of it.
+
+    Squared sines stay finite and smooth out of reach.
+    """
     robot, limits = setting.robot, setting.limits
     q, state = _state(setting)
     pose, velocity, _ = state
@@ -161,13 +153,12 @@ def _path(setting: Setting, watched: tuple[str, ...]) -> _Path:
     forces = program(robot, "inverse_dynamics").function(*state, ca.DM(parameters(robot))).T
     for name, value in (("speed", rates), ("acceleration", seconds), ("force", forces)):
         found[name] = value / per_joint(limits, name, robot), _BACK_OFF - 1.0, 1.0 - _BACK_OFF
-    values, low, high = zip(*(found[name] for name in watched), strict=True)
-    function = ca.Function("path", q, [ca.densify(ca.vertcat(*values))], {"cse": True})
-    bounds = [
+    values, *sides = zip(*(found[name] for name in watched), strict=True)
+    low, high = (
         np.concatenate([np.broadcast_to(b, v.shape[0]) for v, b in zip(values, side, strict=True)])
-        for side in (low, high)
-    ]
-    return _Path(function, bounds[0], bounds[1])
+        for side in sides
+    )
+    return ca.Function("path", q, [ca.densify(ca.vertcat(*values))], {"cse": True}), low, high
 
 
 def _state(setting: Setting) -> tuple[list[Expression], list[Expression]]:
@@ -203,16 +194,14 @@ def measure(information: Expression, criterion: Criterion, doublings: int) -> Ex
 
 def _log_trace(matrix: Expression, doublings: int) -> Expression:
     """Return log(tr(A^q)) / q with q = 2^doublings, of a symmetric matrix, free of overflow."""
-    power = 1
     total = ca.log(ca.trace(matrix))
     matrix = matrix / ca.trace(matrix)
     for _ in range(doublings):
         matrix = ca.mtimes(matrix, matrix)
-        power *= 2
         trace = ca.trace(matrix)
         total = 2.0 * total + ca.log(trace)
         matrix = matrix / trace
-    return total / power
+    return total / 2**doublings
 
 
 @lru_cache(maxsize=16)

@@ -95,17 +95,15 @@ class Excitation:
         times = np.arange(round(periods * motion.period * rate)) / rate
         state = states(motion, times)
         path = state.pose, state.velocity, state.acceleration
-        joints = [f"{leg.joint.coordinate}{i}" for i, leg in enumerate(robot.legs, start=1)]
-        forces = [f"{leg.joint.force}{i}" for i, leg in enumerate(robot.legs, start=1)]
         columns = {"t": times}
         for order, names, values in (
-            ("", joints, state.joints),
+            ("", robot.joint_names, state.joints),
             ("", robot.coordinates, state.pose),
-            ("d", joints, state.rates),
-            ("dd", joints, state.accelerations),
+            ("d", robot.joint_names, state.rates),
+            ("dd", robot.joint_names, state.accelerations),
             ("d", robot.coordinates, state.velocity),
             ("dd", robot.coordinates, state.acceleration),
-            ("", forces, unchecked(robot, "inverse_dynamics", *path)),
+            ("", robot.force_names, unchecked(robot, "inverse_dynamics", *path)),
         ):
             columns |= {f"{order}{name}": values[:, k] for k, name in enumerate(names)}
         return pl.DataFrame(columns)

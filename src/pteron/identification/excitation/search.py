@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass, field, replace
-from typing import get_args
+from typing import NamedTuple, get_args
 
 import numpy as np
 
@@ -129,25 +129,23 @@ def optimal_excitation(
     >>> found.margins.kept, found.gain > 2.0
     (True, True)
     """
-    begin = time.monotonic()
     limits = limits or Limits()
     _check(criterion, starts, draws, seconds, workers)
     base = base or base_parameters(robot)
     search = _Search(criterion, base, progress or (lambda share: None))
     interrupted = False
+    begin = time.monotonic()
     try:
-        begin = time.monotonic()
         for k, seeds in enumerate(np.random.SeedSequence(seed).spawn(draws)):
-            search.add(
-                random_excitation(
-                    robot,
-                    space=space,
-                    harmonics=harmonics,
-                    period=period,
-                    limits=limits,
-                    seed=np.random.default_rng(seeds),
-                )
+            drawn = random_excitation(
+                robot,
+                space=space,
+                harmonics=harmonics,
+                period=period,
+                limits=limits,
+                seed=np.random.default_rng(seeds),
             )
+            search.drawn.append(search.judged(drawn))
             search.report(_SEEN * (k + 1) / draws)
             if time.monotonic() - begin > _DRAWING * seconds:
                 break
@@ -166,8 +164,7 @@ def optimal_excitation(
     return search.result(limits, seed, time.monotonic() - begin, interrupted)
 
 
-@dataclass
-class _Candidate:
+class _Candidate(NamedTuple):
     motion: FourierMotion
     conditioning: Conditioning
 
@@ -188,34 +185,31 @@ class _Search:
     seen: float = 0.0
     """The share of the work that is done."""
 
-    def add(self, motion: FourierMotion) -> None:
-        self.drawn.append(self.judged(motion))
-
     def judged(self, motion: FourierMotion) -> _Candidate:
         return _Candidate(motion, conditioning(motion, self.base))
 
-    def cost(self, found: Conditioning) -> float:
+    def cost(self, one: _Candidate) -> float:
+        found = one.conditioning
         return found.scaled if self.criterion == "condition" else -found.logdet
 
     def choose(self, setting: Setting, starts: int) -> None:
         """Choose the best random motions as starts."""
-        costs = [self.cost(candidate.conditioning) for candidate in self.drawn]
-        order = [int(k) for k in np.argsort(costs, kind="stable")[:starts]]
-        if not math.isfinite(costs[order[0]]):
+        order = sorted(range(len(self.drawn)), key=lambda k: self.cost(self.drawn[k]))[:starts]
+        self.best = [self.drawn[k] for k in order]
+        if not math.isfinite(self.cost(self.best[0])):
             raise DataError(
                 f"harmonics: {setting.harmonics} given, too few to tell {self.base.rank} base "
                 f"parameters of {setting.robot.name} apart; take more"
             )
-        self.best = [self.drawn[k] for k in order]
         self.starts = [
-            Start(k, self.drawn[k].conditioning, self.drawn[k].conditioning, False) for k in order
+            Start(k, one.conditioning, one.conditioning, False)
+            for k, one in zip(order, self.best, strict=True)
         ]
         self.running = list(range(len(order)))
 
     def keep(self, count: int) -> None:
         """Go on with the best starts only."""
-        self.running.sort(key=lambda k: self.cost(self.best[k].conditioning))
-        self.running = self.running[:count]
+        self.running = sorted(self.running, key=lambda k: self.cost(self.best[k]))[:count]
 
     def improve(self, setting: Setting, plan: Round, seconds: float, workers: int) -> None:
         """Do a round on the running starts, in so many seconds."""
@@ -244,16 +238,13 @@ class _Search:
         if not one.improved:
             return
         found = self.judged(one.safe)
-        if self.cost(found.conditioning) < self.cost(self.best[number].conditioning):
+        if self.cost(found) < self.cost(self.best[number]):
             self.best[number] = found
             self.starts[number] = replace(self.starts[number], after=found.conditioning)
 
     def result(self, limits: Limits, seed: int, seconds: float, interrupted: bool) -> Excitation:
-        def least(candidates: list[_Candidate]) -> _Candidate:
-            return min(candidates, key=lambda candidate: self.cost(candidate.conditioning))
-
-        random = least(self.drawn)
-        best = least([*self.best, random])
+        random = min(self.drawn, key=self.cost)
+        best = min([*self.best, random], key=self.cost)
         return Excitation(
             best.motion,
             limits,

@@ -1,13 +1,16 @@
 """Differentiators: how measured positions become positions, rates and accelerations.
 
-Each one is a frozen value with the interface of `Differentiator`; `Preprocessing` chooses it once.
+`whole` says that one takes a log as a whole, and not in blocks; `edge` is how many rows it loses at
+each end of a block; `differentiated` is a block's motion without at least so many; `curve` is the
+log's motion as a curve; above the frequency `fastest`, Hz, nothing of the positions is left. The
+band is that of the parallel filter, Hz.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import ceil
-from typing import ClassVar, Literal, NamedTuple, Protocol
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +36,7 @@ LOST = 4
 _FIRST = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105, -1 / 280])
 _SECOND = np.array([-1 / 560, 8 / 315, -1 / 5, 8 / 5, -205 / 72, 8 / 5, -1 / 5, 8 / 315, -1 / 560])
 
-_EVEN = 1e-3
+EVEN = 1e-3
 """Deviation from even steps, in steps, that is a matter of how stamps were written."""
 
 _DEGREE = 7
@@ -55,30 +58,22 @@ _SMEARED = 24
 
 
 class Differentiated(NamedTuple):
-    """A block of a log without its edges: R samples.
-
-    `motion` holds coordinates, rates and accelerations (R, n); `smooth` is False where positions
-    without noise have a jump in a derivative, which a spline smears.
-    """
+    """A block of a log without its edges: R samples."""
 
     time: Array
     motion: tuple[Array, Array, Array]
+    """Coordinates, rates and accelerations (R, n)."""
     forces: Array
     smooth: NDArray[np.bool_]
+    """False where positions without noise have a jump in a derivative, which a spline smears."""
 
 
 @dataclass(frozen=True)
 class Curve:
-    """A motion as a sum of basis functions, at the T samples of a log.
+    """A motion as `coefficients` (C, n), m, of basis functions, at the T samples of a log.
 
-    Attributes
-    ----------
-    coefficients : array, shape (C, n)
-        How much of each basis function there is in each joint, m.
-    bases : tuple of sparse array, shape (T, C)
-        The basis functions, and their first and second derivatives.
-    ends : int
-        Samples at each end where the curve is not well known.
+    `bases` are the functions and their first and second derivatives (T, C) each; at `ends` samples
+    at each end the curve is not well known.
     """
 
     coefficients: Array
@@ -90,33 +85,6 @@ class Curve:
         """Coordinates, rates and accelerations (T, n)."""
         q, dq, ddq = (np.asarray(basis @ self.coefficients) for basis in self.bases)
         return q, dq, ddq
-
-    def with_coefficients(self, coefficients: Array) -> Curve:
-        """Return another curve of the same basis functions."""
-        return replace(self, coefficients=coefficients)
-
-
-class Differentiator(Protocol):
-    """What the rest of the identification asks of a differentiator."""
-
-    whole: ClassVar[bool]
-    """Whether it takes a log as a whole, with an edge of 0, and not in blocks."""
-
-    @property
-    def edge(self) -> int:
-        """Rows at each end of a block that it loses."""
-
-    def differentiated(self, block: Log, edge: int) -> Differentiated:
-        """Return a block's motion without `edge` rows at each end, at least as many as it loses."""
-
-    def curve(self, log: Log) -> Curve:
-        """Return the log's motion as a curve."""
-
-    def fastest(self, band: float) -> float | None:
-        """Return the frequency (Hz) above which nothing of the positions is left, if any.
-
-        `band` is that of the parallel filter, Hz.
-        """
 
 
 @dataclass(frozen=True)
@@ -217,14 +185,7 @@ class FourierFit:
         return None if self.cutoff is None else max(self.cutoff, band)
 
 
-def differentiator(
-    kind: Derivatives, *, rate: float, cutoff: float | None, period: float | None
-) -> Differentiator:
-    """Return the differentiator of that name; rate and cut-off in Hz, the period in s."""
-    if kind == "periodic":
-        assert period is not None  # `preprocessing_of` sees to it
-        return FourierFit(period, cutoff)
-    return CentralDifferences(rate, cutoff) if kind == "central" else SmoothingSpline(rate, cutoff)
+Differentiator = CentralDifferences | SmoothingSpline | FourierFit
 
 
 def uniform(time: Array, signal: Array) -> tuple[Array, Array]:
@@ -234,7 +195,7 @@ def uniform(time: Array, signal: Array) -> tuple[Array, Array]:
     """
     even = np.linspace(time[0], time[-1], len(time))
     step = (time[-1] - time[0]) / (len(time) - 1)
-    if np.abs(time - even).max() <= _EVEN * step:
+    if np.abs(time - even).max() <= EVEN * step:
         return even, signal
     return even, make_interp_spline(time, signal, k=5)(even)
 
@@ -255,11 +216,9 @@ def central_differences(signal: Array, rate: float) -> tuple[Array, Array]:
 
 
 def fitted_spline(time: Array, signal: Array, cutoff: float | None) -> BSpline:
-    """Return the spline of degree 7 that is nearest to samples, in the least-squares sense.
+    """Return the spline of degree 7 that is nearest to samples (T, k), or through them all.
 
-    Its knots are half a period of the cut-off (Hz) apart, so that what is faster is taken for
-    noise. Without a cut-off it passes through every sample (T, k). The times (T,), s, ascend, but
-    need not be uniform.
+    Its knots are half a period of the cut-off (Hz) apart: what is faster is taken for noise.
     """
     if cutoff is not None:
         pieces = int(np.ceil((time[-1] - time[0]) * 2.0 * cutoff))
@@ -287,11 +246,7 @@ def _design(spline: BSpline, time: Array, derivative: int) -> sparse.csr_matrix:
 
 
 def _without_jumps(time: Array, joints: Array) -> NDArray[np.bool_]:
-    """Return where a spline through samples without noise agrees with central differences.
-
-    They err in different ways next to a jump in a derivative, as at the ends of a rest. Jumps are
-    few: where most samples are apart it is for another reason, such as the rounding of the stamps.
-    """
+    """Return where a spline through samples without noise agrees with central differences."""
     spline = fitted_spline(time, joints, None)
     even = np.linspace(time[0], time[-1], len(time))
     rate = (len(even) - 1) / float(even[-1] - even[0])
@@ -299,6 +254,8 @@ def _without_jumps(time: Array, joints: Array) -> NDArray[np.bool_]:
     rounding = _ROUNDING * np.abs(joints).max() * rate**2
     least = _AGREES * np.abs(second).max(axis=0) + rounding
     apart = (np.abs(spline(even[LOST:-LOST], 2) - second) > least).any(axis=1)
+    # They err in different ways next to a jump, as at the ends of a rest. Jumps are few: where most
+    # samples are apart it is for another reason, such as the rounding of the stamps.
     if apart.mean() > _FEW:
         return np.ones(len(time), dtype=bool)
     apart = maximum_filter1d(np.pad(apart, LOST).astype(int), 2 * _SMEARED + 1) > 0

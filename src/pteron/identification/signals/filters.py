@@ -125,7 +125,10 @@ def cutoff_of(signal: Array, rate: float) -> float | None:
     highest = min(_HIGHEST * rate, _MARGIN * bandwidth) / _SAFETY
     for candidate in np.geomspace(lowest, max(highest, lowest), _CANDIDATES):
         residual = (part - smoothed(part, rate, float(candidate)))[inside]
-        share = _taken(rate, float(candidate))
+        # The share of white noise that the filter takes away.
+        sections = butter(_ORDER, candidate, fs=rate, output="sos")
+        gain = np.abs(freqz_sos(sections, worN=2048, fs=rate)[1])
+        share = float(np.mean((1.0 - gain**2) ** 2))
         if (np.mean(residual**2, axis=0) <= noise**2 * (share + slack)).all():
             break
     return float(_SAFETY * candidate)
@@ -135,13 +138,6 @@ def bins_below(power: Array, share: float) -> int:
     """Return how many frequencies of a spectrum (F, k) hold that share of every signal's power."""
     total = np.maximum(power.sum(axis=0), np.finfo(float).tiny)
     return int((np.cumsum(power, axis=0) / total < share).sum(axis=0).max())
-
-
-def _taken(rate: float, cutoff: float) -> float:
-    """Return the share of white noise that the filter takes away."""
-    sections = butter(_ORDER, cutoff, fs=rate, output="sos")
-    _, gain = freqz_sos(sections, worN=2048, fs=rate)
-    return float(np.mean((1.0 - np.abs(gain) ** 2) ** 2))
 
 
 @dataclass(frozen=True)

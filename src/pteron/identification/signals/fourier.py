@@ -158,11 +158,7 @@ def fitted_series(
 
 
 def most_harmonics(time: Array, period: float) -> int:
-    """Return how many harmonics of a period samples at these times can tell apart.
-
-    A series that repeats itself needs as many samples in one period as it has coefficients, and
-    none of its waves may hide where there are no samples in any period.
-    """
+    """Return how many harmonics samples at these times tell apart: no wave may hide in a hole."""
     rate = (len(time) - 1) / float(time[-1] - time[0])
     # A hole of one step counts as even sampling does, whatever its rounding.
     hole = max(_largest_hole(time, period), (1.0 - 1e-6) / rate)
@@ -176,10 +172,7 @@ def _largest_hole(time: Array, period: float) -> float:
 
 
 def _fitted(time: Array, signal: Array, period: float, harmonics: int) -> tuple[Array, Array]:
-    """Return the coefficients of least squares, and the sum of squares (k,) of what they leave.
-
-    A second step takes out what rounding put in.
-    """
+    """Return the coefficients of least squares, and the sum of squares (k,) of what they leave."""
     projection = Projection(time, period, harmonics)
     size = signal.shape[1]
     first = projection.coefficients(lambda rows: signal[rows], size)
@@ -187,6 +180,7 @@ def _fitted(time: Array, signal: Array, period: float, harmonics: int) -> tuple[
     def rest(rows: slice) -> Array:
         return np.asarray(signal[rows] - projection.basis(rows) @ first)
 
+    # A second step takes out what rounding put in.
     found = first + projection.coefficients(rest, size)
     squares = np.zeros(size)
     for rows in row_blocks(len(time)):

@@ -11,10 +11,12 @@ from pteron.errors import DataError
 from pteron.identification.errors import LogError
 from pteron.identification.logs import Log
 from pteron.identification.signals.derivatives import (
+    CentralDifferences,
     Derivatives,
     Differentiator,
+    FourierFit,
+    SmoothingSpline,
     central_differences,
-    differentiator,
     uniform,
 )
 from pteron.identification.signals.filters import (
@@ -51,7 +53,7 @@ _UNSURE = 0.1
 """Within which the smoothed rate may have the wrong sign, likewise."""
 
 _MENTIONED = 0.1
-"""Speed, as a share of a joint's root mean square, from which its sign counts."""
+"""Speed, as a share of a joint's root mean square, from which its sign counts: noise's does not."""
 
 _SPARED = 0.15
 """Share of the time between two reversals of a joint that is left out, at most, on each side."""
@@ -144,9 +146,11 @@ class Preprocessing:
     @property
     def differentiator(self) -> Differentiator:
         """What differentiates the positions."""
-        return differentiator(
-            self.derivatives, rate=self.rate, cutoff=self.cutoff, period=self.period
-        )
+        if self.derivatives == "periodic":
+            assert self.period is not None  # `preprocessing_of` sees to it
+            return FourierFit(self.period, self.cutoff)
+        kind = CentralDifferences if self.derivatives == "central" else SmoothingSpline
+        return kind(self.rate, self.cutoff)
 
     @property
     def decimation(self) -> Decimation:
@@ -203,17 +207,14 @@ def preprocessing_of(
     # How positions are differentiated
     period = wanted.period or log.description.period
     derivatives = wanted.derivatives or ("spline" if cutoff is None else "central")
+    small = (rows or log.rows) <= _LARGEST_PERIODIC
     series = None
-    if wanted.derivatives == "periodic":
-        derivatives, series = "periodic", _checked_series(log, period)
-    elif wanted.derivatives is None and period and (rows or log.rows) <= _LARGEST_PERIODIC:
+    if wanted.derivatives == "periodic" or (wanted.derivatives is None and period and small):
         series = _checked_series(log, period)
-        if _is_series(series, joints):
-            derivatives = "periodic"
-        else:
+        if wanted.derivatives is None and not _is_series(series, joints):
             series = None
     if series is not None:
-        cutoff = series.harmonics / series.period
+        derivatives, cutoff = "periodic", series.harmonics / series.period
 
     # How fast the motion is
     rates, _ = central_differences(smoothed(joints, rate, cutoff), rate)
@@ -297,13 +298,9 @@ def _check_frequencies(wanted: Processing, rate: float) -> None:
 
 
 def _stroke(rates: Array, rate: float) -> float:
-    """Return the mean time between two reversals of the joint that reverses most, s.
-
-    A change of sign counts once the speed is worth mentioning: noise at rest is none.
-    """
-    fewest = np.inf
+    """Return the mean time between two reversals of the joint that reverses most, s."""
+    most = 0
     for speed in rates.T:
         signs = np.sign(speed[np.abs(speed) > _MENTIONED * np.sqrt((speed**2).mean())])
-        reversals = int((np.diff(signs) != 0.0).sum())
-        fewest = min(fewest, len(rates) / rate / (reversals + 1))
-    return float(fewest)
+        most = max(most, int((np.diff(signs) != 0.0).sum()))
+    return len(rates) / rate / (most + 1)

@@ -1,17 +1,17 @@
-"""A log as states and forces, sample by sample, block by block."""
+"""A log as states and forces, sample by sample, in overlapping blocks and bounded memory."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pteron.identification.errors import LogError
-from pteron.identification.logs import Log
-from pteron.identification.signals.blocks import blocks
+from pteron.identification.logs import Log, joined
 from pteron.identification.signals.preprocessing import Preprocessing
 from pteron.identification.signals.states import States
 from pteron.kernels import Array
@@ -20,23 +20,15 @@ from pteron.manipulator import Manipulator
 BLOCK = 1 << 15
 """Rows of a block: a regressor of 40 columns takes 40 MB of it."""
 
+_GAP = 1.5
+"""Steps of time between two samples that miss none; beyond it a new stretch begins."""
+
 
 @dataclass(frozen=True)
 class Samples:
-    """States and measured forces at the log's own samples.
+    """States and measured forces (R, n), N, at a log's own samples; no other block has the `fresh`.
 
-    Attributes
-    ----------
-    states : States
-        R of them.
-    forces : array, shape (R, n)
-        As they were measured, N.
-    fresh : slice
-        The samples that no other block has.
-    source : str
-        What messages call the log.
-    smooth : array of bool, shape (R,)
-        False where positions without noise have a jump in a derivative, which a spline smears.
+    `smooth` (R,) is that of `Differentiated`.
     """
 
     states: States
@@ -76,19 +68,30 @@ def samples(
         shorter than the filters' edges.
     """
     differentiator = preprocessing.differentiator
+    parts: Iterable[Log] = [log] if isinstance(log, Log) else log
     if differentiator.whole:
         assert isinstance(log, Log)  # `preprocessing_of` takes no other for these
-        yield _samples(robot, log, preprocessing, 0, 0)
-        return
-    # Blocks begin at the same phase of the decimation.
-    step = preprocessing.decimation.factor
-    edge = step * ceil((differentiator.edge + margin) / step) - margin
-    size = step * ceil(block / step)
-    pieces = [log] if isinstance(log, Log) else log
-    found = None
-    for found in blocks(pieces, edge + margin, size, preprocessing.rate):
-        yield _samples(robot, found, preprocessing, edge, margin)
-    if found is None:
+        edge = margin = 0
+    else:
+        # Blocks begin at the same phase of the decimation.
+        step = preprocessing.decimation.factor
+        edge = step * ceil((differentiator.edge + margin) / step) - margin
+        parts = blocks(parts, edge + margin, step * ceil(block / step), preprocessing.rate)
+    part = None
+    for part in parts:
+        found = differentiator.differentiated(part, edge)
+        states = States.of_joints(
+            robot,
+            found.motion,
+            found.time,
+            preprocessing.mode,
+            payload=None if part.payload is None else part.payload[edge : part.rows - edge],
+            source=part.source,
+            first_row=part.first_row + edge,
+        )
+        fresh = slice(margin, len(states) - margin)
+        yield Samples(states, found.forces, fresh, part.source, found.smooth)
+    if part is None:
         raise LogError(
             "too short",
             log.source if isinstance(log, Log) else "log",
@@ -97,18 +100,47 @@ def samples(
         )
 
 
-def _samples(
-    robot: Manipulator, log: Log, preprocessing: Preprocessing, edge: int, margin: int
-) -> Samples:
-    found = preprocessing.differentiator.differentiated(log, edge)
-    states = States.of_joints(
-        robot,
-        found.motion,
-        found.time,
-        preprocessing.mode,
-        payload=None if log.payload is None else log.payload[edge : log.rows - edge],
-        source=log.source,
-        first_row=log.first_row + edge,
+def blocks(pieces: Iterable[Log], margin: int, size: int, rate: float) -> Iterator[Log]:
+    """Yield overlapping blocks of a log, of at most `size` + 2 `margin` rows.
+
+    Without their margins they tile each stretch of the log that has no gap and one payload, except
+    its first and last `margin` rows: a filter's edges are dropped, never bridged. Shorter stretches
+    yield nothing. `pieces` are the log's parts in order, `rate` is in samples per second.
+    """
+    held: Log | None = None
+    for piece in pieces:
+        for stretch in _stretches(piece, rate):
+            if held is not None and _continues(held, stretch, rate):
+                held = joined([held, stretch])
+            else:
+                yield from _rest(held, margin)
+                held = stretch
+            while held.rows >= size + 2 * margin:
+                yield held.part(0, size + 2 * margin)
+                held = held.part(size, held.rows)
+    yield from _rest(held, margin)
+
+
+def _rest(held: Log | None, margin: int) -> Iterator[Log]:
+    if held is not None and held.rows > 2 * margin:
+        yield held
+
+
+def _stretches(piece: Log, rate: float) -> Iterator[Log]:
+    """Yield the parts of a piece between gaps and changes of the payload."""
+    # Not `piece.segments`: the usual step of a few rows may be that of a gap.
+    ends = np.diff(piece.time) * rate > _GAP
+    if piece.payload is not None:
+        ends |= np.diff(piece.payload) != 0
+    edges = [0, *(np.flatnonzero(ends) + 1).tolist(), piece.rows]
+    for start, stop in pairwise(edges):
+        if stop > start:
+            yield piece.part(start, stop)
+
+
+def _continues(held: Log, following: Log, rate: float) -> bool:
+    step = float(following.time[0] - held.time[-1])
+    same = held.payload is None or (
+        following.payload is not None and held.payload[-1] == following.payload[0]
     )
-    fresh = slice(margin, len(states) - margin)
-    return Samples(states, found.forces, fresh, log.source, found.smooth)
+    return same and step * rate <= _GAP

@@ -18,8 +18,7 @@ from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator
 from pteron.workspace import home_pose
 
-_LEAST_TYPE_I = 1e-3
-_LEAST_TYPE_II = 1e-3
+_REGULAR = 1e-3
 """Next to a singularity the regressor grows without bound, and with it every error."""
 
 _LOOK = 1000
@@ -128,9 +127,14 @@ def assembly_mode(robot: Manipulator, log: Log) -> int:
 
 
 @lru_cache(maxsize=64)
+def home(robot: Manipulator) -> tuple[float, ...]:
+    """Return the home pose, which takes a search the first time."""
+    return tuple(home_pose(robot).tolist())
+
+
 def home_mode(robot: Manipulator) -> int:
     """Return the assembly mode of the home pose, from 0."""
-    return mode_of(robot, tuple(home_pose(robot).tolist()))
+    return mode_of(robot, home(robot))
 
 
 def _no_pose(
@@ -152,17 +156,15 @@ def _no_pose(
 
 
 def _check_regular(robot: Manipulator, pose: Array, source: str, first_row: int) -> None:
-    type_i = unchecked(robot, "reach", pose)[1].min(axis=-1)
-    found = [("a leg is all but stretched or folded", type_i, _LEAST_TYPE_I)]
+    measures = {"a leg is all but stretched or folded": unchecked(robot, "reach", pose)[1].min(-1)}
     if closure_of(robot).vanishes() is None or robot.platform.turns:
-        type_ii = np.abs(unchecked(robot, "type_ii", pose))
-        found.append(("the pose is all but singular", type_ii, _LEAST_TYPE_II))
-    for what, size, least in found:
-        if (size < least).any():
-            row = int(np.argmax(size < least))
+        measures["the pose is all but singular"] = np.abs(unchecked(robot, "type_ii", pose))
+    for what, size in measures.items():
+        if (size < _REGULAR).any():
+            row = int(np.argmax(size < _REGULAR))
             raise LogError(
                 "singular",
                 f"{source}: row {first_row + row + 1}",
-                f"{what} ({size[row]:.1e} of 1, at least {least:g} is needed); cut this part out "
-                "of the log",
+                f"{what} ({size[row]:.1e} of 1, at least {_REGULAR:g} is needed); cut this part "
+                "out of the log",
             )
