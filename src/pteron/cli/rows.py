@@ -41,13 +41,7 @@ class Rows:
         columns: Sequence[str],
         on_failure: Failure,
     ) -> NDArray[Any]:
-        """Return what `serve` makes of the numbers (..., K) in `columns`, chunk by chunk.
-
-        Raises
-        ------
-        PteronError
-            For the first row that fails; the message names it.
-        """
+        """Return what `serve` makes of the numbers (..., K) in `columns`, chunk by chunk."""
         import numpy as np
 
         from pteron.workspace.doubts import value_doubts
@@ -157,11 +151,8 @@ def deliver(
     as_json: bool,
     single: bool = False,
 ) -> None:
-    """Write a result with all its columns to a file or a program, or show some to a person.
-
-    The last one of those `shown` is empty in a row that failed; a `single` result belongs to
-    numbers that were typed.
-    """
+    """Write a result with all its columns to a file or a program, or show some to a person."""
+    # The last column shown is empty in a row that failed.
     empty = result.frame[shown[-1]].null_count()
     without = f", {empty} of them without a result" if empty else ""
     if out is not None:

@@ -16,7 +16,7 @@ import casadi as ca
 
 from pteron.bodies.inertia import PlanarInertia, PointMass
 from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, PointMotion
-from pteron.bodies.vectors import Vector, dot, norm, parallel, scaled
+from pteron.bodies.vectors import Vector, cross, dot, parallel, vertical
 from pteron.errors import ModelError
 from pteron.legs.circles import (
     first_moment,
@@ -157,9 +157,7 @@ class PRRR(LegKind):
             ),
             Transfer("both links{} carry the elbow R2", ELBOW),
         ]
-        size = norm(gravity)
-        still = size == 0.0 or parallel(self.direction, scaled(gravity, 1.0 / size))
-        if still and parallel(self.direction, self.e):
+        if vertical(self.direction, gravity) and parallel(self.direction, self.e):
             reason = "no gravity and no slider acceleration acts across the upper link{}"
             found += [Transfer(reason, {(kind, "u"): (1, ())}) for kind in ("mgx", "mgy")]
         return tuple(found)
@@ -169,8 +167,8 @@ class PRRR(LegKind):
         cls, values: Mapping[str, Sequence[Fraction]], rng: Random
     ) -> tuple[list[Fraction], int]:
         """Draw the directions of the links in the leg's plane; the triangle then closes."""
-        d, a = values["direction"], values["plane_axis"]
-        b = [d[1] * a[2] - d[2] * a[1], d[2] * a[0] - d[0] * a[2], d[0] * a[1] - d[1] * a[0]]
+        a = values["plane_axis"]
+        b = cross(values["direction"], a)
         (ua, ub), (la, lb) = (
             random_direction(values[key][0], rng) for key in ("upper_length", "lower_length")
         )

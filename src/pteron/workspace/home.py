@@ -110,5 +110,4 @@ def _refined(robot: Manipulator, start: Array) -> Array:
         method="Nelder-Mead",
         options={"initial_simplex": simplex, "xatol": 1e-5, "fatol": 1e-6, "maxiter": 500},
     )
-    best: Array = found.x
-    return best
+    return np.asarray(found.x)
