@@ -125,11 +125,8 @@ def rows_of_table(file: str | None, what: str, names: Sequence[str]) -> Rows:
 def check_destination(
     out: str | None, source: str | None, table: Table, added: Sequence[str]
 ) -> None:
-    """Refuse, before the work begins, a file that cannot be written or would lose data.
-
-    The columns `added` to the table replace those of the same name: it must not be written over the
-    file `source` that it was read from.
-    """
+    """Refuse, before the work begins, a file that cannot be written or would lose data."""
+    # The columns added replace those of the same name, in another file than the table's own.
     replaced = [name for name in added if name in table.columns]
     columns = f"{'column' if len(replaced) == 1 else 'columns'} {', '.join(replaced)}"
     if out is not None:

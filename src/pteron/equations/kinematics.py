@@ -59,11 +59,9 @@ def body_jacobian(state: State, i: int, letter: str) -> Expression | None:
 def link_jacobians(state: State) -> tuple[list[Expression], list[Expression]]:
     """Return J_u and J_l of every leg, each (6, m); NaN for a link that a leg has not."""
     n = len(state.legs)
-    none = ca.SX.nan(6, n)
-    _, *links = LEG_BODIES
     upper, lower = (
-        [none if j is None else j for j in (body_jacobian(state, i, letter) for i in range(n))]
-        for letter in links
+        [ca.SX.nan(6, n) if j is None else j for j in jacobians]
+        for jacobians in ([body_jacobian(state, i, k) for i in range(n)] for k in LEG_BODIES[1:])
     )
     return upper, lower
 

@@ -25,7 +25,6 @@ from pteron.legs.circles import (
     plane_of,
     quarter_turn,
     random_direction,
-    second_derivative,
     squared_reach,
 )
 from pteron.legs.kind import SLIDER, Key, LegKind, Quantity, ReachBound, Transfer
@@ -390,10 +389,10 @@ class PRRREquations(LegEquations):
         `on_r1` is a - g in the leg's plane on R1; on R3 it is u'' more.
         """
         h, dh = first_moment(at.l_u, upper.hx / self.lu, upper.hy / self.lu)
-        turning = second_derivative(h, dh, at.upper.rate**2, at.upper.acceleration)
+        turning = at.upper.acceleration * dh - at.upper.rate**2 * h  # h'' of a turning vector
         upper_moment = at.upper.acceleration * upper.i + ca.mtimes(on_r1.T, dh)
         h, dh = first_moment(at.l_l, lower.hx / self.ll, lower.hy / self.ll)
-        across = second_derivative(h, dh, at.lower.rate**2, at.lower.acceleration)
+        across = at.lower.acceleration * dh - at.lower.rate**2 * h
         lower_moment = at.lower.acceleration * lower.i + ca.mtimes((on_r1 + at.ddu).T, dh)
         tau = ca.mtimes(at.upper.row, upper_moment) + ca.mtimes(at.lower.row, lower_moment)
         return ca.mtimes(self.e_plane.T, turning - tau), tau + across

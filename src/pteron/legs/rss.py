@@ -219,11 +219,8 @@ class RSSEquations(LegEquations):
         self.zero = ca.mtimes(self.plane.T, zero_direction)
 
     def _triangle(self, w: Expression) -> tuple[Expression, Expression, Expression]:
-        """Return u, h = l_u . w and lu^2 n^2 - h^2, a quarter of Lemma 1's Delta, of w = c - r.
-
-        w . l_u = (w . w + lu^2 - ll^2) / 2, since |w - l_u| = ll; u is the part of w in the plane
-        and n its length.
-        """
+        """Return u, w's part in the plane, h = l_u . w and lu^2 u . u - h^2, a quarter of Delta."""
+        # |w - l_u| = ll
         u = ca.mtimes(self.plane.T, w)
         h = 0.5 * ca.dot(w, w) + 0.5 * (self.lu * self.lu - self.ll * self.ll)
         return u, h, self.lu * self.lu * ca.dot(u, u) - h * h

@@ -53,7 +53,6 @@ def page(report: Report) -> str:
         typeset=lambda text: escape(text).replace("J^-T", Markup("<b>J</b><sup>\u2212T</sup>")),
         zip=zip,
     )
-    # JSON that cannot end the script element it stands in.
     data = json.dumps(scene(report), separators=(",", ":"), allow_nan=False)
     return made.render(
         report=report,
@@ -77,7 +76,7 @@ def page(report: Report) -> str:
         version=pteron.__version__,
         style=resource("page.css"),
         script=resource("view.js"),
-        scene=Markup(data.replace("<", "\\u003c")),
+        scene=Markup(data.replace("<", "\\u003c")),  # so that it cannot end its script element
     )
 
 
