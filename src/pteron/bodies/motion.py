@@ -75,11 +75,8 @@ class BodyMotion(NamedTuple):
     @property
     def kinds(self) -> tuple[str, ...]:
         """The kinds of its parameters."""
-        return (
-            "m",
-            *(() if self.x is None else ("mgx",)),
-            *(() if self.y is None else ("mgy",)),
-        ) + (() if self.x is None else ("I",))
+        owners = {"m": self.position, "mgx": self.x, "mgy": self.y, "I": self.x}
+        return tuple(kind for kind, owner in owners.items() if owner is not None)
 
 
 def moments_of(kinds: tuple[str, ...], rows: list[Expression]) -> Moments:

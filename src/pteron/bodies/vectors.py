@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 from pteron.errors import ModelError
 
@@ -91,7 +92,7 @@ def dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def cross(a: Vector, b: Vector) -> Vector:
+def cross(a: Sequence[Any], b: Sequence[Any]) -> tuple[Any, Any, Any]:
     """Return the vector product."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
@@ -109,3 +110,9 @@ def scaled(a: Vector, factor: float) -> Vector:
 def parallel(a: Vector, b: Vector) -> bool:
     """Say whether two unit vectors are parallel, in the same or in opposite sense."""
     return norm(cross(a, b)) < PARALLEL_TOLERANCE
+
+
+def vertical(d: Vector, gravity: Vector) -> bool:
+    """Say whether gravity has no part across a unit vector."""
+    size = norm(gravity)
+    return size == 0.0 or parallel(d, scaled(gravity, 1.0 / size))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Collection, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from typer import Argument, Option
@@ -41,7 +40,7 @@ Elbows = Annotated[
     str | None, option("elbows", "The working mode, one sign a leg, such as ++-+.", "SIGNS")
 ]
 
-_VECTORS = ("--pose", "--velocity", "--acceleration", "--wrench")
+VECTORS = ("--pose", "--velocity", "--acceleration", "--wrench")
 """The options that take as many numbers as follow them."""
 
 
@@ -95,7 +94,7 @@ def regrouped(args: Sequence[str], valued: Collection[str]) -> list[str]:
         if word == "--":
             free += rest
             break
-        if word in _VECTORS and rest and _numeric(rest[0]):
+        if word in VECTORS and rest and _numeric(rest[0]):
             values = []
             while rest and _numeric(rest[0]):
                 values.append(rest.popleft())
@@ -142,6 +141,7 @@ def parsed_numbers(words: Sequence[str], names: Sequence[str], what: str) -> lis
 def load_robot(name_or_path: str, elbows: str | None = None) -> Manipulator:
     """Load a machine, in the working mode that `elbows` says, such as ``++-+``."""
     from pteron.manipulator import load
+    from pteron.manipulator.manipulator import with_elbows
 
     robot = load(name_or_path)
     if elbows is None:
@@ -151,8 +151,7 @@ def load_robot(name_or_path: str, elbows: str | None = None) -> Manipulator:
             f"--elbows: {elbows!r} given, {len(robot.legs)} signs + or - expected, one for each "
             f"leg of {robot.name}, such as {signs(robot)}"
         )
-    legs = zip(robot.legs, elbows, strict=True)
-    return replace(robot, legs=tuple(replace(leg, elbow=int(f"{s}1")) for leg, s in legs))
+    return with_elbows(robot, [int(f"{sign}1") for sign in elbows])
 
 
 def signs(robot: Manipulator) -> str:

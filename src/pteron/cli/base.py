@@ -57,13 +57,13 @@ def base(
     else:
         for expression in found.expressions(format, symbols=symbols):
             echo(str(expression))
-        for line in (*_meanings(found, symbols=symbols), *_proof(found)):
+        for line in _closing(found, symbols=symbols):
             echo(f"{_COMMENTS[format]} {line}")
 
 
 def _show(found: BaseParameters, *, symbols: bool) -> None:
     expressions = found.expressions(symbols=symbols)
-    closing = [plain(line) for line in (*_meanings(found, symbols=symbols), *_proof(found))]
+    closing = [plain(line) for line in _closing(found, symbols=symbols)]
     if not is_terminal():
         show(*(plain(line) for line in expressions), "", *closing)
         return
@@ -80,22 +80,17 @@ def _show(found: BaseParameters, *, symbols: bool) -> None:
     )
 
 
-def _meanings(found: BaseParameters, *, symbols: bool) -> list[str]:
-    """Return what the symbols stand for, if there are any, and which lengths share one."""
-    if not symbols:
-        return []
-    lines = [f"In metres: {', '.join(f'{n} = {v:g}' for n, v in found.geometry_values.items())}."]
-    shared = found.shared_symbols
-    if shared:
-        text = "; ".join(
-            f"{name} stands for {', '.join(more)} too" for name, more in shared.items()
-        )
-        lines.append(f"Values that are equal but for their sign share a symbol: {text}.")
-    return lines
-
-
-def _proof(found: BaseParameters) -> list[str]:
-    return found.certificate.summary().splitlines()
+def _closing(found: BaseParameters, *, symbols: bool) -> list[str]:
+    """Return what the symbols stand for, if there are any, and the proof."""
+    lines = []
+    if symbols:
+        lengths = ", ".join(f"{name} = {v:g}" for name, v in found.geometry_values.items())
+        lines.append(f"In metres: {lengths}.")
+        shared = [f"{one} stands for {', '.join(m)} too" for one, m in found.shared_symbols.items()]
+        if shared:
+            text = "; ".join(shared)
+            lines.append(f"Values that are equal but for their sign share a symbol: {text}.")
+    return [*lines, *found.certificate.summary().splitlines()]
 
 
 def table1(json: Json = False) -> None:

@@ -100,10 +100,8 @@ def excite(
         note("Note: interrupted; this is the best until then")
     files = []
     if out is not None:
-        files = [
-            found.write_csv(out, rate, periods),
-            found.write_toml(Path(out).with_suffix(".toml")),
-        ]
+        description = Path(out).with_suffix(".toml")
+        files = [found.write_csv(out, rate, periods), found.write_toml(description)]
     if json:
         show_json({**found.as_dict(), "files": [str(path) for path in files]})
         return

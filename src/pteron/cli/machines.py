@@ -107,8 +107,7 @@ def _leg(leg: LegKind) -> dict[str, Any]:
 
 
 def _show(robot: Manipulator, found: dict[str, Any]) -> None:
-    headings = ("leg", "type", "joint's axis", "lengths (m)", "limits")
-    made = table(*headings, numbers=("leg",))
+    made = table("leg", "type", "joint's axis", "lengths (m)", "limits", numbers=("leg",))
     for i, leg in enumerate(found["legs"], start=1):
         limits = leg["limits"]
         made.add_row(

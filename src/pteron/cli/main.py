@@ -101,17 +101,14 @@ app = Typer(
 )
 
 
-def _paragraphs(text: str | None) -> str:
-    """Return a docstring with one line a paragraph, for the terminal to cut."""
-    return "\n\n".join(" ".join(part.split()) for part in cleandoc(text or "").split("\n\n"))
-
-
 def _examples(*lines: str) -> str:
     return "\n\n".join(["[bold]Examples[/bold]", *lines])
 
 
 def _add(function: Callable[..., None], *examples: str, cls: type[Command] = Command) -> None:
-    app.command(cls=cls, help=_paragraphs(function.__doc__), epilog=_examples(*examples))(function)
+    # One line a paragraph, for the terminal to cut.
+    paragraphs = (" ".join(part.split()) for part in cleandoc(function.__doc__ or "").split("\n\n"))
+    app.command(cls=cls, help="\n\n".join(paragraphs), epilog=_examples(*examples))(function)
 
 
 @app.callback(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from typer import Argument
 
 from pteron.cli.arguments import (
+    VECTORS,
     Elbows,
     Failure,
     Json,
@@ -188,8 +189,7 @@ def _typed_row(typed: list[str | None], motion: list[str], loads: tuple[str, ...
     names: list[str] = []
     values: list[float] = []
     parts = (motion[:m], motion[m : 2 * m], motion[2 * m :], loads)
-    options = ("--pose", "--velocity", "--acceleration", "--wrench")
-    for name, given, own in zip(options, typed, parts, strict=True):
+    for name, given, own in zip(VECTORS, typed, parts, strict=True):
         if given is None and name == "--wrench":
             continue
         names += own

@@ -41,13 +41,7 @@ class Rows:
         columns: Sequence[str],
         on_failure: Failure,
     ) -> NDArray[Any]:
-        """Return what `serve` makes of the numbers (..., K) in `columns`, chunk by chunk.
-
-        Raises
-        ------
-        PteronError
-            For the first row that fails; the message names it.
-        """
+        """Return what `serve` makes of the numbers (..., K) in `columns`, chunk by chunk."""
         import numpy as np
 
         from pteron.workspace.doubts import value_doubts
@@ -131,11 +125,8 @@ def rows_of_table(file: str | None, what: str, names: Sequence[str]) -> Rows:
 def check_destination(
     out: str | None, source: str | None, table: Table, added: Sequence[str]
 ) -> None:
-    """Refuse, before the work begins, a file that cannot be written or would lose data.
-
-    The columns `added` to the table replace those of the same name: it must not be written over the
-    file `source` that it was read from.
-    """
+    """Refuse, before the work begins, a file that cannot be written or would lose data."""
+    # The columns added replace those of the same name, in another file than the table's own.
     replaced = [name for name in added if name in table.columns]
     columns = f"{'column' if len(replaced) == 1 else 'columns'} {', '.join(replaced)}"
     if out is not None:
@@ -157,11 +148,8 @@ def deliver(
     as_json: bool,
     single: bool = False,
 ) -> None:
-    """Write a result with all its columns to a file or a program, or show some to a person.
-
-    The last one of those `shown` is empty in a row that failed; a `single` result belongs to
-    numbers that were typed.
-    """
+    """Write a result with all its columns to a file or a program, or show some to a person."""
+    # The last column shown is empty in a row that failed.
     empty = result.frame[shown[-1]].null_count()
     without = f", {empty} of them without a result" if empty else ""
     if out is not None:

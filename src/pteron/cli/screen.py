@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -15,6 +14,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 from typer import echo
+
+from pteron.atomic import plain as plain_data
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -65,15 +66,7 @@ def write(text: str) -> None:
 
 def show_json(data: Any) -> None:
     """Print data on standard output as JSON, null for the numbers that it does not have."""
-    write(json.dumps(_finite(data), indent=2, allow_nan=False) + "\n")
-
-
-def _finite(data: Any) -> Any:
-    if isinstance(data, dict):
-        return {key: _finite(value) for key, value in data.items()}
-    if isinstance(data, list | tuple):
-        return [_finite(value) for value in data]
-    return None if isinstance(data, float) and not math.isfinite(data) else data
+    write(json.dumps(plain_data(data), indent=2, allow_nan=False) + "\n")
 
 
 def table(*columns: str, numbers: tuple[str, ...] = (), caption: str | None = None) -> Table:
@@ -143,17 +136,15 @@ def stages(task: str, rows: int) -> Iterator[Callable[[str, int, int], None]]:
 
 
 def _bar() -> Progress:
-    from rich.progress import (
-        BarColumn,
-        Progress,
-        TaskProgressColumn,
-        TextColumn,
-        TimeRemainingColumn,
-    )
+    from rich import progress
 
     console = Console(stderr=True)
-    columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn()
-    left = TimeRemainingColumn()
-    return Progress(
-        *columns, left, console=console, disable=not console.is_terminal, transient=True
+    return progress.Progress(
+        progress.TextColumn("{task.description}"),
+        progress.BarColumn(),
+        progress.TaskProgressColumn(),
+        progress.TimeRemainingColumn(),
+        console=console,
+        disable=not console.is_terminal,
+        transient=True,
     )

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import casadi as ca
 
 from pteron.bodies.motion import Expression
-from pteron.closures.closure import Closure, det3, nan_below_zero
+from pteron.closures.closure import Closure, adjugate3, det3, nan_below_zero
 from pteron.legs.leg import LegEquations, LegMotion, Plane, Sphere
 from pteron.platforms.motion import PlatformEquations, PlatformMotion
 
@@ -52,11 +52,10 @@ class ThreeLoci(Closure):
     def rates(
         self, joints: Expression, platform: PlatformMotion, legs: Sequence[LegMotion]
     ) -> Expression:
-        a, b, c = (leg.row[:, :3].T for leg in legs)
-        across = ca.horzcat(ca.cross(b, c), ca.cross(c, a), ca.cross(a, b))
-        divisors = ca.vertcat(*(leg.divisor for leg in legs))
-        right = ca.vertcat(*(divisors[i] * joints[i, :] for i in range(3)))
-        return ca.mtimes(across, right) / ca.dot(a, across[:, 0])
+        rows = ca.vertcat(*(leg.row[:, :3] for leg in legs))
+        right = ca.vertcat(*(leg.divisor * joints[i, :] for i, leg in enumerate(legs)))
+        across = adjugate3(rows)
+        return ca.mtimes(across, right) / ca.dot(rows[0, :].T, across[:, 0])
 
     def poses(self, joints: Expression) -> Expression:
         loci = [

@@ -53,11 +53,8 @@ def inverse_dynamics(
     >>> forces.round(3)
     array([31.082, -1.881,  2.566,  0.685])
     """
-    motion = pose, velocity, acceleration
-    loaded = wrench is not None
-    values = (*motion, wrench) if loaded else motion
-    forces: PerJoint = evaluated(robot, "inverse_dynamics", on_failure, *values, wrench=loaded)
-    return forces
+    values = [pose, velocity, acceleration, *([] if wrench is None else [wrench])]
+    return evaluated(robot, "inverse_dynamics", on_failure, *values, wrench=wrench is not None)
 
 
 def forward_dynamics(
@@ -107,11 +104,8 @@ def forward_dynamics(
     >>> np.abs(pteron.forward_dynamics(robot, rest, rest, holding)).max() < 1e-12
     np.True_
     """
-    state = pose, velocity, forces
-    loaded = wrench is not None
-    values = (*state, wrench) if loaded else state
-    found: PerCoordinate = evaluated(robot, "forward_dynamics", on_failure, *values, wrench=loaded)
-    return found
+    values = [pose, velocity, forces, *([] if wrench is None else [wrench])]
+    return evaluated(robot, "forward_dynamics", on_failure, *values, wrench=wrench is not None)
 
 
 def regressor(
@@ -155,6 +149,4 @@ def regressor(
     >>> D.shape, np.allclose(D @ pteron.parameters(robot), pteron.inverse_dynamics(robot, *state))
     ((4, 40), True)
     """
-    motion = pose, velocity, acceleration
-    matrices: Regressors = evaluated(robot, "regressor", on_failure, *motion)
-    return matrices
+    return evaluated(robot, "regressor", on_failure, pose, velocity, acceleration)

@@ -38,8 +38,7 @@ def mass_matrix(robot: Manipulator, pose: PoseLike, *, on_failure: OnFailure = "
     >>> np.allclose(M, M.T), np.linalg.eigvalsh(M).min() > 0
     (True, np.True_)
     """
-    found: Matrices = evaluated(robot, "mass_matrix", on_failure, pose)
-    return found
+    return evaluated(robot, "mass_matrix", on_failure, pose)
 
 
 def coriolis_matrix(
@@ -69,8 +68,7 @@ def coriolis_matrix(
     SingularPose
         If a leg is stretched or folded (type I).
     """
-    found: Matrices = evaluated(robot, "coriolis_matrix", on_failure, pose, velocity)
-    return found
+    return evaluated(robot, "coriolis_matrix", on_failure, pose, velocity)
 
 
 def bias_forces(
@@ -99,8 +97,7 @@ def bias_forces(
     SingularPose
         If a leg is stretched or folded (type I).
     """
-    found: PerCoordinate = evaluated(robot, "bias_forces", on_failure, pose, velocity)
-    return found
+    return evaluated(robot, "bias_forces", on_failure, pose, velocity)
 
 
 def gravity_forces(
@@ -129,8 +126,7 @@ def gravity_forces(
     SingularPose
         If a leg is stretched or folded (type I).
     """
-    found: PerCoordinate = evaluated(robot, "gravity_forces", on_failure, pose)
-    return found
+    return evaluated(robot, "gravity_forces", on_failure, pose)
 
 
 def kinetic_energy(
@@ -159,8 +155,7 @@ def kinetic_energy(
     SingularPose
         If a leg is stretched or folded (type I).
     """
-    found: Numbers = evaluated(robot, "kinetic_energy", on_failure, pose, velocity)
-    return found
+    return evaluated(robot, "kinetic_energy", on_failure, pose, velocity)
 
 
 def potential_energy(
@@ -189,5 +184,4 @@ def potential_energy(
     SingularPose
         If the two ends of a leg coincide, so that its elbow is undetermined.
     """
-    found: Numbers = evaluated(robot, "potential_energy", on_failure, pose)
-    return found
+    return evaluated(robot, "potential_energy", on_failure, pose)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import casadi as ca
 
 from pteron.bodies.motion import Expression
 from pteron.bodies.parameters import LEG_BODIES
 from pteron.closures.closure import nan_below_zero
 from pteron.equations.machine import Machine, State
-from pteron.legs.leg import Reach
+from pteron.legs.leg import Joint, Reach
 
 
 def inverse_position(machine: Machine, pose: Expression) -> Expression:
@@ -57,11 +59,9 @@ def body_jacobian(state: State, i: int, letter: str) -> Expression | None:
 def link_jacobians(state: State) -> tuple[list[Expression], list[Expression]]:
     """Return J_u and J_l of every leg, each (6, m); NaN for a link that a leg has not."""
     n = len(state.legs)
-    none = ca.SX.nan(6, n)
-    _, *links = LEG_BODIES
     upper, lower = (
-        [none if j is None else j for j in (body_jacobian(state, i, letter) for i in range(n))]
-        for letter in links
+        [ca.SX.nan(6, n) if j is None else j for j in jacobians]
+        for jacobians in ([body_jacobian(state, i, k) for i in range(n)] for k in LEG_BODIES[1:])
     )
     return upper, lower
 
@@ -90,21 +90,19 @@ def link_turning(state: State, order: int) -> Expression:
 
 def chain_motion(state: State, order: int) -> Expression:
     """Return rates, or accelerations, (n, j) of every leg's joints; NaN for one it has not."""
-    longest = max(len(leg.chain) for leg in state.legs)
-    rows = []
-    for leg in state.legs:
-        values = [(joint.rate, joint.acceleration)[order] for joint in leg.chain]
-        rows.append(ca.horzcat(*values, *[ca.SX.nan()] * (longest - len(values))))
-    return ca.vertcat(*rows)
+    return ca.vertcat(*_chains(state, lambda joint: (joint.rate, joint.acceleration)[order]))
 
 
 def chain_points(state: State) -> list[Expression]:
     """Return a point (j, 3) on every leg's joint axes, NaN for one it has not."""
+    return [points.T for points in _chains(state, lambda joint: joint.point)]
+
+
+def _chains(state: State, column: Callable[[Joint], Expression]) -> list[Expression]:
+    """Return a column (k, 1) for every joint of every leg, (k, j); NaN for one it has not."""
     longest = max(len(leg.chain) for leg in state.legs)
-    return [
-        ca.vertcat(*(joint.point.T for joint in leg.chain), ca.SX.nan(longest - len(leg.chain), 3))
-        for leg in state.legs
-    ]
+    found = [ca.horzcat(*map(column, leg.chain)) for leg in state.legs]
+    return [ca.horzcat(one, ca.SX.nan(one.shape[0], longest - one.shape[1])) for one in found]
 
 
 def platform_rates(
@@ -127,14 +125,10 @@ def joint_screws(state: State) -> list[Expression]:
     k, R4 of a P-R-R-R leg coincides with R3.
     """
     p = state.platform.body.position
-    longest = max(len(leg.chain) for leg in state.legs)
-    screws = []
-    for leg in state.legs:
-        columns = []
-        for joint in leg.chain:
-            if joint.kind == "P":
-                columns.append(ca.vertcat(ca.SX(3, 1), joint.axis))
-            else:
-                columns.append(ca.vertcat(joint.axis, ca.cross(joint.point - p, joint.axis)))
-        screws.append(ca.horzcat(*columns, ca.SX.nan(6, longest - len(columns))))
-    return screws
+
+    def screw(joint: Joint) -> Expression:
+        if joint.kind == "P":
+            return ca.vertcat(ca.SX(3, 1), joint.axis)
+        return ca.vertcat(joint.axis, ca.cross(joint.point - p, joint.axis))
+
+    return _chains(state, screw)

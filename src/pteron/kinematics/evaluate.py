@@ -6,7 +6,7 @@ particulars of a bad state are worked out only then.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,9 +15,11 @@ from pteron.equations.machine import closure_of
 from pteron.errors import DataError, PteronError, SingularPose, UnreachablePose
 from pteron.kernels import Array, Selects, as_array, needs_of, numeric
 from pteron.kernels.functions import TYPE_I, TYPE_II
-from pteron.kinematics.singularities import EVERYWHERE, is_singular_everywhere
+from pteron.kinematics.singularities import is_singular_everywhere, singular_everywhere
 from pteron.manipulator import Manipulator
 from pteron.shapes import OnFailure
+
+_Outputs = TypeVar("_Outputs")
 
 _COINCIDENT = 1e-6
 """Share of a leg's length within which its two ends count as coincident, in messages."""
@@ -33,8 +35,8 @@ def evaluated(
     *values: ArrayLike,
     base: Selects | None = None,
     wrench: bool = False,
-) -> Any:
-    """Return the outputs of a function of the table, or the only one.
+) -> _Outputs:  # type: ignore[type-var]
+    """Return the outputs of a function of the table, or the only one: what the caller declares.
 
     Raises
     ------
@@ -51,7 +53,8 @@ def evaluated(
                 raise _failure(robot, what, values, status, wrench)
             for result in results:
                 result[status == 0.0] = np.nan
-    return results[0] if len(results) == 1 else tuple(results)
+    found: Any = results[0] if len(results) == 1 else tuple(results)
+    return found  # type: ignore[no-any-return]
 
 
 def unchecked(
@@ -109,25 +112,36 @@ def _failure(
             pose = whole
     others = int((status == 0.0).sum()) - 1
     many = f" ({others + 1} such poses in the batch)" if others else ""
-    where = f"pose[{', '.join(map(str, index))}]" if index else "pose"
-    return _bad_pose(robot, pose, needs_of(what), where, index, many)
+    return _bad_pose(robot, pose, needs_of(what), index, many)
+
+
+def place(name: str, index: tuple[int, ...]) -> str:
+    """Return where an element of a batch is: "pose[3]", or "pose" where there is but one."""
+    return f"{name}[{', '.join(map(str, index))}]" if index else name
 
 
 def _bad_pose(
-    robot: Manipulator,
-    pose: Array,
-    needs: tuple[str, ...],
-    where: str,
-    index: tuple[int, ...],
-    many: str,
+    robot: Manipulator, pose: Array, needs: tuple[str, ...], index: tuple[int, ...], many: str
 ) -> PteronError:
+    where = place("pose", index)
     margin, type_i, spread, _ = numeric(robot, "reach")(pose)
     if "rows" in needs:
         rest = [leg.row_is_constant for leg in closure_of(robot).legs]
         type_i[rest] = 1.0
     if np.isnan(type_i).any():
         i = int(np.isnan(type_i).argmax())
-        return _unreachable(robot, i, max(-float(margin[i]), 0.0), where, index, many)
+        leg, shortfall = robot.legs[i], max(-float(margin[i]), 0.0)
+        doubt = (
+            "is it in millimetres? lengths are in metres"
+            if shortfall > _MILLIMETRES * leg.size
+            else "move the pose towards the legs' reach"
+        )
+        return UnreachablePose(
+            f"{where}: leg {i + 1} misses it by {shortfall:.3g} m: {leg.reach_text}; {doubt}{many}",
+            leg=i + 1,
+            shortfall=shortfall,
+            index=index,
+        )
     for i, leg in enumerate(robot.legs):
         undetermined = bool(spread[i] <= _COINCIDENT * leg.size)
         if type_i[i] <= TYPE_I and (needs != ("reach",) or undetermined):
@@ -146,29 +160,12 @@ def _bad_pose(
                 leg=i + 1,
             )
     if is_singular_everywhere(robot):
-        return SingularPose(EVERYWHERE.format(name=robot.name), kind="II", measure=0.0, index=index)
+        return singular_everywhere(robot, index)
     measure = abs(float(numeric(robot, "type_ii")(pose)[0]))
     return SingularPose(
         f"{where}: singular (type II; measure {measure:.1e}, less than six digits are left below "
         f"{TYPE_II:.0e}): the actuators no longer hold the platform; move away from it{many}",
         kind="II",
         measure=measure,
-        index=index,
-    )
-
-
-def _unreachable(
-    robot: Manipulator, i: int, shortfall: float, where: str, index: tuple[int, ...], many: str
-) -> UnreachablePose:
-    leg = robot.legs[i]
-    doubt = (
-        "; is it in millimetres? lengths are in metres"
-        if shortfall > _MILLIMETRES * leg.size
-        else "; move the pose towards the legs' reach"
-    )
-    return UnreachablePose(
-        f"{where}: leg {i + 1} misses it by {shortfall:.3g} m: {leg.reach_text}{doubt}{many}",
-        leg=i + 1,
-        shortfall=shortfall,
         index=index,
     )

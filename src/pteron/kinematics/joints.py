@@ -36,8 +36,7 @@ def joint_screws(robot: Manipulator, pose: PoseLike, *, on_failure: OnFailure = 
     SingularPose
         If a leg is stretched or folded (type I).
     """
-    screws: Array = evaluated(robot, "joint_screws", on_failure, pose)
-    return screws
+    return evaluated(robot, "joint_screws", on_failure, pose)
 
 
 @dataclass(frozen=True)
@@ -97,7 +96,8 @@ def joint_rates(
     >>> pteron.joint_rates(robot, [0, 0, 0, 0], [0.1, 0, 0, 0]).actuated
     array([0. , 0. , 0.1, 0. ])
     """
-    return JointMotion(*evaluated(robot, "joint_rates", on_failure, pose, velocity))
+    found: tuple[Array, ...] = evaluated(robot, "joint_rates", on_failure, pose, velocity)
+    return JointMotion(*found)
 
 
 def joint_accelerations(
@@ -131,4 +131,5 @@ def joint_accelerations(
         If a leg is stretched or folded (type I).
     """
     motion = pose, velocity, acceleration
-    return JointMotion(*evaluated(robot, "joint_accelerations", on_failure, *motion))
+    found: tuple[Array, ...] = evaluated(robot, "joint_accelerations", on_failure, *motion)
+    return JointMotion(*found)

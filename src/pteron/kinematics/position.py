@@ -7,10 +7,10 @@ from functools import lru_cache
 import numpy as np
 
 from pteron.equations.machine import closure_of
-from pteron.errors import SingularPose, UnreachablePose
+from pteron.errors import UnreachablePose
 from pteron.kernels import Array
-from pteron.kinematics.evaluate import checked, evaluated
-from pteron.kinematics.singularities import EVERYWHERE, is_singular_everywhere
+from pteron.kinematics.evaluate import checked, evaluated, place
+from pteron.kinematics.singularities import is_singular_everywhere, singular_everywhere
 from pteron.manipulator import Manipulator
 from pteron.shapes import JointsLike, Matrices, OnFailure, PerJoint, PoseLike, Poses, Vectors
 
@@ -52,8 +52,7 @@ def inverse_kinematics(
     >>> pteron.inverse_kinematics(pteron.load("quadrupteron"), [0.01, 0.02, 0.03, 0.0])
     array([0.03, 0.02, 0.01, 0.02])
     """
-    joints: PerJoint = evaluated(robot, "inverse_kinematics", on_failure, pose)
-    return joints
+    return evaluated(robot, "inverse_kinematics", on_failure, pose)
 
 
 def link_vectors(
@@ -84,8 +83,7 @@ def link_vectors(
     SingularPose
         If the two ends of a leg coincide, so that its elbow is undetermined.
     """
-    l_u, l_l = evaluated(robot, "link_vectors", on_failure, pose)
-    return l_u, l_l
+    return evaluated(robot, "link_vectors", on_failure, pose)
 
 
 def jacobian(robot: Manipulator, pose: PoseLike, *, on_failure: OnFailure = "raise") -> Matrices:
@@ -121,8 +119,7 @@ def jacobian(robot: Manipulator, pose: PoseLike, *, on_failure: OnFailure = "rai
            [0., 1., 0.],
            [0., 0., 1.]])
     """
-    matrices: Matrices = evaluated(robot, "jacobian", on_failure, pose)
-    return matrices
+    return evaluated(robot, "jacobian", on_failure, pose)
 
 
 def link_jacobians(
@@ -153,8 +150,7 @@ def link_jacobians(
     SingularPose
         If a leg is stretched or folded (type I).
     """
-    upper, lower = evaluated(robot, "link_jacobians", on_failure, pose)
-    return upper, lower
+    return evaluated(robot, "link_jacobians", on_failure, pose)
 
 
 def direct_kinematics(
@@ -207,7 +203,7 @@ def direct_kinematics(
            [0.01      , 0.02      , 0.03      , 3.14159265]])
     """
     if is_singular_everywhere(robot):
-        raise SingularPose(EVERYWHERE.format(name=robot.name), kind="II", measure=0.0, index=())
+        raise singular_everywhere(robot)
     given = checked(robot, joints, "joints", on_failure)
     poses = assembly_modes(robot, given, all_branches=all_branches)
     if not closure_of(robot).keeps_modes:
@@ -216,9 +212,9 @@ def direct_kinematics(
     lost = np.isnan(poses).all(axis=(-2, -1))
     if on_failure == "raise" and lost.any():
         index = tuple(int(i) for i in np.argwhere(lost)[0])
-        where = f"joints[{', '.join(map(str, index))}]" if index else "joints"
         raise UnreachablePose(
-            f"{where}: no pose has these joint coordinates {given[index].tolist()}",
+            f"{place('joints', index)}: no pose has these joint coordinates "
+            f"{given[index].tolist()}",
             leg=0,
             shortfall=float("nan"),
             index=index,
@@ -235,7 +231,7 @@ def assembly_modes(robot: Manipulator, joints: Array, *, all_branches: bool = Fa
     poses: Poses = evaluated(robot, "direct_kinematics", "nan", joints)
     if robot.platform.turns:
         poses[..., 3] = np.where(poses[..., 3] <= -np.pi, np.pi, poses[..., 3])
-    back = evaluated(robot, "inverse_kinematics", "nan", poses)
+    back: PerJoint = evaluated(robot, "inverse_kinematics", "nan", poses)
     lost = np.isnan(back).any(axis=-1)
     if not closure_of(robot).keeps_modes and not all_branches:
         apart = np.abs(back - joints[..., None, :])
@@ -250,13 +246,9 @@ def assembly_modes(robot: Manipulator, joints: Array, *, all_branches: bool = Fa
 @lru_cache(maxsize=64)
 def mode_of(robot: Manipulator, pose: tuple[float, ...]) -> int:
     """Return the column of `assembly_modes` that a pose is in."""
-    joints = evaluated(robot, "inverse_kinematics", "raise", np.array(pose))
+    joints: PerJoint = evaluated(robot, "inverse_kinematics", "raise", np.array(pose))
     poses = assembly_modes(robot, joints, all_branches=True)
-    return int(np.nanargmin(np.linalg.norm(poses[:, :3] - pose[:3], axis=-1) + _turn(poses, pose)))
-
-
-def _turn(poses: Array, pose: tuple[float, ...]) -> Array:
-    """Return how far (k,) poses are turned against another: the half chord."""
-    if poses.shape[-1] < 4:
-        return np.zeros(len(poses))
-    return np.abs(np.sin(0.5 * (poses[:, 3] - pose[3])))
+    apart = np.linalg.norm(poses[:, :3] - pose[:3], axis=-1)
+    if robot.platform.turns:
+        apart += np.abs(np.sin(0.5 * (poses[:, 3] - pose[3])))
+    return int(np.nanargmin(apart))

@@ -108,11 +108,7 @@ def _drawn(
 
 
 def search_ball(robot: Manipulator) -> tuple[Array, float]:
-    """Return a centre and a radius about it that hold every pose in reach.
-
-    Each leg reaches only what is within a radius of a line or a point; the centre is the point
-    nearest to all of them.
-    """
+    """Return a centre, nearest to all legs' bounds, and a radius that hold every pose in reach."""
     normal, right = np.zeros((3, 3)), np.zeros(3)
     reach = 0.0
     for leg in robot.legs:

@@ -72,7 +72,7 @@ def singular_orientations(robot: Manipulator) -> Array:
     array([-90.,  90.])
     """
     if is_singular_everywhere(robot):
-        raise SingularPose(EVERYWHERE.format(name=robot.name), kind="II", measure=0.0, index=())
+        raise singular_everywhere(robot)
     orientation = closure_of(robot).orientation
     if orientation is None:
         return np.empty(0)
@@ -82,8 +82,12 @@ def singular_orientations(robot: Manipulator) -> Array:
     return np.sort(wrapped)
 
 
-EVERYWHERE = (
-    "{name}: singular at every pose (type II): with the actuators held still the platform can "
-    "move; change a leg's direction or platform point"
-)
-"""What is said of such a machine, here and where a pose of it is used."""
+def singular_everywhere(robot: Manipulator, index: tuple[int, ...] = ()) -> SingularPose:
+    """Return what is said of such a machine, here and where a pose of it is used."""
+    return SingularPose(
+        f"{robot.name}: singular at every pose (type II): with the actuators held still the "
+        "platform can move; change a leg's direction or platform point",
+        kind="II",
+        measure=0.0,
+        index=index,
+    )

@@ -18,10 +18,7 @@ _ROUNDING = 1e-15
 
 
 def squared_reach(lu: Expression, ll: Expression, n2: Expression) -> Expression:
-    """Return Delta, the product under the radical of Eqs. (1) and (2): below 0 out of reach.
-
-    The paper's four factors pair into ((lu + ll)^2 - n^2) (n^2 - (lu - ll)^2): n^2 is enough.
-    """
+    """Return Delta, the product under the radical of Eqs. (1) and (2), its four factors paired."""
     longest, shortest = lu + ll, lu - ll
     return (longest * longest - n2) * (n2 - shortest * shortest)
 
@@ -57,13 +54,6 @@ def first_moment(
     )
 
 
-def second_derivative(
-    h: Expression, dh: Expression, rate2: Expression, acceleration: Expression
-) -> Expression:
-    """Return h'' = theta'' d x h - theta'^2 h of a vector h that turns in the plane."""
-    return acceleration * dh - rate2 * h
-
-
 def pole(direction: Sequence[float]) -> tuple[int, int]:
     """Return the largest component of a unit vector and its sign, which `plane_axis` asks for."""
     i = max(range(3), key=lambda j: abs(direction[j]))
@@ -83,13 +73,11 @@ def plane_axis(d: Expression, i: int, sign: int) -> Expression:
 
 
 def plane_of(d: Expression, a: Expression) -> Expression:
-    """Return (3, 2): the axes a and d x a of the plane perpendicular to d.
-
-    Of numbers, what is 0, 1 or -1 but for rounding is taken for it: products with it cost nothing.
-    """
+    """Return (3, 2): the axes a and d x a of the plane perpendicular to d."""
     plane = ca.horzcat(a, ca.cross(d, a))
     if not plane.is_constant():
         return plane
+    # What is 0, 1 or -1 but for rounding is taken for it: products with it cost nothing.
     values = np.array(ca.evalf(plane))
     whole = np.round(values)
     return ca.SX(ca.DM(np.where(np.abs(values - whole) < _ROUNDING, whole, values)))

@@ -123,11 +123,18 @@ class LegKind(ABC):
 
     def __post_init__(self) -> None:
         checked: dict[str, Any] = {
-            "guide_point": vector(self.guide_point, "guide_point"),
-            "platform_point": vector(self.platform_point, "platform_point"),
-            "elbow": _checked_elbow(self.elbow),
-            "limits": _checked_limits(self.limits, self.joint.unit),
+            name: vector(getattr(self, name), name) for name in ("guide_point", "platform_point")
         }
+        if self.elbow not in (1, -1):
+            raise ModelError(f"elbow: {self.elbow!r} is neither 1 nor -1")
+        checked["elbow"] = 1 if self.elbow == 1 else -1
+        if self.limits is not None:
+            low, high = checked["limits"] = numbers(self.limits, "limits", 2)
+            if low >= high:
+                raise ModelError(
+                    f"limits: {low:g} {self.joint.unit} is not below {high:g} {self.joint.unit}; "
+                    "give [least, most]"
+                )
         for name, key in self.keys.items():
             value = getattr(self, name)
             if value is None and key.default is None:
@@ -273,20 +280,3 @@ class LegKind(ABC):
         vectors = [q.name for q in self.quantities if q.role in ("point", "direction", "normal")]
         given = {name: getattr(self, name, None) for name in vectors}
         return replace(self, **{name: turn(v) for name, v in given.items() if v is not None})
-
-
-def _checked_limits(limits: Sequence[float] | None, unit: str) -> tuple[float, float] | None:
-    """Return limits as two floats, the least first."""
-    if limits is None:
-        return None
-    low, high = numbers(limits, "limits", 2)
-    if low >= high:
-        raise ModelError(f"limits: {low:g} {unit} is not below {high:g} {unit}; give [least, most]")
-    return (low, high)
-
-
-def _checked_elbow(elbow: object) -> int:
-    """Return the elbow's side, 1 or -1."""
-    if elbow not in (1, -1):
-        raise ModelError(f"elbow: {elbow!r} is neither 1 nor -1")
-    return 1 if elbow == 1 else -1

@@ -16,7 +16,7 @@ import casadi as ca
 
 from pteron.bodies.inertia import PlanarInertia, PointMass
 from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, PointMotion
-from pteron.bodies.vectors import Vector, dot, norm, parallel, scaled
+from pteron.bodies.vectors import Vector, cross, dot, parallel, vertical
 from pteron.errors import ModelError
 from pteron.legs.circles import (
     first_moment,
@@ -25,7 +25,6 @@ from pteron.legs.circles import (
     plane_of,
     quarter_turn,
     random_direction,
-    second_derivative,
     squared_reach,
 )
 from pteron.legs.kind import SLIDER, Key, LegKind, Quantity, ReachBound, Transfer
@@ -157,9 +156,7 @@ class PRRR(LegKind):
             ),
             Transfer("both links{} carry the elbow R2", ELBOW),
         ]
-        size = norm(gravity)
-        still = size == 0.0 or parallel(self.direction, scaled(gravity, 1.0 / size))
-        if still and parallel(self.direction, self.e):
+        if vertical(self.direction, gravity) and parallel(self.direction, self.e):
             reason = "no gravity and no slider acceleration acts across the upper link{}"
             found += [Transfer(reason, {(kind, "u"): (1, ())}) for kind in ("mgx", "mgy")]
         return tuple(found)
@@ -169,8 +166,8 @@ class PRRR(LegKind):
         cls, values: Mapping[str, Sequence[Fraction]], rng: Random
     ) -> tuple[list[Fraction], int]:
         """Draw the directions of the links in the leg's plane; the triangle then closes."""
-        d, a = values["direction"], values["plane_axis"]
-        b = [d[1] * a[2] - d[2] * a[1], d[2] * a[0] - d[0] * a[2], d[0] * a[1] - d[1] * a[0]]
+        a = values["plane_axis"]
+        b = cross(values["direction"], a)
         (ua, ub), (la, lb) = (
             random_direction(values[key][0], rng) for key in ("upper_length", "lower_length")
         )
@@ -392,10 +389,10 @@ class PRRREquations(LegEquations):
         `on_r1` is a - g in the leg's plane on R1; on R3 it is u'' more.
         """
         h, dh = first_moment(at.l_u, upper.hx / self.lu, upper.hy / self.lu)
-        turning = second_derivative(h, dh, at.upper.rate**2, at.upper.acceleration)
+        turning = at.upper.acceleration * dh - at.upper.rate**2 * h  # h'' of a turning vector
         upper_moment = at.upper.acceleration * upper.i + ca.mtimes(on_r1.T, dh)
         h, dh = first_moment(at.l_l, lower.hx / self.ll, lower.hy / self.ll)
-        across = second_derivative(h, dh, at.lower.rate**2, at.lower.acceleration)
+        across = at.lower.acceleration * dh - at.lower.rate**2 * h
         lower_moment = at.lower.acceleration * lower.i + ca.mtimes((on_r1 + at.ddu).T, dh)
         tau = ca.mtimes(at.upper.row, upper_moment) + ca.mtimes(at.lower.row, lower_moment)
         return ca.mtimes(self.e_plane.T, turning - tau), tau + across

@@ -17,7 +17,7 @@ import casadi as ca
 
 from pteron.bodies.inertia import PlanarInertia, RodInertia
 from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, PointMotion
-from pteron.bodies.vectors import Vector, cross, norm, parallel, perpendicular, scaled
+from pteron.bodies.vectors import Vector, cross, perpendicular, vertical
 from pteron.legs.circles import (
     perpendicular_to,
     plane_of,
@@ -157,8 +157,7 @@ class RSS(LegKind):
             Transfer("the crank{} turns about a fixed axis", {("m", "u"): (1, ())}),
             Transfer("crank and rod{} carry the joint between them", ELBOW),
         ]
-        size = norm(gravity)
-        if size == 0.0 or parallel(self.direction, scaled(gravity, 1.0 / size)):
+        if vertical(self.direction, gravity):
             reason = "no gravity acts across the axis of the crank{}"
             found += [Transfer(reason, {(kind, "u"): (1, ())}) for kind in ("mgx", "mgy")]
         return tuple(found)
@@ -169,7 +168,7 @@ class RSS(LegKind):
     ) -> tuple[list[Fraction], int]:
         """Draw the directions of crank and rod: their sum is a platform point."""
         d, a = values["direction"], values["zero_direction"]
-        b = [d[1] * a[2] - d[2] * a[1], d[2] * a[0] - d[0] * a[2], d[0] * a[1] - d[1] * a[0]]
+        b = cross(d, a)
         x, y = random_direction(values["upper_length"][0], rng)
         s, t = random_fraction(rng), random_fraction(rng)
         scale = values["lower_length"][0] / (1 + s * s + t * t)
@@ -220,11 +219,8 @@ class RSSEquations(LegEquations):
         self.zero = ca.mtimes(self.plane.T, zero_direction)
 
     def _triangle(self, w: Expression) -> tuple[Expression, Expression, Expression]:
-        """Return u, h = l_u . w and lu^2 n^2 - h^2, a quarter of Lemma 1's Delta, of w = c - r.
-
-        w . l_u = (w . w + lu^2 - ll^2) / 2, since |w - l_u| = ll; u is the part of w in the plane
-        and n its length.
-        """
+        """Return u, w's part in the plane, h = l_u . w and lu^2 u . u - h^2, a quarter of Delta."""
+        # |w - l_u| = ll
         u = ca.mtimes(self.plane.T, w)
         h = 0.5 * ca.dot(w, w) + 0.5 * (self.lu * self.lu - self.ll * self.ll)
         return u, h, self.lu * self.lu * ca.dot(u, u) - h * h

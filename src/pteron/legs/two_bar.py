@@ -18,29 +18,23 @@ The tests hold these forces against those of the bodies in motion.
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import casadi as ca
 
 from pteron.bodies.motion import Expression, Moments
 from pteron.legs.circles import quarter_turn
 
-Inertias = tuple[Moments, Moments]
-"""Of the upper and of the lower link."""
-
-
-class TwoBar(Protocol):
-    """The geometry of the leg; see `prrr.PRRREquations`."""
-
-    lu: Expression
-    ll: Expression
-    sigma: Expression
-    e_plane: Expression
-    aligned: bool
+if TYPE_CHECKING:
+    from pteron.legs.prrr import PRRREquations
 
 
 def two_bar_needs(
-    leg: TwoBar, u: list[Expression], sliding: Expression, gravity: Expression, inertia: Inertias
+    leg: PRRREquations,
+    u: list[Expression],
+    sliding: Expression,
+    gravity: Expression,
+    inertia: tuple[Moments, Moments],
 ) -> tuple[Expression, Expression]:
     """Return what a leg needs along its slider beside its masses, (1, K), and across R3, (2, K).
 

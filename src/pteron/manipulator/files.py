@@ -13,7 +13,7 @@ from typing import Any, Literal, TypeVar
 from pteron.atomic import write_text
 from pteron.bodies.inertia import PointMass
 from pteron.errors import ModelError, shown
-from pteron.legs import KINDS, LegKind
+from pteron.legs import KINDS
 from pteron.manipulator.manipulator import STANDARD_GRAVITY, Manipulator
 from pteron.platforms import EQUATIONS, Platform
 from pteron.toml import fault_lines, parsed_toml, read_toml, told
@@ -54,16 +54,15 @@ def load(name_or_path: str | Path) -> Manipulator:
     >>> pteron.load("tripteron").coordinates
     ('x', 'y', 'z')
     """
-    if str(name_or_path) in catalog():
-        resource = files("pteron.manipulator") / "catalog" / f"{name_or_path}.toml"
-        return _machine(
-            parsed_toml(resource.read_bytes(), str(name_or_path), ModelError), str(name_or_path)
-        )
-    close = get_close_matches(str(name_or_path), catalog(), n=1)
+    name = str(name_or_path)
+    if name in catalog():
+        resource = files("pteron.manipulator") / "catalog" / f"{name}.toml"
+        return _machine(parsed_toml(resource.read_bytes(), name, ModelError), name)
+    close = get_close_matches(name, catalog(), n=1)
     guess = f'; did you mean "{close[0]}"?' if close else ""
     names = ", ".join(catalog())
     absent = f"neither a file nor a machine of the catalog ({names}){guess}"
-    return _machine(read_toml(name_or_path, ModelError, absent), str(name_or_path))
+    return _machine(read_toml(name_or_path, ModelError, absent), name)
 
 
 def _machine(document: dict[str, Any], source: str) -> Manipulator:
@@ -205,15 +204,11 @@ def save(robot: Manipulator, path: str | Path) -> Path:
     document.add("platform", _table(platform | _body(robot.platform.inertia)))
     legs = tomlkit.aot()
     for leg in robot.legs:
-        legs.append(_table(_leg_items(leg)))
+        common: dict[str, Any] = {"type": leg.type, "guide_point": leg.guide_point}
+        common |= {"platform_point": leg.platform_point, "elbow": leg.elbow, "limits": leg.limits}
+        legs.append(_table(common | leg.as_table()))
     document.add("legs", legs)
     return write_text(path, tomlkit.dumps(document))
-
-
-def _leg_items(leg: LegKind) -> dict[str, Any]:
-    own = leg.as_table()
-    common = {"platform_point": leg.platform_point, "elbow": leg.elbow, "limits": leg.limits}
-    return {"type": leg.type, "guide_point": leg.guide_point} | common | own
 
 
 def _table(items: dict[str, Any]) -> Any:

@@ -128,11 +128,9 @@ def expect_manipulator(robot: object) -> None:
 
 
 def _check_constraints(platform: Platform, legs: tuple[LegKind, ...]) -> None:
-    """Refuse legs that leave the platform a rotation which its motion does not have.
-
-    What one leg withholds is perpendicular to the axes about which it lets the platform turn.
-    """
+    """Refuse legs that leave the platform a rotation which its motion does not have."""
     axis = platform.axis if platform.turns else None
+    # What one leg withholds is perpendicular to the axes about which it lets the platform turn.
     withheld = np.vstack([_complement(leg.free_axes(axis)) for leg in legs])
     sizes = np.linalg.svd(withheld, compute_uv=False) if len(withheld) else np.zeros(3)
     rank = int((sizes > _VANISHING).sum())
@@ -176,14 +174,13 @@ def working_modes(robot: Manipulator) -> tuple[Manipulator, ...]:
     >>> len(modes), [leg.elbow for leg in modes[1].legs]
     (16, [1, 1, 1, -1])
     """
-    choices = product((1, -1), repeat=len(robot.legs))
-    return tuple(
-        replace(
-            robot,
-            legs=tuple(replace(leg, elbow=s) for leg, s in zip(robot.legs, signs, strict=True)),
-        )
-        for signs in choices
-    )
+    return tuple(with_elbows(robot, signs) for signs in product((1, -1), repeat=len(robot.legs)))
+
+
+def with_elbows(robot: Manipulator, signs: Sequence[int]) -> Manipulator:
+    """Return the machine in the working mode that has these elbows, +1 or -1 for each leg."""
+    legs = zip(robot.legs, signs, strict=True)
+    return replace(robot, legs=tuple(replace(leg, elbow=sign) for leg, sign in legs))
 
 
 def turned(robot: Manipulator, rotation: ArrayLike, *, gravity: bool = True) -> Manipulator:

@@ -95,12 +95,10 @@ def parameters(robot: Manipulator) -> NDArray[np.float64]:
     array, shape (N,)
         kg, kg m and kg m^2.
     """
-    values = []
-    bodies = [leg.bodies for leg in robot.legs]
-    for p in parameter_data(robot):
-        body = bodies[p.legs[0] - 1][p.body] if p.legs else robot.platform.inertia
-        values.append(body.values[body.kinds.index(p.kind)])
-    return np.array(values)
+    legs = [leg.bodies for leg in robot.legs]
+    listed = parameter_data(robot)
+    bodies = (legs[p.legs[0] - 1][p.body] if p.legs else robot.platform.inertia for p in listed)
+    return np.array([b.values[b.kinds.index(p.kind)] for p, b in zip(listed, bodies, strict=True)])
 
 
 def with_parameters(robot: Manipulator, values: ArrayLike) -> Manipulator:

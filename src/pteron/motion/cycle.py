@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pteron.errors import DataError
 from pteron.kernels import Array
@@ -106,15 +107,10 @@ def up(robot: Manipulator) -> Array:
     return -gravity / strength if strength > 0.0 else np.array(robot.platform.axis)
 
 
-def across_directions(robot: Manipulator, direction: Array | None, count: int) -> Array:
+def across_directions(robot: Manipulator, direction: ArrayLike | None, count: int) -> Array:
     """Return horizontal unit vectors: the given direction made horizontal, or `count` of them.
 
     These start at the platform's x axis (or y, where x is nearer to the vertical) and go round.
-
-    Raises
-    ------
-    DataError
-        If the given direction is vertical.
     """
     vertical = up(robot)
 
@@ -122,10 +118,11 @@ def across_directions(robot: Manipulator, direction: Array | None, count: int) -
         return np.asarray(v - (v @ vertical) * vertical, dtype=float)
 
     if direction is not None:
-        flat = level(direction)
+        given = np.asarray(direction, dtype=float)
+        flat = level(given)
         length = float(np.linalg.norm(flat))
-        if not length > 1e-9 * float(np.linalg.norm(direction)):
-            raise DataError(f"direction: {direction.tolist()} has no horizontal part")
+        if not length > 1e-9 * float(np.linalg.norm(given)):
+            raise DataError(f"direction: {given.tolist()} has no horizontal part")
         return flat[None] / length
     x, y, _ = (level(np.array(axis)) for axis in robot.platform.frame)
     first = x if np.linalg.norm(x) > 0.5 else y

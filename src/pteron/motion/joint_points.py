@@ -103,8 +103,8 @@ def joint_points(robot: Manipulator, pose: PoseLike) -> JointPoints:
     """
     given = np.asarray(pose, dtype=float)
     coordinates = inverse_kinematics(robot, given)
-    chain = evaluated(robot, "joint_points", "raise", given)
-    points = evaluated(robot, "platform_points", "raise", given)
+    chain: Array = evaluated(robot, "joint_points", "raise", given)
+    points: Array = evaluated(robot, "platform_points", "raise", given)
     x, y, z = (np.array(axis) for axis in robot.platform.frame)
     angle = (given[..., 3] if robot.platform.turns else np.zeros(given.shape[:-1]))[..., None]
     axes = np.stack(

@@ -130,8 +130,7 @@ def pick_and_place(
     if scale is None:
         scale, across = scaled_to_reach(robot, middle, direction=direction, turn=turn, least=least)
     else:
-        given = None if direction is None else np.asarray(direction, dtype=float)
-        across = across_directions(robot, given, 1)[0]
+        across = across_directions(robot, direction, 1)[0]
     angle = turn if robot.platform.turns else 0.0
     cycle = Cycle(middle, across, up(robot), angle, scale)
     if duration is None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -85,9 +87,8 @@ def scaled_to_reach(
     True
     """
     middle = checked(robot, around, "around")
-    given = None if direction is None else np.asarray(direction, dtype=float)
     scale, best = 0, None
-    for across in across_directions(robot, given, _DIRECTIONS):
+    for across in across_directions(robot, direction, _DIRECTIONS):
         fits = _largest(robot, middle, across, turn, least)
         if best is None or fits > _WORTH * scale:
             scale, best = fits, across
@@ -109,14 +110,7 @@ def _largest(robot: Manipulator, around: Array, across: Array, turn: float, leas
 
     if fits(_STEPS):
         return _STEPS
-    low, high = 0, _STEPS
-    while high - low > 1:
-        middle = (low + high) // 2
-        if fits(middle):
-            low = middle
-        else:
-            high = middle
-    return low
+    return _STEPS - bisect_left(range(_STEPS), True, lo=1, key=lambda less: fits(_STEPS - less))
 
 
 def _keeps(robot: Manipulator, poses: Array, least: float) -> bool:

@@ -116,10 +116,7 @@ def _nice(step: float) -> float:
 
 
 def _territories(legs: Array) -> Array:
-    """Return, for each leg (n, B, A), a field that is positive where it misses the pose by most.
-
-    Where legs tie, as mirrored ones do in a plane of symmetry, the first of them has it.
-    """
+    """Return, for each leg (n, B, A), a field above 0 where it, first of equals, misses by most."""
     fields = np.empty_like(legs)
     ranked = legs + _TIE * np.arange(len(legs))[:, None, None]
     for i, margin in enumerate(legs):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -36,12 +35,13 @@ from pteron.workspace import (
     reserve,
 )
 from pteron.workspace.doubts import doubts
+from pteron.workspace.reach import Plane
 
 _SAMPLES = 481
 """Samples of the cycle: 120 steps of the moving picture, four each."""
 
 _LEAST_RESERVE = 0.2
-_PLANES: tuple[Literal["xy", "xz", "yz"], ...] = ("xy", "xz", "yz")
+_PLANES: tuple[Plane, ...] = ("xy", "xz", "yz")
 _ANGLES = 361
 
 _RIM = 0.08
@@ -145,6 +145,8 @@ def contents(robot: Manipulator) -> Report:
     cycle = pick_and_place(robot, home, samples=_SAMPLES, least=least)
     volume = reach_volume(robot, home)
     base = base_parameters(robot)
+    # Squares of one width, so that the pictures share a scale.
+    half = (0.5 + _RIM) * float((volume.box[1] - volume.box[0]).max())
     return Report(
         robot=robot,
         doubts=doubts(robot),
@@ -158,21 +160,16 @@ def contents(robot: Manipulator) -> Report:
         forces=inverse_dynamics(robot, cycle.pose, cycle.velocity, cycle.acceleration),
         joint_speeds=joint_rates(robot, cycle.pose, cycle.velocity).actuated,
         joints=joint_ranges(robot, cycle.pose),
-        slices=_slices(robot, home, volume.box),
+        slices=tuple(
+            reach_slice(robot, home, plane, extent=_extent(volume.box, plane, [half] * 3))
+            for plane in _PLANES
+        ),
         volume=volume,
         jacobian=_jacobian(robot, home),
         orientations=_orientations(robot, home),
         measures=_measures(robot, home, volume.box),
         base=base,
         costs=costs(base),
-    )
-
-
-def _slices(robot: Manipulator, home: Array, box: Array) -> tuple[ReachSlice, ...]:
-    """Return squares of one width through the home pose, so that the pictures share a scale."""
-    half = (0.5 + _RIM) * float((box[1] - box[0]).max())
-    return tuple(
-        reach_slice(robot, home, plane, extent=_extent(box, plane, [half] * 3)) for plane in _PLANES
     )
 
 
@@ -188,7 +185,9 @@ def _measures(robot: Manipulator, home: Array, box: Array) -> Measures | None:
     closure = closure_of(robot)
     if closure.orientation is not None or closure.vanishes() is False:
         return None
-    plane = _upright_plane(robot)
+    # The plane of the base frame that holds the vertical best, x before y.
+    vertical = np.abs(robot.gravity if any(robot.gravity) else robot.platform.axis)
+    plane: Plane = "xy" if vertical[1] > vertical[2] else "xz"
     half = (0.5 + _RIM) * (box[1] - box[0])
     cut = reach_slice(robot, home, plane, extent=_extent(box, plane, half.tolist()), points=_FINE)
     poses = np.tile(home, (*cut.status.shape, 1))
@@ -197,12 +196,6 @@ def _measures(robot: Manipulator, home: Array, box: Array) -> Measures | None:
     type_i = numeric(robot, "reach")(poses)[1].min(axis=-1)
     type_ii = np.abs(numeric(robot, "type_ii")(poses)[0])
     return Measures(cut, type_i, np.where(np.isnan(type_i), np.nan, type_ii))
-
-
-def _upright_plane(robot: Manipulator) -> Literal["xy", "xz", "yz"]:
-    """Return the plane of the base frame that holds the vertical best, x before y."""
-    vertical = np.abs(robot.gravity if any(robot.gravity) else robot.platform.axis)
-    return "xy" if vertical[1] > vertical[2] else "xz"
 
 
 def _jacobian(robot: Manipulator, home: Array) -> JacobianAtHome:

@@ -22,11 +22,7 @@ _NAMES = {
 
 @dataclass(frozen=True)
 class Cost:
-    """One form of the model: its name, the operations of one state, and a note.
-
-    Operations are counted from the graph or, where matrices are dense, for full matrices and
-    without those that fill them. The note compares a reduced form with the row before it.
-    """
+    """One form of the model: its name, operations of one state, and how it compares if reduced."""
 
     form: str
     operations: int

@@ -53,7 +53,6 @@ def page(report: Report) -> str:
         typeset=lambda text: escape(text).replace("J^-T", Markup("<b>J</b><sup>\u2212T</sup>")),
         zip=zip,
     )
-    # JSON that cannot end the script element it stands in.
     data = json.dumps(scene(report), separators=(",", ":"), allow_nan=False)
     return made.render(
         report=report,
@@ -77,7 +76,7 @@ def page(report: Report) -> str:
         version=pteron.__version__,
         style=resource("page.css"),
         script=resource("view.js"),
-        scene=Markup(data.replace("<", "\\u003c")),
+        scene=Markup(data.replace("<", "\\u003c")),  # so that it cannot end its script element
     )
 
 
@@ -98,10 +97,7 @@ def kinds(robot: Manipulator) -> list[tuple[LegKind, list[int]]]:
 
 
 def geometry(robot: Manipulator) -> list[tuple[str, bool, list[str]]]:
-    """Return the columns of the legs' geometry: heading, whether of numbers, a text for each leg.
-
-    Points and lengths are in mm; what a leg has not is a dash.
-    """
+    """Return the columns of the legs' geometry, mm: heading, whether of numbers, a text a leg."""
     roles = {
         **{q.name: q.role for leg in robot.legs for q in leg.quantities if hasattr(leg, q.name)},
         "platform_point": "platform point",
@@ -158,10 +154,7 @@ def _reasons(robot: Manipulator) -> list[str]:
 
 
 def _figures(report: Report) -> dict[str, Any]:
-    """Return the pictures as SVG.
-
-    `robot`, `forces`, three of `reach`; and `orientations`, or two of `measures`, or neither.
-    """
+    """Return the pictures as SVG, by their names in the template."""
     robot, cycle, at = report.robot, report.cycle, report.orientations
     gravity = np.array(robot.gravity)
     path = cycle.pose[: len(cycle.time) // 2 + 1, :3]
@@ -241,10 +234,7 @@ def _plain(array: Array) -> Any:
 
 
 def in_symbols(base: BaseParameters) -> dict[str, list[Any]] | None:
-    """Return the base parameters in symbols, `sums`, and the symbols' values in m, `lengths`.
-
-    None where they have none, or are too long.
-    """
+    """Return the sums in symbols and the symbols' values in m; None if none, or too long."""
     try:
         lines = base.expressions(symbols=True)
     except ModelError:

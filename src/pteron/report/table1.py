@@ -64,22 +64,19 @@ class Row:
 def rows() -> tuple[Row, ...]:
     """Return the rows of Table 1, computed for the catalog's Quadrupteron."""
     base = base_parameters(load("quadrupteron"))
-    exact = base.expressions(digits=12)
-    found = []
-    for i, (printed, computed, name) in enumerate(
-        zip(PRINTED, exact, base.names, strict=True), start=1
-    ):
-        shown = base.expressions()[i - 1]
-        agrees = agree(printed, computed)
-        found.append(Row(f"P_b{i}", name, printed, shown, agrees, i in RESTORED))
-    return tuple(found)
+    columns = base.names, PRINTED, base.expressions(), base.expressions(digits=12)
+    return tuple(
+        Row(f"P_b{i}", name, printed, shown, agree(printed, exact), i in RESTORED)
+        for i, (name, printed, shown, exact) in enumerate(zip(*columns, strict=True), start=1)
+    )
 
 
 def agree(printed: str, computed: str) -> bool:
     """Say whether two sums agree, as `Row` has it."""
     given, found = _terms(printed), _terms(computed)
     return given.keys() == found.keys() and all(
-        round(float(found[name]), _decimals(text)) == float(text) for name, text in given.items()
+        round(float(found[name]), len(text.partition(".")[2])) == float(text)
+        for name, text in given.items()
     )
 
 
@@ -89,7 +86,3 @@ def _terms(text: str) -> dict[str, str]:
         name: ("-" if sign == "-" else "") + (size or "1")
         for sign, size, name in _TERM.findall(text)
     }
-
-
-def _decimals(text: str) -> int:
-    return len(text.partition(".")[2])

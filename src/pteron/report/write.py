@@ -53,10 +53,7 @@ def write_report(robot: Manipulator, folder: str | Path) -> Path:
 
 
 def checked_folder(path: str | Path) -> Path:
-    """Return a folder after a check, before the work, that it can be made and written.
-
-    Nothing is left behind if the work then fails, or is interrupted, however roughly.
-    """
+    """Return a folder after a check, which leaves nothing behind, that it can be written."""
     if str(path) == "":
         raise OutputError("the folder's name is empty; name one")
     target = Path(path)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 from scipy.optimize import minimize  # type: ignore[import-untyped]
 
@@ -11,10 +13,9 @@ from pteron.kinematics import inverse_kinematics, random_poses, singular_orienta
 from pteron.manipulator import Manipulator
 from pteron.workspace.reserve import reserve
 
-_SEARCHES = ((0.3, 0.3), (0.02, 0.02), (0.0, 0.0))
-"""The measures that random poses must have: less where the legs have little common reach."""
+_SEARCHES = ((200, 0.3), (200, 0.02), (200, 0.0), (1, 0.0))
+"""How many random poses, and their least measures: less where the legs have little common reach."""
 
-_SAMPLES = 200
 _STARTS = 12
 
 _STEPS = (0.02, 0.2)
@@ -86,18 +87,13 @@ def home_pose(robot: Manipulator) -> Array:
 
 
 def _random_poses(robot: Manipulator) -> Array:
-    for type_i, type_ii in _SEARCHES:
-        try:
-            return random_poses(robot, _SAMPLES, type_i=type_i, type_ii=type_ii)
-        except ModelError:
-            continue
-    try:
-        return random_poses(robot, 1, type_i=0.0, type_ii=0.0)
-    except ModelError:
-        raise ModelError(
-            f"{robot.name}: no pose is in reach of all legs; bring the guide points nearer or "
-            "lengthen the links"
-        ) from None
+    for count, least in _SEARCHES:
+        with suppress(ModelError):
+            return random_poses(robot, count, type_i=least, type_ii=least)
+    raise ModelError(
+        f"{robot.name}: no pose is in reach of all legs; bring the guide points nearer or lengthen "
+        "the links"
+    )
 
 
 def _refined(robot: Manipulator, start: Array) -> Array:
@@ -110,5 +106,4 @@ def _refined(robot: Manipulator, start: Array) -> Array:
         method="Nelder-Mead",
         options={"initial_simplex": simplex, "xatol": 1e-5, "fatol": 1e-6, "maxiter": 500},
     )
-    best: Array = found.x
-    return best
+    return np.asarray(found.x)

@@ -98,13 +98,9 @@ def _facts(robot: Manipulator) -> _Facts:
 
 
 def clearances(robot: Manipulator, joints: Array) -> Array:
-    """Return the distance (..., n) of joints from their nearer limit, m or rad.
-
-    It is negative beyond a limit, infinite without limits, and NaN where the coordinate is.
-    """
+    """Return the distance (..., n) of joints from their nearer limit, negative beyond, or inf."""
     facts = _facts(robot)
-    distances: Array = np.minimum(joints - facts.low, facts.high - joints)
-    return distances
+    return np.asarray(np.minimum(joints - facts.low, facts.high - joints))
 
 
 def room_to_limits(robot: Manipulator, poses: Array) -> Array:

@@ -28,6 +28,8 @@ _ENDLESS = 10.0
 _SLACK = 1e-8
 """Metres by which the optimiser may overstep a bound."""
 
+_OPTIONS = {"ftol": 1e-10, "maxiter": 200}
+
 _TOUCH = 1e-9
 """Metres by which the legs' reach must overlap to count as common."""
 
@@ -131,10 +133,9 @@ def _deepest(room: Callable[[Array], Array], start: Array) -> Array:
         np.append(start, float(room(start).min())),
         method="SLSQP",
         constraints={"type": "ineq", "fun": lambda v: room(v[:3]) - v[3]},
-        options={"ftol": 1e-10, "maxiter": 200},
+        options=_OPTIONS,
     )
-    deepest: Array = found.x[:3]
-    return deepest
+    return np.asarray(found.x[:3])
 
 
 def _furthest(room: Callable[[Array], Array], start: Array, objective: Array) -> float:
@@ -145,7 +146,7 @@ def _furthest(room: Callable[[Array], Array], start: Array, objective: Array) ->
         jac=lambda p: objective,
         method="SLSQP",
         constraints={"type": "ineq", "fun": room},
-        options={"ftol": 1e-10, "maxiter": 200},
+        options=_OPTIONS,
     )
     inside = bool(room(found.x).min() > -_SLACK)
     return float(objective @ (found.x if inside else start))

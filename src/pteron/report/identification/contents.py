@@ -106,6 +106,7 @@ def contents(result: Identification) -> Contents:
     names = short_sources(result)
     held = tuple(_shown(prediction, names) for prediction in result.held_out)
     fitted = tuple(_shown(prediction, names) for prediction in result.fitted)
+    worst = sorted(held, key=lambda one: -float(one.prediction.nrms.max()))
     residuals = _residuals(result)
     correlations, bound = _correlations(residuals)
     tones = {"trustworthy": "good", "usable with care": "care", "not trustworthy": "bad"}
@@ -117,7 +118,8 @@ def contents(result: Identification) -> Contents:
         notes=shortened(result.notes, names),
         held_out=held,
         fitted=fitted,
-        drawn=_drawn(held),
+        # A single sample is nothing to draw.
+        drawn=tuple(one for one in worst if len(one.prediction.time) > 1)[:_MOST_PICTURES],
         repeats={one.name for one in held} <= {one.name for one in fitted},
         parameters=parameter_rows(result),
         bodies=body_rows(result),
@@ -137,13 +139,6 @@ def contents(result: Identification) -> Contents:
         correlations=correlations,
         bound=bound,
     )
-
-
-def _drawn(held: tuple[Shown, ...]) -> tuple[Shown, ...]:
-    # A single sample is nothing to draw.
-    several = [one for one in held if len(one.prediction.time) > 1]
-    several.sort(key=lambda one: -float(one.prediction.nrms.max()))
-    return tuple(several[:_MOST_PICTURES])
 
 
 def _shown(prediction: Prediction, names: dict[str, str]) -> Shown:

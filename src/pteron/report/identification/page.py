@@ -32,10 +32,7 @@ from pteron.report.typeset import resource, significant, template
 
 
 def page(result: Identification, model_file: str | None = None) -> str:
-    """Return the page of an identification, as HTML without any reference to another file.
-
-    `model_file` names the file of the machine with its identified bodies, beside the page.
-    """
+    """Return the page as HTML without reference to another file but the machine's, beside it."""
     made = template(
         "identification/page.html.j2",
         measured=lambda row: measured(row.value, row.half),

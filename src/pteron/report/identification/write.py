@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 import tempfile
 from collections.abc import Iterable
@@ -11,9 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from pteron.atomic import make_folder, write_text
+from pteron.atomic import make_folder, plain, write_text
 from pteron.errors import OutputError
 from pteron.identification import Identification
 from pteron.manipulator import save
@@ -82,10 +79,7 @@ def write_identification(
 
 
 def model_path(folder: str | Path, name: str, sources: Iterable[str | Path] = ()) -> Path:
-    """Return where the model file of a machine goes, in a folder of results.
-
-    It must not replace a file that was read, nor be taken for the description of a log.
-    """
+    """Return where the model file goes: replacing none that is read, nor describing a log."""
     stem = _SAFE.sub("_", name).strip("._") or "robot"
     path = Path(folder) / f"{stem[:100]}.toml"
     for source in map(Path, sources):
@@ -139,16 +133,4 @@ def _line(text: str) -> str:
 
 def numbers(result: Identification) -> dict[str, Any]:
     """Return the numbers of an identification as plain data, null where one is not finite."""
-    found = _finite(result.as_dict())
-    assert isinstance(found, dict)
-    return found
-
-
-def _finite(data: Any) -> Any:
-    if isinstance(data, dict):
-        return {key: _finite(value) for key, value in data.items()}
-    if isinstance(data, list | tuple):
-        return [_finite(value) for value in data]
-    if isinstance(data, np.generic):
-        data = data.item()
-    return None if isinstance(data, float) and not math.isfinite(data) else data
+    return {key: plain(value) for key, value in result.as_dict().items()}
