@@ -24,7 +24,6 @@ from pteron.identification import (
     open_log,
     write_log,
 )
-from pteron.identification import recordings as recordings_module
 from pteron.identification.diagnosis import Fault
 from pteron.identification.logs import Description
 from pteron.identification.plausibility import has_negative_inertia
@@ -534,18 +533,18 @@ def test_an_interrupt_in_a_callback_of_a_weak_reference_gets_through():
 # Files ---------------------------------------------------------------------------------------
 
 
-def test_a_file_in_pieces_gives_what_the_log_in_memory_gives(tmp_path, monkeypatch):
+def test_a_file_in_pieces_gives_what_the_log_in_memory_gives(tmp_path):
     log = noisy(QUADRUPTERON)
     path = write_log(log, tmp_path / "log.parquet")
     # Cut-offs, and what is slow, would be found from the first piece.
     pinned = Processing(derivatives="central", cutoff=20.0, band=20.0, slow=0.0)
     whole = identify(QUADRUPTERON, open_log(path, QUADRUPTERON), processing=pinned)
-    monkeypatch.setattr(recordings_module, "_IN_MEMORY", 100)
-    monkeypatch.setattr(recordings_module, "_PIECE", 1700)
+    file = open_log(path, QUADRUPTERON)
+    file.rows_in_memory, file.rows_in_piece = 100, 1700
     told = []
     streamed = identify(
         QUADRUPTERON,
-        open_log(path, QUADRUPTERON),
+        file,
         processing=pinned,
         progress=lambda task, done, total: told.append(task),
     )

@@ -11,11 +11,6 @@ from pteron.errors import DataError
 from pteron.identification.logs import Finding, Log, LogFile
 from pteron.kernels import Array
 
-_IN_MEMORY = 2_000_000
-"""Rows up to which a file is read whole: 150 MB for four joints."""
-
-_PIECE = 1 << 18
-
 _LOOKED_AT = 2_000_000
 """Rows of a file read in pieces that tell how well a fit describes what it was fitted to."""
 
@@ -69,7 +64,7 @@ class Recording:
             if progress is not None:
                 progress(self.rows)
             return
-        for piece in self.log.pieces(_PIECE, progress):
+        for piece in self.log.pieces(progress=progress):
             if piece.first_row >= self.stop:
                 return
             first = max(self.start - piece.first_row, 0)
@@ -90,7 +85,7 @@ class Recording:
 
 def recording(log: Log | LogFile, progress: Callable[[int], None] | None = None) -> Recording:
     """Return a log as a recording; files of a usual length are read whole."""
-    if isinstance(log, LogFile) and (log.rows_estimate or 0) <= _IN_MEMORY:
+    if isinstance(log, LogFile) and (log.rows_estimate or 0) <= log.rows_in_memory:
         log = log.read(progress)
     if isinstance(log, Log):
         return Recording(replace(log, time=_since(log.time)), 0, log.rows)

@@ -33,7 +33,6 @@ from pteron.tables import CsvFile, Dialect, ParquetFile, open_table
 _FEWEST = 50
 _AHEAD = 10_000
 """Rows looked at when a log is opened: the usual step is their median."""
-_PIECE = 1 << 18
 _PER_UNIT = {"ms": 1e3, "us": 1e6, "mm": 1e3, "um": 1e6}
 
 Values = NDArray[np.float64]
@@ -52,7 +51,14 @@ class LogFile:
         About how many rows it has, for a progress bar; exact in Parquet.
     findings : tuple of Finding
         What was guessed and, after a full pass, all that was noticed.
+    rows_in_memory : int
+        Rows up to which `identify` reads it whole: 2 million, 150 MB for four joints.
+    rows_in_piece : int
+        Rows that it is read by otherwise.
     """
+
+    rows_in_memory = 2_000_000
+    rows_in_piece = 1 << 18
 
     def __init__(
         self, file: CsvFile | ParquetFile, robot: Manipulator, description: Description
@@ -72,14 +78,14 @@ class LogFile:
         self._step = self._usual_step()
 
     def pieces(
-        self, rows: int = _PIECE, progress: Callable[[int], None] | None = None
+        self, rows: int | None = None, progress: Callable[[int], None] | None = None
     ) -> Iterator[Log]:
         """Yield the log in pieces, checked across their borders, in bounded memory.
 
         Parameters
         ----------
-        rows : int
-            Rows a piece; the last may have fewer.
+        rows : int, optional
+            Rows a piece, `rows_in_piece` if not given; the last may have fewer.
         progress : callable, optional
             Called with the number of rows of each piece, once it is read.
 
@@ -88,6 +94,7 @@ class LogFile:
         DataError
             As `read_log`; a dead channel is known only behind the last piece.
         """
+        rows = self.rows_in_piece if rows is None else rows
         if rows < 1:
             raise DataError(f"rows: {rows} given; a piece has at least 1 row")
         stamps = TimeStamps(self._step, self._columns.time.shown[0], self.source)
