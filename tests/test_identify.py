@@ -330,6 +330,12 @@ def test_swapped_sliders_are_found(pair):
     refused(changed, f"rho{pair[0] + 1} and rho{pair[1] + 1}", "swapped")
 
 
+def test_swaps_are_found_without_noise_too():
+    robot = CATALOG["delta"]
+    log = log_of(robot)
+    refused(replace(log, forces=log.forces[:, [1, 0, 2]]), "swapped", "vanishes", robot=robot)
+
+
 def test_swaps_are_found_on_three_legs_too():
     robot = CATALOG["tripteron-oblique"]
     log = noisy(robot)

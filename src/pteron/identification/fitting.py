@@ -142,7 +142,9 @@ def check_columns(model: Model, one: Recording, preprocessing: Preprocessing) ->
     fault = column_fault(model, one.head().part(0, _LOOK), preprocessing)
     if fault is None:
         return
-    if fault.after < fault.before:
+    if fault.after < 1e-6 * fault.before:
+        why = ": mended so, the error of the fit vanishes"
+    elif fault.after < fault.before:
         why = f": mended so, the error of the fit falls {fault.before / fault.after:.1f} times"
     else:
         why = ": as they are, the machine would have negative inertia"
