@@ -60,10 +60,12 @@ class Terms:
 
 
 class Term(NamedTuple):
-    """One value beside the base parameters: what it is, of which leg or joint, and its unit."""
+    """One value beside the base parameters: what it is, and how it is written: a letter's index."""
 
     kind: Literal["coulomb", "viscous", "offset", "passive", "rotor", "payload"]
     name: str
+    letter: str
+    index: str
     unit: str
 
 
@@ -103,18 +105,26 @@ class Model:
         slides = {i: joint.unit == "m" for i, joint in joints}
         found: list[Term] = []
         if self.terms.coulomb:
-            found += [Term("coulomb", f"Fc{i}", joint.force_unit) for i, joint in joints]
+            found += [Term("coulomb", f"Fc{i}", "F", f"c{i}", j.force_unit) for i, j in joints]
         if self.terms.viscous:
-            found += [Term("viscous", f"Fv{i}", "N s/m" if slides[i] else "N m s") for i in slides]
+            units = {i: "N s/m" if slides[i] else "N m s" for i in slides}
+            found += [Term("viscous", f"Fv{i}", "F", f"v{i}", units[i]) for i in slides]
         if self.terms.offset:
-            found += [Term("offset", f"offset{i}", joint.force_unit) for i, joint in joints]
-        found += [Term("passive", name, "N m s") for name in self._passive]
+            found += [
+                Term("offset", f"offset{i}", "offset", f"{i}", j.force_unit) for i, j in joints
+            ]
+        for index in self._passive:
+            found.append(Term("passive", f"F{'_'.join(index)}", "F", ",".join(index), "N m s"))
         if self.terms.rotors:
-            found += [Term("rotor", f"J_m{i}", "kg" if slides[i] else "kg m^2") for i in slides]
+            units = {i: "kg" if slides[i] else "kg m^2" for i in slides}
+            found += [Term("rotor", f"J_m{i}", "J", f"m{i}", units[i]) for i in slides]
         if self.terms.payload:
-            units = ("kg", "kg m", "kg m", "kg m^2")
-            pairs = zip(PLATFORM_KINDS, units, strict=True)
-            found += [Term("payload", f"{kind}_L", unit) for kind, unit in pairs]
+            found += [
+                Term("payload", "m_L", "m", "L", "kg"),
+                Term("payload", "mgx_L", "m\u03b3", "x,L", "kg m"),
+                Term("payload", "mgy_L", "m\u03b3", "y,L", "kg m"),
+                Term("payload", "I_L", "I", "L", "kg m^2"),
+            ]
         return tuple(found)
 
     @cached_property
@@ -168,23 +178,23 @@ class Model:
         return np.ascontiguousarray(self._everything(states)[..., kept])
 
     @property
-    def _passive(self) -> dict[str, list[int]]:
+    def _passive(self) -> dict[tuple[str, ...], list[int]]:
         """The columns of `passive_friction` that each coefficient of passive joints is for."""
         if self.terms.passive == "none":
             return {}
-        found: dict[str, list[int]] = {}
+        found: dict[tuple[str, ...], list[int]] = {}
         kinds = [leg.type for leg in self.robot.legs]
         places = passive_joints(self.robot)
         for column, (leg, number) in enumerate(places):
             if self.terms.passive == "each":
-                name = f"Fv_R{number}_{leg}"
+                index: tuple[str, ...] = ("v", f"R{number}", f"{leg}")
             else:
                 alike = [i for i, kind in enumerate(kinds, start=1) if kind == kinds[leg - 1]]
                 legs = "" if len(alike) == len(kinds) else f"({','.join(map(str, alike))})"
-                name = f"Fv_R{number}{legs}"
-            found.setdefault(name, []).append(column)
+                index = ("v", f"R{number}{legs}")
+            found.setdefault(index, []).append(column)
         if self.robot.platform.turns:
-            found[f"Fv_R{1 + max(number for _, number in places)}"] = [len(places)]
+            found["v", f"R{1 + max(number for _, number in places)}"] = [len(places)]
         return found
 
     def _everything(self, states: States) -> Array:

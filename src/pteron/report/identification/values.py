@@ -125,15 +125,9 @@ def html_names(model: Model) -> dict[str, Markup]:
 
 
 def _term_html(term: Term) -> str:
-    """Return the name of a term: Fv_R1_2 is F with the index v,R1,2."""
-    if term.kind == "offset":
-        return f"offset<sub>{term.name.removeprefix('offset')}</sub>"
-    head, *indices = term.name.split("_")
-    if term.kind in ("rotor", "payload"):
-        axis = [head[2:]] if head in ("mgx", "mgy") else []
-        letter = "m\u03b3" if axis else head
-        return f"<i>{letter}</i><sub>{','.join([*axis, *indices])}</sub>"
-    return f"<i>{head[0]}</i><sub>{','.join([head[1:], *indices])}</sub>"
+    """Return the name of a term; a word is not in italics, as a letter is."""
+    letter = term.letter if term.kind == "offset" else f"<i>{term.letter}</i>"
+    return f"{letter}<sub>{term.index}</sub>"
 
 
 @dataclass(frozen=True)
