@@ -60,12 +60,12 @@ class Terms:
 
 
 class Term(NamedTuple):
-    """One value beside the base parameters: what it is, and how it is written: a letter's index."""
+    """One value beside the base parameters: what it is, and how it is written and measured."""
 
     kind: Literal["coulomb", "viscous", "offset", "passive", "rotor", "payload"]
     name: str
     letter: str
-    index: str
+    subscript: str
     unit: str
 
 

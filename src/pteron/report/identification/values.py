@@ -127,7 +127,7 @@ def html_names(model: Model) -> dict[str, Markup]:
 def _term_html(term: Term) -> str:
     """Return the name of a term; a word is not in italics, as a letter is."""
     letter = term.letter if term.kind == "offset" else f"<i>{term.letter}</i>"
-    return f"{letter}<sub>{term.index}</sub>"
+    return f"{letter}<sub>{term.subscript}</sub>"
 
 
 @dataclass(frozen=True)
