@@ -30,6 +30,8 @@ class AngleMotion(NamedTuple):
     angle: Expression
     rate: Expression
     acceleration: Expression
+    hinge: Expression | None = None
+    """A point of the axis about which it turns against a leg, (3, 1)."""
 
 
 class Moments(NamedTuple):

@@ -32,6 +32,20 @@ class Slider(Table):
     mass: Number
 
 
+class Bar(Table):
+    """`{ mass, hinge }` of a part that moves with the platform and does not turn."""
+
+    mass: Number
+    hinge: Three
+
+
+class Geared(Table):
+    """`{ inertia, ratio }` of a part that a gear turns with the platform."""
+
+    inertia: Number
+    ratio: Number
+
+
 class _Body(Table):
     mass: Number
     center_of_mass: Any = None

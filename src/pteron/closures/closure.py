@@ -4,17 +4,20 @@ The legs' rows [dq/dc | dq/dphi] and the platform's matrices d (c, phi)/dx make 
 (10): q' = J x'. A closure turns that round: forces through J^-T, rates through J^-1, joint
 coordinates into poses, and how far J is from singular. Which closure serves a machine depends on
 its legs' rows and on its platform alone. A kind is one file of this folder, named in
-`closures.KINDS`; its closed forms are tested against the plain J.
+`closures.KINDS`; what is solved here by the adjugate it may give in closed form.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from functools import reduce
+from operator import mul
 
 import casadi as ca
 
 from pteron.bodies.motion import Expression
+from pteron.closures.determinants import adjugate, determinant
 from pteron.legs.leg import LegEquations, LegMotion
 from pteron.platforms.motion import PlatformEquations, PlatformMotion
 
@@ -24,6 +27,10 @@ class Closure(ABC):
 
     def __init__(self, legs: Sequence[LegEquations], platform: PlatformEquations) -> None:
         self.legs, self.platform = legs, platform
+        square = sum(ca.dot(offset.a, offset.a) for offset in platform.offsets) / len(legs)
+        self.lever = ca.SX(1) if square.is_zero() else ca.sqrt(square)
+        """Root mean square distance of the platform points from the axis, m; 1 m if they are on it.
+        """
 
     @classmethod
     @abstractmethod
@@ -35,25 +42,43 @@ class Closure(ABC):
     def modes(self) -> int:
         """How many columns `poses` has."""
 
-    @abstractmethod
     def forces(
         self, wrench: Expression, platform: PlatformMotion, legs: Sequence[LegMotion]
     ) -> Expression:
-        """Return F (n, K) with J^T F = wrench (m, K)."""
+        """Return F (n, K) with J^T F = wrench (m, K).
 
-    @abstractmethod
+        With J = B^-1 A, B being the divisors: F = B A^-T wrench.
+        """
+        rows = plain_rows(platform, legs)
+        across = adjugate(rows)
+        divisors = ca.vertcat(*(leg.divisor for leg in legs))
+        share = divisors / ca.mtimes(rows[0, :], across[:, 0])
+        return ca.repmat(share, 1, wrench.shape[1]) * ca.mtimes(across.T, wrench)
+
     def rates(
         self, joints: Expression, platform: PlatformMotion, legs: Sequence[LegMotion]
     ) -> Expression:
         """Return x (m, K) with J x = joints (n, K)."""
+        rows = plain_rows(platform, legs)
+        across = adjugate(rows)
+        right = ca.vertcat(*(leg.divisor * joints[i, :] for i, leg in enumerate(legs)))
+        return ca.mtimes(across, right) / ca.mtimes(rows[0, :], across[:, 0])
 
     @abstractmethod
     def poses(self, joints: Expression) -> Expression:
         """Return every pose that joint coordinates allow, as columns (m, k); NaN if not real."""
 
-    @abstractmethod
     def measure(self, platform: PlatformMotion, legs: Sequence[LegMotion]) -> Expression:
-        """Return the type-II measure: 1 in size at best, 0 where J is singular, without unit."""
+        """Return the type-II measure: 1 in size at best, 0 where J is singular, without unit.
+
+        It is the volume that the rows of A span, J = B^-1 A, each made a unit vector, after phi is
+        counted as a length on `lever`: the same for every kind of leg, in any units and frame.
+        """
+        rows = plain_rows(platform, legs)
+        if platform.angle is not None:
+            rows = ca.horzcat(rows[:, :-1], rows[:, -1] / self.lever)
+        squares = (ca.dot(row, row) for row in ca.vertsplit(rows))
+        return determinant(rows) / ca.sqrt(reduce(mul, squares))
 
     keeps_modes: bool = False
     """Whether each column of `poses` is one assembly mode throughout."""
@@ -72,12 +97,7 @@ def nan_below_zero(value: Expression) -> Expression:
     return ca.if_else(value < 0, ca.SX.nan(), 0)
 
 
-def det3(m: Expression) -> Expression:
-    """Return the determinant of a 3x3 matrix."""
-    return ca.dot(m[0, :].T, ca.cross(m[1, :].T, m[2, :].T))
-
-
-def adjugate3(m: Expression) -> Expression:
-    """Return the adjugate of a 3x3 matrix: its columns are the cross products of its rows."""
-    a, b, c = m[0, :].T, m[1, :].T, m[2, :].T
-    return ca.horzcat(ca.cross(b, c), ca.cross(c, a), ca.cross(a, b))
+def plain_rows(platform: PlatformMotion, legs: Sequence[LegMotion]) -> Expression:
+    """Return A (n, m), J's rows times their divisors."""
+    pairs = zip(legs, platform.matrices, strict=True)
+    return ca.vertcat(*(ca.mtimes(leg.row, matrix) for leg, matrix in pairs))

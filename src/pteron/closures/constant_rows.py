@@ -13,7 +13,8 @@ import casadi as ca
 import numpy as np
 
 from pteron.bodies.motion import Expression
-from pteron.closures.closure import Closure, adjugate3, det3, nan_below_zero
+from pteron.closures.closure import Closure, nan_below_zero
+from pteron.closures.determinants import adjugate, determinant
 from pteron.legs.leg import LegEquations, LegMotion, Plane
 from pteron.platforms.motion import PlatformEquations, PlatformMotion
 
@@ -30,7 +31,7 @@ class ConstantRows(Closure):
 
     @classmethod
     def fits(cls, legs: Sequence[type[LegEquations]], platform: type[PlatformEquations]) -> bool:
-        return all(leg.row_is_constant for leg in legs)
+        return all(leg.row_is_constant for leg in legs) and "z" in platform.coordinates
 
     def __init__(self, legs: Sequence[LegEquations], platform: PlatformEquations) -> None:
         super().__init__(legs, platform)
@@ -38,11 +39,11 @@ class ConstantRows(Closure):
         bars: list[Expression] = [leg.constant_row for leg in legs]
         self.rows = ca.horzcat(*bars).T  # D
         if not self.turns:
-            self.right_inverse = adjugate3(self.rows).T / det3(self.rows)  # P
+            self.right_inverse = adjugate(self.rows).T / determinant(self.rows)  # P
             return
         normal = ca.mtimes(self.rows.T, self.rows)
-        self.right_inverse = ca.mtimes(self.rows, adjugate3(normal)) / det3(normal)
-        null = ca.vertcat(*((-1) ** i * det3(_without(self.rows, i)) for i in range(4)))
+        self.right_inverse = ca.mtimes(self.rows, adjugate(normal)) / determinant(normal)
+        null = ca.vertcat(*((-1) ** i * determinant(_without(self.rows, i)) for i in range(4)))
         self.null = null / ca.norm_inf(null) if null.is_constant() else null  # N
         # j = cosines cos(phi) + sines sin(phi) is the Jacobian's fourth column.
         pairs = list(zip(bars, platform.offsets, strict=True))
@@ -71,19 +72,10 @@ class ConstantRows(Closure):
         return 2 if self.turns else 1
 
     def measure(self, platform: PlatformMotion, legs: Sequence[LegMotion]) -> Expression:
-        """Return N . j over its largest value, the cosine of the angle from the best orientation.
-
-        For 3T it is det D over the product of its rows' lengths. Of a machine that is singular
-        everywhere only rounding is left of either, and it is 0.
-        """
+        """Return the measure; of a machine that is singular everywhere only rounding is left: 0."""
         if self.rows.is_constant() and self.vanishes():
             return ca.SX(0)
-        if self.orientation is None:
-            rows = ca.vertsplit(self.rows)
-            return det3(self.rows) / (ca.norm_2(rows[0]) * ca.norm_2(rows[1]) * ca.norm_2(rows[2]))
-        assert platform.angle is not None
-        (a, b), phi = self.orientation, platform.angle.angle
-        return (a * ca.cos(phi) + b * ca.sin(phi)) / ca.sqrt(a * a + b * b)
+        return super().measure(platform, legs)
 
     def forces(
         self, wrench: Expression, platform: PlatformMotion, legs: Sequence[LegMotion]
@@ -154,9 +146,9 @@ class ConstantRows(Closure):
 
 def _sparse_inverse(rows: Expression) -> Expression:
     """Return a P with D^T P = 1 that loads three legs only: those that hold a force best."""
-    best = max(range(4), key=lambda i: abs(float(det3(_without(rows, i)))))
+    best = max(range(4), key=lambda i: abs(float(determinant(_without(rows, i)))))
     held = _without(rows, best)
-    inverse = ca.vertsplit(adjugate3(held).T / det3(held))
+    inverse = ca.vertsplit(adjugate(held).T / determinant(held))
     inverse.insert(best, ca.SX.zeros(1, 3))
     return ca.vertcat(*inverse)
 

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 import casadi as ca
 
 from pteron.bodies.motion import Expression
-from pteron.closures.closure import Closure, adjugate3, det3, nan_below_zero
-from pteron.legs.leg import LegEquations, LegMotion, Plane, Sphere
+from pteron.closures.closure import Closure, nan_below_zero
+from pteron.legs.leg import LegEquations, LegMotion, Locus, Plane, Sphere
 from pteron.platforms.motion import PlatformEquations, PlatformMotion
 
 _ROUNDING = 1e-14
@@ -27,12 +27,6 @@ class ThreeLoci(Closure):
     @classmethod
     def fits(cls, legs: Sequence[type[LegEquations]], platform: type[PlatformEquations]) -> bool:
         return platform.coordinates == ("x", "y", "z")
-
-    def measure(self, platform: PlatformMotion, legs: Sequence[LegMotion]) -> Expression:
-        """Return det A over the product of its rows' lengths: the volume that the rods span."""
-        rows = [leg.row[:, :3] for leg in legs]
-        sizes = [ca.norm_2(row) for row in rows]
-        return det3(ca.vertcat(*rows)) / (sizes[0] * sizes[1] * sizes[2])
 
     def forces(
         self, wrench: Expression, platform: PlatformMotion, legs: Sequence[LegMotion]
@@ -48,14 +42,6 @@ class ThreeLoci(Closure):
                 for leg, (row, column) in zip(legs, shares, strict=True)
             )
         )
-
-    def rates(
-        self, joints: Expression, platform: PlatformMotion, legs: Sequence[LegMotion]
-    ) -> Expression:
-        rows = ca.vertcat(*(leg.row[:, :3] for leg in legs))
-        right = ca.vertcat(*(leg.divisor * joints[i, :] for i, leg in enumerate(legs)))
-        across = adjugate3(rows)
-        return ca.mtimes(across, right) / ca.dot(rows[0, :].T, across[:, 0])
 
     def poses(self, joints: Expression) -> Expression:
         loci = [
@@ -88,8 +74,9 @@ class ThreeLoci(Closure):
         return ca.horzcat(*(first.center + foot + side * step * along + beyond for side in (-1, 1)))
 
 
-def _moved(locus: Plane | Sphere, offset: Expression) -> Plane | Sphere:
+def _moved(locus: Locus, offset: Expression) -> Plane | Sphere:
     """Return the locus of P, where that of P + offset is given."""
     if isinstance(locus, Sphere):
         return Sphere(locus.center - offset, locus.radius)
+    assert isinstance(locus, Plane)  # others are of platforms that turn, or of planar ones
     return locus._replace(offset=locus.offset - ca.dot(locus.normal, offset))

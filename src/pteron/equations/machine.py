@@ -49,25 +49,29 @@ class Machine:
         expect_manipulator(robot)
         legs = tuple(leg.equations() for leg in robot.legs)
         frame = [ca.SX(list(axis)) for axis in robot.platform.frame]
-        points = [ca.SX(list(leg.platform_point)) for leg in robot.legs]
-        return cls._made(robot, legs, frame, points, ca.SX(list(robot.gravity)))
+        points, fixed = (
+            [ca.SX(list(getattr(leg, name))) for leg in robot.legs]
+            for name in ("platform_point", "fixed_offset")
+        )
+        return cls._made(robot, legs, frame, points, fixed, ca.SX(list(robot.gravity)))
 
     @classmethod
     def symbols(cls, robot: Manipulator) -> tuple[Machine, Expression]:
         """Return the machines of a robot's topology in symbols, and the symbols as one vector.
 
-        The vector holds the quantities of each leg and its platform point; then x0, y0, k and
-        gravity: the order of `numbers`.
+        The vector holds the quantities of each leg, its platform point and fixed offset; then x0,
+        y0, k and gravity: the order of `numbers`.
         """
-        legs, points, vectors = [], [], []
+        legs, points, fixed, vectors = [], [], [], []
         for i, leg in enumerate(robot.legs, start=1):
             parts = {q.name: ca.SX.sym(f"{q.name}{i}", len(q.value)) for q in leg.quantities}
             points.append(ca.SX.sym(f"platform_point{i}", 3))
+            fixed.append(ca.SX.sym(f"fixed_offset{i}", 3))
             legs.append(leg.equations(parts))
-            vectors += [*parts.values(), points[-1]]
+            vectors += [*parts.values(), points[-1], fixed[-1]]
         frame = [ca.SX.sym(name, 3) for name in ("x0", "y0", "k")]
         gravity = ca.SX.sym("gravity", 3)
-        machine = cls._made(robot, tuple(legs), frame, points, gravity)
+        machine = cls._made(robot, tuple(legs), frame, points, fixed, gravity)
         return machine, ca.vertcat(*vectors, *frame, gravity)
 
     @classmethod
@@ -77,9 +81,10 @@ class Machine:
         legs: tuple[LegEquations, ...],
         frame: list[Expression],
         points: list[Expression],
+        fixed: list[Expression],
         gravity: Expression,
     ) -> Machine:
-        platform = EQUATIONS[robot.platform.motion](frame, points)
+        platform = EQUATIONS[robot.platform.motion](frame, points, fixed)
         closure = kind_for([type(leg) for leg in legs], type(platform))
         assert closure is not None  # the manipulator has asked
         return cls(legs, platform, closure(legs, platform), gravity)
@@ -97,8 +102,9 @@ class Machine:
             rest if velocity is None else velocity,
             rest if acceleration is None else acceleration,
         )
-        pairs = zip(self.legs, platform.points, strict=True)
-        return State(platform, tuple(leg.motion(c, platform.angle) for leg, c in pairs))
+        trios = zip(self.legs, platform.points, self.platform.fixed, strict=True)
+        legs = tuple(leg.motion(c, platform.angle_at(c, fixed)) for leg, c, fixed in trios)
+        return State(platform, legs)
 
     def moments(self, parameters: Expression) -> tuple[list[dict[str, Moments]], Moments]:
         """Return the legs' inertia, by body, and the platform's from P (N, K)."""
@@ -124,7 +130,7 @@ def numbers(robot: Manipulator) -> list[float]:
     for leg in robot.legs:
         for quantity in leg.quantities:
             values += map(float, quantity.value)
-        values += leg.platform_point
+        values += (*leg.platform_point, *leg.fixed_offset)
     for vector in (*robot.platform.frame, robot.gravity):
         values += vector
     return values

@@ -334,7 +334,7 @@ def bare(robot: Manipulator) -> Manipulator:
         leg.with_bodies({letter: plain(body) for letter, body in leg.bodies.items()})
         for leg in robot.legs
     )
-    platform = replace(robot.platform, inertia=plain(robot.platform.inertia))
+    platform = robot.platform.with_joined(plain(robot.platform.joined))
     return replace(robot, name="any", legs=legs, platform=platform)
 
 

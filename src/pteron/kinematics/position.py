@@ -230,7 +230,7 @@ def assembly_modes(robot: Manipulator, joints: Array, *, all_branches: bool = Fa
     """
     poses: Poses = evaluated(robot, "direct_kinematics", "nan", joints)
     if robot.platform.turns:
-        poses[..., 3] = np.where(poses[..., 3] <= -np.pi, np.pi, poses[..., 3])
+        poses[..., -1] = np.where(poses[..., -1] <= -np.pi, np.pi, poses[..., -1])
     back: PerJoint = evaluated(robot, "inverse_kinematics", "nan", poses)
     lost = np.isnan(back).any(axis=-1)
     if not closure_of(robot).keeps_modes and not all_branches:
@@ -248,7 +248,8 @@ def mode_of(robot: Manipulator, pose: tuple[float, ...]) -> int:
     """Return the column of `assembly_modes` that a pose is in."""
     joints: PerJoint = evaluated(robot, "inverse_kinematics", "raise", np.array(pose))
     poses = assembly_modes(robot, joints, all_branches=True)
-    apart = np.linalg.norm(poses[:, :3] - pose[:3], axis=-1)
+    lengths = len(robot.platform.directions)
+    apart = np.linalg.norm(poses[:, :lengths] - pose[:lengths], axis=-1)
     if robot.platform.turns:
-        apart += np.abs(np.sin(0.5 * (poses[:, 3] - pose[3])))
+        apart += np.abs(np.sin(0.5 * (poses[:, -1] - pose[-1])))
     return int(np.nanargmin(apart))

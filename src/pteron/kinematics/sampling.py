@@ -68,7 +68,7 @@ def random_poses(
     if len(coarse) >= count:
         return coarse[:count]
     # The ball is generous: with scouts in, their bounding box, widened, serves the rest.
-    least, most = coarse[:, :3].min(axis=0), coarse[:, :3].max(axis=0)
+    least, most = (coarse[:, : len(low)].min(axis=0), coarse[:, : len(low)].max(axis=0))
     margin = 0.25 * (most - least)
     low, high = np.maximum(least - margin, low), np.minimum(most + margin, high)
     return _drawn(robot, low, high, count, rng, type_i, type_ii)[:count]
@@ -88,9 +88,9 @@ def _drawn(
     total = 0
     for _ in range(_ATTEMPTS + count // 16):
         poses = rng.uniform(-1.0, 1.0, (_BATCH, robot.freedom))
-        poses[:, :3] = 0.5 * (low + high) + 0.5 * (high - low) * poses[:, :3]
-        if robot.platform.turns:
-            poses[:, 3] *= np.pi
+        lengths = len(low)
+        poses[:, :lengths] = 0.5 * (low + high) + 0.5 * (high - low) * poses[:, :lengths]
+        poses[:, lengths:] *= np.pi
         _, measures, _, _ = numeric(robot, "reach")(poses)
         good = (measures >= type_i).all(axis=-1)
         if type_ii:
@@ -108,15 +108,23 @@ def _drawn(
 
 
 def search_ball(robot: Manipulator) -> tuple[Array, float]:
-    """Return a centre, nearest to all legs' bounds, and a radius that hold every pose in reach."""
+    """Return a centre, nearest to all legs' bounds, and a radius that hold every pose in reach.
+
+    The centre's coordinates are the pose's lengths.
+    """
     normal, right = np.zeros((3, 3)), np.zeros(3)
     reach = 0.0
     for leg in robot.legs:
         bound = leg.reach_bound
+        if bound is None:
+            continue
+        offset = np.array(leg.fixed_offset)
         line = np.zeros(3) if bound.line is None else np.array(bound.line)
         across = np.eye(3) - np.outer(line, line)
         normal += across
-        right += across @ np.array(bound.point)
+        right += across @ (np.array(bound.point) - offset)
         reach = max(reach, float(np.linalg.norm(leg.platform_point)) + bound.radius)
+    directions = robot.platform.directions
+    normal, right = directions @ normal @ directions.T, directions @ right
     center = np.linalg.lstsq(normal, right, rcond=None)[0]
     return np.asarray(center, dtype=float), 1.5 * reach

@@ -5,7 +5,7 @@ Vectors lie in the plane of the links, as two-vectors (2, 1).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from random import Random
 
@@ -13,6 +13,7 @@ import casadi as ca
 import numpy as np
 
 from pteron.bodies.motion import Expression
+from pteron.bodies.vectors import cross
 
 _ROUNDING = 1e-15
 
@@ -92,6 +93,20 @@ def random_direction(length: Fraction, rng: Random) -> tuple[Fraction, Fraction]
     """Return a random vector of the plane with this length, rational by its half angle."""
     t = random_fraction(rng)
     return length * (1 - t * t) / (1 + t * t), length * 2 * t / (1 + t * t)
+
+
+def random_triangle(
+    values: Mapping[str, Sequence[Fraction]], rng: Random
+) -> tuple[list[Fraction], int]:
+    """Return the sum of two links drawn in their plane, in fractions, and the side of the elbow."""
+    a = values["plane_axis"]
+    b = cross(values["direction"], a)
+    (ua, ub), (la, lb) = (
+        random_direction(values[key][0], rng) for key in ("upper_length", "lower_length")
+    )
+    u = [(ua + la) * p + (ub + lb) * q for p, q in zip(a, b, strict=True)]
+    # D = (l_u x l_l) . d has the sign of -sigma.
+    return u, -1 if ua * lb - ub * la > 0 else 1
 
 
 def random_fraction(rng: Random) -> Fraction:

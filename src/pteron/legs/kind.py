@@ -14,7 +14,7 @@ import casadi as ca
 from pteron.bodies.inertia import Inertia, PointMass
 from pteron.bodies.motion import Expression
 from pteron.bodies.parameters import LEG_BODIES
-from pteron.bodies.vectors import Vector, numbers, positive, unit_vector, vector
+from pteron.bodies.vectors import Vector, number, numbers, positive, unit_vector, vector
 from pteron.errors import ModelError
 from pteron.legs.leg import LegEquations
 
@@ -33,9 +33,9 @@ class ActuatedJoint:
 SLIDER = ActuatedJoint("slider", "rho", "m", "force", "N")
 CRANK = ActuatedJoint("crank", "theta", "rad", "torque", "N m")
 
-Role = Literal["point", "direction", "normal", "platform point", "length", "angle", "sign"]
-"""What a quantity is: a point or a unit vector in the base frame; a unit vector perpendicular to
-the kind's first direction; a point in the platform frame; a length; an angle; +1 or -1."""
+Role = Literal["point", "direction", "normal", "length", "number", "sign"]
+"""What a quantity is: a point or a unit vector in the base frame; a unit vector that no force
+depends on, as an axis perpendicular to the kind's first direction; a length; a number; +1 or -1."""
 
 
 class Quantity(NamedTuple):
@@ -55,9 +55,9 @@ class Quantity(NamedTuple):
 class Key(NamedTuple):
     """What a field of a leg, and its TOML key, holds."""
 
-    role: Literal["direction", "length", "count", "slider", "planar", "rod"]
-    """A unit vector, a length, a whole number, a slider's mass (TOML key `slider`), a body in a
-    plane, a rod."""
+    role: Literal["direction", "length", "number", "count", "slider", "planar", "rod"]
+    """A unit vector, a length, a number, a whole number, a slider's mass (TOML key `slider`), a
+    body in a plane, a rod."""
     body: str = ""
     """The letter of the body whose inertia it is: "p", "u" or "l"."""
     default: Any = ...
@@ -98,6 +98,9 @@ class LegKind(ABC):
         coordinate is zero, or the centre of the crank's circle; m.
     platform_point : vector
         s0, from P to the platform point, in the platform frame, m.
+    fixed_offset : vector
+        t0, what is added to it in the base frame: the part that does not turn with phi, as on the
+        articulated platform of an H4 or a Par4; m.
     elbow : {1, -1}
         sigma, the side of the elbow: the leg's branch.
     limits : (float, float), optional
@@ -106,6 +109,7 @@ class LegKind(ABC):
 
     guide_point: Vector
     platform_point: Vector
+    fixed_offset: Vector
     elbow: int
     limits: tuple[float, float] | None
 
@@ -114,6 +118,10 @@ class LegKind(ABC):
     joint: ClassVar[ActuatedJoint]
     names: ClassVar[Mapping[str, str]] = {"p": "slider", "u": "upper link", "l": "lower link"}
     """What its bodies are called, by letter."""
+    branches: ClassVar[tuple[int, ...]] = (1, -1)
+    """The values that `elbow` may have."""
+    follows_angle: ClassVar[bool] = False
+    """Whether its joint follows the platform's angle, and not its platform point."""
     account: ClassVar[str] = ""
     """How it is built, in a few sentences for a report; vectors by their letters r, d, e, k, s0."""
     keys: ClassVar[Mapping[str, Key]]
@@ -123,10 +131,12 @@ class LegKind(ABC):
 
     def __post_init__(self) -> None:
         checked: dict[str, Any] = {
-            name: vector(getattr(self, name), name) for name in ("guide_point", "platform_point")
+            name: vector(getattr(self, name), name)
+            for name in ("guide_point", "platform_point", "fixed_offset")
         }
-        if self.elbow not in (1, -1):
-            raise ModelError(f"elbow: {self.elbow!r} is neither 1 nor -1")
+        if self.elbow not in self.branches:
+            valid = "neither 1 nor -1" if len(self.branches) > 1 else "not 1, its only branch"
+            raise ModelError(f"elbow: {self.elbow!r} is {valid}")
         checked["elbow"] = 1 if self.elbow == 1 else -1
         if self.limits is not None:
             low, high = checked["limits"] = numbers(self.limits, "limits", 2)
@@ -143,6 +153,8 @@ class LegKind(ABC):
                 checked[name] = unit_vector(value, name)
             elif key.role == "length":
                 checked[name] = positive(value, name, "m")
+            elif key.role == "number":
+                checked[name] = number(value, name)
             elif key.role == "slider":
                 checked[name] = positive(value, "slider.mass", "kg")
         for name, value in checked.items():
@@ -180,6 +192,15 @@ class LegKind(ABC):
         """
 
     @property
+    def plane_normal(self) -> Vector | None:
+        """The normal of the plane in which a planar leg keeps its platform point; else None."""
+        return None
+
+    def under(self, axis: Vector) -> Self:
+        """Return the leg with what it takes from the axis of its platform, where it has it not."""
+        return self
+
+    @property
     @abstractmethod
     def joint_axis(self) -> Vector:
         """The unit vector along which the slider moves, or about which the crank turns."""
@@ -190,9 +211,9 @@ class LegKind(ABC):
         return 1.0
 
     @property
-    @abstractmethod
-    def reach_bound(self) -> ReachBound:
-        """A bound on the platform points in reach."""
+    def reach_bound(self) -> ReachBound | None:
+        """A bound on the platform points in reach; None where there is none."""
+        return None
 
     @property
     @abstractmethod
@@ -207,6 +228,7 @@ class LegKind(ABC):
         types: dict[str, Any] = {
             "direction": tables.Three,
             "length": tables.Number,
+            "number": tables.Number,
             "count": tables.Count,
             "slider": tables.Slider,
             "planar": tables.PlanarBody,
@@ -225,7 +247,7 @@ class LegKind(ABC):
         """Build the leg from a table that has been read."""
         values: dict[str, Any] = {
             name: getattr(table, name)
-            for name in ("guide_point", "platform_point", "elbow", "limits")
+            for name in ("guide_point", "platform_point", "fixed_offset", "elbow", "limits")
         }
         for name, key in cls.keys.items():
             if key.role == "slider":
@@ -278,5 +300,5 @@ class LegKind(ABC):
     def turned(self, turn: Any) -> Self:
         """Return the leg with every base-frame vector v replaced by `turn(v)`."""
         vectors = [q.name for q in self.quantities if q.role in ("point", "direction", "normal")]
-        given = {name: getattr(self, name, None) for name in vectors}
+        given = {name: getattr(self, name, None) for name in (*vectors, "fixed_offset")}
         return replace(self, **{name: turn(v) for name, v in given.items() if v is not None})

@@ -126,7 +126,21 @@ class Sphere(NamedTuple):
     radius: Expression
 
 
-Locus = Plane | Sphere
+class Circle(NamedTuple):
+    """Where c may be for a given joint of a planar leg: its part in the plane lies on a circle."""
+
+    center: Expression
+    """(3, 1); only its part in the plane counts."""
+    radius: Expression
+
+
+class Turned(NamedTuple):
+    """The platform's angle for a given joint of a leg that follows it; c may be anywhere."""
+
+    angle: Expression
+
+
+Locus = Plane | Sphere | Circle | Turned
 
 
 class LegEquations(ABC):

@@ -16,25 +16,23 @@ import casadi as ca
 
 from pteron.bodies.inertia import PlanarInertia, PointMass
 from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, PointMotion
-from pteron.bodies.vectors import Vector, cross, dot, parallel, vertical
+from pteron.bodies.vectors import Vector, dot, parallel, vertical
 from pteron.errors import ModelError
 from pteron.legs.circles import (
     first_moment,
     links_from_triangle,
     perpendicular_to,
     plane_of,
-    quarter_turn,
-    random_direction,
+    random_triangle,
     squared_reach,
 )
+from pteron.legs.crank import ELBOW
 from pteron.legs.kind import SLIDER, Key, LegKind, Quantity, ReachBound, Transfer
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Plane, Reach
+from pteron.legs.planar_links import Turning, last_joints, link_body, lower_link_body
 from pteron.legs.two_bar import two_bar_needs
 
 _LEAST_SLIDE = 1e-6
-
-_PARALLEL = 1.0 - 1e-12
-"""Cosine between d and k above which R3 and R4 of a leg are one joint."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +62,8 @@ class PRRR(LegKind):
         sigma, the side of the elbow.
     limits : (float, float), optional
         Least and greatest slider coordinate, m.
+    fixed_offset : vector
+        t0, the part of the platform point that does not turn with phi, in the base frame, m.
     """
 
     guide_point: Vector
@@ -77,6 +77,7 @@ class PRRR(LegKind):
     slider_direction: Vector | None = None
     elbow: int = 1
     limits: tuple[float, float] | None = None
+    fixed_offset: Vector = (0.0, 0.0, 0.0)
 
     type = "PRRR"
     joint = SLIDER
@@ -166,33 +167,7 @@ class PRRR(LegKind):
         cls, values: Mapping[str, Sequence[Fraction]], rng: Random
     ) -> tuple[list[Fraction], int]:
         """Draw the directions of the links in the leg's plane; the triangle then closes."""
-        a = values["plane_axis"]
-        b = cross(values["direction"], a)
-        (ua, ub), (la, lb) = (
-            random_direction(values[key][0], rng) for key in ("upper_length", "lower_length")
-        )
-        u = [(ua + la) * p + (ub + lb) * q for p, q in zip(a, b, strict=True)]
-        # D = (l_u x l_l) . d has the sign of -sigma.
-        return u, -1 if ua * lb - ub * la > 0 else 1
-
-
-ELBOW: Mapping[tuple[str, str], tuple[int, tuple[str, ...]]] = {
-    ("m", "u"): (1, ()),
-    ("mgx", "u"): (1, ("lu",)),
-    ("I", "u"): (1, ("lu", "lu")),
-    ("m", "l"): (-1, ()),
-    ("mgx", "l"): (1, ("ll",)),
-    ("I", "l"): (-1, ("ll", "ll")),
-}
-"""Mass moved from the lower link's end to the upper link's: both carry the joint between them."""
-
-
-class Turning(NamedTuple):
-    """How a link turns about d: d theta / d u (2, 1), theta' and theta''."""
-
-    row: Expression
-    rate: Expression
-    acceleration: Expression
+        return random_triangle(values, rng)
 
 
 class _InPlane(NamedTuple):
@@ -200,6 +175,8 @@ class _InPlane(NamedTuple):
 
     l_u: Expression
     l_l: Expression
+    rows: tuple[Expression, Expression]
+    """d theta_u / d u and d theta_l / d u, (2, 1)."""
     upper: Turning
     lower: Turning
     ddu: Expression
@@ -253,9 +230,12 @@ class PRRREquations(LegEquations):
         upper_row, lower_row = l_l * inverse_d, -(l_u * inverse_d)
         upper_rate, lower_rate = ca.dot(upper_row, du), ca.dot(lower_row, du)
         v = ddu + (upper_rate * upper_rate) * l_u + (lower_rate * lower_rate) * l_l
-        upper = Turning(upper_row, upper_rate, ca.dot(upper_row, v))
-        lower = Turning(lower_row, lower_rate, ca.dot(lower_row, v))
-        return _InPlane(l_u, l_l, upper, lower, ddu)
+        rows = upper_row, lower_row
+        upper, lower = (
+            Turning(ca.horzcat(ca.mtimes(row.T, self.across), 0), rate, ca.dot(row, v))
+            for row, rate in zip(rows, (upper_rate, lower_rate), strict=True)
+        )
+        return _InPlane(l_u, l_l, rows, upper, lower, ddu)
 
     def motion(self, point: PointMotion, angle: AngleMotion | None) -> LegMotion:
         at = self._state(point)
@@ -264,62 +244,20 @@ class PRRREquations(LegEquations):
         row = ca.horzcat(self.d_bar.T, 0)
         r1 = self.r + rho * self.e
         slides = r1, ca.mtimes(self.e, row), sliding * self.e
-        rides = point.position, ca.horzcat(ca.SX.eye(3), ca.SX(3, 1)), point.acceleration
         bodies = {
             "p": BodyMotion(*slides),
-            "u": BodyMotion(*slides, *self._axes(at.l_u / self.lu, at.upper)),
-            "l": BodyMotion(*rides, *self._axes(at.l_l / self.ll, at.lower)),
+            "u": link_body(slides, self.d, self.plane, at.l_u / self.lu, at.upper),
+            "l": lower_link_body(point, self.d, self.plane, at.l_l / self.ll, at.lower),
         }
-        slider = Joint("P", self.e, self.r, row, rate, sliding)
         links = ca.mtimes(self.plane, at.l_u), ca.mtimes(self.plane, at.l_l)
-        chain = (slider, *self._revolute(r1, links[0], point, angle, at))
+        chain = (
+            Joint("P", self.e, self.r, row, rate, sliding),
+            Joint("R", self.d, r1, *at.upper),
+            Joint("R", self.d, r1 + links[0], *at.lower.less(at.upper)),
+            *last_joints(self.d, point, at.lower, angle),
+        )
         angles = tuple((link.rate, link.acceleration) for link in (at.upper, at.lower))
         return LegMotion(rho, rate, sliding, row, ca.SX(1), bodies, chain, links, angles)
-
-    def _row(self, turning: Turning) -> Expression:
-        """Return the row (1, 4) of a link's angle with respect to (c, phi)."""
-        return ca.horzcat(ca.mtimes(turning.row.T, self.across), 0)
-
-    def _axes(self, x: Expression, turning: Turning) -> tuple[Expression, ...]:
-        """Return how a link turns, its axes x and y, and their second derivatives."""
-        y = quarter_turn(x)
-        along, square = turning.acceleration, turning.rate * turning.rate
-        vectors = (x, y, along * y - square * x, -along * x - square * y)
-        row = self._row(turning)
-        return (self.d, row, *(ca.mtimes(self.plane, vector) for vector in vectors))
-
-    def _revolute(
-        self,
-        r1: Expression,
-        l_u: Expression,
-        point: PointMotion,
-        angle: AngleMotion | None,
-        at: _InPlane,
-    ) -> list[Joint]:
-        """Return R1, R2, R3 and, under a platform that turns, R4.
-
-        Where d is parallel to k, R3 and R4 are one joint: its motion is under R3, and R4 has none.
-        """
-        upper = self._row(at.upper), at.upper.rate, at.upper.acceleration
-        lower = self._row(at.lower), at.lower.rate, at.lower.acceleration
-        knee = tuple(a - b for a, b in zip(lower, upper, strict=True))
-        ankle = tuple(-a for a in lower)
-        c, r2 = point.position, r1 + l_u
-        if angle is None:
-            last = []
-        else:
-            along = ca.dot(self.d, angle.axis)
-            sense = ca.if_else(ca.fabs(along) > _PARALLEL, along, 0)
-            turn = ca.SX([[0, 0, 0, 1]]), angle.rate, angle.acceleration
-            ankle = tuple(a + sense * b for a, b in zip(ankle, turn, strict=True))
-            apart = 1 - sense * sense
-            last = [Joint("R", angle.axis, c, *(apart * b for b in turn))]
-        return [
-            Joint("R", self.d, r1, *upper),
-            Joint("R", self.d, r2, *knee),
-            Joint("R", self.d, c, *ankle),
-            *last,
-        ]
 
     def named(self, point: PointMotion, angle: AngleMotion | None) -> dict[str, Expression]:
         at = self._state(point)
@@ -329,8 +267,10 @@ class PRRREquations(LegEquations):
         found = {"u": u, "n2": ca.dot(u, u), "delta": delta, "root": root, "ddu": at.ddu}
         found |= {"inverse_d": -2 * self.sigma / root, "links_dot": ca.dot(at.l_u, at.l_l)}
         v = at.ddu
-        for letter, l_b, link in (("u", at.l_u, at.upper), ("l", at.l_l, at.lower)):
-            found |= {f"theta_{letter}_{part}": value for part, value in link._asdict().items()}
+        links = (("u", at.l_u, at.rows[0], at.upper), ("l", at.l_l, at.rows[1], at.lower))
+        for letter, l_b, row, link in links:
+            found |= {f"theta_{letter}_row": row, f"theta_{letter}_rate": link.rate}
+            found[f"theta_{letter}_acceleration"] = link.acceleration
             found[f"theta_{letter}_rate2"] = square = link.rate * link.rate
             found[f"along_{letter}"] = ca.dot(l_b, at.ddu + square * l_b)
             found[f"plane_{letter}"] = l_b
@@ -394,7 +334,7 @@ class PRRREquations(LegEquations):
         h, dh = first_moment(at.l_l, lower.hx / self.ll, lower.hy / self.ll)
         across = at.lower.acceleration * dh - at.lower.rate**2 * h
         lower_moment = at.lower.acceleration * lower.i + ca.mtimes((on_r1 + at.ddu).T, dh)
-        tau = ca.mtimes(at.upper.row, upper_moment) + ca.mtimes(at.lower.row, lower_moment)
+        tau = ca.mtimes(at.rows[0], upper_moment) + ca.mtimes(at.rows[1], lower_moment)
         return ca.mtimes(self.e_plane.T, turning - tau), tau + across
 
 

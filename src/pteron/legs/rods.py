@@ -1,11 +1,23 @@
-"""A rod between two ball joints, whose bar at the platform keeps its direction."""
+"""A rod between two ball joints, or parallel rods that keep a bar at their ends parallel."""
 
 from __future__ import annotations
 
 import casadi as ca
 
-from pteron.bodies.motion import BodyMotion, Expression, PointMotion
+from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, PointMotion
+from pteron.bodies.vectors import Vector
 from pteron.legs.leg import Joint
+
+
+def free_axes(rods: int, bar: Vector | None, axis: Vector | None) -> tuple[Vector, ...]:
+    """Return axes about which rods let the platform turn, whose axis is `axis` if it turns.
+
+    Parallel rods keep the bar at their ends, on a hinge where the platform turns; one alone keeps
+    nothing. Where the bar is not told, nothing is held against the machine.
+    """
+    if rods == 1:
+        return (1, 0, 0), (0, 1, 0), (0, 0, 1)
+    return tuple(v for v in (bar, axis) if v is not None)
 
 
 def rod_body(point: PointMotion, n: Expression, ddn: Expression, swing: Expression) -> BodyMotion:
@@ -24,9 +36,12 @@ def universal_joints(
     c: Expression,
     swing: Expression,
     direction: tuple[Expression, Expression, Expression],
+    angle: AngleMotion | None,
     before: Joint | None = None,
 ) -> list[Joint]:
     """Return the universal joints at a rod's ends, tip and c: about d, and about d x n across it.
+
+    Where the platform turns, a hinge about k follows.
 
     With n' = omega x n and omega = alpha' d + beta' e, e = d x n / |d x n|: alpha' = n'.(d x n) /
     |d x n|^2 and beta' = - n'.d / |d x n|. `direction` is n, n' and n''; `swing` (3, 4) is
@@ -47,9 +62,14 @@ def universal_joints(
     if before is not None:
         knee = tuple(a - b for a, b in zip(about_d, before[3:], strict=True))
     axis = across / size
+    hinge = []
+    if angle is not None:
+        turn = ca.SX([[0, 0, 0, 1]]), angle.rate, angle.acceleration
+        hinge = [Joint("R", angle.axis, angle.hinge, *turn)]
     return [
         Joint("R", d, tip, *knee),
         Joint("R", axis, tip, *about_e),
         Joint("R", axis, c, *(-a for a in about_e)),
         Joint("R", d, c, *(-a for a in about_d)),
+        *hinge,
     ]

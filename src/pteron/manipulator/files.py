@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from difflib import get_close_matches
 from functools import lru_cache
 from importlib.resources import files
@@ -15,7 +15,7 @@ from pteron.bodies.inertia import PointMass
 from pteron.errors import ModelError, shown
 from pteron.legs import KINDS
 from pteron.manipulator.manipulator import STANDARD_GRAVITY, Manipulator
-from pteron.platforms import EQUATIONS, Platform
+from pteron.platforms import EQUATIONS, Bar, Geared, Platform
 from pteron.toml import fault_lines, parsed_toml, read_toml, told
 
 _Built = TypeVar("_Built")
@@ -137,6 +137,9 @@ def _machine_table() -> Any:
         motion=(motion, ...),
         axis=(tables.Three, (0.0, 0.0, 1.0)),
         x_axis=(tables.Three | None, None),
+        tool=(tables.Three, (0.0, 0.0, 0.0)),
+        bars=(list[tables.Bar], []),
+        geared=(list[tables.Geared], []),
     )
     return create_model(
         "MachineTable",
@@ -160,6 +163,7 @@ def _leg_table(kind: str) -> Any:
         "type": (str, kind),
         "guide_point": (tables.Three, ...),
         "platform_point": (tables.Three, ...),
+        "fixed_offset": (tables.Three, (0.0, 0.0, 0.0)),
         "elbow": (Literal[1, -1], 1),
         "limits": (tables.Two | None, limits),
     }
@@ -167,8 +171,15 @@ def _leg_table(kind: str) -> Any:
 
 
 def _platform(table: Any) -> Platform:
-    inertia = table.inertia_of("")
-    return Platform(table.motion, inertia, axis=table.axis, x_axis=table.x_axis)
+    return Platform(
+        table.motion,
+        table.inertia_of(""),
+        axis=table.axis,
+        x_axis=table.x_axis,
+        tool=table.tool,
+        bars=tuple(Bar(bar.mass, bar.hinge) for bar in table.bars),
+        geared=tuple(Geared(part.inertia, part.ratio) for part in table.geared),
+    )
 
 
 def save(robot: Manipulator, path: str | Path) -> Path:
@@ -201,11 +212,19 @@ def save(robot: Manipulator, path: str | Path) -> Path:
     document.add("gravity", tomlkit.item(list(robot.gravity)))
     x, _, axis = robot.platform.frame
     platform = {"motion": robot.platform.motion, "axis": axis, "x_axis": x}
-    document.add("platform", _table(platform | _body(robot.platform.inertia)))
+    platform |= {"tool": robot.platform.tool, **_body(robot.platform.inertia)}
+    table = _table(platform)
+    for name in ("bars", "geared"):
+        if parts := getattr(robot.platform, name):
+            table.add(name, tomlkit.aot())
+            for part in parts:
+                table[name].append(_table(asdict(part)))
+    document.add("platform", table)
     legs = tomlkit.aot()
     for leg in robot.legs:
-        common: dict[str, Any] = {"type": leg.type, "guide_point": leg.guide_point}
-        common |= {"platform_point": leg.platform_point, "elbow": leg.elbow, "limits": leg.limits}
+        common: dict[str, Any] = {"type": leg.type}
+        names = ("guide_point", "platform_point", "fixed_offset", "elbow", "limits")
+        common |= {name: getattr(leg, name) for name in names}
         legs.append(_table(common | leg.as_table()))
     document.add("legs", legs)
     return write_text(path, tomlkit.dumps(document))

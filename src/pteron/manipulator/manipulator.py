@@ -12,16 +12,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pteron.bodies.vectors import Vector, vector
-from pteron.closures import kind_for
+from pteron.bodies.vectors import Vector, parallel, vector
 from pteron.errors import ModelError
 from pteron.legs import LegKind
-from pteron.platforms import EQUATIONS, Platform
+from pteron.platforms import Platform
 
 _VANISHING = 1e-9
 """Singular value of unit vectors below which they do not span another direction."""
 
 _ORTHOGONAL = 1e-9
+
+_COINCIDENT = 1e-9
+"""m between points that are taken for one."""
 
 STANDARD_GRAVITY: Vector = (0.0, 0.0, -9.81)
 """Acceleration of gravity where a file does not say it, m/s^2."""
@@ -38,7 +40,7 @@ class Manipulator:
     name : str
         What the machine is called.
     platform : Platform
-        The moving platform; its motion fixes how many legs there are (3T: 3, 3T1R: 4).
+        The moving platform; its motion fixes how many legs there are: one for each freedom.
     legs : tuple of legs
         Of any kind in `pteron.legs`, in the order of the joint coordinates.
     gravity : vector
@@ -81,14 +83,8 @@ class Manipulator:
         for i, leg in enumerate(legs):
             if not isinstance(leg, LegKind):
                 raise ModelError(f"legs[{i}]: {type(leg).__name__} given, a leg expected")
+        legs = tuple(leg.under(self.platform.axis) for leg in legs)
         _check_constraints(self.platform, legs)
-        kinds = [leg.equations_class for leg in legs]
-        if kind_for(kinds, EQUATIONS[self.platform.motion]) is None:
-            types = ", ".join(sorted({leg.type for leg in legs}))
-            raise ModelError(
-                f"legs: no closure is known of {types} legs under a {self.platform.motion} "
-                "platform; give it other legs or another motion"
-            )
         object.__setattr__(self, "legs", legs)
         object.__setattr__(self, "gravity", vector(self.gravity, "gravity"))
 
@@ -106,7 +102,7 @@ class Manipulator:
 
     @property
     def coordinates(self) -> tuple[str, ...]:
-        """Names of the pose's coordinates: x, y, z and, for 3T1R, phi."""
+        """Names of the pose's coordinates: x, y, in space z, and phi where the platform turns."""
         return self.platform.coordinates
 
     @property
@@ -128,22 +124,63 @@ def expect_manipulator(robot: object) -> None:
 
 
 def _check_constraints(platform: Platform, legs: tuple[LegKind, ...]) -> None:
-    """Refuse legs that leave the platform a rotation which its motion does not have."""
+    """Refuse legs that leave the platform another freedom than its motion has."""
+    for i, leg in enumerate(legs, start=1):
+        _check_plane(platform, i, leg)
+        if leg.follows_angle and not platform.turns:
+            raise ModelError(
+                f"leg {i}: a {leg.type} leg turns the platform, but a {platform.motion} platform "
+                "does not turn; give it another leg or another motion"
+            )
+    if platform.planar and all(leg.plane_normal is None for leg in legs):
+        raise ModelError(
+            f"legs: none keeps a {platform.motion} platform in its plane; give it a planar leg"
+        )
     axis = platform.axis if platform.turns else None
     # What one leg withholds is perpendicular to the axes about which it lets the platform turn.
     withheld = np.vstack([_complement(leg.free_axes(axis)) for leg in legs])
     sizes = np.linalg.svd(withheld, compute_uv=False) if len(withheld) else np.zeros(3)
     rank = int((sizes > _VANISHING).sum())
-    if axis is None and rank < 3:
+    if platform.motion == "3T" and rank < 3:
         raise ModelError(
             "legs: all directions are parallel, or rods single, so that the platform is free to "
             "turn; a 3T platform needs two legs that are not parallel"
         )
-    if axis is not None and rank < 2:
+    if platform.motion == "3T1R" and rank < 2:
         raise ModelError(
-            "legs: all directions lie in one plane with the platform's axis, so that the platform "
-            "is free to tilt; turn one leg's direction out of that plane"
+            "legs: all directions lie in one plane with the platform's axis, or rods are single, "
+            "so that the platform is free to tilt; turn one leg's direction out of that plane"
         )
+    if platform.motion == "2T" and rank < 3:
+        first, second = (_in_plane(platform, leg) for leg in legs)
+        if np.abs(first - second).max() > _COINCIDENT:
+            raise ModelError(
+                "legs: their platform points do not coincide, so that the platform is free to turn "
+                "about its axis; a 2T platform needs one point for both"
+            )
+
+
+def _check_plane(platform: Platform, i: int, leg: LegKind) -> None:
+    """Refuse a planar leg under a platform that leaves the leg's plane."""
+    normal = leg.plane_normal
+    if normal is None:
+        return
+    if not platform.planar:
+        raise ModelError(
+            f"leg {i}: a {leg.type} leg moves in a plane, which a {platform.motion} platform "
+            'leaves; make the platform\'s motion "2T" or "2T1R", or give it another leg'
+        )
+    if not parallel(normal, platform.axis):
+        raise ModelError(
+            f"leg {i}: direction {list(normal)} is not along the platform's axis "
+            f"{list(platform.axis)}, the normal of its plane"
+        )
+
+
+def _in_plane(platform: Platform, leg: LegKind) -> NDArray[np.float64]:
+    """Return where a leg's platform point is in the platform's plane, from P, at phi = 0."""
+    point = np.array(platform.frame).T @ leg.platform_point + leg.fixed_offset
+    return platform.directions @ point
 
 
 def _complement(axes: Sequence[Vector]) -> NDArray[np.float64]:
@@ -155,7 +192,7 @@ def _complement(axes: Sequence[Vector]) -> NDArray[np.float64]:
 
 
 def working_modes(robot: Manipulator) -> tuple[Manipulator, ...]:
-    """Return the 2^n working modes of a manipulator: every choice of its elbows' sides.
+    """Return the working modes of a manipulator: every choice of its elbows' sides, 2^n for n legs.
 
     Parameters
     ----------
@@ -174,7 +211,8 @@ def working_modes(robot: Manipulator) -> tuple[Manipulator, ...]:
     >>> len(modes), [leg.elbow for leg in modes[1].legs]
     (16, [1, 1, 1, -1])
     """
-    return tuple(with_elbows(robot, signs) for signs in product((1, -1), repeat=len(robot.legs)))
+    branches = (leg.branches for leg in robot.legs)
+    return tuple(with_elbows(robot, signs) for signs in product(*branches))
 
 
 def with_elbows(robot: Manipulator, signs: Sequence[int]) -> Manipulator:

@@ -97,7 +97,7 @@ def parameters(robot: Manipulator) -> NDArray[np.float64]:
     """
     legs = [leg.bodies for leg in robot.legs]
     listed = parameter_data(robot)
-    bodies = (legs[p.legs[0] - 1][p.body] if p.legs else robot.platform.inertia for p in listed)
+    bodies = (legs[p.legs[0] - 1][p.body] if p.legs else robot.platform.joined for p in listed)
     return np.array([b.values[b.kinds.index(p.kind)] for p, b in zip(listed, bodies, strict=True)])
 
 
@@ -133,7 +133,7 @@ def with_parameters(robot: Manipulator, values: ArrayLike) -> Manipulator:
         blocks.setdefault((p.body, p.legs), []).append(value)
     bodies: dict[tuple[str, tuple[int, ...]], Any] = {}
     for (body, owner), block in blocks.items():
-        old: Inertia = robot.legs[owner[0] - 1].bodies[body] if owner else robot.platform.inertia
+        old: Inertia = robot.legs[owner[0] - 1].bodies[body] if owner else robot.platform.joined
         try:
             bodies[body, owner] = old.of_values(block)
         except ModelError as error:
@@ -143,5 +143,5 @@ def with_parameters(robot: Manipulator, values: ArrayLike) -> Manipulator:
         leg.with_bodies({body: bodies[body, (i,)] for body in leg.bodies})
         for i, leg in enumerate(robot.legs, start=1)
     )
-    platform = replace(robot.platform, inertia=bodies[PLATFORM, ()])
+    platform = robot.platform.with_joined(bodies[PLATFORM, ()])
     return replace(robot, legs=legs, platform=platform)

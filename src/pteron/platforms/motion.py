@@ -11,11 +11,16 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import ClassVar, NamedTuple
 
+import casadi as ca
+
 from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, PointMotion
 
 
 class Offset(NamedTuple):
-    """s = a cos(phi) + b sin(phi) + still, from P to a platform point; each (3, 1)."""
+    """s = a cos(phi) + b sin(phi) + still, from P to a platform point; each (3, 1).
+
+    `still` is along k, and what of the platform does not turn.
+    """
 
     a: Expression
     b: Expression
@@ -35,6 +40,10 @@ class PlatformMotion(NamedTuple):
     matrix: Expression
     """(4, m): d (p, phi) / dx."""
 
+    def angle_at(self, point: PointMotion, fixed: Expression) -> AngleMotion | None:
+        """Return the angle's motion as the leg at a point sees it, whose fixed offset is given."""
+        return self.angle and self.angle._replace(hinge=point.position - fixed)
+
 
 class PlatformEquations(ABC):
     """The equations of a platform, for one state."""
@@ -42,12 +51,20 @@ class PlatformEquations(ABC):
     coordinates: ClassVar[tuple[str, ...]]
     """The pose's coordinates, in order."""
 
-    def __init__(self, frame: Sequence[Expression], platform_points: Sequence[Expression]) -> None:
-        self.frame, self.points = frame, platform_points
+    def __init__(
+        self,
+        frame: Sequence[Expression],
+        platform_points: Sequence[Expression],
+        fixed_offsets: Sequence[Expression],
+    ) -> None:
+        self.frame, self.points, self.fixed = frame, platform_points, fixed_offsets
         x0, y0, k = frame
         self.offsets = [
-            Offset(x0 * s[0] + y0 * s[1], y0 * s[0] - x0 * s[1], k * s[2]) for s in platform_points
+            Offset(x0 * s[0] + y0 * s[1], y0 * s[0] - x0 * s[1], k * s[2] + t)
+            for s, t in zip(platform_points, fixed_offsets, strict=True)
         ]
+        self.directions = ca.SX.eye(3) if "z" in self.coordinates else ca.horzcat(x0, y0)
+        """(3, 2) or (3, 3): along which the pose's lengths count; p = directions (x, y, ...)."""
 
     @abstractmethod
     def motion(

@@ -2,17 +2,69 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pteron.bodies.inertia import PlanarInertia
-from pteron.bodies.vectors import Vector, cross, perpendicular, unit_vector
+from pteron.bodies.vectors import (
+    Vector,
+    cross,
+    number,
+    perpendicular,
+    positive,
+    unit_vector,
+    vector,
+)
 from pteron.errors import ModelError
 
-Motion = Literal["3T", "3T1R"]
-"""3T: the platform only translates. 3T1R: it also turns about its axis (Schoenflies motion)."""
+Motion = Literal["3T", "3T1R", "2T", "2T1R"]
+"""3T: the platform only translates. 3T1R: it also turns about its axis (Schoenflies motion). 2T and
+2T1R: the same in the plane across its axis."""
 
 _BASE_Z: Vector = (0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A part of an articulated platform that moves with a hinge of it and does not turn.
+
+    Parameters
+    ----------
+    mass : float
+        kg.
+    hinge : vector
+        Its hinge on the part that turns, in the platform frame, m.
+    """
+
+    mass: float
+    hinge: Vector
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mass", positive(self.mass, "mass", "kg"))
+        object.__setattr__(self, "hinge", vector(self.hinge, "hinge"))
+
+
+@dataclass(frozen=True)
+class Geared:
+    """A balanced part of the platform, such as a tool, that a gear turns faster than the platform.
+
+    Parameters
+    ----------
+    inertia : float
+        Its moment of inertia about its own axis, which is parallel to the platform's, kg m^2.
+    ratio : float
+        Its angle over phi.
+    """
+
+    inertia: float
+    ratio: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "inertia", positive(self.inertia, "inertia", "kg m^2"))
+        object.__setattr__(self, "ratio", number(self.ratio, "ratio"))
 
 
 @dataclass(frozen=True)
@@ -21,21 +73,32 @@ class Platform:
 
     Parameters
     ----------
-    motion : {"3T1R", "3T"}
-        Its freedom: translation, with or without a rotation about `axis`.
+    motion : {"3T1R", "3T", "2T", "2T1R"}
+        Its freedom: translation, in space or in the plane across `axis`, with or without a rotation
+        about `axis`.
     inertia : PlanarInertia
         Mass, first moment in the platform frame and moment of inertia about `axis` through P.
     axis : unit vector
-        k, the axis of rotation in the base frame, and the platform frame's z.
+        k, the axis of rotation in the base frame, and the platform frame's z; the normal of the
+        plane that a planar machine moves in.
     x_axis : unit vector, optional
         The platform frame's x at phi = 0, in the base frame. It may be left out where `axis` is
         the base frame's z: the frames then coincide at phi = 0.
+    tool : vector
+        The tool's centre point in the platform frame, m.
+    bars : tuple of Bar
+        Parts that move with the platform's hinges and do not turn.
+    geared : tuple of Geared
+        Parts that a gear turns with the platform.
     """
 
     motion: Motion
     inertia: PlanarInertia
     axis: Vector = _BASE_Z
     x_axis: Vector | None = None
+    tool: Vector = (0.0, 0.0, 0.0)
+    bars: tuple[Bar, ...] = ()
+    geared: tuple[Geared, ...] = ()
 
     def __post_init__(self) -> None:
         if self.motion not in get_args(Motion):
@@ -52,8 +115,13 @@ class Platform:
                 f"x_axis: missing; axis {list(axis)} is not the base frame's z, so x_axis must say "
                 "where the platform frame's x points at phi = 0"
             )
+        if self.geared and not self.turns:
+            raise ModelError(f"geared: a {self.motion} platform has no angle for a gear to turn")
         object.__setattr__(self, "axis", axis)
         object.__setattr__(self, "x_axis", x)
+        object.__setattr__(self, "tool", vector(self.tool, "tool"))
+        for name in ("bars", "geared"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
 
     @property
     def frame(self) -> tuple[Vector, Vector, Vector]:
@@ -63,11 +131,39 @@ class Platform:
         return (x, cross(self.axis, x), self.axis)
 
     @property
+    def planar(self) -> bool:
+        """Whether the platform stays in the plane across its axis."""
+        return self.motion in ("2T", "2T1R")
+
+    @property
     def turns(self) -> bool:
         """Whether the pose has an angle."""
-        return self.motion == "3T1R"
+        return self.motion in ("3T1R", "2T1R")
 
     @property
     def coordinates(self) -> tuple[str, ...]:
         """Names of the pose's coordinates, in order."""
-        return ("x", "y", "z", "phi") if self.turns else ("x", "y", "z")
+        return ("x", "y", *(() if self.planar else ("z",)), *(("phi",) if self.turns else ()))
+
+    @property
+    def directions(self) -> NDArray[np.float64]:
+        """Unit vectors (k, 3), k = 2 or 3, along which the pose's lengths count."""
+        return np.array(self.frame[:2]) if self.planar else np.eye(3)
+
+    @property
+    def joined(self) -> PlanarInertia:
+        """The platform's inertia with its bars and geared parts, as the equations take it.
+
+        A bar counts as a point mass at its hinge; a gear of ratio n adds n^2 times the inertia.
+        """
+        mass, (hx, hy), inertia = self.inertia.mass, self.inertia.first_moment, self.inertia.inertia
+        for bar in self.bars:
+            x, y, _ = bar.hinge
+            mass, hx, hy = mass + bar.mass, hx + bar.mass * x, hy + bar.mass * y
+            inertia += bar.mass * (x * x + y * y)
+        inertia += sum(part.ratio**2 * part.inertia for part in self.geared)
+        return PlanarInertia(mass, (hx, hy), inertia)
+
+    def with_joined(self, inertia: PlanarInertia) -> Platform:
+        """Return the same platform with this inertia, of which no part is told apart."""
+        return replace(self, inertia=inertia, bars=(), geared=())

@@ -1,6 +1,8 @@
-"""The 3T platform, which only translates: all its points move alike."""
+"""Platforms that only translate, in space (3T) or in a plane (2T): all their points move alike."""
 
 from __future__ import annotations
+
+from typing import ClassVar
 
 import casadi as ca
 
@@ -11,21 +13,26 @@ from pteron.platforms.motion import PlatformEquations, PlatformMotion
 class Translating(PlatformEquations):
     """c = p + s, with s constant."""
 
-    coordinates = ("x", "y", "z")
+    coordinates: ClassVar[tuple[str, ...]] = ("x", "y", "z")
 
     def motion(
         self, pose: Expression, velocity: Expression, acceleration: Expression
     ) -> PlatformMotion:
-        points = tuple(
-            PointMotion(pose + offset.a + offset.still, velocity, acceleration)
-            for offset in self.offsets
-        )
-        matrix = ca.vertcat(ca.SX.eye(3), ca.SX(1, 3))
+        p, dp, ddp = (ca.mtimes(self.directions, v) for v in (pose, velocity, acceleration))
+        points = tuple(PointMotion(p + offset.a + offset.still, dp, ddp) for offset in self.offsets)
+        matrix = ca.vertcat(self.directions, ca.SX(1, len(self.coordinates)))
         rest = ca.SX(3, 1)
         x, y, k = self.frame
         row = ca.horzcat(ca.SX.eye(3), ca.SX(3, 1))
-        body = BodyMotion(pose, row, acceleration, k, ca.SX(1, 4), x, y, rest, rest)
+        body = BodyMotion(p, row, ddp, k, ca.SX(1, 4), x, y, rest, rest)
         return PlatformMotion(points, (matrix,) * len(points), None, body, matrix)
 
     def needs(self, motion: PlatformMotion, gravity: Expression, inertia: Moments) -> Expression:
-        return ca.mtimes(motion.body.acceleration - gravity, inertia.m)
+        a_g = ca.mtimes(self.directions.T, motion.body.acceleration - gravity)
+        return ca.mtimes(a_g, inertia.m)
+
+
+class PlanarTranslating(Translating):
+    """The same in the plane across k."""
+
+    coordinates = ("x", "y")

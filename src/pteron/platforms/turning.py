@@ -1,6 +1,8 @@
-"""The 3T1R platform, which translates and turns about its axis k (Schoenflies motion)."""
+"""Platforms that translate and turn about their axis k: 3T1R (Schoenflies motion), 2T1R."""
 
 from __future__ import annotations
+
+from typing import ClassVar
 
 import casadi as ca
 
@@ -11,24 +13,30 @@ from pteron.platforms.motion import PlatformEquations, PlatformMotion
 class Turning(PlatformEquations):
     """c = p + R(phi) s0, with R a rotation about k."""
 
-    coordinates = ("x", "y", "z", "phi")
+    coordinates: ClassVar[tuple[str, ...]] = ("x", "y", "z", "phi")
 
     def motion(
         self, pose: Expression, velocity: Expression, acceleration: Expression
     ) -> PlatformMotion:
-        p, dp, ddp = pose[:3], velocity[:3], acceleration[:3]
-        angle = AngleMotion(self.frame[2], pose[3], velocity[3], acceleration[3])
+        p, dp, ddp = (ca.mtimes(self.directions, v[:-1]) for v in (pose, velocity, acceleration))
+        angle = AngleMotion(self.frame[2], pose[-1], velocity[-1], acceleration[-1])
         points, matrices = [], []
         for a, b, still in self.offsets:
             s, lever, dds = _turned(a, b, angle)
             points.append(PointMotion(p + s + still, dp + lever * angle.rate, ddp + dds))
-            matrices.append(ca.vertcat(ca.horzcat(ca.SX.eye(3), lever), ca.SX([[0, 0, 0, 1]])))
+            matrices.append(self._matrix(lever))
         x0, y0, k = self.frame
         x, y, ddx = _turned(x0, y0, angle)
         ddy = _turned(y0, -x0, angle)[2]
         row = ca.horzcat(ca.SX.eye(3), ca.SX(3, 1))
         body = BodyMotion(p, row, ddp, k, ca.SX([[0, 0, 0, 1]]), x, y, ddx, ddy)
-        return PlatformMotion(tuple(points), tuple(matrices), angle, body, ca.SX.eye(4))
+        at_p = self._matrix(ca.SX(3, 1))
+        return PlatformMotion(tuple(points), tuple(matrices), angle, body, at_p)
+
+    def _matrix(self, lever: Expression) -> Expression:
+        """Return d (c, phi)/dx (4, m) of a point with this k x s."""
+        still = ca.SX(1, self.directions.shape[1])
+        return ca.vertcat(ca.horzcat(self.directions, lever), ca.horzcat(still, 1))
 
     def needs(self, motion: PlatformMotion, gravity: Expression, inertia: Moments) -> Expression:
         body, angle = motion.body, motion.angle
@@ -40,7 +48,14 @@ class Turning(PlatformEquations):
         dh0 = ca.mtimes(y0, inertia.hx) - ca.mtimes(x0, inertia.hy)
         _, dh, ddh = _turned(h0, dh0, angle)
         force = ca.mtimes(a_g, inertia.m) + ddh
-        return ca.vertcat(force, ca.mtimes(a_g.T, dh) + angle.acceleration * inertia.i)
+        moment = ca.mtimes(a_g.T, dh) + angle.acceleration * inertia.i
+        return ca.vertcat(ca.mtimes(self.directions.T, force), moment)
+
+
+class PlanarTurning(Turning):
+    """The same in the plane across k."""
+
+    coordinates = ("x", "y", "phi")
 
 
 def _turned(

@@ -78,7 +78,8 @@ class ExactLeg:
             else:
                 program = _plane_axis(*pole([float(c) for c in self.direction]))
                 found[name] = evaluate(program, field, [d])[0]
-        return found | {"platform_point": [number.within(field) for number in self.platform_point]}
+        points = {"platform_point": self.platform_point, "fixed_offset": (ZERO, ZERO, ZERO)}
+        return found | {k: [number.within(field) for number in v] for k, v in points.items()}
 
 
 @dataclass(frozen=True)
@@ -146,7 +147,7 @@ class ExactGeometry:
             for name, value in leg.values.items():
                 found[-1][name] = slice(start, start + (len(value) or 3))
                 start = found[-1][name].stop
-            start += 3
+            start += 6  # platform point and fixed offset
         return found
 
 
@@ -194,13 +195,13 @@ def _exact_leg(
     robot: Manipulator, i: int, frame: Array, exact: dict[str, ExactVector], notes: _Notes
 ) -> ExactLeg:
     leg = robot.legs[i]
-    shift = np.zeros(3)
+    # What does not turn only shifts what the leg is fixed to.
+    shift = np.array(leg.fixed_offset)
     if robot.platform.turns:
         x, y = notes.planar(f"s{i + 1}", *leg.platform_point[:2])
         s0 = (x, y, notes.length(f"s{i + 1}.z", leg.platform_point[2]))
     else:
-        # For 3T a platform point only shifts what the leg is fixed to.
-        shift = np.array(robot.platform.frame).T @ np.array(leg.platform_point)
+        shift = shift + np.array(robot.platform.frame).T @ np.array(leg.platform_point)
         s0 = (ZERO, ZERO, ZERO)
     values: dict[str, tuple[Surd, ...]] = {}
     lengths: dict[str, Surd] = {}

@@ -128,7 +128,7 @@ def bodies(robot: Manipulator) -> list[tuple[str, int | None, dict[str, float]]]
         for i, leg in enumerate(robot.legs)
         for letter, inertia in leg.bodies.items()
     ]
-    found.append(("platform", None, robot.platform.inertia))
+    found.append(("platform", None, robot.platform.joined))
     return [(name, i, with_center(inertia)) for name, i, inertia in found]
 
 

@@ -44,7 +44,7 @@ def doubts(robot: Manipulator) -> tuple[str, ...]:
     found = []
     if hypot(*robot.gravity) > _PULL:
         found.append(f"gravity: {hypot(*robot.gravity):g} m/s^2: is that mm/s^2?")
-    platform = robot.platform.inertia
+    platform = robot.platform.joined
     radius = max(hypot(*leg.platform_point) for leg in robot.legs)
     if radius > 0.0:
         found += [f"platform: {text}" for text in _spread(platform, 3.0 * radius)]

@@ -141,7 +141,7 @@ def _size_of(robot: Manipulator) -> float:
 
 
 def _travel_of(leg: LegKind, robot: Manipulator) -> float:
-    if leg.limits is not None:
+    if leg.limits is not None or leg.reach_bound is None:
         return _farthest(leg.limits)
     # Along a guide that is oblique to the leg's reach the slider travels farther.
     return _size_of(robot) * max(leg.reach_bound.radius / leg.size, 1.0)

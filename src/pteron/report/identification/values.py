@@ -164,7 +164,7 @@ def body_rows(result: Identification) -> tuple[Body, ...]:
         for i, (leg, other) in enumerate(zip(found.legs, drawn.legs, strict=True), start=1)
         for (letter, one), old in zip(leg.bodies.items(), other.bodies.values(), strict=True)
     ]
-    body, cad = (_values(robot.platform.inertia) for robot in (found, drawn))
+    body, cad = (_values(robot.platform.joined) for robot in (found, drawn))
     return (*rows, Body("platform", None, body, cad, (PLATFORM, None) in border))
 
 

@@ -1,0 +1,45 @@
+"""Determinants and adjugates of small matrices of expressions, without a pivot to choose."""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from pteron.bodies.motion import Expression
+
+
+def determinant(m: Expression) -> Expression:
+    """Return the determinant of a matrix (2, 2) to (4, 4)."""
+    return ca.mtimes(m[0, :], adjugate(m)[:, 0])
+
+
+def adjugate(m: Expression) -> Expression:
+    """Return the adjugate of a matrix (2, 2) to (4, 4): its product with the matrix is det 1."""
+    if m.shape[0] == 2:
+        return ca.vertcat(ca.horzcat(m[1, 1], -m[0, 1]), ca.horzcat(-m[1, 0], m[0, 0]))
+    if m.shape[0] == 3:
+        a, b, c = m[0, :].T, m[1, :].T, m[2, :].T
+        return ca.horzcat(ca.cross(b, c), ca.cross(c, a), ca.cross(a, b))
+    # Laplace: the minors of the upper and of the lower pair of rows serve all cofactors.
+    upper, lower = _minors(m[:2, :]), _minors(m[2:, :])
+    columns = [_cofactors(m, i, lower if i < 2 else upper) for i in range(4)]
+    return ca.horzcat(*columns)
+
+
+def _minors(rows: Expression) -> dict[tuple[int, int], Expression]:
+    """Return the minors of two rows, by their columns."""
+    return {
+        (i, j): rows[0, i] * rows[1, j] - rows[0, j] * rows[1, i]
+        for i in range(4)
+        for j in range(i + 1, 4)
+    }
+
+
+def _cofactors(m: Expression, row: int, minors: dict[tuple[int, int], Expression]) -> Expression:
+    """Return the cofactors of a row (4, 1), from the minors of the pair of rows it is not in."""
+    other = m[row ^ 1, :]
+    found = []
+    for column in range(4):
+        i, j, k = (c for c in range(4) if c != column)
+        minor = other[i] * minors[j, k] - other[j] * minors[i, k] + other[k] * minors[i, j]
+        found.append((-1) ** (row + column) * minor)
+    return ca.vertcat(*found)

@@ -1,0 +1,280 @@
+"""Legs with a crank, R-S-S and planar R-R-R: a last link leads from its end to the platform point.
+
+The crank turns about d through the guide point r. The last link counts its length in space where it
+is a rod, in the crank's plane where it is a planar link; this is all that tells the kinds apart.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import casadi as ca
+
+from pteron.bodies.inertia import PlanarInertia
+from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, PointMotion
+from pteron.bodies.vectors import Vector, cross, perpendicular, vertical
+from pteron.legs.circles import perpendicular_to, plane_of, quarter_turn
+from pteron.legs.kind import CRANK, LegKind, Quantity, ReachBound, Transfer
+from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Reach
+
+ELBOW: Mapping[tuple[str, str], tuple[int, tuple[str, ...]]] = {
+    ("m", "u"): (1, ()),
+    ("mgx", "u"): (1, ("lu",)),
+    ("I", "u"): (1, ("lu", "lu")),
+    ("m", "l"): (-1, ()),
+    ("mgx", "l"): (1, ("ll",)),
+    ("I", "l"): (-1, ("ll", "ll")),
+}
+"""Mass moved from the last link's end to the upper link's: both carry the joint between them."""
+
+
+@dataclass(frozen=True)
+class CrankLeg(LegKind):
+    """The data of a leg with a crank; its kinds say what the last link is."""
+
+    guide_point: Vector
+    direction: Vector
+    zero_direction: Vector
+    platform_point: Vector
+    upper_length: float
+    lower_length: float
+    upper: PlanarInertia
+    lower: Any
+    elbow: int = 1
+    limits: tuple[float, float] | None = None
+    fixed_offset: Vector = (0.0, 0.0, 0.0)
+
+    joint = CRANK
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        zero = perpendicular(self.zero_direction, self.direction, "zero_direction", "direction")
+        object.__setattr__(self, "zero_direction", zero)
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        # The crank's angle is the one nearest to the middle of its limits, else in (-pi, pi].
+        low, high = self.limits or (0.0, 0.0)
+        inside = -math.pi < low and high <= math.pi
+        middle = 0.0 if inside else 0.5 * (low + high)
+        a, b = self.zero_direction, cross(self.direction, self.zero_direction)
+        c, s = math.cos(middle), math.sin(middle)
+        return (
+            Quantity("guide_point", "point", self.guide_point),
+            Quantity("direction", "direction", self.direction, "d"),
+            Quantity(
+                "zero_direction",
+                "normal",
+                a if inside else [c * x + s * y for x, y in zip(a, b, strict=True)],
+            ),
+            Quantity("plane_axis", "normal", perpendicular_to(self.direction)),
+            Quantity("upper_length", "length", (self.upper_length,), "lu"),
+            Quantity("lower_length", "length", (self.lower_length,), "ll"),
+            Quantity("middle", "number", (middle,)),
+            Quantity("elbow", "sign", (self.elbow,)),
+        )
+
+    @property
+    def joint_axis(self) -> Vector:
+        return self.direction
+
+    @property
+    def lever(self) -> float:
+        return self.upper_length
+
+    @property
+    def reach_bound(self) -> ReachBound:
+        return ReachBound(self.guide_point, None, self.size)
+
+    @property
+    def extents(self) -> dict[str, tuple[str, float, float, str]]:
+        last = self.names["l"]
+        return {
+            "u": ("upper", 0.0, self.upper_length, f"its axis and the {last}"),
+            "l": ("lower", -self.lower_length, 0.0, "crank and platform, where its x is zero"),
+        }
+
+    def transfers(self, gravity: Vector) -> tuple[Transfer, ...]:
+        last = self.names["l"]
+        found = [
+            Transfer("the crank{} turns about a fixed axis", {("m", "u"): (1, ())}),
+            Transfer(f"crank and {last}{{}} carry the joint between them", ELBOW),
+        ]
+        if vertical(self.direction, gravity):
+            reason = "no gravity acts across the axis of the crank{}"
+            found += [Transfer(reason, {(kind, "u"): (1, ())}) for kind in ("mgx", "mgy")]
+        return tuple(found)
+
+
+class CrankState(NamedTuple):
+    """What crank and last link do."""
+
+    l_u: Expression
+    """The crank, (2, 1), in its plane; g = d x l_u."""
+    g: Expression
+    b: Expression
+    """The last link: (3, 1), or (2, 1) in the plane."""
+    divisor: Expression
+    """b . g."""
+    rate: Expression
+    acceleration: Expression
+
+
+class CrankEquations(LegEquations):
+    """The equations of a leg with a crank, whose plane's axes `plane` (3, 2) holds."""
+
+    rides = ("l",)
+
+    def __init__(
+        self,
+        guide_point: Expression,
+        direction: Expression,
+        zero_direction: Expression,
+        plane_axis: Expression,
+        upper_length: Expression,
+        lower_length: Expression,
+        middle: Expression,
+        elbow: Expression,
+    ) -> None:
+        self.r, self.d = guide_point, direction
+        self.lu, self.ll, self.sigma = upper_length, lower_length, elbow
+        self.plane = plane_of(direction, plane_axis)
+        self.zero = ca.mtimes(self.plane.T, zero_direction)
+        self.middle = middle
+
+    @abstractmethod
+    def counted(self, v: Expression) -> Expression:
+        """Return what of a vector (3, 1) the length of the last link counts."""
+
+    @abstractmethod
+    def within(self, v: Expression) -> Expression:
+        """Return a vector of the crank's plane (2, K) as `counted` has it."""
+
+    @abstractmethod
+    def height(self, w: Expression) -> Expression:
+        """Return how far from the crank's plane c is, as far as it counts; w = c - r."""
+
+    @abstractmethod
+    def last_link(
+        self,
+        point: PointMotion,
+        angle: AngleMotion | None,
+        at: CrankState,
+        crank: Joint,
+    ) -> tuple[BodyMotion, list[Joint], tuple[Expression, Expression] | None]:
+        """Return the last link in motion, the joints after the crank, and how the link turns."""
+
+    def _triangle(self, w: Expression) -> tuple[Expression, Expression, Expression]:
+        """Return u, h and lu^2 u.u - h^2, a quarter of the Delta of Lemma 1, for w = c - r.
+
+        The length of the last link is |w - l_u| = ll, so that u . l_u = h, u being in the plane.
+        """
+        u, seen = ca.mtimes(self.plane.T, w), self.counted(w)
+        h = 0.5 * ca.dot(seen, seen) + 0.5 * (self.lu * self.lu - self.ll * self.ll)
+        return u, h, self.lu * self.lu * ca.dot(u, u) - h * h
+
+    def state(self, point: PointMotion) -> CrankState:
+        """Return crank and last link and how the crank moves.
+
+        b . c' = (b . g) q'. Differentiated, (b . g) q'' = b . c'' + b' . b' - q'^2 b . g', whose
+        last two terms are c' . c' + q' (q' h - 2 g . c').
+        """
+        w = point.position - self.r
+        dw, ddw = self.counted(point.velocity), self.counted(point.acceleration)
+        u, h, quarter = self._triangle(w)
+        n2, root = ca.dot(u, u), ca.sqrt(quarter)
+        l_u = (h / n2) * u + self.sigma * ((root / n2) * quarter_turn(u))
+        g, b = quarter_turn(l_u), self.counted(w) - self.within(l_u)
+        divisor = -self.sigma * root  # b . g
+        rate = ca.dot(b, dw) / divisor
+        du = ca.mtimes(self.plane.T, point.velocity)
+        pull = ca.dot(b, ddw) + ca.dot(dw, dw)
+        acceleration = (pull + rate * (rate * h - 2 * ca.dot(g, du))) / divisor
+        return CrankState(l_u, g, b, divisor, rate, acceleration)
+
+    def in_space(self, v: Expression) -> Expression:
+        """Return a vector that `counted` or `within` gave, in the base frame."""
+        return v if v.shape[0] == 3 else ca.mtimes(self.plane, v)
+
+    def motion(self, point: PointMotion, angle: AngleMotion | None) -> LegMotion:
+        at = self.state(point)
+        l_u, g, b = (self.in_space(v) for v in (at.l_u, at.g, at.b))
+        full, square = ca.horzcat(b.T, 0), at.rate * at.rate
+        coordinate = self.middle + ca.atan2(
+            ca.dot(at.l_u, quarter_turn(self.zero)), ca.dot(at.l_u, self.zero)
+        )
+        row = full / at.divisor
+        x, y = l_u / self.lu, g / self.lu
+        ddx, ddy = at.acceleration * y - square * x, -at.acceleration * x - square * y
+        rest = ca.SX(3, 1)
+        crank = BodyMotion(self.r, ca.SX(3, 4), rest, self.d, row, x, y, ddx, ddy)
+        joint = Joint("R", self.d, self.r, row, at.rate, at.acceleration)
+        last, joints, turning = self.last_link(point, angle, at, joint)
+        return LegMotion(
+            coordinate,
+            at.rate,
+            at.acceleration,
+            full,
+            at.divisor,
+            {"u": crank, "l": last},
+            (joint, *joints),
+            (l_u, b),
+            ((at.rate, at.acceleration), turning),
+        )
+
+    def named(self, point: PointMotion, angle: AngleMotion | None) -> dict[str, Expression]:
+        w, at = point.position - self.r, self.state(point)
+        u, h, quarter = self._triangle(w)
+        n2, root = ca.dot(u, u), ca.sqrt(quarter)
+        crank = {"plane_u": at.l_u, "g": at.g, "along": h / n2, "across": root / n2}
+        closing = {"w": w, "u": u, "n2": n2, "h": h, "quarter": quarter, "root": root}
+        return {**closing, **crank, "theta_rate2": at.rate * at.rate}
+
+    def reach(self, c: Expression) -> Reach:
+        w = c - self.r
+        u, _, quarter = self._triangle(w)
+        n, height = ca.sqrt(ca.dot(u, u)), self.height(w)
+        # The least and greatest distance of c from the crank's circle.
+        near, far = (ca.sqrt((n + side * self.lu) ** 2 + height**2) for side in (-1, 1))
+        margin = ca.fmin(self.ll - near, far - self.ll)
+        return Reach(margin, quarter, (self.lu * self.ll) ** 2, n)
+
+    def tip(self, q: Expression) -> Expression:
+        """Return the crank's end at an angle q."""
+        turn = q - self.middle
+        ahead = ca.cos(turn) * self.zero + ca.sin(turn) * quarter_turn(self.zero)
+        return self.r + self.lu * ca.mtimes(self.plane, ahead)
+
+    def needs(
+        self,
+        point: PointMotion,
+        angle: AngleMotion | None,
+        gravity: Expression,
+        inertia: Mapping[str, Moments],
+    ) -> Needs:
+        """Return the forces that crank and last link need: the latter's at its ends.
+
+        With eta = m gamma_x / ll, nu = m gamma_y / ll and mu = I / ll^2 of the last link, alpha =
+        eta + mu, t the tip and z = d, the tip needs mu t'' - alpha c'' + eta g + nu z x (c'' - g)
+        and the platform point alpha (g - t'') - nu z x (t'' - g) beside a mass m + eta + alpha
+        that rides. A rod has no m gamma_y.
+        """
+        at, upper, lower = self.state(point), inertia["u"], inertia["l"]
+        lu2, weight = self.lu * self.lu, ca.mtimes(self.plane.T, gravity)
+        eta, nu, mu = lower.hx / self.ll, lower.hy / self.ll, lower.i / (self.ll * self.ll)
+        alpha = eta + mu
+        ddu = ca.mtimes(self.plane.T, point.acceleration)
+        # What gravity does to the crank and, through the tip, to the last link: on g = d x l_u.
+        along = ca.mtimes(weight, eta - upper.hx / self.lu)
+        across = ca.mtimes(quarter_turn(weight), upper.hy / self.lu)
+        swing = ca.mtimes(ddu, alpha) - ca.mtimes(quarter_turn(ddu - weight), nu)
+        joint = at.acceleration * (upper.i + mu * lu2) + ca.mtimes(at.g.T, along + across - swing)
+        tip = ca.mtimes(at.g, at.acceleration * alpha) - ca.mtimes(at.l_u, at.rate**2 * alpha)
+        force = ca.mtimes(self.counted(gravity), alpha) - self.within(tip)
+        turned = quarter_turn(at.g * at.acceleration - at.l_u * at.rate**2 - weight)
+        force = self.in_space(force - self.within(ca.mtimes(turned, nu)))
+        return Needs(joint, ca.vertcat(force, ca.SX(1, alpha.shape[1])), lower.m + eta + alpha)

@@ -1,0 +1,163 @@
+"""P-R-R legs, of planar machines: a slider and a link in one plane."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import ClassVar, Self
+
+import casadi as ca
+
+from pteron.bodies.inertia import PlanarInertia, PointMass
+from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, PointMotion
+from pteron.bodies.vectors import Vector, perpendicular
+from pteron.legs.circles import perpendicular_to, plane_of, quarter_turn
+from pteron.legs.kind import Key, Quantity
+from pteron.legs.leg import Circle, Joint, Needs
+from pteron.legs.planar_links import Turning, last_joints, lower_link_body
+from pteron.legs.slide import SlideEquations, SlideLeg, SlideState
+
+
+@dataclass(frozen=True)
+class PRR(SlideLeg):
+    """A planar P-R-R leg that carries one point of the platform.
+
+    Places along `direction` do not count: the leg moves in a plane of its own.
+
+    Parameters
+    ----------
+    guide_point : vector
+        r, the point of the guide where the slider coordinate is zero, m.
+    slider_direction : unit vector
+        e, in the platform's plane.
+    platform_point : vector
+        s0, from P to the platform point, in the platform frame, m.
+    lower_length : float
+        Length of the link, m.
+    slider_mass : float
+        m_p, kg.
+    lower : PlanarInertia
+        Inertia of the link about its platform end, x from the slider to there.
+    elbow : {1, -1}
+        sigma: 1 where the platform point is ahead of the slider along e, -1 where it is behind.
+    limits : (float, float), optional
+        Least and greatest slider coordinate, m.
+    fixed_offset : vector
+        t0, the part of the platform point that does not turn with phi, in the base frame, m.
+    direction : unit vector, optional
+        d, of the two revolute axes: the normal of the platform's plane, which is its default.
+    """
+
+    lower: PlanarInertia
+    direction: Vector | None = None
+
+    type = "PRR"
+    names: ClassVar = {"p": "slider", "l": "link"}
+    account = (
+        "A slider moves along e through the guide point r; its coordinate rho is zero there. A "
+        "link leads from it to the platform point s0, with revolute joints along d, the normal of "
+        "the plane, at both ends."
+    )
+
+    keys: ClassVar = {
+        "direction": Key("direction", default=None),
+        "slider_direction": Key("direction"),
+        "lower_length": Key("length"),
+        "slider_mass": Key("slider", "p"),
+        "lower": Key("planar", "l"),
+    }
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.direction is not None:
+            e = perpendicular(
+                self.slider_direction, self.direction, "slider_direction", "the plane's normal"
+            )
+            object.__setattr__(self, "slider_direction", e)
+
+    def under(self, axis: Vector) -> Self:
+        return replace(self, direction=axis) if self.direction is None else self
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        d = self.plane_normal
+        return (
+            Quantity("guide_point", "point", self.guide_point),
+            Quantity("direction", "direction", d, "d"),
+            Quantity("slider_direction", "direction", self.slider_direction, "e"),
+            Quantity("plane_axis", "normal", perpendicular_to(d)),
+            Quantity("lower_length", "length", (self.lower_length,), "ll"),
+            Quantity("elbow", "sign", (self.elbow,)),
+        )
+
+    @property
+    def plane_normal(self) -> Vector:
+        assert self.direction is not None  # the manipulator has given it
+        return self.direction
+
+    def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
+        return (self.plane_normal,)
+
+
+class PRREquations(SlideEquations):
+    """The equations of a P-R-R leg, whose link turns in its plane."""
+
+    kinds: ClassVar = {"p": PointMass.kinds, "l": PlanarInertia.kinds}
+
+    def __init__(
+        self,
+        guide_point: Expression,
+        direction: Expression,
+        slider_direction: Expression,
+        plane_axis: Expression,
+        lower_length: Expression,
+        elbow: Expression,
+    ) -> None:
+        super().__init__(guide_point, slider_direction, lower_length, elbow)
+        self.d = direction
+        self.plane = plane_of(direction, plane_axis)
+
+    def counted(self, v: Expression) -> Expression:
+        return ca.mtimes(self.plane.T, v)
+
+    def in_space(self, v: Expression) -> Expression:
+        return ca.mtimes(self.plane, v)
+
+    def link(
+        self, point: PointMotion, angle: AngleMotion | None, at: SlideState, slider: Joint
+    ) -> tuple[BodyMotion, list[Joint], tuple[Expression, Expression]]:
+        """Return the link: b' = theta' d x b, whose part across e is that of c'."""
+        across = quarter_turn(self.counted(self.e)) / at.divisor
+        row = ca.horzcat(self.in_space(across).T, 0)
+        rate = ca.dot(across, self.counted(point.velocity))
+        pull = self.counted(point.acceleration) + rate * rate * at.b
+        turning = Turning(row, rate, ca.dot(across, pull))
+        body = lower_link_body(point, self.d, self.plane, at.b / self.ll, turning)
+        tip = self.r + at.q * self.e
+        joints = [Joint("R", self.d, tip, *turning), *last_joints(self.d, point, turning, angle)]
+        return body, joints, (turning.rate, turning.acceleration)
+
+    def locus(self, q: Expression) -> Circle:
+        return Circle(self.r + q * self.e, self.ll)
+
+    def needs(
+        self,
+        point: PointMotion,
+        angle: AngleMotion | None,
+        gravity: Expression,
+        inertia: Mapping[str, Moments],
+    ) -> Needs:
+        """Return the needs of slider and link, with what m gamma_y of the link adds.
+
+        With nu = m gamma_y / ll: nu d x (c'' - g) at the tip t, -nu d x (t'' - g) at the platform.
+        """
+        along = super().needs(point, angle, gravity, inertia)
+        at, nu = self.state(point), inertia["l"].hy / self.ll
+        e, ddc, weight = (self.counted(v) for v in (self.e, point.acceleration, gravity))
+        joint = along.joint + ca.dot(e, quarter_turn(ddc - weight)) * nu
+        turned = quarter_turn(at.acceleration * e - weight)
+        force = along.point[:3, :] - self.in_space(ca.mtimes(turned, nu))
+        return Needs(joint, ca.vertcat(force, along.point[3, :]), along.mass)
+
+
+PRR.equations_class = PRREquations

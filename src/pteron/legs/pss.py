@@ -1,0 +1,127 @@
+"""P-S-S legs, the linear Delta's: a slider that carries a rod between two ball joints.
+
+Two parallel rods, which keep the platform from turning, count as one rod with the sum of both. The
+joints of a rod are counted as universal ones: a rod's spin about itself moves nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import casadi as ca
+
+from pteron.bodies.inertia import PointMass, RodInertia
+from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, PointMotion
+from pteron.bodies.vectors import Vector
+from pteron.legs.kind import Key, Quantity
+from pteron.legs.leg import Joint, Sphere
+from pteron.legs.rods import free_axes, rod_body, universal_joints
+from pteron.legs.slide import SlideEquations, SlideLeg, SlideState
+
+
+@dataclass(frozen=True)
+class PSS(SlideLeg):
+    """A P-S-S leg that carries one point of the platform.
+
+    Parameters
+    ----------
+    guide_point : vector
+        r, the point of the guide where the slider coordinate is zero, m.
+    slider_direction : unit vector
+        e.
+    platform_point : vector
+        s0, from P to the platform point, in the platform frame, m.
+    lower_length : float
+        Length of the rod, m.
+    slider_mass : float
+        m_p, kg.
+    lower : RodInertia
+        Inertia of the rod, or the sum of parallel rods, about the platform end.
+    elbow : {1, -1}
+        sigma: 1 where the platform point is ahead of the slider along e, -1 where it is behind.
+    limits : (float, float), optional
+        Least and greatest slider coordinate, m.
+    fixed_offset : vector
+        t0, the part of the platform point that does not turn with phi, in the base frame, m.
+    rods : int
+        How many parallel rods `lower` is the sum of.
+    bar_direction : unit vector, optional
+        Of the bar between the ends of parallel rods. Where it is given the machine is checked: the
+        bars must keep the platform from tilting.
+    """
+
+    lower: RodInertia
+    rods: int = 2
+    bar_direction: Vector | None = None
+
+    type = "PSS"
+    names: ClassVar = {"p": "slider", "l": "rod"}
+    account = (
+        "A slider moves along e through the guide point r; its coordinate rho is zero there. A rod "
+        "between two ball joints leads from it to the platform point s0; parallel rods, which keep "
+        "the platform from tilting, count as one with the sum of both."
+    )
+
+    keys: ClassVar = {
+        "slider_direction": Key("direction"),
+        "lower_length": Key("length"),
+        "rods": Key("count", default=2),
+        "bar_direction": Key("direction", default=None),
+        "slider_mass": Key("slider", "p"),
+        "lower": Key("rod", "l"),
+    }
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        return (
+            Quantity("guide_point", "point", self.guide_point),
+            Quantity("slider_direction", "direction", self.slider_direction, "e"),
+            Quantity("bar_direction", "normal", self.bar_direction or self.slider_direction),
+            Quantity("lower_length", "length", (self.lower_length,), "ll"),
+            Quantity("elbow", "sign", (self.elbow,)),
+        )
+
+    def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
+        return free_axes(self.rods, self.bar_direction, axis)
+
+
+class PSSEquations(SlideEquations):
+    """The equations of a P-S-S leg; its joints are counted about the bar and across it."""
+
+    kinds: ClassVar = {"p": PointMass.kinds, "l": RodInertia.kinds}
+
+    def __init__(
+        self,
+        guide_point: Expression,
+        slider_direction: Expression,
+        bar_direction: Expression,
+        lower_length: Expression,
+        elbow: Expression,
+    ) -> None:
+        super().__init__(guide_point, slider_direction, lower_length, elbow)
+        self.bar = bar_direction
+
+    def counted(self, v: Expression) -> Expression:
+        return v
+
+    def in_space(self, v: Expression) -> Expression:
+        return v
+
+    def link(
+        self, point: PointMotion, angle: AngleMotion | None, at: SlideState, slider: Joint
+    ) -> tuple[BodyMotion, list[Joint], None]:
+        rides = ca.horzcat(ca.SX.eye(3), ca.SX(3, 1))
+        swing = (rides - ca.mtimes(self.e, slider.row)) / self.ll
+        n = at.b / self.ll
+        dn = (point.velocity - at.rate * self.e) / self.ll
+        ddn = (point.acceleration - at.acceleration * self.e) / self.ll
+        tip = self.r + at.q * self.e
+        joints = universal_joints(self.bar, tip, point.position, swing, (n, dn, ddn), angle)
+        return rod_body(point, n, ddn, swing), joints, None
+
+    def locus(self, q: Expression) -> Sphere:
+        return Sphere(self.r + q * self.e, self.ll)
+
+
+PSS.equations_class = PSSEquations

@@ -1,0 +1,133 @@
+"""R-R-R legs, of planar machines: a crank and a link in one plane, as of a five-bar or a 3-RRR."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from random import Random
+from typing import ClassVar
+
+import casadi as ca
+
+from pteron.bodies.inertia import PlanarInertia
+from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, PointMotion
+from pteron.bodies.vectors import Vector
+from pteron.legs.circles import random_triangle
+from pteron.legs.crank import CrankEquations, CrankLeg, CrankState
+from pteron.legs.kind import Key
+from pteron.legs.leg import Circle, Joint
+from pteron.legs.planar_links import Turning, last_joints, lower_link_body
+
+
+@dataclass(frozen=True)
+class RRR(CrankLeg):
+    """A planar R-R-R leg that carries one point of the platform.
+
+    The crank turns about `direction` through `guide_point`; its angle is zero where it points along
+    `zero_direction`, and positive by the right hand about `direction`. Places along `direction` do
+    not count: the leg moves in a plane of its own.
+
+    Parameters
+    ----------
+    guide_point : vector
+        r, the centre of the crank's circle, m.
+    direction : unit vector
+        d, of the three revolute axes: the normal of the platform's plane.
+    zero_direction : unit vector
+        a, where the crank points at q = 0; perpendicular to `direction`.
+    platform_point : vector
+        s0, from P to the platform point, in the platform frame, m.
+    upper_length, lower_length : float
+        Lengths of the crank and of the lower link, m.
+    upper : PlanarInertia
+        Inertia of the crank, about the origin on its axis, x towards the lower link.
+    lower : PlanarInertia
+        Inertia of the lower link about its platform end, x from the elbow to there.
+    elbow : {1, -1}
+        sigma, the side of the elbow.
+    limits : (float, float), optional
+        Least and greatest crank angle, rad.
+    fixed_offset : vector
+        t0, the part of the platform point that does not turn with phi, in the base frame, m.
+    """
+
+    lower: PlanarInertia
+
+    type = "RRR"
+    names: ClassVar = {"u": "crank", "l": "lower link"}
+    account = (
+        "A crank turns about d, the normal of the plane, through the guide point r; its angle "
+        "theta is zero where it points along the zero direction, and counts by the right hand. A "
+        "lower link leads from the elbow to the platform point s0, with revolute joints at both "
+        "ends."
+    )
+
+    keys: ClassVar = {
+        "direction": Key("direction"),
+        "zero_direction": Key("direction"),
+        "upper_length": Key("length"),
+        "lower_length": Key("length"),
+        "upper": Key("planar", "u"),
+        "lower": Key("planar", "l"),
+    }
+
+    def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
+        return (self.direction,)
+
+    @property
+    def plane_normal(self) -> Vector:
+        return self.direction
+
+    @property
+    def reach_text(self) -> str:
+        shortest = abs(self.upper_length - self.lower_length)
+        return f"its links span {shortest:.4g} to {self.size:.4g} m"
+
+    @classmethod
+    def closing(
+        cls, values: Mapping[str, Sequence[Fraction]], rng: Random
+    ) -> tuple[list[Fraction], int]:
+        """Draw the directions of the links; the triangle then closes."""
+        return random_triangle(values, rng)
+
+
+class RRREquations(CrankEquations):
+    """The equations of an R-R-R leg, whose last link turns in the crank's plane."""
+
+    kinds: ClassVar = {"u": PlanarInertia.kinds, "l": PlanarInertia.kinds}
+
+    def counted(self, v: Expression) -> Expression:
+        return ca.mtimes(self.plane.T, v)
+
+    def within(self, v: Expression) -> Expression:
+        return v
+
+    def height(self, w: Expression) -> Expression:
+        return ca.SX(0)
+
+    def last_link(
+        self, point: PointMotion, angle: AngleMotion | None, at: CrankState, crank: Joint
+    ) -> tuple[BodyMotion, list[Joint], tuple[Expression, Expression]]:
+        """Return the lower link: theta_l' = -l_u . u' / D and theta_l'' = -l_u . v / D, as Eq. (7).
+
+        With v = u'' + theta_u'^2 l_u + theta_l'^2 b; D = b . g.
+        """
+        du, ddu = self.counted(point.velocity), self.counted(point.acceleration)
+        along = -at.l_u / at.divisor
+        rate = ca.dot(along, du)
+        v = ddu + at.rate * at.rate * at.l_u + rate * rate * at.b
+        row = ca.horzcat(ca.mtimes(self.plane, along).T, 0)
+        lower = Turning(row, rate, ca.dot(along, v))
+        upper = Turning(crank.row, crank.rate, crank.acceleration)
+        body = lower_link_body(point, self.d, self.plane, at.b / self.ll, lower)
+        elbow = self.r + ca.mtimes(self.plane, at.l_u)
+        knee = Joint("R", self.d, elbow, *lower.less(upper))
+        joints = [knee, *last_joints(self.d, point, lower, angle)]
+        return body, joints, (lower.rate, lower.acceleration)
+
+    def locus(self, q: Expression) -> Circle:
+        return Circle(self.tip(q), self.ll)
+
+
+RRR.equations_class = RRREquations

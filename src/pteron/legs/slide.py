@@ -1,0 +1,188 @@
+"""Legs with a slider and one link, P-S-S and planar P-R-R.
+
+The slider moves along e through the guide point r. The link counts its length in space where it is
+a rod, in its plane where it is a planar link; this is all that tells the kinds apart.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import casadi as ca
+
+from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, PointMotion
+from pteron.bodies.vectors import Vector
+from pteron.legs.kind import SLIDER, LegKind, ReachBound, Transfer
+from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Reach
+
+
+@dataclass(frozen=True)
+class SlideLeg(LegKind):
+    """The data of a leg with a slider and one link; its kinds say what the link is."""
+
+    guide_point: Vector
+    slider_direction: Vector
+    platform_point: Vector
+    lower_length: float
+    slider_mass: float
+    lower: Any
+    elbow: int = 1
+    limits: tuple[float, float] | None = None
+    fixed_offset: Vector = (0.0, 0.0, 0.0)
+
+    joint = SLIDER
+
+    @property
+    def joint_axis(self) -> Vector:
+        return self.slider_direction
+
+    @property
+    def reach_bound(self) -> ReachBound:
+        return ReachBound(self.guide_point, self.slider_direction, self.size)
+
+    @property
+    def reach_text(self) -> str:
+        return f"its {self.names['l']} reaches {self.lower_length:.4g} m from the guide"
+
+    @property
+    def extents(self) -> dict[str, tuple[str, float, float, str]]:
+        ends = "slider and platform, where its x is zero"
+        return {"l": ("lower", -self.lower_length, 0.0, ends)}
+
+    def transfers(self, gravity: Vector) -> tuple[Transfer, ...]:
+        entries = {
+            ("m", "p"): (1, ()),
+            ("m", "l"): (-1, ()),
+            ("mgx", "l"): (1, ("ll",)),
+            ("I", "l"): (-1, ("ll", "ll")),
+        }
+        return (
+            Transfer(f"slider and {self.names['l']}{{}} carry the joint between them", entries),
+        )
+
+
+class SlideState(NamedTuple):
+    """What slider and link do."""
+
+    w: Expression
+    """c - r as the link counts it: (3, 1), or (2, 1) in the plane."""
+    q: Expression
+    b: Expression
+    """The link, as w."""
+    divisor: Expression
+    """b . e."""
+    rate: Expression
+    acceleration: Expression
+
+
+class SlideEquations(LegEquations):
+    """The equations of a leg with a slider and one link."""
+
+    rides = ("l",)
+
+    def __init__(
+        self,
+        guide_point: Expression,
+        slider_direction: Expression,
+        lower_length: Expression,
+        elbow: Expression,
+    ) -> None:
+        self.r, self.e = guide_point, slider_direction
+        self.ll, self.sigma = lower_length, elbow
+
+    @abstractmethod
+    def counted(self, v: Expression) -> Expression:
+        """Return what of a vector (3, K) the length of the link counts: (3, K), or (2, K)."""
+
+    @abstractmethod
+    def in_space(self, v: Expression) -> Expression:
+        """Return a vector that `counted` gave, in the base frame."""
+
+    @abstractmethod
+    def link(
+        self,
+        point: PointMotion,
+        angle: AngleMotion | None,
+        at: SlideState,
+        slider: Joint,
+    ) -> tuple[BodyMotion, list[Joint], tuple[Expression, Expression] | None]:
+        """Return the link in motion, the joints after the slider, and how the link turns."""
+
+    def _closed(self, c: Expression) -> tuple[Expression, Expression, Expression]:
+        """Return w, h = w . e and ll^2 - |w - h e|^2, where the guide is far from c by the last."""
+        w, e = self.counted(c - self.r), self.counted(self.e)
+        h = ca.dot(w, e)
+        across = w - h * e
+        return w, h, self.ll * self.ll - ca.dot(across, across)
+
+    def state(self, point: PointMotion) -> SlideState:
+        """Return slider and link and how the slider moves.
+
+        (b . e) q' = b . c'. Differentiated, (b . e) q'' = b . c'' + b' . b'.
+        """
+        e, dw, ddw = (self.counted(v) for v in (self.e, point.velocity, point.acceleration))
+        w, h, square = self._closed(point.position)
+        divisor = self.sigma * ca.sqrt(square)  # b . e
+        q = h - divisor
+        b = w - q * e
+        rate = ca.dot(b, dw) / divisor
+        db = dw - rate * e
+        return SlideState(w, q, b, divisor, rate, (ca.dot(b, ddw) + ca.dot(db, db)) / divisor)
+
+    def motion(self, point: PointMotion, angle: AngleMotion | None) -> LegMotion:
+        at = self.state(point)
+        b = self.in_space(at.b)
+        full = ca.horzcat(b.T, 0)
+        row = full / at.divisor
+        slider = Joint("P", self.e, self.r, row, at.rate, at.acceleration)
+        tip = self.r + at.q * self.e
+        body = BodyMotion(tip, ca.mtimes(self.e, row), at.acceleration * self.e)
+        link, joints, turning = self.link(point, angle, at, slider)
+        return LegMotion(
+            at.q,
+            at.rate,
+            at.acceleration,
+            full,
+            at.divisor,
+            {"p": body, "l": link},
+            (slider, *joints),
+            (None, b),
+            (None, turning),
+        )
+
+    def named(self, point: PointMotion, angle: AngleMotion | None) -> dict[str, Expression]:
+        w, h, square = self._closed(point.position)
+        return {"w": w, "h": h, "square": square, "root": ca.sqrt(square), "b": self.state(point).b}
+
+    def reach(self, c: Expression) -> Reach:
+        _, _, square = self._closed(c)
+        far = ca.sqrt(self.ll * self.ll - square)
+        return Reach(self.ll - far, square, self.ll * self.ll, self.ll)
+
+    def needs(
+        self,
+        point: PointMotion,
+        angle: AngleMotion | None,
+        gravity: Expression,
+        inertia: Mapping[str, Moments],
+    ) -> Needs:
+        """Return the forces that slider and link need: the latter's at its ends.
+
+        With eta = m gamma_x / ll and mu = I / ll^2 of the link, alpha = eta + mu and t the tip, the
+        tip needs mu t'' - alpha c'' + eta g and the platform point alpha (g - t'') beside a mass
+        m + eta + alpha that rides.
+        """
+        at, slider, lower = self.state(point), inertia["p"], inertia["l"]
+        e, ddc, weight = (self.counted(v) for v in (self.e, point.acceleration, gravity))
+        eta, mu = lower.hx / self.ll, lower.i / (self.ll * self.ll)
+        alpha = eta + mu
+        joint = (
+            at.acceleration * (slider.m + mu)
+            - ca.dot(e, ddc) * alpha
+            + ca.dot(e, weight) * (eta - slider.m)
+        )
+        force = self.in_space(ca.mtimes(weight - at.acceleration * e, alpha))
+        return Needs(joint, ca.vertcat(force, ca.SX(1, alpha.shape[1])), lower.m + eta + alpha)
