@@ -109,7 +109,7 @@ class PSSEquations(LegEquations):
         swing = (ca.horzcat(ca.SX.eye(3), ca.SX(3, 1)) - slides) / self.ll  # d n / d (c, phi)
         dn, ddn = db / self.ll, (ddc - acceleration * self.e) / self.ll
         slider = Joint("P", self.e, self.r, row / divisor, rate, acceleration)
-        chain = (slider, *universal_joints(self.d, tip, c, swing, (n, dn, ddn), angle))
+        chain = (slider, *universal_joints(self.d, tip, point, swing, (n, dn, ddn), angle))
         slides = BodyMotion(tip, slides, acceleration * self.e)
         bodies = {"p": slides, "l": rod_body(point, n, ddn, swing)}
         return LegMotion(q, rate, acceleration, row, divisor, bodies, chain, links=(None, b))

@@ -194,6 +194,7 @@ def test_a_singular_orientation_is_of_type_2(name, sign):
 
 
 def test_forces_are_given_down_to_the_bound_of_the_type_2_measure():
+    slope = abs(pteron.compile(ROBOT, "type_ii")(LOOSE + [0, 0, 0, 1e-7])) / 1e-7
     for away, served in ((0.5e-9, False), (2e-9, True), (1e-8, True)):
         pose = LOOSE + np.array([0, 0, 0, away])
         velocity, acceleration = np.random.default_rng(0).normal(size=(2, 4))
@@ -201,7 +202,7 @@ def test_forces_are_given_down_to_the_bound_of_the_type_2_measure():
             with pytest.raises(SingularPose) as caught:
                 pteron.inverse_dynamics(ROBOT, pose, velocity, acceleration)
             # The sum of pi / 2 and 5e-10 is rounded to 2e-16.
-            assert caught.value.measure == pytest.approx(away, rel=1e-6)
+            assert caught.value.measure == pytest.approx(slope * away, rel=1e-6)
             continue
         forces = pteron.inverse_dynamics(ROBOT, pose, velocity, acceleration)
         # One force grows as 1 / measure, its share lost to rounding with it.
@@ -373,11 +374,6 @@ def test_the_name_of_a_robot_is_no_robot():
             ModelError, match=r"^robot: 'quadrupteron' given, a Manipulator expected; "
         ):
             refused()
-
-
-def test_legs_that_no_closure_is_known_of_are_refused():
-    with pytest.raises(ModelError, match="no closure is known of PRRR, RSS legs under a 3T1R"):
-        replace(ROBOT, legs=(*ROBOT.legs[:3], DELTA.legs[0]))
 
 
 def test_a_jacobian_of_constant_rows_is_given_out_of_reach_and_at_singularities():

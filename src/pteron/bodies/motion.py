@@ -31,7 +31,11 @@ class AngleMotion(NamedTuple):
     rate: Expression
     acceleration: Expression
     hinge: Expression | None = None
-    """A point of the axis about which it turns against a leg, (3, 1)."""
+    """A point of the axis about which it turns against a leg, (3, 1); None: the platform point."""
+
+    def axis_point(self, point: PointMotion) -> Expression:
+        """Return a point of the axis about which the platform turns against a leg."""
+        return point.position if self.hinge is None else self.hinge
 
 
 class Moments(NamedTuple):

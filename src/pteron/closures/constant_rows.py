@@ -72,10 +72,13 @@ class ConstantRows(Closure):
         return 2 if self.turns else 1
 
     def measure(self, platform: PlatformMotion, legs: Sequence[LegMotion]) -> Expression:
-        """Return the measure; of a machine that is singular everywhere only rounding is left: 0."""
+        """Return the measure, of N . j's sign, by which the columns of `poses` are told apart.
+
+        Of a machine that is singular everywhere only rounding would be left: it is 0.
+        """
         if self.rows.is_constant() and self.vanishes():
             return ca.SX(0)
-        return super().measure(platform, legs)
+        return (-1 if self.turns else 1) * super().measure(platform, legs)
 
     def forces(
         self, wrench: Expression, platform: PlatformMotion, legs: Sequence[LegMotion]

@@ -65,11 +65,12 @@ def last_joints(
     ankle = Turning(*(-a for a in lower))
     if angle is None:
         return [Joint("R", d, point.position, *ankle)]
-    along, apart = ca.dot(d, angle.axis), ca.cross(d, point.position - angle.hinge)
+    at = angle.axis_point(point)
+    along, apart = ca.dot(d, angle.axis), ca.cross(d, point.position - at)
     one = ca.logic_and(ca.fabs(along) > _PARALLEL, ca.dot(apart, apart) < _COINCIDENT**2)
     sense = ca.if_else(one, along, 0)
     turn = Turning(ca.SX([[0, 0, 0, 1]]), angle.rate, angle.acceleration)
     ankle = Turning(*(a + sense * b for a, b in zip(ankle, turn, strict=True)))
     rest = 1 - sense * sense
-    hinge = Joint("R", angle.axis, angle.hinge, *(rest * b for b in turn))
+    hinge = Joint("R", angle.axis, at, *(rest * b for b in turn))
     return [Joint("R", d, point.position, *ankle), hinge]

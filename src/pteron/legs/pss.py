@@ -117,7 +117,7 @@ class PSSEquations(SlideEquations):
         dn = (point.velocity - at.rate * self.e) / self.ll
         ddn = (point.acceleration - at.acceleration * self.e) / self.ll
         tip = self.r + at.q * self.e
-        joints = universal_joints(self.bar, tip, point.position, swing, (n, dn, ddn), angle)
+        joints = universal_joints(self.bar, tip, point, swing, (n, dn, ddn), angle)
         return rod_body(point, n, ddn, swing), joints, None
 
     def locus(self, q: Expression) -> Sphere:

@@ -33,7 +33,7 @@ def rod_body(point: PointMotion, n: Expression, ddn: Expression, swing: Expressi
 def universal_joints(
     d: Expression,
     tip: Expression,
-    c: Expression,
+    point: PointMotion,
     swing: Expression,
     direction: tuple[Expression, Expression, Expression],
     angle: AngleMotion | None,
@@ -47,7 +47,7 @@ def universal_joints(
     |d x n|^2 and beta' = - n'.d / |d x n|. `direction` is n, n' and n''; `swing` (3, 4) is
     dn/d(c, phi); `before` is a joint about d that turns the tip's side, such as a crank's.
     """
-    n, dn, ddn = direction
+    c, (n, dn, ddn) = point.position, direction
     across, turning = ca.cross(d, n), ca.cross(d, dn)
     square = ca.dot(across, across)
     size, growth = ca.sqrt(square), ca.dot(across, turning) / square
@@ -65,7 +65,7 @@ def universal_joints(
     hinge = []
     if angle is not None:
         turn = ca.SX([[0, 0, 0, 1]]), angle.rate, angle.acceleration
-        hinge = [Joint("R", angle.axis, angle.hinge, *turn)]
+        hinge = [Joint("R", angle.axis, angle.axis_point(point), *turn)]
     return [
         Joint("R", d, tip, *knee),
         Joint("R", axis, tip, *about_e),

@@ -143,7 +143,7 @@ class RSSEquations(CrankEquations):
         dn = (point.velocity - at.rate * g) / self.ll
         ddn = (point.acceleration - at.acceleration * g + square * l_u) / self.ll
         tip = self.r + l_u
-        joints = universal_joints(self.d, tip, point.position, swing, (n, dn, ddn), angle, crank)
+        joints = universal_joints(self.d, tip, point, swing, (n, dn, ddn), angle, crank)
         return rod_body(point, n, ddn, swing), joints, None
 
     def locus(self, q: Expression) -> Sphere:

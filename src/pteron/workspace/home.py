@@ -77,9 +77,9 @@ def home_pose(robot: Manipulator) -> Array:
     best: Array = equals[travel.argmin()]
     least = _WORTH * float(reserve(robot, best).smallest)
     if robot.platform.turns:
-        best[3] = np.pi - (np.pi - best[3]) % (2.0 * np.pi)
+        best[-1] = np.pi - (np.pi - best[-1]) % (2.0 * np.pi)
     for metres, degrees in _GRIDS:
-        step = np.array([metres] * 3 + [np.radians(degrees)])[: robot.freedom]
+        step = _steps(robot, metres, np.radians(degrees))
         rounded: Array = np.round(best / step) * step + 0.0  # -0.0 becomes 0.0
         if reserve(robot, rounded).smallest >= least:
             return rounded
@@ -96,10 +96,14 @@ def _random_poses(robot: Manipulator) -> Array:
     )
 
 
+def _steps(robot: Manipulator, metres: float, radians: float) -> Array:
+    """Return a step of each of the pose's coordinates."""
+    return np.array([radians if name == "phi" else metres for name in robot.coordinates])
+
+
 def _refined(robot: Manipulator, start: Array) -> Array:
     """Return the pose of a locally best reserve."""
-    steps = np.array([_STEPS[0]] * 3 + [_STEPS[1]])[: robot.freedom]
-    simplex = np.vstack([start, start + np.diag(steps)])
+    simplex = np.vstack([start, start + np.diag(_steps(robot, *_STEPS))])
     found = minimize(
         lambda pose: -float(reserve(robot, pose).smallest),
         start,

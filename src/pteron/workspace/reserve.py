@@ -9,12 +9,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.equations.machine import closure_of
 from pteron.errors import DataError
 from pteron.kernels import Array, numeric
-from pteron.kinematics import inverse_kinematics
+from pteron.kinematics import inverse_kinematics, random_poses
 from pteron.manipulator import Manipulator
 from pteron.shapes import Numbers, PerJoint, PoseLike
+
+_DRAWN = 4096
+"""Random poses among which the best type-II measure is sought."""
 
 
 @dataclass(frozen=True)
@@ -27,8 +29,8 @@ class Reserve:
         The type-I measure of each leg: 0 where it is stretched or folded. Out of reach it is
         negative: the missing metres over the leg's size.
     type_ii : array, shape (...)
-        The size of the type-II measure: 0 where the actuators do not hold the platform. It is 1 for
-        a machine whose Jacobian is constant.
+        The size of the type-II measure over the best that the machine has, as far as random poses
+        tell: 0 where the actuators do not hold the platform.
     clearances : array, shape (..., n)
         Distance of each joint from its nearer limit, over half its range; negative beyond it, and 1
         for a joint without limits.
@@ -66,10 +68,7 @@ def reserve(robot: Manipulator, pose: PoseLike) -> Reserve:
     facts = _facts(robot)
     margin, measure, _, _ = numeric(robot, "reach")(pose)
     type_i = np.where(margin < 0.0, margin / facts.sizes, np.nan_to_num(measure))
-    if facts.constant:
-        type_ii = np.ones(type_i.shape[:-1])
-    else:
-        type_ii = np.nan_to_num(np.abs(numeric(robot, "type_ii")(pose)[0]))
+    type_ii = np.nan_to_num(np.abs(numeric(robot, "type_ii")(pose)[0])) / facts.best
     room = clearances(robot, numeric(robot, "joint_coordinates")(pose)[0])
     shares = np.where(np.isinf(room), 1.0, room / facts.half_ranges)
     shares = np.where(np.isnan(shares), np.minimum(type_i, 0.0), shares)
@@ -78,23 +77,24 @@ def reserve(robot: Manipulator, pose: PoseLike) -> Reserve:
 
 
 class _Facts(NamedTuple):
-    """What a machine's reserves are measured by, (n,) each, and whether its J is constant."""
+    """What a machine's reserves are measured by, (n,) each, and its best type-II measure."""
 
     sizes: Array
     low: Array
     high: Array
     half_ranges: Array
     levers: Array
-    constant: bool
+    best: float
 
 
 @lru_cache(maxsize=64)
 def _facts(robot: Manipulator) -> _Facts:
     low, high = np.array([leg.limits or (-np.inf, np.inf) for leg in robot.legs]).T
     sizes, levers = np.array([(leg.size, leg.lever) for leg in robot.legs]).T
-    constant = closure_of(robot).vanishes() is False and not robot.platform.turns
     half = np.where(np.isinf(low), 1.0, (high - low) / 2.0)
-    return _Facts(sizes, low, high, half, levers, constant)
+    drawn = random_poses(robot, _DRAWN, type_i=0.0, type_ii=0.0)
+    best = float(np.abs(numeric(robot, "type_ii")(drawn)[0]).max())
+    return _Facts(sizes, low, high, half, levers, best or 1.0)
 
 
 def clearances(robot: Manipulator, joints: Array) -> Array:

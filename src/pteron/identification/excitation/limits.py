@@ -71,7 +71,7 @@ class Limits:
     acceleration: float | Sequence[float] = 10.0
     force: float | Sequence[float] | None = None
     type_i: float = 0.25
-    type_ii: float = 0.3
+    type_ii: float = 0.2
     joint_clearance: float = 0.005
 
     def __post_init__(self) -> None:
