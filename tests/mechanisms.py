@@ -138,7 +138,7 @@ MECHANISMS = {
 def states(robot, count, seed=0):
     """Return random poses away from singularities, velocities and accelerations."""
     rng = np.random.default_rng(seed)
-    pose = pteron.random_poses(robot, count, seed=rng, type_i=0.3, type_ii=0.2)
+    pose = pteron.random_poses(robot, count, seed=rng, type_i=0.3, type_ii=0.15)
     found = pose, rng.normal(size=pose.shape), 10.0 * rng.normal(size=pose.shape)
     for array in found:
         array.setflags(write=False)

@@ -194,7 +194,7 @@ def test_a_singular_orientation_is_of_type_2(name, sign):
 
 
 def test_forces_are_given_down_to_the_bound_of_the_type_2_measure():
-    slope = abs(pteron.compile(ROBOT, "type_ii")(LOOSE + [0, 0, 0, 1e-7])) / 1e-7
+    slope = abs(pteron.compile(ROBOT, "type_ii")(LOOSE + np.array([0, 0, 0, 1e-7]))) / 1e-7
     for away, served in ((0.5e-9, False), (2e-9, True), (1e-8, True)):
         pose = LOOSE + np.array([0, 0, 0, away])
         velocity, acceleration = np.random.default_rng(0).normal(size=(2, 4))

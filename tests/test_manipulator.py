@@ -278,7 +278,7 @@ def test_the_catalog():
         robot = pteron.load(name)
         assert robot.name == name
         assert robot.platform.motion == ("3T1R" if name.startswith("quadrupteron") else "3T")
-        assert pteron.random_poses(robot, 1, type_i=0.5, type_ii=0.3).shape == (1, robot.freedom)
+        assert pteron.random_poses(robot, 1, type_i=0.5, type_ii=0.15).shape == (1, robot.freedom)
 
 
 def test_the_catalogs_quadrupteron_is_that_of_table_1():

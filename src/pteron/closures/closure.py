@@ -27,10 +27,6 @@ class Closure(ABC):
 
     def __init__(self, legs: Sequence[LegEquations], platform: PlatformEquations) -> None:
         self.legs, self.platform = legs, platform
-        square = sum(ca.dot(offset.a, offset.a) for offset in platform.offsets) / len(legs)
-        self.lever = ca.SX(1) if square.is_zero() else ca.sqrt(square)
-        """Root mean square distance of the platform points from the axis, m; 1 m if they are on it.
-        """
 
     @classmethod
     @abstractmethod
@@ -71,14 +67,34 @@ class Closure(ABC):
     def measure(self, platform: PlatformMotion, legs: Sequence[LegMotion]) -> Expression:
         """Return the type-II measure: 1 in size at best, 0 where J is singular, without unit.
 
-        It is the volume that the rows of A span, J = B^-1 A, each made a unit vector, after phi is
-        counted as a length on `lever`: the same for every kind of leg, in any units and frame.
+        It is det A, J = B^-1 A, with each row made a unit force, or a unit moment, over the most
+        that so many forces on these platform points may have: 1 where the forces are isotropic and
+        their moments balanced. So it is the same in any units and frame, for every kind of leg.
         """
         rows = plain_rows(platform, legs)
-        if platform.angle is not None:
-            rows = ca.horzcat(rows[:, :-1], rows[:, -1] / self.lever)
-        squares = (ca.dot(row, row) for row in ca.vertsplit(rows))
-        return determinant(rows) / ca.sqrt(reduce(mul, squares))
+        lengths = self.platform.directions.shape[1]
+        holds = [not leg.row[:3].is_zero() for leg in legs]
+        parts = (
+            row[:lengths] if force else row[lengths:]
+            for row, force in zip(ca.vertsplit(rows), holds, strict=True)
+        )
+        sizes = ca.sqrt(reduce(mul, (ca.dot(part, part) for part in parts)))
+        greatest = (sum(holds) / lengths) ** (lengths / 2)
+        if all(holds) and platform.angle is not None:
+            if self._lever.is_zero():  # no force has a moment
+                return ca.SX(0)
+            greatest = greatest * self._lever
+        return determinant(rows) / (greatest * sizes)
+
+    @property
+    def _lever(self) -> Expression:
+        """Return the root of the sum of squares of the platform points' distances from their mean.
+
+        About an axis along k through it; it is the greatest moment that unit forces may have.
+        """
+        points = [offset.a for offset in self.platform.offsets]
+        center = sum(points) / len(points)
+        return ca.sqrt(sum(ca.dot(point - center, point - center) for point in points))
 
     keeps_modes: bool = False
     """Whether each column of `poses` is one assembly mode throughout."""

@@ -68,7 +68,7 @@ def reserve(robot: Manipulator, pose: PoseLike) -> Reserve:
     facts = _facts(robot)
     margin, measure, _, _ = numeric(robot, "reach")(pose)
     type_i = np.where(margin < 0.0, margin / facts.sizes, np.nan_to_num(measure))
-    type_ii = np.nan_to_num(np.abs(numeric(robot, "type_ii")(pose)[0])) / facts.best
+    type_ii = np.nan_to_num(np.abs(numeric(robot, "type_ii")(pose)[0])) / best_type_ii(robot)
     room = clearances(robot, numeric(robot, "joint_coordinates")(pose)[0])
     shares = np.where(np.isinf(room), 1.0, room / facts.half_ranges)
     shares = np.where(np.isnan(shares), np.minimum(type_i, 0.0), shares)
@@ -77,14 +77,13 @@ def reserve(robot: Manipulator, pose: PoseLike) -> Reserve:
 
 
 class _Facts(NamedTuple):
-    """What a machine's reserves are measured by, (n,) each, and its best type-II measure."""
+    """What a machine's reserves are measured by, (n,) each."""
 
     sizes: Array
     low: Array
     high: Array
     half_ranges: Array
     levers: Array
-    best: float
 
 
 @lru_cache(maxsize=64)
@@ -92,9 +91,14 @@ def _facts(robot: Manipulator) -> _Facts:
     low, high = np.array([leg.limits or (-np.inf, np.inf) for leg in robot.legs]).T
     sizes, levers = np.array([(leg.size, leg.lever) for leg in robot.legs]).T
     half = np.where(np.isinf(low), 1.0, (high - low) / 2.0)
+    return _Facts(sizes, low, high, half, levers)
+
+
+@lru_cache(maxsize=64)
+def best_type_ii(robot: Manipulator) -> float:
+    """Return the largest type-II measure, in size, of many random poses; 1 if all are singular."""
     drawn = random_poses(robot, _DRAWN, type_i=0.0, type_ii=0.0)
-    best = float(np.abs(numeric(robot, "type_ii")(drawn)[0]).max())
-    return _Facts(sizes, low, high, half, levers, best or 1.0)
+    return float(np.abs(numeric(robot, "type_ii")(drawn)[0]).max()) or 1.0
 
 
 def clearances(robot: Manipulator, joints: Array) -> Array:

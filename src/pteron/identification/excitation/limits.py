@@ -14,7 +14,7 @@ from pteron.identification.excitation.fourier import FourierMotion, State, state
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator
-from pteron.workspace.reserve import clearances
+from pteron.workspace.reserve import best_type_ii, clearances
 
 UNITS = {
     "type_i": "",
@@ -49,8 +49,8 @@ class Limits:
     type_i : float
         Least type-I measure of each leg, in (0, 1): the distance from stretched and folded legs.
     type_ii : float
-        Least type-II measure, in (0, 1): the distance from poses where the actuators do not hold
-        the platform. Without meaning where J is constant.
+        Least share, in (0, 1), of the best type-II measure that the machine has: the distance from
+        poses where the actuators do not hold the platform. Without meaning where J is constant.
     joint_clearance : float
         Least distance of the joints from their limits, m or rad; without effect on a joint that
         has none.
@@ -71,7 +71,7 @@ class Limits:
     acceleration: float | Sequence[float] = 10.0
     force: float | Sequence[float] | None = None
     type_i: float = 0.25
-    type_ii: float = 0.2
+    type_ii: float = 0.3
     joint_clearance: float = 0.005
 
     def __post_init__(self) -> None:
@@ -259,7 +259,7 @@ def _margins_of(robot: Manipulator, limits: Limits, state: State) -> dict[str, A
     found = {"type_i": unchecked(robot, "reach", state.pose)[1] - limits.type_i}
     if closure_of(robot).vanishes() is None or robot.platform.turns:
         type_ii = np.abs(unchecked(robot, "type_ii", state.pose))[:, None]
-        found["type_ii"] = type_ii - limits.type_ii
+        found["type_ii"] = type_ii / best_type_ii(robot) - limits.type_ii
     if any(leg.limits for leg in robot.legs):
         found["joint_clearance"] = clearances(robot, state.joints) - limits.joint_clearance
     found["speed"] = per_joint(limits, "speed", robot) - np.abs(state.rates)

@@ -17,6 +17,7 @@ from pteron.identification.signals.states import home, home_mode
 from pteron.kernels import Array, Columns, program
 from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator, parameters
+from pteron.workspace.reserve import best_type_ii
 
 Criterion = Literal["condition", "logdet"]
 """What is made small: the scaled condition number, or the volume of the confidence ellipsoid."""
@@ -140,7 +141,7 @@ def _path(setting: Setting, watched: tuple[str, ...]) -> tuple[ca.Function, Arra
     # An assembly mode keeps the sign that the measure has in the home pose.
     sign = float(np.sign(unchecked(robot, "type_ii", np.array(home(robot)))))
     type_ii = sign * program(robot, "type_ii").function(pose)
-    found["type_ii"] = type_ii, limits.type_ii + _BACK_OFF, np.inf
+    found["type_ii"] = type_ii / best_type_ii(robot), limits.type_ii + _BACK_OFF, np.inf
     if setting.space == "joints":
         joints, rates, seconds = q
     else:
