@@ -157,7 +157,7 @@ def test_a_platform_has_a_motion_and_axes():
     def platform(motion="3T1R", **axes):
         return lambda: Platform(motion, BODY, **axes)
 
-    refused(platform("2T"), 'motion: \'2T\' is not "3T" or "3T1R"')
+    refused(platform("2R"), 'motion: \'2R\' is not "3T" or "3T1R" or "2T" or "2T1R"')
     refused(platform(axis=(0.0, 2.0, 0.0)), "axis: [0.0, 2.0, 0.0] has length 2, not 1; write")
     words = "x_axis: missing; axis [0.0, 1.0, 0.0] is not the base frame's z", "must say"
     refused(platform(axis=(0.0, 1.0, 0.0)), *words)
@@ -341,11 +341,15 @@ BAD_FILES = {
         "[0.0, 0.0, -inf]",
         "gravity, item 3: -inf given, a finite number",
     ),
-    "unknown motion": ('"3T1R"', '"2T"', "platform.motion: '2T' given, '3T' or '3T1R' expected"),
+    "unknown motion": (
+        '"3T1R"',
+        '"2R"',
+        "platform.motion: '2R' given, '3T', '3T1R', '2T' or '2T1R' expected",
+    ),
     "unknown kind": (
         "elbow = 1\n",
-        'elbow = 1\ntype = "PRR"\n',
-        "leg 1: type: 'PRR' is not one of PRRR, RSS",
+        'elbow = 1\ntype = "RPR"\n',
+        "leg 1: type: 'RPR' is not one of PRRR, PSS, RSS, RRR, PRR, RUPU",
     ),
     "elbow": ("elbow = 1", "elbow = 0", "leg 1: elbow: 0 given, 1 or -1 expected"),
     "not a unit vector": (
