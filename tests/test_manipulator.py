@@ -265,20 +265,34 @@ def test_turned_machines_are_loaded_without_loss(tmp_path_factory, name, seed):
     assert pteron.load(pteron.save(robot, tmp_path_factory.mktemp("saved") / "r.toml")) == robot
 
 
+CATALOGUED = {
+    "3-prr": ("2T1R", "PRR PRR PRR"),
+    "3-rrr": ("2T1R", "RRR RRR RRR"),
+    "delta": ("3T", "RSS RSS RSS"),
+    "delta-4": ("3T1R", "RSS RSS RSS RUPU"),
+    "delta-omnid": ("3T", "RSS RSS RSS"),
+    "five-bar": ("2T", "RRR RRR"),
+    "h4": ("3T1R", "RSS RSS RSS RSS"),
+    "linear-delta": ("3T", "PSS PSS PSS"),
+    "orthoglide": ("3T", "PSS PSS PSS"),
+    "par4": ("3T1R", "RSS RSS RSS RSS"),
+    "quadrupteron": ("3T1R", "PRRR PRRR PRRR PRRR"),
+    "quadrupteron-oblique": ("3T1R", "PRRR PRRR PRRR PRRR"),
+    "tripteron": ("3T", "PRRR PRRR PRRR"),
+    "tripteron-colinear": ("3T", "PRRR PRRR PRRR"),
+    "tripteron-oblique": ("3T", "PRRR PRRR PRRR"),
+    "tripteron-router": ("3T", "PRRR PRRR PRRR"),
+}
+
+
 def test_the_catalog():
-    names = pteron.catalog()
-    assert names == (
-        "delta",
-        "quadrupteron",
-        "quadrupteron-oblique",
-        "tripteron",
-        "tripteron-oblique",
-    )
-    for name in names:
+    assert pteron.catalog() == tuple(CATALOGUED)
+    for name, (motion, types) in CATALOGUED.items():
         robot = pteron.load(name)
         assert robot.name == name
-        assert robot.platform.motion == ("3T1R" if name.startswith("quadrupteron") else "3T")
-        assert pteron.random_poses(robot, 1, type_i=0.5, type_ii=0.15).shape == (1, robot.freedom)
+        assert robot.platform.motion == motion
+        assert " ".join(leg.type for leg in robot.legs) == types
+        assert pteron.random_poses(robot, 1, type_i=0.5, type_ii=0.05).shape == (1, robot.freedom)
 
 
 def test_the_catalogs_quadrupteron_is_that_of_table_1():
@@ -510,7 +524,7 @@ def test_a_byte_order_mark_is_passed_over(tmp_path):
 
 def test_files_that_cannot_be_read_are_refused(tmp_path):
     missing = tmp_path / "nowhere.toml"
-    words = "neither a file nor a machine of the catalog (delta, quadrupteron, "
+    words = "neither a file nor a machine of the catalog (3-prr, 3-rrr, delta, "
     refused(lambda: pteron.load(missing), f"{missing}: {words}")
     refused(lambda: pteron.load("quadrupteorn"), 'did you mean "quadrupteron"?')
     refused(lambda: pteron.load(tmp_path), f"{tmp_path}: cannot be read")
@@ -566,14 +580,17 @@ def test_parameters_stand_in_the_papers_order(name):
     expected = {}
     for letter in "pul":
         for i, leg in enumerate(robot.legs, start=1):
-            body = {"p": getattr(leg, "slider_mass", None), "u": leg.upper, "l": leg.lower}[letter]
+            key = {"p": "slider_mass", "u": "upper", "l": "lower"}[letter]
+            body = getattr(leg, key, None)
+            if body is None:
+                continue
             if letter == "p":
-                expected |= {} if body is None else {f"m_p{i}": body}
+                expected |= {f"m_p{i}": body}
                 continue
             moments = dict(zip(("mgx", "mgy"), body.first_moment, strict=False))
             values = {"m": body.mass, **moments, "I": body.inertia}
             expected |= {f"{kind}_{letter}{i}": value for kind, value in values.items()}
-    body = robot.platform.inertia
+    body = robot.platform.joined
     platform = body.mass, *body.first_moment, body.inertia
     expected |= zip(("m_e", "mgx_e", "mgy_e", "I_e"), platform, strict=True)
     assert pteron.parameter_names(robot) == tuple(expected)
@@ -585,18 +602,21 @@ def test_parameters_stand_in_the_papers_order(name):
     for p in listed:
         assert p.name == f"{p.kind}_{p.body}{p.suffix}"
         assert p.length_power == {"kg": 0, "kg m": 1, "kg m^2": 2}[p.unit]
-    assert len(expected) == sum({"PRRR": 9, "RSS": 7}[leg.type] for leg in robot.legs) + 4
+    counts = {"PRRR": 9, "PSS": 4, "RSS": 7, "RRR": 8, "PRR": 5, "RUPU": 6}
+    assert len(expected) == sum(counts[leg.type] for leg in robot.legs) + 4
 
 
 @EVERY
 def test_with_parameters_gives_the_same_machine_back(name):
     robot = MECHANISMS[name]
+    # Parameters tell the platform as a whole, not its bars and geared parts.
+    whole = replace(robot, platform=robot.platform.with_joined(robot.platform.joined))
     values = pteron.parameters(robot)
-    assert pteron.with_parameters(robot, values) == robot
+    assert pteron.with_parameters(robot, values) == whole
     doubled = pteron.with_parameters(robot, 2 * values)
-    assert doubled != robot
+    assert doubled != whole
     np.testing.assert_array_equal(pteron.parameters(doubled), 2 * values)
-    assert pteron.with_parameters(doubled, values.tolist()) == robot
+    assert pteron.with_parameters(doubled, values.tolist()) == whole
 
 
 def test_parameters_of_no_real_body_are_refused():
@@ -630,15 +650,18 @@ def test_turning_keeps_every_angle_and_length(name):
     rotation = Rotation.random(rng=4).as_matrix()
     moved = pteron.turned(robot, rotation)
 
+    base = (
+        *("guide_point", "fixed_offset"),
+        *("direction", "slider_direction", "zero_direction", "bar_direction"),
+    )
+
     def vectors(machine):
         found = [machine.gravity, *machine.platform.frame]
         for leg in machine.legs:
-            keys = "guide_point", "direction", "slider_direction", "zero_direction"
-            found += [getattr(leg, key) for key in keys if getattr(leg, key, None) is not None]
+            found += [getattr(leg, key) for key in base if getattr(leg, key, None) is not None]
         return np.array(found)
 
     np.testing.assert_allclose(vectors(moved), vectors(robot) @ rotation.T, atol=1e-14)
-    base = ("guide_point", "direction", "slider_direction", "zero_direction")
     for before, after in zip(robot.legs, moved.legs, strict=True):
         for key, value in vars(before).items():
             assert (getattr(after, key) == value) or key in base

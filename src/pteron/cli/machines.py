@@ -29,7 +29,7 @@ def catalog(json: Json = False) -> None:
         return
     made = table("name", "motion", "pose", "legs", "elbows")
     for one in found:
-        pose, legs = " ".join(one["coordinates"]), f"{one['legs']} {' '.join(one['types'])}"
+        pose, legs = " ".join(one["coordinates"]), " ".join(one["types"])
         made.add_row(one["name"], one["motion"], pose, legs, one["working_mode"])
     show(made)
 

@@ -67,7 +67,8 @@ def reserve(robot: Manipulator, pose: PoseLike) -> Reserve:
     """
     facts = _facts(robot)
     margin, measure, _, _ = numeric(robot, "reach")(pose)
-    type_i = np.where(margin < 0.0, margin / facts.sizes, np.nan_to_num(measure))
+    # A shaft without lengths reaches everywhere.
+    type_i = np.divide(margin, facts.sizes, out=np.nan_to_num(measure), where=margin < 0.0)
     type_ii = np.nan_to_num(np.abs(numeric(robot, "type_ii")(pose)[0])) / best_type_ii(robot)
     room = clearances(robot, numeric(robot, "joint_coordinates")(pose)[0])
     shares = np.where(np.isinf(room), 1.0, room / facts.half_ranges)
