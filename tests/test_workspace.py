@@ -5,7 +5,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from mechanisms import CATALOG, MECHANISMS, random_machine, states
+from mechanisms import MECHANISMS, NEAREST, random_machine, states
 from scipy.spatial.transform import Rotation
 
 import pteron
@@ -129,7 +129,7 @@ def test_home_has_the_best_reserve(name):
     np.testing.assert_array_equal(home_pose(robot), home(name))
 
 
-@pytest.mark.parametrize("name", CATALOG)
+@pytest.mark.parametrize("name", NEAREST)
 def test_homes_of_the_catalog_are_round(name):
     pose = home(name)
     np.testing.assert_allclose(pose[:3], np.round(pose[:3], 3), atol=1e-12)
