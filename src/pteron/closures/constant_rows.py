@@ -31,7 +31,8 @@ class ConstantRows(Closure):
 
     @classmethod
     def fits(cls, legs: Sequence[type[LegEquations]], platform: type[PlatformEquations]) -> bool:
-        return all(leg.row_is_constant for leg in legs) and "z" in platform.coordinates
+        constant = all(leg.row_is_constant for leg in legs)
+        return constant and "z" in platform.coordinates and not platform.slides
 
     def __init__(self, legs: Sequence[LegEquations], platform: PlatformEquations) -> None:
         super().__init__(legs, platform)

@@ -27,7 +27,8 @@ def mass_matrix(machine: Machine, pose: Expression, parameters: Expression) -> E
     for rides, bodies in zip((leg.rides for leg in machine.legs), legs, strict=True):
         riding.append(sum((bodies[k].m for k in rides), none))
         bodies |= {k: bodies[k]._replace(m=none) for k in rides}
-    at_p = motion.mass_matrix(platform.body, machine.platform.carrying(inertia, riding))
+    carried = machine.platform.carrying(inertia, riding)
+    at_p = machine.platform.mass_matrix(platform, carried)
     total = ca.mtimes(platform.matrix.T, ca.mtimes(at_p, platform.matrix))
     for leg, bodies, matrix in zip(state.legs, legs, platform.matrices, strict=True):
         at_c = sum(motion.mass_matrix(body, bodies[k]) for k, body in leg.bodies.items())
@@ -58,7 +59,7 @@ def potential_energy(machine: Machine, pose: Expression, parameters: Expression)
     """Return V = - sum m g . (centre of mass), zero for bodies at the base frame's origin."""
     legs, inertia = machine.moments(parameters)
     state = machine.state(pose)
-    total = motion.mass_moment(state.platform.body, inertia)
+    total = machine.platform.mass_moment(state.platform, inertia)
     for leg, bodies in zip(state.legs, legs, strict=True):
         total = total + sum(motion.mass_moment(body, bodies[k]) for k, body in leg.bodies.items())
     return -ca.dot(machine.gravity, total)

@@ -12,7 +12,7 @@ from pteron.bodies.parameters import PLATFORM, PLATFORM_KINDS, Parameter, parame
 from pteron.closures import Closure, kind_for
 from pteron.legs.leg import LegEquations, LegMotion
 from pteron.manipulator import Manipulator, expect_manipulator
-from pteron.platforms import EQUATIONS, PlatformEquations
+from pteron.platforms import PlatformEquations, equations_class
 from pteron.platforms.motion import PlatformMotion
 
 
@@ -84,7 +84,7 @@ class Machine:
         fixed: list[Expression],
         gravity: Expression,
     ) -> Machine:
-        platform = EQUATIONS[robot.platform.motion](frame, points, fixed)
+        platform = equations_class(robot.platform)(frame, points, fixed)
         closure = kind_for([type(leg) for leg in legs], type(platform))
         assert closure is not None  # the manipulator has asked
         return cls(legs, platform, closure(legs, platform), gravity)

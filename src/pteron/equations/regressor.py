@@ -46,14 +46,12 @@ def terms(machine: Machine, state: State) -> Terms:
     places = [(i, link) for link in links for i in range(n) if link in state.legs[i].bodies]
     jacobians = [body_jacobian(state, i, link) for i, link in places]
     matrices = [wrench_matrix(state.legs[i].bodies[link], machine.gravity) for i, link in places]
-    body = state.platform.body
-    rows = ca.mtimes(ca.vertcat(body.velocity_row, body.turning_row), state.platform.matrix)
     return Terms(
         jacobian(state),
         ca.diag(ca.vertcat(*diagonal)),
         tuple(jacobians),
         tuple(matrices),
-        ca.mtimes(rows.T, wrench_matrix(body, machine.gravity)),
+        machine.platform.wrench_matrix(state.platform, machine.gravity),
     )
 
 

@@ -15,7 +15,8 @@ from pteron.bodies.inertia import PointMass
 from pteron.errors import ModelError, shown
 from pteron.legs import KINDS
 from pteron.manipulator.manipulator import STANDARD_GRAVITY, Manipulator
-from pteron.platforms import EQUATIONS, Bar, Geared, Platform
+from pteron.platforms import Bar, Geared, Platform
+from pteron.platforms.platform import Motion
 from pteron.toml import fault_lines, parsed_toml, read_toml, told
 
 _Built = TypeVar("_Built")
@@ -130,13 +131,13 @@ def _machine_table() -> Any:
 
     from pteron.bodies import tables
 
-    motion: Any = Literal[tuple(EQUATIONS)]
     platform = create_model(
         "PlatformTable",
         __base__=tables.PlanarBody,
-        motion=(motion, ...),
+        motion=(Motion, ...),
         axis=(tables.Three, (0.0, 0.0, 1.0)),
         x_axis=(tables.Three | None, None),
+        slides=(bool, False),
         tool=(tables.Three, (0.0, 0.0, 0.0)),
         bars=(list[tables.Bar], []),
         geared=(list[tables.Geared], []),
@@ -176,6 +177,7 @@ def _platform(table: Any) -> Platform:
         table.inertia_of(""),
         axis=table.axis,
         x_axis=table.x_axis,
+        slides=table.slides,
         tool=table.tool,
         bars=tuple(Bar(bar.mass, bar.hinge) for bar in table.bars),
         geared=tuple(Geared(part.inertia, part.ratio) for part in table.geared),
@@ -211,8 +213,9 @@ def save(robot: Manipulator, path: str | Path) -> Path:
     document.add("name", tomlkit.item(robot.name))
     document.add("gravity", tomlkit.item(list(robot.gravity)))
     x, _, axis = robot.platform.frame
-    platform = {"motion": robot.platform.motion, "axis": axis, "x_axis": x}
-    platform |= {"tool": robot.platform.tool, **_body(robot.platform.inertia)}
+    platform: dict[str, Any] = {"motion": robot.platform.motion, "axis": axis, "x_axis": x}
+    platform |= {"slides": robot.platform.slides or None, "tool": robot.platform.tool}
+    platform |= _body(robot.platform.inertia)
     table = _table(platform)
     for name in ("bars", "geared"):
         if parts := getattr(robot.platform, name):

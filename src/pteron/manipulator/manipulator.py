@@ -127,26 +127,31 @@ def _check_constraints(platform: Platform, legs: tuple[LegKind, ...]) -> None:
     """Refuse legs that leave the platform another freedom than its motion has."""
     for i, leg in enumerate(legs, start=1):
         _check_plane(platform, i, leg)
-        if leg.follows_angle and not platform.turns:
+        if leg.follows_angle and (platform.slides or not platform.turns):
             raise ModelError(
-                f"leg {i}: a {leg.type} leg turns the platform, but a {platform.motion} platform "
-                "does not turn; give it another leg or another motion"
+                f"leg {i}: a {leg.type} leg turns the platform, but this {platform.motion} "
+                "platform does not turn; give it another leg or another motion"
+            )
+        if platform.slides and leg.platform_point[2] != 0.0:
+            raise ModelError(
+                f"leg {i}: platform_point: {leg.platform_point[2]:g} m/rad along the axis; what "
+                "slides moves across it, so give 0"
             )
     if platform.planar and all(leg.plane_normal is None for leg in legs):
         raise ModelError(
             f"legs: none keeps a {platform.motion} platform in its plane; give it a planar leg"
         )
-    axis = platform.axis if platform.turns else None
+    axis = platform.axis if platform.turns and not platform.slides else None
     # What one leg withholds is perpendicular to the axes about which it lets the platform turn.
     withheld = np.vstack([_complement(leg.free_axes(axis)) for leg in legs])
     sizes = np.linalg.svd(withheld, compute_uv=False) if len(withheld) else np.zeros(3)
     rank = int((sizes > _VANISHING).sum())
-    if platform.motion == "3T" and rank < 3:
+    if not platform.planar and axis is None and rank < 3:
         raise ModelError(
             "legs: all directions are parallel, or rods single, so that the platform is free to "
-            "turn; a 3T platform needs two legs that are not parallel"
+            f"turn; a {platform.motion} platform needs two legs that are not parallel"
         )
-    if platform.motion == "3T1R" and rank < 2:
+    if not platform.planar and rank < 2:
         raise ModelError(
             "legs: all directions lie in one plane with the platform's axis, or rods are single, "
             "so that the platform is free to tilt; turn one leg's direction out of that plane"

@@ -2,7 +2,7 @@
 
 A platform maps its pose x and its derivatives to the motion of the points that the legs carry, and
 says what it needs itself. A kind is one file of this folder: a class under `PlatformEquations`,
-named in `platforms.EQUATIONS` by the file's key `motion`.
+which `platforms.equations_class` finds by the file's keys.
 """
 
 from __future__ import annotations
@@ -13,7 +13,16 @@ from typing import ClassVar, NamedTuple
 
 import casadi as ca
 
-from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, PointMotion
+from pteron.bodies.motion import (
+    AngleMotion,
+    BodyMotion,
+    Expression,
+    Moments,
+    PointMotion,
+    mass_matrix,
+    mass_moment,
+    wrench_matrix,
+)
 
 
 class Offset(NamedTuple):
@@ -39,10 +48,14 @@ class PlatformMotion(NamedTuple):
     """The platform itself, its rows with respect to (p, phi)."""
     matrix: Expression
     """(4, m): d (p, phi) / dx."""
+    hinged: bool = True
+    """Whether it turns against its legs where it has an angle."""
 
     def angle_at(self, point: PointMotion, fixed: Expression) -> AngleMotion | None:
         """Return the angle's motion as the leg at a point sees it, whose fixed offset is given."""
-        return self.angle and self.angle._replace(hinge=point.position - fixed)
+        if self.angle is None or not self.hinged:
+            return None
+        return self.angle._replace(hinge=point.position - fixed)
 
 
 class PlatformEquations(ABC):
@@ -50,6 +63,8 @@ class PlatformEquations(ABC):
 
     coordinates: ClassVar[tuple[str, ...]]
     """The pose's coordinates, in order."""
+    slides: ClassVar[bool] = False
+    """Whether phi slides what the legs carry, and does not turn it."""
 
     def __init__(
         self,
@@ -75,6 +90,20 @@ class PlatformEquations(ABC):
     @abstractmethod
     def needs(self, motion: PlatformMotion, gravity: Expression, inertia: Moments) -> Expression:
         """Return the wrench (m, K) that the platform itself needs at P, -F_e."""
+
+    def wrench_matrix(self, motion: PlatformMotion, gravity: Expression) -> Expression:
+        """Return Om_e (m, 4) of Eq. (15): what acts on it, per unit of each of its parameters."""
+        rows = ca.vertcat(motion.body.velocity_row, motion.body.turning_row)
+        acts = ca.mtimes(rows.T, wrench_matrix(motion.body, gravity))
+        return ca.mtimes(motion.matrix.T, acts)
+
+    def mass_matrix(self, motion: PlatformMotion, inertia: Moments) -> Expression:
+        """Return its mass matrix (4, 4) with respect to (p, phi)."""
+        return mass_matrix(motion.body, inertia)
+
+    def mass_moment(self, motion: PlatformMotion, inertia: Moments) -> Expression:
+        """Return mass times centre of mass, (3, K), in the base frame."""
+        return mass_moment(motion.body, inertia)
 
     def carrying(self, inertia: Moments, masses: Sequence[Expression]) -> Moments:
         """Return the platform's inertia with masses (1, K), one a leg, on its points."""

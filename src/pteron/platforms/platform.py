@@ -84,6 +84,9 @@ class Platform:
     x_axis : unit vector, optional
         The platform frame's x at phi = 0, in the base frame. It may be left out where `axis` is
         the base frame's z: the frames then coincide at phi = 0.
+    slides : bool
+        Whether phi slides the platform points, as the two halves of an I4's nacelle do, and turns
+        nothing but the tool. Platform points then hold m/rad: c = p + t0 + phi (x_axis s_x + ...).
     tool : vector
         The tool's centre point in the platform frame, m.
     bars : tuple of Bar
@@ -96,6 +99,7 @@ class Platform:
     inertia: PlanarInertia
     axis: Vector = _BASE_Z
     x_axis: Vector | None = None
+    slides: bool = False
     tool: Vector = (0.0, 0.0, 0.0)
     bars: tuple[Bar, ...] = ()
     geared: tuple[Geared, ...] = ()
@@ -114,6 +118,10 @@ class Platform:
             raise ModelError(
                 f"x_axis: missing; axis {list(axis)} is not the base frame's z, so x_axis must say "
                 "where the platform frame's x points at phi = 0"
+            )
+        if self.slides and self.motion != "3T1R":
+            raise ModelError(
+                f"slides: a {self.motion} platform has no halves that slide; only 3T1R"
             )
         if self.geared and not self.turns:
             raise ModelError(f"geared: a {self.motion} platform has no angle for a gear to turn")
