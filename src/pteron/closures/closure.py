@@ -36,7 +36,7 @@ class Closure(ABC):
     @property
     @abstractmethod
     def modes(self) -> int:
-        """How many columns `poses` has."""
+        """How many poses joint coordinates have at most: the columns of `poses`."""
 
     def forces(
         self, wrench: Expression, platform: PlatformMotion, legs: Sequence[LegMotion]
@@ -64,6 +64,9 @@ class Closure(ABC):
     def poses(self, joints: Expression) -> Expression:
         """Return every pose that joint coordinates allow, as columns (m, k); NaN if not real."""
 
+    closed_form: bool = True
+    """Whether `poses` is one; if not, `kinematics.assembly` finds the poses."""
+
     def measure(self, platform: PlatformMotion, legs: Sequence[LegMotion]) -> Expression:
         """Return the type-II measure: 1 in size at best, 0 where J is singular, without unit.
 
@@ -71,16 +74,19 @@ class Closure(ABC):
         that so many forces on these platform points may have: 1 where the forces are isotropic and
         their moments balanced. So it is the same in any units and frame, for every kind of leg.
         """
-        rows = plain_rows(platform, legs)
+        return self.measure_of(plain_rows(platform, legs))
+
+    def measure_of(self, rows: Expression) -> Expression:
+        """Return the type-II measure of the rows of A (n, m), of any length."""
         lengths = self.platform.directions.shape[1]
-        holds = [not leg.row[:3].is_zero() for leg in legs]
+        forces = [not row[:lengths].is_zero() for row in ca.vertsplit(rows)]
         parts = (
             row[:lengths] if force else row[lengths:]
-            for row, force in zip(ca.vertsplit(rows), holds, strict=True)
+            for row, force in zip(ca.vertsplit(rows), forces, strict=True)
         )
         sizes = ca.sqrt(reduce(mul, (ca.dot(part, part) for part in parts)))
-        greatest = (sum(holds) / lengths) ** (lengths / 2)
-        if all(holds) and platform.angle is not None:
+        greatest = (sum(forces) / lengths) ** (lengths / 2)
+        if all(forces) and "phi" in self.platform.coordinates:
             if self._lever.is_zero():  # no force has a moment
                 return ca.SX(0)
             greatest = greatest * self._lever

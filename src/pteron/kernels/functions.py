@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.bodies.motion import Expression
-from pteron.equations import kinematics, lagrangian, regressor
+from pteron.equations import closing, kinematics, lagrangian, regressor
 from pteron.equations.friction import passive_friction
 from pteron.equations.machine import Machine
 from pteron.equations.virtual_work import generalized_forces, inverse_dynamics
@@ -84,6 +84,22 @@ def _links(m: Machine, v: Symbols) -> Outputs:
 def _poses(m: Machine, v: Symbols, *, reached: bool) -> Outputs:
     poses = kinematics.direct_position(m, v["joints"], reached=reached).T
     return {"poses": (poses, poses.shape)}
+
+
+def _closure_rows(m: Machine, v: Symbols) -> Outputs:
+    found = closing.closure_rows(m, v["joints"])
+    rows = {name: (part, part.shape) for name, part in found._asdict().items()}
+    return {**rows, "origin": found.origin, "size": found.size}
+
+
+def _newton_step(m: Machine, v: Symbols) -> Outputs:
+    stepped, missed = closing.newton_step(m, v["joints"], v["pose"])
+    return {"pose_out": stepped, "missed": missed}
+
+
+def _direct_step(m: Machine, v: Symbols) -> Outputs:
+    pose, missed, measure = closing.direct_step(m, v["joints"], v["pose"], TYPE_II)
+    return {"pose_out": pose, "missed": missed, "type_ii": measure}
 
 
 def _reach(m: Machine, v: Symbols) -> Outputs:
@@ -202,6 +218,9 @@ _TABLE: dict[str, _Entry] = {
     "link_vectors": _Entry(_POSE, _links, ("reach",)),
     "direct_kinematics": _Entry(("joints",), partial(_poses, reached=True)),
     "closure_poses": _Entry(("joints",), partial(_poses, reached=False)),
+    "closure_rows": _Entry(("joints",), _closure_rows),
+    "newton_step": _Entry(("joints", "pose"), _newton_step),
+    "direct_step": _Entry(("joints", "pose"), _direct_step),
     "reach": _Entry(_POSE, _reach),
     "joint_points": _Entry(
         _POSE, lambda m, v: {"points": kinematics.chain_points(_state(m, v))}, ("reach",)

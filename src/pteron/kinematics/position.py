@@ -5,10 +5,12 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pteron.equations.machine import closure_of
 from pteron.errors import UnreachablePose
 from pteron.kernels import Array
+from pteron.kinematics.assembly import every_pose, in_order, within_a_turn
 from pteron.kinematics.evaluate import checked, evaluated, place
 from pteron.kinematics.singularities import is_singular_everywhere, singular_everywhere
 from pteron.manipulator import Manipulator
@@ -207,8 +209,7 @@ def direct_kinematics(
     given = checked(robot, joints, "joints", on_failure)
     poses = assembly_modes(robot, given, all_branches=all_branches)
     if not closure_of(robot).keeps_modes:
-        order = np.lexsort(tuple(np.moveaxis(poses, -1, 0)))
-        poses = np.take_along_axis(poses, order[..., None], axis=-2)
+        poses = in_order(poses)
     lost = np.isnan(poses).all(axis=(-2, -1))
     if on_failure == "raise" and lost.any():
         index = tuple(int(i) for i in np.argwhere(lost)[0])
@@ -225,22 +226,33 @@ def direct_kinematics(
 def assembly_modes(robot: Manipulator, joints: Array, *, all_branches: bool = False) -> Poses:
     """Return the pose (..., k, m) of joint coordinates (..., n) in each assembly mode.
 
-    Unlike those of `direct_kinematics` they are never sorted: along a motion each column is one
-    mode, a side of the singularities. NaN where a mode has no pose, or one of other elbows.
+    Where the poses have a closed form they are not sorted, unlike those of `direct_kinematics`:
+    along a motion each column is one mode, a side of the singularities. NaN where a mode has no
+    pose, or one of other elbows.
     """
-    poses: Poses = evaluated(robot, "direct_kinematics", "nan", joints)
-    if robot.platform.turns:
-        poses[..., -1] = np.where(poses[..., -1] <= -np.pi, np.pi, poses[..., -1])
+    closure = closure_of(robot)
+    poses: Poses
+    if closure.closed_form:
+        poses = evaluated(robot, "direct_kinematics", "nan", joints)
+    else:
+        poses = every_pose(robot, joints, closure.modes)
+    if robot.platform.turns and not any(leg.follows_angle for leg in robot.legs):
+        poses[..., -1] = within_a_turn(poses[..., -1])
     back: PerJoint = evaluated(robot, "inverse_kinematics", "nan", poses)
     lost = np.isnan(back).any(axis=-1)
-    if not closure_of(robot).keeps_modes and not all_branches:
-        apart = np.abs(back - joints[..., None, :])
-        cranks = np.array([leg.joint.unit == "rad" for leg in robot.legs])
-        turn = 2.0 * np.pi
-        apart = np.where(cranks, np.abs((apart + np.pi) % turn - np.pi), apart)
-        lost |= ~(apart <= _SAME_JOINT).all(axis=-1)
+    if not closure.keeps_modes and not all_branches:
+        lost |= ~_same_joints(robot, back, joints[..., None, :]).all(axis=-1)
     poses[lost] = np.nan
     return poses
+
+
+def _same_joints(robot: Manipulator, one: Array, other: Array) -> NDArray[np.bool_]:
+    """Return where joint coordinates (..., n) are the same, whole turns of cranks left out."""
+    apart = np.abs(one - other)
+    cranks = np.array([leg.joint.unit == "rad" for leg in robot.legs])
+    turn = 2.0 * np.pi
+    apart = np.where(cranks, np.abs((apart + np.pi) % turn - np.pi), apart)
+    return np.asarray(apart <= _SAME_JOINT)
 
 
 @lru_cache(maxsize=64)

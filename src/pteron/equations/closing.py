@@ -1,0 +1,161 @@
+"""What legs leave to the platform while their joints are held, and Newton's step to a pose there.
+
+A held leg keeps its platform point c on a plane, a sphere or, in a planar machine, a circle, or it
+keeps the platform's angle: its locus, see `legs.leg`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import casadi as ca
+
+from pteron.bodies.motion import Expression
+from pteron.closures.closure import nan_below_zero
+from pteron.closures.determinants import adjugate
+from pteron.equations.machine import Machine
+from pteron.legs.leg import Circle, Plane, Sphere, Turned
+
+_STEPS = 4
+"""Newton's steps that a controller takes: they reach rounding from some hundredths of the size."""
+
+_CLOSED = 1e-6
+"""What may be missed before the last of them, which squares it: enough for single precision."""
+
+
+class Rows(NamedTuple):
+    """The closures of legs whose joints are held, for v = (p - origin) / size.
+
+    (still + cosines cos(phi) + sines sin(phi)) (v.v, v, 1) = 0, a row (w, m, h) for each leg.
+    """
+
+    still: Expression
+    """(n, d + 2), where p has d coordinates."""
+    cosines: Expression
+    sines: Expression
+    origin: Expression
+    """(d, 1), m."""
+    size: Expression
+    """m."""
+
+
+def closure_rows(machine: Machine, joints: Expression) -> Rows:
+    """Return the closures with joints (n, 1) held, in the units of the first sphere or circle.
+
+    m.m' - 2 (w h' + w' h) of two rows is the cosine of the angle at which their spheres, circles or
+    planes meet, and 1 for a row with itself.
+    """
+    directions, offsets = machine.platform.directions, machine.platform.offsets
+    loci = [leg.locus(q) for leg, q in zip(machine.legs, ca.vertsplit(joints), strict=True)]
+    none = ca.SX(1, directions.shape[1])
+    origin, size = none.T, ca.SX(1)
+    for locus, offset in reversed(list(zip(loci, offsets, strict=True))):
+        if isinstance(locus, Sphere | Circle):
+            origin, size = ca.mtimes(directions.T, locus.center - offset.still), locus.radius
+    found = []
+    for locus, (a, b, still) in zip(loci, offsets, strict=True):
+        s = ca.mtimes(directions, origin) + still  # c = s + size v + a cos(phi) + b sin(phi)
+        if isinstance(locus, Turned):  # sin(phi - angle) = 0
+            turns = 0, -ca.sin(locus.angle), ca.cos(locus.angle)
+            found.append([ca.horzcat(0, none, h) for h in turns])
+        elif isinstance(locus, Plane):
+            m = ca.mtimes(locus.normal.T, directions)
+            scale = ca.norm_2(m) * size
+            heights = ca.dot(locus.normal, s) - locus.offset, *(ca.dot(locus.normal, v) for v in (a, b))
+            rows = zip((size * m, none, none), heights, strict=True)
+            found.append([ca.horzcat(0, m, h) / scale for m, h in rows])
+        else:
+            apart = _counted(machine, locus, s - locus.center)
+            scale = 2 * locus.radius * size
+            square = ca.dot(apart, apart) + ca.dot(a, a) - locus.radius**2
+            rows = (size**2, apart, square), (0, a, 2 * ca.dot(apart, a)), (0, b, 2 * ca.dot(apart, b))
+            found.append(
+                [
+                    ca.horzcat(w, 2 * size * ca.mtimes(v.T, directions), h) / scale
+                    for w, v, h in rows
+                ]
+            )
+    return Rows(*(ca.vertcat(*rows) for rows in zip(*found, strict=True)), origin, size)
+
+
+def _counted(machine: Machine, locus: Sphere | Circle, v: Expression) -> Expression:
+    """Return what of a vector from a locus' center counts: for a circle its part in the plane."""
+    if isinstance(locus, Sphere):
+        return v
+    directions = machine.platform.directions
+    return ca.mtimes(directions, ca.mtimes(directions.T, v))
+
+
+class Misses(NamedTuple):
+    """By how much a pose misses closures whose joints are held."""
+
+    lengths: Expression
+    """(n, 1): m, or rad."""
+    rows: Expression
+    """(n, m): their derivatives with respect to the pose."""
+    relative: Expression
+    """The largest, as a share of the terms that it is the difference of."""
+
+    @property
+    def step(self) -> tuple[Expression, Expression]:
+        """Newton's step (m, 1) times the determinant of the rows, and the determinant."""
+        across = adjugate(self.rows)
+        return -ca.mtimes(across, self.lengths), ca.mtimes(self.rows[0, :], across[:, 0])
+
+
+def misses(machine: Machine, joints: Expression, pose: Expression) -> Misses:
+    """Return by how much a pose (m, 1) misses the closures of joints (n, 1)."""
+    rest = ca.SX.zeros(machine.freedom)
+    platform = machine.platform.motion(pose, rest, rest)
+    lengths, rows, shares = [], [], []
+    for leg, q, point, matrix in zip(
+        machine.legs, ca.vertsplit(joints), platform.points, platform.matrices, strict=True
+    ):
+        locus, c = leg.locus(q), point.position
+        if isinstance(locus, Turned):
+            assert platform.angle is not None
+            length, row = platform.angle.angle - locus.angle, ca.SX([[0, 0, 0, 1]])
+            size = 1 + ca.fabs(locus.angle)
+        elif isinstance(locus, Plane):
+            length, row = ca.dot(locus.normal, c) - locus.offset, ca.horzcat(locus.normal.T, 0)
+            size = locus.size + ca.dot(ca.fabs(locus.normal), ca.fabs(c))
+        else:
+            b = _counted(machine, locus, c - locus.center)
+            length = 0.5 * (ca.dot(b, b) / locus.radius - locus.radius)
+            row = ca.horzcat(b.T / locus.radius, 0)
+            size = locus.radius + ca.norm_1(c) + ca.norm_1(locus.center)
+        lengths.append(length)
+        rows.append(ca.mtimes(row, matrix))
+        shares.append(ca.fabs(length) / size)
+    return Misses(ca.vertcat(*lengths), ca.vertcat(*rows), ca.mmax(ca.vertcat(*shares)))
+
+
+def newton_step(
+    machine: Machine, joints: Expression, pose: Expression
+) -> tuple[Expression, Expression]:
+    """Return the pose after one step, and what the pose before it missed (`Misses.relative`)."""
+    missed = misses(machine, joints, pose)
+    step, determinant = missed.step
+    return pose + step / determinant, missed.relative
+
+
+def direct_step(
+    machine: Machine, joints: Expression, pose: Expression, least: float
+) -> tuple[Expression, Expression, Expression]:
+    """Return the pose of joints next to a pose, what it misses, and its type-II measure.
+
+    NaN where Newton's steps do not converge, or come to another side of the singularities; and not
+    finite where the measure is not above `least`.
+    """
+    start = measure = machine.closure.measure_of(misses(machine, joints, pose).rows)
+    missed = misses(machine, joints, pose)
+    for _ in range(_STEPS - 1):
+        step, determinant = missed.step
+        pose = pose + step / determinant
+        missed = misses(machine, joints, pose)
+        measure = machine.closure.measure_of(missed.rows)
+    closed = nan_below_zero(_CLOSED - missed.relative) + nan_below_zero(start * measure)
+    # The divisor vanishes where the measure is too small.
+    step, determinant = missed.step
+    held = ca.fmax(measure * measure - least * least, 0) / (measure * measure)
+    return pose + step / (determinant * held) + closed, missed.relative, measure

@@ -1,0 +1,201 @@
+"""Every pose of given joint coordinates, where there is no closed form: machines that turn.
+
+With their joints held, n legs keep points of the platform on spheres, circles or planes, in n - 1
+dimensions. Moved by what phi makes of the points' offsets these meet at P. A sphere, circle or
+plane is a row s = (w, m, h) with w v.v + m.v + h = 0, and <s, s'> = m.m' - 2 (w h' + w' h) is the
+cosine of the angle at which two of them meet. The n rows have one null vector (v.v, v, 1) up to
+scale, and it is a point exactly if the Gram matrix G of their products is singular:
+
+    det G(phi) = 0,  G = G_0 + G_c cos(phi) + G_s sin(phi),
+
+as the products depend on the distances between centers and planes alone. So 2 n solutions phi, real
+or not, are all there are: 8 modes of four legs and 6 of three, and 4 if one leg alone is no plane.
+They are the eigenvalues of a quadratic eigenvalue problem in tan(phi / 2).
+
+Two modes may have one phi: where all cranks of a Par4 have one angle, its tips lie in a plane, of
+which the modes are mirror images. The rows then have two null vectors, a line, which meets the
+spheres twice, and det G has a double zero, of which rounding leaves half the digits. Hence at each
+phi, real but for a margin, both points of the line of the two smallest singular values are tried,
+and Newton's steps on the closures themselves, which are regular there, decide.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.kernels import Array, numeric
+from pteron.manipulator import Manipulator
+
+_BATCH = 4096
+
+_VANISHING = 1e-14
+"""The size of det G, of a matrix whose diagonal is 1, below which it is all rounding: the platform
+can move with the joints held."""
+
+_MARGIN = 1e-2
+"""rad from the real axis within which a zero of det G may be real: a fourfold one loses 3/4 of the
+digits."""
+
+_NEAR = 0.1
+"""What a point may miss a closure by, as a share of the terms, to be worth Newton's steps."""
+
+_ROUNDING = 1e-13
+"""What it may miss in the end: as much as two modes that meet do within 1e-7 of where they are."""
+
+_STEPS = 20
+
+_SAME = 1e-6
+"""Two poses within this, in rad and sizes of the machine, are one: nothing tells them apart."""
+
+
+_TURN_ROUNDING = 1e-14
+"""rad."""
+
+_ALIKE = 1e-9
+"""m or rad by which coordinates differ that do not tell the order of two poses."""
+
+
+def every_pose(robot: Manipulator, joints: Array, most: int) -> Array:
+    """Return all poses (..., most, m) of joint coordinates (..., n), NaN last; phi in (-pi, pi].
+
+    They are ordered by phi, z, y and x.
+    """
+    flat = joints.reshape(-1, joints.shape[-1])
+    parts = [
+        _poses(robot, flat[start : start + _BATCH], most) for start in range(0, len(flat), _BATCH)
+    ]
+    found = np.concatenate(parts) if parts else np.empty((0, most, robot.freedom))
+    return found.reshape(*joints.shape[:-1], most, robot.freedom)
+
+
+def _poses(robot: Manipulator, joints: Array, most: int) -> Array:
+    still, cosines, sines, origin, size, _ = numeric(robot, "closure_rows")(joints)
+    rows = np.stack([still, cosines, sines], axis=-1)
+    rows[~np.isfinite(rows).all(axis=(-3, -2, -1))] = 0.0
+    which, phi = _angles(rows)
+    which, points, phi = _points(rows[which], which, phi)
+    starts = np.column_stack([origin[which] + size[which, None] * points, phi])
+    which, poses = _polished(robot, joints, which, starts)
+    poses[:, -1] = within_a_turn(poses[:, -1])
+    return _table(poses, which, size, most)
+
+
+def _angles(rows: Array) -> tuple[NDArray[np.int64], Array]:
+    """Return where det G vanishes: which state (K,) and phi (K,), the real part if it has others.
+
+    `rows` (B, n, d + 2, 3) are those of 1, cos(phi) and sin(phi).
+    """
+    n = rows.shape[1]
+    # phi = start + 2 atan(t), with the largest determinant found at infinity.
+    tried = 2.0 * np.pi * np.arange(4 * n) / (4 * n)
+    sizes = np.abs(np.linalg.det(_gram(_at(rows[:, None], tried))))
+    start = tried[sizes.argmax(axis=-1)] - np.pi
+    able = np.flatnonzero(sizes.max(axis=-1) > _VANISHING)
+    rows, start = rows[able], start[able]
+    # (1 + t^2) G = low + 2 t middle + t^2 high
+    low, high = _gram(_at(rows, start)), _gram(_at(rows, start + np.pi))
+    middle = _gram(_at(rows, start + 0.5 * np.pi)) - 0.5 * (low + high)
+    companion = np.zeros((len(rows), 2 * n, 2 * n))
+    companion[:, :n, n:] = np.eye(n)
+    companion[:, n:, :n] = -np.linalg.solve(high, low)
+    companion[:, n:, n:] = -2.0 * np.linalg.solve(high, middle)
+    t = np.linalg.eigvals(companion)
+    which, k = np.nonzero(2.0 * np.abs(t.imag) <= _MARGIN * (1.0 + t.real**2))
+    return able[which], start[which] + 2.0 * np.arctan(t.real[which, k])
+
+
+def _at(rows: Array, phi: Array) -> Array:
+    c, s = np.cos(phi)[..., None, None], np.sin(phi)[..., None, None]
+    return rows[..., 0] + c * rows[..., 1] + s * rows[..., 2]
+
+
+def _gram(s: Array) -> Array:
+    """Return the products <s, s'> of rows (..., n, d + 2)."""
+    w, m, h = s[..., 0], s[..., 1:-1], s[..., -1]
+    crossed = w[..., :, None] * h[..., None, :]
+    return m @ np.swapaxes(m, -1, -2) - 2.0 * (crossed + np.swapaxes(crossed, -1, -2))
+
+
+def _points(
+    rows: Array, which: NDArray[np.int64], phi: Array
+) -> tuple[NDArray[np.int64], Array, Array]:
+    """Return the points v (L, d) that the line of the two smallest singular values holds."""
+    _, _, vectors = np.linalg.svd(_at(rows, phi))
+    first, second = vectors[:, -1], vectors[:, -2]
+    # x = first cos + second sin is a point where x_0 x_last = v.v: a cos^2 + 2 b cos sin + c sin^2
+    a, b, c = (_quadric(x, y) for x, y in ((first, first), (first, second), (second, second)))
+    root = np.sqrt(np.maximum(b * b - a * c, 0.0))
+    far = -(b + np.copysign(root, b))
+    lines = np.stack(
+        [
+            far[:, None] * first + a[:, None] * second,
+            c[:, None] * first + far[:, None] * second,
+        ],
+        axis=1,
+    )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        points = lines[..., 1:-1] / lines[..., -1:]
+    good = np.isfinite(points).all(axis=-1)
+    k, _ = np.nonzero(good)
+    return which[k], points[good], phi[k]
+
+
+def _quadric(x: Array, y: Array) -> Array:
+    inner = (x[:, 1:-1] * y[:, 1:-1]).sum(axis=-1)
+    return 0.5 * (x[:, 0] * y[:, -1] + x[:, -1] * y[:, 0]) - inner
+
+
+def _polished(
+    robot: Manipulator, joints: Array, which: NDArray[np.int64], poses: Array
+) -> tuple[NDArray[np.int64], Array]:
+    """Return the poses that Newton's steps come to, those that close."""
+    step = numeric(robot, "newton_step")
+    found, missed = np.empty_like(poses), np.full(len(poses), _NEAR)
+    active = np.arange(len(poses))
+    for _ in range(_STEPS):
+        tried = poses[active]
+        after, misses, _ = step(joints[which[active]], tried)
+        better = misses < missed[active]
+        active, tried, after = active[better], tried[better], after[better]
+        if not len(active):
+            break
+        found[active], missed[active], poses[active] = tried, misses[better], after
+    closed = missed <= _ROUNDING
+    return which[closed], found[closed]
+
+
+def _table(poses: Array, which: NDArray[np.int64], size: Array, most: int) -> Array:
+    """Return the poses of each state (B, most, m), each once, in order and NaN last."""
+    counts = np.bincount(which, minlength=len(size))
+    columns = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
+    table = np.full((len(size), max(most, counts.max(initial=0)), poses.shape[-1]), np.nan)
+    table[which, columns] = poses
+    apart = table[:, :, None] - table[:, None]
+    apart[..., :-1] /= size[:, None, None, None]
+    apart[..., -1] = 2.0 * np.sin(0.5 * apart[..., -1])
+    same = np.abs(apart).max(axis=-1) < _SAME
+    table[np.tril(same, -1).any(axis=-1)] = np.nan
+    return in_order(table)[:, :most]
+
+
+def in_order(poses: Array) -> Array:
+    """Return poses (..., k, m) ordered by their last coordinate, then by those before; NaN last."""
+    order = np.lexsort([_ranks(poses[..., k]) for k in range(poses.shape[-1])])
+    return np.take_along_axis(poses, order[..., None], axis=-2)
+
+
+def _ranks(values: Array) -> NDArray[np.int64]:
+    """Return the ranks of values (..., k), one for those that differ by rounding alone."""
+    order = np.argsort(values, axis=-1)
+    steps = ~(np.diff(np.take_along_axis(values, order, axis=-1), axis=-1) <= _ALIKE)
+    ranks = np.zeros(values.shape, dtype=np.int64)
+    ranks[..., 1:] = np.cumsum(steps, axis=-1)
+    np.put_along_axis(ranks, order, ranks.copy(), axis=-1)
+    return ranks
+
+
+def within_a_turn(phi: Array) -> Array:
+    """Return angles in (-pi, pi]; what is -pi but for rounding becomes pi."""
+    turned = phi - 2.0 * np.pi * np.ceil((phi - np.pi) / (2.0 * np.pi))
+    return np.where(turned <= -np.pi + _TURN_ROUNDING, np.pi, turned)
