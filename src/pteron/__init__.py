@@ -35,7 +35,9 @@ from pteron.errors import (
 from pteron.kernels import compile
 from pteron.kinematics import (
     JointMotion,
+    assembly_mode,
     direct_kinematics,
+    follow,
     inverse_kinematics,
     is_singular_everywhere,
     jacobian,
@@ -46,6 +48,7 @@ from pteron.kinematics import (
     link_vectors,
     random_poses,
     singular_orientations,
+    working_mode,
 )
 from pteron.legs import PRRR, RSS
 from pteron.manipulator import (
@@ -119,6 +122,7 @@ __all__ = [
     "RodInertia",
     "SingularPose",
     "UnreachablePose",
+    "assembly_mode",
     "base_parameters",
     "base_regressor",
     "bias_forces",
@@ -129,6 +133,7 @@ __all__ = [
     "direct_kinematics",
     "export_c",
     "export_st",
+    "follow",
     "forward_dynamics",
     "gravity_forces",
     "identification",
@@ -158,6 +163,7 @@ __all__ = [
     "singular_orientations",
     "turned",
     "with_parameters",
+    "working_mode",
     "working_modes",
     "workspace",
 ]

@@ -47,35 +47,32 @@ def closure_rows(machine: Machine, joints: Expression) -> Rows:
     """
     directions, offsets = machine.platform.directions, machine.platform.offsets
     loci = [leg.locus(q) for leg, q in zip(machine.legs, ca.vertsplit(joints), strict=True)]
-    none = ca.SX(1, directions.shape[1])
-    origin, size = none.T, ca.SX(1)
+    origin, size = ca.SX(directions.shape[1], 1), ca.SX(1)
     for locus, offset in reversed(list(zip(loci, offsets, strict=True))):
         if isinstance(locus, Sphere | Circle):
             origin, size = ca.mtimes(directions.T, locus.center - offset.still), locus.radius
     found = []
     for locus, (a, b, still) in zip(loci, offsets, strict=True):
         s = ca.mtimes(directions, origin) + still  # c = s + size v + a cos(phi) + b sin(phi)
+        w, m, h = ca.SX(1, 3), ca.SX(directions.shape[1], 3), ca.SX(1, 3)
+        scale = ca.SX(1)
         if isinstance(locus, Turned):  # sin(phi - angle) = 0
-            turns = 0, -ca.sin(locus.angle), ca.cos(locus.angle)
-            found.append([ca.horzcat(0, none, h) for h in turns])
+            h[1], h[2] = -ca.sin(locus.angle), ca.cos(locus.angle)
         elif isinstance(locus, Plane):
-            m = ca.mtimes(locus.normal.T, directions)
-            scale = ca.norm_2(m) * size
-            heights = ca.dot(locus.normal, s) - locus.offset, *(ca.dot(locus.normal, v) for v in (a, b))
-            rows = zip((size * m, none, none), heights, strict=True)
-            found.append([ca.horzcat(0, m, h) / scale for m, h in rows])
+            m[:, 0] = size * ca.mtimes(directions.T, locus.normal)
+            h = ca.mtimes(locus.normal.T, ca.horzcat(s, a, b))
+            h[0] -= locus.offset
+            scale = ca.norm_2(m[:, 0])
         else:
             apart = _counted(machine, locus, s - locus.center)
+            w[0] = size**2
+            m = 2 * size * ca.mtimes(directions.T, ca.horzcat(apart, a, b))
+            h = ca.mtimes(apart.T, ca.horzcat(apart, 2 * a, 2 * b))
+            h[0] += ca.dot(a, a) - locus.radius**2
             scale = 2 * locus.radius * size
-            square = ca.dot(apart, apart) + ca.dot(a, a) - locus.radius**2
-            rows = (size**2, apart, square), (0, a, 2 * ca.dot(apart, a)), (0, b, 2 * ca.dot(apart, b))
-            found.append(
-                [
-                    ca.horzcat(w, 2 * size * ca.mtimes(v.T, directions), h) / scale
-                    for w, v, h in rows
-                ]
-            )
-    return Rows(*(ca.vertcat(*rows) for rows in zip(*found, strict=True)), origin, size)
+        found.append(ca.vertcat(w, m, h) / scale)
+    still, cosines, sines = (ca.horzcat(*(rows[:, k] for rows in found)).T for k in range(3))
+    return Rows(still, cosines, sines, origin, size)
 
 
 def _counted(machine: Machine, locus: Sphere | Circle, v: Expression) -> Expression:

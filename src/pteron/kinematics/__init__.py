@@ -1,22 +1,30 @@
 """Kinematics in numbers: batched, validated, documented."""
 
-from pteron.kinematics.joints import JointMotion, joint_accelerations, joint_rates, joint_screws
-from pteron.kinematics.position import (
+from pteron.kinematics.direct import (
+    assembly_mode,
     assembly_modes,
     direct_kinematics,
+    mode_of,
+    nearest,
+    working_mode,
+)
+from pteron.kinematics.following import follow
+from pteron.kinematics.joints import JointMotion, joint_accelerations, joint_rates, joint_screws
+from pteron.kinematics.position import (
     inverse_kinematics,
     jacobian,
     link_jacobians,
     link_vectors,
-    mode_of,
 )
 from pteron.kinematics.sampling import random_poses
 from pteron.kinematics.singularities import is_singular_everywhere, singular_orientations
 
 __all__ = [
     "JointMotion",
+    "assembly_mode",
     "assembly_modes",
     "direct_kinematics",
+    "follow",
     "inverse_kinematics",
     "is_singular_everywhere",
     "jacobian",
@@ -26,6 +34,8 @@ __all__ = [
     "link_jacobians",
     "link_vectors",
     "mode_of",
+    "nearest",
     "random_poses",
     "singular_orientations",
+    "working_mode",
 ]

@@ -143,7 +143,7 @@ def _points(
 
 def _quadric(x: Array, y: Array) -> Array:
     inner = (x[:, 1:-1] * y[:, 1:-1]).sum(axis=-1)
-    return 0.5 * (x[:, 0] * y[:, -1] + x[:, -1] * y[:, 0]) - inner
+    return np.asarray(0.5 * (x[:, 0] * y[:, -1] + x[:, -1] * y[:, 0]) - inner)
 
 
 def _polished(

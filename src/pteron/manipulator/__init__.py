@@ -6,6 +6,7 @@ from pteron.manipulator.manipulator import (
     Manipulator,
     expect_manipulator,
     turned,
+    with_elbows,
     working_modes,
 )
 from pteron.manipulator.parameters import (
@@ -28,6 +29,7 @@ __all__ = [
     "parameters",
     "save",
     "turned",
+    "with_elbows",
     "with_parameters",
     "working_modes",
 ]

@@ -1,0 +1,225 @@
+"""Joint coordinates to poses, and the modes that poses are in."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.equations.machine import closure_of
+from pteron.errors import UnreachablePose
+from pteron.kernels import Array
+from pteron.kinematics.assembly import every_pose, in_order, within_a_turn
+from pteron.kinematics.evaluate import checked, evaluated, place, unchecked
+from pteron.kinematics.singularities import is_singular_everywhere, singular_everywhere
+from pteron.manipulator import Manipulator, with_elbows
+from pteron.shapes import JointsLike, OnFailure, PerJoint, PoseLike, Poses
+
+_SAME_JOINT = 1e-6
+"""m or rad within which a pose gives the joints back: far above rounding, even near a singularity,
+where the other branch, which it is to tell apart, is no other."""
+
+
+def direct_kinematics(
+    robot: Manipulator,
+    joints: JointsLike,
+    *,
+    all_branches: bool = False,
+    on_failure: OnFailure = "nan",
+) -> Poses:
+    """Return every pose with the given joint coordinates: all assembly modes.
+
+    With the joints held, legs keep points of the platform on planes (P-R-R-R), spheres (the ends of
+    rods) or circles (planar legs); the poses are where these meet. They are found in closed form,
+    but for platforms that turn on legs with rods or planar legs: there as the zeros of a polynomial
+    whose degree is k, polished by Newton's method to 1e-14 or so.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    joints : array, shape (..., n)
+        Joint coordinates, m or rad.
+    all_branches : bool
+        Rods and planar legs close with either side of an elbow. By default only poses of the
+        robot's own working mode are returned, those whose inverse kinematics are the joints; True
+        returns those of the others as well.
+    on_failure : {"nan", "raise"}
+        A mode that is not real is NaN: that is an answer, not a failure, hence the default. With
+        "raise", joints that no pose has raise.
+
+    Returns
+    -------
+    array, shape (..., k, m)
+        Legs of kind P-R-R-R alone: k = 2, or 1 where the platform does not turn; each row stands
+        for one assembly mode throughout. Any others: in the order of phi, z, y and x, NaN last,
+        with k = 2 where the platform does not turn, or where a leg holds its angle (1 with P-R-R-R
+        legs alone); else k = 8 for four legs and 6 for three, but 4 where all but one are P-R-R-R.
+        A row is NaN where the closures have no further real solution, or where a leg does not reach
+        the pose that solves them. phi lies in (-pi, pi] unless a leg holds it.
+
+    Raises
+    ------
+    SingularPose
+        If the machine is singular at every pose.
+    UnreachablePose
+        With ``on_failure="raise"``, if joints have no pose.
+
+    Examples
+    --------
+    >>> import numpy as np, pteron
+    >>> robot = pteron.load("quadrupteron")
+    >>> poses = pteron.direct_kinematics(robot, [0.03, 0.02, 0.01, 0.02])
+    >>> np.round(poses, 12) + 0.0
+    array([[0.01      , 0.02      , 0.03      , 0.        ],
+           [0.01      , 0.02      , 0.03      , 3.14159265]])
+    """
+    if is_singular_everywhere(robot):
+        raise singular_everywhere(robot)
+    given = checked(robot, joints, "joints", on_failure)
+    poses = _rows(robot, given, all_branches=all_branches)
+    lost = np.isnan(poses).all(axis=(-2, -1))
+    if on_failure == "raise" and lost.any():
+        index = tuple(int(i) for i in np.argwhere(lost)[0])
+        raise UnreachablePose(
+            f"{place('joints', index)}: no pose has these joint coordinates "
+            f"{given[index].tolist()}",
+            leg=0,
+            shortfall=float("nan"),
+            index=index,
+        )
+    return poses
+
+
+def assembly_mode(
+    robot: Manipulator, pose: PoseLike, *, all_branches: bool = False
+) -> NDArray[np.int64]:
+    """Return which of the poses with its joint coordinates a pose is.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    pose : array, shape (..., m)
+        Poses, m and rad.
+    all_branches : bool
+        As for `direct_kinematics`.
+
+    Returns
+    -------
+    array of int, shape (...,)
+        The row of `direct_kinematics`, from 0. Of P-R-R-R legs alone it tells the assembly mode
+        throughout; of other machines it counts the modes of these joint coordinates, and may change
+        along a motion, which `follow` keeps in its mode.
+
+    Raises
+    ------
+    UnreachablePose
+        If a leg does not reach a pose.
+    SingularPose
+        If the machine is singular at every pose.
+
+    Examples
+    --------
+    >>> import numpy as np, pteron
+    >>> robot = pteron.load("quadrupteron")
+    >>> pteron.assembly_mode(robot, [[0.01, 0.02, 0.03, 0.0], [0.01, 0.02, 0.03, np.pi]])
+    array([0, 1])
+    """
+    if is_singular_everywhere(robot):
+        raise singular_everywhere(robot)
+    given = checked(robot, pose, "pose")
+    joints: PerJoint = evaluated(robot, "inverse_kinematics", "raise", given)
+    return nearest(robot, _rows(robot, joints, all_branches=all_branches), given)
+
+
+def working_mode(robot: Manipulator, pose: PoseLike, joints: JointsLike) -> NDArray[np.int64]:
+    """Return on which side the elbow of each leg is where a pose has given joint coordinates.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    pose : array, shape (..., m)
+        Poses, m and rad.
+    joints : array, shape (..., n)
+        Their joint coordinates, m or rad.
+
+    Returns
+    -------
+    array of int, shape (..., n)
+        The legs' `elbow`, 1 or -1, with which inverse kinematics of the pose gives the joint
+        coordinates; the robot's own where either does, as for P-R-R-R legs; 0 where neither does.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> robot = pteron.load("delta")
+    >>> joints = pteron.inverse_kinematics(robot, [0.0, 0.0, -0.9])
+    >>> poses = pteron.direct_kinematics(robot, joints, all_branches=True)
+    >>> pteron.working_mode(robot, poses, joints)
+    array([[ 1,  1,  1],
+           [-1, -1, -1]])
+    """
+    poses, given = checked(robot, pose, "pose"), checked(robot, joints, "joints")
+    found = np.zeros(np.broadcast_shapes(poses.shape, given.shape), dtype=np.int64)
+    own = [leg.elbow for leg in robot.legs]
+    other = [-leg.elbow if -leg.elbow in leg.branches else leg.elbow for leg in robot.legs]
+    for signs in (other, own):
+        back = unchecked(with_elbows(robot, signs), "inverse_kinematics", poses)
+        found = np.where(_same_joints(robot, back, given), signs, found)
+    return found
+
+
+def assembly_modes(robot: Manipulator, joints: Array, *, all_branches: bool = False) -> Poses:
+    """Return the pose (..., k, m) of joint coordinates (..., n) in each assembly mode.
+
+    Where the poses have a closed form they are not sorted, unlike those of `direct_kinematics`:
+    along a motion each column is one mode, a side of the singularities. NaN where a mode has no
+    pose, or one of other elbows.
+    """
+    closure = closure_of(robot)
+    poses: Poses
+    if closure.closed_form:
+        poses = evaluated(robot, "direct_kinematics", "nan", joints)
+    else:
+        poses = every_pose(robot, joints, closure.modes)
+    if robot.platform.turns and not any(leg.follows_angle for leg in robot.legs):
+        poses[..., -1] = within_a_turn(poses[..., -1])
+    back: PerJoint = evaluated(robot, "inverse_kinematics", "nan", poses)
+    lost = np.isnan(back).any(axis=-1)
+    if not closure.keeps_modes and not all_branches:
+        lost |= ~_same_joints(robot, back, joints[..., None, :]).all(axis=-1)
+    poses[lost] = np.nan
+    return poses
+
+
+@lru_cache(maxsize=64)
+def mode_of(robot: Manipulator, pose: tuple[float, ...]) -> int:
+    """Return the column of `assembly_modes` that a pose is in."""
+    joints: PerJoint = evaluated(robot, "inverse_kinematics", "raise", np.array(pose))
+    return int(nearest(robot, assembly_modes(robot, joints, all_branches=True), np.array(pose)))
+
+
+def nearest(robot: Manipulator, poses: Array, pose: Array) -> NDArray[np.int64]:
+    """Return which of poses (..., k, m) is nearest to a pose (..., m), whole turns left out."""
+    apart = poses - pose[..., None, :]
+    lengths = len(robot.platform.directions)
+    distance = np.linalg.norm(apart[..., :lengths], axis=-1)
+    distance += np.abs(np.sin(0.5 * apart[..., lengths:])).sum(axis=-1)
+    return np.asarray(np.nan_to_num(distance, nan=np.inf).argmin(axis=-1))
+
+
+def _rows(robot: Manipulator, joints: Array, *, all_branches: bool) -> Poses:
+    poses = assembly_modes(robot, joints, all_branches=all_branches)
+    return poses if closure_of(robot).keeps_modes else in_order(poses)
+
+
+def _same_joints(robot: Manipulator, one: Array, other: Array) -> NDArray[np.bool_]:
+    """Return where joint coordinates (..., n) are the same, whole turns of cranks left out."""
+    apart = np.abs(one - other)
+    cranks = np.array([leg.joint.unit == "rad" for leg in robot.legs])
+    turn = 2.0 * np.pi
+    apart = np.where(cranks, np.abs((apart + np.pi) % turn - np.pi), apart)
+    return np.asarray(apart <= _SAME_JOINT)

@@ -1,0 +1,113 @@
+"""A motion of the joints, followed by the platform in the assembly mode that it starts in."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pteron.errors import DataError, UnreachablePose
+from pteron.kernels import Array, Kernel, numeric
+from pteron.kinematics.evaluate import checked, unchecked
+from pteron.manipulator import Manipulator
+from pteron.shapes import JointsLike, OnFailure, PerCoordinate, PoseLike
+
+_HALVINGS = 12
+"""How often the way between two samples may be halved before it counts as none."""
+
+
+def follow(
+    robot: Manipulator, joints: JointsLike, start: PoseLike, *, on_failure: OnFailure = "raise"
+) -> PerCoordinate:
+    """Return the poses of joints that move, in one assembly mode: that of a pose to start from.
+
+    From each pose a line through the last two leads near the next one, and Newton's steps onto it;
+    where they do not converge the joints' way is halved. A mode ends where the machine is singular
+    (type II), and the motion with it.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    joints : array, shape (N, n)
+        Joint coordinates along the motion, m or rad: close enough to tell the way between them,
+        which is taken as straight.
+    start : array, shape (m,)
+        The pose of the first sample, or one from whose joint coordinates a straight way leads
+        there, m and rad.
+    on_failure : {"raise", "nan"}
+        Whether a sample that the motion does not come to raises, or gives NaN with all after it.
+
+    Returns
+    -------
+    array, shape (N, m)
+        The poses, m and rad; phi goes on beyond a turn.
+
+    Raises
+    ------
+    UnreachablePose
+        If the motion of the platform ends before that of the joints.
+
+    Examples
+    --------
+    >>> import numpy as np, pteron
+    >>> robot = pteron.load("delta")
+    >>> poses = np.linspace([0.0, 0.0, -0.9], [0.2, 0.1, -0.8], 50)
+    >>> joints = pteron.inverse_kinematics(robot, poses)
+    >>> bool(np.allclose(pteron.follow(robot, joints, poses[0]), poses, atol=1e-12))
+    True
+    """
+    given, pose = checked(robot, joints, "joints", on_failure), checked(robot, start, "start")
+    if given.ndim != 2 or pose.ndim != 1:
+        n = robot.freedom
+        raise DataError(
+            f"joints, start: shapes {given.shape} and {pose.shape} given, (N, {n}) and ({n},) "
+            "expected"
+        )
+    step = numeric(robot, "direct_step")
+    found = np.full(given.shape, np.nan)
+    before = pose
+    for k, q in enumerate(given):
+        ahead = step(q, 2.0 * pose - before)[0]
+        if np.isnan(ahead[0]):
+            here = given[k - 1] if k else _joints_of(robot, pose, q)
+            ahead = _halved(step, here, q, pose)
+            if np.isnan(ahead[0]):
+                if on_failure == "raise":
+                    raise _ended(given, k)
+                break
+        before, pose = pose, ahead
+        found[k] = pose
+    return found
+
+
+def _joints_of(robot: Manipulator, pose: Array, near: Array) -> Array:
+    """Return the joint coordinates of a pose, with those whole turns of cranks that are nearest."""
+    joints: Array = unchecked(robot, "inverse_kinematics", pose)
+    cranks = [leg.joint.unit == "rad" and not leg.follows_angle for leg in robot.legs]
+    turns = np.where(cranks, np.round((near - joints) / (2.0 * np.pi)), 0.0)
+    turned: Array = joints + 2.0 * np.pi * turns
+    return turned
+
+
+def _halved(step: Kernel, here: Array, there: Array, pose: Array) -> Array:
+    """Return the pose of joints there, from that of joints here, by as many steps as it takes."""
+    done, size = 0.0, 1.0
+    while done < 1.0:
+        to = min(done + size, 1.0)
+        ahead: Array = step(here + to * (there - here), pose)[0]
+        if np.isnan(ahead[0]):
+            size *= 0.5
+            if size < 0.5**_HALVINGS:
+                return ahead
+        else:
+            done, pose, size = to, ahead, 2.0 * size
+    return pose
+
+
+def _ended(joints: Array, k: int) -> UnreachablePose:
+    return UnreachablePose(
+        f"joints[{k}]: the platform does not follow to the joint coordinates {joints[k].tolist()}: "
+        "its assembly mode ends before, or the way from the sample before is too long",
+        leg=0,
+        shortfall=float("nan"),
+        index=(k,),
+    )
