@@ -21,6 +21,7 @@ FUNCTIONS = (
     "inverse_kinematics",
     "inverse_dynamics",
     "closure_poses",
+    "direct_step",
     "jacobian",
     "forward_dynamics",
 )

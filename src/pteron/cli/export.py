@@ -37,12 +37,13 @@ def export(
     machine = load_robot(robot, elbows)
     files = []
     with spinner(f"Writing code for {machine.name}"):
-        from pteron.export import BLOCKS, FUNCTIONS, Real, export_c, export_st
+        from pteron.export import BLOCKS, Real, export_c, export_st
 
         if c is not None:
             real: Real = "float" if single else "double"
-            chosen = function or FUNCTIONS
-            files += export_c(machine, chosen, c, real=real, specialised=specialised, wrench=wrench)
+            files += export_c(
+                machine, function, c, real=real, specialised=specialised, wrench=wrench
+            )
         if st is not None:
             files += export_st(machine, function or BLOCKS, st, wrench=wrench)
     if json:

@@ -24,22 +24,27 @@ def moved(locus: Locus, offset: Expression) -> Locus:
     return locus._replace(center=locus.center - offset)
 
 
-def meeting_points(loci: Sequence[Locus], platform: PlatformEquations) -> Expression:
+def meeting_points(
+    loci: Sequence[Locus], platform: PlatformEquations
+) -> tuple[Expression, Expression]:
     """Return the points, as columns, in which as many loci meet as the platform has lengths.
 
-    They are two, on both sides of a plane or a line; or one of planes alone. NaN if not real.
+    They are two, on both sides of a plane or a line; or one of planes alone. Where they are not
+    real they are NaN, and so is the number that comes with them, which is 0 else.
     """
-    meeting = _meeting_in_plane if platform.directions.shape[1] == 2 else _meeting_in_space
-    return meeting(loci, platform)
+    if platform.directions.shape[1] == 2:
+        return _meeting_in_plane(loci, platform)
+    return _meeting_in_space(loci)
 
 
-def _meeting_in_space(loci: Sequence[Locus], platform: PlatformEquations) -> Expression:
+def _meeting_in_space(loci: Sequence[Locus]) -> tuple[Expression, Expression]:
     spheres = [locus for locus in loci if isinstance(locus, Sphere)]
     planes = [(locus.normal, locus.offset) for locus in loci if isinstance(locus, Plane)]
     if not spheres:
         normals, offsets = (ca.horzcat(*parts) for parts in zip(*planes, strict=True))
         across = adjugate(normals.T)
-        return ca.mtimes(across, offsets.T) / ca.mtimes(normals[:, 0].T, across[:, 0])
+        point = ca.mtimes(across, offsets.T) / ca.mtimes(normals[:, 0].T, across[:, 0])
+        return point, ca.SX(0)
     first, *others = spheres
     # Two planes n . (p - o) = h, o being the centre of the first sphere.
     planes = [(normal, offset - ca.dot(normal, first.center)) for normal, offset in planes]
@@ -51,11 +56,13 @@ def _meeting_in_space(loci: Sequence[Locus], platform: PlatformEquations) -> Exp
     along = ca.cross(n1, n2)
     square = ca.dot(along, along)
     foot = (h1 * ca.cross(n2, along) + h2 * ca.cross(along, n1)) / square
-    step = _step(first.radius * first.radius, ca.dot(foot, foot), square) * along
-    return ca.horzcat(*(first.center + foot + side * step for side in (-1, 1)))
+    share, beyond = _half_chord(first.radius * first.radius, ca.dot(foot, foot), square)
+    return _both_sides(first.center + foot, share * along, beyond)
 
 
-def _meeting_in_plane(loci: Sequence[Locus], platform: PlatformEquations) -> Expression:
+def _meeting_in_plane(
+    loci: Sequence[Locus], platform: PlatformEquations
+) -> tuple[Expression, Expression]:
     circles, lines = [], []
     for locus in loci:
         assert not isinstance(locus, Turned)
@@ -75,13 +82,21 @@ def _meeting_in_plane(loci: Sequence[Locus], platform: PlatformEquations) -> Exp
     ((normal, height),) = lines
     n2 = ca.dot(normal, normal)
     foot = (height / n2) * normal
-    step = _step(square, ca.dot(foot, foot), n2) * quarter_turn(normal)
-    return ca.horzcat(*(first + foot + side * step for side in (-1, 1)))
+    share, beyond = _half_chord(square, ca.dot(foot, foot), n2)
+    return _both_sides(first + foot, share * quarter_turn(normal), beyond)
 
 
-def _step(radius2: Expression, distance2: Expression, square: Expression) -> Expression:
-    """Return the half-chord over the length of a vector of this square; NaN if not real."""
+def _both_sides(
+    middle: Expression, step: Expression, beyond: Expression
+) -> tuple[Expression, Expression]:
+    return ca.horzcat(*(middle + side * step + beyond for side in (-1, 1))), beyond
+
+
+def _half_chord(
+    radius2: Expression, distance2: Expression, square: Expression
+) -> tuple[Expression, Expression]:
+    """Return half a chord over the length of a vector of this square; and NaN if it is not real."""
     # Where both points meet the radicand is all rounding: barely below zero counts as zero.
     rest = radius2 - distance2
     radicand = ca.fmax(rest, ca.fmin(rest + _ROUNDING * (radius2 + distance2), 0))
-    return ca.sqrt(radicand / square) + nan_below_zero(radicand)
+    return ca.sqrt(radicand / square), nan_below_zero(radicand)

@@ -54,7 +54,7 @@ class TurningLoci(Closure):
                 'turns; "direct_step" follows the pose from one that is near'
             )
         c, s = ca.cos(angle), ca.sin(angle)
-        points = meeting_points(
+        points, beyond = meeting_points(
             [moved(locus, still + a * c + b * s) for locus, (a, b, still) in loci], self.platform
         )
-        return ca.vertcat(points, ca.repmat(angle, 1, points.shape[1]))
+        return ca.vertcat(points, ca.repmat(angle + beyond, 1, points.shape[1]))

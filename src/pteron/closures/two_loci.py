@@ -25,4 +25,4 @@ class TwoLoci(Closure):
     def poses(self, joints: Expression) -> Expression:
         pairs = zip(self.legs, ca.vertsplit(joints), self.platform.offsets, strict=True)
         loci = [moved(leg.locus(q), offset.a + offset.still) for leg, q, offset in pairs]
-        return meeting_points(loci, self.platform)
+        return meeting_points(loci, self.platform)[0]

@@ -138,21 +138,21 @@ def newton_step(
 
 def direct_step(
     machine: Machine, joints: Expression, pose: Expression, least: float
-) -> tuple[Expression, Expression, Expression]:
-    """Return the pose of joints next to a pose, what it misses, and its type-II measure.
+) -> tuple[Expression, Expression]:
+    """Return the pose of joints next to a pose, and its type-II measure.
 
-    NaN where Newton's steps do not converge, or come to another side of the singularities; and not
+    NaN where Newton's steps do not converge, or come to another side of the singularities; not
     finite where the measure is not above `least`.
     """
-    start = measure = machine.closure.measure_of(misses(machine, joints, pose).rows)
     missed = misses(machine, joints, pose)
+    start = machine.closure.measure_of(missed.rows)
     for _ in range(_STEPS - 1):
         step, determinant = missed.step
         pose = pose + step / determinant
         missed = misses(machine, joints, pose)
-        measure = machine.closure.measure_of(missed.rows)
-    closed = nan_below_zero(_CLOSED - missed.relative) + nan_below_zero(start * measure)
-    # The divisor vanishes where the measure is too small.
+    measure = machine.closure.measure_of(missed.rows)
+    lost = nan_below_zero(_CLOSED - missed.relative) + nan_below_zero(start * measure)
+    # The last step's divisor vanishes where the measure is too small.
     step, determinant = missed.step
-    held = ca.fmax(measure * measure - least * least, 0) / (measure * measure)
-    return pose + step / (determinant * held) + closed, missed.relative, measure
+    enough = ca.fmax(measure * measure - least * least, 0) / (measure * measure)
+    return pose + step / (determinant * enough) + lost, measure

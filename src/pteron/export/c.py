@@ -15,7 +15,7 @@ from typing import Literal, get_args
 
 from pteron.atomic import write_texts
 from pteron.errors import ModelError
-from pteron.export.functions import FUNCTIONS, Exported, banner, chosen
+from pteron.export.functions import Exported, banner, chosen
 from pteron.kernels import Array
 from pteron.kernels.code import (
     C,
@@ -36,7 +36,7 @@ _WIDTH = 97
 
 def export_c(
     robot: Manipulator,
-    functions: str | Sequence[str] = FUNCTIONS,
+    functions: str | Sequence[str] | None = None,
     folder: str | Path = ".",
     *,
     real: Real = "double",
@@ -59,7 +59,8 @@ def export_c(
     functions : sequence of str
         Names of what `compile` accepts, or `"inverse_dynamics_base"`, from the cheapest base
         parameters. By default inverse and direct kinematics, Jacobian, inverse dynamics from the
-        inertial parameters and from base parameters, forward dynamics and the regressor.
+        inertial parameters and from base parameters, forward dynamics and the regressor. Where
+        direct kinematics have no closed form, `"direct_step"` comes in their place.
     folder : path
         Where; made if it is missing.
     real : {"double", "float"}

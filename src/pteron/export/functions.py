@@ -8,7 +8,7 @@ from importlib.metadata import version
 
 import numpy as np
 
-from pteron.equations.machine import Machine
+from pteron.equations.machine import Machine, closure_of
 from pteron.errors import ModelError
 from pteron.export.labels import node_names
 from pteron.kernels import FUNCTIONS as COMPILED
@@ -28,13 +28,16 @@ FUNCTIONS = (
     "forward_dynamics",
     "regressor",
 )
-"""What is exported unless a choice is given."""
+"""What is exported unless a choice is given; direct kinematics where it has a closed form."""
 
 _SUMMARIES = {
     "inverse_kinematics": "Joint coordinates of a pose.",
     "direct_kinematics": "Every pose that the joint coordinates allow, one a row; NaN where it is "
     "not real or not in reach.",
     "closure_poses": "Every pose that the joint coordinates allow, one a row, in reach or not.",
+    "direct_step": "The pose of the joint coordinates next to a given one, such as the last one "
+    "of a motion, by Newton's method; NaN where it does not converge, or comes to another side of "
+    "the singularities.",
     "jacobian": "Jacobian: joint rates = J velocity.",
     "inverse_dynamics": "Actuator forces of a motion, from the inertial parameters; no friction.",
     "inverse_dynamics_base": "Actuator forces of a motion, from base parameters; no friction.",
@@ -102,15 +105,25 @@ class Exported:
 
 
 def chosen(
-    robot: Manipulator, functions: str | Sequence[str], *, specialised: bool, wrench: bool
+    robot: Manipulator,
+    functions: str | Sequence[str] | None,
+    *,
+    specialised: bool,
+    wrench: bool,
 ) -> tuple[Exported, ...]:
-    """Return what is to be written.
+    """Return what is to be written: `FUNCTIONS` unless a choice is given.
+
+    Without a closed form for every pose that joints have, there is the step from the last one.
 
     Raises
     ------
     ModelError
         If a name is unknown, or there is none.
     """
+    if functions is None:
+        closed = closure_of(robot).closed_form
+        step = {"direct_kinematics": "direct_step"}
+        functions = [name if closed else step.get(name, name) for name in FUNCTIONS]
     names = [functions] if isinstance(functions, str) else list(dict.fromkeys(functions))
     allowed = sorted({*COMPILED, "inverse_dynamics_base"} - {"base_regressor"})
     valid = f"choose from {', '.join(allowed)}"
@@ -168,8 +181,10 @@ def _states(
     """Return inputs at three random poses in reach, and far out of it."""
     rng = np.random.default_rng(1)
     states = []
+    # Where the joints are given a pose is but next to theirs.
+    apart = 1e-3 if "joints" in {port.name for port in ports} else 0.0
     for pose in random_poses(robot, 3, seed=rng):
-        known = {"pose": pose, "joints": inverse_kinematics(robot, pose), **fixed}
+        known = {"pose": pose + apart, "joints": inverse_kinematics(robot, pose), **fixed}
         states.append(
             [np.array(known.get(port.name, rng.normal(size=port.shape))) for port in ports]
         )
@@ -221,6 +236,7 @@ def _meaning(robot: Manipulator, port: Port) -> str:
     texts = {
         "pose": f"platform pose: {lengths} in m{angle}",
         "poses": f"poses by rows: {lengths} in m{angle}",
+        "found": f"platform pose that has the joint coordinates: {lengths} in m{angle}",
         "velocity": f"the pose's rate: m/s{rate}",
         "acceleration": f"the pose's acceleration: m/s^2{second}",
         "joints": f"joint coordinates, {joints}",

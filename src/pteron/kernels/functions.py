@@ -94,12 +94,12 @@ def _closure_rows(m: Machine, v: Symbols) -> Outputs:
 
 def _newton_step(m: Machine, v: Symbols) -> Outputs:
     stepped, missed = closing.newton_step(m, v["joints"], v["pose"])
-    return {"pose_out": stepped, "missed": missed}
+    return {"stepped": stepped, "missed": missed}
 
 
 def _direct_step(m: Machine, v: Symbols) -> Outputs:
-    pose, missed, measure = closing.direct_step(m, v["joints"], v["pose"], TYPE_II)
-    return {"pose_out": pose, "missed": missed, "type_ii": measure}
+    found, measure = closing.direct_step(m, v["joints"], v["pose"], TYPE_II)
+    return {"found": found, "type_ii": measure}
 
 
 def _reach(m: Machine, v: Symbols) -> Outputs:
