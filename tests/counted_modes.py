@@ -8,9 +8,9 @@ import numpy as np
 
 
 def held_loci(robot, joints):
-    """Return, for each leg, (w, n, h, a, b, t): w |c|^2 + n.c + h = 0 with c = p + a cos + b sin + t.
+    """Return (w, n, h, a, b, t), with a row for each leg: w |c|^2 + n.c + h = 0.
 
-    In a planar machine they are written in the plane's two coordinates.
+    c = p + a cos(phi) + b sin(phi) + t; in a planar machine in the plane's two coordinates.
     """
     x, y, k = (np.array(axis) for axis in robot.platform.frame)
     planar = robot.platform.motion in ("2T", "2T1R")

@@ -150,6 +150,7 @@ ALLOWED = {
     ("manipulator/manipulator.py", "an elbow"): "working modes",
     ("cli/", "an elbow"): "--elbows, the working mode; and a leg as JSON",
     ("report/", "an elbow"): "the working mode",
+    ("kinematics/direct.py", "an elbow"): "the working mode that a pose is in",
     ("kinematics/evaluate.py", "an elbow"): "the kind of a singularity, in its message",
     ("reduction/configurations.py", "an elbow"): "the side that a leg says it closed on",
     ("reduction/exact_geometry.py", "data of one kind"): "a unit vector across another, in a field",

@@ -13,7 +13,8 @@ from pteron.kernels import Array
 from pteron.kinematics.assembly import every_pose, in_order, within_a_turn
 from pteron.kinematics.evaluate import checked, evaluated, place, unchecked
 from pteron.kinematics.singularities import is_singular_everywhere, singular_everywhere
-from pteron.manipulator import Manipulator, with_elbows
+from pteron.manipulator import Manipulator
+from pteron.manipulator.manipulator import with_elbows
 from pteron.shapes import JointsLike, OnFailure, PerJoint, PoseLike, Poses
 
 _SAME_JOINT = 1e-6

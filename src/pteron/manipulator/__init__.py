@@ -6,7 +6,6 @@ from pteron.manipulator.manipulator import (
     Manipulator,
     expect_manipulator,
     turned,
-    with_elbows,
     working_modes,
 )
 from pteron.manipulator.parameters import (
@@ -29,7 +28,6 @@ __all__ = [
     "parameters",
     "save",
     "turned",
-    "with_elbows",
     "with_parameters",
     "working_modes",
 ]
