@@ -10,7 +10,8 @@ import numpy as np
 def held_loci(robot, joints):
     """Return (w, n, h, a, b, t), with a row for each leg: w |c|^2 + n.c + h = 0.
 
-    c = p + a cos(phi) + b sin(phi) + t; in a planar machine in the plane's two coordinates.
+    c = p + a f_1 + b f_2 + t, f being cosine and sine of phi, or phi and zero where the platform
+    slides; in a planar machine in the plane's two coordinates.
     """
     x, y, k = (np.array(axis) for axis in robot.platform.frame)
     planar = robot.platform.motion in ("2T", "2T1R")
@@ -46,9 +47,12 @@ def held_loci(robot, joints):
 def count_modes(robot, joints, samples=8000):
     """Return how many poses there are of joints (n,): right if no two are nearer than a sample."""
     loci = held_loci(robot, joints)
+    slides = robot.platform.slides
     # Off the angles at which machines are drawn.
     phi = 2.0 * np.pi * (np.arange(samples + 1) + 0.37) / samples
-    misses, radicand = _meet(loci, phi)
+    if slides:
+        phi = 3.0 * np.tan(0.5 * (phi[:-1] - np.pi))
+    misses, radicand = _meet(loci, phi, slides)
     inside = radicand > 0.0
     both = inside[:-1] & inside[1:]
     signs = np.sign(misses)
@@ -59,16 +63,17 @@ def count_modes(robot, joints, samples=8000):
     near = np.where(inside[ends], ends, ends + 1)
     for _ in range(60):
         middle = 0.5 * (within + beyond)
-        good = _meet(loci, middle)[1] > 0.0
+        good = _meet(loci, middle, slides)[1] > 0.0
         within, beyond = np.where(good, middle, within), np.where(good, beyond, middle)
-    last = np.sign(_meet(loci, within)[0].mean(axis=1))
+    last = np.sign(_meet(loci, within, slides)[0].mean(axis=1))
     return count + int((signs[near] != last[:, None]).sum())
 
 
-def _meet(loci, phi):
+def _meet(loci, phi, slides):
     """Return what the points p1 and p2 miss the last locus by (N, 2), and the radicand (N,)."""
     w, n, h, a, b, t = loci
-    v = a * np.cos(phi)[:, None, None] + b * np.sin(phi)[:, None, None] + t
+    f1, f2 = (phi, 0.0 * phi) if slides else (np.cos(phi), np.sin(phi))
+    v = a * f1[:, None, None] + b * f2[:, None, None] + t
     m = 2.0 * w[:, None] * v + n
     g = w * (v * v).sum(axis=-1) + (n * v).sum(axis=-1) + h
     center, square = -0.5 * m[:, 0], 0.25 * (m[:, 0] ** 2).sum(axis=-1) - g[:, 0]

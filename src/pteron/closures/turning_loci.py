@@ -1,8 +1,9 @@
-"""The closure of any legs under a platform that translates and turns.
+"""The closure of any legs under a platform that translates and turns, or slides.
 
 Where a leg holds the angle phi, the loci of the others, moved by offsets that are then known, meet
-at P as they do under a platform that only translates. Otherwise what is left of the closures is one
-polynomial in tan(phi / 2), which has no roots in closed form: see `kinematics.assembly`.
+at P as they do under a platform that only translates. Where all legs have planes and the platform
+slides, their closures are linear. Otherwise what is left of the closures is one polynomial, in
+tan(phi / 2) or phi, which has no roots in closed form: see `kinematics.assembly`.
 """
 
 from __future__ import annotations
@@ -13,18 +14,28 @@ import casadi as ca
 
 from pteron.bodies.motion import Expression
 from pteron.closures.closure import Closure
+from pteron.closures.determinants import adjugate
 from pteron.closures.loci import meeting_points, moved
 from pteron.errors import ModelError
-from pteron.legs.leg import LegEquations, Turned
+from pteron.legs.leg import LegEquations, Plane, Turned
 from pteron.platforms.motion import PlatformEquations
 
 
 class TurningLoci(Closure):
-    """Three legs, or four, under a platform that turns, one row at least depending on the pose."""
+    """Three legs, or four, under a platform with an angle, on which the legs' rows depend."""
 
     def __init__(self, legs: Sequence[LegEquations], platform: PlatformEquations) -> None:
         super().__init__(legs, platform)
-        self.closed_form = any(isinstance(leg.locus(ca.SX(0)), Turned) for leg in legs)
+        held = any(isinstance(leg.locus(ca.SX(0)), Turned) for leg in legs)
+        curved = sum(not leg.row_is_constant for leg in legs) - held
+        self.closed_form = held or not curved
+        self._most = 2 * len(legs)
+        if self.closed_form:
+            self._most = 2 if curved else 1
+        elif platform.slides:
+            self._most = 2 * curved
+        elif curved == 1:
+            self._most = 4
 
     @classmethod
     def fits(cls, legs: Sequence[type[LegEquations]], platform: type[PlatformEquations]) -> bool:
@@ -32,29 +43,30 @@ class TurningLoci(Closure):
 
     @property
     def modes(self) -> int:
-        """2, or 1 of planes alone, where a leg holds phi; else the degree of the polynomial."""
-        curved = sum(not leg.row_is_constant for leg in self.legs)
-        if self.closed_form:
-            return 2 if curved > 1 else 1
-        return 4 if curved == 1 else 2 * len(self.legs)
+        """The degree of what is left of the closures."""
+        return self._most
 
     def poses(self, joints: Expression) -> Expression:
-        angle, loci = None, []
-        for leg, q, offset in zip(
-            self.legs, ca.vertsplit(joints), self.platform.offsets, strict=True
-        ):
-            locus = leg.locus(q)
-            if isinstance(locus, Turned):
-                angle = locus.angle
-            else:
-                loci.append((locus, offset))
-        if angle is None:
-            raise ModelError(
-                "direct_kinematics: these legs have no closed form of it under a platform that "
-                'turns; "direct_step" follows the pose from one that is near'
-            )
-        c, s = ca.cos(angle), ca.sin(angle)
-        points, beyond = meeting_points(
-            [moved(locus, still + a * c + b * s) for locus, (a, b, still) in loci], self.platform
-        )
-        return ca.vertcat(points, ca.repmat(angle + beyond, 1, points.shape[1]))
+        loci = [leg.locus(q) for leg, q in zip(self.legs, ca.vertsplit(joints), strict=True)]
+        offsets = self.platform.offsets
+        for held in loci:
+            if isinstance(held, Turned):
+                c, s = ca.cos(held.angle), ca.sin(held.angle)
+                others = [
+                    moved(locus, still + a * c + b * s)
+                    for locus, (a, b, still) in zip(loci, offsets, strict=True)
+                    if locus is not held
+                ]
+                points, beyond = meeting_points(others, self.platform)
+                return ca.vertcat(points, ca.repmat(held.angle + beyond, 1, points.shape[1]))
+        rows, heights = [], []
+        for locus, (a, _, still) in zip(loci, offsets, strict=True):
+            if not isinstance(locus, Plane):
+                raise ModelError(
+                    "direct_kinematics: these legs have no closed form of it under a platform with "
+                    'an angle; "direct_step" follows the pose from one that is near'
+                )
+            rows.append(ca.horzcat(locus.normal.T, ca.dot(locus.normal, a)))
+            heights.append(locus.offset - ca.dot(locus.normal, still))
+        across = adjugate(ca.vertcat(*rows))
+        return ca.mtimes(across, ca.vertcat(*heights)) / ca.mtimes(rows[0], across[:, 0])

@@ -26,13 +26,14 @@ _CLOSED = 1e-6
 class Rows(NamedTuple):
     """The closures of legs whose joints are held, for v = (p - origin) / size.
 
-    (still + cosines cos(phi) + sines sin(phi)) (v.v, v, 1) = 0, a row (w, m, h) for each leg.
+    (constant + first f_1 + second f_2) (v.v, v, 1) = 0, a row (w, m, h) for each leg, where f_1 and
+    f_2 are cos(phi) and sin(phi) or, where the platform slides, phi and its square.
     """
 
-    still: Expression
+    constant: Expression
     """(n, d + 2), where p has d coordinates."""
-    cosines: Expression
-    sines: Expression
+    first: Expression
+    second: Expression
     origin: Expression
     """(d, 1), m."""
     size: Expression
@@ -53,7 +54,7 @@ def closure_rows(machine: Machine, joints: Expression) -> Rows:
             origin, size = ca.mtimes(directions.T, locus.center - offset.still), locus.radius
     found = []
     for locus, (a, b, still) in zip(loci, offsets, strict=True):
-        s = ca.mtimes(directions, origin) + still  # c = s + size v + a cos(phi) + b sin(phi)
+        s = ca.mtimes(directions, origin) + still  # c = s + size v + a f_1 + b f_2
         w, m, h = ca.SX(1, 3), ca.SX(directions.shape[1], 3), ca.SX(1, 3)
         scale = ca.SX(1)
         if isinstance(locus, Turned):  # sin(phi - angle) = 0
@@ -68,11 +69,12 @@ def closure_rows(machine: Machine, joints: Expression) -> Rows:
             w[0] = size**2
             m = 2 * size * ca.mtimes(directions.T, ca.horzcat(apart, a, b))
             h = ca.mtimes(apart.T, ca.horzcat(apart, 2 * a, 2 * b))
-            h[0] += ca.dot(a, a) - locus.radius**2
+            h[0] -= locus.radius**2
+            h[2 if machine.platform.slides else 0] += ca.dot(a, a)  # |a f_1 + b f_2|^2
             scale = 2 * locus.radius * size
         found.append(ca.vertcat(w, m, h) / scale)
-    still, cosines, sines = (ca.horzcat(*(rows[:, k] for rows in found)).T for k in range(3))
-    return Rows(still, cosines, sines, origin, size)
+    constant, first, second = (ca.horzcat(*(rows[:, k] for rows in found)).T for k in range(3))
+    return Rows(constant, first, second, origin, size)
 
 
 def _counted(machine: Machine, locus: Sphere | Circle, v: Expression) -> Expression:

@@ -10,7 +10,8 @@ scale, and it is a point exactly if the Gram matrix G of their products is singu
 
 as the products depend on the distances between centers and planes alone. So 2 n solutions phi, real
 or not, are all there are: 8 modes of four legs and 6 of three, and 4 if one leg alone is no plane.
-They are the eigenvalues of a quadratic eigenvalue problem in tan(phi / 2).
+They are the eigenvalues of a quadratic eigenvalue problem in tan(phi / 2); of a platform that
+slides in phi, with 2 solutions for each leg that is no plane.
 
 Two modes may have one phi: where all cranks of a Par4 have one angle, its tips lie in a plane, of
 which the modes are mirror images. The rows then have two null vectors, a line, which meets the
@@ -33,7 +34,7 @@ _VANISHING = 1e-14
 """The size of det G, of a matrix whose diagonal is 1, below which it is all rounding: the platform
 can move with the joints held."""
 
-_MARGIN = 1e-2
+_MARGIN = 5e-3
 """rad from the real axis within which a zero of det G may be real: a fourfold one loses 3/4 of the
 digits."""
 
@@ -45,9 +46,11 @@ _ROUNDING = 1e-13
 
 _STEPS = 20
 
+_SPAN = np.pi
+"""rad: where a platform slides, what half a turn of alpha is divided at."""
+
 _SAME = 1e-6
 """Two poses within this, in rad and sizes of the machine, are one: nothing tells them apart."""
-
 
 _TURN_ROUNDING = 1e-14
 """rad."""
@@ -57,7 +60,7 @@ _ALIKE = 1e-9
 
 
 def every_pose(robot: Manipulator, joints: Array, most: int) -> Array:
-    """Return all poses (..., most, m) of joint coordinates (..., n), NaN last; phi in (-pi, pi].
+    """Return all poses (..., most, m) of joint coordinates (..., n), NaN last.
 
     They are ordered by phi, z, y and x.
     """
@@ -70,44 +73,70 @@ def every_pose(robot: Manipulator, joints: Array, most: int) -> Array:
 
 
 def _poses(robot: Manipulator, joints: Array, most: int) -> Array:
-    still, cosines, sines, origin, size, _ = numeric(robot, "closure_rows")(joints)
-    rows = np.stack([still, cosines, sines], axis=-1)
+    slides = robot.platform.slides
+    constant, first, second, origin, size, _ = numeric(robot, "closure_rows")(joints)
+    rows = np.stack([constant, first, second], axis=-1)
     rows[~np.isfinite(rows).all(axis=(-3, -2, -1))] = 0.0
-    which, phi = _angles(rows)
-    which, points, phi = _points(rows[which], which, phi)
+    which, phi = _angles(rows, slides)
+    which, points, phi = _points(_at(rows[which], phi, slides), which, phi)
     starts = np.column_stack([origin[which] + size[which, None] * points, phi])
     which, poses = _polished(robot, joints, which, starts)
-    poses[:, -1] = within_a_turn(poses[:, -1])
-    return _table(poses, which, size, most)
+    if not slides:
+        poses[:, -1] = within_a_turn(poses[:, -1])
+    return in_order(_table(poses, which, size, most, slides))[:, :most]
 
 
-def _angles(rows: Array) -> tuple[NDArray[np.int64], Array]:
+def _angles(rows: Array, slides: bool) -> tuple[NDArray[np.int64], Array]:
     """Return where det G vanishes: which state (K,) and phi (K,), the real part if it has others.
 
-    `rows` (B, n, d + 2, 3) are those of 1, cos(phi) and sin(phi).
+    `rows` (B, n, d + 2, 3) are those of 1, f_1 and f_2.
     """
+    form = _form(rows, slides)
     n = rows.shape[1]
-    # phi = start + 2 atan(t), with the largest determinant found at infinity.
-    tried = 2.0 * np.pi * np.arange(4 * n) / (4 * n)
-    sizes = np.abs(np.linalg.det(_gram(_at(rows[:, None], tried))))
-    start = tried[sizes.argmax(axis=-1)] - np.pi
+    # alpha = start + atan(t), with the largest determinant found at infinity.
+    tried = np.pi * np.arange(4 * n) / (4 * n)
+    sizes = np.abs(np.linalg.det(_along(form[:, None], tried)))
     able = np.flatnonzero(sizes.max(axis=-1) > _VANISHING)
-    rows, start = rows[able], start[able]
-    # (1 + t^2) G = low + 2 t middle + t^2 high
-    low, high = _gram(_at(rows, start)), _gram(_at(rows, start + np.pi))
-    middle = _gram(_at(rows, start + 0.5 * np.pi)) - 0.5 * (low + high)
-    companion = np.zeros((len(rows), 2 * n, 2 * n))
+    form, start = form[able], tried[sizes[able].argmax(axis=-1)] - 0.5 * np.pi
+    # low + t middle + t^2 high
+    low, high = _along(form, start), _along(form, start + 0.5 * np.pi)
+    middle = 2.0 * _along(form, start + 0.25 * np.pi) - low - high
+    companion = np.zeros((len(form), 2 * n, 2 * n))
     companion[:, :n, n:] = np.eye(n)
     companion[:, n:, :n] = -np.linalg.solve(high, low)
-    companion[:, n:, n:] = -2.0 * np.linalg.solve(high, middle)
+    companion[:, n:, n:] = -np.linalg.solve(high, middle)
     t = np.linalg.eigvals(companion)
-    which, k = np.nonzero(2.0 * np.abs(t.imag) <= _MARGIN * (1.0 + t.real**2))
-    return able[which], start[which] + 2.0 * np.arctan(t.real[which, k])
+    which, k = np.nonzero(np.abs(t.imag) <= _MARGIN * (1.0 + t.real**2))
+    alpha = start[which] + np.arctan(t.real[which, k])
+    return able[which], _SPAN * np.tan(alpha) if slides else 2.0 * alpha
 
 
-def _at(rows: Array, phi: Array) -> Array:
-    c, s = np.cos(phi)[..., None, None], np.sin(phi)[..., None, None]
-    return rows[..., 0] + c * rows[..., 1] + s * rows[..., 2]
+def _form(rows: Array, slides: bool) -> Array:
+    """Return the parts (B, n, n, 3) of c^2, c s and s^2 in G, c and s being those of alpha.
+
+    phi = 2 alpha where the platform turns; where it slides s / c is phi over `_SPAN`, and G is c^2
+    times what it was.
+    """
+    low = _gram(_at(rows, 0.0, slides))
+    if slides:
+        ahead, behind = (_gram(_at(rows, side * _SPAN, slides)) for side in (1.0, -1.0))
+        high, middle = 0.5 * (ahead + behind) - low, 0.5 * (ahead - behind)
+    else:
+        high = _gram(_at(rows, np.pi, slides))
+        middle = 2.0 * _gram(_at(rows, 0.5 * np.pi, slides)) - low - high
+    return np.stack([low, middle, high], axis=-1)
+
+
+def _along(form: Array, alpha: Array) -> Array:
+    c, s = np.cos(alpha)[..., None, None], np.sin(alpha)[..., None, None]
+    total: Array = form[..., 0] * (c * c) + form[..., 1] * (c * s) + form[..., 2] * (s * s)
+    return total
+
+
+def _at(rows: Array, phi: Array | float, slides: bool) -> Array:
+    first, second = (phi, phi**2) if slides else (np.cos(phi), np.sin(phi))
+    first, second = (np.asarray(f)[..., None, None] for f in (first, second))
+    return rows[..., 0] + first * rows[..., 1] + second * rows[..., 2]
 
 
 def _gram(s: Array) -> Array:
@@ -120,8 +149,11 @@ def _gram(s: Array) -> Array:
 def _points(
     rows: Array, which: NDArray[np.int64], phi: Array
 ) -> tuple[NDArray[np.int64], Array, Array]:
-    """Return the points v (L, d) that the line of the two smallest singular values holds."""
-    _, _, vectors = np.linalg.svd(_at(rows, phi))
+    """Return the points v (L, d) that the line of the two smallest singular values holds.
+
+    `rows` (K, n, d + 2) are those at phi (K,).
+    """
+    _, _, vectors = np.linalg.svd(rows)
     first, second = vectors[:, -1], vectors[:, -2]
     # x = first cos + second sin is a point where x_0 x_last = v.v: a cos^2 + 2 b cos sin + c sin^2
     a, b, c = (_quadric(x, y) for x, y in ((first, first), (first, second), (second, second)))
@@ -165,18 +197,19 @@ def _polished(
     return which[closed], found[closed]
 
 
-def _table(poses: Array, which: NDArray[np.int64], size: Array, most: int) -> Array:
-    """Return the poses of each state (B, most, m), each once, in order and NaN last."""
+def _table(poses: Array, which: NDArray[np.int64], size: Array, most: int, slides: bool) -> Array:
+    """Return the poses of each state (B, k, m), k at least `most`, each once, among NaN."""
     counts = np.bincount(which, minlength=len(size))
     columns = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
-    table = np.full((len(size), max(most, counts.max(initial=0)), poses.shape[-1]), np.nan)
+    table = np.full((len(size), counts.max(initial=most), poses.shape[-1]), np.nan)
     table[which, columns] = poses
     apart = table[:, :, None] - table[:, None]
     apart[..., :-1] /= size[:, None, None, None]
-    apart[..., -1] = 2.0 * np.sin(0.5 * apart[..., -1])
+    if not slides:
+        apart[..., -1] = 2.0 * np.sin(0.5 * apart[..., -1])
     same = np.abs(apart).max(axis=-1) < _SAME
     table[np.tril(same, -1).any(axis=-1)] = np.nan
-    return in_order(table)[:, :most]
+    return table
 
 
 def in_order(poses: Array) -> Array:

@@ -33,8 +33,8 @@ def direct_kinematics(
 
     With the joints held, legs keep points of the platform on planes (P-R-R-R), spheres (the ends of
     rods) or circles (planar legs); the poses are where these meet. They are found in closed form,
-    but for platforms that turn on legs with rods or planar legs: there as the zeros of a polynomial
-    whose degree is k, polished by Newton's method to 1e-14 or so.
+    but for platforms with an angle on legs with rods or planar legs: there as the zeros of a
+    polynomial whose degree is k, polished by Newton's method to 1e-14 or so.
 
     Parameters
     ----------
@@ -55,10 +55,11 @@ def direct_kinematics(
     array, shape (..., k, m)
         Legs of kind P-R-R-R alone: k = 2, or 1 where the platform does not turn; each row stands
         for one assembly mode throughout. Any others: in the order of phi, z, y and x, NaN last,
-        with k = 2 where the platform does not turn, or where a leg holds its angle (1 with P-R-R-R
-        legs alone); else k = 8 for four legs and 6 for three, but 4 where all but one are P-R-R-R.
-        A row is NaN where the closures have no further real solution, or where a leg does not reach
-        the pose that solves them. phi lies in (-pi, pi] unless a leg holds it.
+        with k = 2 where the platform has no angle, or where a leg holds it (1 with P-R-R-R legs
+        alone); else k = 8 for four legs and 6 for three, but 4 where all but one are P-R-R-R; where
+        the platform slides k = 2 for each leg of another kind. A row is NaN where the closures have
+        no further real solution, or where a leg does not reach the pose that solves them. phi lies
+        in (-pi, pi] unless a leg holds it or the platform slides.
 
     Raises
     ------
@@ -186,7 +187,7 @@ def assembly_modes(robot: Manipulator, joints: Array, *, all_branches: bool = Fa
         poses = evaluated(robot, "direct_kinematics", "nan", joints)
     else:
         poses = every_pose(robot, joints, closure.modes)
-    if robot.platform.turns and not any(leg.follows_angle for leg in robot.legs):
+    if _turns_freely(robot):
         poses[..., -1] = within_a_turn(poses[..., -1])
     back: PerJoint = evaluated(robot, "inverse_kinematics", "nan", poses)
     lost = np.isnan(back).any(axis=-1)
@@ -208,8 +209,15 @@ def nearest(robot: Manipulator, poses: Array, pose: Array) -> NDArray[np.int64]:
     apart = poses - pose[..., None, :]
     lengths = len(robot.platform.directions)
     distance = np.linalg.norm(apart[..., :lengths], axis=-1)
-    distance += np.abs(np.sin(0.5 * apart[..., lengths:])).sum(axis=-1)
+    angle = 0.5 * apart[..., lengths:]
+    distance += np.abs(np.sin(angle) if _turns_freely(robot) else angle).sum(axis=-1)
     return np.asarray(np.nan_to_num(distance, nan=np.inf).argmin(axis=-1))
+
+
+def _turns_freely(robot: Manipulator) -> bool:
+    """Return whether a whole turn of the platform leaves all as it was."""
+    held = any(leg.follows_angle for leg in robot.legs)
+    return robot.platform.turns and not robot.platform.slides and not held
 
 
 def _rows(robot: Manipulator, joints: Array, *, all_branches: bool) -> Poses:
