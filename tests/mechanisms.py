@@ -3,6 +3,7 @@
 from dataclasses import replace
 from functools import lru_cache
 
+import descriptions
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -36,7 +37,13 @@ def inertia(rng, length):
     return pteron.PlanarInertia.of_body(mass, (x, y), mass * (x * x + y * y + (0.3 * length) ** 2))
 
 
-def slider_leg(rng, d, c, s0):
+def rod_inertia(rng, length):
+    """Return the inertia of a real rod about its platform end."""
+    mass, x = rng.uniform(0.2, 0.6), -length * rng.uniform(0.3, 0.7)
+    return pteron.RodInertia.of_body(mass, (x,), mass * (x * x + (0.3 * length) ** 2))
+
+
+def slider_leg(rng, d, c, **point):
     """Return a P-R-R-R leg with nothing special about it that reaches c."""
     lu, ll = rng.uniform(0.15, 0.25, 2)
     across = unit(rng, d)
@@ -46,7 +53,6 @@ def slider_leg(rng, d, c, s0):
     return pteron.PRRR(
         guide_point=c - reach + rng.uniform(-0.1, 0.1) * e,
         direction=d,
-        platform_point=s0,
         upper_length=lu,
         lower_length=ll,
         slider_mass=rng.uniform(0.3, 0.8),
@@ -54,10 +60,11 @@ def slider_leg(rng, d, c, s0):
         lower=inertia(rng, ll),
         slider_direction=e,
         elbow=int(rng.choice([1, -1])),
+        **point,
     )
 
 
-def crank_leg(rng, d, c, s0):
+def crank_leg(rng, d, c, **point):
     """Return an R-S-S leg that reaches c, its rod at 35 to 70 degrees from d and from the crank."""
     a = unit(rng, d)
     lu, ll = rng.uniform(0.1, 0.15), rng.uniform(0.25, 0.35)
@@ -66,46 +73,140 @@ def crank_leg(rng, d, c, s0):
     lean, side = rng.uniform(0.6, 1.2, 2) * [1, -elbow]
     across = np.cross(d, crank / lu)
     rod = np.cos(lean) * d + np.sin(lean) * (np.cos(side) * crank / lu + np.sin(side) * across)
-    mass, x = rng.uniform(0.2, 0.6), -ll * rng.uniform(0.3, 0.7)
+    lower = rod_inertia(rng, ll)
     return pteron.RSS(
         guide_point=c - crank - ll * rod,
         direction=d,
         zero_direction=a,
-        platform_point=s0,
         upper_length=lu,
         lower_length=ll,
         upper=inertia(rng, lu),
-        lower=pteron.RodInertia.of_body(mass, (x,), mass * (x * x + (0.3 * ll) ** 2)),
+        lower=lower,
         elbow=elbow,
+        **point,
     )
 
 
-LEGS = {"P": slider_leg, "R": crank_leg}
+def rod_leg(rng, n, c, **point):
+    """Return a P-S-S leg that reaches c, its rod along n and 25 to 60 degrees from the guide."""
+    ll = rng.uniform(0.25, 0.35)
+    e, elbow = _guide(rng, n, unit(rng, n))
+    return pteron.PSS(
+        guide_point=c - ll * n + rng.uniform(-0.1, 0.1) * e,
+        slider_direction=e,
+        lower_length=ll,
+        slider_mass=rng.uniform(0.3, 0.8),
+        lower=rod_inertia(rng, ll),
+        elbow=elbow,
+        **point,
+    )
+
+
+def _guide(rng, n, across):
+    """Return a guide's direction, 25 to 60 degrees from a link along n, and the elbow."""
+    lean, elbow = rng.uniform(0.4, 1.1), int(rng.choice([1, -1]))
+    return elbow * (np.cos(lean) * n + np.sin(lean) * across), elbow
+
+
+def planar_slider_leg(rng, n, c, *, k, **point):
+    """Return a P-R-R leg of the plane of normal k, its link along n."""
+    ll = rng.uniform(0.25, 0.35)
+    e, elbow = _guide(rng, n, np.cross(k, n) * rng.choice([1, -1]))
+    return pteron.PRR(
+        guide_point=c - ll * n + rng.uniform(-0.1, 0.1) * e + rng.uniform(-0.1, 0.1) * k,
+        slider_direction=e,
+        direction=k,
+        lower_length=ll,
+        slider_mass=rng.uniform(0.3, 0.8),
+        lower=inertia(rng, ll),
+        elbow=elbow,
+        **point,
+    )
+
+
+def planar_crank_leg(rng, n, c, *, k, **point):
+    """Return an R-R-R leg of the plane of normal k, its last link along n."""
+    lu, ll = rng.uniform(0.15, 0.2), rng.uniform(0.2, 0.3)
+    elbow = int(rng.choice([1, -1]))
+    side = -elbow * rng.uniform(0.8, 2.2)
+    crank = lu * (np.cos(side) * n - np.sin(side) * np.cross(k, n))
+    return pteron.RRR(
+        guide_point=c - crank - ll * n + rng.uniform(-0.1, 0.1) * k,
+        direction=k,
+        zero_direction=unit(rng, k),
+        upper_length=lu,
+        lower_length=ll,
+        upper=inertia(rng, lu),
+        lower=inertia(rng, ll),
+        elbow=elbow,
+        **point,
+    )
+
+
+def shaft_leg(rng, n, c, *, k, **point):
+    """Return an R-U-P-U leg less than 45 degrees from k, wherever n points."""
+    across = rng.uniform(0.0, 1.0) * np.cross(k, n)
+    length = rng.uniform(0.3, 0.4)
+    return pteron.RUPU(
+        guide_point=c + length * (k + across) / np.linalg.norm(k + across),
+        ratio=rng.uniform(1.0, 3.0) * rng.choice([1, -1]),
+        upper=rod_inertia(rng, -0.5 * length),
+        lower=rod_inertia(rng, 0.5 * length),
+        **point,
+    )
+
+
+LEGS = {
+    "P": slider_leg,
+    "R": crank_leg,
+    "S": rod_leg,
+    "U": shaft_leg,
+    "C": planar_crank_leg,
+    "L": planar_slider_leg,
+}
 
 
 def random_machine(seed, kinds):
-    """Return a machine with nothing special about it, built around a pose that it reaches.
+    """Return a machine with nothing special about it, built around a pose that it reaches: zero.
 
-    `kinds` holds a letter for each leg, P (P-R-R-R) or R (R-S-S): four legs turn the platform. Of
-    P-R-R-R legs alone it may say whether the platform turns.
+    `kinds` holds a letter for each leg: P (P-R-R-R), R (R-S-S), S (P-S-S), U (R-U-P-U), and of
+    planar machines C (R-R-R) and L (P-R-R). The number of legs says whether the platform turns. Of
+    P-R-R-R legs alone `kinds` may be that answer.
     """
     if isinstance(kinds, bool):
         kinds = "PPPP" if kinds else "PPP"
     rng = np.random.default_rng(seed)
+    while True:
+        robot = _drawn_machine(rng, f"random {kinds} {seed}", kinds)
+        bend, held = descriptions.distances_from_singular(
+            descriptions.describe(robot), np.zeros((1, robot.freedom))
+        )
+        if bend > 0.4 and held > 0.25:
+            return robot
+
+
+def _drawn_machine(rng, name, kinds):
+    flat, n = bool(set(kinds) & set("CL")), len(kinds)
+    motion = {(False, 3): "3T", (False, 4): "3T1R", (True, 2): "2T", (True, 3): "2T1R"}[flat, n]
     axis = unit(rng)
     x_axis = unit(rng, axis)
     frame = np.column_stack([x_axis, np.cross(axis, x_axis), axis])
     while True:
-        directions = [unit(rng) for _ in kinds]
-        if np.linalg.svd(directions, compute_uv=False)[-1] > 0.4:
+        directions = [unit(rng, axis if flat else None) for _ in kinds]
+        if np.linalg.svd(directions, compute_uv=False)[1 if flat else 2] > 0.4:
             break
     legs = []
+    shared = rng.uniform(-0.06, 0.06, 3)
     for kind, d in zip(kinds, directions, strict=True):
-        s0 = rng.uniform(-0.06, 0.06, 3)
-        legs.append(LEGS[kind](rng, d, frame @ s0, s0))
-    motion = "3T1R" if len(kinds) == 4 else "3T"
+        s0, t0 = rng.uniform(-0.06, 0.06, (2, 3))
+        if motion == "2T":
+            s0[:2], t0 = shared[:2], np.zeros(3)
+        point = {"platform_point": s0, "fixed_offset": t0}
+        if kind in "CLU":
+            point["k"] = axis
+        legs.append(LEGS[kind](rng, d, frame @ s0 + t0, **point))
     platform = pteron.Platform(motion, inertia(rng, 0.08), axis, x_axis)
-    return pteron.Manipulator(f"random {kinds} {seed}", platform, tuple(legs), 9.81 * unit(rng))
+    return pteron.Manipulator(name, platform, tuple(legs), 9.81 * unit(rng))
 
 
 CATALOG = {name: pteron.load(name) for name in pteron.catalog()}
