@@ -73,7 +73,7 @@ class Leg:
 
 @dataclass(frozen=True)
 class Machine:
-    """Legs, the platform's axes as columns, the directions it moves along, body and gravity.
+    """Legs, the platform's axes as columns, the directions it moves along, its body and gravity.
 
     The pose is the position along `moves`, the columns of a matrix, and where the platform `turns`
     its angle about the last axis.
@@ -84,6 +84,10 @@ class Machine:
     moves: np.ndarray
     turns: bool
     platform: Body
+    bars: tuple
+    """Mass and hinge, in the platform's frame, of the parts that do not turn."""
+    geared: tuple
+    """Moment of inertia and ratio of the parts that turn by ratio times the platform's angle."""
     gravity: np.ndarray
 
     @property
@@ -107,6 +111,8 @@ def describe(robot):
         moves=np.eye(3) if count == 3 else frame[:, :2],
         turns=turns,
         platform=_body(robot.platform.inertia),
+        bars=tuple((bar.mass, np.array(bar.hinge)) for bar in robot.platform.bars),
+        geared=tuple((part.inertia, part.ratio) for part in robot.platform.geared),
         gravity=np.array(robot.gravity),
     )
 
@@ -174,9 +180,9 @@ class Place(NamedTuple):
     cosine between rod and guide."""
 
 
-def rotation(machine, pose):
-    """Return the platform's axes as columns, (3, 3)."""
-    phi = pose[-1] if machine.turns else 0.0
+def rotation(machine, pose, ratio=1.0):
+    """Return the axes, as columns, of what turns by ratio times the platform's angle, (3, 3)."""
+    phi = ratio * pose[-1] if machine.turns else 0.0
     c, s = ca.cos(phi), ca.sin(phi)
     turn = ca.blockcat([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     return ca.mtimes(ca.DM(machine.frame), turn)

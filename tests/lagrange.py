@@ -29,9 +29,11 @@ class Lagrange:
     def __init__(self, robot):
         machine = describe(robot)
         x, dx, ddx = (ca.SX.sym(name, machine.freedom) for name in ("x", "dx", "ddx"))
-        joints, found = bodies(machine, x)
+        joints, found, parts = bodies(machine, x)
         self.parameters = np.array([value for body in found for value in body.parameters])
         """In the paper's order: sliders, upper links and cranks, lower links, platform."""
+        found += parts
+        self._all_parameters = np.array([value for body in found for value in body.parameters])
         symbols = [ca.SX.sym("parameters", len(body.parameters)) for body in found]
         energies = [
             _energies(body, parameters, x, dx, ca.DM(machine.gravity))
@@ -51,13 +53,16 @@ class Lagrange:
         self._energies = ca.Function("energies", [parameters, x, dx], [kinetic, potential])
 
     def regressor(self, *motion):
-        """Return D (B, n, N), with D P the actuator forces."""
-        generalized, jacobian = (_batch(v, motion) for v in self._forces(*_columns(motion)))
-        return np.linalg.solve(jacobian.swapaxes(1, 2), generalized)
+        """Return D (B, n, N), with D P the actuator forces of a platform without parts."""
+        return self._whole_regressor(motion)[..., : len(self.parameters)]
 
     def forces(self, *motion):
         """Return the actuator forces (B, n)."""
-        return self.regressor(*motion) @ self.parameters
+        return self._whole_regressor(motion) @ self._all_parameters
+
+    def _whole_regressor(self, motion):
+        generalized, jacobian = (_batch(v, motion) for v in self._forces(*_columns(motion)))
+        return np.linalg.solve(jacobian.swapaxes(1, 2), generalized)
 
     def jacobian(self, pose):
         """Return dq/dx (B, n, m)."""
@@ -66,7 +71,7 @@ class Lagrange:
 
     def energies(self, *motion):
         """Return kinetic and potential energy, (B,) each."""
-        found = self._energies(self.parameters, *_columns(motion))
+        found = self._energies(self._all_parameters, *_columns(motion))
         return tuple(np.array(value).ravel() for value in found)
 
 
@@ -94,7 +99,7 @@ def _energies(body, parameters, x, dx, gravity):
 
 
 def bodies(machine, x):
-    """Return the joint coordinates, and the bodies in the paper's order."""
+    """Return the joint coordinates, the bodies in the paper's order, and the platform's parts."""
     joints, sliders, uppers, lowers = [], [], [], []
     for leg, at in zip(machine.legs, places(machine, x), strict=True):
         joints.append(at.joint)
@@ -111,10 +116,14 @@ def bodies(machine, x):
             lowers.append(_link(leg.lower, at.point, direction, leg.d))
         else:
             lowers.append(_rod(leg.lower, at.point, direction))
-    turn = rotation(machine, x)
-    axes = turn[:, 0], turn[:, 1]
-    platform = Body(machine.platform.moments, position(machine, x), axes)
-    return joints, [*sliders, *uppers, *lowers, platform]
+    p, turn = position(machine, x), rotation(machine, x)
+    platform = Body(machine.platform.moments, p, (turn[:, 0], turn[:, 1]))
+    bars = [Body((mass,), p + ca.mtimes(turn, ca.DM(hinge)), ()) for mass, hinge in machine.bars]
+    geared = [
+        Body((0.0, 0.0, inertia), p, (rotation(machine, x, ratio)[:, 0],))
+        for inertia, ratio in machine.geared
+    ]
+    return joints, [*sliders, *uppers, *lowers, platform], [*bars, *geared]
 
 
 def _link(body, point, x, d):

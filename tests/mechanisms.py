@@ -8,6 +8,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import pteron
+from pteron.legs import PRR, PRRR, PSS, RRR, RSS, RUPU
+from pteron.platforms.platform import Bar, Geared
 
 BATCH_SHAPES = [(), (1,), (7,), (3, 5), (0,), (300,)]
 """300 is more than one block of the virtual machine."""
@@ -50,7 +52,7 @@ def slider_leg(rng, d, c, **point):
     e = d + 0.5 * rng.normal(size=3)
     e /= np.linalg.norm(e) * np.sign(e @ d)
     reach = rng.uniform(0.75, 0.9) * np.hypot(lu, ll) * across
-    return pteron.PRRR(
+    return PRRR(
         guide_point=c - reach + rng.uniform(-0.1, 0.1) * e,
         direction=d,
         upper_length=lu,
@@ -74,7 +76,7 @@ def crank_leg(rng, d, c, **point):
     across = np.cross(d, crank / lu)
     rod = np.cos(lean) * d + np.sin(lean) * (np.cos(side) * crank / lu + np.sin(side) * across)
     lower = rod_inertia(rng, ll)
-    return pteron.RSS(
+    return RSS(
         guide_point=c - crank - ll * rod,
         direction=d,
         zero_direction=a,
@@ -91,7 +93,7 @@ def rod_leg(rng, n, c, **point):
     """Return a P-S-S leg that reaches c, its rod along n and 25 to 60 degrees from the guide."""
     ll = rng.uniform(0.25, 0.35)
     e, elbow = _guide(rng, n, unit(rng, n))
-    return pteron.PSS(
+    return PSS(
         guide_point=c - ll * n + rng.uniform(-0.1, 0.1) * e,
         slider_direction=e,
         lower_length=ll,
@@ -112,7 +114,7 @@ def planar_slider_leg(rng, n, c, *, k, **point):
     """Return a P-R-R leg of the plane of normal k, its link along n."""
     ll = rng.uniform(0.25, 0.35)
     e, elbow = _guide(rng, n, np.cross(k, n) * rng.choice([1, -1]))
-    return pteron.PRR(
+    return PRR(
         guide_point=c - ll * n + rng.uniform(-0.1, 0.1) * e + rng.uniform(-0.1, 0.1) * k,
         slider_direction=e,
         direction=k,
@@ -130,7 +132,7 @@ def planar_crank_leg(rng, n, c, *, k, **point):
     elbow = int(rng.choice([1, -1]))
     side = -elbow * rng.uniform(0.8, 2.2)
     crank = lu * (np.cos(side) * n - np.sin(side) * np.cross(k, n))
-    return pteron.RRR(
+    return RRR(
         guide_point=c - crank - ll * n + rng.uniform(-0.1, 0.1) * k,
         direction=k,
         zero_direction=unit(rng, k),
@@ -147,7 +149,7 @@ def shaft_leg(rng, n, c, *, k, **point):
     """Return an R-U-P-U leg less than 45 degrees from k, wherever n points."""
     across = rng.uniform(0.0, 1.0) * np.cross(k, n)
     length = rng.uniform(0.3, 0.4)
-    return pteron.RUPU(
+    return RUPU(
         guide_point=c + length * (k + across) / np.linalg.norm(k + across),
         ratio=rng.uniform(1.0, 3.0) * rng.choice([1, -1]),
         upper=rod_inertia(rng, -0.5 * length),
@@ -169,25 +171,27 @@ LEGS = {
 def random_machine(seed, kinds):
     """Return a machine with nothing special about it, built around a pose that it reaches: zero.
 
-    `kinds` holds a letter for each leg: P (P-R-R-R), R (R-S-S), S (P-S-S), U (R-U-P-U), and of
-    planar machines C (R-R-R) and L (P-R-R). The number of legs says whether the platform turns. Of
-    P-R-R-R legs alone `kinds` may be that answer.
+    `kinds` holds a letter for each leg: P (P-R-R-R), R (R-S-S), S (P-S-S), U (R-U-P-U), C (planar
+    R-R-R) and L (planar P-R-R); one of the last two makes the machine planar. The number of legs
+    says whether the platform turns. Of P-R-R-R legs alone `kinds` may be that answer.
     """
     if isinstance(kinds, bool):
         kinds = "PPPP" if kinds else "PPP"
     rng = np.random.default_rng(seed)
     while True:
         robot = _drawn_machine(rng, f"random {kinds} {seed}", kinds)
-        bend, held = descriptions.distances_from_singular(
-            descriptions.describe(robot), np.zeros((1, robot.freedom))
-        )
+        home = np.zeros((1, robot.freedom))
+        bend, held = descriptions.distances_from_singular(descriptions.describe(robot), home)
         if bend > 0.4 and held > 0.25:
             return robot
 
 
+MOTIONS = {(False, 3): "3T", (False, 4): "3T1R", (True, 2): "2T", (True, 3): "2T1R"}
+
+
 def _drawn_machine(rng, name, kinds):
-    flat, n = bool(set(kinds) & set("CL")), len(kinds)
-    motion = {(False, 3): "3T", (False, 4): "3T1R", (True, 2): "2T", (True, 3): "2T1R"}[flat, n]
+    flat = bool(set(kinds) & set("CL"))
+    motion = MOTIONS[flat, len(kinds)]
     axis = unit(rng)
     x_axis = unit(rng, axis)
     frame = np.column_stack([x_axis, np.cross(axis, x_axis), axis])
@@ -195,17 +199,23 @@ def _drawn_machine(rng, name, kinds):
         directions = [unit(rng, axis if flat else None) for _ in kinds]
         if np.linalg.svd(directions, compute_uv=False)[1 if flat else 2] > 0.4:
             break
-    legs = []
-    shared = rng.uniform(-0.06, 0.06, 3)
+    legs, shared = [], rng.uniform(-0.06, 0.06, 2)
     for kind, d in zip(kinds, directions, strict=True):
         s0, t0 = rng.uniform(-0.06, 0.06, (2, 3))
         if motion == "2T":
-            s0[:2], t0 = shared[:2], np.zeros(3)
+            s0[:2], t0 = shared, np.zeros(3)
+        if flat and kind in "PRS":
+            d += rng.uniform(-0.7, 0.7) * axis
+            d /= np.linalg.norm(d)
         point = {"platform_point": s0, "fixed_offset": t0}
         if kind in "CLU":
             point["k"] = axis
         legs.append(LEGS[kind](rng, d, frame @ s0 + t0, **point))
-    platform = pteron.Platform(motion, inertia(rng, 0.08), axis, x_axis)
+    parts = {}
+    if motion == "3T1R" and set(kinds) != {"P"}:  # articulated
+        parts["bars"] = [Bar(rng.uniform(0.1, 0.3), rng.uniform(-0.06, 0.06, 3)) for _ in "ab"]
+        parts["geared"] = [Geared(rng.uniform(1e-5, 1e-4), rng.uniform(-6.0, 6.0))]
+    platform = pteron.Platform(motion, inertia(rng, 0.08), axis, x_axis, **parts)
     return pteron.Manipulator(name, platform, tuple(legs), 9.81 * unit(rng))
 
 

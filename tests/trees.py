@@ -1,7 +1,7 @@
 """Newton-Euler engines on the opened mechanism, projected through its closure.
 
-The loops are cut at the platform points: each leg is a chain of as many joints as there are
-directions in which the platform moves, and the platform a chain of its own. Joint angles come from
+The loops are cut at the platform points: each leg is a chain of three joints, or in a plane of two,
+and the platform a chain of its own. Joint angles come from
 triangles; the engine's own kinematics tell how well the cuts close. Rates and accelerations come
 from its point Jacobians and their drift, and the tree's forces T^T tau from the natural orthogonal
 complement T of those Jacobians.
@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
-from descriptions import describe, places
+from descriptions import Body, describe, places
+from scipy.linalg import block_diag
 
 
 @dataclass(frozen=True)
@@ -70,8 +71,16 @@ def chains(machine):
     x, _, k = machine.frame.T
     points = [machine.frame @ leg.s0 for leg in machine.legs]
     joints = [slide(axis) for axis in machine.moves.T] + [hinge(k)] * machine.turns
-    platform = Chain([Link(joints, np.zeros(3), *planar(machine.platform, x, k))], points)
+    platform = Chain([Link(joints, np.zeros(3), *planar(whole_platform(machine), x, k))], points)
     return [*(leg_chain(leg) for leg in machine.legs), platform]
+
+
+def whole_platform(machine):
+    """Return the platform with its bars as masses at their hinges, and with what its gears turn."""
+    m, hx, hy, inertia = machine.platform.moments
+    for mass, (x, y, _) in machine.bars:
+        m, hx, hy, inertia = m + mass, hx + mass * x, hy + mass * y, inertia + mass * (x**2 + y**2)
+    return Body(m, hx / m, hy / m, inertia + sum(ratio**2 * i for i, ratio in machine.geared))
 
 
 def leg_chain(leg):
@@ -125,11 +134,20 @@ def actuated(machine):
     return found
 
 
+def closing(machine):
+    """Return the matrix that takes the loops' gaps (3 n,) to those that count: not across a plane.
+
+    A planar leg closes in the plane, and its own height does not count.
+    """
+    *legs, _ = chains(machine)
+    return block_diag(*(np.eye(3) if leg.size == 3 else machine.moves.T for leg in legs))
+
+
 def projected(robot, engine, pose, velocity, acceleration):
     """Return actuator forces (B, n) and J (B, n, m), and how far the engine's loops are open."""
     machine = describe(robot)
     positions, drives = coordinates(machine), actuated(machine)
-    along = np.kron(np.eye(len(machine.legs)), machine.moves.T)
+    along = closing(machine)
     still = np.ravel([leg.t0 for leg in machine.legs])
     forces, jacobians, gaps = [], [], []
     for at, dx, ddx in zip(pose, velocity, acceleration, strict=True):
