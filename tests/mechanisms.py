@@ -199,11 +199,13 @@ def _drawn_machine(rng, name, kinds):
         directions = [unit(rng, axis if flat else None) for _ in kinds]
         if np.linalg.svd(directions, compute_uv=False)[1 if flat else 2] > 0.4:
             break
-    legs, shared = [], rng.uniform(-0.06, 0.06, 2)
+    articulated = motion in ("3T1R", "2T1R") and set(kinds) != {"P"}
+    legs = []
     for kind, d in zip(kinds, directions, strict=True):
-        s0, t0 = rng.uniform(-0.06, 0.06, (2, 3))
-        if motion == "2T":
-            s0[:2], t0 = shared, np.zeros(3)
+        s0 = rng.uniform(-0.06, 0.06, 3)
+        t0 = rng.uniform(-0.06, 0.06, 3) if articulated else np.zeros(3)
+        if motion == "2T" and legs:
+            s0[:2] = legs[0].platform_point[:2]
         if flat and kind in "PRS":
             d += rng.uniform(-0.7, 0.7) * axis
             d /= np.linalg.norm(d)
@@ -212,7 +214,7 @@ def _drawn_machine(rng, name, kinds):
             point["k"] = axis
         legs.append(LEGS[kind](rng, d, frame @ s0 + t0, **point))
     parts = {}
-    if motion == "3T1R" and set(kinds) != {"P"}:  # articulated
+    if articulated:
         parts["bars"] = [Bar(rng.uniform(0.1, 0.3), rng.uniform(-0.06, 0.06, 3)) for _ in "ab"]
         parts["geared"] = [Geared(rng.uniform(1e-5, 1e-4), rng.uniform(-6.0, 6.0))]
     platform = pteron.Platform(motion, inertia(rng, 0.08), axis, x_axis, **parts)
