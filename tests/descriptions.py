@@ -261,15 +261,18 @@ def distances_from_singular(machine, poses):
     return bends.min(axis=0), held
 
 
-def states(machine, count, seed):
-    """Return poses around zero that are far from singular, velocities and accelerations."""
+def states(machine, count, seed, least=0.1):
+    """Return poses around zero that are far from singular, velocities and accelerations.
+
+    `least` is the least singular value of J with rows of length 1.
+    """
     rng = np.random.default_rng(seed)
     spread = np.array([0.07] * machine.moves.shape[1] + [np.pi] * machine.turns)
     found = np.empty((0, machine.freedom))
     for _ in range(100):
         drawn = spread * rng.uniform(-1, 1, (4096, machine.freedom))
         bend, held = distances_from_singular(machine, drawn)
-        found = np.concatenate([found, drawn[(bend > 0.3) & (held > 0.2)]])[:count]
+        found = np.concatenate([found, drawn[(bend > 0.3) & (held > least)]])[:count]
         if len(found) == count:
             return found, rng.normal(size=found.shape), 10.0 * rng.normal(size=found.shape)
     raise AssertionError("there are too few poses far from singular")

@@ -182,7 +182,7 @@ def random_machine(seed, kinds):
         robot = _drawn_machine(rng, f"random {kinds} {seed}", kinds)
         home = np.zeros((1, robot.freedom))
         bend, held = descriptions.distances_from_singular(descriptions.describe(robot), home)
-        if bend > 0.4 and held > 0.25:
+        if bend > 0.4 and held > 0.1:
             return robot
 
 

@@ -132,6 +132,6 @@ def test_forces_of_every_working_mode(kinds, seed):
     tree = trees.Pinocchio(robot)
     for mode in pteron.working_modes(robot):
         machine = descriptions.describe(mode)
-        motion = descriptions.states(machine, 5, seed)
+        motion = descriptions.states(machine, 5, seed, least=0.02)
         forces, _, _ = trees.projected(machine, tree, *motion)
         assert error(pteron.inverse_dynamics(mode, *motion), forces) < 1e-11
