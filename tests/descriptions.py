@@ -76,13 +76,15 @@ class Machine:
     """Legs, the platform's axes as columns, the directions it moves along, its body and gravity.
 
     The pose is the position along `moves`, the columns of a matrix, and where the platform `turns`
-    its angle about the last axis.
+    its angle about the last axis. If it `slides`, it does not turn, and its points move by the
+    angle times what their legs say.
     """
 
     legs: tuple
     frame: np.ndarray
     moves: np.ndarray
     turns: bool
+    slides: bool
     platform: Body
     bars: tuple
     """Mass and hinge, in the platform's frame, of the parts that do not turn."""
@@ -110,6 +112,7 @@ def describe(robot):
         frame=frame,
         moves=np.eye(3) if count == 3 else frame[:, :2],
         turns=turns,
+        slides=robot.platform.slides,
         platform=_body(robot.platform.inertia),
         bars=tuple((bar.mass, np.array(bar.hinge)) for bar in robot.platform.bars),
         geared=tuple((part.inertia, part.ratio) for part in robot.platform.geared),
@@ -180,10 +183,16 @@ class Place(NamedTuple):
     cosine between rod and guide."""
 
 
-def rotation(machine, pose, ratio=1.0):
-    """Return the axes, as columns, of what turns by ratio times the platform's angle, (3, 3)."""
-    phi = ratio * pose[-1] if machine.turns else 0.0
-    c, s = ca.cos(phi), ca.sin(phi)
+def carried(machine, pose):
+    """Return the matrix (3, 3) from the platform's frame to the base's: columns phi times as long
+    as the platform's axes where the platform slides."""
+    phi = pose[-1] if machine.turns else 0.0
+    return phi * ca.DM(machine.frame) if machine.slides else turned(machine, phi)
+
+
+def turned(machine, angle):
+    """Return the platform's axes as columns, (3, 3), turned by an angle."""
+    c, s = ca.cos(angle), ca.sin(angle)
     turn = ca.blockcat([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     return ca.mtimes(ca.DM(machine.frame), turn)
 
@@ -195,7 +204,7 @@ def position(machine, pose):
 
 def places(machine, pose):
     """Return where every leg is at a pose, (m, 1)."""
-    p, turn = position(machine, pose), rotation(machine, pose)
+    p, turn = position(machine, pose), carried(machine, pose)
     phi = pose[-1] if machine.turns else None
     points = (p + ca.mtimes(turn, ca.DM(leg.s0)) + ca.DM(leg.t0) for leg in machine.legs)
     return [_place(leg, c, phi) for leg, c in zip(machine.legs, points, strict=True)]

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
-from descriptions import describe, places, position, rotation
+from descriptions import carried, describe, places, position, turned
 
 
 class Body(NamedTuple):
@@ -116,11 +116,11 @@ def bodies(machine, x):
             lowers.append(_link(leg.lower, at.point, direction, leg.d))
         else:
             lowers.append(_rod(leg.lower, at.point, direction))
-    p, turn = position(machine, x), rotation(machine, x)
+    p, turn = position(machine, x), carried(machine, x)
     platform = Body(machine.platform.moments, p, (turn[:, 0], turn[:, 1]))
     bars = [Body((mass,), p + ca.mtimes(turn, ca.DM(hinge)), ()) for mass, hinge in machine.bars]
     geared = [
-        Body((0.0, 0.0, inertia), p, (rotation(machine, x, ratio)[:, 0],))
+        Body((0.0, 0.0, inertia), p, (turned(machine, ratio * x[-1])[:, 0],))
         for inertia, ratio in machine.geared
     ]
     return joints, [*sliders, *uppers, *lowers, platform], [*bars, *geared]

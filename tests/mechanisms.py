@@ -173,7 +173,8 @@ def random_machine(seed, kinds):
 
     `kinds` holds a letter for each leg: P (P-R-R-R), R (R-S-S), S (P-S-S), U (R-U-P-U), C (planar
     R-R-R) and L (planar P-R-R); one of the last two makes the machine planar. The number of legs
-    says whether the platform turns. Of P-R-R-R legs alone `kinds` may be that answer.
+    says whether the platform turns, an I at the end that it slides, as an I4's. Of P-R-R-R legs
+    alone `kinds` may be whether it turns.
     """
     if isinstance(kinds, bool):
         kinds = "PPPP" if kinds else "PPP"
@@ -190,6 +191,7 @@ MOTIONS = {(False, 3): "3T", (False, 4): "3T1R", (True, 2): "2T", (True, 3): "2T
 
 
 def _drawn_machine(rng, name, kinds):
+    slides, kinds = "I" in kinds, kinds.removesuffix("I")
     flat = bool(set(kinds) & set("CL"))
     motion = MOTIONS[flat, len(kinds)]
     axis = unit(rng)
@@ -206,18 +208,22 @@ def _drawn_machine(rng, name, kinds):
         t0 = rng.uniform(-0.06, 0.06, 3) if articulated else np.zeros(3)
         if motion == "2T" and legs:
             s0[:2] = legs[0].platform_point[:2]
+        if slides:
+            s0[2] = 0.0
         if flat and kind in "PRS":
             d += rng.uniform(-0.7, 0.7) * axis
             d /= np.linalg.norm(d)
         point = {"platform_point": s0, "fixed_offset": t0}
         if kind in "CLU":
             point["k"] = axis
-        legs.append(LEGS[kind](rng, d, frame @ s0 + t0, **point))
+        legs.append(LEGS[kind](rng, d, (0.0 if slides else frame @ s0) + t0, **point))
     parts = {}
     if articulated:
-        parts["bars"] = [Bar(rng.uniform(0.1, 0.3), rng.uniform(-0.06, 0.06, 3)) for _ in "ab"]
+        parts["bars"] = [
+            Bar(rng.uniform(0.1, 0.3), (*rng.uniform(-0.06, 0.06, 2), 0.0)) for _ in range(2)
+        ]
         parts["geared"] = [Geared(rng.uniform(1e-5, 1e-4), rng.uniform(-6.0, 6.0))]
-    platform = pteron.Platform(motion, inertia(rng, 0.08), axis, x_axis, **parts)
+    platform = pteron.Platform(motion, inertia(rng, 0.08), axis, x_axis, slides, **parts)
     return pteron.Manipulator(name, platform, tuple(legs), 9.81 * unit(rng))
 
 

@@ -67,7 +67,7 @@ def rod(body, x, z):
 
 
 def chains(machine):
-    """Return the legs' chains and the platform's."""
+    """Return the legs' chains and the platform's, which must not slide."""
     x, _, k = machine.frame.T
     points = [machine.frame @ leg.s0 for leg in machine.legs]
     joints = [slide(axis) for axis in machine.moves.T] + [hinge(k)] * machine.turns
@@ -247,7 +247,7 @@ class MuJoCo:
                     mass=link.mass,
                     ipos=link.center,
                     iquat=quaternion,
-                    inertia=np.ones(3),
+                    inertia=np.maximum(link.moments, 2e-15),
                     explicitinertial=True,
                 )
                 moments.append(link.moments)
