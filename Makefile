@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
-QUICK := published kinematics delta dynamics_oracles manipulator errors toml passes payload costs
+QUICK := published kinematics delta family manipulator errors toml passes payload costs
 
 .PHONY: demo quick test lint bench clean
 

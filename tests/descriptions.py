@@ -1,16 +1,22 @@
-"""A machine in plain numbers, for oracles that share nothing with pteron but its files.
+"""A machine in plain numbers, for oracles that share nothing with pteron but its data.
 
-Positions are trigonometry of triangles; `crank_angle` finds the same by a search for roots.
+Positions are trigonometry of triangles, in CasADi's functions: of numbers and of symbols alike.
 """
 
-import tomllib
 from dataclasses import dataclass, replace
-from itertools import islice
-from pathlib import Path
-from types import SimpleNamespace
+from typing import Any, NamedTuple
 
+import casadi as ca
 import numpy as np
-from scipy.optimize import brentq
+
+MOTIONS = {"3T": (3, False), "3T1R": (3, True), "2T": (2, False), "2T1R": (2, True)}
+"""How many ways the platform moves without turning, and whether it turns."""
+
+FLAT = {"PRRR", "RRR", "PRR"}
+"""The kinds whose last link moves in the plane perpendicular to d, as the others' swings."""
+
+LENGTH = 0.1
+"""Metres that count as much as a radian where singular values are taken."""
 
 
 @dataclass(frozen=True)
@@ -33,42 +39,62 @@ class Body:
 
 @dataclass(frozen=True)
 class Leg:
-    """A P-R-R-R leg, or with `crank` an R-S-S leg.
+    """A leg of any kind: what it has not is None.
 
-    `first` and `second` span the plane perpendicular to d; a crank's angle counts from `first`.
+    A leg with e has a slider, one with a ratio is a shaft, another with an upper body has a crank
+    or an upper link, which turns about d. `first` and `second` span the plane perpendicular to d;
+    angles count from `first`, as a crank's coordinate does.
     """
 
-    crank: bool
     r: np.ndarray
-    d: np.ndarray
-    e: np.ndarray
-    first: np.ndarray
     s0: np.ndarray
-    lu: float
-    ll: float
+    t0: np.ndarray
+    d: np.ndarray
+    first: np.ndarray
+    flat: bool
+    e: np.ndarray | None
+    ratio: float | None
+    lu: float | None
+    ll: float | None
     elbow: int
-    slider_mass: float
-    upper: Body
+    slider_mass: float | None
+    upper: Body | None
     lower: Body
 
     @property
     def second(self):
         return np.cross(self.d, self.first)
 
+    @property
+    def turns(self):
+        """Whether its joint coordinate is a crank's angle."""
+        return self.e is None and self.ratio is None
+
 
 @dataclass(frozen=True)
 class Machine:
-    """Legs, the platform's axes as columns, whether it turns about the last, body and gravity."""
+    """Legs, the platform's axes as columns, the directions it moves along, its body and gravity.
+
+    The pose is the position along `moves`, the columns of a matrix, and where the platform `turns`
+    its angle about the last axis. If it `slides`, it does not turn, and its points move by the
+    angle times what their legs say.
+    """
 
     legs: tuple
     frame: np.ndarray
+    moves: np.ndarray
     turns: bool
+    slides: bool
     platform: Body
+    bars: tuple
+    """Mass and hinge, in the platform's frame, of the parts that do not turn."""
+    geared: tuple
+    """Moment of inertia and ratio of the parts that turn by ratio times the platform's angle."""
     gravity: np.ndarray
 
     @property
     def freedom(self):
-        return 4 if self.turns else 3
+        return self.moves.shape[1] + self.turns
 
     def with_elbows(self, signs):
         legs = zip(self.legs, signs, strict=True)
@@ -76,151 +102,186 @@ class Machine:
 
 
 def describe(robot):
-    """Return the description of a pteron robot, or of what looks like one."""
+    """Return the description of a pteron robot."""
     if isinstance(robot, Machine):
         return robot
+    frame = np.column_stack(robot.platform.frame)
+    count, turns = MOTIONS[robot.platform.motion]
     return Machine(
-        legs=tuple(_leg(leg) for leg in robot.legs),
-        frame=np.column_stack(robot.platform.frame),
-        turns=robot.platform.turns,
+        legs=tuple(_leg(leg, frame[:, 2]) for leg in robot.legs),
+        frame=frame,
+        moves=np.eye(3) if count == 3 else frame[:, :2],
+        turns=turns,
+        slides=robot.platform.slides,
         platform=_body(robot.platform.inertia),
+        bars=tuple((bar.mass, np.array(bar.hinge)) for bar in robot.platform.bars),
+        geared=tuple((part.inertia, part.ratio) for part in robot.platform.geared),
         gravity=np.array(robot.gravity),
     )
 
 
-def _leg(leg):
-    crank = getattr(leg, "type", "PRRR") == "RSS"
-    d = np.array(leg.direction)
-    if crank:
+def _leg(leg, k):
+    ratio = getattr(leg, "ratio", None)
+    slider = getattr(leg, "slider_mass", None)
+    e = d = None
+    if hasattr(leg, "direction"):
+        d = np.array(leg.direction)
+    if slider is not None:
+        e = np.array(leg.slider_direction or leg.direction)
+    if hasattr(leg, "zero_direction"):
         first = np.array(leg.zero_direction)
+    elif d is not None:
+        first = _across(d)
     else:
-        first = np.cross(d, np.eye(3)[np.argmin(np.abs(d))])
-        first /= np.linalg.norm(first)
+        # A rod is never across its guide, nor a shaft across the axis that it turns.
+        first = k if e is None else e
+        d = _across(first)
     return Leg(
-        crank=crank,
         r=np.array(leg.guide_point),
-        d=d,
-        e=d if crank else np.array(leg.slider_direction or leg.direction),
-        first=first,
         s0=np.array(leg.platform_point),
-        lu=leg.upper_length,
-        ll=leg.lower_length,
+        t0=np.array(getattr(leg, "fixed_offset", (0.0, 0.0, 0.0))),
+        d=d,
+        first=first,
+        flat=leg.type in FLAT,
+        e=e,
+        ratio=ratio,
+        lu=getattr(leg, "upper_length", None),
+        ll=getattr(leg, "lower_length", None),
         elbow=leg.elbow,
-        slider_mass=0.0 if crank else leg.slider_mass,
-        upper=_body(leg.upper),
+        slider_mass=slider,
+        upper=_body(leg.upper) if hasattr(leg, "upper") else None,
         lower=_body(leg.lower),
     )
 
 
+def _across(v):
+    across = np.cross(v, np.eye(3)[np.argmin(np.abs(v))])
+    return across / np.linalg.norm(across)
+
+
 def _body(body):
-    x, y = (*np.ravel(body.center_of_mass), 0.0)[:2]
-    return Body(body.mass, float(x), float(y), body.inertia)
+    x, y = (*body.center_of_mass, 0.0)[:2]
+    return Body(body.mass, x, y, body.inertia)
 
 
-def read(path):
-    """Return the description of a file, read without pteron."""
-    return describe(lookalike(tomllib.loads(Path(path).read_text(encoding="utf-8"))))
+class Place(NamedTuple):
+    """Where a leg's bodies are; what it has not is None."""
+
+    joint: Any
+    """The joint coordinate."""
+    point: Any
+    """The platform point c, (3, 1)."""
+    slide: Any
+    """How far its slider is from the guide point."""
+    angle: Any
+    """Of the upper link or crank, and its direction, (3, 1)."""
+    upper: Any
+    last: Any
+    """The vector of the last link, or of the whole shaft, to the platform point, (3, 1)."""
+    bend: Any
+    """1 at best, 0 where the leg is singular: the sine between the links, as seen along d, or the
+    cosine between rod and guide."""
 
 
-def lookalike(document):
-    """Return what has a robot's attributes, from a file's content; 3T machines, frame of the base.
+def carried(machine, pose):
+    """Return the matrix (3, 3) from the platform's frame to the base's: columns phi times as long
+    as the platform's axes where the platform slides."""
+    phi = pose[-1] if machine.turns else 0.0
+    return phi * ca.DM(machine.frame) if machine.slides else turned(machine, phi)
 
-    Unit vectors are taken as they are.
+
+def turned(machine, angle):
+    """Return the platform's axes as columns, (3, 3), turned by an angle."""
+    c, s = ca.cos(angle), ca.sin(angle)
+    turn = ca.blockcat([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    return ca.mtimes(ca.DM(machine.frame), turn)
+
+
+def position(machine, pose):
+    """Return the position of P, (3, 1)."""
+    return ca.mtimes(ca.DM(machine.moves), pose[: machine.moves.shape[1]])
+
+
+def places(machine, pose):
+    """Return where every leg is at a pose, (m, 1)."""
+    p, turn = position(machine, pose), carried(machine, pose)
+    phi = pose[-1] if machine.turns else None
+    points = (p + ca.mtimes(turn, ca.DM(leg.s0)) + ca.DM(leg.t0) for leg in machine.legs)
+    return [_place(leg, c, phi) for leg, c in zip(machine.legs, points, strict=True)]
+
+
+def _place(leg, c, phi):
+    d, first, second, w = ca.DM(leg.d), ca.DM(leg.first), ca.DM(leg.second), c - ca.DM(leg.r)
+    slide = angle = upper = None
+    if leg.ratio is not None:
+        return Place(leg.ratio * phi, c, slide, angle, upper, w, 1)
+    if leg.upper is None:
+        e = ca.DM(leg.e)
+        if leg.flat:
+            w -= ca.dot(w, d) * d
+        lean = ca.asin(ca.norm_2(w - ca.dot(w, e) * e) / leg.ll)
+        slide, bend = ca.dot(w, e) - leg.elbow * leg.ll * ca.cos(lean), ca.cos(lean)
+        return Place(slide, c, slide, angle, upper, w - slide * e, bend)
+    if leg.e is not None:
+        e = ca.DM(leg.e)
+        slide = ca.dot(w, d) / ca.dot(e, d)
+        w -= slide * e
+    elif leg.flat:
+        w -= ca.dot(w, d) * d
+    x, y, out = ca.dot(w, first), ca.dot(w, second), ca.dot(w, d)
+    n = ca.sqrt(x**2 + y**2)
+    opening = ca.acos((n**2 + leg.lu**2 + out**2 - leg.ll**2) / (2 * n * leg.lu))
+    angle = ca.atan2(y, x) + leg.elbow * opening
+    upper = ca.cos(angle) * first + ca.sin(angle) * second
+    last = w - leg.lu * upper
+    bend = ca.fabs(ca.dot(d, ca.cross(upper, last))) / leg.ll
+    return Place(angle if slide is None else slide, c, slide, angle, upper, last, bend)
+
+
+def _positions(machine):
+    """Return the function from the pose to joint coordinates, their derivatives and the bends."""
+    x = ca.SX.sym("x", machine.freedom)
+    found = places(machine, x)
+    joints = ca.vertcat(*(at.joint for at in found))
+    bends = ca.vertcat(*(at.bend for at in found))
+    return ca.Function("positions", [x], [joints, ca.jacobian(joints, x), bends])
+
+
+def inverse_kinematics(machine, poses):
+    """Return the joint coordinates (B, n) at poses (B, m); cranks within (-pi, pi]."""
+    joints = np.array(_positions(machine)(poses.T)[0]).T
+    cranks = [leg.turns for leg in machine.legs]
+    return np.where(cranks, -((np.pi - joints) % (2 * np.pi)) + np.pi, joints)
+
+
+def distances_from_singular(machine, poses):
+    """Return the least bend of the legs, and the least singular value of J with rows of length 1.
+
+    Poses are (B, m), results (B,); NaN where a leg does not reach.
     """
-    platform = document["platform"]
-    legs = []
-    for table in document["legs"]:
-        bodies = {key: SimpleNamespace(**table[key]) for key in ("upper", "lower")}
-        slider = {
-            "slider_direction": table.get("slider_direction"),
-            "slider_mass": table.get("slider", {}).get("mass"),
-        }
-        legs.append(SimpleNamespace(**{**table, **bodies, **slider}))
-    return SimpleNamespace(
-        name=document["name"],
-        legs=tuple(legs),
-        platform=SimpleNamespace(frame=np.eye(3), turns=False, inertia=SimpleNamespace(**platform)),
-        gravity=document["gravity"],
-    )
+    _, jacobian, bends = (np.array(v) for v in _positions(machine)(poses.T))
+    rows = jacobian.reshape(len(jacobian), *poses.shape).swapaxes(0, 1)
+    rows[..., machine.moves.shape[1] :] /= LENGTH
+    reached = np.isfinite(rows).all(axis=(1, 2))
+    held = np.full(len(rows), np.nan)
+    rows = rows[reached]
+    rows /= np.linalg.norm(rows, axis=-1, keepdims=True)
+    held[reached] = np.linalg.svd(rows, compute_uv=False)[:, -1]
+    return bends.min(axis=0), held
 
 
-def platform_points(machine, pose):
-    """Return the platform points (n, 3)."""
-    phi = pose[3] if machine.turns else 0.0
-    turn = np.array([[np.cos(phi), -np.sin(phi), 0], [np.sin(phi), np.cos(phi), 0], [0, 0, 1]])
-    return np.array([pose[:3] + machine.frame @ turn @ leg.s0 for leg in machine.legs])
+def states(machine, count, seed, least=0.1):
+    """Return poses around zero that are far from singular, velocities and accelerations.
 
-
-def leg_angles(leg, c):
-    """Return the joint coordinate, the angle of the upper link, and the last link (3,).
-
-    The angle counts from `first`, so that a crank's is its joint coordinate.
+    `least` is the least singular value of J with rows of length 1.
     """
-    w = c - leg.r
-    slide = 0.0 if leg.crank else (w @ leg.d) / (leg.e @ leg.d)
-    w = w - slide * leg.e
-    x, y, out = w @ leg.first, w @ leg.second, w @ leg.d
-    n = np.hypot(x, y)
-    opening = np.arccos((n**2 + leg.lu**2 + out**2 - leg.ll**2) / (2 * n * leg.lu))
-    angle = np.arctan2(y, x) + leg.elbow * opening
-    last = w - leg.lu * (np.cos(angle) * leg.first + np.sin(angle) * leg.second)
-    return (angle if leg.crank else slide), angle, last
-
-
-def crank_angle(leg, c):
-    """Return the angle at which the crank's end is as far from c as the rod is long, by search.
-
-    Of the two it is the one whose crank lies on the elbow's side of the plane through d and c.
-    """
-    w = c - leg.r
-
-    def crank(q):
-        return leg.lu * (
-            np.multiply.outer(np.cos(q), leg.first) + np.multiply.outer(np.sin(q), leg.second)
-        )
-
-    def excess(q):
-        return np.linalg.norm(w - crank(q), axis=-1) - leg.ll
-
-    grid = np.linspace(-np.pi, np.pi, 721)
-    negative = excess(grid) < 0
-    brackets = np.flatnonzero(negative[:-1] != negative[1:])
-    roots = [brentq(excess, grid[i], grid[i + 1], xtol=1e-15, rtol=1e-14) for i in brackets]
-    (found,) = [q for q in roots if leg.elbow * (leg.d @ np.cross(w, crank(q))) > 0]
-    return found
-
-
-def inverse_kinematics(machine, pose):
-    """Return the joint coordinates (n,); cranks within (-pi, pi]."""
-    points = zip(machine.legs, platform_points(machine, pose), strict=True)
-    joints = [leg_angles(leg, c)[0] for leg, c in points]
-    cranks = [leg.crank for leg in machine.legs]
-    return np.where(cranks, -((np.pi - np.array(joints)) % (2 * np.pi)) + np.pi, joints)
-
-
-def distances_from_singular(machine, pose):
-    """Return the least sine between a leg's two links, and the least singular value of A (3T).
-
-    The sine is that of the crank and the rod's part in its plane, per rod length; A's rows are
-    unit vectors along the rods, and d for a slider. NaN where a leg does not reach.
-    """
-    sines, rows = [], []
-    for leg, c in zip(machine.legs, platform_points(machine, pose), strict=True):
-        with np.errstate(invalid="ignore"):
-            _, angle, last = leg_angles(leg, c)
-        upper = np.cos(angle) * leg.first + np.sin(angle) * leg.second
-        sines.append(abs(leg.d @ np.cross(upper, last)) / leg.ll)
-        rows.append(last / leg.ll if leg.crank else leg.d)
-    if not np.isfinite(rows).all():
-        return np.nan, np.nan
-    return min(sines), np.linalg.svd(rows, compute_uv=False)[-1]
-
-
-def states(machine, center, spread, count, seed):
-    """Return poses of a box that are far from singular, velocities and accelerations (3T)."""
     rng = np.random.default_rng(seed)
-    drawn = center + spread * rng.uniform(-1, 1, (20 * count, 3))
-    far = (pose for pose in drawn if min(distances_from_singular(machine, pose)) > 0.2)
-    poses = np.array(list(islice(far, count)))
-    assert len(poses) == count, "the box holds too few poses far from singular"
-    return poses, rng.normal(size=poses.shape), 10.0 * rng.normal(size=poses.shape)
+    spread = np.array([0.07] * machine.moves.shape[1] + [np.pi] * machine.turns)
+    found = np.empty((0, machine.freedom))
+    for _ in range(100):
+        drawn = spread * rng.uniform(-1, 1, (4096, machine.freedom))
+        bend, held = distances_from_singular(machine, drawn)
+        found = np.concatenate([found, drawn[(bend > 0.3) & (held > least)]])[:count]
+        if len(found) == count:
+            return found, rng.normal(size=found.shape), 10.0 * rng.normal(size=found.shape)
+    raise AssertionError("there are too few poses far from singular")

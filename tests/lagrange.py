@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
-from descriptions import describe
+from descriptions import carried, describe, places, position, turned
 
 
 class Body(NamedTuple):
@@ -23,101 +23,113 @@ class Body(NamedTuple):
     axes: tuple
 
 
-def inverse_dynamics(robot):
-    """Return a function of pose, velocity and acceleration that gives the actuator forces."""
-    regressor_of = regressor(robot)
-    values = np.array([v for body in bodies(*_symbols(robot))[0] for v in body.parameters])
-    return lambda *motion: regressor_of(*motion) @ values
+class Lagrange:
+    """The dynamics of a machine, for batches of states (B, m)."""
+
+    def __init__(self, robot):
+        machine = describe(robot)
+        x, dx, ddx = (ca.SX.sym(name, machine.freedom) for name in ("x", "dx", "ddx"))
+        joints, found, parts = bodies(machine, x)
+        self.parameters = np.array([value for body in found for value in body.parameters])
+        """In the paper's order: sliders, upper links and cranks, lower links, platform."""
+        found += parts
+        self._all_parameters = np.array([value for body in found for value in body.parameters])
+        symbols = [ca.SX.sym("parameters", len(body.parameters)) for body in found]
+        energies = [
+            _energies(body, parameters, x, dx, ca.DM(machine.gravity))
+            for body, parameters in zip(found, symbols, strict=True)
+        ]
+        kinetic, potential = map(sum, zip(*energies, strict=True))
+        momentum = ca.gradient(kinetic, dx)
+        generalized = (
+            ca.jtimes(momentum, x, dx)
+            + ca.jtimes(momentum, dx, ddx)
+            - ca.gradient(kinetic - potential, x)
+        )
+        parameters = ca.vertcat(*symbols)
+        regressor = ca.jacobian(generalized, parameters)
+        jacobian = ca.jacobian(ca.vertcat(*joints), x)
+        self._forces = ca.Function("forces", [x, dx, ddx], [regressor, jacobian])
+        self._energies = ca.Function("energies", [parameters, x, dx], [kinetic, potential])
+
+    def regressor(self, *motion):
+        """Return D (B, n, N), with D P the actuator forces of a platform without parts."""
+        return self._whole_regressor(motion)[..., : len(self.parameters)]
+
+    def forces(self, *motion):
+        """Return the actuator forces (B, n)."""
+        return self._whole_regressor(motion) @ self._all_parameters
+
+    def _whole_regressor(self, motion):
+        generalized, jacobian = (_batch(v, motion) for v in self._forces(*_columns(motion)))
+        return np.linalg.solve(jacobian.swapaxes(1, 2), generalized)
+
+    def jacobian(self, pose):
+        """Return dq/dx (B, n, m)."""
+        motion = pose, np.zeros_like(pose), np.zeros_like(pose)
+        return _batch(self._forces(*_columns(motion))[1], motion)
+
+    def energies(self, *motion):
+        """Return kinetic and potential energy, (B,) each."""
+        found = self._energies(self._all_parameters, *_columns(motion))
+        return tuple(np.array(value).ravel() for value in found)
 
 
-def regressor(robot):
-    """Return a function of the motion that gives D (n, N), with D P the actuator forces.
-
-    Parameters come in the paper's order: sliders, upper links and cranks, lower links, platform.
-    """
-    function = _function(robot)
-
-    def matrix(pose, velocity, acceleration):
-        generalized, jacobian = function(pose, velocity, acceleration)
-        return np.linalg.solve(np.array(jacobian).T, np.array(generalized))
-
-    return matrix
+def _columns(motion):
+    return [np.transpose(value) for value in motion]
 
 
-def jacobian(robot):
-    """Return a function of the pose that gives dq/dx (n, m)."""
-    function, rest = _function(robot), np.zeros(describe(robot).freedom)
-    return lambda pose: np.array(function(pose, rest, rest)[1])
+def _batch(value, motion):
+    """Return (B, rows, columns) from the batch's matrices beside each other."""
+    value, count = np.array(value), len(motion[0])
+    return value.reshape(len(value), count, -1).swapaxes(0, 1)
 
 
-def _symbols(robot):
-    machine = describe(robot)
-    return machine, ca.SX.sym("x", machine.freedom)
-
-
-def _function(robot):
-    """Return the function from (x, dx, ddx) to the forces along x per parameter, and dq/dx."""
-    machine, x = _symbols(robot)
-    dx, ddx = ca.SX.sym("dx", machine.freedom), ca.SX.sym("ddx", machine.freedom)
-    gravity = ca.DM(machine.gravity)
-    found, joints = bodies(machine, x)
-    lagrangian, parameters = 0, []
-    for body in found:
-        parameter = ca.SX.sym("parameter", len(body.parameters))
-        parameters.append(parameter)
-        velocity = ca.jtimes(body.point, x, dx)
-        kinetic = 0.5 * parameter[0] * ca.sumsqr(velocity)
-        potential = -parameter[0] * ca.dot(gravity, body.point)
-        for k, axis in enumerate(body.axes, start=1):
-            kinetic += parameter[k] * ca.dot(velocity, ca.jtimes(axis, x, dx))
-            potential -= parameter[k] * ca.dot(gravity, axis)
-        for axis in body.axes[:1]:
-            kinetic += 0.5 * parameter[-1] * ca.sumsqr(ca.jtimes(axis, x, dx))
-        lagrangian += kinetic - potential
-    momentum = ca.gradient(lagrangian, dx)
-    generalized = (
-        ca.jtimes(momentum, x, dx) + ca.jtimes(momentum, dx, ddx) - ca.gradient(lagrangian, x)
-    )
-    outputs = [
-        ca.jacobian(generalized, ca.vertcat(*parameters)),
-        ca.jacobian(ca.vertcat(*joints), x),
-    ]
-    return ca.Function("lagrange", [x, dx, ddx], outputs)
+def _energies(body, parameters, x, dx, gravity):
+    """Return the kinetic and the potential energy of a body with symbols for its parameters."""
+    velocity = ca.jtimes(body.point, x, dx)
+    kinetic = 0.5 * parameters[0] * ca.sumsqr(velocity)
+    potential = -parameters[0] * ca.dot(gravity, body.point)
+    for k, axis in enumerate(body.axes, start=1):
+        kinetic += parameters[k] * ca.dot(velocity, ca.jtimes(axis, x, dx))
+        potential -= parameters[k] * ca.dot(gravity, axis)
+    for axis in body.axes[:1]:
+        kinetic += 0.5 * parameters[-1] * ca.sumsqr(ca.jtimes(axis, x, dx))
+    return kinetic, potential
 
 
 def bodies(machine, x):
-    """Return the bodies in the paper's order, and the joint coordinates."""
-    phi = x[3] if machine.turns else ca.SX(0)
-    turn = ca.vertcat(
-        ca.horzcat(ca.cos(phi), -ca.sin(phi), 0),
-        ca.horzcat(ca.sin(phi), ca.cos(phi), 0),
-        ca.DM([[0, 0, 1]]),
-    )
-    rotation = ca.mtimes(ca.DM(machine.frame), turn)
+    """Return the joint coordinates, the bodies in the paper's order, and the platform's parts."""
     joints, sliders, uppers, lowers = [], [], [], []
-    for leg in machine.legs:
-        a, b, d, e = (ca.DM(v) for v in (leg.first, leg.second, leg.d, leg.e))
-        c = x[:3] + ca.mtimes(rotation, ca.DM(leg.s0))
-        joint1 = ca.SX(ca.DM(leg.r))
-        if not leg.crank:
-            slide = ca.dot(d, c - joint1) / ca.dot(d, e)
-            joint1 += slide * e
-            joints.append(slide)
-            sliders.append(Body((leg.slider_mass,), joint1, ()))
-        w = c - joint1
-        n2 = ca.dot(w, a) ** 2 + ca.dot(w, b) ** 2
-        ll2 = leg.ll**2 - ca.dot(w, d) ** 2
-        opening = ca.acos((n2 + leg.lu**2 - ll2) / (2 * ca.sqrt(n2) * leg.lu))
-        angle = ca.atan2(ca.dot(w, b), ca.dot(w, a)) + leg.elbow * opening
-        if leg.crank:
-            joints.append(angle)
-        upper = ca.cos(angle) * a + ca.sin(angle) * b
-        lower = (w - leg.lu * upper) / leg.ll
-        uppers.append(Body(leg.upper.moments, joint1, (upper, ca.cross(d, upper))))
-        if leg.crank:
-            m, mgx, _, inertia = leg.lower.moments
-            lowers.append(Body((m, mgx, inertia), c, (lower,)))
+    for leg, at in zip(machine.legs, places(machine, x), strict=True):
+        joints.append(at.joint)
+        fixed = ca.SX(ca.DM(leg.r))
+        if leg.e is not None:
+            fixed += at.slide * ca.DM(leg.e)
+            sliders.append(Body((leg.slider_mass,), fixed, ()))
+        direction = at.last / ca.norm_2(at.last)
+        if leg.ratio is not None:
+            uppers.append(_rod(leg.upper, fixed, direction))
+        elif leg.upper is not None:
+            uppers.append(_link(leg.upper, fixed, at.upper, leg.d))
+        if leg.flat:
+            lowers.append(_link(leg.lower, at.point, direction, leg.d))
         else:
-            lowers.append(Body(leg.lower.moments, c, (lower, ca.cross(d, lower))))
-    platform = Body(machine.platform.moments, x[:3], (rotation[:, 0], rotation[:, 1]))
-    return [*sliders, *uppers, *lowers, platform], joints
+            lowers.append(_rod(leg.lower, at.point, direction))
+    p, turn = position(machine, x), carried(machine, x)
+    platform = Body(machine.platform.moments, p, (turn[:, 0], turn[:, 1]))
+    bars = [Body((mass,), p + ca.mtimes(turn, ca.DM(hinge)), ()) for mass, hinge in machine.bars]
+    geared = [
+        Body((0.0, 0.0, inertia), p, (turned(machine, ratio * x[-1])[:, 0],))
+        for inertia, ratio in machine.geared
+    ]
+    return joints, [*sliders, *uppers, *lowers, platform], [*bars, *geared]
+
+
+def _link(body, point, x, d):
+    return Body(body.moments, point, (x, ca.cross(ca.DM(d), x)))
+
+
+def _rod(body, point, x):
+    m, mgx, _, inertia = body.moments
+    return Body((m, mgx, inertia), point, (x,))

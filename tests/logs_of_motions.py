@@ -1,13 +1,10 @@
 """Synthetic logs: a machine's own dynamics along a motion, friction, noise and gaps at will."""
 
-import tempfile
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-import rod_machines
-import tomlkit
 from mechanisms import MECHANISMS
 
 import pteron
@@ -17,13 +14,10 @@ from pteron.workspace import home_pose
 
 @lru_cache
 def machine(name):
-    """Return a machine that the tests share: one of `MECHANISMS`, or of `rod_machines`."""
+    """Return a machine that the tests share: one of `MECHANISMS`, or a file of `data`."""
     if name in MECHANISMS:
         return MECHANISMS[name]
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "machine.toml"
-        path.write_text(tomlkit.dumps(rod_machines.MACHINES[name][0]), encoding="utf-8")
-        return pteron.load(path)
+    return pteron.load(Path(__file__).with_name("data") / f"{name}.toml")
 
 
 @dataclass(frozen=True)

@@ -3,10 +3,13 @@
 from dataclasses import replace
 from functools import lru_cache
 
+import descriptions
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 import pteron
+from pteron.legs import PRR, PRRR, PSS, RRR, RSS, RUPU
+from pteron.platforms.platform import Bar, Geared
 
 BATCH_SHAPES = [(), (1,), (7,), (3, 5), (0,), (300,)]
 """300 is more than one block of the virtual machine."""
@@ -36,17 +39,22 @@ def inertia(rng, length):
     return pteron.PlanarInertia.of_body(mass, (x, y), mass * (x * x + y * y + (0.3 * length) ** 2))
 
 
-def slider_leg(rng, d, c, s0):
+def rod_inertia(rng, length):
+    """Return the inertia of a real rod about its platform end."""
+    mass, x = rng.uniform(0.2, 0.6), -length * rng.uniform(0.3, 0.7)
+    return pteron.RodInertia.of_body(mass, (x,), mass * (x * x + (0.3 * length) ** 2))
+
+
+def slider_leg(rng, d, c, **point):
     """Return a P-R-R-R leg with nothing special about it that reaches c."""
     lu, ll = rng.uniform(0.15, 0.25, 2)
     across = unit(rng, d)
     e = d + 0.5 * rng.normal(size=3)
     e /= np.linalg.norm(e) * np.sign(e @ d)
     reach = rng.uniform(0.75, 0.9) * np.hypot(lu, ll) * across
-    return pteron.PRRR(
+    return PRRR(
         guide_point=c - reach + rng.uniform(-0.1, 0.1) * e,
         direction=d,
-        platform_point=s0,
         upper_length=lu,
         lower_length=ll,
         slider_mass=rng.uniform(0.3, 0.8),
@@ -54,10 +62,11 @@ def slider_leg(rng, d, c, s0):
         lower=inertia(rng, ll),
         slider_direction=e,
         elbow=int(rng.choice([1, -1])),
+        **point,
     )
 
 
-def crank_leg(rng, d, c, s0):
+def crank_leg(rng, d, c, **point):
     """Return an R-S-S leg that reaches c, its rod at 35 to 70 degrees from d and from the crank."""
     a = unit(rng, d)
     lu, ll = rng.uniform(0.1, 0.15), rng.uniform(0.25, 0.35)
@@ -66,46 +75,156 @@ def crank_leg(rng, d, c, s0):
     lean, side = rng.uniform(0.6, 1.2, 2) * [1, -elbow]
     across = np.cross(d, crank / lu)
     rod = np.cos(lean) * d + np.sin(lean) * (np.cos(side) * crank / lu + np.sin(side) * across)
-    mass, x = rng.uniform(0.2, 0.6), -ll * rng.uniform(0.3, 0.7)
-    return pteron.RSS(
+    lower = rod_inertia(rng, ll)
+    return RSS(
         guide_point=c - crank - ll * rod,
         direction=d,
         zero_direction=a,
-        platform_point=s0,
         upper_length=lu,
         lower_length=ll,
         upper=inertia(rng, lu),
-        lower=pteron.RodInertia.of_body(mass, (x,), mass * (x * x + (0.3 * ll) ** 2)),
+        lower=lower,
         elbow=elbow,
+        **point,
     )
 
 
-LEGS = {"P": slider_leg, "R": crank_leg}
+def rod_leg(rng, n, c, **point):
+    """Return a P-S-S leg that reaches c, its rod along n and 25 to 60 degrees from the guide."""
+    ll = rng.uniform(0.25, 0.35)
+    e, elbow = _guide(rng, n, unit(rng, n))
+    return PSS(
+        guide_point=c - ll * n + rng.uniform(-0.1, 0.1) * e,
+        slider_direction=e,
+        lower_length=ll,
+        slider_mass=rng.uniform(0.3, 0.8),
+        lower=rod_inertia(rng, ll),
+        elbow=elbow,
+        **point,
+    )
+
+
+def _guide(rng, n, across):
+    """Return a guide's direction, 25 to 60 degrees from a link along n, and the elbow."""
+    lean, elbow = rng.uniform(0.4, 1.1), int(rng.choice([1, -1]))
+    return elbow * (np.cos(lean) * n + np.sin(lean) * across), elbow
+
+
+def planar_slider_leg(rng, n, c, *, k, **point):
+    """Return a P-R-R leg of the plane of normal k, its link along n."""
+    ll = rng.uniform(0.25, 0.35)
+    e, elbow = _guide(rng, n, np.cross(k, n) * rng.choice([1, -1]))
+    return PRR(
+        guide_point=c - ll * n + rng.uniform(-0.1, 0.1) * e + rng.uniform(-0.1, 0.1) * k,
+        slider_direction=e,
+        direction=k,
+        lower_length=ll,
+        slider_mass=rng.uniform(0.3, 0.8),
+        lower=inertia(rng, ll),
+        elbow=elbow,
+        **point,
+    )
+
+
+def planar_crank_leg(rng, n, c, *, k, **point):
+    """Return an R-R-R leg of the plane of normal k, its last link along n."""
+    lu, ll = rng.uniform(0.15, 0.2), rng.uniform(0.2, 0.3)
+    elbow = int(rng.choice([1, -1]))
+    side = -elbow * rng.uniform(0.8, 2.2)
+    crank = lu * (np.cos(side) * n - np.sin(side) * np.cross(k, n))
+    return RRR(
+        guide_point=c - crank - ll * n + rng.uniform(-0.1, 0.1) * k,
+        direction=k,
+        zero_direction=unit(rng, k),
+        upper_length=lu,
+        lower_length=ll,
+        upper=inertia(rng, lu),
+        lower=inertia(rng, ll),
+        elbow=elbow,
+        **point,
+    )
+
+
+def shaft_leg(rng, n, c, *, k, **point):
+    """Return an R-U-P-U leg less than 45 degrees from k, wherever n points."""
+    across = rng.uniform(0.0, 1.0) * np.cross(k, n)
+    length = rng.uniform(0.3, 0.4)
+    return RUPU(
+        guide_point=c + length * (k + across) / np.linalg.norm(k + across),
+        ratio=rng.uniform(1.0, 3.0) * rng.choice([1, -1]),
+        upper=rod_inertia(rng, -0.5 * length),
+        lower=rod_inertia(rng, 0.5 * length),
+        **point,
+    )
+
+
+LEGS = {
+    "P": slider_leg,
+    "R": crank_leg,
+    "S": rod_leg,
+    "U": shaft_leg,
+    "C": planar_crank_leg,
+    "L": planar_slider_leg,
+}
 
 
 def random_machine(seed, kinds):
-    """Return a machine with nothing special about it, built around a pose that it reaches.
+    """Return a machine with nothing special about it, built around a pose that it reaches: zero.
 
-    `kinds` holds a letter for each leg, P (P-R-R-R) or R (R-S-S): four legs turn the platform. Of
-    P-R-R-R legs alone it may say whether the platform turns.
+    `kinds` holds a letter for each leg: P (P-R-R-R), R (R-S-S), S (P-S-S), U (R-U-P-U), C (planar
+    R-R-R) and L (planar P-R-R); one of the last two makes the machine planar. The number of legs
+    says whether the platform turns, an I at the end that it slides, as an I4's. Of P-R-R-R legs
+    alone `kinds` may be whether it turns.
     """
     if isinstance(kinds, bool):
         kinds = "PPPP" if kinds else "PPP"
     rng = np.random.default_rng(seed)
+    while True:
+        robot = _drawn_machine(rng, f"random {kinds} {seed}", kinds)
+        home = np.zeros((1, robot.freedom))
+        bend, held = descriptions.distances_from_singular(descriptions.describe(robot), home)
+        if bend > 0.4 and held > 0.1:
+            return robot
+
+
+MOTIONS = {(False, 3): "3T", (False, 4): "3T1R", (True, 2): "2T", (True, 3): "2T1R"}
+
+
+def _drawn_machine(rng, name, kinds):
+    slides, kinds = "I" in kinds, kinds.removesuffix("I")
+    flat = bool(set(kinds) & set("CL"))
+    motion = MOTIONS[flat, len(kinds)]
     axis = unit(rng)
     x_axis = unit(rng, axis)
     frame = np.column_stack([x_axis, np.cross(axis, x_axis), axis])
     while True:
-        directions = [unit(rng) for _ in kinds]
-        if np.linalg.svd(directions, compute_uv=False)[-1] > 0.4:
+        directions = [unit(rng, axis if flat else None) for _ in kinds]
+        if np.linalg.svd(directions, compute_uv=False)[1 if flat else 2] > 0.4:
             break
+    articulated = motion in ("3T1R", "2T1R") and set(kinds) != {"P"}
     legs = []
     for kind, d in zip(kinds, directions, strict=True):
         s0 = rng.uniform(-0.06, 0.06, 3)
-        legs.append(LEGS[kind](rng, d, frame @ s0, s0))
-    motion = "3T1R" if len(kinds) == 4 else "3T"
-    platform = pteron.Platform(motion, inertia(rng, 0.08), axis, x_axis)
-    return pteron.Manipulator(f"random {kinds} {seed}", platform, tuple(legs), 9.81 * unit(rng))
+        t0 = rng.uniform(-0.06, 0.06, 3) if articulated else np.zeros(3)
+        if motion == "2T" and legs:
+            s0[:2] = legs[0].platform_point[:2]
+        if slides:
+            s0[2] = 0.0
+        if flat and kind in "PRS":
+            d += rng.uniform(-0.7, 0.7) * axis
+            d /= np.linalg.norm(d)
+        point = {"platform_point": s0, "fixed_offset": t0}
+        if kind in "CLU":
+            point["k"] = axis
+        legs.append(LEGS[kind](rng, d, (0.0 if slides else frame @ s0) + t0, **point))
+    parts = {}
+    if articulated:
+        parts["bars"] = [
+            Bar(rng.uniform(0.1, 0.3), (*rng.uniform(-0.06, 0.06, 2), 0.0)) for _ in range(2)
+        ]
+        parts["geared"] = [Geared(rng.uniform(1e-5, 1e-4), rng.uniform(-6.0, 6.0))]
+    platform = pteron.Platform(motion, inertia(rng, 0.08), axis, x_axis, slides, **parts)
+    return pteron.Manipulator(name, platform, tuple(legs), 9.81 * unit(rng))
 
 
 CATALOG = {name: pteron.load(name) for name in pteron.catalog()}

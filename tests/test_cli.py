@@ -15,8 +15,6 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
-import rod_machines
-import tomlkit
 from typer.testing import CliRunner, Result
 
 import pteron
@@ -251,12 +249,10 @@ def test_a_person_sees_a_table_of_60_columns(monkeypatch: pytest.MonkeyPatch):
     assert "3.141593" in text
 
 
-@pytest.fixture(scope="module")
-def mixed(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """Write the file of a machine with one slider and two cranks."""
-    path = tmp_path_factory.mktemp("machines") / "mixed.toml"
-    path.write_text(tomlkit.dumps(rod_machines.mixed()), encoding="utf-8")
-    return str(path)
+@pytest.fixture
+def mixed() -> str:
+    """Return the file of a machine with one slider and two cranks."""
+    return str(Path(__file__).with_name("data") / "mixed.toml")
 
 
 def test_columns_and_units_are_those_of_the_joints(mixed: str, monkeypatch: pytest.MonkeyPatch):

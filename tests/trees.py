@@ -1,16 +1,18 @@
 """Newton-Euler engines on the opened mechanism, projected through its closure.
 
-The loops are cut at the platform points: each leg is a chain of three joints (slider, R1, R2; or a
-crank and the two hinges of a universal joint), and the platform a chain of its own. Joint angles
-come from triangles; that the cut closes is asserted with the engine's own kinematics. Rates and
-accelerations come from its point Jacobians and their drift, and the tree's forces T^T tau from the
-natural orthogonal complement T of those Jacobians.
+The loops are cut at the platform points: each leg is a chain of three joints, or in a plane of two,
+and the platform a chain of its own. Joint angles come from
+triangles; the engine's own kinematics tell how well the cuts close. Rates and accelerations come
+from its point Jacobians and their drift, and the tree's forces T^T tau from the natural orthogonal
+complement T of those Jacobians.
 """
 
 from dataclasses import dataclass
 
+import casadi as ca
 import numpy as np
-from descriptions import describe, leg_angles, platform_points
+from descriptions import Body, describe, places
+from scipy.linalg import block_diag
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,10 @@ class Chain:
     links: list
     points: list
 
+    @property
+    def size(self):
+        return sum(len(link.joints) for link in self.links)
+
 
 def slide(axis):
     return True, np.array(axis)
@@ -55,72 +61,107 @@ def planar(body, x, z):
 
 
 def rod(body, x, z):
-    """Return the same of a thin rod along x, whose spin has (for MuJoCo next to) no inertia."""
+    """Return the same of a thin rod along x, whose spin has no inertia."""
     mass, center, axes, _ = planar(body, x, z)
-    return mass, center, axes, np.array([2e-15, body.about_center, body.about_center])
+    return mass, center, axes, np.array([0.0, body.about_center, body.about_center])
 
 
 def chains(machine):
-    """Return the legs' chains and the platform's."""
-    found, ones = [], np.ones(3)
-    for leg in machine.legs:
-        a, d = leg.first, leg.d
-        upper = planar(leg.upper, a, d)
-        mass, center, *inertia = (rod if leg.crank else planar)(leg.lower, a, d)
-        lower = leg.lu * a, mass, center + leg.ll * a, *inertia
-        if leg.crank:
-            links = [
-                Link([hinge(d)], leg.r, *upper),
-                Link([hinge(d), hinge(leg.second)], *lower),
-            ]
-        else:
-            links = [
-                Link([slide(leg.e)], leg.r, leg.slider_mass, np.zeros(3), np.eye(3), 1e-6 * ones),
-                Link([hinge(d)], np.zeros(3), *upper),
-                Link([hinge(d)], *lower),
-            ]
-        found.append(Chain(links, [leg.ll * a]))
+    """Return the legs' chains and the platform's, which must not slide."""
     x, _, k = machine.frame.T
     points = [machine.frame @ leg.s0 for leg in machine.legs]
-    joints = [slide(axis) for axis in np.eye(3)] + ([hinge(k)] if machine.turns else [])
-    found.append(Chain([Link(joints, np.zeros(3), *planar(machine.platform, x, k))], points))
+    joints = [slide(axis) for axis in machine.moves.T] + [hinge(k)] * machine.turns
+    platform = Chain([Link(joints, np.zeros(3), *planar(whole_platform(machine), x, k))], points)
+    return [*(leg_chain(leg) for leg in machine.legs), platform]
+
+
+def whole_platform(machine):
+    """Return the platform with its bars as masses at their hinges, and with what its gears turn."""
+    m, hx, hy, inertia = machine.platform.moments
+    for mass, (x, y, _) in machine.bars:
+        m, hx, hy, inertia = m + mass, hx + mass * x, hy + mass * y, inertia + mass * (x**2 + y**2)
+    return Body(m, hx / m, hy / m, inertia + sum(ratio**2 * i for i, ratio in machine.geared))
+
+
+def leg_chain(leg):
+    """Return a leg's chain; where its joints are zero its links point along `first`."""
+    a, b, d, at = leg.first, leg.second, leg.d, leg.r
+    swing = [hinge(d), hinge(b)]
+    if leg.ratio is not None:
+        upper = Link(swing, at, *rod(leg.upper, a, d))
+        return Chain([upper, Link([slide(a)], np.zeros(3), *rod(leg.lower, a, d))], [np.zeros(3)])
+    links = []
+    if leg.e is not None:
+        ones = np.ones(3)
+        links.append(Link([slide(leg.e)], at, leg.slider_mass, 0 * ones, np.eye(3), 1e-6 * ones))
+        at = np.zeros(3)
+    if leg.upper is not None:
+        links.append(Link([hinge(d)], at, *planar(leg.upper, a, d)))
+        at = leg.lu * a
+    mass, center, *inertia = (planar if leg.flat else rod)(leg.lower, a, d)
+    last = [hinge(d)] if leg.flat else swing
+    links.append(Link(last, at, mass, center + leg.ll * a, *inertia))
+    return Chain(links, [leg.ll * a])
+
+
+def coordinates(machine):
+    """Return the function from the pose to the tree's coordinates: the chains' in order."""
+    x = ca.SX.sym("x", machine.freedom)
+    pairs = zip(machine.legs, places(machine, x), strict=True)
+    return ca.Function("coordinates", [x], [ca.vertcat(*(q for p in pairs for q in _leg(*p)), x)])
+
+
+def _leg(leg, at):
+    length = ca.norm_2(at.last)
+    angle = ca.atan2(ca.dot(at.last, ca.DM(leg.second)), ca.dot(at.last, ca.DM(leg.first)))
+    lean = -ca.asin(ca.dot(at.last, ca.DM(leg.d)) / length)
+    if leg.ratio is not None:
+        return [angle, lean, length]
+    before = [q for q in (at.slide, at.angle) if q is not None]
+    turn = angle if at.angle is None else angle - at.angle
+    return [*before, turn] if leg.flat else [*before, turn, lean]
+
+
+def actuated(machine):
+    """Return the matrix from the tree's rates to those of the actuators."""
+    sizes = [chain.size for chain in chains(machine)]
+    found = np.zeros((len(machine.legs), sum(sizes)))
+    for row, leg, at in zip(found, machine.legs, np.cumsum([0, *sizes]), strict=False):
+        if leg.ratio is None:
+            row[at] = 1.0
+        else:
+            row[-1] = leg.ratio
     return found
 
 
-def tree_position(machine, pose):
-    """Return the tree's coordinates: three of each leg, then the pose."""
-    q = []
-    for leg, c in zip(machine.legs, platform_points(machine, pose), strict=True):
-        slide, upper, last = leg_angles(leg, c)
-        lower = np.arctan2(last @ leg.second, last @ leg.first)
-        if leg.crank:
-            q += [upper, lower - upper, -np.arcsin(last @ leg.d / leg.ll)]
-        else:
-            q += [slide, upper, lower - upper]
-    return np.array([*q, *pose])
+def closing(machine):
+    """Return the matrix that takes the loops' gaps (3 n,) to those that count: not across a plane.
+
+    A planar leg closes in the plane, and its own height does not count.
+    """
+    *legs, _ = chains(machine)
+    return block_diag(*(np.eye(3) if leg.size == 3 else machine.moves.T for leg in legs))
 
 
-def projected_forces(robot, engine, pose, velocity, acceleration):
-    """Return the actuator forces, and how far the engine's own closure is from closing."""
+def projected(robot, engine, pose, velocity, acceleration):
+    """Return actuator forces (B, n) and J (B, n, m), and how far the engine's loops are open."""
     machine = describe(robot)
-    n = len(machine.legs)
-    q = tree_position(machine, pose)
-    leg_points, platform_points = engine.points(q)
-    closing = np.abs(leg_points - platform_points).max()
-    leg_jacobians, platform_jacobians = engine.jacobians(q)
-    complement = np.zeros((len(q), len(pose)))
-    complement[3 * n :] = np.eye(len(pose))
-    for i in range(n):
-        own = leg_jacobians[i][:, 3 * i : 3 * i + 3]
-        complement[3 * i : 3 * i + 3] = np.linalg.solve(own, platform_jacobians[i][:, 3 * n :])
-    dq = complement @ velocity
-    leg_drift, platform_drift = engine.drifts(q, dq)
-    ddq = complement @ acceleration
-    for i in range(n):
-        own = leg_jacobians[i][:, 3 * i : 3 * i + 3]
-        ddq[3 * i : 3 * i + 3] += np.linalg.solve(own, platform_drift[i] - leg_drift[i])
-    tau = engine.inverse(q, dq, ddq)
-    return np.linalg.solve(complement[: 3 * n : 3].T, complement.T @ tau), closing
+    positions, drives = coordinates(machine), actuated(machine)
+    along = closing(machine)
+    still = np.ravel([leg.t0 for leg in machine.legs])
+    forces, jacobians, gaps = [], [], []
+    for at, dx, ddx in zip(pose, velocity, acceleration, strict=True):
+        q = np.array(positions(at)).ravel()
+        legs, platform = np.split(along @ engine.jacobian(q), [len(along)], axis=1)
+        gaps.append(along @ (engine.gap(q) - still))
+        complement = np.vstack([-np.linalg.solve(legs, platform), np.eye(len(at))])
+        dq, ddq = complement @ dx, complement @ ddx
+        ddq[: len(along)] -= np.linalg.solve(legs, along @ engine.drift(q, dq))
+        jacobians.append(drives @ complement)
+        forces.append(
+            np.linalg.solve(jacobians[-1].T, complement.T @ engine.inverse(q, dq, ddq)),
+        )
+    return np.array(forces), np.array(jacobians), np.abs(gaps).max()
 
 
 class Pinocchio:
@@ -129,7 +170,6 @@ class Pinocchio:
     def __init__(self, robot):
         import pinocchio as pin
 
-        machine = describe(robot)
         machine = describe(robot)
         self.pin = pin
         model = pin.Model()
@@ -160,31 +200,26 @@ class Pinocchio:
             )
         self.model, self.data = model, model.createData()
 
-    def _pairs(self, value):
+    def _opened(self, value):
+        """Return the differences of a value, (3, ...), at the legs' ends and the platform's."""
         *legs, platform = self.frames
-        return [value(f) for (f,) in legs], [value(f) for f in platform]
+        return np.concatenate([value(a) - value(b) for (a,), b in zip(legs, platform, strict=True)])
 
-    def points(self, q):
+    def gap(self, q):
         self.pin.framesForwardKinematics(self.model, self.data, q)
-        legs, platform = self._pairs(lambda f: self.data.oMf[f].translation.copy())
-        return np.array(legs), np.array(platform)
+        return self._opened(lambda f: self.data.oMf[f].translation)
 
-    def jacobians(self, q):
+    def jacobian(self, q):
         self.pin.computeJointJacobians(self.model, self.data, q)
-        self.pin.updateFramePlacements(self.model, self.data)
         world = self.pin.LOCAL_WORLD_ALIGNED
-        return self._pairs(
-            lambda f: self.pin.getFrameJacobian(self.model, self.data, f, world)[:3].copy()
+        return self._opened(
+            lambda f: self.pin.getFrameJacobian(self.model, self.data, f, world)[:3]
         )
 
-    def drifts(self, q, dq):
+    def drift(self, q, dq):
         self.pin.forwardKinematics(self.model, self.data, q, dq, np.zeros_like(dq))
-        world = self.pin.LOCAL_WORLD_ALIGNED
-        return self._pairs(
-            lambda f: self.pin.getFrameClassicalAcceleration(
-                self.model, self.data, f, world
-            ).linear.copy()
-        )
+        acceleration, world = self.pin.getFrameClassicalAcceleration, self.pin.LOCAL_WORLD_ALIGNED
+        return self._opened(lambda f: acceleration(self.model, self.data, f, world).linear)
 
     def inverse(self, q, dq, ddq):
         return self.pin.rnea(self.model, self.data, q, dq, ddq)
@@ -197,12 +232,11 @@ class MuJoCo:
         import mujoco
 
         machine = describe(robot)
-        machine = describe(robot)
         self.mujoco = mujoco
         spec = mujoco.MjSpec()
         spec.compiler.degree = False
         spec.option.gravity = machine.gravity
-        self.points_of = []
+        points, moments = [], []
         for chain in chains(machine):
             parent = spec.worldbody
             for link in chain.links:
@@ -213,33 +247,33 @@ class MuJoCo:
                     mass=link.mass,
                     ipos=link.center,
                     iquat=quaternion,
-                    inertia=link.moments,
+                    inertia=np.maximum(link.moments, 2e-15),
                     explicitinertial=True,
                 )
+                moments.append(link.moments)
                 for slides, axis in link.joints:
                     kind = mujoco.mjtJoint.mjJNT_SLIDE if slides else mujoco.mjtJoint.mjJNT_HINGE
                     parent.add_joint(type=kind, axis=axis)
-            self.points_of.append([parent.add_site(pos=point) for point in chain.points])
+            points.append([parent.add_site(pos=point) for point in chain.points])
         self.model = spec.compile()
+        # The compiler refuses moments that are zero, a rod's about itself; the dynamics do not.
+        self.model.body_inertia[1:] = moments
         self.data = mujoco.MjData(self.model)
-        self.sites = [[site.id for site in group] for group in self.points_of]
+        self.sites = [[site.id for site in group] for group in points]
 
-    def _place(self, q, dq=None, ddq=None):
-        self.data.qpos[:] = q
-        self.data.qvel[:] = 0.0 if dq is None else dq
-        self.data.qacc[:] = 0.0 if ddq is None else ddq
+    def _opened(self, value):
+        *legs, platform = self.sites
+        return np.concatenate([value(a) - value(b) for (a,), b in zip(legs, platform, strict=True)])
+
+    def _place(self, q, dq=0.0, ddq=0.0):
+        self.data.qpos[:], self.data.qvel[:], self.data.qacc[:] = q, dq, ddq
         self.mujoco.mj_inverse(self.model, self.data)
 
-    def _pairs(self, value):
-        *legs, platform = self.sites
-        return [value(s) for (s,) in legs], [value(s) for s in platform]
-
-    def points(self, q):
+    def gap(self, q):
         self._place(q)
-        legs, platform = self._pairs(lambda s: self.data.site_xpos[s].copy())
-        return np.array(legs), np.array(platform)
+        return self._opened(lambda s: self.data.site_xpos[s])
 
-    def jacobians(self, q):
+    def jacobian(self, q):
         self._place(q)
 
         def linear(site):
@@ -247,9 +281,9 @@ class MuJoCo:
             self.mujoco.mj_jacSite(self.model, self.data, jac, None, site)
             return jac
 
-        return self._pairs(linear)
+        return self._opened(linear)
 
-    def drifts(self, q, dq):
+    def drift(self, q, dq):
         self._place(q, dq)
 
         def drift(site):
@@ -259,7 +293,7 @@ class MuJoCo:
             self.mujoco.mj_jacDot(self.model, self.data, jac, None, point, body)
             return jac @ dq
 
-        return self._pairs(drift)
+        return self._opened(drift)
 
     def inverse(self, q, dq, ddq):
         self._place(q, dq, ddq)
