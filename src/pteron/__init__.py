@@ -1,9 +1,9 @@
 """Pteron: parallel manipulators whose legs carry points of the platform.
 
-Closed-form kinematics, dynamics by virtual work, and base inertial parameters, for the
-Quadrupteron, the Tripteron and their oblique relatives. `robot` is a `Manipulator`; poses,
-velocities and accelerations have shape (..., m), slider coordinates and forces (..., n), in SI
-units and radians.
+Kinematics, dynamics by virtual work, and base inertial parameters, for the Quadrupteron and the
+Tripteron, Deltas, Par4 and H4, five-bars and other planar machines, and any mixture of their legs.
+`robot` is a `Manipulator`; poses, velocities and accelerations have shape (..., m), joint
+coordinates and actuator forces (..., n), in SI units and radians.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ from pteron.kinematics import (
     singular_orientations,
     working_mode,
 )
-from pteron.legs import PRRR, RSS
+from pteron.legs import PRR, PRRR, PSS, RRR, RSS, RUPU
 from pteron.manipulator import (
     Manipulator,
     catalog,
@@ -64,7 +64,7 @@ from pteron.manipulator import (
     with_parameters,
     working_modes,
 )
-from pteron.platforms import Platform
+from pteron.platforms import Bar, Geared, Platform
 
 Leg = PRRR
 """The kind of leg that a file means where it does not say `type`."""
@@ -106,19 +106,25 @@ def __getattr__(name: str) -> Any:
 
 
 __all__ = [
+    "Bar",
     "BaseParameters",
     "DataError",
+    "Geared",
     "JointMotion",
     "Leg",
     "Manipulator",
     "ModelError",
     "OutputError",
+    "PRR",
     "PRRR",
+    "PSS",
     "Parameter",
     "PlanarInertia",
     "Platform",
     "PteronError",
+    "RRR",
     "RSS",
+    "RUPU",
     "RodInertia",
     "SingularPose",
     "UnreachablePose",
