@@ -179,8 +179,8 @@ class Place(NamedTuple):
     last: Any
     """The vector of the last link, or of the whole shaft, to the platform point, (3, 1)."""
     bend: Any
-    """1 at best, 0 where the leg is singular: the sine between the links, as seen along d, or the
-    cosine between rod and guide."""
+    """1 at best, 0 where the leg is singular: the sine between the links, as seen along d, and the
+    cosine between d and a guide; or that between a rod and its guide."""
 
 
 def carried(machine, pose):
@@ -222,9 +222,11 @@ def _place(leg, c, phi):
         lean = ca.asin(ca.norm_2(w - ca.dot(w, e) * e) / leg.ll)
         slide, bend = ca.dot(w, e) - leg.elbow * leg.ll * ca.cos(lean), ca.cos(lean)
         return Place(slide, c, slide, angle, upper, w - slide * e, bend)
+    cosine = 1
     if leg.e is not None:
         e = ca.DM(leg.e)
-        slide = ca.dot(w, d) / ca.dot(e, d)
+        cosine = ca.dot(e, d)
+        slide = ca.dot(w, d) / cosine
         w -= slide * e
     elif leg.flat:
         w -= ca.dot(w, d) * d
@@ -234,7 +236,7 @@ def _place(leg, c, phi):
     angle = ca.atan2(y, x) + leg.elbow * opening
     upper = ca.cos(angle) * first + ca.sin(angle) * second
     last = w - leg.lu * upper
-    bend = ca.fabs(ca.dot(d, ca.cross(upper, last))) / leg.ll
+    bend = ca.fmin(ca.fabs(ca.dot(d, ca.cross(upper, last))) / leg.ll, ca.fabs(cosine))
     return Place(angle if slide is None else slide, c, slide, angle, upper, last, bend)
 
 

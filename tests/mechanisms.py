@@ -146,8 +146,8 @@ def planar_crank_leg(rng, n, c, *, k, **point):
 
 
 def shaft_leg(rng, n, c, *, k, **point):
-    """Return an R-U-P-U leg less than 45 degrees from k, wherever n points."""
-    across = rng.uniform(0.0, 1.0) * np.cross(k, n)
+    """Return an R-U-P-U leg less than 30 degrees from k, wherever n points."""
+    across = rng.uniform(0.0, 0.5) * np.cross(k, n)
     length = rng.uniform(0.3, 0.4)
     return RUPU(
         guide_point=c + length * (k + across) / np.linalg.norm(k + across),
