@@ -179,8 +179,8 @@ class Place(NamedTuple):
     last: Any
     """The vector of the last link, or of the whole shaft, to the platform point, (3, 1)."""
     bend: Any
-    """1 at best, 0 where the leg is singular: the sine between the links, as seen along d, and the
-    cosine between d and a guide; or that between a rod and its guide."""
+    """1 at best, 0 where the leg is singular: the sine between the links, as seen along d, times
+    the cosine between d and a guide; or the cosine between a rod and its guide."""
 
 
 def carried(machine, pose):
@@ -236,7 +236,7 @@ def _place(leg, c, phi):
     angle = ca.atan2(y, x) + leg.elbow * opening
     upper = ca.cos(angle) * first + ca.sin(angle) * second
     last = w - leg.lu * upper
-    bend = ca.fmin(ca.fabs(ca.dot(d, ca.cross(upper, last))) / leg.ll, ca.fabs(cosine))
+    bend = ca.fabs(cosine * ca.dot(d, ca.cross(upper, last))) / leg.ll
     return Place(angle if slide is None else slide, c, slide, angle, upper, last, bend)
 
 
