@@ -3,7 +3,7 @@
 Positions are trigonometry of triangles, in CasADi's functions: of numbers and of symbols alike.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -66,7 +66,7 @@ class Leg:
         return np.cross(self.d, self.first)
 
     @property
-    def turns(self):
+    def crank(self):
         """Whether its joint coordinate is a crank's angle."""
         return self.e is None and self.ratio is None
 
@@ -96,10 +96,6 @@ class Machine:
     def freedom(self):
         return self.moves.shape[1] + self.turns
 
-    def with_elbows(self, signs):
-        legs = zip(self.legs, signs, strict=True)
-        return replace(self, legs=tuple(replace(leg, elbow=sign) for leg, sign in legs))
-
 
 def describe(robot):
     """Return the description of a pteron robot."""
@@ -123,23 +119,18 @@ def describe(robot):
 def _leg(leg, k):
     ratio = getattr(leg, "ratio", None)
     slider = getattr(leg, "slider_mass", None)
-    e = d = None
-    if hasattr(leg, "direction"):
-        d = np.array(leg.direction)
-    if slider is not None:
-        e = np.array(leg.slider_direction or leg.direction)
-    if hasattr(leg, "zero_direction"):
-        first = np.array(leg.zero_direction)
-    elif d is not None:
-        first = _across(d)
-    else:
-        # A rod is never across its guide, nor a shaft across the axis that it turns.
+    e = None if slider is None else np.array(leg.slider_direction or leg.direction)
+    if ratio is not None or leg.type == "PSS":
+        # A shaft is hardly ever across the axis that it turns, nor a rod across its guide.
         first = k if e is None else e
         d = _across(first)
+    else:
+        d = np.array(leg.direction)
+        first = np.array(leg.zero_direction) if slider is None else _across(d)
     return Leg(
         r=np.array(leg.guide_point),
         s0=np.array(leg.platform_point),
-        t0=np.array(getattr(leg, "fixed_offset", (0.0, 0.0, 0.0))),
+        t0=np.array(leg.fixed_offset),
         d=d,
         first=first,
         flat=leg.type in FLAT,
@@ -252,7 +243,7 @@ def _positions(machine):
 def inverse_kinematics(machine, poses):
     """Return the joint coordinates (B, n) at poses (B, m); cranks within (-pi, pi]."""
     joints = np.array(_positions(machine)(poses.T)[0]).T
-    cranks = [leg.turns for leg in machine.legs]
+    cranks = [leg.crank for leg in machine.legs]
     return np.where(cranks, -((np.pi - joints) % (2 * np.pi)) + np.pi, joints)
 
 

@@ -8,8 +8,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import pteron
-from pteron.legs import PRR, PRRR, PSS, RRR, RSS, RUPU
-from pteron.platforms.platform import Bar, Geared
 
 BATCH_SHAPES = [(), (1,), (7,), (3, 5), (0,), (300,)]
 """300 is more than one block of the virtual machine."""
@@ -52,7 +50,7 @@ def slider_leg(rng, d, c, **point):
     e = d + 0.5 * rng.normal(size=3)
     e /= np.linalg.norm(e) * np.sign(e @ d)
     reach = rng.uniform(0.75, 0.9) * np.hypot(lu, ll) * across
-    return PRRR(
+    return pteron.PRRR(
         guide_point=c - reach + rng.uniform(-0.1, 0.1) * e,
         direction=d,
         upper_length=lu,
@@ -76,7 +74,7 @@ def crank_leg(rng, d, c, **point):
     across = np.cross(d, crank / lu)
     rod = np.cos(lean) * d + np.sin(lean) * (np.cos(side) * crank / lu + np.sin(side) * across)
     lower = rod_inertia(rng, ll)
-    return RSS(
+    return pteron.RSS(
         guide_point=c - crank - ll * rod,
         direction=d,
         zero_direction=a,
@@ -93,7 +91,7 @@ def rod_leg(rng, n, c, **point):
     """Return a P-S-S leg that reaches c, its rod along n and 25 to 60 degrees from the guide."""
     ll = rng.uniform(0.25, 0.35)
     e, elbow = _guide(rng, n, unit(rng, n))
-    return PSS(
+    return pteron.PSS(
         guide_point=c - ll * n + rng.uniform(-0.1, 0.1) * e,
         slider_direction=e,
         lower_length=ll,
@@ -114,10 +112,10 @@ def planar_slider_leg(rng, n, c, *, k, **point):
     """Return a P-R-R leg of the plane of normal k, its link along n."""
     ll = rng.uniform(0.25, 0.35)
     e, elbow = _guide(rng, n, np.cross(k, n) * rng.choice([1, -1]))
-    return PRR(
+    return pteron.PRR(
         guide_point=c - ll * n + rng.uniform(-0.1, 0.1) * e + rng.uniform(-0.1, 0.1) * k,
         slider_direction=e,
-        direction=k,
+        direction=rng.choice([1, -1]) * k,
         lower_length=ll,
         slider_mass=rng.uniform(0.3, 0.8),
         lower=inertia(rng, ll),
@@ -130,12 +128,12 @@ def planar_crank_leg(rng, n, c, *, k, **point):
     """Return an R-R-R leg of the plane of normal k, its last link along n."""
     lu, ll = rng.uniform(0.15, 0.2), rng.uniform(0.2, 0.3)
     elbow = int(rng.choice([1, -1]))
-    side = -elbow * rng.uniform(0.8, 2.2)
-    crank = lu * (np.cos(side) * n - np.sin(side) * np.cross(k, n))
-    return RRR(
+    side, d = -elbow * rng.uniform(0.8, 2.2), rng.choice([1, -1]) * k
+    crank = lu * (np.cos(side) * n - np.sin(side) * np.cross(d, n))
+    return pteron.RRR(
         guide_point=c - crank - ll * n + rng.uniform(-0.1, 0.1) * k,
-        direction=k,
-        zero_direction=unit(rng, k),
+        direction=d,
+        zero_direction=unit(rng, d),
         upper_length=lu,
         lower_length=ll,
         upper=inertia(rng, lu),
@@ -146,10 +144,10 @@ def planar_crank_leg(rng, n, c, *, k, **point):
 
 
 def shaft_leg(rng, n, c, *, k, **point):
-    """Return an R-U-P-U leg less than 30 degrees from k, wherever n points."""
-    across = rng.uniform(0.0, 0.5) * np.cross(k, n)
+    """Return an R-U-P-U leg less than 45 degrees from k, wherever n points."""
+    across = rng.uniform(0.0, 1.0) * np.cross(k, n)
     length = rng.uniform(0.3, 0.4)
-    return RUPU(
+    return pteron.RUPU(
         guide_point=c + length * (k + across) / np.linalg.norm(k + across),
         ratio=rng.uniform(1.0, 3.0) * rng.choice([1, -1]),
         upper=rod_inertia(rng, -0.5 * length),
@@ -220,9 +218,9 @@ def _drawn_machine(rng, name, kinds):
     parts = {}
     if articulated:
         parts["bars"] = [
-            Bar(rng.uniform(0.1, 0.3), (*rng.uniform(-0.06, 0.06, 2), 0.0)) for _ in range(2)
+            pteron.Bar(rng.uniform(0.1, 0.3), (*rng.uniform(-0.06, 0.06, 2), 0.0)) for _ in range(2)
         ]
-        parts["geared"] = [Geared(rng.uniform(1e-5, 1e-4), rng.uniform(-6.0, 6.0))]
+        parts["geared"] = [pteron.Geared(rng.uniform(1e-5, 1e-4), rng.uniform(-6.0, 6.0))]
     platform = pteron.Platform(motion, inertia(rng, 0.08), axis, x_axis, slides, **parts)
     return pteron.Manipulator(name, platform, tuple(legs), 9.81 * unit(rng))
 

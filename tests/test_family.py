@@ -74,7 +74,7 @@ def test_joints(case):
     machine, poses = descriptions.describe(case.robot), case.motion[0]
     away = pteron.inverse_kinematics(case.robot, poses)
     away -= descriptions.inverse_kinematics(machine, poses)
-    cranks = [leg.turns for leg in machine.legs]
+    cranks = [leg.crank for leg in machine.legs]
     away[:, cranks] = (away[:, cranks] + np.pi) % (2 * np.pi) - np.pi
     assert np.abs(away).max() < 1e-12
 
