@@ -102,8 +102,9 @@ def _drawn(
         if total >= count:
             return np.concatenate(found)
     raise ModelError(
-        f"{robot.name}: only {total} of {_ATTEMPTS * _BATCH} random poses are in reach of all legs "
-        "and away from singularities; bring the guide points nearer or lengthen the links"
+        f"only {total} of {_ATTEMPTS * _BATCH} random poses are in reach of all legs and away from "
+        "singularities; bring the guide points nearer or lengthen the links",
+        subject=robot.name,
     )
 
 

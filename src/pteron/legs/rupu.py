@@ -16,8 +16,9 @@ from pteron.bodies.motion import AngleMotion, Expression, PointMotion
 from pteron.bodies.vectors import Vector
 from pteron.errors import ModelError
 from pteron.legs.circles import perpendicular_to
+from pteron.legs.cones import within
 from pteron.legs.kind import CRANK, Key, LegKind, Quantity, Transfer
-from pteron.legs.leg import Joint, LegEquations, LegMotion, Reach, Turned
+from pteron.legs.leg import Joint, LegEquations, LegMotion, Passive, Reach, Turned
 from pteron.legs.rods import rod_body, universal_joints
 
 
@@ -45,6 +46,8 @@ class RUPU(LegKind):
         t0, the part of the platform point that does not turn with phi, in the base frame, m.
     direction : unit vector, optional
         Of the joint's axis: the platform's, which is its default.
+    travel : (float, float), optional
+        Least and greatest length of the shaft, m.
     """
 
     guide_point: Vector
@@ -56,6 +59,7 @@ class RUPU(LegKind):
     limits: tuple[float, float] | None = None
     fixed_offset: Vector = (0.0, 0.0, 0.0)
     direction: Vector | None = None
+    travel: tuple[float, float] | None = None
 
     type = "RUPU"
     joint = CRANK
@@ -70,10 +74,35 @@ class RUPU(LegKind):
     )
 
     keys: ClassVar = {
-        "direction": Key("direction", default=None),
-        "ratio": Key("number", default=1.0),
-        "upper": Key("rod", "u"),
-        "lower": Key("rod", "l"),
+        "guide_point": Key("point", "r, the shaft's universal joint on the base, m"),
+        "direction": Key(
+            "direction",
+            "of the actuated joint's axis: the platform's where left out",
+            default=None,
+            example=[0.0, 0.0, 1.0],
+        ),
+        "ratio": Key("number", "the joint's angle over phi", default=1.0),
+        "elbow": Key("sign", "1: a shaft has but one branch", default=1),
+        "limits": Key(
+            "limits",
+            "least and greatest angle of the joint, rad",
+            default=None,
+            example=[-3.0, 3.0],
+        ),
+        "travel": Key(
+            "limits",
+            "least and greatest length of the shaft between its universal joints, m",
+            default=None,
+            example=[0.3, 0.6],
+        ),
+        "upper": Key(
+            "rod", "the part at the base: origin at guide_point, x along it to the platform", "u"
+        ),
+        "lower": Key(
+            "rod",
+            "the part at the platform: origin at the platform point, x as upper's",
+            "l",
+        ),
     }
 
     def __post_init__(self) -> None:
@@ -97,6 +126,9 @@ class RUPU(LegKind):
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return (1, 0, 0), (0, 1, 0), (0, 0, 1)
+
+    def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
+        return within("shaft", "m", ca.norm_2(motion.links[1]), self.travel, 1.0)
 
     @property
     def joint_axis(self) -> Vector:

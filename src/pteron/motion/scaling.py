@@ -94,8 +94,9 @@ def scaled_to_reach(
             scale, best = fits, across
     if best is None or scale == 0:
         raise ModelError(
-            f"{robot.name}: no pick-and-place cycle about pose {middle.tolist()} keeps a reserve "
-            f"of {least:g} to the singularities and the joints' limits; choose a better pose"
+            f"no pick-and-place cycle about pose {middle.tolist()} keeps a reserve of {least:g} to "
+            "the singularities and the joints' limits; choose a better pose",
+            subject=robot.name,
         )
     return scale / _STEPS, best
 
