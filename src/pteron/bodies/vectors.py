@@ -50,6 +50,14 @@ def numbers(values: Sequence[object], key: str, count: int) -> tuple[float, ...]
     return tuple(number(item, f"{key}[{i}]") for i, item in enumerate(items))
 
 
+def interval(values: Sequence[object], key: str) -> tuple[float, float]:
+    """Return `values` as least and most, finite floats in this order."""
+    low, high = numbers(values, key, 2)
+    if low >= high:
+        raise ModelError(f"{key}: {low:g} is not below {high:g}; give [least, most]")
+    return low, high
+
+
 def vector(values: Sequence[object], key: str) -> Vector:
     """Return `values` as a vector of three finite floats."""
     x, y, z = numbers(values, key, 3)

@@ -25,6 +25,7 @@ def random_poses(
     """Return poses drawn at random from those in reach and away from singularities.
 
     Uniformly in position and orientation, within a box that holds all but the rarest corners.
+    Passive joints keep their limits; the actuated ones need not.
 
     Parameters
     ----------
@@ -97,6 +98,7 @@ def _drawn(
             # Of a machine that is singular everywhere the measure is 0: all poses count.
             measure = np.abs(numeric(robot, "type_ii")(poses)[0])
             good &= (measure >= type_ii) | ~(measure > 0.0).any()
+        good &= (numeric(robot, "passive_room")(poses)[0] >= 0.0).all(axis=-1)
         found.append(poses[good])
         total += int(good.sum())
         if total >= count:

@@ -14,7 +14,7 @@ import casadi as ca
 from pteron.bodies.inertia import Inertia, PointMass
 from pteron.bodies.motion import Expression
 from pteron.bodies.parameters import LEG_BODIES
-from pteron.bodies.vectors import Vector, number, numbers, positive, unit_vector, vector
+from pteron.bodies.vectors import Vector, interval, number, positive, unit_vector, vector
 from pteron.errors import ModelError
 from pteron.legs.leg import LegEquations, LegMotion, Passive
 
@@ -137,10 +137,7 @@ def _checked(value: Any, name: str, role: KeyRole) -> Any:
     if role == "sign":
         return 1 if value == 1 else -1
     if role == "limits":
-        low, high = numbers(value, name, 2)
-        if low >= high:
-            raise ModelError(f"{name}: {low:g} is not below {high:g}; give [least, most]")
-        return low, high
+        return interval(value, name)
     return value
 
 

@@ -161,6 +161,7 @@ def _platform(table: Any) -> Platform:
         axis=table.axis,
         x_axis=table.x_axis,
         slides=table.slides,
+        limits=table.limits,
         tool=table.tool,
         bars=tuple(Bar(bar.mass, bar.hinge) for bar in table.bars),
         geared=tuple(Geared(part.inertia, part.ratio) for part in table.geared),
@@ -192,19 +193,19 @@ def save(robot: Manipulator, path: str | Path) -> Path:
 
     x, _, axis = robot.platform.frame
     platform: dict[str, Any] = {"motion": robot.platform.motion, "axis": axis, "x_axis": x}
-    platform |= {"slides": True} if robot.platform.slides else {}
-    platform |= {"tool": robot.platform.tool, **_plain(robot.platform.inertia)}
-    for name in ("bars", "geared"):
-        if parts := getattr(robot.platform, name):
-            platform[name] = [_plain(part) for part in parts]
-    legs = [
-        {key: _plain(value) for key, value in leg_items(leg).items() if value is not None}
-        for leg in robot.legs
-    ]
-    found = {"name": robot.name, "gravity": robot.gravity, "platform": platform, "legs": legs}
-    return write_text(path, written(found))
+    platform |= {"tool": robot.platform.tool, **asdict(robot.platform.inertia)}
+    for name in ("slides", "limits", "bars", "geared"):
+        if given := getattr(robot.platform, name):
+            platform[name] = given
+    legs = [{k: v for k, v in leg_items(leg).items() if v is not None} for leg in robot.legs]
+    machine = {"name": robot.name, "gravity": robot.gravity, "platform": platform, "legs": legs}
+    return write_text(path, written(_plain(machine)))
 
 
 def _plain(value: Any) -> Any:
-    """Return a value as a file has it: a body or a part as a table."""
+    """Return what a file holds: a body as a table, a tuple as a list."""
+    if isinstance(value, dict):
+        return {key: _plain(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
     return asdict(value) if is_dataclass(value) and not isinstance(value, type) else value

@@ -68,6 +68,11 @@ class PlatformTable(PlanarBody, _Motion):
         False,
         description="whether phi slides the platform points, m/rad, as an I4's nacelle does",
     )
+    limits: Two | None = Field(
+        None,
+        description="least and greatest phi, rad, where hinges of the platform allow no more",
+        examples=[[-0.8, 0.8]],
+    )
     tool: Three = Field(
         (0.0, 0.0, 0.0), description="the tool's centre point in the platform frame, m"
     )

@@ -125,4 +125,5 @@ def _keeps(robot: Manipulator, poses: Array, least: float) -> bool:
         if leg.limits is not None:
             low, high = leg.limits
             good &= bool(q.min() >= low + _DIP and q.max() <= high - _DIP)
+    good &= bool((numeric(robot, "passive_room")(poses)[1] >= _DIP).all())
     return bool(good)

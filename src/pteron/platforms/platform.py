@@ -12,6 +12,7 @@ from pteron.bodies.inertia import PlanarInertia
 from pteron.bodies.vectors import (
     Vector,
     cross,
+    interval,
     number,
     perpendicular,
     positive,
@@ -87,6 +88,8 @@ class Platform:
     slides : bool
         Whether phi slides the platform points, as the two halves of an I4's nacelle do, and turns
         nothing but the tool. Platform points then hold m/rad: c = p + t0 + phi (x_axis s_x + ...).
+    limits : (float, float), optional
+        Least and greatest phi, rad, where hinges of the platform allow no more.
     tool : vector
         The tool's centre point in the platform frame, m.
     bars : tuple of Bar
@@ -100,6 +103,7 @@ class Platform:
     axis: Vector = _BASE_Z
     x_axis: Vector | None = None
     slides: bool = False
+    limits: tuple[float, float] | None = None
     tool: Vector = (0.0, 0.0, 0.0)
     bars: tuple[Bar, ...] = ()
     geared: tuple[Geared, ...] = ()
@@ -125,6 +129,10 @@ class Platform:
             )
         if self.geared and not self.turns:
             raise ModelError(f"geared: a {self.motion} platform has no angle for a gear to turn")
+        if self.limits is not None:
+            if not self.turns:
+                raise ModelError(f"limits: a {self.motion} platform has no angle to limit")
+            object.__setattr__(self, "limits", interval(self.limits, "limits"))
         object.__setattr__(self, "axis", axis)
         object.__setattr__(self, "x_axis", x)
         object.__setattr__(self, "tool", vector(self.tool, "tool"))
