@@ -34,12 +34,8 @@ def beyond_reach(machine: Machine, pose: Expression) -> Expression:
     return ca.vertcat(*(nan_below_zero(leg.discriminant) for leg in found))
 
 
-def passive_room(machine: Machine, pose: Expression) -> tuple[Expression, Expression]:
-    """Return how far the passive joints of every leg (n, 1) are from their limits, the least.
-
-    First as shares of half their ranges, then in metres that the leg moves meanwhile; negative
-    beyond, 1 and `FAR` for a leg without such limits. Limits of phi count for every leg.
-    """
+def passive_joints(machine: Machine, pose: Expression) -> list[list[Passive]]:
+    """Return every leg's passive joints that have limits, and with them phi if it has."""
     state, at = machine.state(pose), machine.platform
     still, body = ca.horzcat(*at.frame), state.platform.body
     turned = still if body.x is None else ca.horzcat(body.x, body.y, body.axes)
@@ -47,10 +43,20 @@ def passive_room(machine: Machine, pose: Expression) -> tuple[Expression, Expres
     if limits is not None:
         radius = max(norm(leg.platform_point) for leg in machine.robot.legs)
         own = [Passive("phi", "rad", pose[-1], *limits, radius or 1.0)]
+    pairs = zip(machine.robot.legs, state.legs, strict=True)
+    return [[*leg.passive(motion, still, turned), *own] for leg, motion in pairs]
+
+
+def passive_room(machine: Machine, pose: Expression) -> tuple[Expression, Expression]:
+    """Return how far the passive joints of every leg (n, 1) are from their limits, the least.
+
+    First as shares of half their ranges, then in metres that the leg moves meanwhile; negative
+    beyond, 1 and `FAR` for a leg without such limits. A limit of phi counts for every leg.
+    """
     shares, metres = [], []
-    for leg, motion in zip(machine.robot.legs, state.legs, strict=True):
+    for joints in passive_joints(machine, pose):
         share, way = ca.SX(1), ca.SX(FAR)
-        for joint in (*leg.passive(motion, still, turned), *own):
+        for joint in joints:
             room = ca.fmin(joint.value - joint.least, joint.most - joint.value)
             share = ca.fmin(share, room / (0.5 * (joint.most - joint.least)))
             way = ca.fmin(way, room * joint.lever)

@@ -40,7 +40,21 @@ class Cone:
         object.__setattr__(self, "axis", unit_vector(self.axis, "axis"))
         object.__setattr__(self, "angle", number(self.angle, "angle"))
         if not 0.0 < self.angle <= math.pi:
-            raise ModelError(f"angle: {self.angle:g} rad given, one above 0 and up to pi expected")
+            raise ModelError(
+                f"angle: {self.angle:g} rad given, one above 0 and up to pi expected; are these "
+                "degrees?"
+            )
+
+
+def check_elbow(
+    limits: tuple[float, float] | None, least: float = 0.0, most: float = math.pi
+) -> None:
+    """Refuse an elbow's limits beyond the angles that it can have."""
+    if limits is not None and not least <= limits[0] < limits[1] <= most:
+        raise ModelError(
+            f"elbow_limits: {list(limits)} rad reaches beyond {least:.4g} to {most:.4g}, where the "
+            "angle always is; are these degrees?"
+        )
 
 
 def between(a: Expression, b: Expression) -> Expression:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from random import Random
@@ -273,6 +273,13 @@ class LegKind(ABC):
         The platform's axes are the columns (3, 3) of `turned`, and of `still` at phi = 0.
         """
         return []
+
+    def doubts(self, axis: Vector | None) -> Iterator[str]:
+        """Yield what is possible but unlikely in it, beside what is so in any leg.
+
+        The platform turns about `axis`, if it does.
+        """
+        yield from ()
 
     def equations(self, values: Mapping[str, Expression] | None = None) -> LegEquations:
         """Return its equations, for its own geometry or for other values of the quantities."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self
@@ -12,7 +13,7 @@ from pteron.bodies.inertia import PlanarInertia, PointMass
 from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, PointMotion
 from pteron.bodies.vectors import Vector, perpendicular
 from pteron.legs.circles import perpendicular_to, plane_of, quarter_turn
-from pteron.legs.cones import within
+from pteron.legs.cones import check_elbow, within
 from pteron.legs.kind import Key, Quantity
 from pteron.legs.leg import Circle, Joint, LegMotion, Needs, Passive
 from pteron.legs.planar_links import Turning, last_joints, lower_link_body
@@ -87,6 +88,7 @@ class PRR(SlideLeg):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        check_elbow(self.elbow_limits, -0.5 * math.pi, 0.5 * math.pi)
         if self.direction is not None:
             e = perpendicular(
                 self.slider_direction, self.direction, "slider_direction", "the plane's normal"

@@ -26,7 +26,7 @@ from pteron.legs.circles import (
     random_triangle,
     squared_reach,
 )
-from pteron.legs.cones import ELBOW_LIMITS, between, within
+from pteron.legs.cones import ELBOW_LIMITS, between, check_elbow, within
 from pteron.legs.crank import ELBOW
 from pteron.legs.kind import SLIDER, Key, LegKind, Quantity, ReachBound, Transfer
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Passive, Plane, Reach
@@ -118,6 +118,7 @@ class PRRR(LegKind):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        check_elbow(self.elbow_limits)
         if abs(dot(self.direction, self.e)) < _LEAST_SLIDE:
             raise ModelError(
                 f"slider_direction: {list(self.e)} is perpendicular to direction "

@@ -6,6 +6,7 @@ joints of a rod are counted as universal ones: a rod's spin about itself moves n
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
@@ -17,7 +18,7 @@ from pteron.bodies.vectors import Vector
 from pteron.legs.cones import Cone
 from pteron.legs.kind import Key, Quantity
 from pteron.legs.leg import Joint, LegMotion, Passive, Sphere
-from pteron.legs.rods import ROD_KEYS, cones, free_axes, rod_body, universal_joints
+from pteron.legs.rods import ROD_KEYS, cones, free_axes, hinge_doubts, rod_body, universal_joints
 from pteron.legs.slide import SLIDER_KEYS, SlideEquations, SlideLeg, SlideState
 
 
@@ -102,6 +103,9 @@ class PSS(SlideLeg):
 
     def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
         return cones(self, motion, ca.SX.eye(3), still, turned)
+
+    def doubts(self, axis: Vector | None) -> Iterator[str]:
+        return hinge_doubts(self, axis)
 
     def turned(self, turn: Any) -> Self:
         moved = super().turned(turn)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import casadi as ca
 
 from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, PointMotion
-from pteron.bodies.vectors import Vector
+from pteron.bodies.vectors import Vector, parallel
 from pteron.legs.cones import within_cone
 from pteron.legs.kind import Key
 from pteron.legs.leg import Joint, LegMotion, Passive
@@ -56,6 +57,22 @@ def cones(
         *within_cone("rod at its tip", leg.tip_cone, tip, rod, length),
         *within_cone("rod at the platform", leg.platform_cone, socket, -rod, length),
     ]
+
+
+def hinge_doubts(leg: Any, axis: Vector | None) -> Iterator[str]:
+    """Yield it where parallel rods would keep their end of the platform from turning about an axis.
+
+    The file does not tell whether their bar is on a hinge at the platform point; of an articulated
+    platform it is where the fixed offset begins.
+    """
+    x, y, _ = leg.platform_point
+    alone = leg.rods == 1 or any(leg.fixed_offset) or x == y == 0.0
+    if axis is None or alone or (leg.bar_direction and parallel(leg.bar_direction, axis)):
+        return
+    yield (
+        "platform_point: turns with phi, but parallel rods keep their bar from turning: is the bar "
+        "on a hinge there? What does not turn belongs in fixed_offset"
+    )
 
 
 def rod_body(point: PointMotion, n: Expression, ddn: Expression, swing: Expression) -> BodyMotion:

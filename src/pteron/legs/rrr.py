@@ -14,7 +14,7 @@ from pteron.bodies.inertia import PlanarInertia
 from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, PointMotion
 from pteron.bodies.vectors import Vector
 from pteron.legs.circles import random_triangle
-from pteron.legs.cones import ELBOW_LIMITS, between, within
+from pteron.legs.cones import ELBOW_LIMITS, between, check_elbow, within
 from pteron.legs.crank import CRANK_KEYS, CrankEquations, CrankLeg, CrankState
 from pteron.legs.kind import Key
 from pteron.legs.leg import Circle, Joint, LegMotion, Passive
@@ -79,6 +79,10 @@ class RRR(CrankLeg):
             "planar", "the lower link: origin at the platform point, x from the elbow to there", "l"
         ),
     }
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_elbow(self.elbow_limits)
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return (self.direction,)

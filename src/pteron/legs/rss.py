@@ -6,7 +6,7 @@ joints of a rod are counted as universal ones (R-U-U): a rod's spin about itself
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from random import Random
@@ -23,7 +23,7 @@ from pteron.legs.cones import Cone
 from pteron.legs.crank import CRANK_KEYS, CrankEquations, CrankLeg, CrankState
 from pteron.legs.kind import Key
 from pteron.legs.leg import Joint, LegMotion, Passive, Sphere
-from pteron.legs.rods import ROD_KEYS, cones, free_axes, rod_body, universal_joints
+from pteron.legs.rods import ROD_KEYS, cones, free_axes, hinge_doubts, rod_body, universal_joints
 
 
 @dataclass(frozen=True)
@@ -111,6 +111,9 @@ class RSS(CrankLeg):
     def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
         crank = motion.bodies["u"]
         return cones(self, motion, ca.horzcat(crank.x, crank.y, crank.axes), still, turned)
+
+    def doubts(self, axis: Vector | None) -> Iterator[str]:
+        return hinge_doubts(self, axis)
 
     @property
     def reach_text(self) -> str:

@@ -6,6 +6,7 @@ from the base to the platform point. The cardan error of its joints is left out.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
@@ -20,6 +21,9 @@ from pteron.legs.cones import within
 from pteron.legs.kind import CRANK, Key, LegKind, Quantity, Transfer
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Passive, Reach, Turned
 from pteron.legs.rods import rod_body, universal_joints
+
+_FAST = 10.0
+"""Ratio beyond which a gear is likelier to be the motor's."""
 
 
 @dataclass(frozen=True)
@@ -129,6 +133,17 @@ class RUPU(LegKind):
 
     def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
         return within("shaft", "m", ca.norm_2(motion.links[1]), self.travel, 1.0)
+
+    def doubts(self, axis: Vector | None) -> Iterator[str]:
+        if not 1.0 / _FAST <= abs(self.ratio) <= _FAST:
+            yield (
+                f"ratio: {self.ratio:g} rad of the joint per rad of phi: is that the motor's gear? "
+                "The joint is the shaft's end at the base"
+            )
+        if self.upper.first_moment[0] < 0.0:
+            yield "upper: center_of_mass: x is negative, towards the base joint's other side"
+        if self.lower.first_moment[0] > 0.0:
+            yield "lower: center_of_mass: x is positive, beyond the platform point"
 
     @property
     def joint_axis(self) -> Vector:

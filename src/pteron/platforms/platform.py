@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
@@ -132,7 +133,12 @@ class Platform:
         if self.limits is not None:
             if not self.turns:
                 raise ModelError(f"limits: a {self.motion} platform has no angle to limit")
-            object.__setattr__(self, "limits", interval(self.limits, "limits"))
+            low, high = interval(self.limits, "limits")
+            if not -math.pi <= low < high <= math.pi:
+                raise ModelError(
+                    f"limits: [{low:g}, {high:g}] rad reaches beyond -pi to pi; are these degrees?"
+                )
+            object.__setattr__(self, "limits", (low, high))
         object.__setattr__(self, "axis", axis)
         object.__setattr__(self, "x_axis", x)
         object.__setattr__(self, "tool", vector(self.tool, "tool"))
