@@ -24,7 +24,7 @@ from pteron.legs.rods import rod_body, universal_joints
 
 
 @dataclass(frozen=True)
-class PSS(LegKind):
+class SliderRod(LegKind):
     """Two parallel rods, whose bar keeps its direction, from a slider to a platform point."""
 
     guide_point: Vector
@@ -38,15 +38,15 @@ class PSS(LegKind):
     limits: tuple[float, float] | None = None
     fixed_offset: Vector = (0.0, 0.0, 0.0)
 
-    type = "PSS"
+    type = "SliderRod"
     joint = SLIDER
 
     keys: ClassVar = {
-        "slider_direction": Key("direction"),
-        "bar_direction": Key("direction"),
-        "lower_length": Key("length"),
-        "slider_mass": Key("slider", "p"),
-        "lower": Key("rod", "l"),
+        "slider_direction": Key("direction", "e, of the guide"),
+        "bar_direction": Key("direction", "of the bars at the rods' ends"),
+        "lower_length": Key("length", "of the rods, m"),
+        "slider_mass": Key("slider", "the slider's mass, kg", "p"),
+        "lower": Key("rod", "the rods: origin at the platform point, x along them to there", "l"),
     }
 
     @property
@@ -75,7 +75,7 @@ class PSS(LegKind):
         return f"its rod reaches {self.lower_length:.4g} m from the guide"
 
 
-class PSSEquations(LegEquations):
+class SliderRodEquations(LegEquations):
     """The equations of a P-S-S leg; bar_direction is an axis of its joints, no more."""
 
     kinds: ClassVar = {"p": PointMass.kinds, "l": RodInertia.kinds}
@@ -125,8 +125,8 @@ class PSSEquations(LegEquations):
         return Sphere(self.r + q * self.e, self.ll)
 
 
-PSS.equations_class = PSSEquations
-KINDS[PSS.type] = PSS  # that is all: files may name it now
+SliderRod.equations_class = SliderRodEquations
+KINDS[SliderRod.type] = SliderRod  # that is all: files may name it now
 
 
 def linear_delta() -> pteron.Manipulator:
@@ -134,7 +134,7 @@ def linear_delta() -> pteron.Manipulator:
     legs = []
     for azimuth in (0.0, 2 * pi / 3, 4 * pi / 3):
         x, y = cos(azimuth), sin(azimuth)  # outwards
-        leg = PSS(
+        leg = SliderRod(
             guide_point=(0.3 * x, 0.3 * y, 0.0),
             slider_direction=(0.0, 0.0, 1.0),
             bar_direction=(-y, x, 0.0),

@@ -146,7 +146,6 @@ KNOWLEDGE = {
 ALLOWED = {
     ("__init__.py", "a kind of leg"): "hands the kinds on",
     ("manipulator/files.py", "a kind of leg"): "the kind where a file names none",
-    ("manipulator/files.py", "an elbow"): "a key that every kind has",
     ("manipulator/manipulator.py", "an elbow"): "working modes",
     ("cli/", "an elbow"): "--elbows, the working mode; and a leg as JSON",
     ("report/", "an elbow"): "the working mode",

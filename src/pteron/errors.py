@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from reprlib import Repr
 
 _LONGEST = 60
@@ -11,7 +12,20 @@ _brief.maxlevel = 3
 
 
 class PteronError(ValueError):
-    """Root of every error that Pteron raises for something the user can mend."""
+    """Root of every error that Pteron raises for something the user can mend.
+
+    Attributes
+    ----------
+    message : str
+        What is wrong.
+    subject : str
+        What the error's text names before it, a file or a machine; empty where it names none.
+    """
+
+    def __init__(self, message: str = "", *, subject: str = "") -> None:
+        super().__init__(f"{subject}: {message}" if subject else message)
+        self.message = message
+        self.subject = subject
 
 
 class ModelError(PteronError):
@@ -20,12 +34,12 @@ class ModelError(PteronError):
     Attributes
     ----------
     faults : tuple of str
-        Every fault of a file, one line each; empty where the message says all.
+        Everything that is wrong with a file or a machine, one line each.
     """
 
-    def __init__(self, message: str, *, faults: tuple[str, ...] = ()) -> None:
-        super().__init__(message)
-        self.faults = faults
+    def __init__(self, message: str, *, subject: str = "", faults: Sequence[str] = ()) -> None:
+        super().__init__(message, subject=subject)
+        self.faults = tuple(faults) or (message,)
 
 
 class DataError(PteronError):
@@ -74,9 +88,16 @@ class SingularPose(PteronError):
     """
 
     def __init__(
-        self, message: str, *, kind: str, measure: float, index: tuple[int, ...], leg: int = 0
+        self,
+        message: str,
+        *,
+        kind: str,
+        measure: float,
+        index: tuple[int, ...],
+        leg: int = 0,
+        subject: str = "",
     ) -> None:
-        super().__init__(message)
+        super().__init__(message, subject=subject)
         self.kind = kind
         self.measure = measure
         self.index = index

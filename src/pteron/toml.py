@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -55,14 +56,14 @@ def read_toml(path: str | Path, error: type[PteronError], absent: str) -> dict[s
     PteronError
         If it cannot be read, or as `parsed_toml`.
     """
-    source = shown(str(path), bare=True, longest=1000)
+    source = shown(str(path), bare=True, longest=1000) or "''"
     try:
         with Path(path).open("rb") as file:
             data = file.read(_LARGEST + 1)
     except (FileNotFoundError, ValueError):  # ValueError: a NUL in the name
-        raise error(f"{source}: {absent}") from None
+        raise error(absent, subject=source) from None
     except OSError as reason:
-        raise error(f"{source}: cannot be read ({reason.strerror or reason})") from None
+        raise error(f"cannot be read ({reason.strerror or reason})", subject=source) from None
     return parsed_toml(data, source, error)
 
 
@@ -76,16 +77,19 @@ def parsed_toml(data: bytes, source: str, error: type[PteronError]) -> dict[str,
         numbers of thousands of digits.
     """
     if len(data) > _LARGEST:
-        raise error(f"{source}: has over {_LARGEST >> 20} MB; a TOML file of settings is short")
+        raise error(
+            f"has over {_LARGEST >> 20} MB; a TOML file of settings is short", subject=source
+        )
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise error(f"{source}: not a TOML file (it is not UTF-8 text)") from None
+        raise error("not a TOML file (it is not UTF-8 text)", subject=source) from None
     # The parser's time and memory grow with the square of a dotted key's length.
     if long := _LONG_KEY.search(_STRING_OR_COMMENT.sub("_", text)):
         start = shown(long[0], bare=True, longest=20)
         raise error(
-            f"{source}: not a file of settings (the key {start} has over {_PARTS} parts); mend it"
+            f"not a file of settings (the key {start} has over {_PARTS} parts); mend it",
+            subject=source,
         )
     try:
         return tomllib.loads(text)
@@ -95,7 +99,7 @@ def parsed_toml(data: bytes, source: str, error: type[PteronError]) -> dict[str,
         reason = "its brackets are nested too deeply"
     except ValueError:  # of `int`
         reason = "a number in it has thousands of digits"
-    raise error(f"{source}: not a TOML file ({reason})")
+    raise error(f"not a TOML file ({reason})", subject=source)
 
 
 def validated(
@@ -113,15 +117,15 @@ def validated(
     try:
         return TypeAdapter(model).validate_python(document)
     except ValidationError as fault:
-        raise error(told(source, fault_lines(fault, model))) from None
+        raise error(told(fault_lines(fault, model)), subject=source) from None
 
 
-def told(source: str, lines: list[str]) -> str:
-    """Return the message of a file's faults."""
+def told(lines: Sequence[str]) -> str:
+    """Return several faults as the reason of one error."""
     if len(lines) == 1:
-        return f"{source}: {lines[0]}"
+        return lines[0]
     more = [f"and {len(lines) - _MANY} more"] if len(lines) > _MANY else []
-    return "\n  ".join([f"{source}: {len(lines)} faults", *lines[:_MANY], *more])
+    return "\n  ".join([f"{len(lines)} faults", *lines[:_MANY], *more])
 
 
 def fault_lines(error: ValidationError, model: Any) -> list[str]:

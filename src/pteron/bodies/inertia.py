@@ -79,9 +79,11 @@ class _TurningInertia:
         inertia = number(self.inertia, "inertia")
         least = sum(h * h for h in moment) / mass
         if inertia < least * (1.0 - _ROUNDING) or inertia <= 0.0:
+            mend = f"; about the centre of mass? Then write {inertia + least:g}"
             raise ModelError(
                 f"inertia: {inertia:g} kg m^2 belongs to no real body; with this mass and centre "
                 f"of mass, and about the reference point, it must be above {least:g} kg m^2"
+                f"{mend if inertia > 0.0 else ''}"
             )
         for key, value in (("mass", mass), ("first_moment", moment), ("inertia", inertia)):
             object.__setattr__(self, key, value)

@@ -1,7 +1,8 @@
 """The parts of TOML tables that hold bodies and vectors, as pydantic reads them.
 
-Only shape and type are checked here; what the numbers mean is checked by what they build. Imported
-where a file is read, since pydantic would slow the start of those who read none.
+Only shape and type are checked here; what the numbers mean is checked by what they build. What a
+key is stands in its description, which files and pages show. Imported where a file is read, since
+pydantic would slow the start of those who read none.
 """
 
 from __future__ import annotations
@@ -27,30 +28,30 @@ class Table(BaseModel):
 
 
 class Slider(Table):
-    """`{ mass }`."""
+    """`{ mass }` of a body that does not turn."""
 
-    mass: Number
+    mass: Number = Field(description="kg")
 
 
 class Bar(Table):
     """`{ mass, hinge }` of a part that moves with the platform and does not turn."""
 
-    mass: Number
-    hinge: Three
+    mass: Number = Field(description="kg")
+    hinge: Three = Field(description="its hinge on the part that turns, in the platform frame, m")
 
 
 class Geared(Table):
     """`{ inertia, ratio }` of a part that a gear turns with the platform."""
 
-    inertia: Number
-    ratio: Number
+    inertia: Number = Field(description="about its own axis, which is parallel to axis, kg m^2")
+    ratio: Number = Field(description="its angle over phi")
 
 
 class _Body(Table):
-    mass: Number
+    mass: Number = Field(description="kg")
     center_of_mass: Any = None
     first_moment: Any = None
-    inertia: Number
+    inertia: Number = Field(description="about the origin, not the centre of mass, kg m^2")
 
     kind: ClassVar[type[PlanarInertia] | type[RodInertia]]
 
@@ -69,17 +70,21 @@ class _Body(Table):
             raise ModelError(f"{key}.{error}" if key else str(error)) from None
 
 
+_CENTER = "in the body's frame, m"
+_MOMENT = "mass times center_of_mass, which it may replace, kg m"
+
+
 class PlanarBody(_Body):
     """`{ mass, inertia, center_of_mass or first_moment }` of a body in a plane."""
 
     kind = PlanarInertia
-    center_of_mass: Two | None = None
-    first_moment: Two | None = None
+    center_of_mass: Two | None = Field(None, description=f"[x, y] {_CENTER}")
+    first_moment: Two | None = Field(None, description=_MOMENT)
 
 
 class RodBody(_Body):
     """The same of a rod, whose vectors have one component."""
 
     kind = RodInertia
-    center_of_mass: One | None = None
-    first_moment: One | None = None
+    center_of_mass: One | None = Field(None, description=f"[x] {_CENTER}")
+    first_moment: One | None = Field(None, description=_MOMENT)

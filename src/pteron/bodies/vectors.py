@@ -50,6 +50,14 @@ def numbers(values: Sequence[object], key: str, count: int) -> tuple[float, ...]
     return tuple(number(item, f"{key}[{i}]") for i, item in enumerate(items))
 
 
+def interval(values: Sequence[object], key: str) -> tuple[float, float]:
+    """Return `values` as least and most, finite floats in this order."""
+    low, high = numbers(values, key, 2)
+    if low >= high:
+        raise ModelError(f"{key}: {low:g} is not below {high:g}; give [least, most]")
+    return low, high
+
+
 def vector(values: Sequence[object], key: str) -> Vector:
     """Return `values` as a vector of three finite floats."""
     x, y, z = numbers(values, key, 3)
@@ -79,12 +87,21 @@ def unit_vector(values: Sequence[object], key: str) -> Vector:
 def perpendicular(v: Vector, axis: Vector, key: str, other: str) -> Vector:
     """Return the unit vector v, perpendicular to another but for rounding, made so to rounding."""
     lean = dot(v, axis)
-    if abs(lean) > UNIT_TOLERANCE:
-        raise ModelError(f"{key}: {list(v)} is not perpendicular to {other} {list(axis)}")
     if abs(lean) <= _UPRIGHT:
         return v
     upright = (v[0] - lean * axis[0], v[1] - lean * axis[1], v[2] - lean * axis[2])
-    return scaled(upright, 1.0 / norm(upright))
+    size = norm(upright)
+    if size < UNIT_TOLERANCE:
+        raise ModelError(
+            f"{key}: {list(v)} is along {other} {list(axis)}; give one at right angles to it"
+        )
+    upright = scaled(upright, 1.0 / size)
+    if abs(lean) > UNIT_TOLERANCE:
+        near = [float(f"{c:.12g}") + 0.0 for c in upright]
+        raise ModelError(
+            f"{key}: {list(v)} is not perpendicular to {other} {list(axis)}; {near} is"
+        )
+    return upright
 
 
 def dot(a: Vector, b: Vector) -> float:

@@ -1,15 +1,16 @@
-"""`pteron catalog` and `pteron check`: the machines that come with Pteron, and the user's own."""
+"""`pteron catalog`, `new` and `check`: the machines that come with Pteron, and the user's own."""
 
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Argument, Exit
 
-from pteron.cli.arguments import Json, load_robot, signs
-from pteron.cli.screen import complain, note, plain, show, show_json, spinner, table
-from pteron.errors import ModelError, PteronError
+from pteron.cli.arguments import Json, load_robot, option, signs
+from pteron.cli.screen import complain, note, plain, show, show_json, spinner, table, write
+from pteron.errors import ModelError, OutputError, PteronError
 
 if TYPE_CHECKING:
     from pteron.legs import LegKind
@@ -20,6 +21,10 @@ _FAULTY = 2
 
 def catalog(json: Json = False) -> None:
     """List the machines that come with Pteron."""
+    _list(json)
+
+
+def _list(json: bool) -> None:
     from pteron.manipulator import catalog as names
     from pteron.manipulator import load
 
@@ -32,6 +37,38 @@ def catalog(json: Json = False) -> None:
         pose, legs = " ".join(one["coordinates"]), " ".join(one["types"])
         made.add_row(one["name"], one["motion"], pose, legs, one["working_mode"])
     show(made)
+
+
+def new(
+    kind: Annotated[
+        str | None,
+        Argument(metavar="KIND", help="A machine of the catalog, or a TOML file.", show_default=""),
+    ] = None,
+    out: Annotated[str | None, option("out", "Write it to this TOML file.", "FILE")] = None,
+    overwrite: Annotated[bool, option("overwrite", "Replace the file if it is there.")] = False,
+    json: Json = False,
+) -> None:
+    """Write a file for a machine of your own, which says what every key is.
+
+    It is a machine like KIND, to put your numbers into; without KIND the kinds are listed.
+    """
+    if kind is None:
+        _list(json)
+        return
+    from pteron.atomic import write_text
+    from pteron.manipulator.files import explained
+
+    if out is not None and Path(out).exists() and not overwrite:
+        raise OutputError(f"{out}: is there already; name another file, or say --overwrite")
+    text = explained(kind)
+    if out is not None:
+        write_text(out, text)
+    if json:
+        show_json({"kind": kind, "file": out, "text": text})
+    elif out is None:
+        write(text)
+    else:
+        show(f"Written: {plain(out)}. Put in your numbers, then: pteron check {plain(out)}")
 
 
 def _machine(robot: Manipulator) -> dict[str, Any]:
@@ -57,8 +94,8 @@ def check(
     try:
         robot = load_robot(file)
     except ModelError as error:
-        for fault in error.faults or (str(error),):
-            complain(fault)
+        for fault in error.faults:
+            complain(f"{error.subject}: {fault}")
         raise Exit(_FAULTY) from None
     from pteron.workspace.doubts import doubts
 
@@ -66,10 +103,8 @@ def check(
         with spinner(f"Looking where {robot.name} can work"):
             found = _findings(robot, doubts(robot))
     except PteronError as error:
-        # What the library says of a machine begins with its name; the user gave a file.
-        message = str(error).removeprefix(f"{robot.name}: ")
         unlikely = "".join(f"; {text}" for text in doubts(robot))
-        raise ModelError(f"{file}: {message}{unlikely}") from None
+        raise ModelError(f"{error.message}{unlikely}", subject=file) from None
     for text in found["doubts"]:
         note(f"Warning: {file}: {text}")
     if json:

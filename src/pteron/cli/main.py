@@ -19,7 +19,7 @@ from pteron.cli.excite import excite
 from pteron.cli.export import export
 from pteron.cli.identify import identify
 from pteron.cli.interrupts import insistent_interrupts
-from pteron.cli.machines import catalog, check
+from pteron.cli.machines import catalog, check, new
 from pteron.cli.motions import direct, forces, inverse
 from pteron.cli.report import report
 from pteron.cli.screen import complain, note
@@ -115,6 +115,7 @@ def _add(function: Callable[..., None], *examples: str, cls: type[Command] = Com
     invoke_without_command=True,
     epilog=_examples(
         "pteron catalog",
+        "pteron new delta --out robot.toml",
         "pteron report quadrupteron --out report",
         "pteron inverse quadrupteron 0.01 0.02 -0.03 0.1",
     ),
@@ -138,7 +139,8 @@ def pteron(
 
 
 _add(catalog, "pteron catalog --json")
-_add(check, "pteron check my-robot.toml")
+_add(new, "pteron new", "pteron new delta --out robot.toml")
+_add(check, "pteron check robot.toml")
 _add(report, "pteron report quadrupteron --out report")
 _add(
     inverse,

@@ -8,9 +8,13 @@ import casadi as ca
 
 from pteron.bodies.motion import Expression
 from pteron.bodies.parameters import LEG_BODIES
+from pteron.bodies.vectors import norm
 from pteron.closures.closure import nan_below_zero
 from pteron.equations.machine import Machine, State
-from pteron.legs.leg import Joint, Reach
+from pteron.legs.leg import Joint, Passive, Reach
+
+FAR = 1e3
+"""What stands for no limit, m: code on a controller, and optimisers, want finite numbers."""
 
 
 def inverse_position(machine: Machine, pose: Expression) -> Expression:
@@ -28,6 +32,37 @@ def beyond_reach(machine: Machine, pose: Expression) -> Expression:
     """Return, for every leg (n, 1), NaN where it does not reach the pose, 0 where it does."""
     found = reach(machine, pose)
     return ca.vertcat(*(nan_below_zero(leg.discriminant) for leg in found))
+
+
+def passive_joints(machine: Machine, pose: Expression) -> list[list[Passive]]:
+    """Return every leg's passive joints that have limits, and with them phi if it has."""
+    state, at = machine.state(pose), machine.platform
+    still, body = ca.horzcat(*at.frame), state.platform.body
+    turned = still if body.x is None else ca.horzcat(body.x, body.y, body.axes)
+    own, limits = [], machine.robot.platform.limits
+    if limits is not None:
+        radius = max(norm(leg.platform_point) for leg in machine.robot.legs)
+        own = [Passive("phi", "rad", pose[-1], *limits, radius or 1.0)]
+    pairs = zip(machine.robot.legs, state.legs, strict=True)
+    return [[*leg.passive(motion, still, turned), *own] for leg, motion in pairs]
+
+
+def passive_room(machine: Machine, pose: Expression) -> tuple[Expression, Expression]:
+    """Return how far the passive joints of every leg (n, 1) are from their limits, the least.
+
+    First as shares of half their ranges, then in metres that the leg moves meanwhile; negative
+    beyond, 1 and `FAR` for a leg without such limits. A limit of phi counts for every leg.
+    """
+    shares, metres = [], []
+    for joints in passive_joints(machine, pose):
+        share, way = ca.SX(1), ca.SX(FAR)
+        for joint in joints:
+            room = ca.fmin(joint.value - joint.least, joint.most - joint.value)
+            share = ca.fmin(share, room / (0.5 * (joint.most - joint.least)))
+            way = ca.fmin(way, room * joint.lever)
+        shares.append(share)
+        metres.append(way)
+    return ca.vertcat(*shares), ca.vertcat(*metres)
 
 
 def direct_position(machine: Machine, joints: Expression, *, reached: bool = True) -> Expression:

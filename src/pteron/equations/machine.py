@@ -28,6 +28,8 @@ class State:
 class Machine:
     """The equations of a machine's parts."""
 
+    robot: Manipulator
+    """The machine whose topology this is; what limits its passive joints is read from it."""
     legs: tuple[LegEquations, ...]
     platform: PlatformEquations
     closure: Closure
@@ -87,7 +89,7 @@ class Machine:
         platform = equations_class(robot.platform)(frame, points, fixed)
         closure = kind_for([type(leg) for leg in legs], type(platform))
         assert closure is not None  # the manipulator has asked
-        return cls(legs, platform, closure(legs, platform), gravity)
+        return cls(robot, legs, platform, closure(legs, platform), gravity)
 
     def state(
         self,

@@ -35,6 +35,6 @@ class LogError(DataError):
     """
 
     def __init__(self, reason: Reason, place: str, message: str) -> None:
-        super().__init__(f"{place}: {message}")
+        super().__init__(message, subject=place)
         self.reason = reason
         self.place = place

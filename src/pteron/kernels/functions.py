@@ -110,6 +110,11 @@ def _reach(m: Machine, v: Symbols) -> Outputs:
     }
 
 
+def _passive_room(m: Machine, v: Symbols) -> Outputs:
+    shares, metres = kinematics.passive_room(m, v["pose"])
+    return {"shares": shares, "metres": metres}
+
+
 def _platform_points(m: Machine, v: Symbols) -> Outputs:
     points = m.platform.motion(v["pose"], *[ca.SX.zeros(m.freedom)] * 2).points
     return {"points": ca.vertcat(*(point.position.T for point in points))}
@@ -222,6 +227,7 @@ _TABLE: dict[str, _Entry] = {
     "newton_step": _Entry(("joints", "pose"), _newton_step),
     "direct_step": _Entry(("joints", "pose"), _direct_step),
     "reach": _Entry(_POSE, _reach),
+    "passive_room": _Entry(_POSE, _passive_room),
     "joint_points": _Entry(
         _POSE, lambda m, v: {"points": kinematics.chain_points(_state(m, v))}, ("reach",)
     ),

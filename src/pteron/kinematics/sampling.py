@@ -25,6 +25,7 @@ def random_poses(
     """Return poses drawn at random from those in reach and away from singularities.
 
     Uniformly in position and orientation, within a box that holds all but the rarest corners.
+    Passive joints keep their limits; the actuated ones need not.
 
     Parameters
     ----------
@@ -97,13 +98,15 @@ def _drawn(
             # Of a machine that is singular everywhere the measure is 0: all poses count.
             measure = np.abs(numeric(robot, "type_ii")(poses)[0])
             good &= (measure >= type_ii) | ~(measure > 0.0).any()
+        good &= (numeric(robot, "passive_room")(poses)[0] >= 0.0).all(axis=-1)
         found.append(poses[good])
         total += int(good.sum())
         if total >= count:
             return np.concatenate(found)
     raise ModelError(
-        f"{robot.name}: only {total} of {_ATTEMPTS * _BATCH} random poses are in reach of all legs "
-        "and away from singularities; bring the guide points nearer or lengthen the links"
+        f"only {total} of {_ATTEMPTS * _BATCH} random poses are in reach of all legs and away from "
+        "singularities; bring the guide points nearer or lengthen the links",
+        subject=robot.name,
     )
 
 

@@ -85,9 +85,10 @@ def singular_orientations(robot: Manipulator) -> Array:
 def singular_everywhere(robot: Manipulator, index: tuple[int, ...] = ()) -> SingularPose:
     """Return what is said of such a machine, here and where a pose of it is used."""
     return SingularPose(
-        f"{robot.name}: singular at every pose (type II): with the actuators held still the "
-        "platform can move; change a leg's direction or platform point",
+        "singular at every pose (type II): with the actuators held still the platform can move; "
+        "change a leg's direction or platform point",
         kind="II",
         measure=0.0,
         index=index,
+        subject=robot.name,
     )

@@ -18,7 +18,7 @@ from pteron.bodies.inertia import PlanarInertia
 from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, PointMotion
 from pteron.bodies.vectors import Vector, cross, perpendicular, vertical
 from pteron.legs.circles import perpendicular_to, plane_of, quarter_turn
-from pteron.legs.kind import CRANK, LegKind, Quantity, ReachBound, Transfer
+from pteron.legs.kind import CRANK, Key, LegKind, Quantity, ReachBound, Transfer
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Reach
 
 ELBOW: Mapping[tuple[str, str], tuple[int, tuple[str, ...]]] = {
@@ -30,6 +30,30 @@ ELBOW: Mapping[tuple[str, str], tuple[int, tuple[str, ...]]] = {
     ("I", "l"): (-1, ("ll", "ll")),
 }
 """Mass moved from the last link's end to the upper link's: both carry the joint between them."""
+
+
+CRANK_KEYS: dict[str, Key] = {
+    "guide_point": Key("point", "r, the centre of the crank's circle, m"),
+    "direction": Key("direction", "d, the crank's axis: its angle counts by the right hand"),
+    "zero_direction": Key(
+        "direction", "a, where the crank points at angle 0: perpendicular to direction"
+    ),
+    "upper_length": Key("length", "lu, of the crank, m"),
+    "elbow": Key(
+        "sign",
+        "sigma: 1 where the crank is turned by the right hand about direction from the line to "
+        "the platform point, -1 where by the left",
+        default=1,
+    ),
+    "limits": Key(
+        "limits",
+        "least and greatest crank angle, rad",
+        default=None,
+        example=[-1.0, 1.0],
+    ),
+    "upper": Key("planar", "the crank: origin on its axis, x along it to the elbow", "u"),
+}
+"""The keys that legs with a crank share."""
 
 
 @dataclass(frozen=True)

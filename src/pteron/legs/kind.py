@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from random import Random
-from typing import Any, ClassVar, Literal, NamedTuple, Self
+from typing import Any, ClassVar, Literal, NamedTuple, Self, get_args
 
 import casadi as ca
 
 from pteron.bodies.inertia import Inertia, PointMass
 from pteron.bodies.motion import Expression
 from pteron.bodies.parameters import LEG_BODIES
-from pteron.bodies.vectors import Vector, number, numbers, positive, unit_vector, vector
+from pteron.bodies.vectors import Vector, interval, number, positive, unit_vector, vector
 from pteron.errors import ModelError
-from pteron.legs.leg import LegEquations
+from pteron.legs.leg import LegEquations, LegMotion, Passive
 
 
 @dataclass(frozen=True)
@@ -52,16 +52,50 @@ class Quantity(NamedTuple):
     """How a length or a direction is written: "lu" becomes lu1 for leg 1."""
 
 
+KeyRole = Literal[
+    "point",
+    "direction",
+    "length",
+    "number",
+    "count",
+    "sign",
+    "limits",
+    "cone",
+    "slider",
+    "planar",
+    "rod",
+]
+"""What a key holds: a vector, a unit vector, a length, a number, a whole number, +1 or -1, least
+and greatest value, a ball joint's cone, a slider's mass (TOML key `slider`), a body in a plane, a
+rod. Files and pages give a leg's keys in this order."""
+
+
 class Key(NamedTuple):
     """What a field of a leg, and its TOML key, holds."""
 
-    role: Literal["direction", "length", "number", "count", "slider", "planar", "rod"]
-    """A unit vector, a length, a number, a whole number, a slider's mass (TOML key `slider`), a
-    body in a plane, a rod."""
+    role: KeyRole
+    help: str
+    """What it is, in a line, with its letter, its frame and its unit: for files and pages."""
     body: str = ""
     """The letter of the body whose inertia it is: "p", "u" or "l"."""
     default: Any = ...
     """What stands where a file does not give it; `...` where it must."""
+    example: Any = None
+    """A usual value, where the default is None."""
+
+
+COMMON: dict[str, Key] = {
+    "guide_point": Key("point", "r, where the leg is fixed in the base frame, m"),
+    "platform_point": Key("point", "s0, from P to the platform point, in the platform frame, m"),
+    "fixed_offset": Key(
+        "point",
+        "t0, added to it in the base frame: the part that does not turn with phi, m",
+        default=(0.0, 0.0, 0.0),
+    ),
+    "elbow": Key("sign", "sigma, 1 or -1: the side of the elbow", default=1),
+    "limits": Key("limits", "least and greatest joint coordinate, m or rad", default=None),
+}
+"""The keys that every kind of leg has; a kind may say more closely what they are."""
 
 
 Monomial = tuple[int, tuple[str, ...]]
@@ -86,6 +120,25 @@ class ReachBound(NamedTuple):
 
 
 _EquationsClass = type[LegEquations]
+
+
+def _checked(value: Any, name: str, role: KeyRole) -> Any:
+    """Return what a field holds, or say what is wrong with it."""
+    if role == "point":
+        return vector(value, name)
+    if role == "direction":
+        return unit_vector(value, name)
+    if role == "length":
+        return positive(value, name, "m")
+    if role == "number":
+        return number(value, name)
+    if role == "slider":
+        return positive(value, "slider.mass", "kg")
+    if role == "sign":
+        return 1 if value == 1 else -1
+    if role == "limits":
+        return interval(value, name)
+    return value
 
 
 class LegKind(ABC):
@@ -125,46 +178,30 @@ class LegKind(ABC):
     account: ClassVar[str] = ""
     """How it is built, in a few sentences for a report; vectors by their letters r, d, e, k, s0."""
     keys: ClassVar[Mapping[str, Key]]
-    """The fields of its own, which are its TOML keys, and what they hold."""
+    """The fields of its own, which are its TOML keys, and what they hold; see `every_key`."""
     equations_class: ClassVar[_EquationsClass]
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
     def __post_init__(self) -> None:
-        checked: dict[str, Any] = {
-            name: vector(getattr(self, name), name)
-            for name in ("guide_point", "platform_point", "fixed_offset")
-        }
         if self.elbow not in self.branches:
             valid = "neither 1 nor -1" if len(self.branches) > 1 else "not 1, its only branch"
             raise ModelError(f"elbow: {self.elbow!r} is {valid}")
-        checked["elbow"] = 1 if self.elbow == 1 else -1
-        if self.limits is not None:
-            low, high = checked["limits"] = numbers(self.limits, "limits", 2)
-            if low >= high:
-                raise ModelError(
-                    f"limits: {low:g} {self.joint.unit} is not below {high:g} {self.joint.unit}; "
-                    "give [least, most]"
-                )
-        for name, key in self.keys.items():
+        for name, key in self.every_key().items():
             value = getattr(self, name)
-            if value is None and key.default is None:
-                continue
-            if key.role == "direction":
-                checked[name] = unit_vector(value, name)
-            elif key.role == "length":
-                checked[name] = positive(value, name, "m")
-            elif key.role == "number":
-                checked[name] = number(value, name)
-            elif key.role == "slider":
-                checked[name] = positive(value, "slider.mass", "kg")
-        for name, value in checked.items():
-            object.__setattr__(self, name, value)
+            if value is not None or key.default is not None:
+                object.__setattr__(self, name, _checked(value, name, key.role))
+
+    @classmethod
+    def every_key(cls) -> dict[str, Key]:
+        """Return all its keys, in the order in which files and pages give them."""
+        roles, found = get_args(KeyRole), {**COMMON, **cls.keys}
+        return dict(sorted(found.items(), key=lambda item: roles.index(item[1].role)))
 
     @property
     def bodies(self) -> dict[str, Inertia]:
         """The inertia of its bodies, by letter in the order "p", "u", "l"."""
         found: dict[str, Inertia] = {}
-        for name, key in self.keys.items():
+        for name, key in self.every_key().items():
             if key.body:
                 value = getattr(self, name)
                 found[key.body] = PointMass(value) if key.role == "slider" else value
@@ -220,53 +257,6 @@ class LegKind(ABC):
     def reach_text(self) -> str:
         """How far it reaches, as a clause for messages: "its links span 0.1 to 0.4 m"."""
 
-    @classmethod
-    def table(cls) -> dict[str, Any]:
-        """Return the TOML keys of its own: name -> (type, default), as pydantic takes them."""
-        from pteron.bodies import tables
-
-        types: dict[str, Any] = {
-            "direction": tables.Three,
-            "length": tables.Number,
-            "number": tables.Number,
-            "count": tables.Count,
-            "slider": tables.Slider,
-            "planar": tables.PlanarBody,
-            "rod": tables.RodBody,
-        }
-        found = {}
-        for name, key in cls.keys.items():
-            kind = types[key.role]
-            optional = key.default is None
-            toml = "slider" if key.role == "slider" else name
-            found[toml] = (kind | None if optional else kind, key.default)
-        return found
-
-    @classmethod
-    def of_table(cls, table: Any) -> Self:
-        """Build the leg from a table that has been read."""
-        values: dict[str, Any] = {
-            name: getattr(table, name)
-            for name in ("guide_point", "platform_point", "fixed_offset", "elbow", "limits")
-        }
-        for name, key in cls.keys.items():
-            if key.role == "slider":
-                values[name] = table.slider.mass
-            elif key.body:
-                values[name] = getattr(table, name).inertia_of(name)
-            else:
-                values[name] = getattr(table, name)
-        return cls(**values)
-
-    def as_table(self) -> dict[str, Any]:
-        """Return the TOML keys of its own, for `save`."""
-        return {
-            "slider" if key.role == "slider" else name: self.bodies[key.body]
-            if key.body
-            else getattr(self, name)
-            for name, key in self.keys.items()
-        }
-
     @property
     def extents(self) -> dict[str, tuple[str, float, float, str]]:
         """Where a body's mass is expected: its TOML key, least and greatest x, what is there."""
@@ -276,6 +266,20 @@ class LegKind(ABC):
     def size(self) -> float:
         """The length that its reach is measured by, m."""
         return sum(float(q.value[0]) for q in self.quantities if q.role == "length")
+
+    def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
+        """Return its passive joints that have limits.
+
+        The platform's axes are the columns (3, 3) of `turned`, and of `still` at phi = 0.
+        """
+        return []
+
+    def doubts(self, axis: Vector | None) -> Iterator[str]:
+        """Yield what is possible but unlikely in it, beside what is so in any leg.
+
+        The platform turns about `axis`, if it does.
+        """
+        yield from ()
 
     def equations(self, values: Mapping[str, Expression] | None = None) -> LegEquations:
         """Return its equations, for its own geometry or for other values of the quantities."""

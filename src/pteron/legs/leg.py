@@ -78,6 +78,19 @@ class LegMotion(NamedTuple):
     that describes their motion."""
 
 
+class Passive(NamedTuple):
+    """A passive joint that has limits, and where it is."""
+
+    noun: str
+    """What it is, for messages: "elbow"."""
+    unit: str
+    value: Expression
+    least: float
+    most: float
+    lever: float
+    """Metres that the leg moves per unit of it."""
+
+
 class Needs(NamedTuple):
     """The forces that a leg's bodies need, rows of K columns as their parameters have."""
 

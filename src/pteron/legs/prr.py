@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self
@@ -12,10 +13,11 @@ from pteron.bodies.inertia import PlanarInertia, PointMass
 from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, PointMotion
 from pteron.bodies.vectors import Vector, perpendicular
 from pteron.legs.circles import perpendicular_to, plane_of, quarter_turn
+from pteron.legs.cones import check_elbow, within
 from pteron.legs.kind import Key, Quantity
-from pteron.legs.leg import Circle, Joint, Needs
+from pteron.legs.leg import Circle, Joint, LegMotion, Needs, Passive
 from pteron.legs.planar_links import Turning, last_joints, lower_link_body
-from pteron.legs.slide import SlideEquations, SlideLeg, SlideState
+from pteron.legs.slide import SLIDER_KEYS, SlideEquations, SlideLeg, SlideState
 
 
 @dataclass(frozen=True)
@@ -46,10 +48,13 @@ class PRR(SlideLeg):
         t0, the part of the platform point that does not turn with phi, in the base frame, m.
     direction : unit vector, optional
         d, of the two revolute axes: the normal of the platform's plane, which is its default.
+    elbow_limits : (float, float), optional
+        Least and greatest angle of the link against the guide, about d: 0 where it is along it.
     """
 
     lower: PlanarInertia
     direction: Vector | None = None
+    elbow_limits: tuple[float, float] | None = None
 
     type = "PRR"
     names: ClassVar = {"p": "slider", "l": "link"}
@@ -60,20 +65,42 @@ class PRR(SlideLeg):
     )
 
     keys: ClassVar = {
-        "direction": Key("direction", default=None),
-        "slider_direction": Key("direction"),
-        "lower_length": Key("length"),
-        "slider_mass": Key("slider", "p"),
-        "lower": Key("planar", "l"),
+        **SLIDER_KEYS,
+        "slider_direction": Key("direction", "e, of the guide, in the platform's plane"),
+        "direction": Key(
+            "direction",
+            "d, of the revolute axes: along the platform's axis, and this where left out",
+            default=None,
+            example=[0.0, 0.0, 1.0],
+        ),
+        "lower_length": Key("length", "ll, of the link, m"),
+        "elbow_limits": Key(
+            "limits",
+            "least and greatest angle of the link against the guide, rad, within -pi/2 and pi/2: "
+            "0 where it is along the guide, by the right hand about direction",
+            default=None,
+            example=[-1.2, 1.2],
+        ),
+        "lower": Key(
+            "planar", "the link: origin at the platform point, x from the slider to there", "l"
+        ),
     }
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        check_elbow(self.elbow_limits, -0.5 * math.pi, 0.5 * math.pi)
         if self.direction is not None:
             e = perpendicular(
                 self.slider_direction, self.direction, "slider_direction", "the plane's normal"
             )
             object.__setattr__(self, "slider_direction", e)
+
+    def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
+        # The branch keeps the link ahead of the slider along sigma e.
+        ahead, link = self.elbow * ca.SX(list(self.slider_direction)), motion.links[1]
+        across = ca.cross(ca.SX(list(self.plane_normal)), ahead)
+        angle = ca.atan2(ca.dot(link, across), ca.dot(link, ahead))
+        return within("link", "rad", angle, self.elbow_limits, self.lower_length)
 
     def under(self, axis: Vector) -> Self:
         return replace(self, direction=axis) if self.direction is None else self

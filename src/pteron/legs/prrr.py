@@ -26,10 +26,12 @@ from pteron.legs.circles import (
     random_triangle,
     squared_reach,
 )
+from pteron.legs.cones import ELBOW_LIMITS, between, check_elbow, within
 from pteron.legs.crank import ELBOW
 from pteron.legs.kind import SLIDER, Key, LegKind, Quantity, ReachBound, Transfer
-from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Plane, Reach
+from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Passive, Plane, Reach
 from pteron.legs.planar_links import Turning, last_joints, link_body, lower_link_body
+from pteron.legs.slide import SLIDER_KEYS
 from pteron.legs.two_bar import two_bar_needs
 
 _LEAST_SLIDE = 1e-6
@@ -64,6 +66,8 @@ class PRRR(LegKind):
         Least and greatest slider coordinate, m.
     fixed_offset : vector
         t0, the part of the platform point that does not turn with phi, in the base frame, m.
+    elbow_limits : (float, float), optional
+        Least and greatest angle between the links: 0 where stretched, pi where folded.
     """
 
     guide_point: Vector
@@ -78,6 +82,7 @@ class PRRR(LegKind):
     elbow: int = 1
     limits: tuple[float, float] | None = None
     fixed_offset: Vector = (0.0, 0.0, 0.0)
+    elbow_limits: tuple[float, float] | None = None
 
     type = "PRRR"
     joint = SLIDER
@@ -90,17 +95,30 @@ class PRRR(LegKind):
     )
 
     keys: ClassVar = {
-        "direction": Key("direction"),
-        "slider_direction": Key("direction", default=None),
-        "upper_length": Key("length"),
-        "lower_length": Key("length"),
-        "slider_mass": Key("slider", "p"),
-        "upper": Key("planar", "u"),
-        "lower": Key("planar", "l"),
+        **SLIDER_KEYS,
+        "direction": Key("direction", "d, of the revolute axes R1, R2 and R3"),
+        "slider_direction": Key(
+            "direction",
+            "e, of the guide; direction where left out",
+            default=None,
+            example=[1.0, 0.0, 0.0],
+        ),
+        "upper_length": Key("length", "lu, of the upper link, R1 to R2, m"),
+        "lower_length": Key("length", "ll, of the lower link, R2 to R3, m"),
+        "elbow": Key(
+            "sign",
+            "sigma: 1 where the upper link is turned by the right hand about direction from the "
+            "line between R1 and R3, -1 where by the left",
+            default=1,
+        ),
+        "elbow_limits": ELBOW_LIMITS,
+        "upper": Key("planar", "the upper link: origin on R1, x along it to R2", "u"),
+        "lower": Key("planar", "the lower link: origin on R3, x along it from R2 to R3", "l"),
     }
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        check_elbow(self.elbow_limits)
         if abs(dot(self.direction, self.e)) < _LEAST_SLIDE:
             raise ModelError(
                 f"slider_direction: {list(self.e)} is perpendicular to direction "
@@ -127,6 +145,10 @@ class PRRR(LegKind):
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return (self.direction,) if axis is None else (self.direction, axis)
+
+    def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
+        angle = between(*motion.links)
+        return within("elbow", "rad", angle, self.elbow_limits, self.lower_length)
 
     @property
     def joint_axis(self) -> Vector:

@@ -6,18 +6,20 @@ joints of a rod are counted as universal ones: a rod's spin about itself moves n
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import ClassVar
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
 
 import casadi as ca
 
 from pteron.bodies.inertia import PointMass, RodInertia
 from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, PointMotion
 from pteron.bodies.vectors import Vector
+from pteron.legs.cones import Cone
 from pteron.legs.kind import Key, Quantity
-from pteron.legs.leg import Joint, Sphere
-from pteron.legs.rods import free_axes, rod_body, universal_joints
-from pteron.legs.slide import SlideEquations, SlideLeg, SlideState
+from pteron.legs.leg import Joint, LegMotion, Passive, Sphere
+from pteron.legs.rods import ROD_KEYS, cones, free_axes, hinge_doubts, rod_body, universal_joints
+from pteron.legs.slide import SLIDER_KEYS, SlideEquations, SlideLeg, SlideState
 
 
 @dataclass(frozen=True)
@@ -49,11 +51,16 @@ class PSS(SlideLeg):
     bar_direction : unit vector, optional
         Of the bar between the ends of parallel rods. Where it is given the machine is checked: the
         bars must keep the platform from tilting.
+    tip_cone, platform_cone : Cone, optional
+        Where the ball joints at the rod's ends let it point: at the slider in the base frame, at
+        the platform in the platform's, which for parallel rods is that at phi = 0.
     """
 
     lower: RodInertia
     rods: int = 2
     bar_direction: Vector | None = None
+    tip_cone: Cone | None = None
+    platform_cone: Cone | None = None
 
     type = "PSS"
     names: ClassVar = {"p": "slider", "l": "rod"}
@@ -64,12 +71,21 @@ class PSS(SlideLeg):
     )
 
     keys: ClassVar = {
-        "slider_direction": Key("direction"),
-        "lower_length": Key("length"),
-        "rods": Key("count", default=2),
-        "bar_direction": Key("direction", default=None),
-        "slider_mass": Key("slider", "p"),
-        "lower": Key("rod", "l"),
+        **SLIDER_KEYS,
+        **ROD_KEYS,
+        "bar_direction": Key(
+            "direction",
+            "of the bars at the ends of parallel rods; where given, the bars are checked to keep "
+            "the platform from tilting",
+            default=None,
+            example=[0.0, 1.0, 0.0],
+        ),
+        "tip_cone": Key(
+            "cone",
+            "how far the rod may lean at the slider; axis in the base frame",
+            default=None,
+            example={"axis": [0.0, 0.0, -1.0], "angle": 0.8},
+        ),
     }
 
     @property
@@ -84,6 +100,18 @@ class PSS(SlideLeg):
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return free_axes(self.rods, self.bar_direction, axis)
+
+    def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
+        return cones(self, motion, ca.SX.eye(3), still, turned)
+
+    def doubts(self, axis: Vector | None) -> Iterator[str]:
+        return hinge_doubts(self, axis)
+
+    def turned(self, turn: Any) -> Self:
+        moved = super().turned(turn)
+        if self.tip_cone is None:
+            return moved
+        return replace(moved, tip_cone=replace(self.tip_cone, axis=turn(self.tip_cone.axis)))
 
 
 class PSSEquations(SlideEquations):

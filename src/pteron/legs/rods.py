@@ -2,11 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import Any
+
 import casadi as ca
 
 from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, PointMotion
-from pteron.bodies.vectors import Vector
-from pteron.legs.leg import Joint
+from pteron.bodies.vectors import Vector, parallel
+from pteron.legs.cones import within_cone
+from pteron.legs.kind import Key
+from pteron.legs.leg import Joint, LegMotion, Passive
+
+ROD_KEYS: dict[str, Key] = {
+    "lower_length": Key("length", "ll, of the rod, m"),
+    "rods": Key(
+        "count", "parallel rods, which keep their bars parallel; lower is their sum", default=2
+    ),
+    "platform_cone": Key(
+        "cone",
+        "how far the rod may lean at the platform; axis in the platform frame, at phi = 0 for "
+        "parallel rods",
+        default=None,
+        example={"axis": [0.0, 0.0, 1.0], "angle": 0.8},
+    ),
+    "lower": Key("rod", "the rods: origin at the platform point, x along them to there", "l"),
+}
+"""The keys that legs with a rod share."""
 
 
 def free_axes(rods: int, bar: Vector | None, axis: Vector | None) -> tuple[Vector, ...]:
@@ -18,6 +39,40 @@ def free_axes(rods: int, bar: Vector | None, axis: Vector | None) -> tuple[Vecto
     if rods == 1:
         return (1, 0, 0), (0, 1, 0), (0, 0, 1)
     return tuple(v for v in (bar, axis) if v is not None)
+
+
+def cones(
+    leg: Any, motion: LegMotion, tip: Expression, still: Expression, turned: Expression
+) -> list[Passive]:
+    """Return the ball joints at the ends of a leg's rod that have cones.
+
+    The columns of `tip` are the axes of the body that carries the rod, those of `still` and
+    `turned` the platform's. The bars of parallel rods do not turn, nor does what has a fixed
+    offset.
+    """
+    rod, length = motion.links[1], leg.lower_length
+    assert rod is not None
+    socket = turned if leg.rods == 1 and not any(leg.fixed_offset) else still
+    return [
+        *within_cone("rod at its tip", leg.tip_cone, tip, rod, length),
+        *within_cone("rod at the platform", leg.platform_cone, socket, -rod, length),
+    ]
+
+
+def hinge_doubts(leg: Any, axis: Vector | None) -> Iterator[str]:
+    """Yield it where parallel rods would keep their end of the platform from turning about an axis.
+
+    The file does not tell whether their bar is on a hinge at the platform point; of an articulated
+    platform it is where the fixed offset begins.
+    """
+    x, y, _ = leg.platform_point
+    alone = leg.rods == 1 or any(leg.fixed_offset) or x == y == 0.0
+    if axis is None or alone or (leg.bar_direction and parallel(leg.bar_direction, axis)):
+        return
+    yield (
+        "platform_point: turns with phi, but parallel rods keep their bar from turning: is the bar "
+        "on a hinge there? What does not turn belongs in fixed_offset"
+    )
 
 
 def rod_body(point: PointMotion, n: Expression, ddn: Expression, swing: Expression) -> BodyMotion:

@@ -14,9 +14,10 @@ from pteron.bodies.inertia import PlanarInertia
 from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, PointMotion
 from pteron.bodies.vectors import Vector
 from pteron.legs.circles import random_triangle
-from pteron.legs.crank import CrankEquations, CrankLeg, CrankState
+from pteron.legs.cones import ELBOW_LIMITS, between, check_elbow, within
+from pteron.legs.crank import CRANK_KEYS, CrankEquations, CrankLeg, CrankState
 from pteron.legs.kind import Key
-from pteron.legs.leg import Circle, Joint
+from pteron.legs.leg import Circle, Joint, LegMotion, Passive
 from pteron.legs.planar_links import Turning, last_joints, lower_link_body
 
 
@@ -50,9 +51,12 @@ class RRR(CrankLeg):
         Least and greatest crank angle, rad.
     fixed_offset : vector
         t0, the part of the platform point that does not turn with phi, in the base frame, m.
+    elbow_limits : (float, float), optional
+        Least and greatest angle between the links: 0 where stretched, pi where folded.
     """
 
     lower: PlanarInertia
+    elbow_limits: tuple[float, float] | None = None
 
     type = "RRR"
     names: ClassVar = {"u": "crank", "l": "lower link"}
@@ -64,16 +68,28 @@ class RRR(CrankLeg):
     )
 
     keys: ClassVar = {
-        "direction": Key("direction"),
-        "zero_direction": Key("direction"),
-        "upper_length": Key("length"),
-        "lower_length": Key("length"),
-        "upper": Key("planar", "u"),
-        "lower": Key("planar", "l"),
+        **CRANK_KEYS,
+        "direction": Key(
+            "direction",
+            "d, the crank's axis: along the platform's axis; angles count by the right hand",
+        ),
+        "lower_length": Key("length", "ll, of the lower link, m"),
+        "elbow_limits": ELBOW_LIMITS,
+        "lower": Key(
+            "planar", "the lower link: origin at the platform point, x from the elbow to there", "l"
+        ),
     }
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_elbow(self.elbow_limits)
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return (self.direction,)
+
+    def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
+        angle = between(*motion.links)
+        return within("elbow", "rad", angle, self.elbow_limits, self.lower_length)
 
     @property
     def plane_normal(self) -> Vector:

@@ -6,7 +6,7 @@ joints of a rod are counted as universal ones (R-U-U): a rod's spin about itself
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from random import Random
@@ -19,10 +19,11 @@ from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, PointMotio
 from pteron.bodies.vectors import Vector, cross, parallel
 from pteron.errors import ModelError
 from pteron.legs.circles import random_direction, random_fraction
-from pteron.legs.crank import CrankEquations, CrankLeg, CrankState
+from pteron.legs.cones import Cone
+from pteron.legs.crank import CRANK_KEYS, CrankEquations, CrankLeg, CrankState
 from pteron.legs.kind import Key
-from pteron.legs.leg import Joint, Sphere
-from pteron.legs.rods import free_axes, rod_body, universal_joints
+from pteron.legs.leg import Joint, LegMotion, Passive, Sphere
+from pteron.legs.rods import ROD_KEYS, cones, free_axes, hinge_doubts, rod_body, universal_joints
 
 
 @dataclass(frozen=True)
@@ -59,11 +60,16 @@ class RSS(CrankLeg):
     bar_direction : unit vector, optional
         Of the bar between the ends of parallel rods; along `direction`, the only one that the crank
         does not turn.
+    tip_cone, platform_cone : Cone, optional
+        Where the ball joints at the rod's ends let it point: at the crank's end in the crank's
+        frame, at the platform in the platform's, which for parallel rods is that at phi = 0.
     """
 
     lower: RodInertia
     rods: int = 2
     bar_direction: Vector | None = None
+    tip_cone: Cone | None = None
+    platform_cone: Cone | None = None
 
     type = "RSS"
     names: ClassVar = {"u": "crank", "l": "rod"}
@@ -75,14 +81,20 @@ class RSS(CrankLeg):
     )
 
     keys: ClassVar = {
-        "direction": Key("direction"),
-        "zero_direction": Key("direction"),
-        "upper_length": Key("length"),
-        "lower_length": Key("length"),
-        "rods": Key("count", default=2),
-        "bar_direction": Key("direction", default=None),
-        "upper": Key("planar", "u"),
-        "lower": Key("rod", "l"),
+        **CRANK_KEYS,
+        **ROD_KEYS,
+        "bar_direction": Key(
+            "direction",
+            "of the bars at the ends of parallel rods: along direction",
+            default=None,
+            example=[0.0, 1.0, 0.0],
+        ),
+        "tip_cone": Key(
+            "cone",
+            "how far the rod may lean at the crank's end; axis in the crank's frame",
+            default=None,
+            example={"axis": [1.0, 0.0, 0.0], "angle": 2.6},
+        ),
     }
 
     def __post_init__(self) -> None:
@@ -95,6 +107,13 @@ class RSS(CrankLeg):
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return free_axes(self.rods, self.direction, axis)
+
+    def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
+        crank = motion.bodies["u"]
+        return cones(self, motion, ca.horzcat(crank.x, crank.y, crank.axes), still, turned)
+
+    def doubts(self, axis: Vector | None) -> Iterator[str]:
+        return hinge_doubts(self, axis)
 
     @property
     def reach_text(self) -> str:

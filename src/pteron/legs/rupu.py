@@ -6,6 +6,7 @@ from the base to the platform point. The cardan error of its joints is left out.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
@@ -16,9 +17,13 @@ from pteron.bodies.motion import AngleMotion, Expression, PointMotion
 from pteron.bodies.vectors import Vector
 from pteron.errors import ModelError
 from pteron.legs.circles import perpendicular_to
+from pteron.legs.cones import within
 from pteron.legs.kind import CRANK, Key, LegKind, Quantity, Transfer
-from pteron.legs.leg import Joint, LegEquations, LegMotion, Reach, Turned
+from pteron.legs.leg import Joint, LegEquations, LegMotion, Passive, Reach, Turned
 from pteron.legs.rods import rod_body, universal_joints
+
+_FAST = 10.0
+"""Ratio beyond which a gear is likelier to be the motor's."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +50,8 @@ class RUPU(LegKind):
         t0, the part of the platform point that does not turn with phi, in the base frame, m.
     direction : unit vector, optional
         Of the joint's axis: the platform's, which is its default.
+    travel : (float, float), optional
+        Least and greatest length of the shaft, m.
     """
 
     guide_point: Vector
@@ -56,6 +63,7 @@ class RUPU(LegKind):
     limits: tuple[float, float] | None = None
     fixed_offset: Vector = (0.0, 0.0, 0.0)
     direction: Vector | None = None
+    travel: tuple[float, float] | None = None
 
     type = "RUPU"
     joint = CRANK
@@ -70,10 +78,35 @@ class RUPU(LegKind):
     )
 
     keys: ClassVar = {
-        "direction": Key("direction", default=None),
-        "ratio": Key("number", default=1.0),
-        "upper": Key("rod", "u"),
-        "lower": Key("rod", "l"),
+        "guide_point": Key("point", "r, the shaft's universal joint on the base, m"),
+        "direction": Key(
+            "direction",
+            "of the actuated joint's axis: the platform's where left out",
+            default=None,
+            example=[0.0, 0.0, 1.0],
+        ),
+        "ratio": Key("number", "the joint's angle over phi", default=1.0),
+        "elbow": Key("sign", "1: a shaft has but one branch", default=1),
+        "limits": Key(
+            "limits",
+            "least and greatest angle of the joint, rad",
+            default=None,
+            example=[-3.0, 3.0],
+        ),
+        "travel": Key(
+            "limits",
+            "least and greatest length of the shaft between its universal joints, m",
+            default=None,
+            example=[0.3, 0.6],
+        ),
+        "upper": Key(
+            "rod", "the part at the base: origin at guide_point, x along it to the platform", "u"
+        ),
+        "lower": Key(
+            "rod",
+            "the part at the platform: origin at the platform point, x as upper's",
+            "l",
+        ),
     }
 
     def __post_init__(self) -> None:
@@ -97,6 +130,20 @@ class RUPU(LegKind):
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return (1, 0, 0), (0, 1, 0), (0, 0, 1)
+
+    def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
+        return within("shaft", "m", ca.norm_2(motion.links[1]), self.travel, 1.0)
+
+    def doubts(self, axis: Vector | None) -> Iterator[str]:
+        if not 1.0 / _FAST <= abs(self.ratio) <= _FAST:
+            yield (
+                f"ratio: {self.ratio:g} rad of the joint per rad of phi: is that the motor's gear? "
+                "The joint is the shaft's end at the base"
+            )
+        if self.upper.first_moment[0] < 0.0:
+            yield "upper: center_of_mass: x is negative, towards the base joint's other side"
+        if self.lower.first_moment[0] > 0.0:
+            yield "lower: center_of_mass: x is positive, beyond the platform point"
 
     @property
     def joint_axis(self) -> Vector:

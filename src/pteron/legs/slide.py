@@ -15,8 +15,27 @@ import casadi as ca
 
 from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, PointMotion
 from pteron.bodies.vectors import Vector
-from pteron.legs.kind import SLIDER, LegKind, ReachBound, Transfer
+from pteron.legs.kind import SLIDER, Key, LegKind, ReachBound, Transfer
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Reach
+
+SLIDER_KEYS: dict[str, Key] = {
+    "guide_point": Key("point", "r, the point of the guide where its coordinate is 0, m"),
+    "slider_direction": Key("direction", "e, of the guide"),
+    "elbow": Key(
+        "sign",
+        "sigma: 1 where the platform point is ahead of the slider along slider_direction, -1 "
+        "where it is behind",
+        default=1,
+    ),
+    "limits": Key(
+        "limits",
+        "least and greatest coordinate of the slider, m",
+        default=None,
+        example=[-0.3, 0.3],
+    ),
+    "slider_mass": Key("slider", "the slider's mass, kg", "p"),
+}
+"""The keys that legs with a slider share."""
 
 
 @dataclass(frozen=True)

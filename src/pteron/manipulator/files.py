@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field, is_dataclass
 from difflib import get_close_matches
-from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, TypeVar
 
 from pteron.atomic import write_text
-from pteron.bodies.inertia import PointMass
 from pteron.errors import ModelError, shown
-from pteron.legs import KINDS
-from pteron.manipulator.manipulator import STANDARD_GRAVITY, Manipulator
+from pteron.legs import KINDS, LegKind
+from pteron.manipulator.manipulator import Manipulator, faults_of
 from pteron.platforms import Bar, Geared, Platform
-from pteron.platforms.platform import Motion
 from pteron.toml import fault_lines, parsed_toml, read_toml, told
 
 _Built = TypeVar("_Built")
@@ -55,34 +52,65 @@ def load(name_or_path: str | Path) -> Manipulator:
     >>> pteron.load("tripteron").coordinates
     ('x', 'y', 'z')
     """
+    return _machine(document(name_or_path), str(name_or_path))
+
+
+def document(name_or_path: str | Path) -> dict[str, Any]:
+    """Return what the file of a machine holds, unchecked.
+
+    Raises
+    ------
+    ModelError
+        If there is no such file, or it is not TOML.
+    """
     name = str(name_or_path)
     if name in catalog():
         resource = files("pteron.manipulator") / "catalog" / f"{name}.toml"
-        return _machine(parsed_toml(resource.read_bytes(), name, ModelError), name)
+        return parsed_toml(resource.read_bytes(), name, ModelError)
     close = get_close_matches(name, catalog(), n=1)
     guess = f'; did you mean "{close[0]}"?' if close else ""
     names = ", ".join(catalog())
     absent = f"neither a file nor a machine of the catalog ({names}){guess}"
-    return _machine(read_toml(name_or_path, ModelError, absent), name)
+    return read_toml(name_or_path, ModelError, absent)
+
+
+def explained(name_or_path: str | Path) -> str:
+    """Return the text of a file of a machine like a given one, which says what every key is.
+
+    Parameters
+    ----------
+    name_or_path : str or path
+        A catalog name, or the path of a file.
+
+    Raises
+    ------
+    ModelError
+        As `load`.
+    """
+    from pteron.manipulator.writing import written
+
+    given = document(name_or_path)
+    name = _machine(given, str(name_or_path)).name
+    legs = [{"type": _DEFAULT_KIND, **leg} for leg in given["legs"]]
+    about = (f"Made after {shown(name, bare=True)}. Put in your numbers, then: pteron check FILE",)
+    return written({**given, "name": f"my {name}", "legs": legs}, explained=True, about=about)
 
 
 def _machine(document: dict[str, Any], source: str) -> Manipulator:
-    source, reading = shown(source, bare=True, longest=1000), _Reading()
-    machine = reading.table(_machine_table(), document, "")
+    from pteron.manipulator.tables import MachineTable
+
+    reading = _Reading()
+    machine = reading.table(MachineTable, document, "")
     platform = machine and reading.built("platform.", lambda: _platform(machine.platform))
     given = document.get("legs")
-    legs = [
-        reading.leg(i, leg)
-        for i, leg in enumerate(given if isinstance(given, list) else [], start=1)
-    ]
-    if not reading.faults and machine is not None and platform is not None:
-        robot = reading.built(
-            "", lambda: Manipulator(machine.name, platform, tuple(legs), machine.gravity)
-        )
-        if robot is not None:
-            return robot
-    faults = tuple(f"{source}: {fault}" for fault in reading.faults)
-    raise ModelError(told(source, reading.faults), faults=faults)
+    legs = given if isinstance(given, list) else []
+    built: list[Any] = [reading.leg(i, leg) for i, leg in enumerate(legs, start=1)]
+    if platform is not None:
+        reading.faults += faults_of(machine.name, platform, built)
+        if not reading.faults:
+            return Manipulator(machine.name, platform, tuple(built), machine.gravity)
+    subject = shown(source, bare=True, longest=1000)
+    raise ModelError(told(reading.faults), subject=subject, faults=reading.faults)
 
 
 @dataclass
@@ -109,8 +137,10 @@ class _Reading:
             self.faults.append(f"{prefix}{error}")
             return None
 
-    def leg(self, i: int, given: object) -> Any:
+    def leg(self, i: int, given: object) -> LegKind | None:
         """Return leg i, from 1, or None."""
+        from pteron.manipulator.tables import leg_of, leg_table
+
         prefix = f"leg {i}: "
         if not isinstance(given, dict):
             self.faults.append(f"{prefix}{shown(given)} given, a table [[legs]] expected")
@@ -120,55 +150,8 @@ class _Reading:
         if kind is None:
             self.faults.append(f"{prefix}type: {shown(name)} is not one of {', '.join(KINDS)}")
             return None
-        table = self.table(_leg_table(kind.type), given, prefix)
-        return table and self.built(prefix, lambda: kind.of_table(table))
-
-
-@lru_cache(maxsize=1)
-def _machine_table() -> Any:
-    """Return what a file may hold; each of `legs` is read by its own kind."""
-    from pydantic import create_model
-
-    from pteron.bodies import tables
-
-    platform = create_model(
-        "PlatformTable",
-        __base__=tables.PlanarBody,
-        motion=(Motion, ...),
-        axis=(tables.Three, (0.0, 0.0, 1.0)),
-        x_axis=(tables.Three | None, None),
-        slides=(bool, False),
-        tool=(tables.Three, (0.0, 0.0, 0.0)),
-        bars=(list[tables.Bar], []),
-        geared=(list[tables.Geared], []),
-    )
-    return create_model(
-        "MachineTable",
-        __base__=tables.Table,
-        name=(str, ...),
-        gravity=(tables.Three, STANDARD_GRAVITY),
-        platform=(platform, ...),
-        legs=(list[Any], ...),
-    )
-
-
-@lru_cache(maxsize=16)
-def _leg_table(kind: str) -> Any:
-    """Return what a table of `[[legs]]` may hold, for a kind of leg."""
-    from pydantic import AliasChoices, Field, create_model
-
-    from pteron.bodies import tables
-
-    limits = Field(None, validation_alias=AliasChoices("limits", "slider_limits"))
-    keys: dict[str, Any] = {
-        "type": (str, kind),
-        "guide_point": (tables.Three, ...),
-        "platform_point": (tables.Three, ...),
-        "fixed_offset": (tables.Three, (0.0, 0.0, 0.0)),
-        "elbow": (Literal[1, -1], 1),
-        "limits": (tables.Two | None, limits),
-    }
-    return create_model(f"{kind}Table", __base__=tables.Table, **keys, **KINDS[kind].table())
+        table = self.table(leg_table(kind), given, prefix)
+        return table and self.built(prefix, lambda: leg_of(kind, table))
 
 
 def _platform(table: Any) -> Platform:
@@ -178,6 +161,7 @@ def _platform(table: Any) -> Platform:
         axis=table.axis,
         x_axis=table.x_axis,
         slides=table.slides,
+        limits=table.limits,
         tool=table.tool,
         bars=tuple(Bar(bar.mass, bar.hinge) for bar in table.bars),
         geared=tuple(Geared(part.inertia, part.ratio) for part in table.geared),
@@ -204,53 +188,24 @@ def save(robot: Manipulator, path: str | Path) -> Path:
     OutputError
         If the file cannot be written.
     """
-    import tomlkit
+    from pteron.manipulator.tables import leg_items
+    from pteron.manipulator.writing import written
 
-    document = tomlkit.document()
-    document.add(
-        tomlkit.comment("A parallel manipulator for Pteron. SI units: m, kg, kg m, kg m^2, m/s^2.")
-    )
-    document.add("name", tomlkit.item(robot.name))
-    document.add("gravity", tomlkit.item(list(robot.gravity)))
     x, _, axis = robot.platform.frame
     platform: dict[str, Any] = {"motion": robot.platform.motion, "axis": axis, "x_axis": x}
-    platform |= {"slides": robot.platform.slides or None, "tool": robot.platform.tool}
-    platform |= _body(robot.platform.inertia)
-    table = _table(platform)
-    for name in ("bars", "geared"):
-        if parts := getattr(robot.platform, name):
-            table.add(name, tomlkit.aot())
-            for part in parts:
-                table[name].append(_table(asdict(part)))
-    document.add("platform", table)
-    legs = tomlkit.aot()
-    for leg in robot.legs:
-        common: dict[str, Any] = {"type": leg.type}
-        names = ("guide_point", "platform_point", "fixed_offset", "elbow", "limits")
-        common |= {name: getattr(leg, name) for name in names}
-        legs.append(_table(common | leg.as_table()))
-    document.add("legs", legs)
-    return write_text(path, tomlkit.dumps(document))
+    platform |= {"tool": robot.platform.tool, **asdict(robot.platform.inertia)}
+    for name in ("slides", "limits", "bars", "geared"):
+        if given := getattr(robot.platform, name):
+            platform[name] = given
+    legs = [{k: v for k, v in leg_items(leg).items() if v is not None} for leg in robot.legs]
+    machine = {"name": robot.name, "gravity": robot.gravity, "platform": platform, "legs": legs}
+    return write_text(path, written(_plain(machine)))
 
 
-def _table(items: dict[str, Any]) -> Any:
-    """Return a TOML table; what is None is left out, a body becomes an inline table."""
-    import tomlkit
-
-    table = tomlkit.table()
-    for key, value in items.items():
-        if isinstance(value, PointMass) or hasattr(value, "first_moment"):
-            inline = tomlkit.inline_table()
-            inline.update(_body(value))
-            table.add(key, inline)
-        elif isinstance(value, Sequence) and not isinstance(value, str):
-            table.add(key, list(value))
-        elif value is not None:
-            table.add(key, value)
-    return table
-
-
-def _body(body: Any) -> dict[str, Any]:
-    if isinstance(body, PointMass):
-        return {"mass": body.mass}
-    return {"mass": body.mass, "first_moment": list(body.first_moment), "inertia": body.inertia}
+def _plain(value: Any) -> Any:
+    """Return what a file holds: a body as a table, a tuple as a list."""
+    if isinstance(value, dict):
+        return {key: _plain(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    return asdict(value) if is_dataclass(value) and not isinstance(value, type) else value

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -16,6 +16,7 @@ from pteron.bodies.vectors import Vector, parallel, vector
 from pteron.errors import ModelError
 from pteron.legs import LegKind
 from pteron.platforms import Platform
+from pteron.toml import told
 
 _VANISHING = 1e-9
 """Singular value of unit vectors below which they do not span another direction."""
@@ -71,20 +72,10 @@ class Manipulator:
         return {key: value for key, value in self.__dict__.items() if key != "_hash"}
 
     def __post_init__(self) -> None:
-        if type(self.name) is not str or not self.name.strip():
-            raise ModelError(f"name: {self.name!r} is not a text with at least one letter")
         legs = tuple(self.legs)
-        freedom = len(self.platform.coordinates)
-        if len(legs) != freedom:
-            raise ModelError(
-                f"legs: {len(legs)} given, but a {self.platform.motion} platform has {freedom} "
-                f"freedoms and needs {freedom} legs"
-            )
-        for i, leg in enumerate(legs):
-            if not isinstance(leg, LegKind):
-                raise ModelError(f"legs[{i}]: {type(leg).__name__} given, a leg expected")
+        if faults := faults_of(self.name, self.platform, legs):
+            raise ModelError(told(faults), faults=faults)
         legs = tuple(leg.under(self.platform.axis) for leg in legs)
-        _check_constraints(self.platform, legs)
         object.__setattr__(self, "legs", legs)
         object.__setattr__(self, "gravity", vector(self.gravity, "gravity"))
 
@@ -123,63 +114,100 @@ def expect_manipulator(robot: object) -> None:
         raise ModelError(f"robot: {given} given, a Manipulator expected; pteron.load gives one")
 
 
-def _check_constraints(platform: Platform, legs: tuple[LegKind, ...]) -> None:
-    """Refuse legs that leave the platform another freedom than its motion has."""
-    for i, leg in enumerate(legs, start=1):
-        _check_plane(platform, i, leg)
-        if leg.follows_angle and (platform.slides or not platform.turns):
-            raise ModelError(
-                f"leg {i}: a {leg.type} leg turns the platform, but this {platform.motion} "
-                "platform does not turn; give it another leg or another motion"
-            )
-        if platform.slides and leg.platform_point[2] != 0.0:
-            raise ModelError(
-                f"leg {i}: platform_point: {leg.platform_point[2]:g} m/rad along the axis; what "
-                "slides moves across it, so give 0"
-            )
-    if platform.planar and all(leg.plane_normal is None for leg in legs):
-        raise ModelError(
-            f"legs: none keeps a {platform.motion} platform in its plane; give it a planar leg"
+def faults_of(name: object, platform: Platform, legs: Sequence[LegKind | None]) -> list[str]:
+    """Return all that is wrong with a machine, a line each; a leg that is None is wrong itself."""
+    found = []
+    if type(name) is not str or not name.strip():
+        found.append(f"name: {name!r} is not a text with at least one letter")
+    freedom = len(platform.coordinates)
+    if len(legs) != freedom:
+        found.append(
+            f"legs: {len(legs)} given, but a {platform.motion} platform has {freedom} freedoms and "
+            f"needs {freedom} legs"
         )
+    given = {i: leg for i, leg in enumerate(legs, start=1) if leg is not None}
+    found += [f"leg {i}: {fault}" for i, leg in given.items() for fault in _misfits(platform, leg)]
+    if found or len(given) < freedom:
+        return found
+    return _loose(platform, [leg.under(platform.axis) for leg in given.values()])
+
+
+def _misfits(platform: Platform, leg: object) -> Iterator[str]:
+    """Yield why a leg cannot carry a platform."""
+    if not isinstance(leg, LegKind):
+        yield f"{type(leg).__name__} given, a leg expected"
+        return
+    if leg.follows_angle and (platform.slides or not platform.turns):
+        yield (
+            f"a {leg.type} leg turns the platform, but this {platform.motion} platform does not "
+            "turn; give it another leg or another motion"
+        )
+    if platform.slides and leg.platform_point[2] != 0.0:
+        yield (
+            f"platform_point: {leg.platform_point[2]:g} m/rad along the axis; what slides moves "
+            "across it, so give 0"
+        )
+    try:
+        normal = leg.under(platform.axis).plane_normal
+    except ModelError as error:
+        yield str(error)
+        return
+    if normal is not None and not platform.planar:
+        yield (
+            f"a {leg.type} leg moves in a plane, which a {platform.motion} platform leaves; make "
+            'the platform\'s motion "2T" or "2T1R", or give it another leg'
+        )
+    elif normal is not None and not parallel(normal, platform.axis):
+        yield (
+            f"direction {list(normal)} is not along the platform's axis {list(platform.axis)}, the "
+            "normal of its plane"
+        )
+
+
+def _loose(platform: Platform, legs: list[LegKind]) -> list[str]:
+    """Return which freedom the legs leave the platform that its motion has not."""
+    turning = [i for i, leg in enumerate(legs, start=1) if leg.follows_angle]
+    if len(turning) > 1:
+        return [f"{told_legs(turning)}: all turn the platform, which takes one such leg"]
+    if platform.planar and all(leg.plane_normal is None for leg in legs):
+        return [f"legs: none keeps a {platform.motion} platform in its plane; give it a planar leg"]
     axis = platform.axis if platform.turns and not platform.slides else None
     # What one leg withholds is perpendicular to the axes about which it lets the platform turn.
-    withheld = np.vstack([_complement(leg.free_axes(axis)) for leg in legs])
-    sizes = np.linalg.svd(withheld, compute_uv=False) if len(withheld) else np.zeros(3)
-    rank = int((sizes > _VANISHING).sum())
-    if not platform.planar and axis is None and rank < 3:
-        raise ModelError(
-            "legs: all directions are parallel, or rods single, so that the platform is free to "
-            f"turn; a {platform.motion} platform needs two legs that are not parallel"
-        )
-    if not platform.planar and rank < 2:
-        raise ModelError(
-            "legs: all directions lie in one plane with the platform's axis, or rods are single, "
-            "so that the platform is free to tilt; turn one leg's direction out of that plane"
-        )
-    if platform.motion == "2T" and rank < 3:
+    withheld = [_complement(leg.free_axes(axis)) for leg in legs]
+    free = _complement(np.vstack([*withheld, *([axis] if axis else [])]))
+    if not len(free):
+        return []
+    if platform.motion == "2T":
         first, second = (_in_plane(platform, leg) for leg in legs)
-        if np.abs(first - second).max() > _COINCIDENT:
-            raise ModelError(
-                "legs: their platform points do not coincide, so that the platform is free to turn "
-                "about its axis; a 2T platform needs one point for both"
-            )
+        apart = float(np.linalg.norm(first - second))
+        if apart <= _COINCIDENT:
+            return []
+        return [
+            f"legs: their platform points are {apart:.4g} m apart, so that the platform is free to "
+            "turn about its axis; a 2T platform needs one point for both"
+        ]
+    single = [
+        i
+        for i, (leg, rows) in enumerate(zip(legs, withheld, strict=True), start=1)
+        if not len(rows) and not leg.follows_angle
+    ]
+    causes = [f"{told_legs(single)} keep it from no turn, as single rods do"] if single else []
+    if len(single) + len(turning) < len(legs):
+        whose = "the other directions" if single else "all directions"
+        where = "lie in one plane with it and the platform's axis" if axis else "are parallel to it"
+        causes.append(f"{whose} {where}")
+    about = [round(float(x), 3) + 0.0 for x in free[0]]
+    return [
+        f"legs: the platform is free to {'tilt' if axis else 'turn'} about {about}: "
+        f"{', and '.join(causes)}; turn a leg's direction, or the bar of its rods, elsewhere"
+        f"{', or make rods double' if single else ''}"
+    ]
 
 
-def _check_plane(platform: Platform, i: int, leg: LegKind) -> None:
-    """Refuse a planar leg under a platform that leaves the leg's plane."""
-    normal = leg.plane_normal
-    if normal is None:
-        return
-    if not platform.planar:
-        raise ModelError(
-            f"leg {i}: a {leg.type} leg moves in a plane, which a {platform.motion} platform "
-            'leaves; make the platform\'s motion "2T" or "2T1R", or give it another leg'
-        )
-    if not parallel(normal, platform.axis):
-        raise ModelError(
-            f"leg {i}: direction {list(normal)} is not along the platform's axis "
-            f"{list(platform.axis)}, the normal of its plane"
-        )
+def told_legs(numbers: Sequence[int]) -> str:
+    """Return legs by their numbers in words: "leg 1", "legs 1 and 2", "legs 1, 2 and 3"."""
+    *rest, last = map(str, numbers)
+    return f"legs {', '.join(rest)} and {last}" if rest else f"leg {last}"
 
 
 def _in_plane(platform: Platform, leg: LegKind) -> NDArray[np.float64]:
@@ -188,9 +216,9 @@ def _in_plane(platform: Platform, leg: LegKind) -> NDArray[np.float64]:
     return platform.directions @ point
 
 
-def _complement(axes: Sequence[Vector]) -> NDArray[np.float64]:
+def _complement(axes: ArrayLike) -> NDArray[np.float64]:
     """Return rows that span what is perpendicular to given vectors."""
-    matrix = np.array(axes, dtype=float).reshape(-1, 3)
+    matrix = np.asarray(axes, dtype=float).reshape(-1, 3)
     _, sizes, rows = np.linalg.svd(matrix) if len(matrix) else (None, np.zeros(0), np.eye(3))
     complement: NDArray[np.float64] = rows[int((sizes > _VANISHING).sum()) :]
     return complement

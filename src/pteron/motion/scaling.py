@@ -94,8 +94,9 @@ def scaled_to_reach(
             scale, best = fits, across
     if best is None or scale == 0:
         raise ModelError(
-            f"{robot.name}: no pick-and-place cycle about pose {middle.tolist()} keeps a reserve "
-            f"of {least:g} to the singularities and the joints' limits; choose a better pose"
+            f"no pick-and-place cycle about pose {middle.tolist()} keeps a reserve of {least:g} to "
+            "the singularities and the joints' limits; choose a better pose",
+            subject=robot.name,
         )
     return scale / _STEPS, best
 
@@ -124,4 +125,5 @@ def _keeps(robot: Manipulator, poses: Array, least: float) -> bool:
         if leg.limits is not None:
             low, high = leg.limits
             good &= bool(q.min() >= low + _DIP and q.max() <= high - _DIP)
+    good &= bool((numeric(robot, "passive_room")(poses)[1] >= _DIP).all())
     return bool(good)

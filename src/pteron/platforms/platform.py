@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
@@ -12,6 +13,7 @@ from pteron.bodies.inertia import PlanarInertia
 from pteron.bodies.vectors import (
     Vector,
     cross,
+    interval,
     number,
     perpendicular,
     positive,
@@ -87,6 +89,8 @@ class Platform:
     slides : bool
         Whether phi slides the platform points, as the two halves of an I4's nacelle do, and turns
         nothing but the tool. Platform points then hold m/rad: c = p + t0 + phi (x_axis s_x + ...).
+    limits : (float, float), optional
+        Least and greatest phi, rad, where hinges of the platform allow no more.
     tool : vector
         The tool's centre point in the platform frame, m.
     bars : tuple of Bar
@@ -100,6 +104,7 @@ class Platform:
     axis: Vector = _BASE_Z
     x_axis: Vector | None = None
     slides: bool = False
+    limits: tuple[float, float] | None = None
     tool: Vector = (0.0, 0.0, 0.0)
     bars: tuple[Bar, ...] = ()
     geared: tuple[Geared, ...] = ()
@@ -125,6 +130,15 @@ class Platform:
             )
         if self.geared and not self.turns:
             raise ModelError(f"geared: a {self.motion} platform has no angle for a gear to turn")
+        if self.limits is not None:
+            if not self.turns:
+                raise ModelError(f"limits: a {self.motion} platform has no angle to limit")
+            low, high = interval(self.limits, "limits")
+            if not -math.pi <= low < high <= math.pi:
+                raise ModelError(
+                    f"limits: [{low:g}, {high:g}] rad reaches beyond -pi to pi; are these degrees?"
+                )
+            object.__setattr__(self, "limits", (low, high))
         object.__setattr__(self, "axis", axis)
         object.__setattr__(self, "x_axis", x)
         object.__setattr__(self, "tool", vector(self.tool, "tool"))

@@ -64,11 +64,12 @@ def exact_grouping(
     """
     if is_singular_everywhere(robot):
         raise SingularPose(
-            f"{robot.name}: singular at every pose (type II), so that it has no inverse dynamics "
-            "and no base parameters",
+            "singular at every pose (type II), so that it has no inverse dynamics and no base "
+            "parameters",
             kind="II",
             measure=0.0,
             index=(),
+            subject=robot.name,
         )
     geometry = exact_geometry(robot)
     topology, n = bare(robot), robot.freedom

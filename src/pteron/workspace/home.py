@@ -11,6 +11,7 @@ from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kinematics import inverse_kinematics, random_poses, singular_orientations
 from pteron.manipulator import Manipulator
+from pteron.workspace.lacking import beyond_limits, nowhere
 from pteron.workspace.reserve import reserve
 
 _SEARCHES = ((200, 0.3), (200, 0.02), (200, 0.0), (1, 0.0))
@@ -67,10 +68,7 @@ def home_pose(robot: Manipulator) -> Array:
     reserves = reserve(robot, refined).smallest
     most = float(reserves.max())
     if most <= 0.0:
-        raise ModelError(
-            f"{robot.name}: no pose in reach of all legs found within the joints' limits; widen "
-            "limits or move the guide points"
-        )
+        raise beyond_limits(robot, refined[reserves.argmax()])
     # Zero says where the joints are meant to be, where nothing else tells.
     equals = refined[reserves >= _WORTH * most]
     travel = np.abs(inverse_kinematics(robot, equals)).max(axis=-1)
@@ -90,10 +88,7 @@ def _random_poses(robot: Manipulator) -> Array:
     for count, least in _SEARCHES:
         with suppress(ModelError):
             return random_poses(robot, count, type_i=least, type_ii=least)
-    raise ModelError(
-        f"{robot.name}: no pose is in reach of all legs; bring the guide points nearer or lengthen "
-        "the links"
-    )
+    raise nowhere(robot)
 
 
 def _steps(robot: Manipulator, metres: float, radians: float) -> Array:

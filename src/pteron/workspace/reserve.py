@@ -32,8 +32,8 @@ class Reserve:
         The size of the type-II measure over the best that the machine has, as far as random poses
         tell: 0 where the actuators do not hold the platform.
     clearances : array, shape (..., n)
-        Distance of each joint from its nearer limit, over half its range; negative beyond it, and 1
-        for a joint without limits.
+        Distance of each leg's joint, or of a passive one, from its nearer limit, over half its
+        range, the least; negative beyond it, and 1 for a leg without limits.
     smallest : array, shape (...)
         The least of them all, which is what `home_pose` makes as large as it can.
     """
@@ -73,6 +73,7 @@ def reserve(robot: Manipulator, pose: PoseLike) -> Reserve:
     room = clearances(robot, numeric(robot, "joint_coordinates")(pose)[0])
     shares = np.where(np.isinf(room), 1.0, room / facts.half_ranges)
     shares = np.where(np.isnan(shares), np.minimum(type_i, 0.0), shares)
+    shares = np.fmin(shares, numeric(robot, "passive_room")(pose)[0])
     smallest = np.minimum(np.minimum(type_i, shares).min(axis=-1), type_ii)
     return Reserve(type_i, type_ii, shares, smallest)
 
@@ -109,13 +110,14 @@ def clearances(robot: Manipulator, joints: Array) -> Array:
 
 
 def room_to_limits(robot: Manipulator, poses: Array) -> Array:
-    """Return how far (..., n) the actuated bodies' ends are from what their limits allow, m.
+    """Return how far (..., n) legs may move until an actuated or passive joint meets its limit, m.
 
-    Infinite without limits, and out of reach, where a joint may have no coordinate.
+    Very far without limits, and out of reach, where a joint may have no coordinate.
     """
     joints = numeric(robot, "joint_coordinates")(poses)[0]
     room = clearances(robot, joints) * _facts(robot).levers
-    return np.where(np.isnan(room), np.inf, room)
+    passive: Array = numeric(robot, "passive_room")(poses)[1]
+    return np.asarray(np.fmin(np.where(np.isnan(room), np.inf, room), passive))
 
 
 @dataclass(frozen=True)

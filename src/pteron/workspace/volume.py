@@ -107,8 +107,9 @@ def bounding_box(robot: Manipulator, pose: PoseLike) -> Array:
         starts = starts[room(starts).min(axis=-1) > _TOUCH]
         if not len(starts):
             raise ModelError(
-                f"{robot.name}: no position is in reach of all legs, within the joints' limits, at "
-                f"the orientation of pose {given.tolist()}"
+                "no position is in reach of all legs, within the joints' limits, at the "
+                f"orientation of pose {given.tolist()}",
+                subject=robot.name,
             )
     good = np.vstack([drawn[inside > _TOUCH], starts[room(starts).min(axis=-1) > _TOUCH]])
     sides = np.empty((2, 3))
@@ -120,8 +121,9 @@ def bounding_box(robot: Manipulator, pose: PoseLike) -> Array:
             )
     if not (np.abs(sides - center) <= _ENDLESS * radius).all():
         raise ModelError(
-            f"{robot.name}: the reach has no end: the guides let the platform move along them for "
-            "ever; give the legs limits"
+            "the reach has no end: the guides let the platform move along them for ever; give the "
+            "legs limits",
+            subject=robot.name,
         )
     return sides
 

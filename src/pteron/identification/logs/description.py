@@ -74,7 +74,7 @@ def _raises_data_errors(cls: _Class) -> _Class:
         try:
             checked(self, **dict(zip(names, args, strict=False)), **given)
         except ValidationError as error:
-            raise DataError(told(cls.__name__, fault_lines(error, cls))) from None
+            raise DataError(told(fault_lines(error, cls)), subject=cls.__name__) from None
 
     cls.__init__ = __init__  # type: ignore[misc]
     return cls

@@ -1,0 +1,87 @@
+"""Limits of passive joints: the cone in which a ball joint holds its rod, the angle of an elbow."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import casadi as ca
+
+from pteron.bodies.motion import Expression
+from pteron.bodies.vectors import Vector, number, unit_vector
+from pteron.errors import ModelError
+from pteron.legs.kind import Key
+from pteron.legs.leg import Passive
+
+ELBOW_LIMITS = Key(
+    "limits",
+    "least and greatest angle between the links, rad: 0 where stretched, pi where folded",
+    default=None,
+    example=[0.3, 2.8],
+)
+
+
+@dataclass(frozen=True)
+class Cone:
+    """The cone in which a ball joint holds the direction of its rod, seen from the joint.
+
+    Parameters
+    ----------
+    axis : unit vector
+        In the frame of the body that carries the socket.
+    angle : float
+        The greatest angle between axis and rod, rad.
+    """
+
+    axis: Vector
+    angle: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "axis", unit_vector(self.axis, "axis"))
+        object.__setattr__(self, "angle", number(self.angle, "angle"))
+        if not 0.0 < self.angle <= math.pi:
+            raise ModelError(
+                f"angle: {self.angle:g} rad given, one above 0 and up to pi expected; are these "
+                "degrees?"
+            )
+
+
+def check_elbow(
+    limits: tuple[float, float] | None, least: float = 0.0, most: float = math.pi
+) -> None:
+    """Refuse an elbow's limits beyond the angles that it can have."""
+    if limits is not None and not least <= limits[0] < limits[1] <= most:
+        raise ModelError(
+            f"elbow_limits: {list(limits)} rad reaches beyond {least:.4g} to {most:.4g}, where the "
+            "angle always is; are these degrees?"
+        )
+
+
+def between(a: Expression, b: Expression) -> Expression:
+    """Return the angle between two vectors, 0 to pi."""
+    return ca.atan2(ca.norm_2(ca.cross(a, b)), ca.dot(a, b))
+
+
+def within_cone(
+    noun: str, cone: Cone | None, socket: Expression, rod: Expression, length: float
+) -> list[Passive]:
+    """Return the angle of a rod, seen from its joint, against a cone; none without a cone.
+
+    The columns of `socket` (3, 3) are the axes of the body that carries the socket.
+    """
+    if cone is None:
+        return []
+    angle = between(ca.mtimes(socket, ca.SX(list(cone.axis))), rod)
+    # Nothing is too near to the axis: a limit below zero is never met.
+    return [Passive(noun, "rad", angle, -cone.angle, cone.angle, length)]
+
+
+def within(
+    noun: str,
+    unit: str,
+    value: Expression,
+    limits: tuple[float, float] | None,
+    lever: float,
+) -> list[Passive]:
+    """Return a value against its limits; none without limits."""
+    return [] if limits is None else [Passive(noun, unit, value, *limits, lever)]

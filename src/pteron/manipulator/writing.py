@@ -1,0 +1,105 @@
+"""A machine's file as text: its values, and on request what every key is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from textwrap import wrap
+from typing import Any, get_args
+
+import tomlkit
+from pydantic.fields import FieldInfo
+
+from pteron.bodies.tables import PlanarBody, Table
+from pteron.legs import KINDS
+from pteron.manipulator.tables import MachineTable, PlatformTable, leg_table
+
+_WIDTH = 110
+_COLUMN = 46
+"""Where comments begin at the latest; those of longer lines stand above them."""
+
+_UNITS = "SI units: m, kg, kg m, kg m^2, m/s^2, rad."
+
+_CONVENTIONS = (
+    f"{_UNITS} Vectors are in the base frame where nothing else is said; directions have length 1.",
+    "A #key may be left out: what stands behind it is its default, or an example.",
+)
+
+
+def written(
+    document: Mapping[str, Any], *, explained: bool = False, about: Sequence[str] = ()
+) -> str:
+    """Return the text of a machine's file.
+
+    Parameters
+    ----------
+    document : mapping
+        What the file holds; each leg has its `type`.
+    explained : bool
+        Whether it says of every key what it is, and names those that it has not, as comments; of
+        legs of one kind at the first.
+    about : sequence of str
+        Comments at its head.
+    """
+    head = [*about, *([*_CONVENTIONS, _bodies()] if explained else [f"For Pteron. {_UNITS}"])]
+    lines = [f"# {line}" for text in head for line in wrap(text, _WIDTH - 2)]
+    own = {key: value for key, value in document.items() if key not in ("platform", "legs")}
+    lines += ["", *_block("", MachineTable, own, explained)]
+    lines += ["", *_block("platform", PlatformTable, document["platform"], explained)]
+    told: set[str] = set()
+    for i, leg in enumerate(document["legs"], start=1):
+        kind = leg["type"]
+        heading, *rest = _block(
+            "[legs]", leg_table(KINDS[kind]), leg, explained and kind not in told
+        )
+        lines += ["", f"{heading} # {i}", *rest]
+        told.add(kind)
+    return "\n".join(lines) + "\n"
+
+
+def _bodies() -> str:
+    fields = PlanarBody.model_fields.items()
+    return f"A body's keys: {'; '.join(f'{key}, {field.description}' for key, field in fields)}."
+
+
+def _block(name: str, model: type[Table], given: Mapping[str, Any], explained: bool) -> list[str]:
+    """Return the lines of one table, and of the lists of tables in it."""
+    fields, lines, inner = model.model_fields, [f"[{name}]"] if name else [], []
+    entries = []
+    for key, value in given.items():
+        if isinstance(value, list) and value and isinstance(value[0], Mapping):
+            part = get_args(fields[key].annotation)[0]
+            for one in value:
+                inner += ["", *_block(f"[{name}.{key}]", part, one, explained)]
+        else:
+            entries.append((f"{key} = {_toml(value)}", fields.get(key)))
+    if explained:
+        entries += [
+            (f"#{key} = {_toml(field.examples[0] if field.examples else field.default)}", field)
+            for key, field in fields.items()
+            if key not in given and (field.examples or field.default is not None)
+            if not field.is_required()
+        ]
+        return [*lines, *_commented(entries), *inner]
+    return [*lines, *(text for text, _ in entries), *inner]
+
+
+def _commented(entries: list[tuple[str, FieldInfo | None]]) -> list[str]:
+    """Return lines with what their keys are: behind the short ones, above the long ones."""
+    lines = []
+    column = max((len(text) for text, _ in entries if len(text) <= _COLUMN), default=0)
+    for text, field in entries:
+        about = field.description or "" if field is not None else ""
+        if len(text) > column:
+            lines += [*(f"# {line}" for line in wrap(about, _WIDTH - 2)), text]
+            continue
+        first, *more = wrap(about, _WIDTH - column - 4) or [""]
+        lines += [f"{text:{column}}  # {first}", *(f"{'':{column}}  # {line}" for line in more)]
+    return lines
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{key} = {_toml(one)}" for key, one in value.items()) + " }"
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return f"[{', '.join(map(_toml, value))}]"
+    return str(tomlkit.item(value).as_string())

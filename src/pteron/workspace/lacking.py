@@ -1,0 +1,89 @@
+"""Why a machine has no pose to work in: which legs miss it, or which joints pass their limits."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+from scipy.optimize import minimize  # type: ignore[import-untyped]
+
+from pteron.equations.kinematics import passive_joints
+from pteron.equations.machine import Machine
+from pteron.errors import ModelError
+from pteron.kernels import Array, numeric
+from pteron.kinematics.sampling import search_ball
+from pteron.legs.leg import Passive
+from pteron.manipulator import Manipulator
+from pteron.manipulator.manipulator import told_legs
+from pteron.workspace.reserve import room_to_limits
+
+_DRAWN = 20_000
+_STARTS = 5
+
+_TOUCH = 1e-6
+"""Metres of common reach that count as none."""
+
+
+def nowhere(robot: Manipulator) -> ModelError:
+    """Return what is said of a machine that reaches no pose, or none within its joints' limits."""
+    pose, drawn = _deepest(robot)
+    margin = numeric(robot, "reach")(pose)[0]
+    if float(margin.min()) > _TOUCH:
+        reached = drawn[(numeric(robot, "reach")(drawn)[0] > _TOUCH).all(axis=-1)]
+        poses = np.array([pose, *reached])
+        return beyond_limits(robot, poses[room_to_limits(robot, poses).min(axis=-1).argmax()])
+    missed: dict[str, list[int]] = {}
+    for i, m in enumerate(margin, start=1):
+        if m < _TOUCH:
+            missed.setdefault(f"{max(-m, 0.0):.3g} m", []).append(i)
+    return ModelError(
+        "no pose is in reach of all legs: at the best one they miss by "
+        f"{', '.join(f'{way} ({told_legs(legs)})' for way, legs in missed.items())}; bring the "
+        "guide points nearer or lengthen the links",
+        subject=robot.name,
+    )
+
+
+def _deepest(robot: Manipulator) -> tuple[Array, Array]:
+    """Return the pose at which the leg that misses it most misses least, and random ones."""
+    center, radius = search_ball(robot)
+    lengths = len(center)
+    drawn = np.random.default_rng(0).uniform(-1.0, 1.0, (_DRAWN, robot.freedom))
+    drawn[:, :lengths] = center + radius * drawn[:, :lengths]
+    drawn[:, lengths:] *= np.pi
+
+    def margins(pose: Array) -> Array:
+        return np.asarray(numeric(robot, "reach")(pose)[0])
+
+    def deeper(start: Array) -> Array:
+        found = minimize(
+            lambda v: -v[-1],
+            np.append(start, margins(start).min()),
+            method="SLSQP",
+            constraints={"type": "ineq", "fun": lambda v: margins(v[:-1]) - v[-1]},
+        )
+        return np.asarray(found.x[:-1])
+
+    starts = drawn[np.argsort(-margins(drawn).min(axis=-1))[:_STARTS]]
+    best = np.array([*starts, *map(deeper, starts)])
+    return best[np.nanargmax(margins(best).min(axis=-1))], drawn
+
+
+def beyond_limits(robot: Manipulator, pose: Array) -> ModelError:
+    """Return what is said of a machine that at its best pose, in reach, passes joints' limits."""
+    told = []
+    joints = numeric(robot, "joint_coordinates")(pose)[0]
+    passive = passive_joints(Machine.of(robot), ca.SX(ca.DM(pose)))
+    for i, (leg, q, others) in enumerate(zip(robot.legs, joints, passive, strict=True), start=1):
+        own = leg.joint
+        limited = [Passive(own.noun, own.unit, q, *leg.limits, 0.0)] if leg.limits else []
+        for joint in (*limited, *others):
+            value, low, high = float(joint.value), joint.least, joint.most
+            if not low < value < high:
+                told.append(
+                    f"leg {i}: {joint.noun} at {value:.4g} {joint.unit} of {low:g} to {high:g}"
+                )
+    return ModelError(
+        "no pose in reach of all legs keeps the joints' limits; nearest to it is one with "
+        f"{', '.join(told)}; widen limits or move the guide points",
+        subject=robot.name,
+    )
