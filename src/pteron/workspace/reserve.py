@@ -11,12 +11,10 @@ from numpy.typing import NDArray
 
 from pteron.errors import DataError
 from pteron.kernels import Array, numeric
-from pteron.kinematics import inverse_kinematics, random_poses
+from pteron.kinematics import inverse_kinematics
+from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator
 from pteron.shapes import Numbers, PerJoint, PoseLike
-
-_DRAWN = 4096
-"""Random poses among which the best type-II measure is sought."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +65,9 @@ def reserve(robot: Manipulator, pose: PoseLike) -> Reserve:
     """
     facts = _facts(robot)
     margin, measure, _, _ = numeric(robot, "reach")(pose)
-    type_i = np.where(margin < 0.0, margin / facts.sizes, np.nan_to_num(measure))
+    # Only legs with links, which have a size, miss a pose.
+    missing = np.divide(margin, facts.sizes, out=np.zeros_like(margin), where=margin < 0.0)
+    type_i = np.where(margin < 0.0, missing, np.nan_to_num(measure))
     type_ii = np.nan_to_num(np.abs(numeric(robot, "type_ii")(pose)[0])) / best_type_ii(robot)
     room = clearances(robot, numeric(robot, "joint_coordinates")(pose)[0])
     shares = np.where(np.isinf(room), 1.0, room / facts.half_ranges)
@@ -94,13 +94,6 @@ def _facts(robot: Manipulator) -> _Facts:
     return _Facts(sizes, low, high, half, levers)
 
 
-@lru_cache(maxsize=64)
-def best_type_ii(robot: Manipulator) -> float:
-    """Return the largest type-II measure, in size, of many random poses; 1 if all are singular."""
-    drawn = random_poses(robot, _DRAWN, type_i=0.0, type_ii=0.0)
-    return float(np.abs(numeric(robot, "type_ii")(drawn)[0]).max()) or 1.0
-
-
 def clearances(robot: Manipulator, joints: Array) -> Array:
     """Return the distance (..., n) of joints from their nearer limit, negative beyond, or inf."""
     facts = _facts(robot)
@@ -110,11 +103,13 @@ def clearances(robot: Manipulator, joints: Array) -> Array:
 def room_to_limits(robot: Manipulator, poses: Array) -> Array:
     """Return how far (..., n) the actuated bodies' ends are from what their limits allow, m.
 
-    Infinite without limits, and out of reach, where a joint may have no coordinate.
+    Infinite without limits, and out of reach, where a joint may have no coordinate; so it is where
+    a joint that follows the platform's angle is within its limits, since no way leads out of them.
     """
     joints = numeric(robot, "joint_coordinates")(poses)[0]
     room = clearances(robot, joints) * _facts(robot).levers
-    return np.where(np.isnan(room), np.inf, room)
+    follows = np.array([leg.follows_angle for leg in robot.legs])
+    return np.where(np.isnan(room) | (follows & (room >= 0.0)), np.inf, room)
 
 
 @dataclass(frozen=True)
