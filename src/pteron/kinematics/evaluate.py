@@ -148,7 +148,7 @@ def _bad_pose(
             told = (
                 "its two ends coincide, so that its elbow may be anywhere"
                 if undetermined
-                else f"it is stretched or folded (type I; measure {type_i[i]:.1e}, less than six "
+                else f"{leg.singular_text} (type I; measure {type_i[i]:.1e}, less than six "
                 f"digits are left below {TYPE_I:.0e})"
             )
             return SingularPose(

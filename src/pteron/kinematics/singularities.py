@@ -5,14 +5,27 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pteron.equations.machine import closure_of
-from pteron.errors import ModelError, SingularPose
-from pteron.kernels import Array, numeric
+from pteron.errors import DataError, ModelError, SingularPose
+from pteron.kernels import Array, as_array, numeric
 from pteron.manipulator import Manipulator
 
 _VANISHING = 1e-10
 _SAMPLES = 64
+
+_DRAWN = 4096
+"""Random poses among which the best type-II measure is sought."""
+
+_ANGLES = 720
+"""Samples of phi."""
+
+_HALVINGS = 50
+"""From half a degree to rounding."""
+
+_ZERO = 1e-9
+"""The measure where its sign changes, but for rounding."""
 
 
 @lru_cache(maxsize=256)
@@ -43,27 +56,41 @@ def is_singular_everywhere(robot: Manipulator) -> bool:
     return bool((np.abs(numeric(robot, "type_ii")(poses)[0]) <= _VANISHING).all())
 
 
-def singular_orientations(robot: Manipulator) -> Array:
-    """Return the orientations of the platform that are singular (type II) whatever the position.
+@lru_cache(maxsize=64)
+def best_type_ii(robot: Manipulator) -> float:
+    """Return the largest type-II measure, in size, of many random poses; 1 if all are singular."""
+    from pteron.kinematics.sampling import random_poses
 
-    For P-R-R-R legs under a 3T1R platform det J is a multiple of A cos(phi) + B sin(phi): there are
-    two singular orientations, 180 degrees apart.
+    drawn = random_poses(robot, _DRAWN, type_i=0.0, type_ii=0.0)
+    return float(np.abs(numeric(robot, "type_ii")(drawn)[0]).max()) or 1.0
+
+
+def singular_orientations(robot: Manipulator, position: ArrayLike | None = None) -> Array:
+    """Return the orientations of the platform that are singular (type II), at a position.
+
+    For P-R-R-R legs under a 3T1R platform det J is a multiple of A cos(phi) + B sin(phi), whatever
+    the position: there are two singular orientations, 180 degrees apart. For other legs they depend
+    on the position; each is found where det J, sampled over phi within reach, changes its sign.
 
     Parameters
     ----------
     robot : Manipulator
         The machine.
+    position : array, shape (k,), optional
+        The pose's lengths, k = 2 or 3, m. Without it only such orientations are returned as are
+        singular at every position.
 
     Returns
     -------
-    array, shape (2,) or (0,)
-        The angles in rad, ascending, in (-pi, pi]; none where the platform does not turn, or where
-        singularity depends on the position.
+    array, shape (A,)
+        The angles in rad, ascending, in (-pi, pi]; none where the platform does not turn.
 
     Raises
     ------
     SingularPose
-        If every pose is singular.
+        If every pose is singular, or every orientation at this position.
+    DataError
+        If the position is not k finite numbers.
 
     Examples
     --------
@@ -73,13 +100,53 @@ def singular_orientations(robot: Manipulator) -> Array:
     """
     if is_singular_everywhere(robot):
         raise singular_everywhere(robot)
+    given = None
+    if position is not None:
+        given = as_array(position, "position", (len(robot.platform.lengths),))
+        if given.ndim > 1 or not np.isfinite(given).all():
+            raise DataError(f"position: {given.tolist()} given, one row of finite numbers expected")
     orientation = closure_of(robot).orientation
-    if orientation is None:
+    if orientation is not None:
+        a, b = (float(value) for value in orientation)
+        one = np.arctan2(b, a) + np.pi / 2
+        return np.sort(_wrapped(np.array([one, one - np.pi])))
+    if given is None or not robot.platform.turns:
         return np.empty(0)
-    a, b = (float(value) for value in orientation)
-    one = np.arctan2(b, a) + np.pi / 2
-    wrapped = np.pi - (np.pi - np.array([one, one - np.pi])) % (2 * np.pi)
-    return np.sort(wrapped)
+    return _sign_changes(robot, given)
+
+
+def _sign_changes(robot: Manipulator, position: Array) -> Array:
+    """Return the angles at which the type-II measure at a position changes its sign, in reach."""
+
+    def measure(angles: Array) -> Array:
+        at = np.broadcast_to(position, (*angles.shape, len(position)))
+        poses = np.concatenate([at, angles[:, None]], axis=-1)
+        return np.asarray(numeric(robot, "type_ii")(poses)[0])
+
+    # Round angles, where many machines are singular, lie between the samples.
+    angles = np.pi * ((2.0 * np.arange(_ANGLES + 1) + 1.0) / _ANGLES - 1.0)
+    values = measure(angles)
+    negative, known = values < 0.0, ~np.isnan(values)
+    if known.any() and (np.abs(values[known]) <= _VANISHING).all():
+        raise SingularPose(
+            f"{robot.name}: singular in every orientation (type II) that is in reach at position "
+            f"{position.tolist()}; choose another position",
+            kind="II",
+            measure=0.0,
+        )
+    first = np.flatnonzero((negative[1:] != negative[:-1]) & known[1:] & known[:-1])
+    low, high, side = angles[first], angles[first + 1], negative[first]
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        before = (measure(middle) < 0.0) == side
+        low, high = np.where(before, middle, low), np.where(before, high, middle)
+    found = np.abs(measure(low)) <= _ZERO  # else a gap in the reach lies between two samples
+    return np.sort(_wrapped(low[found]))
+
+
+def _wrapped(angles: Array) -> Array:
+    """Return angles in (-pi, pi]."""
+    return np.asarray(np.pi - (np.pi - angles) % (2.0 * np.pi))
 
 
 def singular_everywhere(robot: Manipulator, index: tuple[int, ...] = ()) -> SingularPose:

@@ -32,6 +32,7 @@ class ActuatedJoint:
 
 SLIDER = ActuatedJoint("slider", "rho", "m", "force", "N")
 CRANK = ActuatedJoint("crank", "theta", "rad", "torque", "N m")
+SHAFT = ActuatedJoint("shaft", "theta", "rad", "torque", "N m")
 
 Role = Literal["point", "direction", "normal", "length", "number", "sign"]
 """What a quantity is: a point or a unit vector in the base frame; a unit vector that no force
@@ -177,6 +178,10 @@ class LegKind(ABC):
     """Whether its joint follows the platform's angle, and not its platform point."""
     account: ClassVar[str] = ""
     """How it is built, in a few sentences for a report; vectors by their letters r, d, e, k, s0."""
+    measure_text: ClassVar[str] = ""
+    """What its type-I measure is, as a clause for a report; vectors by their letters."""
+    singular_text: ClassVar[str] = "it is stretched or folded"
+    """How it stands where that is zero, as a clause for messages."""
     keys: ClassVar[Mapping[str, Key]]
     """The fields of its own, which are its TOML keys, and what they hold; see `every_key`."""
     equations_class: ClassVar[_EquationsClass]
@@ -243,8 +248,19 @@ class LegKind(ABC):
         """The unit vector along which the slider moves, or about which the crank turns."""
 
     @property
+    def bar(self) -> Vector | None:
+        """The direction along which its parallel rods stand side by side, where the file says so.
+
+        Pictures show such rods as two.
+        """
+        return None
+
+    @property
     def lever(self) -> float:
-        """Metres that the actuated body's end moves per unit of the joint: 1 for a slider."""
+        """Metres that the actuated body's end moves per unit of the joint: 1 for a slider.
+
+        It says nothing of a joint that follows the platform's angle.
+        """
         return 1.0
 
     @property

@@ -58,6 +58,7 @@ class PRR(SlideLeg):
 
     type = "PRR"
     names: ClassVar = {"p": "slider", "l": "link"}
+    measure_text = "the cosine of the angle between link and guide"
     account = (
         "A slider moves along e through the guide point r; its coordinate rho is zero there. A "
         "link leads from it to the platform point s0, with revolute joints along d, the normal of "

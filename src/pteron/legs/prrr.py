@@ -86,6 +86,7 @@ class PRRR(LegKind):
 
     type = "PRRR"
     joint = SLIDER
+    measure_text = "the sine of the angle between its links, seen along d"
     account = (
         "A slider moves along e through the guide point r. Three revolute joints R1, R2, R3 with "
         "axes along d follow: between slider and upper link, upper and lower link, and at the "

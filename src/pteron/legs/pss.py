@@ -64,6 +64,7 @@ class PSS(SlideLeg):
 
     type = "PSS"
     names: ClassVar = {"p": "slider", "l": "rod"}
+    measure_text = "the cosine of the angle between rod and guide"
     account = (
         "A slider moves along e through the guide point r; its coordinate rho is zero there. A rod "
         "between two ball joints leads from it to the platform point s0; parallel rods, which keep "
@@ -97,6 +98,10 @@ class PSS(SlideLeg):
             Quantity("lower_length", "length", (self.lower_length,), "ll"),
             Quantity("elbow", "sign", (self.elbow,)),
         )
+
+    @property
+    def bar(self) -> Vector | None:
+        return self.bar_direction if self.rods > 1 else None
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return free_axes(self.rods, self.bar_direction, axis)

@@ -60,6 +60,7 @@ class RRR(CrankLeg):
 
     type = "RRR"
     names: ClassVar = {"u": "crank", "l": "lower link"}
+    measure_text = "the sine of the angle between crank and lower link"
     account = (
         "A crank turns about d, the normal of the plane, through the guide point r; its angle "
         "theta is zero where it points along the zero direction, and counts by the right hand. A "

@@ -73,6 +73,7 @@ class RSS(CrankLeg):
 
     type = "RSS"
     names: ClassVar = {"u": "crank", "l": "rod"}
+    measure_text = "the sine of the angle between crank and rod, seen along d"
     account = (
         "A crank turns about d through the guide point r; its angle theta is zero where it points "
         "along the zero direction, and counts by the right hand. A rod between two ball joints "
@@ -104,6 +105,10 @@ class RSS(CrankLeg):
                 f"bar_direction: {list(self.bar_direction)} is not along direction "
                 f"{list(self.direction)}, so that the crank turns the bar and with it the platform"
             )
+
+    @property
+    def bar(self) -> Vector | None:
+        return self.direction if self.rods > 1 else None
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return free_axes(self.rods, self.direction, axis)

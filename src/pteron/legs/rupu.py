@@ -18,7 +18,7 @@ from pteron.bodies.vectors import Vector
 from pteron.errors import ModelError
 from pteron.legs.circles import perpendicular_to
 from pteron.legs.cones import within
-from pteron.legs.kind import CRANK, Key, LegKind, Quantity, Transfer
+from pteron.legs.kind import SHAFT, Key, LegKind, Quantity, Transfer
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Passive, Reach, Turned
 from pteron.legs.rods import rod_body, universal_joints
 
@@ -66,10 +66,11 @@ class RUPU(LegKind):
     travel: tuple[float, float] | None = None
 
     type = "RUPU"
-    joint = CRANK
+    joint = SHAFT
     branches = (1,)
     follows_angle = True
     names: ClassVar = {"u": "upper part of the shaft", "l": "lower part of the shaft"}
+    measure_text = "1 everywhere, as a shaft turns the platform in every pose"
     account = (
         "A telescopic shaft leads from the guide point r, between two universal joints, to the "
         "platform point s0 and turns the platform: its joint angle theta is the ratio times phi. "

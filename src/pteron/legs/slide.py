@@ -53,6 +53,7 @@ class SlideLeg(LegKind):
     fixed_offset: Vector = (0.0, 0.0, 0.0)
 
     joint = SLIDER
+    singular_text = "its link is at a right angle to its guide"
 
     @property
     def joint_axis(self) -> Vector:

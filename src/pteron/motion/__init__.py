@@ -1,6 +1,6 @@
 """Motions of the platform: time laws, the pick-and-place cycle, and where the joints are."""
 
-from pteron.motion.joint_points import Guide, JointPoints, joint_guides, joint_points
+from pteron.motion.joint_points import Guide, JointPoints, Part, joint_guides, joint_points
 from pteron.motion.pick_and_place import Motion, PickAndPlace, pick_and_place
 from pteron.motion.scaling import scaled_to_reach
 
@@ -8,6 +8,7 @@ __all__ = [
     "Guide",
     "JointPoints",
     "Motion",
+    "Part",
     "PickAndPlace",
     "joint_guides",
     "joint_points",

@@ -1,4 +1,8 @@
-"""The pick-and-place cycle as a path in time: up, across, down, and back, over one unit of time."""
+"""The pick-and-place cycle as a path in time: up, across, down, and back, over one unit of time.
+
+It is the path of the tool's centre point. A planar machine goes it in its plane: up is then against
+what gravity does in the plane or, where that is nothing, at a right angle to across.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +14,7 @@ from numpy.typing import ArrayLike
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
+from pteron.platforms import Platform
 
 LIFT = 0.025
 """Height of the standard cycle, m."""
@@ -22,6 +27,9 @@ _LIFT_ENDS = 0.4
 
 _ACROSS_BEGINS = 0.15
 """Share of one way after which it sets off across: it rounds the corners, and saves time."""
+
+_NONE = 1e-9
+"""A part of a vector, over the whole, that is none but for rounding."""
 
 
 def quintic(tau: Array, begin: float, end: float) -> tuple[Array, Array, Array]:
@@ -60,73 +68,127 @@ def quintic(tau: Array, begin: float, end: float) -> tuple[Array, Array, Array]:
 
 @dataclass(frozen=True)
 class Cycle:
-    """The cycle about a pose, which is half way across and half way up.
+    """The cycle about a pose, in which the tool is half way across and half way up.
 
     Attributes
     ----------
+    platform : Platform
+        What moves, with its tool's centre point.
     around : array, shape (m,)
         The pose in the middle, m and rad.
     across, up : array, shape (3,)
-        Unit vectors of the two moves.
+        Unit vectors of the two moves, in the base frame.
     turn : float
-        By how much the platform turns on its way across, rad; 0 for 3T.
+        By how much the platform turns on its way across, rad; without effect where it does not.
     scale : float
         Factor on lift, width and turn alike, so that a cycle of scale 0 stays at `around`.
     """
 
+    platform: Platform
     around: Array
     across: Array
     up: Array
     turn: float
     scale: float
 
-    def at(self, tau: Array) -> tuple[Array, Array, Array]:
-        """Return poses (T, m) at times `tau` (T,) in [0, 1], and two derivatives by tau.
+    def path(self, tau: Array) -> tuple[Array, Array, Array]:
+        """Return where the tool is from its middle (T, k), and two derivatives by tau.
 
-        The first half of the time is the way out, the second the same path back.
+        k is the number of the pose's lengths, tau (T,) in [0, 1].
         """
-        way = np.where(tau <= 0.5, 2.0 * tau, 2.0 - 2.0 * tau)
-        rate = np.where(tau <= 0.5, 2.0, -2.0)
-        across = quintic(way, _ACROSS_BEGINS, 1.0 - _ACROSS_BEGINS)
-        rise, sink = quintic(way, 0.0, _LIFT_ENDS), quintic(way, 1.0 - _LIFT_ENDS, 1.0)
-        lift = [up - down for up, down in zip(rise, sink, strict=True)]
-        move = np.concatenate([ACROSS * self.across, [self.turn]])[: len(self.around)]
-        climb = np.concatenate([LIFT * self.up, [0.0]])[: len(self.around)]
-        pose, first, second = (
-            self.scale * (np.multiply.outer(a, move) + np.multiply.outer(b, climb))
+        move, climb = (
+            self.scale * size * (self.platform.directions @ way)
+            for size, way in ((ACROSS, self.across), (LIFT, self.up))
+        )
+        across, lift = _shares(tau)
+        return tuple(
+            np.multiply.outer(a, move) + np.multiply.outer(b, climb)
             for a, b in zip(across, lift, strict=True)
         )
-        middle = self.around - self.scale * (move + climb) / 2.0
-        return middle + pose, rate[:, None] * first, 4.0 * second
+
+    def at(self, tau: Array) -> tuple[Array, Array, Array]:
+        """Return poses (T, m) at times `tau` (T,) in [0, 1], and two derivatives by tau."""
+        place, velocity, acceleration = self.path(tau)
+        place = self.around[: place.shape[1]] + place
+        if not self.platform.turns:
+            return place, velocity, acceleration
+        turned, rate, growth = (self.scale * self.turn * s[:, None] for s in _shares(tau)[0])
+        angle = self.around[-1:] + turned
+        # P leads to the tool by an arm, of which a part turns with the platform.
+        (middle, _), (arm, lever) = self._arm(self.around[-1:]), self._arm(angle)
+        return (
+            np.hstack([place + middle - arm, angle]),
+            np.hstack([velocity - rate * lever, rate]),
+            np.hstack([acceleration - growth * lever + rate**2 * arm, growth]),
+        )
+
+    def _arm(self, angle: Array) -> tuple[Array, Array]:
+        """Return what of the way from P to the tool turns, at angles (..., 1), and d/d angle."""
+        platform = self.platform
+        x, y = (platform.directions @ axis for axis in platform.frame[:2])
+        a, b = (
+            platform.tool[0] * x + platform.tool[1] * y,
+            platform.tool[0] * y - platform.tool[1] * x,
+        )
+        cos, sin = np.cos(angle), np.sin(angle)
+        return cos * a + sin * b, cos * b - sin * a
 
 
-def up(robot: Manipulator) -> Array:
-    """Return the unit vector against gravity, or the platform's axis where there is none."""
-    gravity = np.array(robot.gravity)
-    strength = float(np.linalg.norm(gravity))
-    return -gravity / strength if strength > 0.0 else np.array(robot.platform.axis)
+_Shares = tuple[Array, Array, Array]
 
 
-def across_directions(robot: Manipulator, direction: ArrayLike | None, count: int) -> Array:
-    """Return horizontal unit vectors: the given direction made horizontal, or `count` of them.
+def _shares(tau: Array) -> tuple[_Shares, _Shares]:
+    """Return how far the way across and the lift are from half, and two derivatives by tau.
 
-    These start at the platform's x axis (or y, where x is nearer to the vertical) and go round.
+    The first half of the time is the way out, the second the same path back.
     """
-    vertical = up(robot)
+    way = np.where(tau <= 0.5, 2.0 * tau, 2.0 - 2.0 * tau)
+    rate = np.where(tau <= 0.5, 2.0, -2.0)
+    across = quintic(way, _ACROSS_BEGINS, 1.0 - _ACROSS_BEGINS)
+    rise, sink = quintic(way, 0.0, _LIFT_ENDS), quintic(way, 1.0 - _LIFT_ENDS, 1.0)
+    lift = [up - down for up, down in zip(rise, sink, strict=True)]
+    centred = [(s - 0.5, rate * ds, 4.0 * dds) for s, ds, dds in (across, lift)]
+    return centred[0], centred[1]
 
-    def level(v: Array) -> Array:
-        return np.asarray(v - (v @ vertical) * vertical, dtype=float)
+
+def moves(
+    robot: Manipulator, direction: ArrayLike | None, count: int
+) -> tuple[tuple[Array, Array], ...]:
+    """Return pairs of unit vectors across and up: those of a direction, or some to choose from.
+
+    Up is against gravity, or the platform's axis where there is none; of a planar machine, against
+    what gravity does in its plane or, where that is nothing, the axis times across. Across is
+    horizontal, and in the plane: the given direction as far as it is so, or `count` directions that
+    go round from the platform's x axis (or y, where x is nearer to the vertical); two, to and fro,
+    in an upright plane.
+    """
+    platform, gravity = robot.platform, np.array(robot.gravity)
+    axis = np.array(platform.axis)
+    level = platform.directions.T @ platform.directions
+    weight = level @ gravity
+    strength = float(np.linalg.norm(weight))
+    upright: Array | None = None
+    if strength > _NONE * float(np.linalg.norm(gravity)):
+        upright = -weight / strength
+    elif not platform.planar:
+        upright = axis
+    if upright is not None:
+        level = level - np.outer(upright, upright)
 
     if direction is not None:
         given = np.asarray(direction, dtype=float)
-        flat = level(given)
-        length = float(np.linalg.norm(flat))
-        if not length > 1e-9 * float(np.linalg.norm(given)):
-            raise DataError(f"direction: {given.tolist()} has no horizontal part")
-        return flat[None] / length
-    x, y, _ = (level(np.array(axis)) for axis in robot.platform.frame)
-    first = x if np.linalg.norm(x) > 0.5 else y
+        first = level @ given
+        if not np.linalg.norm(first) > _NONE * np.linalg.norm(given):
+            place = " in the machine's plane" if platform.planar else ""
+            raise DataError(f"direction: {given.tolist()} has no horizontal part{place}")
+        count = 1
+    else:
+        x, y, _ = (level @ axis for axis in platform.frame)
+        first = x if np.linalg.norm(x) > 0.5 else y
+        if platform.planar and upright is not None:
+            count = min(count, 2)
     first = first / np.linalg.norm(first)
+    second = np.cross(axis if upright is None else upright, first)
     angles = 2.0 * np.pi * np.arange(count) / count
-    second = np.cross(vertical, first)
-    return np.asarray(np.outer(np.cos(angles), first) + np.outer(np.sin(angles), second))
+    ways = np.outer(np.cos(angles), first) + np.outer(np.sin(angles), second)
+    return tuple((way, np.cross(axis, way) if upright is None else upright) for way in ways)

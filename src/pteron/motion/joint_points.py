@@ -1,8 +1,9 @@
-"""Where the joints of a machine are, for pictures of it."""
+"""Where the joints of a machine and the parts of its platform are, for pictures of it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,12 +16,24 @@ from pteron.manipulator import Manipulator
 from pteron.shapes import PerJoint, PoseLike
 
 _SAME = 1e-9
-"""Share of a leg's size within which two of its joints are at one point."""
+"""Share of a leg's extent, from end to end, within which two of its joints are at one point."""
+
+_COINCIDENT = 1e-9
+"""m between points of the platform that are taken for one."""
 
 _SPARE = 0.25
 """Length of a guide without limits, beyond what poses use, as a share of the leg's size."""
 
 _ARC = np.radians(5.0)
+
+
+class Part(NamedTuple):
+    """A rigid part of the platform: arms from a hub to its corners."""
+
+    hub: Array
+    """(..., 3): P, or the hinge of a part that does not turn."""
+    corners: Array
+    """(..., k, 3), in order round the platform's axis; none is at the hub."""
 
 
 @dataclass(frozen=True)
@@ -37,20 +50,31 @@ class JointPoints:
         centre, to the platform point.
     platform_points : array, shape (..., n, 3)
         Where the legs carry the platform.
-    reference : array, shape (..., 3)
-        P.
+    parts : tuple of Part
+        The platform: what moves as one with P, then, of an articulated platform, each part that
+        does not turn.
+    reference, tool : array, shape (..., 3)
+        P, and the tool's centre point.
     axes : array, shape (..., 3, 3)
         The platform frame's x, y and z, one a row.
     coordinates : array, shape (..., n)
         The joint coordinates, m or rad.
+    bars : tuple of (array, shape (3,), or None)
+        The unit vector along which a leg's parallel rods, its last link, stand side by side.
+    plane : array, shape (2, 3), or None
+        The unit vectors along which x and y of a planar machine's poses count.
     """
 
     chain: Array
     links: tuple[Array, ...]
     platform_points: Array
+    parts: tuple[Part, ...]
     reference: Array
+    tool: Array
     axes: Array
     coordinates: PerJoint
+    bars: tuple[Array | None, ...]
+    plane: Array | None
 
 
 @dataclass(frozen=True)
@@ -64,7 +88,8 @@ class Guide:
     axis : array, shape (3,)
         Unit vector along which the slider moves, or about which the crank turns.
     path : array, shape (K, 3)
-        The way of the slider, or of the crank's end, from one limit to the other, m.
+        The way of the slider, or of the crank's end, from one limit to the other, m; of a joint
+        that only turns the platform, where it is, K = 1.
     """
 
     slides: bool
@@ -105,32 +130,70 @@ def joint_points(robot: Manipulator, pose: PoseLike) -> JointPoints:
     coordinates = inverse_kinematics(robot, given)
     chain: Array = evaluated(robot, "joint_points", "raise", given)
     points: Array = evaluated(robot, "platform_points", "raise", given)
-    x, y, z = (np.array(axis) for axis in robot.platform.frame)
-    angle = (given[..., 3] if robot.platform.turns else np.zeros(given.shape[:-1]))[..., None]
-    axes = np.stack(
-        [
-            np.cos(angle) * x + np.sin(angle) * y,
-            np.cos(angle) * y - np.sin(angle) * x,
-            np.broadcast_to(z, (*angle.shape[:-1], 3)),
-        ],
-        axis=-2,
-    )
+    p, axes = robot.platform.at(given)
     links = tuple(
-        _links(leg, chain[..., i, :, :], coordinates[..., i]) for i, leg in enumerate(robot.legs)
+        _links(leg, chain[..., i, :, :], coordinates[..., i], points[..., i, :])
+        for i, leg in enumerate(robot.legs)
     )
-    return JointPoints(chain, links, points, given[..., :3], axes, coordinates)
+    return JointPoints(
+        chain,
+        links,
+        points,
+        _parts(robot, p, axes),
+        p,
+        p + robot.platform.tool @ axes,
+        axes,
+        coordinates,
+        tuple(None if leg.bar is None else np.array(leg.bar) for leg in robot.legs),
+        robot.platform.directions if robot.platform.planar else None,
+    )
 
 
-def _links(leg: LegKind, chain: Array, coordinate: Array) -> Array:
+def _links(leg: LegKind, chain: Array, coordinate: Array, end: Array) -> Array:
+    """Return a leg's line, which ends at its platform point: a hinge of the platform is beyond."""
+    # A joint that follows the platform's angle is counted where the leg ends, not where it begins.
+    chain = chain[..., int(leg.follows_angle) :, :]
     start = chain[..., 0, :]
     if leg.joint is SLIDER:
         start = start + np.multiply.outer(coordinate, leg.joint_axis)
+    same = _SAME * float(np.abs(end - start).max(initial=0.0))
     line = [start]
     for k in range(1, chain.shape[-2]):
-        apart = np.abs(chain[..., k, :] - line[-1]).max(initial=0.0)
-        if apart > _SAME * leg.size:  # NaN, a joint that it has not, compares false
-            line.append(chain[..., k, :])
+        point = chain[..., k, :]
+        if np.abs(point - line[-1]).max(initial=0.0) > same:
+            line.append(point)
+        if np.abs(point - end).max(initial=0.0) <= same:
+            break
     return np.stack(line, axis=-2)
+
+
+def _parts(robot: Manipulator, p: Array, axes: Array) -> tuple[Part, ...]:
+    """Return the platform's parts for P (..., 3) and the platform frame's axes (..., 3, 3)."""
+    frame = np.array(robot.platform.frame)
+    arms = np.array([leg.platform_point for leg in robot.legs])
+    still = np.array([leg.fixed_offset for leg in robot.legs]) @ frame.T
+    if not robot.platform.turns:
+        arms, still = arms + still, np.zeros_like(still)
+    found = [Part(p, p[..., None, :] + _corners(arms) @ axes)]
+    for hinge in _distinct(arms):
+        own = _corners(still[np.abs(arms - hinge).max(axis=-1) <= _COINCIDENT])
+        if len(own):
+            hub = p + hinge @ axes
+            found.append(Part(hub, hub[..., None, :] + own @ frame))
+    return tuple(found)
+
+
+def _corners(arms: Array) -> Array:
+    """Return the distinct arms (k, 3) that lead away from a hub, in order round its z axis."""
+    led = _distinct(arms[np.abs(arms).max(axis=-1) > _COINCIDENT])
+    away = led - led.mean(axis=0) if len(led) else led
+    return led[np.argsort(np.arctan2(away[:, 1], away[:, 0]), kind="stable")]
+
+
+def _distinct(points: Array) -> Array:
+    """Return the points (k, 3) but for those that are where one before them is."""
+    apart = np.abs(points[:, None] - points).max(axis=-1) > _COINCIDENT
+    return points[[bool(apart[i, :i].all()) for i in range(len(points))]]
 
 
 def joint_guides(robot: Manipulator, poses: PoseLike) -> tuple[Guide, ...]:
@@ -162,7 +225,9 @@ def joint_guides(robot: Manipulator, poses: PoseLike) -> tuple[Guide, ...]:
     found = []
     for i, leg in enumerate(robot.legs):
         used, axis = points.coordinates[:, i], np.array(leg.joint_axis)
-        if leg.joint is SLIDER:
+        if leg.follows_angle:
+            path = points.links[i][0, :1]
+        elif leg.joint is SLIDER:
             spare = _SPARE * leg.size
             limits = leg.limits or (used.min() - spare, used.max() + spare)
             path = np.array(leg.guide_point) + np.multiply.outer(np.array(limits), axis)

@@ -12,12 +12,12 @@ from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import checked
 from pteron.manipulator import Manipulator
-from pteron.motion.cycle import Cycle, across_directions, up
+from pteron.motion.cycle import Cycle, moves
 from pteron.motion.scaling import LEAST_RESERVE, TURN, scaled_to_reach
 from pteron.shapes import PoseLike
 
 PEAK_ACCELERATION = 10.0
-"""Of the platform's reference point, where no duration is given, m/s^2."""
+"""Of the tool's centre point, where no duration is given, m/s^2."""
 
 
 @dataclass(frozen=True)
@@ -77,8 +77,11 @@ def pick_and_place(
 ) -> PickAndPlace:
     """Return the standard pick-and-place cycle: 25 mm up, 305 mm across, 25 mm down, and back.
 
-    Up is against gravity, or along the platform's axis where there is none. Each move is a quintic
-    in time; they overlap, so that the corners are round. The platform rests at both ends.
+    It is the way of the tool's centre point, `platform.tool`; P goes along where that needs it. Up
+    is against gravity, or along the platform's axis where there is none. A planar machine goes the
+    cycle in its plane: up is then against what gravity does there or, in a horizontal plane, at a
+    right angle to across. Each move is a quintic in time; they overlap, so that the corners are
+    round. The platform rests at both ends.
 
     Parameters
     ----------
@@ -96,9 +99,9 @@ def pick_and_place(
     direction : array, shape (3,), optional
         Where the cycle goes across; see `scaled_to_reach`.
     turn : float
-        Turn of the platform on its way across, at scale 1, rad; without effect for 3T.
+        Turn of the platform on its way across, at scale 1, rad; without effect where it does not.
     peak : float
-        Largest acceleration of P, m/s^2, where no duration is given.
+        Largest acceleration of the tool's centre point, m/s^2, where no duration is given.
     least : float
         Reserve that the cycle keeps, where no scale is given; see `scaled_to_reach`.
 
@@ -111,7 +114,8 @@ def pick_and_place(
     ModelError
         If no scale is given and not even the smallest cycle fits.
     DataError
-        If a number is not positive, or the direction is vertical.
+        If a number is not positive, or the direction has no horizontal part, in the plane of a
+        planar machine.
 
     Examples
     --------
@@ -128,11 +132,12 @@ def pick_and_place(
         raise DataError(f"samples: {samples} given, at least 2 expected")
     middle = checked(robot, around, "around")
     if scale is None:
-        scale, across = scaled_to_reach(robot, middle, direction=direction, turn=turn, least=least)
-    else:
-        across = across_directions(robot, direction, 1)[0]
+        scale, direction = scaled_to_reach(
+            robot, middle, direction=direction, turn=turn, least=least
+        )
+    across, up = moves(robot, direction, 1)[0]
     angle = turn if robot.platform.turns else 0.0
-    cycle = Cycle(middle, across, up(robot), angle, scale)
+    cycle = Cycle(robot.platform, middle, across, up, angle, scale)
     if duration is None:
         # Accelerations go with 1 / duration^2.
         duration = float(np.sqrt(_peak_acceleration(cycle) / peak))
@@ -145,16 +150,16 @@ def pick_and_place(
         second / duration**2,
         scale,
         across,
-        cycle.up,
+        up,
         scale * angle,
     )
 
 
 def _peak_acceleration(cycle: Cycle) -> float:
-    """Return the largest acceleration of P over a cycle that takes one second, m/s^2."""
+    """Return the tool's largest acceleration over a cycle that takes one second, m/s^2."""
 
     def size(tau: Array) -> Array:
-        return np.asarray(np.linalg.norm(cycle.at(tau)[2][:, :3], axis=-1))
+        return np.asarray(np.linalg.norm(cycle.path(tau)[2], axis=-1))
 
     tau = np.linspace(0.0, 0.5, 1001)
     highest = int(size(tau).argmax())

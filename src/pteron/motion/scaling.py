@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,12 +12,13 @@ from pteron.equations.machine import closure_of
 from pteron.errors import ModelError
 from pteron.kernels import Array, numeric
 from pteron.kinematics.evaluate import checked
+from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator
-from pteron.motion.cycle import Cycle, across_directions, up
+from pteron.motion.cycle import Cycle, moves
 from pteron.shapes import PoseLike
 
 LEAST_RESERVE = 0.2
-"""Least type-I and type-II measure that a cycle keeps."""
+"""Least reserve, of type I and of type II, that a cycle keeps."""
 
 TURN = np.pi / 3.0
 """Turn of the platform on its way across in the full cycle, rad."""
@@ -26,8 +28,8 @@ _SAMPLES = 501
 """Poses checked on the way across; the way back is the same path."""
 
 _DIP = 1e-4
-"""By how much, in units of the reserve and in metres, a limit is kept clear: more than a reserve
-or a joint can dip between two checked poses."""
+"""By how much, in units of the reserve, m and rad, a limit is kept clear: more than a reserve or a
+joint can dip between two checked poses."""
 
 _STEPS = 1000
 """The scale is a multiple of one thousandth."""
@@ -46,7 +48,7 @@ def scaled_to_reach(
 ) -> tuple[float, Array]:
     """Return the scale of the largest pick-and-place cycle about a pose, and its direction.
 
-    The whole cycle stays in reach, keeps the type-I and type-II measures (see
+    The whole cycle stays in reach, keeps the reserves of type I and type II (see
     `pteron.workspace.Reserve`) at `least` or above, and the joints within their limits. The scale
     is found by bisection: a smaller cycle stays nearer to the pose in its middle.
 
@@ -57,10 +59,10 @@ def scaled_to_reach(
     around : array, shape (m,)
         The pose in the middle of the cycle, m and rad.
     direction : array, shape (3,), optional
-        Where the cycle goes across; its horizontal part counts. By default the best of twelve, the
-        platform's x axis where another is hardly better.
+        Where the cycle goes across; its horizontal part counts, in the plane of a planar machine.
+        By default the best of twelve, the platform's x axis where another is hardly better.
     turn : float
-        Turn of the platform on its way across, at scale 1, rad; without effect for 3T.
+        Turn of the platform on its way across, at scale 1, rad; without effect where it does not.
     least : float
         What the reserves must keep.
 
@@ -88,8 +90,8 @@ def scaled_to_reach(
     """
     middle = checked(robot, around, "around")
     scale, best = 0, None
-    for across in across_directions(robot, direction, _DIRECTIONS):
-        fits = _largest(robot, middle, across, turn, least)
+    for across, up in moves(robot, direction, _DIRECTIONS):
+        fits = _largest(robot, Cycle(robot.platform, middle, across, up, turn, 1.0), least)
         if best is None or fits > _WORTH * scale:
             scale, best = fits, across
     if best is None or scale == 0:
@@ -101,13 +103,12 @@ def scaled_to_reach(
     return scale / _STEPS, best
 
 
-def _largest(robot: Manipulator, around: Array, across: Array, turn: float, least: float) -> int:
+def _largest(robot: Manipulator, cycle: Cycle, least: float) -> int:
     """Return the largest scale that fits, in thousandths; 0 if none does."""
     way = np.linspace(0.0, 0.5, _SAMPLES)
 
     def fits(thousandths: int) -> bool:
-        cycle = Cycle(around, across, up(robot), turn, thousandths / _STEPS)
-        return _keeps(robot, cycle.at(way)[0], least)
+        return _keeps(robot, replace(cycle, scale=thousandths / _STEPS).at(way)[0], least)
 
     if fits(_STEPS):
         return _STEPS
@@ -119,7 +120,8 @@ def _keeps(robot: Manipulator, poses: Array, least: float) -> bool:
     type_i = numeric(robot, "reach")(poses)[1]
     good = (type_i >= least + _DIP).all()  # NaN, out of reach, compares false
     if closure_of(robot).vanishes() is not False or robot.platform.turns:
-        good &= (np.abs(numeric(robot, "type_ii")(poses)[0]) >= least + _DIP).all()
+        type_ii = np.abs(numeric(robot, "type_ii")(poses)[0]) / best_type_ii(robot)
+        good &= (type_ii >= least + _DIP).all()
     joints = numeric(robot, "joint_coordinates")(poses)[0]
     for leg, q in zip(robot.legs, joints.T, strict=True):
         if leg.limits is not None:

@@ -168,9 +168,23 @@ class Platform:
         return ("x", "y", *(() if self.planar else ("z",)), *(("phi",) if self.turns else ()))
 
     @property
+    def lengths(self) -> tuple[str, ...]:
+        """Names of those that are lengths, which come first."""
+        return tuple(name for name in self.coordinates if name != "phi")
+
+    @property
     def directions(self) -> NDArray[np.float64]:
         """Unit vectors (k, 3), k = 2 or 3, along which the pose's lengths count."""
         return np.array(self.frame[:2]) if self.planar else np.eye(3)
+
+    def at(self, poses: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return P (..., 3) and the platform frame's axes (..., 3, 3), one a row, in base frame."""
+        count = len(self.lengths)
+        x, y, z = (np.array(axis) for axis in self.frame)
+        angle = poses[..., -1:] if self.turns else np.zeros((*poses.shape[:-1], 1))
+        cos, sin = np.cos(angle), np.sin(angle)
+        axes = [cos * x + sin * y, cos * y - sin * x, np.broadcast_to(z, (*angle.shape[:-1], 3))]
+        return poses[..., :count] @ self.directions, np.stack(axes, axis=-2)
 
     @property
     def joined(self) -> PlanarInertia:

@@ -18,7 +18,7 @@ from pteron.plots.comparison import (
 )
 from pteron.plots.forces import forces_figure, regularity_figure
 from pteron.plots.reach import measure_figure, reach_figure
-from pteron.plots.robot import outline, robot_figure
+from pteron.plots.robot import grid_step, robot_figure
 
 __all__ = [
     "LEG_COLORS",
@@ -28,9 +28,9 @@ __all__ = [
     "correlation_figure",
     "errors_figure",
     "forces_figure",
+    "grid_step",
     "histogram_figure",
     "measure_figure",
-    "outline",
     "reach_figure",
     "regularity_figure",
     "residual_speed_figure",

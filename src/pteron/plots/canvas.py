@@ -13,6 +13,7 @@ from io import StringIO
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -101,6 +102,12 @@ def legend(figure: Figure, columns: int) -> None:
         columnspacing=1.2,
         handletextpad=0.5,
     )
+
+
+def nice_step(least: float) -> float:
+    """Return the least of 1, 2 and 5 times a power of ten that is no smaller than a step."""
+    power = 10.0 ** np.floor(np.log10(least))
+    return float(power * min(factor for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= least))
 
 
 def spot(axes: Axes, x: float, y: float, face: str, edge: str, size: float, **more: Any) -> None:

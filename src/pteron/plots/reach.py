@@ -17,6 +17,7 @@ from pteron.plots.canvas import (
     PAPER,
     REACH,
     blank,
+    nice_step,
     plain_axes,
     spot,
 )
@@ -35,10 +36,10 @@ _DASHES = ("-", "-", (0, (3, 2)), (0, (3, 2)))
 
 
 def reach_figure(cut: ReachSlice, *, path: Array | None = None) -> Figure:
-    """Return the map of a slice, with the positions (T, 3) of a motion, m, in projection.
+    """Return the map of a slice, with the poses' lengths (T, k) in a motion, m, in projection.
 
     In reach, the shade deepens with the margin. Outside, the colour is that of the leg that misses
-    the pose by most; a line in a leg's colour is where it is stretched or folded (type I).
+    the pose by most; a line in a leg's colour is the end of its reach (type I).
     """
     figure = blank(3.9, 3.9)
     axes = plain_axes(figure, f"{cut.plane[0]} (mm)", f"{cut.plane[1]} (mm)")
@@ -104,15 +105,9 @@ def _finish(axes: Axes, cut: ReachSlice, path: Array | None) -> None:
     first, second = 1e3 * cut.first, 1e3 * cut.second
     axes.set_aspect("equal")
     axes.set(xlim=(first[0], first[-1]), ylim=(second[0], second[-1]))
-    step = _nice(max(first[-1] - first[0], second[-1] - second[0]) / 6.0)
+    step = nice_step(max(first[-1] - first[0], second[-1] - second[0]) / 6.0)
     axes.xaxis.set_major_locator(MultipleLocator(step))
     axes.yaxis.set_major_locator(MultipleLocator(step))
-
-
-def _nice(step: float) -> float:
-    """Return the least of 1, 2 and 5 times a power of ten that is no smaller than a step."""
-    power = 10.0 ** np.floor(np.log10(step))
-    return float(power * min(factor for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= step))
 
 
 def _territories(legs: Array) -> Array:

@@ -1,4 +1,4 @@
-"""The machine in space: guides and cranks, links, platform and frames."""
+"""The machine in space, or in its plane: guides and cranks, links, platform and frames."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from pteron.kernels import Array
-from pteron.motion import Guide, JointPoints
-from pteron.plots.canvas import INK, LEG_COLORS, MUTED, PAPER, REACH, blank
+from pteron.motion import Guide, JointPoints, Part
+from pteron.plots.canvas import INK, LEG_COLORS, MUTED, PAPER, REACH, blank, nice_step
+from pteron.plots.sheet import Sheet
 from pteron.plots.space import Space, upright
 
 _PLATFORM_AXES = ("x\u2032", "y\u2032", "z\u2032")
@@ -18,6 +19,18 @@ _PLATFORM_AXES = ("x\u2032", "y\u2032", "z\u2032")
 
 _AXLE = 0.03
 """Half the length of a crank's axle, as a share of the machine's size."""
+
+APART = 0.018
+"""Half the distance of parallel rods, as a share of the machine's size: files do not say it."""
+
+_SQUARES = 10.0
+"""About so many squares of the grid are as long as the machine."""
+
+_WIDTH = 5.6
+"""Inches."""
+
+_NONE = 1e-9
+"""A part of gravity, over the whole, that is none but for rounding."""
 
 
 def robot_figure(
@@ -28,60 +41,110 @@ def robot_figure(
     path: Array | None = None,
     angle: str = "",
 ) -> Figure:
-    """Return the machine in one pose, with the vertical upwards.
+    """Return the machine in one pose: in space with the vertical upwards, or in its plane.
 
     The points are those of one pose, the guides those of `pteron.motion.joint_guides`; the `path`
-    (T, 3) of P is in m. Gravity (3,) is drawn as an arrow; without it the platform frame's z points
-    up. The `angle` stands, in words, beside the platform frame's x axis.
+    (T, 3) of a point in the base frame is in m. Gravity (3,) is drawn as an arrow, where the
+    picture's plane has it; in space without it the platform frame's z points up. The `angle`
+    stands, in words, beside the platform frame's x axis.
     """
-    figure = blank(5.6, 4.4)
-    space = Space(figure, points.axes[2] if gravity is None else -gravity)
-
-    paths = [guide.path for guide in guides if guide.slides]
-    corners = np.vstack([*points.links, *paths])
-    turned = corners @ space.rotation.T
-    low, high = turned.min(axis=0), turned.max(axis=0)
+    everything = _everything(points, guides)
+    step = grid_step(points, guides)
+    sheet: Space | Sheet
+    if points.plane is None:
+        figure = blank(_WIDTH, 4.4)
+        sheet = space = Space(figure, points.axes[2] if gravity is None else -gravity)
+        turned = everything @ space.rotation.T
+        low, high = turned.min(axis=0), turned.max(axis=0)
+        space.ground(low, high, step)
+    else:
+        flat = everything @ points.plane.T
+        low, high = flat.min(axis=0), flat.max(axis=0)
+        wide, tall = high - low
+        figure = blank(_WIDTH, float(np.clip(0.6 + (_WIDTH - 0.6) * tall / wide, 2.6, 5.6)))
+        sheet = Sheet(figure, points.plane, step)
+        if gravity is not None:
+            pull = points.plane.T @ (points.plane @ gravity)
+            gravity = pull if np.linalg.norm(pull) > _NONE * np.linalg.norm(gravity) else None
     size = float((high - low).max())
-    space.ground(low, high)
-    base = [line[0] for line, guide in zip(points.links, guides, strict=True) if not guide.slides]
+    base = base_outline(points, guides)
     if len(base) > 1:
-        space.faces([np.array(base)], MUTED, 0.18)
-        space.line(np.array([*base, base[0]]), MUTED, 2.0, raised=-0.02)
+        sheet.faces([base], MUTED, 0.18, raised=-0.03)
+        sheet.line(np.vstack([base, base[:1]]), MUTED, 2.0, raised=-0.02)
     for i, guide in enumerate(guides):
-        _draw_leg(space, points, guide, i, size)
-    _draw_platform(space, points, size, angle)
+        _draw_leg(sheet, points, guide, i, size)
+    for part in points.parts:
+        _draw_part(sheet, part)
+    _draw_frame(sheet, points, size, angle)
     if path is not None:
-        space.line(path, INK, 1.2, raised=1.0, style=(0, (1.5, 1.2)))
-    _draw_base_frame(space, low, size, gravity)
-    space.fill()
+        sheet.line(path, INK, 1.2, raised=1.0, style=(0, (1.5, 1.2)))
+    if isinstance(sheet, Space):
+        # At the near corner of the ground, in the upright frame: beside the machine, not in it.
+        corner = sheet.rotation.T @ (low + size * np.array([-0.02, -0.10, 0.0]))
+        for axis, name in zip(np.eye(3), "xyz", strict=True):
+            sheet.line(np.array([corner, corner + 0.13 * size * axis]), INK, 1.6, raised=1.0)
+            sheet.text(corner + 0.17 * size * axis, name, INK)
+        start = corner + size * (sheet.rotation.T @ np.array([-0.16, -0.02, 0.30]))
+    else:
+        start = np.array([low[0] - 0.06 * size, high[1]]) @ sheet.plane
+    if gravity is not None:
+        _draw_gravity(sheet, start, gravity, size)
+    sheet.fill()
     return figure
 
 
-def outline(points: JointPoints) -> list[int]:
-    """Return the legs in the order in which their platform points go round the platform's axis."""
-    arms = points.platform_points - points.platform_points.mean(axis=-2, keepdims=True)
-    x, y, _ = points.axes
-    return [int(i) for i in np.argsort(np.arctan2(arms @ y, arms @ x), kind="stable")]
+def _everything(points: JointPoints, guides: Sequence[Guide]) -> Array:
+    """Return the points (K, 3) that a picture must hold."""
+    return np.vstack([*points.links, *(guide.path for guide in guides)])
 
 
-def _draw_leg(space: Space, points: JointPoints, guide: Guide, i: int, size: float) -> None:
+def grid_step(points: JointPoints, guides: Sequence[Guide]) -> float:
+    """Return the side of the squares, m, behind a picture of a machine in one pose."""
+    everything = _everything(points, guides)
+    if points.plane is not None:
+        everything = everything @ points.plane.T
+    return nice_step(float(np.ptp(everything, axis=0).max()) / _SQUARES)
+
+
+def base_outline(points: JointPoints, guides: Sequence[Guide]) -> Array:
+    """Return the centres (k, 3) of the cranks' circles in one pose, in the order round them."""
+    pairs = zip(points.links, guides, strict=True)
+    base = np.array([line[0] for line, guide in pairs if not guide.slides and len(guide.path) > 1])
+    if len(base) < 3:
+        return base.reshape(-1, 3)
+    away = base - base.mean(axis=0)
+    x, y = np.linalg.svd(away)[2][:2] @ away.T
+    return np.asarray(base[np.argsort(np.arctan2(y, x), kind="stable")])
+
+
+def rods(line: Array, bar: Array | None, size: float) -> list[Array]:
+    """Return what a leg's last link is drawn as: its line (2, 3), or two and the bars between."""
+    if bar is None:
+        return [line[-2:]]
+    one, other = (line[-2:] + side * APART * size * bar for side in (1.0, -1.0))
+    return [one, other, *np.stack([one, other], axis=1)]
+
+
+def _draw_leg(sheet: Space | Sheet, points: JointPoints, guide: Guide, i: int, size: float) -> None:
     color, line = LEG_COLORS[i], points.links[i]
     if guide.slides:
-        space.line(guide.path, MUTED, 3.4, raised=-0.01)
+        sheet.line(guide.path, MUTED, 3.4, raised=-0.01)
         for end in guide.path:
-            space.mark(end, MUTED, MUTED, 3.0, raised=-0.01)
-        space.faces(_block(line[0], guide.axis, size), color, 0.95)
+            sheet.mark(end, MUTED, MUTED, 3.0, raised=-0.01)
+        sheet.faces(_block(line[0], guide.axis, size), color, 0.95)
     else:
-        space.line(guide.path, MUTED, 0.9, raised=-0.01, style=(0, (2.0, 2.0)))
+        sheet.line(guide.path, MUTED, 0.9, raised=-0.01, style=(0, (2.0, 2.0)))
         axle = _AXLE * size * guide.axis
-        space.line(np.array([line[0] - axle, line[0] + axle]), MUTED, 6.0, raised=-0.01)
-    for k, ends in enumerate(pairwise(line)):
-        space.line(np.array(ends), color, 4.6 if k == 0 else 3.0)
+        sheet.line(np.array([line[0] - axle, line[0] + axle]), MUTED, 6.0, raised=-0.01)
+    for ends in pairwise(line[:-1]):
+        sheet.line(np.array(ends), color, 4.6)
+    for ends in rods(line, points.bars[i], size):
+        sheet.line(ends, color, 3.0 if points.bars[i] is None else 2.0)
     for joint in line:
-        space.mark(joint, PAPER, color, 5.0)
+        sheet.mark(joint, PAPER, color, 5.0)
     along = guide.axis if guide.slides else line[1] - line[0]
-    away = space.beside(line[0] - points.reference, along)
-    space.text(line[0] + 0.075 * size * away, str(i + 1), color, bold=True)
+    away = sheet.beside(line[0] - points.reference, along)
+    sheet.text(line[0] + 0.075 * size * away, str(i + 1), color, bold=True)
 
 
 def _block(center: Array, along: Array, size: float) -> list[Array]:
@@ -95,32 +158,35 @@ def _block(center: Array, along: Array, size: float) -> list[Array]:
     ]
 
 
-def _draw_platform(space: Space, points: JointPoints, size: float, angle: str) -> None:
-    space.faces([points.platform_points[outline(points)]], REACH, 0.55)
-    p = points.reference
-    for corner in points.platform_points:
-        space.line(np.array([p, corner]), REACH, 2.0, raised=-2e-3)
-    for axis, name in zip(points.axes, _PLATFORM_AXES, strict=True):
+def _draw_part(sheet: Space | Sheet, part: Part) -> None:
+    if len(part.corners) > 2:
+        sheet.faces([part.corners], REACH, 0.55)
+    for corner in part.corners:
+        sheet.line(np.array([part.hub, corner]), REACH, 2.4, raised=-2e-3)
+    sheet.mark(part.hub, PAPER, REACH, 5.0)
+
+
+def _draw_frame(sheet: Space | Sheet, points: JointPoints, size: float, angle: str) -> None:
+    """Draw the platform's frame and the tool's centre point."""
+    p, tool = points.reference, points.tool
+    shown = 3 if points.plane is None else 2
+    for axis, name in list(zip(points.axes, _PLATFORM_AXES, strict=True))[:shown]:
         tip = p + 0.13 * size * axis
-        space.line(np.array([p, tip]), INK, 1.3, raised=0.5)
+        sheet.line(np.array([p, tip]), INK, 1.3, raised=0.5)
         label = f"{name} ({angle})" if angle and name == _PLATFORM_AXES[0] else name
-        space.text(p + 0.16 * size * axis, label, INK)
-    space.mark(p, INK, PAPER, 5.0, raised=0.6)
+        sheet.text(p + 0.16 * size * axis, label, INK)
+    if np.any(tool != p):
+        sheet.line(np.array([p, tool]), REACH, 3.4, raised=0.4)
+        sheet.mark(tool, REACH, INK, 5.0, raised=0.6)
+    sheet.mark(p, INK, PAPER, 5.0, raised=0.6)
 
 
-def _draw_base_frame(space: Space, low: Array, size: float, gravity: Array | None) -> None:
-    # At the near corner of the ground, in the upright frame: beside the machine, not in it.
-    corner = space.rotation.T @ (low + size * np.array([-0.02, -0.10, 0.0]))
-    for axis, name in zip(np.eye(3), "xyz", strict=True):
-        space.line(np.array([corner, corner + 0.13 * size * axis]), INK, 1.6, raised=1.0)
-        space.text(corner + 0.17 * size * axis, name, INK)
-    if gravity is not None:
-        down = gravity / np.linalg.norm(gravity)
-        start = corner + size * (space.rotation.T @ np.array([-0.16, -0.02, 0.30]))
-        tip = start + 0.2 * size * down
-        space.line(np.array([start, tip]), MUTED, 1.6, raised=1.0)
-        side = 0.03 * size * space.rotation[0]
-        for sign in (-1.0, 1.0):
-            barb = tip - 0.05 * size * down + sign * side
-            space.line(np.array([tip, barb]), MUTED, 1.6, raised=1.0)
-        space.text(start - 0.05 * size * down, "g", MUTED)
+def _draw_gravity(sheet: Space | Sheet, start: Array, gravity: Array, size: float) -> None:
+    down = gravity / np.linalg.norm(gravity)
+    tip = start + 0.2 * size * down
+    sheet.line(np.array([start, tip]), MUTED, 1.6, raised=1.0)
+    side = 0.03 * size * sheet.beside(np.ones(3), down)
+    for sign in (-1.0, 1.0):
+        barb = tip - 0.05 * size * down + sign * side
+        sheet.line(np.array([tip, barb]), MUTED, 1.6, raised=1.0)
+    sheet.text(start - 0.05 * size * down, "g", MUTED)

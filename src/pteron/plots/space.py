@@ -17,9 +17,6 @@ _ELEVATION, _AZIMUTH = 24.0, -52.0
 _MARGIN = 0.04
 """Share of the figure on each side."""
 
-_GRID_STEP = 0.1
-"""Side of the ground's squares, m."""
-
 
 def upright(vertical: Array) -> Array:
     """Return a rotation (3, 3) that takes a direction to z, and x as nearly to x as it can."""
@@ -115,10 +112,10 @@ class Space:
         corner = 0.5 - scale * (left + right) / 2.0
         self.axes.set_position((corner[0], corner[1], scale, scale))
 
-    def ground(self, low: Array, high: Array) -> None:
-        """Draw squares under everything, one rim wider than it."""
-        first, last = np.floor(low / _GRID_STEP) - 0.5, np.ceil(high / _GRID_STEP) + 0.5
-        x, y = (np.arange(first[i] + 0.5, last[i], 1.0) * _GRID_STEP for i in (0, 1))
+    def ground(self, low: Array, high: Array, step: float) -> None:
+        """Draw squares of a side under everything, one rim wider than it."""
+        first, last = np.floor(low / step) - 0.5, np.ceil(high / step) + 0.5
+        x, y = (np.arange(first[i] + 0.5, last[i], 1.0) * step for i in (0, 1))
         z = low[2]
         self._drawn.append(np.array([(a, b, z) for a in (x[0], x[-1]) for b in (y[0], y[-1])]))
         lines = [[(a, y[0], z), (a, y[-1], z)] for a in x]

@@ -11,6 +11,7 @@ from pteron.dynamics import inverse_dynamics
 from pteron.equations.machine import closure_of
 from pteron.kernels import Array, numeric
 from pteron.kinematics import jacobian, joint_rates, singular_orientations
+from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator
 from pteron.motion import (
     Guide,
@@ -20,6 +21,7 @@ from pteron.motion import (
     joint_points,
     pick_and_place,
 )
+from pteron.plots import grid_step
 from pteron.reduction import BaseParameters, base_parameters
 from pteron.report.costs import Cost, costs
 from pteron.workspace import (
@@ -35,14 +37,16 @@ from pteron.workspace import (
     reserve,
 )
 from pteron.workspace.doubts import doubts
-from pteron.workspace.reach import Plane
+from pteron.workspace.reach import Plane, slice_planes
 
 _SAMPLES = 481
 """Samples of the cycle: 120 steps of the moving picture, four each."""
 
 _LEAST_RESERVE = 0.2
-_PLANES: tuple[Plane, ...] = ("xy", "xz", "yz")
 _ANGLES = 361
+
+_CONSTANT = 1e-6
+"""The type-II measure's change over the orientation that is none but for rounding."""
 
 _RIM = 0.08
 """Share of the reach's greatest width that the slices show around it."""
@@ -55,9 +59,10 @@ _FINE = 121
 class JacobianAtHome:
     """The Jacobian (n, m) at the home pose, Eq. (10), and its condition number.
 
-    The number is that of J with a crank's row times its length and the angle's column divided by
-    `radius`, the root mean square distance of the platform points from the platform's axis, so that
-    no unit is mixed with another; a platform that does not turn has no radius.
+    The number is that of J with a crank's row times its length, a shaft's times `radius`, and the
+    angle's column divided by `radius`, so that no unit is mixed with another. The radius is the
+    root mean square distance of the platform points, as far as they turn, from the platform's axis
+    through P; None where the platform does not turn, or none of them does.
     """
 
     matrix: Array
@@ -67,19 +72,29 @@ class JacobianAtHome:
 
 @dataclass(frozen=True)
 class Orientations:
-    """The type-II measure (A,) over phi, where it depends on nothing else.
+    """The type-II measure (A,) over phi, as a share of its best; NaN out of reach.
 
-    `singular` has the type-II singular orientations; angles are in rad.
+    `singular` has the type-II singular orientations; angles are in rad. They are those of every
+    position, or, if not `everywhere`, of the home position.
     """
 
     angles: Array
     type_ii: Array
     singular: Array
+    everywhere: bool
+
+    @property
+    def partial(self) -> bool:
+        """Whether some angles are out of reach."""
+        return bool(np.isnan(self.type_ii).any())
 
 
 @dataclass(frozen=True)
 class Measures:
-    """Both measures (B, A) on a slice, the least of the legs for type I; NaN out of reach."""
+    """Both measures (B, A) on a slice; NaN out of reach.
+
+    Of type I it is the least of the legs', of type II the share of its best.
+    """
 
     cut: ReachSlice
     type_i: Array
@@ -92,7 +107,8 @@ class Report:
 
     The cycle keeps the reserve `least`; its forces and joint speeds (T, n) are in N and m/s, or
     N m and rad/s. The slices go through the home pose and are all of one width. Of `orientations`
-    and `measures` there is what the type-II measure depends on; neither where J is constant.
+    and `measures` there is what the type-II measure depends on; neither where J is constant. The
+    squares of the machine's pictures have sides of `grid`, m.
     """
 
     robot: Manipulator
@@ -104,6 +120,7 @@ class Report:
     points: JointPoints
     home_points: JointPoints
     guides: tuple[Guide, ...]
+    grid: float
     forces: Array
     joint_speeds: Array
     joints: JointRanges
@@ -145,6 +162,7 @@ def contents(robot: Manipulator) -> Report:
     cycle = pick_and_place(robot, home, samples=_SAMPLES, least=least)
     volume = reach_volume(robot, home)
     base = base_parameters(robot)
+    home_points, guides = joint_points(robot, home), joint_guides(robot, cycle.pose)
     # Squares of one width, so that the pictures share a scale.
     half = (0.5 + _RIM) * float((volume.box[1] - volume.box[0]).max())
     return Report(
@@ -155,14 +173,15 @@ def contents(robot: Manipulator) -> Report:
         least=least,
         cycle=cycle,
         points=joint_points(robot, cycle.pose),
-        home_points=joint_points(robot, home),
-        guides=joint_guides(robot, cycle.pose),
+        home_points=home_points,
+        guides=guides,
+        grid=grid_step(home_points, guides),
         forces=inverse_dynamics(robot, cycle.pose, cycle.velocity, cycle.acceleration),
         joint_speeds=joint_rates(robot, cycle.pose, cycle.velocity).actuated,
         joints=joint_ranges(robot, cycle.pose),
         slices=tuple(
             reach_slice(robot, home, plane, extent=_extent(volume.box, plane, [half] * 3))
-            for plane in _PLANES
+            for plane in slice_planes(robot)
         ),
         volume=volume,
         jacobian=_jacobian(robot, home),
@@ -181,37 +200,47 @@ def _extent(box: Array, plane: str, half: Sequence[float]) -> tuple[float, float
 
 
 def _measures(robot: Manipulator, home: Array, box: Array) -> Measures | None:
-    """Return the measures on the upright plane of home, where the type-II measure varies in it."""
+    """Return the measures on a plane of home, upright if it may be, where type II varies in it."""
     closure = closure_of(robot)
     if closure.orientation is not None or closure.vanishes() is False:
         return None
     # The plane of the base frame that holds the vertical best, x before y.
     vertical = np.abs(robot.gravity if any(robot.gravity) else robot.platform.axis)
-    plane: Plane = "xy" if vertical[1] > vertical[2] else "xz"
+    plane: Plane = "xy" if robot.platform.planar or vertical[1] > vertical[2] else "xz"
     half = (0.5 + _RIM) * (box[1] - box[0])
     cut = reach_slice(robot, home, plane, extent=_extent(box, plane, half.tolist()), points=_FINE)
     poses = np.tile(home, (*cut.status.shape, 1))
-    i, j = ("xyz".index(letter) for letter in plane)
+    i, j = (robot.coordinates.index(letter) for letter in plane)
     poses[..., i], poses[..., j] = np.meshgrid(cut.first, cut.second)
     type_i = numeric(robot, "reach")(poses)[1].min(axis=-1)
-    type_ii = np.abs(numeric(robot, "type_ii")(poses)[0])
+    type_ii = _type_ii(robot, poses)
     return Measures(cut, type_i, np.where(np.isnan(type_i), np.nan, type_ii))
 
 
 def _jacobian(robot: Manipulator, home: Array) -> JacobianAtHome:
     matrix = jacobian(robot, home)
-    metres = matrix * np.array([[leg.lever] for leg in robot.legs])
-    if not robot.platform.turns:
-        return JacobianAtHome(matrix, None, float(np.linalg.cond(metres)))
-    points = np.array([leg.platform_point[:2] for leg in robot.legs])
-    radius = float(np.sqrt((points**2).sum(axis=-1).mean()))
-    return JacobianAtHome(matrix, radius, float(np.linalg.cond(metres / [1.0, 1.0, 1.0, radius])))
+    held = [leg.platform_point[:2] for leg in robot.legs if not leg.follows_angle]
+    radius = float(np.sqrt((np.array(held) ** 2).sum(axis=-1).mean()))
+    unit = radius or 1.0
+    levers = [unit if leg.follows_angle else leg.lever for leg in robot.legs]
+    columns = [unit if name == "phi" else 1.0 for name in robot.coordinates]
+    condition = float(np.linalg.cond(matrix * np.array(levers)[:, None] / columns))
+    return JacobianAtHome(matrix, radius or None if robot.platform.turns else None, condition)
 
 
 def _orientations(robot: Manipulator, home: Array) -> Orientations | None:
-    if closure_of(robot).orientation is None:
+    """Return the type-II measure over phi at home, where it depends on that."""
+    if not robot.platform.turns:
         return None
     poses = np.tile(home, (_ANGLES, 1))
-    poses[:, 3] = angles = np.linspace(-np.pi, np.pi, _ANGLES)
-    measure = np.abs(numeric(robot, "type_ii")(poses)[0])
-    return Orientations(angles, measure, singular_orientations(robot))
+    poses[:, -1] = angles = np.linspace(-np.pi, np.pi, _ANGLES)
+    measure = _type_ii(robot, poses)
+    if np.nanmax(measure) - np.nanmin(measure) <= _CONSTANT:
+        return None
+    singular = singular_orientations(robot, home[:-1])
+    return Orientations(angles, measure, singular, closure_of(robot).orientation is not None)
+
+
+def _type_ii(robot: Manipulator, poses: Array) -> Array:
+    """Return the size of the type-II measure as a share of its best, NaN where it has none."""
+    return np.asarray(np.abs(numeric(robot, "type_ii")(poses)[0]) / best_type_ii(robot))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -18,22 +19,24 @@ from pteron.manipulator import Manipulator
 from pteron.plots import (
     forces_figure,
     measure_figure,
-    outline,
     reach_figure,
     regularity_figure,
     robot_figure,
     svg,
 )
+from pteron.plots.robot import APART, base_outline
 from pteron.reduction import BaseParameters
 from pteron.reduction.expressions import html_symbol
 from pteron.report.contents import Report
 from pteron.report.joints import coordinate, force, nouns, speed
-from pteron.report.typeset import fixed, resource, template, triple
+from pteron.report.typeset import compact, fixed, resource, template, triple
 
 _FRAMES = 120
 """Frames of the moving picture; it repeats, so that the cycle's last sample is left out."""
 
 _DECIMALS = 6
+
+_ROUNDING = 1e-9
 
 _LONGEST = 200
 """Characters of a sum that a person still reads; an oblique Quadrupteron's take thousands."""
@@ -68,6 +71,10 @@ def page(report: Report) -> str:
         force=force(joints),
         speed=speed(joints),
         joint=nouns(joints),
+        joint_units=dict.fromkeys(joint.unit for joint in joints),
+        gravity=_gravity(robot),
+        paired=any(leg.bar for leg in robot.legs),
+        modes=prod(len(leg.branches) for leg in robot.legs),
         figures=_figures(report),
         units=[report.base.parameters[k].unit for k in report.base.kept],
         values=report.base.values(),
@@ -88,6 +95,17 @@ def lettered(text: str) -> Markup:
     return Markup(re.sub(r"\bs0\b", "<b>s</b><sub>0</sub>", safe))
 
 
+def _gravity(robot: Manipulator) -> str:
+    """Return which way gravity acts in the picture of a planar machine, as a clause."""
+    gravity, frame = np.array(robot.gravity), np.array(robot.platform.frame)
+    if not gravity.any():
+        return "there is no gravity"
+    x, y, _ = frame @ gravity / np.linalg.norm(gravity)
+    if np.hypot(x, y) <= _ROUNDING:
+        return "gravity acts along the normal"
+    return "gravity acts along the arrow"
+
+
 def kinds(robot: Manipulator) -> list[tuple[LegKind, list[int]]]:
     """Return one leg of each kind, and the legs of that kind, from 1."""
     found: dict[str, list[int]] = {}
@@ -98,26 +116,31 @@ def kinds(robot: Manipulator) -> list[tuple[LegKind, list[int]]]:
 
 def geometry(robot: Manipulator) -> list[tuple[str, bool, list[str]]]:
     """Return the columns of the legs' geometry, mm: heading, whether of numbers, a text a leg."""
-    roles = {
-        **{q.name: q.role for leg in robot.legs for q in leg.quantities if hasattr(leg, q.name)},
-        "platform_point": "platform point",
-    }
-    order = ("point", "direction", "normal", "platform point", "length", "angle")
+    roles = {"guide_point": "point"}
+    roles |= {name: key.role for leg in robot.legs for name, key in leg.keys.items()}
+    roles["platform_point"] = "point of the platform"
+    if any(any(leg.fixed_offset) for leg in robot.legs):
+        roles["fixed_offset"] = "point of the platform"
+    order = ("point", "direction", "point of the platform", "length", "number", "count")
     columns = []
     shown = [name for name, role in roles.items() if role in order]
     for name in sorted(shown, key=lambda name: order.index(roles[name])):
         role, texts = roles[name], []
         for leg in robot.legs:
-            given = {q.name: q.value for q in leg.quantities}.get(name)
+            # A direction that the file leaves out may be another one's, or none.
+            default = [q.value for q in leg.quantities if q.name == name and q.role == "direction"]
             value = getattr(leg, name, None)
-            value = given if value is None else value
+            value = default[0] if value is None and default else value
             if value is None:
                 texts.append("\u2013")
-            elif role in ("length", "angle"):
-                texts.append(fixed((1e3 if role == "length" else 1.0) * float(np.ravel(value)[0])))
+            elif role in ("length", "number"):
+                texts.append(fixed(1e3 * value) if role == "length" else compact(value))
+            elif role == "count":
+                texts.append(str(value))
             else:
                 texts.append(triple(value, 1e3) if "point" in role else triple(value, digits=3))
-        columns.append((name.replace("_", " "), role in ("length", "angle"), texts))
+        if any(text != "\u2013" for text in texts):
+            columns.append((name.replace("_", " "), role in ("length", "number", "count"), texts))
     return columns
 
 
@@ -128,8 +151,17 @@ def bodies(robot: Manipulator) -> list[tuple[str, int | None, dict[str, float]]]
         for i, leg in enumerate(robot.legs)
         for letter, inertia in leg.bodies.items()
     ]
-    found.append(("platform", None, robot.platform.joined))
-    return [(name, i, with_center(inertia)) for name, i, inertia in found]
+    platform = robot.platform
+    found.append(("platform", None, platform.inertia))
+    rows = [(name, i, with_center(inertia)) for name, i, inertia in found]
+    for bar in platform.bars:
+        x, y, _ = bar.hinge
+        rows.append(("bar at its hinge", None, {"m": bar.mass, "mgx": x, "mgy": y}))
+    for part in platform.geared:
+        rows.append((f"geared part, ratio {compact(part.ratio)}", None, {"I": part.inertia}))
+    if platform.bars or platform.geared:
+        rows.append(("platform with all of it", None, with_center(platform.joined)))
+    return rows
 
 
 def _letters(robot: Manipulator) -> list[tuple[str, str]]:
@@ -157,13 +189,17 @@ def _figures(report: Report) -> dict[str, Any]:
     """Return the pictures as SVG, by their names in the template."""
     robot, cycle, at = report.robot, report.cycle, report.orientations
     gravity = np.array(robot.gravity)
-    path = cycle.pose[: len(cycle.time) // 2 + 1, :3]
+    out = slice(len(cycle.time) // 2 + 1)
+    lengths = robot.platform.lengths
+    path = cycle.pose[out, : len(lengths)]
     machine = robot_figure(
         report.home_points,
         report.guides,
         gravity=gravity if gravity.any() else None,
-        path=path,
-        angle=f"φ = {fixed(float(np.degrees(report.home[3])), 0)}°" if robot.platform.turns else "",
+        path=report.points.tool[out],
+        angle=f"φ = {fixed(float(np.degrees(report.home[-1])), 0)}°"
+        if robot.platform.turns
+        else "",
     )
     label = f"actuator {force([leg.joint for leg in robot.legs]).axis}"
     half = cycle.duration / 2.0
@@ -181,8 +217,8 @@ def _figures(report: Report) -> dict[str, Any]:
         ],
     }
     if at is not None:
-        turns = cycle.pose[:, 3]
-        used, home = (float(turns.min()), float(turns.max())), float(report.home[3])
+        turns = cycle.pose[:, -1]
+        used, home = (float(turns.min()), float(turns.max())), float(report.home[-1])
         figure = regularity_figure(at.angles, at.type_ii, at.singular, home=home, used=used)
         title = "The type-II measure over the orientation"
         made["orientations"] = svg(figure, name="orientations", title=title)
@@ -202,30 +238,50 @@ def _figures(report: Report) -> dict[str, Any]:
 def scene(report: Report) -> dict[str, Any]:
     """Return the machine and the frames of its motion as plain lists.
 
-    Everything is in the base frame, in m, rad, s, N and N m; a leg's `chains` in a frame are the
-    points of its line, a `guide` the way of its slider or of its crank's end.
+    Everything is in m, rad, s, N and N m, in the base frame; of a planar machine along its pose's x
+    and y and the plane's normal, in the plane. A leg's `chains` in a frame are the points of its
+    line, a `guide` the way of its slider or of its crank's end, its `bars` what leads from the line
+    to each of parallel rods, over the machine's size.
     """
-    cycle, points = report.cycle, report.points
+    robot, cycle, points = report.robot, report.cycle, report.points
     step = (len(cycle.time) - 1) // _FRAMES
     frames = slice(0, _FRAMES * step, step)
-    lines = [_plain(line[frames]) for line in points.links]
-    shown = coordinate([leg.joint for leg in report.robot.legs])
+    planar = robot.platform.planar
+    turn = np.array(robot.platform.frame) if planar else np.eye(3)
+
+    def seen(array: Array) -> Any:
+        return _plain(array @ turn.T * ([1.0, 1.0, 0.0] if planar else 1.0))
+
+    gravity = np.array(robot.gravity)
+    strength = float(np.linalg.norm(gravity)) or 1.0
+    lines = [seen(line[frames]) for line in points.links]
+    shown = coordinate([leg.joint for leg in robot.legs])
     return {
-        "up": _plain(cycle.up),
-        "gravity": any(report.robot.gravity),
+        "planar": planar,
+        "up": [0.0, 0.0, 1.0] if planar else _plain(cycle.up),
+        "gravity": seen(gravity / strength),
+        "grid": report.grid,
         "duration": round(cycle.duration, _DECIMALS),
-        "guides": [_plain(guide.path) for guide in report.guides],
+        "guides": [seen(guide.path) for guide in report.guides],
         "slides": [guide.slides for guide in report.guides],
-        "directions": _plain(np.array([guide.axis for guide in report.guides])),
-        "outline": outline(report.home_points),
+        "directions": _plain(np.array([guide.axis for guide in report.guides]) @ turn.T),
+        "bars": [None if bar is None else seen(APART * bar) for bar in points.bars],
+        "base": seen(base_outline(report.home_points, report.guides)),
+        "parts": [
+            {"hub": seen(part.hub[frames]), "corners": seen(part.corners[frames])}
+            for part in points.parts
+        ],
+        "position": seen(points.reference[frames]),
+        "tool": seen(points.tool[frames]) if any(robot.platform.tool) else None,
         "time": _plain(cycle.time[frames]),
         "pose": _plain(cycle.pose[frames]),
-        "axes": _plain(points.axes[frames]),
+        "scales": [180.0 / np.pi if name == "phi" else 1e3 for name in robot.coordinates],
+        "axes": _plain(points.axes[frames] @ turn.T),
         "chains": [list(legs) for legs in zip(*lines, strict=True)],
         "coordinates": _plain(points.coordinates[frames]),
         "factors": shown.factors,
         "forces": _plain(report.forces[frames]),
-        "units": [leg.joint.force_unit for leg in report.robot.legs],
+        "units": [leg.joint.force_unit for leg in robot.legs],
     }
 
 

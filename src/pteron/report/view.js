@@ -16,26 +16,28 @@
   const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
   const unit = (a) => { const l = Math.hypot(...a) || 1; return [a[0] / l, a[1] / l, a[2] / l]; };
 
-  // The picture's vertical is `up`; the base frame's x stays as nearly to the right as it can.
+  // The picture's vertical is `up`; the first axis stays as nearly to the right as it can. A planar
+  // machine lies in the plane of the first two axes and is seen from above.
   const up = unit(data.up);
   const side = unit(cross(cross(up, Math.abs(up[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0]), up));
   const basis = [side, cross(up, side), up];
   const upright = (p) => basis.map((axis) => dot(axis, p));
   const deep = (value) => (typeof value[0] === "number" ? upright(value) : value.map(deep));
-  const guides = deep(data.guides), directions = deep(data.directions), axes = deep(data.axes);
+  const guides = deep(data.guides), directions = deep(data.directions), axes = deep(data.axes), bars = data.bars.map((bar) => bar && upright(bar));
   // Of each frame and leg, the points where its bodies meet, from the slider or the crank's centre.
   const chains = deep(data.chains), slides = data.slides;
   const first = chains.map((lines) => lines.map((chain) => chain[0]));
-  const platform = chains.map((lines) => lines.map((chain) => chain[chain.length - 1]));
-  const position = data.pose.map((pose) => upright(pose.slice(0, 3)));
-  const baseAxes = deep([[1, 0, 0], [0, 1, 0], [0, 0, 1]]);
+  // The platform's parts: arms from a hub to corners, in each frame.
+  const parts = data.parts.map((part) => ({ hub: deep(part.hub), corners: deep(part.corners) }));
+  const position = deep(data.position), tool = data.tool && deep(data.tool), base = deep(data.base);
+  const baseAxes = deep([[1, 0, 0], [0, 1, 0], [0, 0, 1]]).slice(0, data.planar ? 2 : 3);
 
-  const rails = guides.filter((_, i) => slides[i]), base = first[0].filter((_, i) => !slides[i]);
+  const rails = guides.filter((_, i) => slides[i]);
   const cloud = guides.flat().concat(chains.flat(2));
   const low = [0, 1, 2].map((k) => Math.min(...cloud.map((p) => p[k])));
   const high = [0, 1, 2].map((k) => Math.max(...cloud.map((p) => p[k])));
   const size = Math.max(...[0, 1, 2].map((k) => high[k] - low[k]));
-  const floor = low[2] - 0.03 * size, step = 0.1;
+  const floor = low[2] - 0.03 * size, step = data.grid;
   const gridLow = [0, 1].map((k) => Math.floor(low[k] / step) * step);
   const gridHigh = [0, 1].map((k) => Math.ceil(high[k] / step) * step);
   const center = [(gridLow[0] + gridHigh[0]) / 2, (gridLow[1] + gridHigh[1]) / 2, (floor + high[2]) / 2];
@@ -43,7 +45,7 @@
   const peaks = data.units.map((unit) =>
     Math.max(1e-9, ...data.forces.flatMap((row) => row.filter((_, i) => data.units[i] === unit).map(Math.abs))));
 
-  const start = { yaw: -0.95, pitch: 0.4, zoom: 1 };
+  const start = data.planar ? { yaw: 0, pitch: Math.PI / 2, zoom: 1 } : { yaw: -0.95, pitch: 0.4, zoom: 1 };
   const camera = { ...start };
   let width = 0, height = 0, scale = 1, middle = 0, frame = 0, playing = false, phase = 0, last = null, shown = true;
   let colors = {};
@@ -76,11 +78,12 @@
     width = canvas.clientWidth; height = canvas.clientHeight;
     canvas.width = Math.round(width * ratio); canvas.height = Math.round(height * ratio);
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
-    // The size that holds the machine from any side, at the pitch it starts with.
+    // The size that holds the machine from any side, at the pitch it starts with; a planar one from its own.
     const corners = [gridLow, [gridLow[0], gridHigh[1]], gridHigh, [gridHigh[0], gridLow[1]]].map((p) => [...p, floor]);
-    const outer = cloud.concat(corners);
+    const frame = position.flatMap((p, k) => axes[k].map((axis) => add(p, axis, 0.1 * size)));
+    const outer = cloud.concat(corners, frame);
     let wide = 0, top = 0, bottom = 0;
-    for (let turn = 0; turn < 12; turn++) {
+    for (let turn = 0; turn < (data.planar ? 1 : 12); turn++) {
       for (const p of outer) {
         const q = project(p, start.yaw + (turn * Math.PI) / 6, start.pitch);
         wide = Math.max(wide, Math.abs(q[0])); top = Math.min(top, q[1]); bottom = Math.max(bottom, q[1]);
@@ -160,26 +163,32 @@
       path([[gridLow[0], y, floor], [gridHigh[0], y, floor]]); pen.stroke();
     }
     const corner = [...gridLow, floor];
-    "xyz".split("").forEach((name, k) => {
-      line(corner, add(corner, baseAxes[k], 0.13 * size), colors.ink, 1.8);
-      label(add(corner, baseAxes[k], 0.17 * size), name, colors.ink);
+    baseAxes.forEach((axis, k) => {
+      line(corner, add(corner, axis, 0.13 * size), colors.ink, 1.8);
+      label(add(corner, axis, 0.17 * size), "xyz"[k], colors.ink);
     });
+    if (!data.planar || !Math.hypot(...data.gravity)) return;
+    const from = [gridHigh[0] - 0.06 * size, gridHigh[1] - 0.06 * size, floor], down = data.gravity, across = [-down[1], down[0], 0];
+    const tip = add(from, down, 0.15 * size);
+    for (const end of [from, add(add(tip, down, -0.04 * size), across, 0.025 * size), add(add(tip, down, -0.04 * size), across, -0.025 * size)]) line(tip, end, colors.muted, 1.8);
+    label(add(from, down, -0.04 * size), "g", colors.muted);
   }
   function shadow(k) {
     const drop = (p) => [p[0], p[1], floor];
     pen.lineJoin = "round"; pen.lineCap = "round"; pen.strokeStyle = colors.shade; pen.fillStyle = colors.shade;
     for (let i = 0; i < legs; i++) {
       path(chains[k][i].map(drop));
-      pen.lineWidth = Math.max(2, 0.016 * size * pixel(drop(platform[k][i]))[3]); pen.stroke();
+      pen.lineWidth = Math.max(2, 0.016 * size * pixel(drop(position[k]))[3]); pen.stroke();
     }
     for (const rail of rails) { path(rail.map(drop)); pen.lineWidth = 2; pen.stroke(); }
-    path(data.outline.map((i) => drop(platform[k][i]))); pen.closePath(); pen.fill();
+    for (const part of parts) { path(part.corners[k].map(drop)); pen.closePath(); pen.fill(); }
   }
 
   function draw() {
     pen.clearRect(0, 0, width, height);
     const k = frame;
-    ground(); shadow(k);
+    ground();
+    if (!data.planar) shadow(k);
     const items = [];
     const put = (points, run, nearer = 0) => {
       const depth = points.reduce((sum, p) => sum + project(p)[2], 0) / points.length;
@@ -196,19 +205,30 @@
         const axle = [-0.035, 0.035].map((t) => add(a, directions[i], t * size));
         put([a], () => line(...axle, colors.rail, Math.max(3, 0.026 * size * pixel(a)[3])), -0.01);
       }
-      chain.slice(1).forEach((p, j) => put([chain[j], p], () => rod(chain[j], p, color, (j ? 0.015 : 0.022) * size)));
+      chain.slice(1, -1).forEach((p, j) => put([chain[j], p], () => rod(chain[j], p, color, 0.022 * size)));
+      const ends = chain.slice(-2), sides = bars[i] ? [-size, size].map((t) => ends.map((p) => add(p, bars[i], t))) : [ends];
+      for (const [from, to] of sides) put([from, to], () => rod(from, to, color, (bars[i] ? 0.009 : 0.015) * size));
+      if (bars[i]) for (const j of [0, 1]) put([ends[j]], () => rod(sides[0][j], sides[1][j], color, 0.009 * size));
       for (const p of chain) put([p], () => ball(p, color, 0.011 * size), 0.012);
     }
-    if (base.length > 1) put(base, () => face(base, colors.rail, 0.25), -0.03);
-    const plate = data.outline.map((i) => platform[k][i]);
-    put(plate, () => solid(prism(plate, axes[k][2], 0.014 * size), colors.reach, 0.85));
-    for (const corner of plate) put([position[k], corner], () => line(position[k], corner, colors.reach, Math.max(2, 0.009 * size * pixel(corner)[3])));
+    if (base.length > 2) put(base, () => face(base, colors.rail, 0.25), -0.03);
+    else if (base.length > 1) put(base, () => line(...base, colors.rail, Math.max(2.5, 0.011 * size * pixel(base[0])[3])), -0.03);
+    for (const part of parts) {
+      const hub = part.hub[k], plate = part.corners[k];
+      if (plate.length > 2) put(plate, () => solid(prism(plate, axes[k][2], 0.014 * size), colors.reach, 0.85));
+      for (const corner of plate) put([hub, corner], () => line(hub, corner, colors.reach, Math.max(2, 0.012 * size * pixel(corner)[3])));
+      put([hub], () => ball(hub, colors.reach, 0.009 * size), 0.012);
+    }
+    if (tool) {
+      put([position[k], tool[k]], () => line(position[k], tool[k], colors.reach, Math.max(2, 0.016 * size * pixel(tool[k])[3])));
+      put([tool[k]], () => ball(tool[k], colors.ink, 0.009 * size), 0.02);
+    }
     items.sort((a, b) => b[0] - a[0]).forEach((item) => item[1]());
 
-    pen.setLineDash([2, 4]); path(position.slice(0, Math.floor(frames / 2) + 1));
+    pen.setLineDash([2, 4]); path((tool || position).slice(0, Math.floor(frames / 2) + 1));
     pen.strokeStyle = colors.ink; pen.lineWidth = 1.4; pen.stroke(); pen.setLineDash([]);
     const p = position[k];
-    axes[k].forEach((axis, j) => line(p, add(p, axis, (j < 2 ? 0.1 : 0.07) * size), colors.ink, 1.6));
+    axes[k].slice(0, baseAxes.length).forEach((axis, j) => line(p, add(p, axis, (j < 2 ? 0.1 : 0.07) * size), colors.ink, 1.6));
     for (let i = 0; i < legs; i++) {
       const at = first[k][i], along = slides[i] ? directions[i] : unit(add(chains[k][i][1], at, -1));
       const a = pixel(at), ahead = pixel(add(at, along, 0.1)), from = pixel(p);
@@ -230,9 +250,9 @@
       const force = data.forces[k][i], share = (50 * Math.abs(force)) / peaks[i];
       const bar = document.getElementById("bar" + i);
       bar.style.width = share + "%"; bar.style.left = (force < 0 ? 50 - share : 50) + "%";
-      put("force" + i, minus(force, 1)); put("joint" + i, minus(data.factors[i] * data.coordinates[k][i], 1));
+      put("force" + i, minus(force, Math.max(1, 2 - Math.floor(Math.log10(peaks[i]))))); put("joint" + i, minus(data.factors[i] * data.coordinates[k][i], 1));
     }
-    data.pose[k].forEach((value, j) => put("pose" + j, minus(value * (j < 3 ? 1e3 : 180 / Math.PI), 1)));
+    data.pose[k].forEach((value, j) => put("pose" + j, minus(value * data.scales[j], 1)));
     put("clock", data.time[k].toFixed(2) + " s");
     seek.value = k;
     seek.setAttribute("aria-valuetext", data.time[k].toFixed(2) + " seconds");
@@ -262,7 +282,7 @@
     if (on) requestAnimationFrame(tick);
   }
   function turn(yaw, pitch) {
-    camera.yaw += yaw; camera.pitch = Math.min(1.5, Math.max(-0.3, camera.pitch + pitch)); redraw();
+    camera.yaw += yaw; camera.pitch = Math.min(Math.PI / 2, Math.max(-0.3, camera.pitch + pitch)); redraw();
   }
   function zoom(factor) { camera.zoom = Math.min(8, Math.max(0.5, camera.zoom * factor)); redraw(); }
 

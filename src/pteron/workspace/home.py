@@ -1,8 +1,9 @@
-"""The home pose: where a machine has the best reserve."""
+"""The home pose: where a machine has the best reserve, turned by no more than that is worth."""
 
 from __future__ import annotations
 
 from contextlib import suppress
+from itertools import product
 
 import numpy as np
 from scipy.optimize import minimize  # type: ignore[import-untyped]
@@ -11,6 +12,7 @@ from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kinematics import inverse_kinematics, random_poses, singular_orientations
 from pteron.manipulator import Manipulator
+from pteron.shapes import Numbers
 from pteron.workspace.lacking import beyond_limits, nowhere
 from pteron.workspace.reserve import reserve
 
@@ -22,7 +24,8 @@ _STARTS = 12
 _STEPS = (0.02, 0.2)
 """Size of the first simplex: m and rad."""
 
-_GRIDS = ((0.1, 30.0), (0.05, 15.0), (0.01, 5.0), (0.001, 1.0))
+_METRES = (0.1, 0.05, 0.01, 0.001)
+_DEGREES = (30.0, 15.0, 5.0, 1.0)
 """Round poses that are tried, coarsest first: multiples of so many metres and degrees."""
 
 _WORTH = 0.99
@@ -33,8 +36,9 @@ def home_pose(robot: Manipulator) -> Array:
     """Return the pose with the best reserve, rounded where that costs next to nothing.
 
     The reserve is the smallest of the type-I and type-II measures and of the joints' clearances
-    (see `Reserve`); a random search with a fixed seed finds it, and Nelder and Mead's
-    method refines it. The result is always the same for the same machine.
+    (see `Reserve`) and, where the platform turns, of what is left of half a turn from phi = 0: a
+    machine seldom works the wrong way round. A random search with a fixed seed finds it, and Nelder
+    and Mead's method refines it. The result is always the same for the same machine.
 
     Parameters
     ----------
@@ -63,9 +67,9 @@ def home_pose(robot: Manipulator) -> Array:
     """
     singular_orientations(robot)  # refuses a machine that is singular everywhere
     drawn = _random_poses(robot)
-    order = np.argsort(-reserve(robot, drawn).smallest, kind="stable")
+    order = np.argsort(-_worth(robot, drawn), kind="stable")
     refined = np.array([_refined(robot, drawn[i]) for i in order[:_STARTS]])
-    reserves = reserve(robot, refined).smallest
+    reserves = _worth(robot, refined)
     most = float(reserves.max())
     if most <= 0.0:
         raise beyond_limits(robot, refined[reserves.argmax()])
@@ -73,13 +77,11 @@ def home_pose(robot: Manipulator) -> Array:
     equals = refined[reserves >= _WORTH * most]
     travel = np.abs(inverse_kinematics(robot, equals)).max(axis=-1)
     best: Array = equals[travel.argmin()]
-    least = _WORTH * float(reserve(robot, best).smallest)
-    if robot.platform.turns:
-        best[-1] = np.pi - (np.pi - best[-1]) % (2.0 * np.pi)
-    for metres, degrees in _GRIDS:
+    least = _WORTH * float(_worth(robot, best))
+    for metres, degrees in product(_METRES, _DEGREES):
         step = _steps(robot, metres, np.radians(degrees))
         rounded: Array = np.round(best / step) * step + 0.0  # -0.0 becomes 0.0
-        if reserve(robot, rounded).smallest >= least:
+        if _worth(robot, rounded) >= least:
             return rounded
     return best
 
@@ -91,6 +93,14 @@ def _random_poses(robot: Manipulator) -> Array:
     raise nowhere(robot)
 
 
+def _worth(robot: Manipulator, poses: Array) -> Numbers:
+    """Return the least reserve (...), which is 0 at most where the platform is turned back."""
+    least = reserve(robot, poses).smallest
+    if not robot.platform.turns:
+        return least
+    return np.minimum(least, 1.0 - np.abs(poses[..., -1]) / np.pi)
+
+
 def _steps(robot: Manipulator, metres: float, radians: float) -> Array:
     """Return a step of each of the pose's coordinates."""
     return np.array([radians if name == "phi" else metres for name in robot.coordinates])
@@ -100,7 +110,7 @@ def _refined(robot: Manipulator, start: Array) -> Array:
     """Return the pose of a locally best reserve."""
     simplex = np.vstack([start, start + np.diag(_steps(robot, *_STEPS))])
     found = minimize(
-        lambda pose: -float(reserve(robot, pose).smallest),
+        lambda pose: -float(_worth(robot, pose)),
         start,
         method="Nelder-Mead",
         options={"initial_simplex": simplex, "xatol": 1e-5, "fatol": 1e-6, "maxiter": 500},

@@ -30,7 +30,7 @@ Plane = Literal["xy", "xz", "yz"]
 
 @dataclass(frozen=True)
 class ReachSlice:
-    """A grid of poses that differ in two of x, y and z.
+    """A grid of poses that differ in two of their lengths x, y and z.
 
     Attributes
     ----------
@@ -57,6 +57,11 @@ class ReachSlice:
     leg_margins: Array
 
 
+def slice_planes(robot: Manipulator) -> tuple[Plane, ...]:
+    """Return the planes in which slices are possible: in space three, of a planar machine one."""
+    return ("xy",) if robot.platform.planar else ("xy", "xz", "yz")
+
+
 def reach_slice(
     robot: Manipulator,
     center: PoseLike,
@@ -65,7 +70,7 @@ def reach_slice(
     extent: tuple[float, float, float, float] | None = None,
     points: int = 81,
 ) -> ReachSlice:
-    """Return a slice through the reach at the orientation of a pose.
+    """Return a slice through the reach of P at the orientation of a pose.
 
     Parameters
     ----------
@@ -74,7 +79,7 @@ def reach_slice(
     center : array, shape (m,)
         The pose the slice goes through, m and rad.
     plane : {"xy", "xz", "yz"}
-        The two coordinates, of the base frame, that vary.
+        The two coordinates that vary; a planar machine has but x and y.
     extent : (float, float, float, float), optional
         Least and greatest value of the first coordinate, then of the second, m; by default what
         shows the whole reach at this orientation.
@@ -88,7 +93,7 @@ def reach_slice(
     Raises
     ------
     DataError
-        If the plane is none of the three or there are fewer than 2 points.
+        If the machine's poses have no such plane or there are fewer than 2 points.
     ModelError
         If no extent is given and no position is in reach at this orientation.
 
@@ -100,12 +105,14 @@ def reach_slice(
     >>> cut.status[1, 1], cut.margin[1, 1].round(3)
     (np.int64(0), np.float64(0.095))
     """
-    if plane not in ("xy", "xz", "yz"):
-        raise DataError(f'plane: {plane!r} is none of "xy", "xz" and "yz"')
+    planes = slice_planes(robot)
+    if plane not in planes:
+        valid = ", ".join(f'"{one}"' for one in planes)
+        raise DataError(f"plane: {plane!r} is not one of {valid}")
     if points < 2:
         raise DataError(f"points: {points} given, at least 2 expected")
     pose = checked(robot, center, "center")
-    i, j = ("xyz".index(letter) for letter in plane)
+    i, j = (robot.coordinates.index(letter) for letter in plane)
     if extent is None:
         box = bounding_box(robot, pose)
         rim = _RIM * (box[1] - box[0])

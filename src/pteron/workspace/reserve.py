@@ -11,12 +11,10 @@ from numpy.typing import NDArray
 
 from pteron.errors import DataError
 from pteron.kernels import Array, numeric
-from pteron.kinematics import inverse_kinematics, random_poses
+from pteron.kinematics import inverse_kinematics
+from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator
 from pteron.shapes import Numbers, PerJoint, PoseLike
-
-_DRAWN = 4096
-"""Random poses among which the best type-II measure is sought."""
 
 
 @dataclass(frozen=True)
@@ -96,13 +94,6 @@ def _facts(robot: Manipulator) -> _Facts:
     return _Facts(sizes, low, high, half, levers)
 
 
-@lru_cache(maxsize=64)
-def best_type_ii(robot: Manipulator) -> float:
-    """Return the largest type-II measure, in size, of many random poses; 1 if all are singular."""
-    drawn = random_poses(robot, _DRAWN, type_i=0.0, type_ii=0.0)
-    return float(np.abs(numeric(robot, "type_ii")(drawn)[0]).max()) or 1.0
-
-
 def clearances(robot: Manipulator, joints: Array) -> Array:
     """Return the distance (..., n) of joints from their nearer limit, negative beyond, or inf."""
     facts = _facts(robot)
@@ -112,12 +103,15 @@ def clearances(robot: Manipulator, joints: Array) -> Array:
 def room_to_limits(robot: Manipulator, poses: Array) -> Array:
     """Return how far (..., n) legs may move until an actuated or passive joint meets its limit, m.
 
-    Very far without limits, and out of reach, where a joint may have no coordinate.
+    Very far without limits, and out of reach, where a joint may have no coordinate; so is a joint
+    that follows the platform's angle within its limits, since no way leads out of them.
     """
     joints = numeric(robot, "joint_coordinates")(poses)[0]
     room = clearances(robot, joints) * _facts(robot).levers
+    follows = np.array([leg.follows_angle for leg in robot.legs])
+    free = np.isnan(room) | (follows & (room >= 0.0))
     passive: Array = numeric(robot, "passive_room")(poses)[1]
-    return np.asarray(np.fmin(np.where(np.isnan(room), np.inf, room), passive))
+    return np.asarray(np.fmin(np.where(free, np.inf, room), passive))
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""How large the reach is at constant orientation: its bounding box and its volume."""
+"""How large the reach is at constant orientation: its bounding box and its volume, or area."""
 
 from __future__ import annotations
 
@@ -36,22 +36,27 @@ _TOUCH = 1e-9
 
 @dataclass(frozen=True)
 class ReachVolume:
-    """The set of positions in reach at one orientation, within the joints' limits.
+    """The set of positions of P in reach at one orientation, within the joints' limits.
+
+    The tool's centre point reaches the same set, moved by where it is from P.
 
     Attributes
     ----------
     volume : float
-        m^3, an estimate.
+        An estimate; of a planar machine it is an area.
     standard_error : float
-        Of the estimate, m^3.
-    box : array, shape (2, 3)
-        Least and greatest x, y and z in reach, m.
+        Of the estimate.
+    unit : {"m^3", "m^2"}
+        Of both.
+    box : array, shape (2, k)
+        Least and greatest of each of the pose's k lengths in reach, m.
     count : int
         Number of random positions in the box that the estimate rests on.
     """
 
     volume: float
     standard_error: float
+    unit: str
     box: Array
     count: int
 
@@ -71,8 +76,8 @@ def bounding_box(robot: Manipulator, pose: PoseLike) -> Array:
 
     Returns
     -------
-    array, shape (2, 3)
-        Least and greatest x, y and z, m.
+    array, shape (2, k)
+        Least and greatest x, y and, in space, z; m.
 
     Raises
     ------
@@ -88,17 +93,19 @@ def bounding_box(robot: Manipulator, pose: PoseLike) -> Array:
            [ 0.3 ,  0.3 ,  0.3 ]])
     """
     given = checked(robot, pose, "pose")
+    count = len(robot.platform.lengths)
 
     def room(p: Array) -> Array:
         """Return how far inside every bound positions are, m."""
-        at = np.concatenate([p, np.broadcast_to(given[3:], (*p.shape[:-1], len(given) - 3))], -1)
+        at = np.broadcast_to(given, (*p.shape[:-1], len(given))).copy()
+        at[..., :count] = p
         limits = room_to_limits(robot, at)
         return np.concatenate([numeric(robot, "reach")(at)[0], np.minimum(limits, _FAR)], axis=-1)
 
     center, radius = search_ball(robot)
     rng = np.random.default_rng(0)
-    drawn = center + radius * rng.uniform(-1.0, 1.0, (_SAMPLES, 3))
-    drawn = np.vstack([drawn, given[:3]])
+    drawn = center + radius * rng.uniform(-1.0, 1.0, (_SAMPLES, count))
+    drawn = np.vstack([drawn, given[:count]])
     inside = room(drawn).min(axis=-1)
     # Where next to nothing is in reach, the deepest positions are moved inside first.
     starts = drawn[np.argsort(-inside)[:_STARTS]]
@@ -112,12 +119,12 @@ def bounding_box(robot: Manipulator, pose: PoseLike) -> Array:
                 subject=robot.name,
             )
     good = np.vstack([drawn[inside > _TOUCH], starts[room(starts).min(axis=-1) > _TOUCH]])
-    sides = np.empty((2, 3))
-    for axis in range(3):
+    sides = np.empty((2, count))
+    for axis in range(count):
         for side, sign in enumerate((1.0, -1.0)):
             firsts = good[np.argsort(sign * good[:, axis])[:_STARTS]]
             sides[side, axis] = sign * min(
-                _furthest(room, p, sign * np.eye(3)[axis]) for p in firsts
+                _furthest(room, p, sign * np.eye(count)[axis]) for p in firsts
             )
     if not (np.abs(sides - center) <= _ENDLESS * radius).all():
         raise ModelError(
@@ -131,13 +138,13 @@ def bounding_box(robot: Manipulator, pose: PoseLike) -> Array:
 def _deepest(room: Callable[[Array], Array], start: Array) -> Array:
     """Return a position that is deeper inside every bound, from one that need not be inside."""
     found = minimize(
-        lambda v: -v[3],
+        lambda v: -v[-1],
         np.append(start, float(room(start).min())),
         method="SLSQP",
-        constraints={"type": "ineq", "fun": lambda v: room(v[:3]) - v[3]},
+        constraints={"type": "ineq", "fun": lambda v: room(v[:-1]) - v[-1]},
         options=_OPTIONS,
     )
-    return np.asarray(found.x[:3])
+    return np.asarray(found.x[:-1])
 
 
 def _furthest(room: Callable[[Array], Array], start: Array, objective: Array) -> float:
@@ -158,6 +165,8 @@ def reach_volume(
     robot: Manipulator, pose: PoseLike, *, count: int = 50_000, seed: int = 0
 ) -> ReachVolume:
     """Return the volume in reach at the orientation of a pose, by random positions in its box.
+
+    A planar machine has an area instead.
 
     Parameters
     ----------
@@ -186,10 +195,10 @@ def reach_volume(
     given = checked(robot, pose, "pose")
     box = bounding_box(robot, given)
     poses = np.tile(given, (count, 1))
-    poses[:, :3] = np.random.default_rng(seed).uniform(box[0], box[1], (count, 3))
+    size = (count, len(box[0]))
+    poses[:, : size[1]] = np.random.default_rng(seed).uniform(box[0], box[1], size)
     margin = numeric(robot, "reach")(poses)[0]
     share = float((np.minimum(margin, room_to_limits(robot, poses)).min(axis=-1) >= 0.0).mean())
     whole = float(np.prod(box[1] - box[0]))
-    return ReachVolume(
-        share * whole, whole * float(np.sqrt(share * (1.0 - share) / count)), box, count
-    )
+    error = whole * float(np.sqrt(share * (1.0 - share) / count))
+    return ReachVolume(share * whole, error, f"m^{size[1]}", box, count)

@@ -13,8 +13,9 @@ from pteron.errors import DataError, ModelError
 from pteron.identification.excitation.fourier import FourierMotion, State, states
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import unchecked
+from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator
-from pteron.workspace.reserve import best_type_ii, clearances
+from pteron.workspace.reserve import clearances
 
 UNITS = {
     "type_i": "",

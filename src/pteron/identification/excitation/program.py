@@ -16,8 +16,8 @@ from pteron.identification.excitation.limits import Limits, joint_sizes, per_joi
 from pteron.identification.signals.states import home, home_mode
 from pteron.kernels import Array, Columns, program
 from pteron.kinematics.evaluate import unchecked
+from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator, parameters
-from pteron.workspace.reserve import best_type_ii
 
 Criterion = Literal["condition", "logdet"]
 """What is made small: the scaled condition number, or the volume of the confidence ellipsoid."""
