@@ -30,6 +30,9 @@ from pteron.manipulator import Manipulator
 
 _BATCH = 4096
 
+_HUGE = 1e30
+"""Sizes of the machine beyond which joints have no pose; det G stays finite."""
+
 _VANISHING = 1e-14
 """The size of det G, of a matrix whose diagonal is 1, below which it is all rounding: the platform
 can move with the joints held."""
@@ -76,7 +79,7 @@ def _poses(robot: Manipulator, joints: Array, most: int) -> Array:
     slides = robot.platform.slides
     constant, first, second, origin, size, _ = numeric(robot, "closure_rows")(joints)
     rows = np.stack([constant, first, second], axis=-1)
-    rows[~np.isfinite(rows).all(axis=(-3, -2, -1))] = 0.0
+    rows[~(np.abs(rows) < _HUGE).all(axis=(-3, -2, -1))] = 0.0
     which, phi = _angles(rows, slides)
     which, points, phi = _points(_at(rows[which], phi, slides), which, phi)
     starts = np.column_stack([origin[which] + size[which, None] * points, phi])

@@ -152,7 +152,8 @@ def working_mode(robot: Manipulator, pose: PoseLike, joints: JointsLike) -> NDAr
     -------
     array of int, shape (..., n)
         The legs' `elbow`, 1 or -1, with which inverse kinematics of the pose gives the joint
-        coordinates; the robot's own where either does, as for P-R-R-R legs; 0 where neither does.
+        coordinates; the robot's own where either does, as for P-R-R-R legs; 0 where neither does,
+        and where the pose is NaN.
 
     Examples
     --------
@@ -164,7 +165,7 @@ def working_mode(robot: Manipulator, pose: PoseLike, joints: JointsLike) -> NDAr
     array([[ 1,  1,  1],
            [-1, -1, -1]])
     """
-    poses, given = checked(robot, pose, "pose"), checked(robot, joints, "joints")
+    poses, given = checked(robot, pose, "pose", "nan"), checked(robot, joints, "joints", "nan")
     found = np.zeros(np.broadcast_shapes(poses.shape, given.shape), dtype=np.int64)
     own = [leg.elbow for leg in robot.legs]
     other = [-leg.elbow if -leg.elbow in leg.branches else leg.elbow for leg in robot.legs]

@@ -64,19 +64,21 @@ def follow(
         )
     step = numeric(robot, "direct_step")
     found = np.full(given.shape, np.nan)
-    before = pose
+    before, side = pose, 0.0
     for k, q in enumerate(given):
-        ahead = step(q, 2.0 * pose - before)[0]
-        if np.isnan(ahead[0]):
+        ahead, measure, _ = step(q, 2.0 * pose - before)
+        if not side * measure >= 0.0 or np.isnan(ahead[0]):
             here = given[k - 1] if k else _joints_of(robot, pose, q)
-            ahead = _halved(step, here, q, pose)
+            ahead, measure = _halved(step, here, q, pose, side)
             if np.isnan(ahead[0]):
                 if on_failure == "raise":
                     raise _ended(given, k)
                 break
-        before, pose = pose, ahead
+        before, pose, side = pose, ahead, measure
         found[k] = pose
-    return found
+    # Where samples are far apart the last of Newton's steps may leave some digits.
+    refined: Array = step(given, found)[0]
+    return np.where(np.isnan(refined), found, refined)
 
 
 def _joints_of(robot: Manipulator, pose: Array, near: Array) -> Array:
@@ -88,19 +90,24 @@ def _joints_of(robot: Manipulator, pose: Array, near: Array) -> Array:
     return turned
 
 
-def _halved(step: Kernel, here: Array, there: Array, pose: Array) -> Array:
-    """Return the pose of joints there, from that of joints here, by as many steps as it takes."""
+def _halved(
+    step: Kernel, here: Array, there: Array, pose: Array, side: float
+) -> tuple[Array, float]:
+    """Return the pose of joints there, from that of joints here, by as many steps as it takes.
+
+    `side` is the sign of the type-II measure, which must not change; with the pose comes its own.
+    """
     done, size = 0.0, 1.0
     while done < 1.0:
         to = min(done + size, 1.0)
-        ahead: Array = step(here + to * (there - here), pose)[0]
-        if np.isnan(ahead[0]):
+        ahead, measure, _ = step(here + to * (there - here), pose)
+        if not side * measure >= 0.0 or np.isnan(ahead[0]):
             size *= 0.5
             if size < 0.5**_HALVINGS:
-                return ahead
+                return np.full_like(pose, np.nan), side
         else:
-            done, pose, size = to, ahead, 2.0 * size
-    return pose
+            done, pose, side, size = to, ahead, measure, 2.0 * size
+    return pose, side
 
 
 def _ended(joints: Array, k: int) -> UnreachablePose:
