@@ -11,6 +11,7 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 from pteron.atomic import write_texts
+from pteron.equations.machine import closure_of
 from pteron.export.c import prefix_of
 from pteron.export.functions import Exported, banner, chosen
 from pteron.export.guards import INPUT_POWER, Names, Statements, element, power
@@ -52,8 +53,9 @@ def export_st(
         The machine; its name becomes the prefix of the blocks and the files.
     functions : sequence of str
         As for `export_c`; by default inverse kinematics and inverse dynamics. For direct
-        kinematics, `"closure_poses"` is written, whose poses a leg may not reach. Angles are
-        computed by ATAN2, which some controllers have in a library only.
+        kinematics, `"closure_poses"` is written, whose poses a leg may not reach, or
+        `"direct_step"` where they have no closed form. Angles are computed by ATAN2, which some
+        controllers have in a library only.
     folder : path
         Where; made if it is missing.
     specialised : bool
@@ -82,8 +84,9 @@ def export_st(
     ['Tripteron_InverseKinematics.st', 'Tripteron_InverseDynamics.st']
     """
     # A block is valid or not as a whole; but of two assembly modes one alone may be in reach.
+    direct = "closure_poses" if closure_of(robot).closed_form else "direct_step"
     names = [functions] if isinstance(functions, str) else functions
-    closures = ["closure_poses" if name == "direct_kinematics" else name for name in names]
+    closures = [direct if name == "direct_kinematics" else name for name in names]
     prefix = _camel(prefix_of(robot))
     blocks = {
         f"{prefix}_{_camel(item.name)}": item
