@@ -161,8 +161,12 @@ def test_a_platform_has_a_motion_and_axes():
     refused(platform(axis=(0.0, 2.0, 0.0)), "axis: [0.0, 2.0, 0.0] has length 2, not 1; write")
     words = "x_axis: missing; axis [0.0, 1.0, 0.0] is not the base frame's z", "must say"
     refused(platform(axis=(0.0, 1.0, 0.0)), *words)
-    words = "x_axis: [0.0, 0.0, 1.0] is not perpendicular to axis [0.0, 0.0, 1.0]"
+    words = "x_axis: [0.0, 0.0, 1.0] is along axis [0.0, 0.0, 1.0]; give one at right angles to it"
     refused(platform(x_axis=(0.0, 0.0, 1.0)), words)
+    words = "x_axis: [0.6, 0.0, 0.8] is not perpendicular to axis", "; [1.0, 0.0, 0.0] is"
+    refused(platform(x_axis=(0.6, 0.0, 0.8)), *words)
+    refused(platform(limits=(-45.0, 45.0)), "limits: [-45, 45] rad reaches beyond", "are these deg")
+    refused(platform("3T", limits=(-0.5, 0.5)), "limits: a 3T platform has no angle to limit")
     refused(platform(x_axis=(1.0, 0.0)), "x_axis: 2 numbers given, 3 expected")
     assert platform()().frame == ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     turned = platform(axis=(0.0, 1.0, 0.0), x_axis=(0.0, 0.0, 1.0))()
@@ -208,10 +212,10 @@ TILTED = (0.0, 0.6, 0.8)
 
 def test_constraints_that_leave_the_platform_a_freedom_are_refused():
     three, four = CATALOG["tripteron"], CATALOG["quadrupteron"]
-    words = "legs: all directions are parallel", "free to turn", "needs two legs"
-    refused(lambda: with_directions(three, Z, Z, (0.0, 0.0, -1.0)), *words)
-    words = "legs: all directions lie in one plane with the platform's axis", "free to tilt", "turn"
-    refused(lambda: with_directions(four, Y, Y, TILTED, TILTED), *words)
+    words = "free to turn about [0.0, 0.0, 1.0]: all directions are parallel to it; turn a leg's"
+    refused(lambda: with_directions(three, Z, Z, (0.0, 0.0, -1.0)), words)
+    words = "free to tilt about [0.0, 1.0, 0.0]: all directions lie in one plane with it and the"
+    refused(lambda: with_directions(four, Y, Y, TILTED, TILTED), words)
     # A leg along k has no universal joint; two that are not parallel hold a 3T platform.
     assert with_directions(four, Z, Y, TILTED, TILTED).freedom == 4
     assert with_directions(four, X, Y, TILTED, TILTED).freedom == 4
@@ -328,7 +332,7 @@ BAD_FILES = {
     "unknown key": (
         "mass = 0.8\n",
         "mass = 0.8\nmas = 1\n",
-        "platform.mas: unknown key; the valid ones there are mass, ",
+        "platform.mas: unknown key; the valid ones there are motion, ",
     ),
     "unknown key of a link": (
         "mass = 0.36,",
@@ -383,7 +387,7 @@ BAD_FILES = {
         "inertia = 0.001",
         "leg 3: upper.inertia: 0.001 kg m^2 belongs to no real body",
     ),
-    "limits": ("[-0.3, 0.3]", "[0.3, -0.3]", "leg 1: limits: 0.3 m is not below -0.3 m; give"),
+    "limits": ("[-0.3, 0.3]", "[0.3, -0.3]", "leg 1: limits: 0.3 is not below -0.3; give"),
     "both": (
         "center_of_mass = [0.006, -0.004]",
         "center_of_mass = [0.006, -0.004]\nfirst_moment = [0.0, 0.0]",
@@ -414,7 +418,7 @@ BAD_DELTAS = {
     "zero direction along d": (
         "zero_direction = [0.9956794417434706, 0.0, -0.09285714452539878]",
         "zero_direction = [0.0, 1.0, 0.0]",
-        "leg 1: zero_direction: [0.0, 1.0, 0.0] is not perpendicular to direction [0.0, -1.0, 0.0]",
+        "leg 1: zero_direction: [0.0, 1.0, 0.0] is along direction [0.0, -1.0, 0.0]; give one",
     ),
     "a rod off its axis": (
         "center_of_mass = [-0.5275]",
@@ -427,7 +431,11 @@ BAD_DELTAS = {
         "elbow = 1\nslider = { mass = 1.0 }\n",
         "leg 1: slider: unknown key",
     ),
-    "single rods": ("rods = 2", "rods = 1", "legs: all directions are parallel, or rods single"),
+    "single rods": (
+        "rods = 2",
+        "rods = 1",
+        "legs: the platform is free to turn about several axes: legs 1, 2 and 3 keep it from no",
+    ),
 }
 DELTA_TEXT = catalog_text("delta")
 
@@ -453,7 +461,7 @@ def test_a_file_whose_legs_leave_a_freedom_is_refused(tmp_path):
     text = text.replace("direction = [0.0, 0.0, 1.0]", "direction = [0.0, 0.6, 0.8]")
     file = tmp_path / "bad.toml"
     file.write_text(text, encoding="utf-8")
-    refused(lambda: pteron.load(file), f"{file}: legs: all directions lie in one plane")
+    refused(lambda: pteron.load(file), f"{file}: legs: the platform is free to tilt about")
 
 
 def test_all_faults_of_a_file_are_told_at_once(tmp_path):

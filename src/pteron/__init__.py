@@ -50,7 +50,7 @@ from pteron.kinematics import (
     singular_orientations,
     working_mode,
 )
-from pteron.legs import PRR, PRRR, PSS, RRR, RSS, RUPU
+from pteron.legs import PRR, PRRR, PSS, RRR, RSS, RUPU, Cone
 from pteron.manipulator import (
     Manipulator,
     catalog,
@@ -108,6 +108,7 @@ def __getattr__(name: str) -> Any:
 __all__ = [
     "Bar",
     "BaseParameters",
+    "Cone",
     "DataError",
     "Geared",
     "JointMotion",

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from rich.table import Table
 from typer import Argument, Exit
 
 from pteron.cli.arguments import Json, load_robot, option, signs
@@ -115,7 +117,7 @@ def check(
 
 def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
     from pteron.kinematics import singular_orientations
-    from pteron.workspace import home_pose, reserve
+    from pteron.workspace import home_pose, limited_joints, reserve
 
     home = home_pose(robot)
     return {
@@ -125,6 +127,7 @@ def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
         "singular_orientations": singular_orientations(robot).tolist(),
         "home_pose": home.tolist(),
         "home_reserve": float(reserve(robot, home).smallest),
+        "limited_joints": [asdict(joint) for joint in limited_joints(robot, home)],
         "doubts": list(unlikely),
     }
 
@@ -163,8 +166,19 @@ def _show(robot: Manipulator, found: dict[str, Any]) -> None:
         made,
         f"Singular orientations: {turns} deg" if turns else "Singular orientations: none",
         f"Home pose: {_vector(found['home_pose'])}, reserve {found['home_reserve']:.2f} of 1",
+        *_passive(found["limited_joints"]),
         work,
     )
+
+
+def _passive(joints: list[dict[str, Any]]) -> list[Table]:
+    """Return where the passive joints that have limits are at home."""
+    passive = [joint for joint in joints if not joint["actuated"]]
+    made = table("leg", "passive joint", "at home", "limits", numbers=("leg", "at home"))
+    for joint in passive:
+        of = f"{joint['least']:.4g} to {joint['most']:.4g} {joint['unit']}"
+        made.add_row(str(joint["leg"] or ""), joint["noun"], f"{joint['value']:.4g}", of)
+    return [made] if passive else []
 
 
 def _vector(values: Any, places: int = 4) -> str:

@@ -35,28 +35,29 @@ def beyond_reach(machine: Machine, pose: Expression) -> Expression:
 
 
 def passive_joints(machine: Machine, pose: Expression) -> list[list[Passive]]:
-    """Return every leg's passive joints that have limits, and with them phi if it has."""
-    state, at = machine.state(pose), machine.platform
-    still, body = ca.horzcat(*at.frame), state.platform.body
+    """Return the passive joints that have limits: the platform's angle first, then every leg's."""
+    state, platform = machine.state(pose), machine.robot.platform
+    still, body = ca.horzcat(*machine.platform.frame), state.platform.body
     turned = still if body.x is None else ca.horzcat(body.x, body.y, body.axes)
-    own, limits = [], machine.robot.platform.limits
-    if limits is not None:
+    angle = []
+    if platform.limits is not None:
         radius = max(norm(leg.platform_point) for leg in machine.robot.legs)
-        own = [Passive("phi", "rad", pose[-1], *limits, radius or 1.0)]
+        angle = [Passive("phi", "rad", pose[-1], *platform.limits, radius or 1.0)]
     pairs = zip(machine.robot.legs, state.legs, strict=True)
-    return [[*leg.passive(motion, still, turned), *own] for leg, motion in pairs]
+    return [angle, *(leg.passive(motion, still, turned) for leg, motion in pairs)]
 
 
 def passive_room(machine: Machine, pose: Expression) -> tuple[Expression, Expression]:
     """Return how far the passive joints of every leg (n, 1) are from their limits, the least.
 
     First as shares of half their ranges, then in metres that the leg moves meanwhile; negative
-    beyond, 1 and `FAR` for a leg without such limits. A limit of phi counts for every leg.
+    beyond, 1 and `FAR` for a leg without such limits. The platform's angle counts for every leg.
     """
     shares, metres = [], []
-    for joints in passive_joints(machine, pose):
+    angle, *legs = passive_joints(machine, pose)
+    for joints in legs:
         share, way = ca.SX(1), ca.SX(FAR)
-        for joint in joints:
+        for joint in (*angle, *joints):
             room = ca.fmin(joint.value - joint.least, joint.most - joint.value)
             share = ca.fmin(share, room / (0.5 * (joint.most - joint.least)))
             way = ca.fmin(way, room * joint.lever)

@@ -196,7 +196,8 @@ def _loose(platform: Platform, legs: list[LegKind]) -> list[str]:
         whose = "the other directions" if single else "all directions"
         where = "lie in one plane with it and the platform's axis" if axis else "are parallel to it"
         causes.append(f"{whose} {where}")
-    about = [round(float(x), 3) + 0.0 for x in free[0]]
+    one = free[0] * np.sign(free[0][np.abs(free[0]).argmax()])
+    about = [round(float(x), 3) + 0.0 for x in one] if len(free) == 1 else "several axes"
     return [
         f"legs: the platform is free to {'tilt' if axis else 'turn'} about {about}: "
         f"{', and '.join(causes)}; turn a leg's direction, or the bar of its rods, elsewhere"

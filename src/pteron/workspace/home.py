@@ -13,7 +13,7 @@ from pteron.kernels import Array
 from pteron.kinematics import inverse_kinematics, random_poses, singular_orientations
 from pteron.manipulator import Manipulator
 from pteron.shapes import Numbers
-from pteron.workspace.lacking import beyond_limits, nowhere
+from pteron.workspace.limits import beyond_limits, nowhere
 from pteron.workspace.reserve import reserve
 
 _SEARCHES = ((200, 0.3), (200, 0.02), (200, 0.0), (1, 0.0))

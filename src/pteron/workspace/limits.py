@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import casadi as ca
 import numpy as np
 from scipy.optimize import minimize  # type: ignore[import-untyped]
@@ -70,20 +72,58 @@ def _deepest(robot: Manipulator) -> tuple[Array, Array]:
 
 def beyond_limits(robot: Manipulator, pose: Array) -> ModelError:
     """Return what is said of a machine that at its best pose, in reach, passes joints' limits."""
-    told = []
-    joints = numeric(robot, "joint_coordinates")(pose)[0]
-    passive = passive_joints(Machine.of(robot), ca.SX(ca.DM(pose)))
-    for i, (leg, q, others) in enumerate(zip(robot.legs, joints, passive, strict=True), start=1):
-        own = leg.joint
-        limited = [Passive(own.noun, own.unit, q, *leg.limits, 0.0)] if leg.limits else []
-        for joint in (*limited, *others):
-            value, low, high = float(joint.value), joint.least, joint.most
-            if not low < value < high:
-                told.append(
-                    f"leg {i}: {joint.noun} at {value:.4g} {joint.unit} of {low:g} to {high:g}"
-                )
+    told = [
+        f"{f'leg {at.leg}: ' if at.leg else ''}{at.noun} at {at.value:.4g} {at.unit} of "
+        f"{at.least:g} to {at.most:g}"
+        for at in limited_joints(robot, pose)
+        if not at.least < at.value < at.most
+    ]
     return ModelError(
         "no pose in reach of all legs keeps the joints' limits; nearest to it is one with "
         f"{', '.join(told)}; widen limits or move the guide points",
         subject=robot.name,
     )
+
+
+@dataclass(frozen=True)
+class LimitedJoint:
+    """A joint that has limits, and where it is in a pose.
+
+    Attributes
+    ----------
+    leg : int
+        Its leg, from 1; 0 for the platform's angle.
+    noun : str
+        What it is: "slider", "elbow", ...
+    actuated : bool
+        Whether a drive moves it.
+    unit : str
+        Of the numbers, "m" or "rad".
+    value, least, most : float
+        Where it is, and its limits.
+    """
+
+    leg: int
+    noun: str
+    actuated: bool
+    unit: str
+    value: float
+    least: float
+    most: float
+
+
+def limited_joints(robot: Manipulator, pose: Array) -> tuple[LimitedJoint, ...]:
+    """Return all joints that have limits, actuated and passive, at a pose (m,) in reach."""
+    joints = numeric(robot, "joint_coordinates")(pose)[0]
+    angle, *legs = passive_joints(Machine.of(robot), ca.SX(ca.DM(pose)))
+    found = [_limited(0, joint) for joint in angle]
+    for i, (leg, q, passive) in enumerate(zip(robot.legs, joints, legs, strict=True), start=1):
+        if leg.limits is not None:
+            own = leg.joint
+            found.append(LimitedJoint(i, own.noun, True, own.unit, float(q), *leg.limits))
+        found += [_limited(i, joint) for joint in passive]
+    return tuple(found)
+
+
+def _limited(leg: int, at: Passive) -> LimitedJoint:
+    return LimitedJoint(leg, at.noun, False, at.unit, float(at.value), at.least, at.most)

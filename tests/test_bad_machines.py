@@ -1,0 +1,303 @@
+"""What a file may get wrong about a machine: one clear line each, and all of them at once."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from mechanisms import CATALOG
+
+import pteron
+from pteron import ModelError, PlanarInertia
+from pteron.workspace import home_pose
+from pteron.workspace.doubts import doubts
+
+FOLDER = Path(pteron.__file__).parent / "manipulator" / "catalog"
+
+BAD = {
+    "a crank whose zero direction is along its axis": (
+        "five-bar",
+        ["zero_direction = [1.0, 0.0, 0.0]", "zero_direction = [0.0, 0.0, -1.0]"],
+        "leg 1: zero_direction: [0.0, 0.0, -1.0] is along direction [0.0, 0.0, 1.0]; give one at "
+        "right angles to it",
+    ),
+    "a crank whose zero direction leans": (
+        "five-bar",
+        ["zero_direction = [1.0, 0.0, 0.0]", "zero_direction = [0.8, 0.0, 0.6]"],
+        "leg 1: zero_direction: [0.8, 0.0, 0.6] is not perpendicular to direction [0.0, 0.0, 1.0]; "
+        "[1.0, 0.0, 0.0] is",
+    ),
+    "a planar leg out of the plane": (
+        "3-rrr",
+        ["direction = [0.0, 0.0, 1.0]", "direction = [0.0, 0.6, 0.8]"],
+        "leg 1: direction [0.0, 0.6, 0.8] is not along the platform's axis [0.0, 0.0, 1.0], the "
+        "normal of its plane",
+    ),
+    "a planar slider out of the plane": (
+        "3-prr",
+        ["slider_direction = [1.0, 0.0, 0.0]", "slider_direction = [0.8, 0.0, 0.6]"],
+        "leg 1: slider_direction: [0.8, 0.0, 0.6] is not perpendicular to the plane's normal "
+        "[0.0, 0.0, 1.0]; [1.0, 0.0, 0.0] is",
+    ),
+    "a planar leg in space": (
+        "3-rrr",
+        ['motion = "2T1R"', 'motion = "3T"'],
+        "leg 1: a RRR leg moves in a plane, which a 3T platform leaves; make the platform's motion "
+        '"2T" or "2T1R", or give it another leg',
+    ),
+    "2T with three legs": (
+        "3-prr",
+        ['motion = "2T1R"', 'motion = "2T"'],
+        "legs: 3 given, but a 2T platform has 2 freedoms and needs 2 legs",
+    ),
+    "2T with two points": (
+        "five-bar",
+        ["platform_point = [0.0, 0.0, 0.0]", "platform_point = [0.03, 0.04, 0.0]"],
+        "legs: their platform points are 0.05 m apart, so that the platform is free to turn about "
+        "its axis; a 2T platform needs one point for both",
+    ),
+    "a bar that the crank turns": (
+        "delta",
+        ["rods = 2", "rods = 2\nbar_direction = [1.0, 0.0, 0.0]"],
+        "leg 1: bar_direction: [1.0, 0.0, 0.0] is not along direction [0.0, -1.0, 0.0], so that "
+        "the crank turns the bar and with it the platform",
+    ),
+    "elbows in degrees": (
+        "3-rrr",
+        ["elbow = 1", "elbow = 1\nelbow_limits = [20.0, 160.0]"],
+        "leg 1: elbow_limits: [20.0, 160.0] rad reaches beyond 0 to 3.142, where the angle always "
+        "is; are these degrees?",
+    ),
+    "a cone in degrees": (
+        "delta",
+        ["rods = 2", "rods = 2\ntip_cone = { axis = [0.0, 0.0, 1.0], angle = 30.0 }"],
+        "leg 1: tip_cone.angle: 30 rad given, one above 0 and up to pi expected; are these "
+        "degrees?",
+    ),
+    "inertia about the centre of mass": (
+        "five-bar",
+        ["inertia = 0.000162", "inertia = 4.05e-5"],
+        "leg 1: upper.inertia: 4.05e-05 kg m^2 belongs to no real body; with this mass and centre "
+        "of mass, and about the reference point, it must be above 0.0001215 kg m^2; about the "
+        "centre of mass? Then write 0.000162",
+    ),
+}
+"""Catalog name, what of its first leg's text is replaced, and the line that is told."""
+
+EVERYWHERE = {
+    "single rods": (
+        "delta",
+        ["rods = 2", "rods = 1"],
+        "legs: the platform is free to turn about several axes: legs 1, 2 and 3 keep it from no "
+        "turn, as single rods do; turn a leg's direction, or the bar of its rods, elsewhere, or "
+        "make rods double",
+    ),
+    "single rods under a platform that turns": (
+        "par4",
+        ["rods = 2", "rods = 1"],
+        "legs: the platform is free to tilt about several axes: legs 1, 2, 3 and 4 keep it from no "
+        "turn, as single rods do; turn a leg's direction, or the bar of its rods, elsewhere, or "
+        "make rods double",
+    ),
+}
+"""The same, replaced throughout."""
+
+
+def text_of(name):
+    return (FOLDER / f"{name}.toml").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("case", [*BAD, *EVERYWHERE])
+def test_bad_input_is_one_clear_line(case, tmp_path):
+    name, (old, new), line = BAD.get(case) or EVERYWHERE[case]
+    assert old in text_of(name)
+    file = tmp_path / "bad.toml"
+    file.write_text(text_of(name).replace(old, new, 1 if case in BAD else -1), encoding="utf-8")
+    with pytest.raises(ModelError) as caught:
+        pteron.load(file)
+    first, *others = caught.value.faults
+    assert first == line
+    if others:  # the same of every leg
+        assert {fault.split(":", 1)[1] for fault in others} == {line.split(":", 1)[1]}
+    else:
+        assert str(caught.value) == f"{file}: {line}"
+    assert caught.value.subject == str(file)
+
+
+def legs_of(name, change):
+    return tuple(change(i, leg) for i, leg in enumerate(CATALOG[name].legs))
+
+
+def refused(robot, *words, **changes):
+    """Check that a machine is refused in one line that holds the words."""
+    with pytest.raises(ModelError) as caught:
+        replace(robot, **changes)
+    assert "\n" not in str(caught.value)
+    assert all(word in str(caught.value) for word in words), str(caught.value)
+
+
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+def test_a_platform_that_may_tilt_is_refused_as_far_as_the_file_tells():
+    parallel = legs_of("linear-delta", lambda i, leg: replace(leg, bar_direction=Y))
+    words = "free to turn about [0.0, 1.0, 0.0]: all directions are parallel to it"
+    refused(CATALOG["linear-delta"], words, legs=parallel)
+    # Where nobody says where the bars are, nothing is held against the machine.
+    untold = legs_of("linear-delta", lambda i, leg: replace(leg, bar_direction=None))
+    assert replace(CATALOG["linear-delta"], legs=untold).freedom == 3
+    in_plane = legs_of("par4", lambda i, leg: replace(leg, direction=X, zero_direction=Y))
+    words = "free to tilt about [1.0, 0.0, 0.0]: all directions lie in one plane with it and"
+    refused(CATALOG["par4"], words, legs=in_plane)
+    one = legs_of("delta", lambda i, leg: replace(leg, rods=1 + (i == 0)))
+    words = "about [0.0, 1.0, 0.0]: legs 2 and 3 keep it from no turn, as single rods do, and the o"
+    refused(CATALOG["delta"], words, legs=one)
+
+
+def test_a_shaft_needs_an_angle_to_turn_and_turns_it_alone():
+    robot = CATALOG["delta-4"]
+    still = replace(robot.platform, motion="3T", geared=())
+    words = "leg 4: a RUPU leg turns the platform, but this 3T platform does not turn"
+    with pytest.raises(ModelError) as caught:
+        replace(robot, platform=still)
+    assert caught.value.faults[1].startswith(words)
+    twice = (*robot.legs[:2], robot.legs[3], robot.legs[3])
+    refused(robot, "legs 3 and 4: all turn the platform, which takes one such leg", legs=twice)
+
+
+def test_all_faults_are_told_at_once_those_of_the_machine_too(tmp_path):
+    text = text_of("3-prr").replace("lower_length = 0.2", "lower_length = -0.2", 1)
+    text = text.replace("slider_direction = [-0.5, 0.8", "direction = [0.0, 1.0, 0.0]\n" + SLIDER)
+    text = text.replace('motion = "2T1R"', 'motion = "2T"').replace('name = "3-prr"', 'name = " "')
+    file = tmp_path / "bad.toml"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(ModelError) as caught:
+        pteron.load(file)
+    assert [fault.split(":")[0] for fault in caught.value.faults] == [
+        "leg 1",
+        "name",
+        "legs",
+        "leg 2",
+    ]
+    assert str(caught.value).splitlines()[0] == f"{file}: 4 faults"
+
+
+SLIDER = "slider_direction = [-0.5, 0.0, 0.8660254037844386] # "
+
+
+# Nothing in reach.
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "words"),
+    [
+        (
+            "delta",
+            {"upper_length": 0.05, "lower_length": 0.1},
+            "no pose is in reach of all legs: at the best one they miss by 0.055 m (legs 1, 2 and "
+            "3); bring the guide points nearer or lengthen the links",
+        ),
+        (
+            "five-bar",
+            {"upper_length": 0.02, "lower_length": 0.02},
+            "they miss by 0.019 m (legs 1 and 2)",
+        ),
+        (
+            "quadrupteron",
+            {"upper_length": 0.02},
+            "they miss by 0.045 m (legs 1 and 3), 0.039 m (legs 2 and 4)",
+        ),
+    ],
+)
+def test_rods_too_short_to_meet_are_named_with_what_they_lack(name, change, words):
+    robot = replace(CATALOG[name], legs=legs_of(name, lambda i, leg: replace(leg, **change)))
+    with pytest.raises(ModelError) as caught:
+        home_pose(robot)
+    assert words in str(caught.value)
+    assert (caught.value.subject, caught.value.message) == (
+        name,
+        str(caught.value)[len(name) + 2 :],
+    )
+
+
+def test_limits_that_no_pose_keeps_are_named_with_where_the_joints_are():
+    robot = CATALOG["3-rrr"]
+    elbows = legs_of("3-rrr", lambda i, leg: replace(leg, elbow_limits=(3.0, 3.1)))
+    with pytest.raises(ModelError, match=r"leg 1: elbow at .* rad of 3 to 3\.1, leg 2: elbow at "):
+        home_pose(replace(robot, legs=elbows))
+    far = legs_of("quadrupteron", lambda i, leg: replace(leg, limits=(1.0 + i, 2.0 + i)))
+    with pytest.raises(ModelError, match=r"keeps the joints' limits; .*leg 4: slider at .* m of 4"):
+        home_pose(replace(CATALOG["quadrupteron"], legs=far))
+
+
+# What is possible but unlikely.
+
+
+def crank(leg, **changes):
+    body = leg.upper
+    given = {"mass": body.mass, "center_of_mass": body.center_of_mass, "inertia": body.inertia}
+    return PlanarInertia.of_body(**given | changes)
+
+
+DOUBTS = {
+    "limits: [-90.0, 90.0] rad: are these degrees?": lambda leg: {"limits": (-90.0, 90.0)},
+    "upper: center_of_mass: x = -0.2463 m is not between": lambda leg: {
+        "upper": crank(leg, center_of_mass=(-0.2463, 0.0))
+    },
+    "upper: center_of_mass: 27 m beside it: are these mm?": lambda leg: {
+        "upper": crank(leg, center_of_mass=(0.2, 27.0), inertia=3000.0)
+    },
+    "kg m^2 leaves 2.07e+05 about the centre of mass": lambda leg: {
+        "upper": crank(leg, inertia=207308.0)
+    },
+    "platform_point: 2.1 m from P, farther than the leg is long": lambda leg: {
+        "platform_point": (2.1, 0.0, 0.0)
+    },
+    "fixed_offset: [125.0, 0.0, 0.0] m: are these mm?": lambda leg: {"fixed_offset": (125, 0, 0)},
+}
+
+
+@pytest.mark.parametrize("words", DOUBTS)
+def test_a_leg_s_unlikely_numbers_are_doubted(words):
+    robot = CATALOG["delta"]
+    odd = replace(robot.legs[1], **DOUBTS[words](robot.legs[1]))
+    found = doubts(replace(robot, legs=(robot.legs[0], odd, robot.legs[2])))
+    assert any(text.startswith("leg 2: ") and words in text for text in found), found
+    assert not any(text.startswith("leg 1: ") for text in found)
+
+
+def test_a_shaft_s_unlikely_numbers_are_doubted():
+    robot = CATALOG["delta-4"]
+    shaft = robot.legs[3]
+    odd = replace(shaft, ratio=28.11, upper=shaft.lower, lower=shaft.upper)
+    found = doubts(replace(robot, legs=(*robot.legs[:3], odd)))
+    for words in (
+        "ratio: 28.11",
+        "upper: center_of_mass: x is neg",
+        "lower: center_of_mass: x is po",
+    ):
+        assert any(text.startswith(f"leg 4: {words}") for text in found), words
+
+
+def test_what_parallel_rods_would_keep_from_turning_is_asked_about():
+    robot = CATALOG["delta-4"]
+    rigid = legs_of(
+        "delta-4",
+        lambda i, leg: (
+            leg if i == 3 else replace(leg, platform_point=leg.fixed_offset, fixed_offset=(0, 0, 0))
+        ),
+    )
+    found = doubts(replace(robot, legs=rigid))
+    assert [text.split(": ")[0] for text in found] == ["leg 1", "leg 2", "leg 3"]
+    assert all("is the bar on a hinge there?" in text for text in found)
+    # Alone on its hinge, a single rod lets the offset turn; a pair beside it would not.
+    par4 = CATALOG["par4"]
+    single = legs_of("par4", lambda i, leg: replace(leg, rods=1) if i < 2 else leg)
+    found = doubts(replace(par4, legs=single))
+    assert [text.split(":")[0] for text in found] == ["leg 1", "leg 2"]
+    assert all("no leg at this platform_point keeps it from turning" in text for text in found)
+    one = legs_of("par4", lambda i, leg: replace(leg, rods=1) if i < 1 else leg)
+    assert doubts(replace(par4, legs=one)) == ()
+
+
+def test_nothing_in_the_catalog_is_doubted():
+    assert {name: doubts(robot) for name, robot in CATALOG.items() if doubts(robot)} == {}
