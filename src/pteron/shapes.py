@@ -1,7 +1,8 @@
 """Names of array shapes, for the type hints of the public functions; and the failure modes.
 
 `...` are the batch axes, n the legs, m the pose coordinates (n = m), k the assembly modes and N the
-inertial parameters. SI units and radians; poses are ordered (x, y, z, phi), or (x, y, z) for 3T.
+inertial parameters. SI units and radians; poses are ordered (x, y, z, phi), without z
+in a plane, without phi where the platform does not turn.
 """
 
 from __future__ import annotations

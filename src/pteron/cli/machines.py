@@ -120,11 +120,14 @@ def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
     from pteron.workspace import home_pose, limited_joints, reserve
 
     home = home_pose(robot)
+    position = home[: len(robot.platform.lengths)]
     return {
         **_machine(robot),
         "gravity": list(robot.gravity),
         "legs": [_leg(leg) for leg in robot.legs],
-        "singular_orientations": singular_orientations(robot).tolist(),
+        "singular_orientations": singular_orientations(robot, position).tolist(),
+        "singular_at_every_position": bool(len(singular_orientations(robot))),
+        "tool": list(robot.platform.tool),
         "home_pose": home.tolist(),
         "home_reserve": float(reserve(robot, home).smallest),
         "limited_joints": [asdict(joint) for joint in limited_joints(robot, home)],
@@ -152,10 +155,13 @@ def _show(robot: Manipulator, found: dict[str, Any]) -> None:
             str(i),
             leg["type"],
             _vector(leg["axis"], 2),
-            ", ".join(f"{length:g}" for length in leg["lengths"].values()),
+            ", ".join(f"{length:g}" for length in leg["lengths"].values()) or "-",
             "none" if limits is None else "{:g} to {:g} {}".format(*limits, leg["unit"]),
         )
-    turns = ", ".join(f"{math.degrees(angle):.4g}" for angle in found["singular_orientations"])
+    angles = ", ".join(f"{math.degrees(angle):.4g}" for angle in found["singular_orientations"])
+    where = "" if found["singular_at_every_position"] or not angles else " at the home position"
+    tool = [f"Tool: {_vector(found['tool'])} m from P, in the platform frame"]
+    tool = tool if any(found["tool"]) else []
     work = "[green]This machine can work.[/green]"
     if found["doubts"]:
         work = "[yellow]This machine can work, if the warnings are none.[/yellow]"
@@ -164,9 +170,10 @@ def _show(robot: Manipulator, found: dict[str, Any]) -> None:
         f"{len(robot.legs)} legs, pose {' '.join(robot.coordinates)}, "
         f"working mode {signs(robot)}",
         made,
-        f"Singular orientations: {turns} deg" if turns else "Singular orientations: none",
+        f"Singular orientations{where}: {f'{angles} deg' if angles else 'none'}",
         f"Home pose: {_vector(found['home_pose'])}, reserve {found['home_reserve']:.2f} of 1",
         *_passive(found["limited_joints"]),
+        *tool,
         work,
     )
 

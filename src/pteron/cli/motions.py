@@ -27,14 +27,19 @@ if TYPE_CHECKING:
 
     from pteron.tables import Table
 
-_LOADS = ("fx", "fy", "fz", "mk")
+_LOADS = {"x": "fx", "y": "fy", "z": "fz", "phi": "mk"}
+"""What acts on the platform along each coordinate of the pose."""
 
 
 def inverse(
     robot: Robot,
     pose: Annotated[
         list[str] | None,
-        Argument(metavar="POSE", help="x y z phi, or x y z for 3T; m and rad.", show_default=False),
+        Argument(
+            metavar="POSE",
+            help="x y z phi, or those that the machine has; m and rad.",
+            show_default=False,
+        ),
     ] = None,
     table: TableFile = None,
     out: Out = None,
@@ -43,8 +48,8 @@ def inverse(
 ) -> None:
     """Compute the joint coordinates at poses.
 
-    A table has the columns x y z phi (x y z for 3T); the result has its columns and rho1, rho2, ...
-    of sliders, m, or theta1, theta2, ... of cranks, rad.
+    A table has the columns x y z phi, those that the machine has; the result has its columns and
+    rho1, rho2, ... of sliders, m, or theta1, theta2, ... of cranks, rad.
     """
     from pteron.kinematics import inverse_kinematics
 
@@ -136,7 +141,7 @@ def _vector(name: str, text: str) -> Any:
 
 def forces(
     robot: Robot,
-    pose: Annotated[str | None, _vector("pose", "x y z phi, or x y z for 3T; m and rad.")] = None,
+    pose: Annotated[str | None, _vector("pose", "x y z phi, or those it has; m and rad.")] = None,
     velocity: Annotated[str | None, _vector("velocity", "Its rate; at rest if left out.")] = None,
     acceleration: Annotated[
         str | None, _vector("acceleration", "The rate of that; zero if left out.")
@@ -152,15 +157,15 @@ def forces(
 ) -> None:
     """Compute the actuator forces of a motion.
 
-    A table has the columns x y z phi dx dy dz dphi ddx ddy ddz ddphi (3T: without the angles) and,
-    if a wrench acts on the platform, fx fy fz mk (3T: fx fy fz); the result has its columns and
-    force1, force2, ... of sliders, N, or torque1, torque2, ... of cranks, N m.
+    A table has the columns x y z phi dx dy dz dphi ddx ddy ddz ddphi and, if a wrench acts on the
+    platform, fx fy fz mk: of each four those that the machine's pose has. The result has its
+    columns and force1, force2, ... of sliders, N, or torque1, torque2, ... of cranks, N m.
     """
     from pteron.dynamics import inverse_dynamics
 
     machine = load_robot(robot, elbows)
     m = machine.freedom
-    loads = _LOADS[:m]
+    loads = tuple(_LOADS[name] for name in machine.coordinates)
     motion = [f"{rate}{name}" for rate in ("", "d", "dd") for name in machine.coordinates]
     typed = [pose, velocity, acceleration, wrench]
     if all(text is None for text in typed):

@@ -44,12 +44,13 @@ def report(
 def _machine(found: dict[str, Any]) -> Table:
     home, reach, base = found["home"], found["reach"], found["base_parameters"]
     singular = ", ".join(f"{math.degrees(a):.4g}" for a in found["singular_orientations"] or ())
+    factor, unit = (1e3, "litres") if reach["unit"] == "m^3" else (1e2, "dm^2")
     made = table(plain(found["robot"]), "")
     made.add_row("home pose", " ".join(f"{value:.4g}" for value in home["pose"]))
     made.add_row("reserve there", f"{home['reserve']:.3f} of 1")
     made.add_row("condition number there", f"{home['condition_number']:.4g}")
-    made.add_row("singular orientations", f"{singular} deg" if singular else "none")
-    made.add_row("reach", f"{1e3 * reach['volume']:.4g} litres")
+    made.add_row("singular orientations there", f"{singular} deg" if singular else "none")
+    made.add_row("reach", f"{factor * reach['volume']:.4g} {unit}")
     made.add_row("cycle", f"{found['cycle']['duration']:.3g} s")
     made.add_row("base parameters", f"{base['rank']} of {base['of']}")
     return made

@@ -27,7 +27,7 @@ def inverse_dynamics(
     pose, velocity, acceleration : array, shape (..., m)
         The platform's motion; m, rad and s. Leading axes broadcast.
     wrench : array, shape (..., m), optional
-        What acts on the platform at P: a force in N and, for 3T1R, a moment about k in N m.
+        What acts on the platform at P: a force in N and, where it turns, a moment about k in N m.
     on_failure : {"raise", "nan"}
         Whether a pose that fails raises, or gives NaN.
 
@@ -79,7 +79,7 @@ def forward_dynamics(
     forces : array, shape (..., n)
         N at a slider, N m at a crank; positive along +q.
     wrench : array, shape (..., m), optional
-        What acts on the platform at P: a force in N and, for 3T1R, a moment about k in N m.
+        What acts on the platform at P: a force in N and, where it turns, a moment about k in N m.
     on_failure : {"raise", "nan"}
         Whether a pose that fails raises, or gives NaN.
 

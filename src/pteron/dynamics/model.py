@@ -88,7 +88,7 @@ def bias_forces(
     Returns
     -------
     array, shape (..., m)
-        N and, for 3T1R, N m.
+        N and, where it turns, N m.
 
     Raises
     ------
@@ -117,7 +117,7 @@ def gravity_forces(
     Returns
     -------
     array, shape (..., m)
-        N and, for 3T1R, N m.
+        N and, where it turns, N m.
 
     Raises
     ------

@@ -24,8 +24,8 @@ def inverse_dynamics(
 ) -> Expression:
     """Return the actuator forces F_a (n, K) for the columns of parameters (N, K), Eq. (13).
 
-    `wrench` (m, K) acts on the platform at P: a force and, for 3T1R, a moment about k. A mass on a
-    platform point moves with leg and platform: with `carried` it counts as the platform's.
+    `wrench` (m, K) acts on the platform at P: a force and, where it turns, a moment about k. A mass
+    on a platform point moves with leg and platform: with `carried` it counts as the platform's.
     """
     joints, load = needed_forces(machine, state, parameters, carried)
     if wrench is not None:

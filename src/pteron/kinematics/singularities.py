@@ -133,6 +133,7 @@ def _sign_changes(robot: Manipulator, position: Array) -> Array:
             f"{position.tolist()}; choose another position",
             kind="II",
             measure=0.0,
+            index=(),
         )
     first = np.flatnonzero((negative[1:] != negative[:-1]) & known[1:] & known[:-1])
     low, high, side = angles[first], angles[first + 1], negative[first]

@@ -100,11 +100,11 @@ class Cycle:
             self.scale * size * (self.platform.directions @ way)
             for size, way in ((ACROSS, self.across), (LIFT, self.up))
         )
-        across, lift = _shares(tau)
-        return tuple(
+        place, velocity, acceleration = (
             np.multiply.outer(a, move) + np.multiply.outer(b, climb)
-            for a, b in zip(across, lift, strict=True)
+            for a, b in zip(*_shares(tau), strict=True)
         )
+        return place, velocity, acceleration
 
     def at(self, tau: Array) -> tuple[Array, Array, Array]:
         """Return poses (T, m) at times `tau` (T,) in [0, 1], and two derivatives by tau."""

@@ -136,8 +136,8 @@ def _draw_leg(sheet: Space | Sheet, points: JointPoints, guide: Guide, i: int, s
         sheet.line(guide.path, MUTED, 0.9, raised=-0.01, style=(0, (2.0, 2.0)))
         axle = _AXLE * size * guide.axis
         sheet.line(np.array([line[0] - axle, line[0] + axle]), MUTED, 6.0, raised=-0.01)
-    for ends in pairwise(line[:-1]):
-        sheet.line(np.array(ends), color, 4.6)
+    for pair in pairwise(line[:-1]):
+        sheet.line(np.array(pair), color, 4.6)
     for ends in rods(line, points.bars[i], size):
         sheet.line(ends, color, 3.0 if points.bars[i] is None else 2.0)
     for joint in line:

@@ -1,4 +1,4 @@
-"""Axes in the plane of a planar machine, on which it is drawn as in space, seen along the normal."""
+"""Axes in the plane of a planar machine, which is seen along the plane's normal."""
 
 from __future__ import annotations
 
@@ -57,8 +57,8 @@ class Sheet:
         """Draw a ring at a point."""
         x, y = self._flat(point)
         look: dict[str, Any] = {"marker": "o", "markersize": size, "markeredgewidth": 1.4}
-        colors = {"markerfacecolor": face, "markeredgecolor": edge}
-        self.axes.plot([x], [y], zorder=10.0 + raised, linestyle="none", **look, **colors)
+        look |= {"markerfacecolor": face, "markeredgecolor": edge}
+        self.axes.plot([x], [y], zorder=10.0 + raised, linestyle="none", **look)
 
     def faces(self, faces: list[Array], color: str, alpha: float, raised: float = 0.0) -> None:
         """Draw polygons."""
@@ -69,7 +69,7 @@ class Sheet:
     def text(self, point: Array, text: str, color: str, *, bold: bool = False) -> None:
         """Write beside a point, over everything."""
         x, y = self._flat(point)
-        look = {"fontsize": FONT_SIZE, "fontweight": "bold" if bold else "normal"}
+        look: dict[str, Any] = {"fontsize": FONT_SIZE, "fontweight": "bold" if bold else "normal"}
         self.axes.text(x, y, text, color=color, ha="center", va="center", zorder=30.0, **look)
 
     def fill(self) -> None:

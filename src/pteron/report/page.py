@@ -128,9 +128,8 @@ def geometry(robot: Manipulator) -> list[tuple[str, bool, list[str]]]:
         role, texts = roles[name], []
         for leg in robot.legs:
             # A direction that the file leaves out may be another one's, or none.
-            default = [q.value for q in leg.quantities if q.name == name and q.role == "direction"]
-            value = getattr(leg, name, None)
-            value = default[0] if value is None and default else value
+            given = [q.value for q in leg.quantities if q.name == name and q.role == "direction"]
+            value: Any = given[0] if given else getattr(leg, name, None)
             if value is None:
                 texts.append("\u2013")
             elif role in ("length", "number"):

@@ -38,8 +38,9 @@
   const high = [0, 1, 2].map((k) => Math.max(...cloud.map((p) => p[k])));
   const size = Math.max(...[0, 1, 2].map((k) => high[k] - low[k]));
   const floor = low[2] - 0.03 * size, step = data.grid;
-  const gridLow = [0, 1].map((k) => Math.floor(low[k] / step) * step);
-  const gridHigh = [0, 1].map((k) => Math.ceil(high[k] / step) * step);
+  const rim = data.planar ? 0.06 * size : 0; // the view ends where the squares of a planar machine end
+  const gridLow = [0, 1].map((k) => Math.floor((low[k] - rim) / step) * step);
+  const gridHigh = [0, 1].map((k) => Math.ceil((high[k] + rim) / step) * step);
   const center = [(gridLow[0] + gridHigh[0]) / 2, (gridLow[1] + gridHigh[1]) / 2, (floor + high[2]) / 2];
   // Bars of one unit share a scale.
   const peaks = data.units.map((unit) =>
@@ -168,7 +169,7 @@
       label(add(corner, axis, 0.17 * size), "xyz"[k], colors.ink);
     });
     if (!data.planar || !Math.hypot(...data.gravity)) return;
-    const from = [gridHigh[0] - 0.06 * size, gridHigh[1] - 0.06 * size, floor], down = data.gravity, across = [-down[1], down[0], 0];
+    const from = [gridLow[0] + 0.05 * size, gridHigh[1] - 0.06 * size, floor], down = data.gravity, across = [-down[1], down[0], 0];
     const tip = add(from, down, 0.15 * size);
     for (const end of [from, add(add(tip, down, -0.04 * size), across, 0.025 * size), add(add(tip, down, -0.04 * size), across, -0.025 * size)]) line(tip, end, colors.muted, 1.8);
     label(add(from, down, -0.04 * size), "g", colors.muted);

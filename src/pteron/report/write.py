@@ -78,6 +78,7 @@ def numbers(report: Report) -> dict[str, Any]:
         "joints": [vars(leg.joint) for leg in robot.legs],
         "elbows": [leg.elbow for leg in robot.legs],
         "gravity": list(robot.gravity),
+        "tool": list(robot.platform.tool),
         "doubts": list(report.doubts),
         "home": {
             "pose": report.home.tolist(),
@@ -93,6 +94,7 @@ def numbers(report: Report) -> dict[str, Any]:
         "reach": {
             "volume": report.volume.volume,
             "standard_error": report.volume.standard_error,
+            "unit": report.volume.unit,
             "samples": report.volume.count,
             "box": report.volume.box.tolist(),
         },

@@ -31,6 +31,9 @@ _DEGREES = (30.0, 15.0, 5.0, 1.0)
 _WORTH = 0.99
 """The share of the best reserve that counts as equal to it: nobody wants to type the rest."""
 
+_MIDDLE = 0.9
+"""The share that the middle between equals must have: from there the machine goes every way."""
+
 
 def home_pose(robot: Manipulator) -> Array:
     """Return the pose with the best reserve, rounded where that costs next to nothing.
@@ -48,8 +51,9 @@ def home_pose(robot: Manipulator) -> Array:
     Returns
     -------
     array, shape (m,)
-        m and rad. Its reserve is at least 98 % of the best one found; of equals, the one whose
-        sliders are nearest to their guide points, and cranks to their zero.
+        m and rad. Its reserve is at least 98 % of the best one found. Of equals it is the one whose
+        sliders are nearest to their guide points, and cranks to their zero; or the middle between
+        them, as of a machine with symmetric places, if that has 90 %.
 
     Raises
     ------
@@ -77,6 +81,9 @@ def home_pose(robot: Manipulator) -> Array:
     equals = refined[reserves >= _WORTH * most]
     travel = np.abs(inverse_kinematics(robot, equals)).max(axis=-1)
     best: Array = equals[travel.argmin()]
+    middle = _distinct(equals, _steps(robot, *_STEPS)).mean(axis=0)
+    if _worth(robot, middle) >= _MIDDLE * most:
+        best = middle
     least = _WORTH * float(_worth(robot, best))
     for metres, degrees in product(_METRES, _DEGREES):
         step = _steps(robot, metres, np.radians(degrees))
@@ -91,6 +98,12 @@ def _random_poses(robot: Manipulator) -> Array:
         with suppress(ModelError):
             return random_poses(robot, count, type_i=least, type_ii=least)
     raise nowhere(robot)
+
+
+def _distinct(poses: Array, apart: Array) -> Array:
+    """Return the poses (K, m) but for those that are near one before them."""
+    near = (np.abs(poses[:, None] - poses) <= apart).all(axis=-1)
+    return poses[[not near[i, :i].any() for i in range(len(poses))]]
 
 
 def _worth(robot: Manipulator, poses: Array) -> Numbers:
