@@ -78,8 +78,8 @@ def every_pose(robot: Manipulator, joints: Array, most: int) -> Array:
 
 def _poses(robot: Manipulator, joints: Array, most: int) -> Array:
     slides = robot.platform.slides
-    constant, first, second, origin, size, _ = numeric(robot, "closure_rows")(joints)
-    rows = np.stack([constant, first, second], axis=-1)
+    zeroth, first, second, origin, size, _ = numeric(robot, "closure_rows")(joints)
+    rows = np.stack([zeroth, first, second], axis=-1)
     rows[~(np.abs(rows) < _HUGE).all(axis=(-3, -2, -1))] = 0.0
     which, phi = _angles(rows, slides)
     which, points, phi = _points(_at(rows[which], phi, slides), which, phi)
