@@ -26,11 +26,11 @@ _CLOSED = 1e-6
 class Rows(NamedTuple):
     """The closures of legs whose joints are held, for v = (p - origin) / size.
 
-    (constant + first f_1 + second f_2) (v.v, v, 1) = 0, a row (w, m, h) for each leg, where f_1 and
+    (zeroth + first f_1 + second f_2) (v.v, v, 1) = 0, a row (w, m, h) for each leg, where f_1 and
     f_2 are cos(phi) and sin(phi) or, where the platform slides, phi and its square.
     """
 
-    constant: Expression
+    zeroth: Expression
     """(n, d + 2), where p has d coordinates."""
     first: Expression
     second: Expression
@@ -73,8 +73,8 @@ def closure_rows(machine: Machine, joints: Expression) -> Rows:
             h[2 if machine.platform.slides else 0] += ca.dot(a, a)  # |a f_1 + b f_2|^2
             scale = 2 * locus.radius * size
         found.append(ca.vertcat(w, m, h) / scale)
-    constant, first, second = (ca.horzcat(*(rows[:, k] for rows in found)).T for k in range(3))
-    return Rows(constant, first, second, origin, size)
+    zeroth, first, second = (ca.horzcat(*(rows[:, k] for rows in found)).T for k in range(3))
+    return Rows(zeroth, first, second, origin, size)
 
 
 def _counted(machine: Machine, locus: Sphere | Circle, v: Expression) -> Expression:

@@ -48,6 +48,7 @@ _ROUNDING = 1e-13
 """What it may miss in the end: as much as two modes that meet do within 1e-7 of where they are."""
 
 _STEPS = 20
+"""Newton's steps at most: they end where a pose misses no less than before."""
 
 _SPAN = np.pi
 """rad: where a platform slides, what half a turn of alpha is divided at."""
@@ -77,8 +78,8 @@ def every_pose(robot: Manipulator, joints: Array, most: int) -> Array:
 
 def _poses(robot: Manipulator, joints: Array, most: int) -> Array:
     slides = robot.platform.slides
-    constant, first, second, origin, size, _ = numeric(robot, "closure_rows")(joints)
-    rows = np.stack([constant, first, second], axis=-1)
+    zeroth, first, second, origin, size, _ = numeric(robot, "closure_rows")(joints)
+    rows = np.stack([zeroth, first, second], axis=-1)
     rows[~(np.abs(rows) < _HUGE).all(axis=(-3, -2, -1))] = 0.0
     which, phi = _angles(rows, slides)
     which, points, phi = _points(_at(rows[which], phi, slides), which, phi)
@@ -115,10 +116,10 @@ def _angles(rows: Array, slides: bool) -> tuple[NDArray[np.int64], Array]:
 
 
 def _form(rows: Array, slides: bool) -> Array:
-    """Return the parts (B, n, n, 3) of c^2, c s and s^2 in G, c and s being those of alpha.
+    """Return the parts (B, n, n, 3) of c^2, c s and s^2 in G, with c = cos(alpha), s = sin(alpha).
 
-    phi = 2 alpha where the platform turns; where it slides s / c is phi over `_SPAN`, and G is c^2
-    times what it was.
+    phi = 2 alpha where the platform turns; where it slides phi = `_SPAN` s / c, and G is taken c^2
+    times.
     """
     low = _gram(_at(rows, 0.0, slides))
     if slides:
@@ -169,7 +170,7 @@ def _points(
         ],
         axis=1,
     )
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(all="ignore"):
         points = lines[..., 1:-1] / lines[..., -1:]
     good = np.isfinite(points).all(axis=-1)
     k, _ = np.nonzero(good)
@@ -206,11 +207,14 @@ def _table(poses: Array, which: NDArray[np.int64], size: Array, most: int, slide
     columns = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
     table = np.full((len(size), counts.max(initial=most), poses.shape[-1]), np.nan)
     table[which, columns] = poses
-    apart = table[:, :, None] - table[:, None]
-    apart[..., :-1] /= size[:, None, None, None]
-    if not slides:
-        apart[..., -1] = 2.0 * np.sin(0.5 * apart[..., -1])
-    same = np.abs(apart).max(axis=-1) < _SAME
+    same = np.ones((*table.shape[:2], table.shape[1]), dtype=bool)
+    for k, values in enumerate(np.moveaxis(table, -1, 0)):
+        apart = values[:, :, None] - values[:, None]
+        if k < table.shape[-1] - 1:
+            apart /= size[:, None, None]
+        elif not slides:
+            apart = 2.0 * np.sin(0.5 * apart)
+        same &= np.abs(apart) < _SAME
     table[np.tril(same, -1).any(axis=-1)] = np.nan
     return table
 
