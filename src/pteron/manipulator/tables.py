@@ -95,8 +95,8 @@ class MachineTable(Table):
     gravity: Three = Field(
         STANDARD_GRAVITY, description="acceleration of gravity in the base frame, m/s^2"
     )
-    platform: PlatformTable
-    legs: list[Any]
+    platform: PlatformTable = Field(description="what the legs carry")
+    legs: list[Any] = Field(description="one table for each freedom of the platform")
 
 
 _TYPES: dict[KeyRole, Any] = {

@@ -28,6 +28,9 @@ _ENDLESS = 10.0
 _SLACK = 1e-8
 """Metres by which the optimiser may overstep a bound."""
 
+_WAY = 101
+"""Positions on the way back that are tried where the optimiser has gone too far."""
+
 _OPTIONS = {"ftol": 1e-10, "maxiter": 200}
 
 _TOUCH = 1e-9
@@ -157,8 +160,11 @@ def _furthest(room: Callable[[Array], Array], start: Array, objective: Array) ->
         constraints={"type": "ineq", "fun": room},
         options=_OPTIONS,
     )
-    inside = bool(room(found.x).min() > -_SLACK)
-    return float(objective @ (found.x if inside else start))
+    way = start + np.linspace(1.0, 0.0, _WAY)[:, None] * (found.x - start)
+    inside = room(way).min(axis=-1) > -_SLACK
+    # At the rim of a leg's reach its joint may have no coordinate, and so no limit.
+    inside[:-1] &= inside[1:]
+    return float(objective @ way[inside.argmax()])
 
 
 def reach_volume(

@@ -1,0 +1,52 @@
+"""Write the tables of keys into docs/robot-file.md, from what the keys' declarations say.
+
+A table stands between `<!-- keys of NAME -->` and `<!-- end -->`; a test keeps them as this script
+writes them.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from pteron.bodies.tables import Bar, Geared, PlanarBody, Table
+from pteron.legs import KINDS
+from pteron.manipulator.tables import ConeTable, MachineTable, PlatformTable, leg_table
+
+PAGE = Path(__file__).parent / "robot-file.md"
+
+TABLES: dict[str, type[Table]] = {
+    "the machine": MachineTable,
+    "platform": PlatformTable,
+    "bars": Bar,
+    "geared": Geared,
+    "a body": PlanarBody,
+    "a cone": ConeTable,
+    **{name: leg_table(kind) for name, kind in KINDS.items()},
+}
+"""What the page has tables of; those of legs by their type."""
+
+_MARKED = re.compile(r"(<!-- keys of ([^>]*) -->\n).*?(<!-- end -->)", re.DOTALL)
+
+
+def key_table(model: type[Table]) -> str:
+    """Return the keys of a table of the file in Markdown, what they are and their defaults."""
+    lines = ["| key | what it is | default |", "| --- | --- | --- |"]
+    for key, field in model.model_fields.items():
+        default = "" if field.is_required() else "none"
+        if field.default is not None and not field.is_required():
+            value = field.default
+            shown = list(value) if isinstance(value, tuple) else value
+            default = f"`{str(shown).lower() if isinstance(shown, bool) else shown}`"
+        about = (field.description or "a table of its own").replace("|", "\\|")
+        lines.append(f"| `{key}` | {about} | {default} |")
+    return "\n".join(lines) + "\n"
+
+
+def filled(page: str) -> str:
+    """Return the page with every table as the declarations have it."""
+    return _MARKED.sub(lambda found: f"{found[1]}{key_table(TABLES[found[2]])}{found[3]}", page)
+
+
+if __name__ == "__main__":
+    PAGE.write_text(filled(PAGE.read_text(encoding="utf-8")), encoding="utf-8")

@@ -1,0 +1,122 @@
+"""`pteron new` and docs/robot-file.md: both say of every key what its declaration says."""
+
+import re
+import runpy
+import tomllib
+from pathlib import Path
+
+import pytest
+from mechanisms import CATALOG
+from pydantic import TypeAdapter
+
+import pteron
+from pteron import Manipulator, OutputError
+from pteron.legs import KINDS
+from pteron.manipulator.files import explained
+from pteron.manipulator.tables import PlatformTable, leg_table
+
+DOCS = Path(__file__).parent.parent / "docs"
+PAGE = (DOCS / "robot-file.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def program(tmp_path, monkeypatch):
+    """Return what runs `pteron` in a folder of its own."""
+    from typer.testing import CliRunner
+
+    from pteron.cli.main import app
+
+    monkeypatch.chdir(tmp_path)
+    return lambda *words: CliRunner().invoke(app, list(words))
+
+
+# pteron new.
+
+
+@pytest.mark.parametrize("name", CATALOG)
+def test_an_explained_file_is_that_machine_and_is_read_at_once(name, tmp_path):
+    file = tmp_path / "robot.toml"
+    file.write_text(explained(name), encoding="utf-8")
+    robot, known = pteron.load(file), CATALOG[name]
+    assert robot == Manipulator(f"my {name}", known.platform, known.legs, known.gravity)
+    assert max(map(len, explained(name).splitlines())) <= 125
+
+
+@pytest.mark.parametrize("name", ["quadrupteron", "delta-4", "linear-delta", "3-prr", "five-bar"])
+def test_it_says_of_every_key_what_it_is(name):
+    text = explained(name)
+    legs = {leg.type: leg_table(type(leg)) for leg in CATALOG[name].legs}
+    spoken = re.sub(r"\s+#? ?", " ", text)
+    for model in (PlatformTable, *legs.values()):
+        for key, field in model.model_fields.items():
+            if key == "first_moment":
+                continue  # told of bodies in general
+            assert re.search(rf"(?m)^#?{key} = |^\[\[platform\.{key}\]\]", text), key
+            if not re.search(rf"\[\[platform\.{key}\]\]", text):
+                assert field.description in spoken, key
+    # Only the first leg of a kind is explained.
+    assert len(re.findall(r"(?m)^#?elbow = [^#\n]*# ", text)) == len(legs)
+
+
+def test_what_may_be_left_out_has_a_value_that_could_stand_there():
+    models = {"platform": PlatformTable, **{name: leg_table(kind) for name, kind in KINDS.items()}}
+    for name, model in models.items():
+        for key, field in model.model_fields.items():
+            for example in field.examples or ():
+                TypeAdapter(field.rebuild_annotation()).validate_python(example)
+            told = field.is_required() or field.examples or field.default is not None
+            assert told or key in ("first_moment", "center_of_mass"), (name, key)
+
+
+def test_it_is_written_to_a_file_and_none_is_replaced_unasked(program):
+    assert program("new", "delta", "--out", "robot.toml").exit_code == 0
+    text = Path("robot.toml").read_text(encoding="utf-8")
+    assert text == explained("delta") == program("new", "delta").stdout
+    Path("robot.toml").write_text("mine")
+    refused = program("new", "delta", "--out", "robot.toml")
+    assert refused.exit_code == 2
+    assert "robot.toml: is there already; name another file, or say --overwrite" in refused.stderr
+    assert Path("robot.toml").read_text() == "mine"
+    assert program("new", "delta", "--out", "robot.toml", "--overwrite").exit_code == 0
+    assert Path("robot.toml").read_text(encoding="utf-8") == text
+    assert [file.name for file in Path().iterdir()] == ["robot.toml"]
+    assert program("check", "robot.toml").stdout.rstrip().endswith("This machine can work.")
+
+
+def test_without_a_kind_the_kinds_are_listed_and_an_unknown_one_is_guessed(program):
+    assert program("new").stdout == program("catalog").stdout
+    refused = program("new", "detla")
+    assert refused.exit_code == 2
+    assert 'did you mean "delta"?' in refused.stderr
+    assert program("new", "delta", "--out", "no/where.toml").exit_code == 2
+
+
+def test_a_file_of_one_s_own_is_explained_too(tmp_path):
+    robot = CATALOG["quadrupteron"]
+    file = pteron.save(robot, tmp_path / "plain.toml")
+    again = tmp_path / "explained.toml"
+    again.write_text(explained(file), encoding="utf-8")
+    assert pteron.load(again).legs == robot.legs
+    assert tomllib.loads(again.read_text())["name"] == "my quadrupteron"
+    with pytest.raises(OutputError):
+        pteron.save(robot, tmp_path / "no" / "where.toml")
+
+
+# The page.
+
+
+def test_the_page_has_the_keys_as_they_are_declared():
+    script = runpy.run_path(str(DOCS / "key_tables.py"))
+    assert script["filled"](PAGE) == PAGE, "run docs/key_tables.py"
+    marked = set(re.findall(r"<!-- keys of (.*?) -->", PAGE))
+    assert marked == set(script["TABLES"])
+
+
+def test_every_kind_of_leg_is_drawn(tmp_path):
+    script = runpy.run_path(str(DOCS / "leg_drawings.py"))
+    assert set(script["DRAWINGS"]) == set(KINDS)
+    script["main"](tmp_path)
+    for name in KINDS:
+        assert f"](legs/{name}.svg)" in PAGE
+        assert (DOCS / "legs" / f"{name}.svg").stat().st_size > 10_000
+        assert (tmp_path / f"{name}.svg").stat().st_size > 10_000
