@@ -157,6 +157,8 @@ def _show(robot: Manipulator, found: dict[str, Any]) -> None:
         )
     angles = ", ".join(f"{math.degrees(angle):.4g}" for angle in found["singular_orientations"])
     where = "" if found["singular_at_every_position"] or not angles else " at the home position"
+    tool = [f"Tool: {_vector(found['tool'])} m from P, in the platform frame"]
+    tool = tool if any(found["tool"]) else []
     work = "[green]This machine can work.[/green]"
     if found["doubts"]:
         work = "[yellow]This machine can work, if the warnings are none.[/yellow]"
@@ -167,7 +169,7 @@ def _show(robot: Manipulator, found: dict[str, Any]) -> None:
         made,
         f"Singular orientations{where}: {f'{angles} deg' if angles else 'none'}",
         f"Home pose: {_vector(found['home_pose'])}, reserve {found['home_reserve']:.2f} of 1",
-        *([f"Tool: {_vector(found['tool'])} m from P, in the platform frame"] if any(found["tool"]) else ()),
+        *tool,
         work,
     )
 
