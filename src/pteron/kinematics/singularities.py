@@ -123,8 +123,10 @@ def _sign_changes(robot: Manipulator, position: Array) -> Array:
         poses = np.concatenate([at, angles[:, None]], axis=-1)
         return np.asarray(numeric(robot, "type_ii")(poses)[0])
 
-    # Round angles, where many machines are singular, lie between the samples.
-    angles = np.pi * ((2.0 * np.arange(_ANGLES + 1) + 1.0) / _ANGLES - 1.0)
+    # Round angles, where many machines are singular, lie between the samples. The last is the first
+    # again, but for a platform that slides.
+    count = _ANGLES if robot.platform.slides else _ANGLES + 1
+    angles = np.pi * ((2.0 * np.arange(count) + 1.0) / _ANGLES - 1.0)
     values = measure(angles)
     negative, known = values < 0.0, ~np.isnan(values)
     if known.any() and (np.abs(values[known]) <= _VANISHING).all():

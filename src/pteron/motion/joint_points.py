@@ -139,7 +139,7 @@ def joint_points(robot: Manipulator, pose: PoseLike) -> JointPoints:
         chain,
         links,
         points,
-        _parts(robot, p, axes),
+        _parts(robot, given, p),
         p,
         p + robot.platform.tool @ axes,
         axes,
@@ -167,18 +167,19 @@ def _links(leg: LegKind, chain: Array, coordinate: Array, end: Array) -> Array:
     return np.stack(line, axis=-2)
 
 
-def _parts(robot: Manipulator, p: Array, axes: Array) -> tuple[Part, ...]:
-    """Return the platform's parts for P (..., 3) and the platform frame's axes (..., 3, 3)."""
-    frame = np.array(robot.platform.frame)
+def _parts(robot: Manipulator, poses: Array, p: Array) -> tuple[Part, ...]:
+    """Return the platform's parts in poses (..., m), P being at (..., 3)."""
+    platform = robot.platform
+    frame = np.array(platform.frame)
     arms = np.array([leg.platform_point for leg in robot.legs])
     still = np.array([leg.fixed_offset for leg in robot.legs]) @ frame.T
-    if not robot.platform.turns:
+    if not platform.turns:
         arms, still = arms + still, np.zeros_like(still)
-    found = [Part(p, p[..., None, :] + _corners(arms) @ axes)]
+    found = [Part(p, p[..., None, :] + platform.arms(_corners(arms), poses))]
     for hinge in _distinct(arms):
         own = _corners(still[np.abs(arms - hinge).max(axis=-1) <= _COINCIDENT])
         if len(own):
-            hub = p + hinge @ axes
+            hub = p + platform.arms(hinge[None], poses)[..., 0, :]
             found.append(Part(hub, hub[..., None, :] + own @ frame))
     return tuple(found)
 

@@ -178,13 +178,22 @@ class Platform:
         return np.array(self.frame[:2]) if self.planar else np.eye(3)
 
     def at(self, poses: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return P (..., 3) and the platform frame's axes (..., 3, 3), one a row, in base frame."""
+        """Return P (..., 3) and the platform frame's axes (..., 3, 3), one a row, in base frame.
+
+        Of a platform that slides they are the tool's.
+        """
         count = len(self.lengths)
         x, y, z = (np.array(axis) for axis in self.frame)
         angle = poses[..., -1:] if self.turns else np.zeros((*poses.shape[:-1], 1))
         cos, sin = np.cos(angle), np.sin(angle)
         axes = [cos * x + sin * y, cos * y - sin * x, np.broadcast_to(z, (*angle.shape[:-1], 3))]
         return poses[..., :count] @ self.directions, np.stack(axes, axis=-2)
+
+    def arms(self, points: NDArray[np.float64], poses: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the way (..., k, 3) from P to platform points (k, 3), but for fixed offsets."""
+        if self.slides:
+            return np.asarray(poses[..., -1:, None] * (points @ np.array(self.frame)))
+        return np.asarray(points @ self.at(poses)[1])
 
     @property
     def joined(self) -> PlanarInertia:

@@ -56,9 +56,11 @@ def cheapest_parameters(robot: Manipulator) -> BaseParameters:
     candidates = [k for k, p in enumerate(columns) if (p.kind, p.body) not in JOINED]
     always = [k for k in candidates if (columns[k].kind, columns[k].body) in OWN]
     others = [k for k in candidates if k not in always]
+    # Not all are left to the joints: a telescopic shaft's lower part hands its mass to no other.
+    joined = [k for k in range(len(columns)) if k not in candidates]
     found = {base.kept}
     for order in (others, others[::-1]):
-        start = _independent(grouping, always + order)
+        start = _independent(grouping, always + order + joined)
         found.add(_improved(robot, grouping, start, candidates)[1])
     best = min(found, key=lambda kept: (_final_cost(robot, kept), kept))
     return base_parameters(robot, keep=[columns[k].name for k in best])

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import casadi as ca
 import numpy as np
 
 from pteron.dynamics import inverse_dynamics
-from pteron.equations.machine import closure_of
+from pteron.equations.kinematics import passive_joints
+from pteron.equations.machine import Machine, closure_of
 from pteron.kernels import Array, numeric
 from pteron.kinematics import jacobian, joint_rates, singular_orientations
 from pteron.kinematics.singularities import best_type_ii
+from pteron.legs.leg import Passive
 from pteron.manipulator import Manipulator
 from pteron.motion import (
     Guide,
@@ -108,7 +111,8 @@ class Report:
     The cycle keeps the reserve `least`; its forces and joint speeds (T, n) are in N and m/s, or
     N m and rad/s. The slices go through the home pose and are all of one width. Of `orientations`
     and `measures` there is what the type-II measure depends on; neither where J is constant. The
-    squares of the machine's pictures have sides of `grid`, m.
+    squares of the machine's pictures have sides of `grid`, m. `passive` has the legs' passive
+    joints that have limits, at home, each with its leg, from 0.
     """
 
     robot: Manipulator
@@ -124,6 +128,7 @@ class Report:
     forces: Array
     joint_speeds: Array
     joints: JointRanges
+    passive: tuple[tuple[int, Passive], ...]
     slices: tuple[ReachSlice, ...]
     volume: ReachVolume
     jacobian: JacobianAtHome
@@ -179,6 +184,7 @@ def contents(robot: Manipulator) -> Report:
         forces=inverse_dynamics(robot, cycle.pose, cycle.velocity, cycle.acceleration),
         joint_speeds=joint_rates(robot, cycle.pose, cycle.velocity).actuated,
         joints=joint_ranges(robot, cycle.pose),
+        passive=_passive(robot, home),
         slices=tuple(
             reach_slice(robot, home, plane, extent=_extent(volume.box, plane, [half] * 3))
             for plane in slice_planes(robot)
@@ -189,6 +195,16 @@ def contents(robot: Manipulator) -> Report:
         measures=_measures(robot, home, volume.box),
         base=base,
         costs=costs(base),
+    )
+
+
+def _passive(robot: Manipulator, home: Array) -> tuple[tuple[int, Passive], ...]:
+    platform = replace(robot.platform, limits=None)  # which count for every leg
+    machine = Machine.of(replace(robot, platform=platform))
+    return tuple(
+        (i, joint._replace(value=float(joint.value)))
+        for i, joints in enumerate(passive_joints(machine, ca.SX(ca.DM(home))))
+        for joint in joints
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from math import pi
 
 from pteron.legs.kind import ActuatedJoint
+from pteron.report.typeset import fixed
 
 _NARROW = "\u202f"
 _SYMBOLS = {"rho": "\u03c1", "theta": "\u03b8"}
@@ -65,6 +66,18 @@ def speed(joints: Sequence[ActuatedJoint]) -> Quantity:
 def nouns(joints: Sequence[ActuatedJoint]) -> str:
     """Return what the actuated joints are: "slider", or "slider or crank"."""
     return " or ".join(_distinct(joint.noun for joint in joints))
+
+
+def readable(value: float, unit: str) -> str:
+    """Return a joint's coordinate as people read it.
+
+    Examples
+    --------
+    >>> readable(0.5, "rad"), readable(0.12, "m")
+    ('28.6°', '120.0 mm')
+    """
+    shown, factor = _SHOWN[unit]
+    return f"{fixed(factor * value)}{shown if shown == '°' else ' ' + shown}"
 
 
 def _distinct(words: Iterable[str]) -> list[str]:

@@ -28,7 +28,7 @@ from pteron.plots.robot import APART, base_outline
 from pteron.reduction import BaseParameters
 from pteron.reduction.expressions import html_symbol
 from pteron.report.contents import Report
-from pteron.report.joints import coordinate, force, nouns, speed
+from pteron.report.joints import coordinate, force, nouns, readable, speed
 from pteron.report.typeset import compact, fixed, resource, template, triple
 
 _FRAMES = 120
@@ -50,6 +50,7 @@ def page(report: Report) -> str:
         "page.html.j2",
         degrees=lambda angle, places=1: fixed(float(np.degrees(angle)), places),
         lettered=lettered,
+        readable=readable,
         mm=lambda metres, places=1: fixed(1e3 * float(metres), places),
         signed=lambda text: re.sub(r"(?<![\w.-])-(?=\d)", "\u2212", text),
         triple=triple,
@@ -90,7 +91,7 @@ def page(report: Report) -> str:
 def lettered(text: str) -> Markup:
     """Return an account of a leg with its vectors bold and its Greek letters Greek."""
     safe = str(escape(text)).replace(" . ", " \u00b7 ").replace(" - ", " \u2212 ")
-    safe = safe.replace("rho", "\u03c1").replace("theta", "\u03b8")
+    safe = safe.replace("rho", "\u03c1").replace("theta", "\u03b8").replace("phi", "\u03c6")
     safe = re.sub(r"(?<![;'])\b([rdekps])\b", r"<b>\1</b>", safe)
     return Markup(re.sub(r"\bs0\b", "<b>s</b><sub>0</sub>", safe))
 

@@ -102,7 +102,7 @@ def _random_poses(robot: Manipulator) -> Array:
 
 def _distinct(poses: Array, apart: Array) -> Array:
     """Return the poses (K, m) but for those that are near one before them."""
-    near = (np.abs(poses[:, None] - poses) <= apart).all(axis=-1)
+    near = np.asarray((np.abs(poses[:, None] - poses) <= apart).all(axis=-1))
     return poses[[not near[i, :i].any() for i in range(len(poses))]]
 
 
