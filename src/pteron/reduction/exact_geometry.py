@@ -93,8 +93,8 @@ class ExactGeometry:
     gravity : vector of Surd
         In the machine's own frame, m/s^2.
     frame : array, shape (3, 3)
-        The machine's own frame: its rows are the axes, in the base frame. For 3T1R they are the
-        platform frame's at some phi.
+        The machine's own frame: its rows are the axes, in the base frame. Where the platform turns
+        or stays in a plane they are the platform frame's at some phi.
     recognised, approximated : tuple of str
         What was taken for a root, and what was approximated, each with the error made.
     lost : tuple of str
@@ -278,7 +278,7 @@ class _Notes:
 def _best_frame(robot: Manipulator, vectors: list[Array]) -> Array:
     """Return the frame, as rows, in which most components of the vectors are simple."""
     frames = []
-    if robot.platform.turns:
+    if robot.platform.turns or robot.platform.planar:
         x0, _, k = (np.array(axis) for axis in robot.platform.frame)
         firsts = [x0, *(v - (v @ k) * k for v in vectors)]
         frames = [(v / np.linalg.norm(v), k) for v in firsts if np.linalg.norm(v) > 1e-6]
