@@ -75,7 +75,7 @@ def peers(robot: pteron.Manipulator, *, quick: bool = False) -> list[Peer]:
         If the machine is neither.
     """
     kinds = {leg.type for leg in robot.legs}
-    if not (kinds == {"PRRR"} and robot.platform.turns or kinds <= {"RSS", "PSS", "RRR"}):
+    if not ((kinds == {"PRRR"} and robot.platform.turns) or kinds <= {"RSS", "PSS", "RRR"}):
         raise ValueError(f"{robot.name}: the peers are not written for its legs")
     found = []
     for name, build in _BUILDERS.items():

@@ -12,8 +12,8 @@ import casadi as ca
 
 import pteron
 from peers.closure import Array, Closure
-from peers.library import Missing
 from peers.leg_closure import LegClosure
+from peers.library import Missing
 from pteron.kernels import TARGETS, Port
 from pteron.kernels.c import compiler
 

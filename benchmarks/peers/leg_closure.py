@@ -116,9 +116,9 @@ class Leg(ABC):
         turning = x * s[0] + y * s[1], y * s[0] - x * s[1]
         if not platform.turns:
             still, turning = still + turning[0], (np.zeros(3), np.zeros(3))
-        out = tuple(_clean(frame.T @ v) for v in (*turning, still))
+        a, b, rest = (_clean(frame.T @ v) for v in (*turning, still))
         crank = getattr(leg, "upper_length", 0.0)
-        return cls(_clean(frame), out, crank, leg.lower_length, float(leg.elbow))
+        return cls(_clean(frame), (a, b, rest), crank, leg.lower_length, float(leg.elbow))
 
     @abstractmethod
     def joints(self, point: Point) -> Joints:

@@ -115,7 +115,7 @@ def _model(robot: pteron.Manipulator, carried: bool = True) -> tuple[Any, Any]:
 
 
 def cpp_tuned(robot: pteron.Manipulator) -> Sweep:
-    """Return the peer that calls `pinocchio::rnea` in C++, with its best flags and fewest joints."""
+    """Return the peer that calls `pinocchio::rnea` in C++, with its best flags and best tree."""
     return _cpp(robot, _TUNING, carried=robot.platform.turns)
 
 

@@ -65,8 +65,8 @@ def tree(robot: pteron.Manipulator, carried: bool = True) -> list[Body]:
         return bodies
     frame = np.column_stack(platform.frame)
     slides = tuple(platform.directions @ frame)
-    hinges = "z" if platform.turns else ""
-    return [*bodies, Body(-1, frame, np.zeros(3), slides, hinges, *_planar(platform.joined))]
+    inertia = _planar(platform.joined)
+    return [*bodies, Body(-1, frame, np.zeros(3), slides, "z" if platform.turns else "", *inertia)]
 
 
 def _with_mass(body: Body, mass: float, place: Array) -> Body:
