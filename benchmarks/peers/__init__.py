@@ -2,8 +2,8 @@
 
 Each cuts the loops, runs its Newton-Euler algorithm on the tree, and projects the joint forces
 through the closure; what is not the engine's is done in closed form. Tuned peers have the best
-flags, buffers and stages that we found; the others are what a good user writes first. For machines
-with four sliders, and for Deltas.
+flags, buffers, stages and trees that we found; the others are what a good user writes first. For
+machines with four P-R-R-R legs, and those of legs R-S-S, P-S-S and R-R-R.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def peers(robot: pteron.Manipulator, *, quick: bool = False) -> list[Peer]:
     Parameters
     ----------
     robot : Manipulator
-        A 3T1R machine of P-R-R-R legs, or a Delta.
+        A 3T1R machine of P-R-R-R legs, or any of R-S-S, P-S-S and R-R-R legs.
     quick : bool
         Whether to leave out Pinocchio in C++, which may take most of a minute to compile.
 
@@ -74,9 +74,9 @@ def peers(robot: pteron.Manipulator, *, quick: bool = False) -> list[Peer]:
     ValueError
         If the machine is neither.
     """
-    kinds = {getattr(leg, "type", "PRRR") for leg in robot.legs}
-    if kinds != ({"PRRR"} if robot.platform.turns else {"RSS"}):
-        raise ValueError(f"{robot.name}: the peers are written for 3T1R machines and for Deltas")
+    kinds = {leg.type for leg in robot.legs}
+    if not ((kinds == {"PRRR"} and robot.platform.turns) or kinds <= {"RSS", "PSS", "RRR"}):
+        raise ValueError(f"{robot.name}: the peers are not written for its legs")
     found = []
     for name, build in _BUILDERS.items():
         if quick and name.startswith("Pinocchio, C++"):

@@ -25,14 +25,25 @@ Expression = Any
 """A CasADi SX matrix."""
 
 
-def plane(leg: Any) -> Array:
-    """Return the axes (3, 3), as columns, of a leg's frame: two of its plane, then d."""
+def frame_of(leg: Any) -> Array:
+    """Return the axes (3, 3), as columns, of a leg's frame: z along d, or x along a lone slider."""
+    if leg.type == "PSS":
+        e, bar = np.array(leg.slider_direction), leg.bar_direction
+        # Far from along the rod, which is where its joint's hinges would fold.
+        z = _across(e) if bar is None else np.array(bar) - (e @ np.array(bar)) * e
+        z = z / np.linalg.norm(z)
+        return np.column_stack([e, np.cross(z, e), z])
     d = np.array(leg.direction)
+    a = _across(d)
+    return np.column_stack([a, np.cross(d, a), d])
+
+
+def _across(d: Array) -> Array:
+    """Return a unit vector perpendicular to another."""
     i = int(np.argmax(np.abs(d)))
     a = np.roll(np.eye(3)[i], 1)
     a = a - (a @ d) * d
-    a /= np.linalg.norm(a)
-    return np.column_stack([a, np.cross(d, a), d])
+    return np.asarray(a / np.linalg.norm(a), dtype=float)
 
 
 @dataclass(frozen=True)
@@ -71,7 +82,7 @@ class Closure:
         for leg in legs:
             d, e, s = np.array(leg.direction), np.array(leg.e), leg.platform_point
             d_bar = d / (d @ e)
-            across = plane(leg).T[:2]
+            across = frame_of(leg).T[:2]
             three = np.vstack([d_bar, across - np.outer(across @ e, d_bar)])
             three[np.abs(three) < 1e-15] = 0.0
             rows.append(three)

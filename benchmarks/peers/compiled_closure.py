@@ -12,8 +12,8 @@ import casadi as ca
 
 import pteron
 from peers.closure import Array, Closure
+from peers.leg_closure import LegClosure
 from peers.library import Missing
-from peers.rod_closure import RodClosure
 from pteron.kernels import TARGETS, Port
 from pteron.kernels.c import compiler
 
@@ -25,12 +25,13 @@ Follow = Callable[[Array, Array, Array], tuple[Array, Array, Array, Array]]
 Project = Callable[[Array, Array], Array]
 """From the tree's joint forces and `rows` to the actuator forces."""
 
-ClosedForm = Closure | RodClosure
+ClosedForm = Closure | LegClosure
 
 
-def closed_form(robot: pteron.Manipulator) -> ClosedForm:
-    """Return the closed form of a machine with four sliders, or of a Delta."""
-    return Closure.of(robot) if robot.platform.turns else RodClosure.of(robot)
+def closed_form(robot: pteron.Manipulator, carried: bool = True) -> ClosedForm:
+    """Return the closed form of a machine, for a tree with or without its platform."""
+    prrr = all(leg.type == "PRRR" for leg in robot.legs)
+    return Closure.of(robot) if prrr else LegClosure.of(robot, carried)
 
 
 def joints(closure: ClosedForm, unbounded: bool) -> Follow:

@@ -26,7 +26,7 @@ from peers.tree import tree
 __all__ = ["c_tuned", "c_usual", "python_tuned"]
 
 
-def _model(robot: pteron.Manipulator, closed: bool = False) -> Any:
+def _model(robot: pteron.Manipulator, carried: bool, closed: bool = False) -> Any:
     """Return the tree; with its loops closed by constraints if asked for."""
     import mujoco
 
@@ -34,7 +34,7 @@ def _model(robot: pteron.Manipulator, closed: bool = False) -> Any:
     spec.compiler.degree = False
     spec.option.gravity = robot.gravity
     built: list[Any] = []
-    for body in tree(robot):
+    for body in tree(robot, carried):
         parent = spec.worldbody if body.parent < 0 else built[body.parent]
         quaternion = np.empty(4)
         mujoco.mju_mat2Quat(quaternion, body.rotation.ravel())
@@ -71,13 +71,14 @@ def python_tuned(robot: pteron.Manipulator) -> Calls:
         raise Missing("the package mujoco is not installed")
     import mujoco
 
-    model = _model(robot)
+    carried = robot.platform.turns
+    model = _model(robot, carried)
     data = mujoco.MjData(model)
     position, rate, rate_of_rate = data.qpos, data.qvel, data.qacc
     tau = np.empty(model.nv)
     kinematics, rne = mujoco.mj_kinematics, mujoco.mj_rne
     com_position, com_velocity = mujoco.mj_comPos, mujoco.mj_comVel
-    closure = closed_form(robot)
+    closure = closed_form(robot, carried)
     joints = compiled_closure.joints(closure, unbounded=False)
     forces = compiled_closure.forces(closure)
 
@@ -109,6 +110,8 @@ def _c(robot: pteron.Manipulator, closed: bool) -> Sweep:
         raise Missing("the package mujoco is not installed")
     import mujoco
 
+    if closed and robot.platform.turns and any(any(leg.fixed_offset) for leg in robot.legs):
+        raise Missing("the platform is articulated, and its bars are no bodies of the tree")
     folder = Path(package.origin).parent
     libraries = sorted(folder.glob("libmujoco.so*"))
     if not libraries or not (folder / "include" / "mujoco" / "mujoco.h").is_file():
@@ -116,9 +119,10 @@ def _c(robot: pteron.Manipulator, closed: bool) -> Sweep:
     options = ["-std=gnu11", "-fno-math-errno", *(["-DCLOSED"] if closed else [])]
     options += ["-isystem", str(folder / "include"), str(libraries[0]), "-lm"]
     options += [f"-Wl,-rpath,{folder}"]
-    header, numbers = closed_form(robot).in_c(unbounded=False)
+    carried = closed or robot.platform.turns
+    header, numbers = closed_form(robot, carried).in_c(unbounded=False)
     library = compiled("gcc", "mujoco_peer.c", options, version("mujoco"), header)
     with tempfile.TemporaryDirectory() as scratch:
         path = Path(scratch) / "tree.mjb"
-        mujoco.mj_saveModel(_model(robot, closed), str(path))
+        mujoco.mj_saveModel(_model(robot, carried, closed), str(path))
         return Sweep(library, c_char_p(bytes(path)), c_void_p(numbers.ctypes.data))

@@ -61,6 +61,10 @@ pinocchio::Model built(const Joint *joints, int count, const double *gravity) {
             kind = pinocchio::JointModelRUBY();
         else if (joint.kind == translation)
             kind = pinocchio::JointModelTranslation();
+        else if (axis == Vector3::UnitX())
+            kind = pinocchio::JointModelPX();
+        else if (axis == Vector3::UnitY())
+            kind = pinocchio::JointModelPY();
         else if (axis == Vector3::UnitZ())
             kind = pinocchio::JointModelPZ();
         else

@@ -46,9 +46,10 @@ one by one and read as a pair stall, and its small functions are inlined only wh
 
 def python_tuned(robot: pteron.Manipulator) -> Calls:
     """Return the peer that calls `pinocchio.rnea` between two calls of compiled closed form."""
-    pin, model = _model(robot)
+    carried = robot.platform.turns
+    pin, model = _model(robot, carried)
     data = model.createData()
-    closure = closed_form(robot)
+    closure = closed_form(robot, carried)
     joints = compiled_closure.joints(closure, unbounded=True)
     forces = compiled_closure.forces(closure)
     rnea = pin.rnea
@@ -68,7 +69,8 @@ def python_usual(robot: pteron.Manipulator) -> Calls:
     pin, model = _model(robot)
     data = model.createData()
     joints = compiled_closure.joints_and_rates(closed_form(robot), unbounded=True)
-    actuated = slice(0, 3 * len(robot.legs), 3)
+    first = 2 if robot.platform.planar else 3
+    actuated = slice(0, first * len(robot.legs), first)
 
     def call(pose: Array, velocity: Array, acceleration: Array) -> Array:
         q, v, a, rates = joints(pose, velocity, acceleration)
@@ -78,7 +80,7 @@ def python_usual(robot: pteron.Manipulator) -> Calls:
     return Calls(call)
 
 
-def _model(robot: pteron.Manipulator) -> tuple[Any, Any]:
+def _model(robot: pteron.Manipulator, carried: bool = True) -> tuple[Any, Any]:
     """Return the module pinocchio and the tree in it."""
     if find_spec("pinocchio") is None:
         raise Missing("the package pin is not installed")
@@ -87,17 +89,20 @@ def _model(robot: pteron.Manipulator) -> tuple[Any, Any]:
     model = pin.Model()
     model.gravity.linear = np.array(robot.gravity)
     ids: list[int] = []
-    for n, body in enumerate(tree(robot)):
+    for n, body in enumerate(tree(robot, carried)):
         joint = 0 if body.parent < 0 else ids[body.parent]
         place = pin.SE3(body.rotation, body.offset)
-        if len(body.slides) == 3:
-            resting = pin.SE3.Identity()
+        slides = body.slides
+        if len(slides) == 3:
+            resting, slides = pin.SE3.Identity(), ()
             joint = model.addJoint(joint, pin.JointModelTranslation(), resting, f"p{n}")
-        elif body.slides:
-            (axis,) = body.slides
-            along_z = np.array_equal(axis, [0.0, 0.0, 1.0])
-            kind = pin.JointModelPZ() if along_z else pin.JointModelPrismaticUnaligned(axis)
-            joint = model.addJoint(joint, kind, place, f"p{n}")
+        for axis in slides:
+            kinds = [pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ]
+            aligned = [
+                kind() for kind, unit in zip(kinds, np.eye(3), strict=True) if all(axis == unit)
+            ]
+            kind = aligned[0] if aligned else pin.JointModelPrismaticUnaligned(axis)
+            joint = model.addJoint(joint, kind, place, f"p{len(model.names)}")
             place = pin.SE3.Identity()
         for letter in body.hinges:
             kind = pin.JointModelRUBZ() if letter == "z" else pin.JointModelRUBY()
@@ -110,19 +115,19 @@ def _model(robot: pteron.Manipulator) -> tuple[Any, Any]:
 
 
 def cpp_tuned(robot: pteron.Manipulator) -> Sweep:
-    """Return the peer that calls `pinocchio::rnea` in C++, with its best flags."""
-    return _cpp(robot, _TUNING)
+    """Return the peer that calls `pinocchio::rnea` in C++, with its best flags and best tree."""
+    return _cpp(robot, _TUNING, carried=robot.platform.turns)
 
 
 def cpp_usual(robot: pteron.Manipulator) -> Sweep:
     """Return the peer that calls `pinocchio::rnea` in C++, with -O3 -march=native -DNDEBUG."""
-    return _cpp(robot, ())
+    return _cpp(robot, (), carried=True)
 
 
-def _cpp(robot: pteron.Manipulator, flags: tuple[str, ...]) -> Sweep:
-    joints = _table(tree(robot))
+def _cpp(robot: pteron.Manipulator, flags: tuple[str, ...], carried: bool) -> Sweep:
+    joints = _table(tree(robot, carried))
     gravity = np.array(robot.gravity)
-    header, numbers = closed_form(robot).in_c(unbounded=True)
+    header, numbers = closed_form(robot, carried).in_c(unbounded=True)
     options = ["-std=c++17", *flags, *_BOOST, *_includes()]
     library = compiled("g++", "pinocchio_peer.cpp", options, version("pin"), header)
     return Sweep(
@@ -164,11 +169,12 @@ def _table(bodies: list[Body]) -> Array:
         parent = 0.0 if body.parent < 0 else ids[body.parent]
         place = np.array([*body.rotation.ravel(), *body.offset])
         resting = np.array([*identity, 0.0, 0.0, 0.0])
-        if len(body.slides) == 3:
+        slides = body.slides
+        if len(slides) == 3:
             table.append(np.array([translation, parent, *resting, 0.0, 0.0, 0.0, *nothing]))
-            parent = float(len(table))
-        elif body.slides:
-            table.append(np.array([slide, parent, *place, *body.slides[0], *nothing]))
+            parent, slides = float(len(table)), ()
+        for axis in slides:
+            table.append(np.array([slide, parent, *place, *axis, *nothing]))
             parent, place = float(len(table)), resting
         for letter in body.hinges:
             table.append(np.array([turn[letter], parent, *place, 0.0, 0.0, 1.0, *nothing]))

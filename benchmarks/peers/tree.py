@@ -2,18 +2,18 @@
 
 Each leg is a chain of its own, and so is the platform, whose joints are the pose itself. A slider
 does not turn and R1 runs through it, so that its mass may sit in the upper link: one body less. The
-joint between a crank and its rod is two hinges.
+joint between a crank or a slider and its rod is two hinges.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 
 import pteron
-from peers.closure import Array, plane
+from peers.closure import Array, frame_of
 
 __all__ = ["Body", "tree"]
 
@@ -48,20 +48,38 @@ class Body:
     inertia: Array
 
 
-def tree(robot: pteron.Manipulator) -> list[Body]:
-    """Return upper and lower link of each leg, or crank and rod, then the platform."""
-    turns = robot.platform.turns
+def tree(robot: pteron.Manipulator, carried: bool = True) -> list[Body]:
+    """Return two bodies for each leg, then the platform.
+
+    A platform that does not turn is but a mass at its points: without `carried` it is at the end of
+    the first leg, a body less.
+    """
+    legs: tuple[Any, ...] = robot.legs
     bodies: list[Body] = []
-    for leg in robot.legs:
-        bodies += _slider_leg(leg, len(bodies)) if turns else _crank_leg(leg, len(bodies))
-    frame = np.column_stack(robot.platform.frame)
-    inertia = _planar(robot.platform.inertia)
-    bodies.append(Body(-1, frame, np.zeros(3), tuple(frame), "z" if turns else "", *inertia))
-    return bodies
+    for leg in legs:
+        bodies += _LEGS[leg.type](leg, len(bodies))
+    platform = robot.platform
+    if not carried:
+        end = np.array([legs[0].lower_length, 0.0, 0.0])
+        bodies[1] = _with_mass(bodies[1], platform.joined.mass, end)
+        return bodies
+    frame = np.column_stack(platform.frame)
+    slides = tuple(platform.directions @ frame)
+    inertia = _planar(platform.joined)
+    return [*bodies, Body(-1, frame, np.zeros(3), slides, "z" if platform.turns else "", *inertia)]
 
 
-def _slider_leg(leg: Any, count: int) -> list[Body]:
-    frame = plane(leg)
+def _with_mass(body: Body, mass: float, place: Array) -> Body:
+    """Return a body with a mass at a place in its frame."""
+    total = body.mass + mass
+    center = (body.mass * body.center + mass * place) / total
+    apart = place - body.center
+    moved = body.mass * mass / total * (apart @ apart - apart**2)
+    return replace(body, mass=total, center=center, inertia=body.inertia + moved)
+
+
+def _prrr(leg: Any, count: int) -> list[Body]:
+    frame = frame_of(leg)
     e = frame.T @ np.array(leg.e) if leg.e != leg.direction else np.array([0.0, 0.0, 1.0])
     mass = leg.upper.mass + leg.slider_mass
     upper = pteron.PlanarInertia(mass, leg.upper.first_moment, leg.upper.inertia)
@@ -73,19 +91,40 @@ def _slider_leg(leg: Any, count: int) -> list[Body]:
     ]
 
 
-def _crank_leg(leg: Any, count: int) -> list[Body]:
+def _pss(leg: Any, count: int) -> list[Body]:
+    mass = leg.slider_mass
+    x, nowhere = np.array([1.0, 0.0, 0.0]), np.zeros(3)
+    # A body that does not turn: its moments of inertia do not matter, but MuJoCo wants some.
+    slider = Body(-1, frame_of(leg), np.array(leg.guide_point), (x,), "", mass, nowhere, mass * x)
+    return [slider, _rod(leg, count, nowhere)]
+
+
+def _rss(leg: Any, count: int) -> list[Body]:
     elbow = np.array([leg.upper_length, 0.0, 0.0])
+    return [_crank(leg), _rod(leg, count, elbow)]
+
+
+def _rrr(leg: Any, count: int) -> list[Body]:
+    elbow = np.array([leg.upper_length, 0.0, 0.0])
+    lower = _planar(leg.lower, reach=leg.lower_length)
+    return [_crank(leg), Body(count, np.eye(3), elbow, (), "z", *lower)]
+
+
+_LEGS = {"PRRR": _prrr, "PSS": _pss, "RSS": _rss, "RRR": _rrr}
+
+
+def _crank(leg: Any) -> Body:
+    return Body(-1, frame_of(leg), np.array(leg.guide_point), (), "z", *_planar(leg.upper))
+
+
+def _rod(leg: Any, count: int, tip: Array) -> Body:
     rod = leg.lower
     (x,) = rod.center_of_mass
     about_center = rod.inertia - rod.mass * x**2
     # A rod's spin has no inertia; MuJoCo wants some, and this much is lost in rounding.
     inertia = np.array([2e-15, about_center, about_center])
     center = np.array([leg.lower_length + x, 0.0, 0.0])
-    crank = _planar(leg.upper)
-    return [
-        Body(-1, plane(leg), np.array(leg.guide_point), (), "z", *crank),
-        Body(count, np.eye(3), elbow, (), "zy", rod.mass, center, inertia),
-    ]
+    return Body(count, np.eye(3), tip, (), "zy", rod.mass, center, inertia)
 
 
 def _planar(body: Any, reach: float = 0.0) -> tuple[float, Array, Array]:

@@ -98,7 +98,9 @@ class Closure(ABC):
 
         About an axis along k through it; it is the greatest moment that unit forces may have.
         """
-        points = [offset.a for offset in self.platform.offsets]
+        # From the first point, so that points that coincide do so to the last bit.
+        first = self.platform.offsets[0].a
+        points = [offset.a - first for offset in self.platform.offsets]
         center = sum(points) / len(points)
         return ca.sqrt(sum(ca.dot(point - center, point - center) for point in points))
 

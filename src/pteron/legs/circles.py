@@ -89,10 +89,11 @@ def perpendicular_to(d: Sequence[float]) -> list[float]:
     return [float(x) for x in ca.vertsplit(plane_axis(ca.DM(list(d)), *pole(d)))]
 
 
-def random_direction(length: Fraction, rng: Random) -> tuple[Fraction, Fraction]:
-    """Return a random vector of the plane with this length, rational by its half angle."""
-    t = random_fraction(rng)
-    return length * (1 - t * t) / (1 + t * t), length * 2 * t / (1 + t * t)
+def random_vector(length: Fraction, dimension: int, rng: Random) -> list[Fraction]:
+    """Return a random vector with this length, rational by its stereographic projection."""
+    flat = [random_fraction(rng) for _ in range(dimension - 1)]
+    square = sum(t * t for t in flat)
+    return [length * part / (1 + square) for part in (*(2 * t for t in flat), 1 - square)]
 
 
 def random_triangle(
@@ -102,7 +103,7 @@ def random_triangle(
     a = values["plane_axis"]
     b = cross(values["direction"], a)
     (ua, ub), (la, lb) = (
-        random_direction(values[key][0], rng) for key in ("upper_length", "lower_length")
+        random_vector(values[key][0], 2, rng) for key in ("upper_length", "lower_length")
     )
     u = [(ua + la) * p + (ub + lb) * q for p, q in zip(a, b, strict=True)]
     # D = (l_u x l_l) . d has the sign of -sigma.

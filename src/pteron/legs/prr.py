@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
+from random import Random
 from typing import ClassVar, Self
 
 import casadi as ca
 
 from pteron.bodies.inertia import PlanarInertia, PointMass
 from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, PointMotion
-from pteron.bodies.vectors import Vector, perpendicular
-from pteron.legs.circles import perpendicular_to, plane_of, quarter_turn
+from pteron.bodies.vectors import Vector, cross, perpendicular
+from pteron.legs.circles import perpendicular_to, plane_of, quarter_turn, random_vector
 from pteron.legs.cones import check_elbow, within
 from pteron.legs.kind import Key, Quantity
 from pteron.legs.leg import Circle, Joint, LegMotion, Needs, Passive
@@ -125,6 +127,11 @@ class PRR(SlideLeg):
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return (self.plane_normal,)
+
+    @classmethod
+    def random_link(cls, values: Mapping[str, Sequence[Fraction]], rng: Random) -> list[Fraction]:
+        a, (x, y) = values["plane_axis"], random_vector(values["lower_length"][0], 2, rng)
+        return [x * p + y * q for p, q in zip(a, cross(values["direction"], a), strict=True)]
 
 
 class PRREquations(SlideEquations):

@@ -6,8 +6,10 @@ joints of a rod are counted as universal ones: a rod's spin about itself moves n
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
+from random import Random
 from typing import Any, ClassVar, Self
 
 import casadi as ca
@@ -15,6 +17,7 @@ import casadi as ca
 from pteron.bodies.inertia import PointMass, RodInertia
 from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, PointMotion
 from pteron.bodies.vectors import Vector
+from pteron.legs.circles import random_vector
 from pteron.legs.cones import Cone
 from pteron.legs.kind import Key, Quantity
 from pteron.legs.leg import Joint, LegMotion, Passive, Sphere
@@ -117,6 +120,10 @@ class PSS(SlideLeg):
         if self.tip_cone is None:
             return moved
         return replace(moved, tip_cone=replace(self.tip_cone, axis=turn(self.tip_cone.axis)))
+
+    @classmethod
+    def random_link(cls, values: Mapping[str, Sequence[Fraction]], rng: Random) -> list[Fraction]:
+        return random_vector(values["lower_length"][0], 3, rng)
 
 
 class PSSEquations(SlideEquations):

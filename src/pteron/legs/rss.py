@@ -18,7 +18,7 @@ from pteron.bodies.inertia import PlanarInertia, RodInertia
 from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, PointMotion
 from pteron.bodies.vectors import Vector, cross, parallel
 from pteron.errors import ModelError
-from pteron.legs.circles import random_direction, random_fraction
+from pteron.legs.circles import random_vector
 from pteron.legs.cones import Cone
 from pteron.legs.crank import CRANK_KEYS, CrankEquations, CrankLeg, CrankState
 from pteron.legs.kind import Key
@@ -134,10 +134,8 @@ class RSS(CrankLeg):
         """Draw the directions of crank and rod: their sum is a platform point."""
         d, a = values["direction"], values["zero_direction"]
         b = cross(d, a)
-        x, y = random_direction(values["upper_length"][0], rng)
-        s, t = random_fraction(rng), random_fraction(rng)
-        scale = values["lower_length"][0] / (1 + s * s + t * t)
-        rx, ry, rz = 2 * s * scale, 2 * t * scale, (1 - s * s - t * t) * scale
+        x, y = random_vector(values["upper_length"][0], 2, rng)
+        rx, ry, rz = random_vector(values["lower_length"][0], 3, rng)
         w = [(x + rx) * p + (y + ry) * q + rz * r for p, q, r in zip(a, b, d, strict=True)]
         # D = (l_u x b) . d has the sign of -sigma.
         return w, -1 if x * ry - y * rx > 0 else 1

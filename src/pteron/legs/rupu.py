@@ -6,8 +6,10 @@ from the base to the platform point. The cardan error of its joints is left out.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
+from random import Random
 from typing import ClassVar, Self
 
 import casadi as ca
@@ -16,7 +18,7 @@ from pteron.bodies.inertia import RodInertia
 from pteron.bodies.motion import AngleMotion, Expression, PointMotion
 from pteron.bodies.vectors import Vector
 from pteron.errors import ModelError
-from pteron.legs.circles import perpendicular_to
+from pteron.legs.circles import perpendicular_to, random_fraction, random_vector
 from pteron.legs.cones import within
 from pteron.legs.kind import SHAFT, Key, LegKind, Quantity, Transfer
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Passive, Reach, Turned
@@ -157,10 +159,20 @@ class RUPU(LegKind):
 
     def transfers(self, gravity: Vector) -> tuple[Transfer, ...]:
         swing = {("I", "u"): (1, ()), ("I", "l"): (-1, ())}
-        return (
+        found = [
             Transfer("the shaft{} swings about a fixed point", {("m", "u"): (1, ())}),
             Transfer("both parts of the shaft{} swing alike", swing),
-        )
+        ]
+        if not any(gravity):
+            found.append(Transfer("no gravity acts on the shaft{}", {("mgx", "u"): (1, ())}))
+        return tuple(found)
+
+    @classmethod
+    def closing(
+        cls, values: Mapping[str, Sequence[Fraction]], rng: Random
+    ) -> tuple[list[Fraction], int]:
+        """Draw the shaft."""
+        return random_vector(abs(random_fraction(rng)), 3, rng), 1
 
 
 class RUPUEquations(LegEquations):

@@ -7,14 +7,17 @@ a rod, in its plane where it is a planar link; this is all that tells the kinds 
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
+from random import Random
 from typing import Any, NamedTuple
 
 import casadi as ca
 
 from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, PointMotion
 from pteron.bodies.vectors import Vector
+from pteron.legs.circles import random_fraction
 from pteron.legs.kind import SLIDER, Key, LegKind, ReachBound, Transfer
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Reach
 
@@ -82,6 +85,22 @@ class SlideLeg(LegKind):
         return (
             Transfer(f"slider and {self.names['l']}{{}} carry the joint between them", entries),
         )
+
+    @classmethod
+    @abstractmethod
+    def random_link(
+        cls, values: Mapping[str, Sequence[Fraction]], rng: Random
+    ) -> Sequence[Fraction]:
+        """Return the link in a random direction, in fractions."""
+
+    @classmethod
+    def closing(
+        cls, values: Mapping[str, Sequence[Fraction]], rng: Random
+    ) -> tuple[list[Fraction], int]:
+        """Draw the link and the slider's place: their sum is a platform point."""
+        b, e, q = cls.random_link(values, rng), values["slider_direction"], random_fraction(rng)
+        ahead = sum(x * y for x, y in zip(b, e, strict=True))
+        return [x + q * y for x, y in zip(b, e, strict=True)], 1 if ahead > 0 else -1
 
 
 class SlideState(NamedTuple):

@@ -117,7 +117,8 @@ class ExactCertificate(Certificate):
         Relations found: columns - rank.
     rational_configurations : int
         Random configurations with rational links at which every null vector, in fractions,
-        annihilates the regressor exactly (zero where the geometry holds roots).
+        annihilates the regressor exactly; the guide points follow from them. Zero where the
+        geometry holds roots, or where some relations are due to special guide points.
     modular_configurations : int
         Further random configurations, modulo a prime that was not used to find them, at which every
         null vector does so.

@@ -82,9 +82,9 @@ def _scaled_regressor(robot: Manipulator, sharing: Array, seed: int) -> tuple[Ar
     states = _STATES_PER_COLUMN * sharing.shape[1]
     poses = random_poses(robot, states, seed=rng, type_i=0.2, type_ii=0.2)
     # In the machine's own units of length and time, so that its size does not matter.
-    size = float(np.mean([leg.size for leg in robot.legs]))
+    size = max(leg.size for leg in robot.legs)
     second = np.sqrt(size / _ACCELERATION)
-    units = np.where(np.arange(robot.freedom) < 3, size, 1.0)
+    units = np.where(np.arange(robot.freedom) < len(robot.platform.directions), size, 1.0)
     velocity = units / second * rng.normal(size=poses.shape)
     acceleration = units / second**2 * rng.normal(size=poses.shape)
     stacked = regressor(robot, poses, velocity, acceleration) @ sharing
