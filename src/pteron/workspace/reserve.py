@@ -68,6 +68,7 @@ def reserve(robot: Manipulator, pose: PoseLike) -> Reserve:
     # A shaft without lengths reaches everywhere.
     type_i = np.divide(margin, facts.sizes, out=np.nan_to_num(measure), where=margin < 0.0)
     type_ii = np.nan_to_num(np.abs(numeric(robot, "type_ii")(pose)[0])) / best_type_ii(robot)
+    type_ii = np.minimum(type_ii, 1.0)
     room = clearances(robot, numeric(robot, "joint_coordinates")(pose)[0])
     shares = np.where(np.isinf(room), 1.0, room / facts.half_ranges)
     shares = np.where(np.isnan(shares), np.minimum(type_i, 0.0), shares)
