@@ -1,10 +1,9 @@
 """Newton-Euler engines on the opened mechanism, projected through its closure.
 
 The loops are cut at the platform points: each leg is a chain of three joints, or in a plane of two,
-and the platform a chain of its own. Joint angles come from
-triangles; the engine's own kinematics tell how well the cuts close. Rates and accelerations come
-from its point Jacobians and their drift, and the tree's forces T^T tau from the natural orthogonal
-complement T of those Jacobians.
+and the platform a chain of its own. Joint angles come from triangles; the engine's own kinematics
+tell how well the cuts close. Rates and accelerations come from its point Jacobians and their drift,
+and the tree's forces T^T tau from the natural orthogonal complement T of those Jacobians.
 """
 
 from dataclasses import dataclass
@@ -158,9 +157,8 @@ def projected(robot, engine, pose, velocity, acceleration):
         dq, ddq = complement @ dx, complement @ ddx
         ddq[: len(along)] -= np.linalg.solve(legs, along @ engine.drift(q, dq))
         jacobians.append(drives @ complement)
-        forces.append(
-            np.linalg.solve(jacobians[-1].T, complement.T @ engine.inverse(q, dq, ddq)),
-        )
+        tree_forces = complement.T @ engine.inverse(q, dq, ddq)
+        forces.append(np.linalg.solve(jacobians[-1].T, tree_forces))
     return np.array(forces), np.array(jacobians), np.abs(gaps).max()
 
 
