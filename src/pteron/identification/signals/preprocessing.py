@@ -27,7 +27,7 @@ from pteron.identification.signals.filters import (
     white_noise,
 )
 from pteron.identification.signals.fourier import FourierSeries, fitted_series
-from pteron.identification.signals.states import assembly_mode
+from pteron.identification.signals.states import start_pose
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 
@@ -114,8 +114,8 @@ class Preprocessing:
     ----------
     derivatives : {"periodic", "central", "spline"}
         How positions are differentiated; see `Processing`.
-    mode : int
-        The assembly mode, from 0.
+    start : tuple of float
+        A pose (m,) of the assembly mode.
     rate : float
         Samples per second.
     cutoff : float or None
@@ -133,7 +133,7 @@ class Preprocessing:
     """
 
     derivatives: Derivatives
-    mode: int
+    start: tuple[float, ...]
     rate: float
     cutoff: float | None
     band: float
@@ -175,7 +175,12 @@ class Preprocessing:
 
 
 def preprocessing_of(
-    robot: Manipulator, log: Log, processing: Processing | None = None, *, rows: int | None = None
+    robot: Manipulator,
+    log: Log,
+    processing: Processing | None = None,
+    *,
+    rows: int | None = None,
+    start: tuple[float, ...] | None = None,
 ) -> Preprocessing:
     """Return how a log is to be preprocessed.
 
@@ -189,6 +194,8 @@ def preprocessing_of(
         What the user wants.
     rows : int, optional
         How many rows the whole log has, where `log` is only a part.
+    start : tuple of float, optional
+        A pose (m,) of its assembly mode, where it is known.
 
     Raises
     ------
@@ -233,7 +240,7 @@ def preprocessing_of(
         band = min(band, cutoff)
     return Preprocessing(
         derivatives=derivatives,
-        mode=assembly_mode(robot, log),
+        start=start or start_pose(robot, log),
         rate=rate,
         cutoff=cutoff,
         band=float(band),
