@@ -77,8 +77,9 @@ class Drives:
 _TWENTY_BITS = 2.0 * np.pi / 2**20
 """rad: an encoder on the crank's axis, behind the gear."""
 
-_DELTA = Drives((3.0, 0.3), (1.0, 0.1), (0.0, 0.1), _TWENTY_BITS, speed=3.0, acceleration=40.0)
-_PAR4 = Drives((0.4, 0.04), (0.1, 0.01), (0.0, 0.02), _TWENTY_BITS, 6.0, 100.0, period=2.5)
+# Dry friction is about 15 % of the torques' root mean square.
+_DELTA = Drives((4.0, 0.3), (1.0, 0.1), (0.0, 0.1), _TWENTY_BITS, speed=6.0, acceleration=80.0)
+_PAR4 = Drives((0.2, 0.02), (0.05, 0.005), (0.0, 0.01), _TWENTY_BITS, 10.0, 120.0, period=4.0)
 
 MACHINES = {
     "quadrupteron": Drives(),

@@ -23,6 +23,7 @@ from pteron.identification.signals.filters import (
     Decimation,
     bins_below,
     cutoff_of,
+    position_noise,
     smoothed,
     white_noise,
 )
@@ -55,7 +56,7 @@ _UNSURE = 0.1
 _MENTIONED = 0.1
 """Speed, as a share of a joint's root mean square, from which its sign counts: noise's does not."""
 
-_SPARED = 0.15
+_SPARED = 0.25
 """Share of the time between two reversals of a joint that is left out, at most, on each side."""
 
 _PRODUCTS = 10.0
@@ -125,7 +126,7 @@ class Preprocessing:
     period : float or None
         Time after which the motion repeats, s; None where it is not known to.
     joint_noise, force_noise : array, shape (n,)
-        Standard deviation of the white noise on joints (m) and forces (N).
+        Root mean square of the noise on joints (m) and forces (N).
     slow : array, shape (n,)
         Speed of each joint below which its friction is not known, m/s.
     stroke : float
@@ -245,7 +246,7 @@ def preprocessing_of(
         cutoff=cutoff,
         band=float(band),
         period=period,
-        joint_noise=white_noise(joints),
+        joint_noise=position_noise(joints),
         force_noise=white_noise(forces),
         slow=wanted.slow * np.sqrt((rates**2).mean(axis=0)),
         stroke=_stroke(rates, rate),
@@ -291,7 +292,7 @@ def _checked_series(log: Log, period: float | None) -> FourierSeries:
 def _is_series(series: FourierSeries, joints: Array) -> bool:
     """Say whether a Fourier series leaves noise alone: jumps of acceleration take more terms."""
     least = _ROUNDING * np.ptp(joints, axis=0)
-    return bool((series.noise <= np.maximum(3.0 * white_noise(joints), least)).all())
+    return bool((series.noise <= np.maximum(3.0 * position_noise(joints), least)).all())
 
 
 def _check_frequencies(wanted: Processing, rate: float) -> None:
