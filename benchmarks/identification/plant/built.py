@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 import pteron
-from plant.model import legs_of
+from pteron.bodies.inertia import PointMass
 
 __all__ = ["as_built"]
 
@@ -15,27 +16,35 @@ __all__ = ["as_built"]
 def as_built(robot: pteron.Manipulator, seed: int = 0, spread: float = 0.2) -> pteron.Manipulator:
     """Return the machine with the inertia it really has: that of its drawings, off at random.
 
-    Each body's mass, both coordinates of its centre of mass and its moment of inertia about that
+    Each body's mass, the coordinates of its centre of mass and its moment of inertia about that
     centre are multiplied by factors of their own, uniform between 1 - spread and 1 + spread.
     """
     rng = np.random.default_rng(seed)
 
-    def built(body: pteron.PlanarInertia) -> pteron.PlanarInertia:
-        gx, gy = body.center_of_mass
-        about_center = body.inertia - body.mass * (gx**2 + gy**2)
-        factors = rng.uniform(1.0 - spread, 1.0 + spread, 4)
-        mass, gx, gy, about_center = (factors * (body.mass, gx, gy, about_center)).tolist()
-        inertia = about_center + mass * (gx**2 + gy**2)
-        return pteron.PlanarInertia.of_body(mass, (gx, gy), inertia)
+    def factors(count: int) -> list[float]:
+        found: list[float] = rng.uniform(1.0 - spread, 1.0 + spread, count).tolist()
+        return found
+
+    def built(body: Any) -> Any:
+        if isinstance(body, PointMass):
+            return PointMass(body.mass * factors(1)[0])
+        center = np.array(body.center_of_mass)
+        about_center = body.inertia - body.mass * float(center @ center)
+        mass, *shifts, turning = factors(len(center) + 2)
+        mass, center = mass * body.mass, shifts * center
+        inertia = turning * about_center + mass * float(center @ center)
+        return body.of_body(mass, center.tolist(), inertia)
 
     legs = tuple(
-        replace(
-            leg,
-            slider_mass=leg.slider_mass * rng.uniform(1.0 - spread, 1.0 + spread),
-            upper=built(leg.upper),
-            lower=built(leg.lower),
-        )
-        for leg in legs_of(robot)
+        leg.with_bodies({letter: built(body) for letter, body in leg.bodies.items()})
+        for leg in robot.legs
     )
-    platform = replace(robot.platform, inertia=built(robot.platform.inertia))
+    platform = replace(
+        robot.platform,
+        inertia=built(robot.platform.inertia),
+        bars=tuple(replace(bar, mass=bar.mass * factors(1)[0]) for bar in robot.platform.bars),
+        geared=tuple(
+            replace(part, inertia=part.inertia * factors(1)[0]) for part in robot.platform.geared
+        ),
+    )
     return replace(robot, legs=legs, platform=platform)

@@ -1,4 +1,4 @@
-"""A controller of the sliders: feedforward, and feedback of position and rate."""
+"""A controller of the joints: feedforward, and feedback of position and rate."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ _BANDWIDTH = 100.0
 """rad/s; the controller's two poles are there."""
 
 _REVERSAL = 1e-4
-"""Reference speed where the compensation of Coulomb's friction changes sign, m/s."""
+"""Reference speed where the compensation of Coulomb's friction changes sign, m/s or rad/s."""
 
 
 class Controller:
-    """The controller: a command that depends on time, tabulated, less gains times the sliders."""
+    """The controller: a command that depends on time, tabulated, less gains times the joints."""
 
     def __init__(
         self,
@@ -36,8 +36,8 @@ class Controller:
         self.start, self.spacing = start, spacing
         instants = np.arange(round((duration - start) / spacing) + 50, dtype=np.float64)
         time = start + spacing * instants
-        sliders, rates, accelerations = reference(time)
-        state = platform_state(robot, sliders, rates, accelerations)
+        joints, rates, accelerations = reference(time)
+        state = platform_state(robot, joints, rates, accelerations)
         home: Array = pteron.workspace.home_pose(robot)
         inverse: Array = np.linalg.inv(pteron.jacobian(robot, home))
         masses = np.diag(inverse.T @ pteron.mass_matrix(drawn, home) @ inverse)
@@ -46,14 +46,14 @@ class Controller:
         needed = pteron.inverse_dynamics(drawn, state.pose, state.velocity, state.acceleration)
         braking = np.array(friction.coulomb) * np.tanh(rates / _REVERSAL)
         braking += np.array(friction.viscous) * rates + np.array(friction.offset)
-        pulling = self.position_gain * sliders + self.rate_gain * rates
+        pulling = self.position_gain * joints + self.rate_gain * rates
         self.command = needed + compensation * braking + pulling
 
-    def forces(self, time: float, sliders: Array, rates: Array) -> Array:
+    def forces(self, time: float, joints: Array, rates: Array) -> Array:
         """Return the actuator forces (n,); between the table's instants the command is linear."""
         place = (time - self.start) / self.spacing
         k = int(place)
         share = place - k
         command = (1.0 - share) * self.command[k] + share * self.command[k + 1]
-        forces: Array = command - self.position_gain * sliders - self.rate_gain * rates
+        forces: Array = command - self.position_gain * joints - self.rate_gain * rates
         return forces

@@ -1,4 +1,4 @@
-"""From the sliders' motion to the platform's, and to the forces of Pteron's model."""
+"""From the motion of the actuated joints to the platform's."""
 
 from __future__ import annotations
 
@@ -28,20 +28,13 @@ class State:
 
 
 def platform_state(
-    robot: pteron.Manipulator, sliders: Array, rates: Array, accelerations: Array
+    robot: pteron.Manipulator, joints: Array, rates: Array, accelerations: Array
 ) -> State:
-    """Return the motion of the platform, from that of the sliders, (T, n) each.
+    """Return the motion of the platform, from that of the actuated joints, (T, n) each.
 
-    Of the two poses of a Quadrupteron the one on the home pose's side of the singularity is taken.
+    Of the poses that they have it is followed in the home pose's assembly mode.
     """
-    poses = pteron.direct_kinematics(robot, sliders)
-    home = pteron.workspace.home_pose(robot)
-    if robot.platform.turns:
-        turn = np.abs(np.angle(np.exp(1j * (poses[..., 3] - home[3]))))
-        nearest = np.nan_to_num(turn, nan=np.inf).argmin(axis=-1)
-        pose = np.take_along_axis(poses, nearest[..., None, None], axis=-2)[..., 0, :]
-    else:
-        pose = poses[..., 0, :]
+    pose = pteron.follow(robot, joints, pteron.workspace.home_pose(robot))
     jacobian = pteron.jacobian(robot, pose)
     velocity = np.linalg.solve(jacobian, rates[..., None])[..., 0]
     drift = pteron.joint_accelerations(robot, pose, velocity, np.zeros_like(pose))

@@ -1,4 +1,4 @@
-"""The machine: MuJoCo's closed mechanism, with friction, under a controller of its sliders.
+"""The machine: MuJoCo's closed mechanism, with friction, under a controller of its actuated joints.
 
 Forces, positions, rates and accelerations of a sample belong to one instant: the controller and
 friction act at every stage of Runge and Kutta's method, and nothing is held over a step.
@@ -6,7 +6,7 @@ friction act at every stage of Runge and Kutta's method, and nothing is held ove
 How near that comes to rigid bodies with F_c sign(v) + F_v v + F_0, `check.py` in the folder above
 measures. For the catalog's machines, 20 s at 1 kHz: loops stay closed to 1e-8 m; the force
 error's root mean square is at most 4e-5 of the force's, nearly all of it in the milliseconds after
-a slider turns round, while the loops' springs settle under the new load; fitted parameters are off
+a joint turns round, while the loops' springs settle under the new load; fitted parameters are off
 by at most 0.06 of the standard deviations that 1 % of noise gives. This is without samples slower
 than 1 mm/s (0.4 %). Some of those stick, at whatever friction holds them, and a fit that takes
 sign(v) for them is off by up to 11 standard deviations, or 50 if the controller knows 80 % of the
@@ -25,7 +25,14 @@ import pteron
 from plant.controller import Controller
 from plant.friction import Friction, Guides
 from plant.inverse import platform_state
-from plant.model import Array, joint_damping, leg_axes, legs_of, mujoco_model
+from plant.model import (
+    Array,
+    first_joint,
+    joint_damping,
+    leg_coordinates,
+    loop_rows,
+    mujoco_model,
+)
 from plant.reference import Reference
 
 __all__ = ["Recording", "simulate"]
@@ -33,8 +40,11 @@ __all__ = ["Recording", "simulate"]
 _STEP = 2e-4
 """Step of the integration, s."""
 
+_MOMENT = 1e-5
+"""Between the places, s, from which the rates at the beginning are taken."""
+
 _DIVISION = 20
-"""Into how many a step is divided while a slider is about to turn round."""
+"""Into how many a step is divided while a joint is about to turn round."""
 
 
 @dataclass(frozen=True)
@@ -46,9 +56,9 @@ class Recording:
     time : array, shape (T,)
         s, from 0.
     joints, rates, accelerations : array, shape (T, n)
-        m, m/s and m/s^2.
+        m and s; rad at a crank.
     forces : array, shape (T, n)
-        What the actuators applied at these instants, N.
+        What the actuators applied at these instants, N; N m at a crank.
     poses : array, shape (T, m)
         Where the platform was, m and rad.
     gap : float
@@ -78,7 +88,7 @@ def simulate(
 ) -> Recording:
     """Let the machine follow a reference and record it; a repeated call returns the same recording.
 
-    Forces are F = F_ff(t) + K_p (rho_ref - rho) + K_d (rho_ref' - rho'), at every stage of the
+    Forces are F = F_ff(t) + K_p (q_ref - q) + K_d (q_ref' - q'), at every stage of the
     integration; F_ff is what `drawn` needs for the reference, with the known share of friction.
 
     Parameters
@@ -98,7 +108,7 @@ def simulate(
     drawn : Manipulator, optional
         What the controller takes the machine for; by default, what it is.
     compensation : float
-        The share of the sliders' friction that the controller knows.
+        The share of the actuated joints' friction that the controller knows.
 
     Returns
     -------
@@ -135,13 +145,13 @@ def simulate(
             plant.advance(every)
     finally:
         mujoco.set_mjcb_control(previous)
-    sliders, rates, accelerations, forces, poses, gaps = (
+    joints, rates, accelerations, forces, poses, gaps = (
         np.array(column) for column in zip(*rows, strict=True)
     )
     time = np.arange(samples) / rate
-    for column in (time, sliders, rates, accelerations, forces, poses):
+    for column in (time, joints, rates, accelerations, forces, poses):
         column.flags.writeable = False
-    return Recording(time, sliders, rates, accelerations, forces, poses, float(gaps.max()))
+    return Recording(time, joints, rates, accelerations, forces, poses, float(gaps.max()))
 
 
 class _Plant:
@@ -159,12 +169,12 @@ class _Plant:
 
         self.step, self.forward = mujoco.mj_step, mujoco.mj_forward
         self.model, self.data, self.controller = model, data, controller
-        m = robot.freedom
-        self.guides = Guides(friction, model, data, m)
+        m, first = robot.freedom, first_joint(robot)
+        self.guides = Guides(friction, model, data, first, loop_rows(robot))
         self.damping = friction.joints * joint_damping(robot) if friction.joints else None
         # Views: MuJoCo's arrays stay where they are.
-        self.poses, self.joints, self.rates = data.qpos[:m], data.qpos[m::3], data.qvel[m::3]
-        self.accelerations, self.applied = data.qacc[m::3], data.qfrc_applied[m::3]
+        self.poses, self.joints, self.rates = data.qpos[:m], data.qpos[first::3], data.qvel[first::3]
+        self.accelerations, self.applied = data.qacc[first::3], data.qfrc_applied[first::3]
         self.forces = np.zeros(m)
         self.sites = [[data.site(f"{a} {i}").id for i in range(m)] for a in ("leg", "platform")]
 
@@ -178,7 +188,7 @@ class _Plant:
             self.applied[:] = self.forces - self.guides.braking()
 
     def advance(self, steps: int) -> None:
-        """Go on by some steps, finely where a slider is about to turn round."""
+        """Go on by some steps, finely where a joint is about to turn round."""
         for _ in range(steps):
             parts = _DIVISION if self.guides.turning(_STEP) else 1
             self.model.opt.timestep = _STEP / parts
@@ -187,27 +197,28 @@ class _Plant:
                 self.guides.turned()
 
     def sample(self) -> tuple[Array, Array, Array, Array, Array, float]:
-        """Return sliders, rates, accelerations, forces, pose and the widest gap."""
+        """Return joints, rates, accelerations, forces, pose and the widest gap."""
         self.forward(self.model, self.data)
         leg, platform = (self.data.site_xpos[sites] for sites in self.sites)
         gap = float(np.linalg.norm(leg - platform, axis=-1).max())
         state = self.joints, self.rates, self.accelerations, self.forces, self.poses
-        sliders, rates, accelerations, forces, poses = (column.copy() for column in state)
-        return sliders, rates, accelerations, forces, poses, gap
+        joints, rates, accelerations, forces, poses = (column.copy() for column in state)
+        return joints, rates, accelerations, forces, poses, gap
 
 
 def _place(robot: pteron.Manipulator, data: Any, reference: Reference, start: float) -> None:
     """Put the mechanism on the reference, with its rates."""
-    state = platform_state(robot, *reference(np.array([start])))
-    pose, velocity = state.pose[0], state.velocity[0]
-    rates = pteron.joint_rates(robot, pose, velocity)
-    position, motion = [*pose], [*velocity]
-    sliders = pteron.inverse_kinematics(robot, pose)
-    links = pteron.link_vectors(robot, pose)
-    for i, leg in enumerate(legs_of(robot)):
-        axes = leg_axes(leg)
-        upper, lower = (np.arctan2(*(axes.T @ link[i])[1::-1]) for link in links)
-        turns = rates.upper_links[i], rates.lower_links[i]
-        position += [sliders[i], upper, lower - upper]
-        motion += [rates.actuated[i], turns[0], turns[1] - turns[0]]
-    data.qpos[:], data.qvel[:], data.time = position, motion, start
+    moments = start + _MOMENT * np.array([-1.0, 0.0, 1.0])
+    poses = platform_state(robot, *reference(moments)).pose
+    platform = robot.platform
+    parts = [poses]
+    for gear in platform.geared:
+        parts.append((gear.ratio - 1.0) * poses[:, -1:])
+    for bar in platform.bars:
+        x, y, _ = np.array(platform.frame) * np.array(bar.hinge)[:, None]
+        cosine, sine = np.cos(poses[:, -1:]), np.sin(poses[:, -1:])
+        turned = cosine * (x + y) + sine * np.cross(platform.axis, x + y)
+        parts.append(poses[:, :3] + turned - (x + y))
+    before, now, after = np.hstack([*parts, leg_coordinates(robot, poses)])
+    data.qpos[:], data.time = now, start
+    data.qvel[:] = (np.remainder(after - before + np.pi, 2.0 * np.pi) - np.pi) / (2.0 * _MOMENT)

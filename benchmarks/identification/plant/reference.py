@@ -13,7 +13,7 @@ from plant.model import Array
 __all__ = ["Fourier", "Reference", "fourier_reference"]
 
 Reference = Callable[[Array], tuple[Array, Array, Array]]
-"""From times (T,) to slider coordinates, rates and accelerations, (T, n) each; it is hashable."""
+"""From times (T,) to joint coordinates, rates and accelerations, (T, n) each; it is hashable."""
 
 _TYPE_I = 0.25
 _TYPE_II = 0.3
@@ -27,7 +27,7 @@ class Fourier:
     Attributes
     ----------
     robot : Manipulator
-        Whose geometry takes the platform's motion to the sliders.
+        Whose geometry takes the platform's motion to the joints.
     center : tuple of float
         The pose in the middle, m and rad.
     cosines, sines : tuple of tuple of float
@@ -55,7 +55,7 @@ class Fourier:
         )
 
     def __call__(self, time: Array) -> tuple[Array, Array, Array]:
-        """Return slider coordinates, rates and accelerations, (T, n) each."""
+        """Return joint coordinates, rates and accelerations, (T, n) each."""
         pose, velocity, acceleration = self.platform(np.asarray(time, dtype=float))
         rates = pteron.joint_rates(self.robot, pose, velocity)
         accelerations = pteron.joint_accelerations(self.robot, pose, velocity, acceleration)
@@ -74,7 +74,7 @@ def fourier_reference(
     """Return a random lively motion about the home pose.
 
     All coefficients are scaled alike until the first of these stops them: a type-I measure of
-    0.25, a type-II measure of 0.3, a slider's limit, the greatest speed or acceleration of one.
+    0.25, a type-II measure of 0.3, a joint's limit, the greatest speed or acceleration of one.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def fourier_reference(
     period : float
         s.
     speed, acceleration : float
-        The most that any slider does, m/s and m/s^2.
+        The most that any joint does, m/s and m/s^2; rad/s and rad/s^2 of a crank.
 
     Returns
     -------
@@ -96,7 +96,7 @@ def fourier_reference(
     rng = np.random.default_rng(seed)
     spread = np.ones((robot.freedom, harmonics))
     if robot.platform.turns:
-        spread[3] *= 6.0  # rad for m
+        spread[-1] *= 6.0  # rad for m
     a, b = rng.normal(size=(2, *spread.shape)) * spread
     center = tuple(pteron.workspace.home_pose(robot).tolist())
     time = np.linspace(0.0, period, 100 * harmonics, endpoint=False)

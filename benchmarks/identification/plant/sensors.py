@@ -22,25 +22,17 @@ class Log:
     time : array, shape (T,)
         s.
     joints : array, shape (T, n)
-        m.
+        m; rad at a crank.
     forces : array, shape (T, n)
-        N.
+        N; N m at a crank.
     noise : array, shape (n,)
-        Standard deviation of the noise in each actuator's force, N.
+        Standard deviation of the noise in each actuator's force.
     """
 
     time: Array
     joints: Array
     forces: Array
     noise: Array
-
-    @property
-    def columns(self) -> dict[str, Array]:
-        """The columns of a log's file: t, rho1.., force1.. ."""
-        legs = range(self.joints.shape[1])
-        sliders = {f"rho{i + 1}": self.joints[:, i] for i in legs}
-        forces = {f"force{i + 1}": self.forces[:, i] for i in legs}
-        return {"t": self.time} | sliders | forces
 
 
 def measured(
@@ -59,7 +51,7 @@ def measured(
     recording : Recording
         What the machine did.
     encoder : float
-        Step of the encoders, m: slider coordinates are rounded to its multiples. 0 for none.
+        Step of the encoders, m or rad: joint coordinates are rounded to its multiples. 0 for none.
     force : float
         Standard deviation of the white Gaussian noise in each force, as a share of the root mean
         square of that actuator's force.
@@ -83,11 +75,11 @@ def measured(
     late[[0, -1]] = 0.0
     # So near to a sample, the third derivative adds less than a nanometre.
     d = late[:, None]
-    sliders = recording.joints + d * recording.rates + 0.5 * d**2 * recording.accelerations
+    joints = recording.joints + d * recording.rates + 0.5 * d**2 * recording.accelerations
     if encoder > 0.0:
-        sliders = encoder * np.round(sliders / encoder)
+        joints = encoder * np.round(joints / encoder)
     # Local, so that the jumps of friction compensation do not ring.
     forces = Akima1DInterpolator(time, recording.forces)(time + late)
     noise = force * np.sqrt(np.mean(recording.forces**2, axis=0))
     forces = forces + noise * draws.normal(size=forces.shape)
-    return Log(time + late if stamped else time.copy(), sliders, forces, noise)
+    return Log(time + late if stamped else time.copy(), joints, forces, noise)

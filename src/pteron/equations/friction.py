@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Literal, NamedTuple
 
 import casadi as ca
 
@@ -11,38 +12,51 @@ from pteron.equations.machine import Machine, State
 from pteron.manipulator import Manipulator
 
 
+class PassiveJoint(NamedTuple):
+    """What a column of `passive_friction` is for."""
+
+    leg: int | None
+    """From 1; None for the platform's own axis, about which several legs' joints may turn."""
+    number: int
+    """Its place in the leg's chain, the actuated joint being 0."""
+    kind: Literal["P", "R"]
+
+
 def passive_friction(machine: Machine, state: State) -> Expression:
     """Return, for a unit coefficient in each passive joint, the actuator forces (n, columns).
 
     By virtual work: a joint at the rate q' with the coefficient c needs J^T F = c (dq'/dx')^T q'.
-    Columns are the passive joints of leg 1 that turn by the motion of its point, of leg 2, ...;
-    under a platform that turns one more follows, for all joints about its axis: they turn alike, at
-    phi', so that only the sum of their coefficients acts.
+    Columns are the passive joints of leg 1 that move with its point, of leg 2, ...; where legs have
+    joints that turn with the platform alone, one more follows for all of them: they turn alike,
+    as phi' does, so that only the sum of their coefficients acts.
     """
     columns = []
-    for i, k in _turning(state):
-        joint = state.legs[i].chain[k]
-        row = ca.mtimes(joint.row, state.platform.matrices[i])
-        columns.append(ca.mtimes(row.T, joint.rate))
-    if state.platform.angle is not None:
-        columns.append(ca.vertcat(ca.SX(3, 1), state.platform.angle.rate))
-    forces = [machine.closure.forces(load, state.platform, state.legs) for load in columns]
-    return ca.horzcat(*forces)
+    for joint in _moving(state):
+        if joint.leg is None:
+            assert state.platform.angle is not None  # something turns with it
+            load = ca.vertcat(ca.SX(machine.freedom - 1, 1), state.platform.angle.rate)
+        else:
+            one = state.legs[joint.leg - 1].chain[joint.number]
+            row = ca.mtimes(one.row, state.platform.matrices[joint.leg - 1])
+            load = ca.mtimes(row.T, one.rate)
+        columns.append(load)
+    return machine.closure.forces(ca.horzcat(*columns), state.platform, state.legs)
 
 
 @lru_cache(maxsize=64)
-def passive_joints(robot: Manipulator) -> tuple[tuple[int, int], ...]:
-    """Return the leg and the number in its chain, both from 1, of each column but the last."""
+def passive_joints(robot: Manipulator) -> tuple[PassiveJoint, ...]:
+    """Return what each column of `passive_friction` is for."""
     machine = Machine.of(robot)
-    state = machine.state(ca.SX.sym("pose", machine.freedom))
-    return tuple((i + 1, k) for i, k in _turning(state))
+    return _moving(machine.state(ca.SX.sym("pose", machine.freedom)))
 
 
-def _turning(state: State) -> list[tuple[int, int]]:
-    """Return leg and place in its chain of the passive joints that their point's motion turns."""
-    return [
-        (i, k)
-        for i, leg in enumerate(state.legs)
-        for k, joint in enumerate(leg.chain)
-        if k > 0 and not joint.row[:3].is_zero()
-    ]
+def _moving(state: State) -> tuple[PassiveJoint, ...]:
+    """Return the passive joints, those that turn with the platform alone as one, which is last."""
+    found, turning = [], []
+    for i, leg in enumerate(state.legs, start=1):
+        for k, joint in enumerate(leg.chain[1:], start=1):
+            if not joint.row[:3].is_zero():
+                found.append(PassiveJoint(i, k, joint.kind))
+            elif not joint.row[3].is_zero():
+                turning.append(PassiveJoint(None, k, joint.kind))
+    return (*found, *turning[:1])

@@ -85,8 +85,16 @@ def check_payload(fit: Sequence[Recording]) -> None:
         )
 
 
-def preprocessing_for(robot: Manipulator, one: Recording, wanted: Processing) -> Preprocessing:
-    """Return how a recording is to be preprocessed, from its beginning."""
+def preprocessing_for(
+    robot: Manipulator,
+    one: Recording,
+    wanted: Processing,
+    start: tuple[float, ...] | None = None,
+) -> Preprocessing:
+    """Return how a recording is to be preprocessed, from its beginning.
+
+    `start` is a pose of its assembly mode, where it is known.
+    """
     head = one.head()
     period = wanted.period or head.description.period
     # What lasts less than a period is no periodic log.
@@ -95,7 +103,7 @@ def preprocessing_for(robot: Manipulator, one: Recording, wanted: Processing) ->
         wanted = replace(wanted, period=None)
     # A file that is read in pieces is never fitted in one.
     rows = one.rows if isinstance(one.log, Log) else 1 << 30
-    return preprocessing_of(robot, head, wanted, rows=rows)
+    return preprocessing_of(robot, head, wanted, rows=rows, start=start)
 
 
 def fit_observations(

@@ -134,15 +134,16 @@ def identify(
         raise _with_findings(error, whole) from None
 
     # Judge by what was held out, which betrays columns that are not what they are called
+    modes = [None] * len(check) if others else [how.start for how in preprocessing]
     held = [
         predict(
             model,
             estimate.values,
             one,
-            preprocessing_for(robot, one, wanted),
+            preprocessing_for(robot, one, wanted, start),
             _reader(report, "Checking"),
         )
-        for one in check
+        for one, start in zip(check, modes, strict=True)
     ]
     verdict = verdict_of(held, repeats=not others)
     if verdict.grade != "trustworthy" or has_negative_inertia(model, estimate.values):

@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 
 from pteron.bodies.parameters import PLATFORM_KINDS
-from pteron.equations.friction import passive_joints
+from pteron.equations.friction import PassiveJoint, passive_joints
 from pteron.errors import ModelError
 from pteron.identification.signals import States
 from pteron.kernels import Array
@@ -113,8 +113,9 @@ class Model:
             found += [
                 Term("offset", f"offset{i}", "offset", f"{i}", j.force_unit) for i, j in joints
             ]
-        for index in self._passive:
-            found.append(Term("passive", f"F{'_'.join(index)}", "F", ",".join(index), "N m s"))
+        for index, (joint, *_) in self._passive.items():
+            unit = "N s/m" if joint.kind == "P" else "N m s"
+            found.append(Term("passive", f"F{'_'.join(index)}", "F", ",".join(index), unit))
         if self.terms.rotors:
             units = {i: "kg" if slides[i] else "kg m^2" for i in slides}
             found += [Term("rotor", f"J_m{i}", "J", f"m{i}", units[i]) for i in slides]
@@ -177,24 +178,23 @@ class Model:
         kept = [k for k, name in enumerate(names) if name not in self.joins]
         return np.ascontiguousarray(self._everything(states)[..., kept])
 
-    @property
-    def _passive(self) -> dict[tuple[str, ...], list[int]]:
-        """The columns of `passive_friction` that each coefficient of passive joints is for."""
+    @cached_property
+    def _passive(self) -> dict[tuple[str, ...], list[PassiveJoint]]:
+        """The passive joints of each coefficient, by its subscripts."""
         if self.terms.passive == "none":
             return {}
-        found: dict[tuple[str, ...], list[int]] = {}
+        found: dict[tuple[str, ...], list[PassiveJoint]] = {}
         kinds = [leg.type for leg in self.robot.legs]
-        places = passive_joints(self.robot)
-        for column, (leg, number) in enumerate(places):
-            if self.terms.passive == "each":
-                index: tuple[str, ...] = ("v", f"R{number}", f"{leg}")
-            else:
-                alike = [i for i, kind in enumerate(kinds, start=1) if kind == kinds[leg - 1]]
-                legs = "" if len(alike) == len(kinds) else f"({','.join(map(str, alike))})"
-                index = ("v", f"R{number}{legs}")
-            found.setdefault(index, []).append(column)
-        if self.robot.platform.turns:
-            found["v", f"R{1 + max(number for _, number in places)}"] = [len(places)]
+        for joint in passive_joints(self.robot):
+            index: tuple[str, ...] = ("v", f"{joint.kind}{joint.number}")
+            if joint.leg is not None and self.terms.passive == "each":
+                index = (*index, f"{joint.leg}")
+            elif joint.leg is not None:
+                kind = kinds[joint.leg - 1]
+                if kinds.count(kind) < len(kinds):
+                    alike = [str(i) for i, one in enumerate(kinds, start=1) if one == kind]
+                    index = ("v", f"{index[1]}({','.join(alike)})")
+            found.setdefault(index, []).append(joint)
         return found
 
     def _everything(self, states: States) -> Array:
@@ -209,8 +209,11 @@ class Model:
         if terms.offset:
             parts.append(np.broadcast_to(np.eye(n), (len(states), n, n)))
         if terms.passive != "none":
-            joints = unchecked(robot, "passive_friction", states.pose, states.velocity)
-            parts += [joints[..., columns].sum(-1)[..., None] for columns in self._passive.values()]
+            columns = unchecked(robot, "passive_friction", states.pose, states.velocity)
+            places = {joint: k for k, joint in enumerate(passive_joints(robot))}
+            for joints in self._passive.values():
+                chosen = [places[joint] for joint in joints]
+                parts.append(columns[..., chosen].sum(axis=-1, keepdims=True))
         if terms.rotors:
             parts.append(_diagonal(states.joint_accelerations))
         if terms.payload:

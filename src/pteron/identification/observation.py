@@ -242,7 +242,7 @@ def _periodic(
             model.robot,
             (series.at(time), series.at(time, 1), series.at(time, 2)),
             time,
-            preprocessing.mode,
+            preprocessing.start,
             payload=None if log.payload is None else np.full(len(time), log.payload[0]),
             source=log.source,
             first_row=first_row,

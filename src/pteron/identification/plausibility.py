@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from pteron.identification.consistency import Consistency
+from pteron.identification.consistency.bodies import bodies_of
 from pteron.identification.estimators import Estimate
 from pteron.identification.model import Model
 from pteron.identification.signals import Preprocessing
@@ -15,7 +16,7 @@ from pteron.kernels import Array
 from pteron.kinematics import random_poses
 from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator, parameters
-from pteron.reduction import base_regressor
+from pteron.reduction import BaseParameters, base_regressor
 
 _PROBES = 50
 
@@ -27,6 +28,9 @@ _FAR_ABOVE = 5.0
 
 _FAR = 0.5
 """Difference from the drawn machine, as a share of what a parameter is made of, that is doubted."""
+
+_LEAST_SHARE = 0.02
+"""Share of a body's mass and length that a parameter is usually made of, at least."""
 
 _CHANCE = 1e-3
 """Probability below which infeasible values are not chance."""
@@ -56,7 +60,7 @@ def doubts(
     if cad is not None:
         drawn = parameters(model.robot if cad == "robot" else cad)
         base = model.base
-        usual = _usual(model, drawn)
+        usual = usual_sizes(base, drawn)
         values = (estimate.values - known)[: base.rank]
         off = np.abs(values - base.grouping @ drawn)
         far = (off > _FAR * usual) & (off > 5.0 * estimate.deviations[: base.rank])
@@ -106,11 +110,18 @@ def unseen(model: Model, deviations: Array) -> tuple[tuple[str, ...], bool]:
     Their standard deviation, among the (p,) of all values, is larger than what they are made of.
     """
     base = model.base
-    hidden = deviations[: base.rank] > _usual(model, parameters(model.robot))
+    hidden = deviations[: base.rank] > usual_sizes(base, parameters(model.robot))
     names = tuple(name for name, flag in zip(base.names, hidden, strict=True) if flag)
     return names, bool(hidden.mean() > _MOST_UNSEEN)
 
 
-def _usual(model: Model, drawn: Array) -> Array:
-    """Return the sizes (rank,) of what base parameters are made of, for CAD parameters (N,)."""
-    return np.asarray(np.abs(model.base.grouping) @ np.abs(drawn))
+def usual_sizes(base: BaseParameters, drawn: Array) -> Array:
+    """Return the sizes (rank,) of what base parameters are made of, for CAD parameters (N,).
+
+    What is drawn as zero, such as m gamma_y of a straight link, is not that exactly: it counts as a
+    share of the body's mass and length.
+    """
+    bodies = bodies_of(base)
+    masses = bodies.mean(np.abs(drawn))[bodies.masses]
+    least = _LEAST_SHARE * bodies.sharing @ bodies.scale(masses)
+    return np.asarray(np.abs(base.grouping) @ np.maximum(np.abs(drawn), least))

@@ -93,7 +93,8 @@ def bodies_of(base: BaseParameters) -> Bodies:
     robot, columns = base.robot, base.parameters
     groups = list(dict.fromkeys(p.legs for p in columns if p.legs))
     _, sharing = share(robot, groups)
-    sizes = [leg.size / max(len(leg.extents), 1) for leg in robot.legs]
+    # A telescope has no length: its parts count as long as a link.
+    sizes = [leg.size / max(len(leg.extents), 1) for leg in robot.legs if leg.size > 0.0]
     radius = max(float(np.hypot(*leg.platform_point[:2])) for leg in robot.legs)
     mean = float(np.mean(sizes))
     half = 0.5 * (radius if radius > 1e-3 * mean else _SMALL_PLATFORM * mean)
@@ -101,7 +102,7 @@ def bodies_of(base: BaseParameters) -> Bodies:
     for p in columns:
         known = [robot.legs[leg - 1].extents.get(p.body) for leg in p.legs]
         found = [extent[1:3] for extent in known if extent is not None]
-        default = (-half, half) if not p.legs else (0.0, mean)
+        default = (-half, half) if not p.legs else (-mean, 0.0) if p.body == "l" else (0.0, mean)
         extents[p.owner] = np.mean(found, axis=0) if found else np.array(default)
     return Bodies(columns, sharing, np.array(list(extents.values())))
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from pteron.bodies.inertia import RodInertia
 from pteron.bodies.parameters import body_places
 from pteron.errors import ModelError
 from pteron.kernels import Array
@@ -88,7 +89,9 @@ class Bounds:
                 raise ModelError(f"bounds: {name}: lower limit {low:g} is above the upper {high:g}")
 
     def limits(self, robot: Manipulator) -> Limits:
-        """Return the limits as rows on the N parameters.
+        """Return the limits as rows on the N parameters, with what every rod keeps.
+
+        The centre of mass of a rod is between its ends, whatever else is known.
 
         Raises
         ------
@@ -112,6 +115,10 @@ class Bounds:
             for body in _matching(key, turning, "body"):
                 place = {kind: unit[column] for kind, column in places[body].items()}
                 rows += [(row, 0.0, f"box of {body}: {what}") for row, what in _box(place, box)]
+        for body, (low, high) in _rods(robot).items():
+            place = {kind: unit[column] for kind, column in places[body].items()}
+            rows.append((low * place["m"] - place["mgx"], 0.0, f"{body}: centre after its tip"))
+            rows.append((place["mgx"] - high * place["m"], 0.0, f"{body}: centre before its end"))
         if self.total_mass is not None:
             total = sum(unit[place["m"]] for place in places.values())
             low, high = self.total_mass
@@ -121,6 +128,17 @@ class Bounds:
         return Limits(
             matrix, np.array([right for _, right, _ in rows]), tuple(name for _, _, name in rows)
         )
+
+
+def _rods(robot: Manipulator) -> dict[str, tuple[float, float]]:
+    """Return where each rod of known ends begins and ends along its x, m."""
+    found = {}
+    for p in parameter_data(robot):
+        if p.kind == "I" and p.legs:
+            leg = robot.legs[p.legs[0] - 1]
+            if p.body in leg.extents and leg.bodies[p.body].kinds == RodInertia.kinds:
+                found[p.owner] = leg.extents[p.body][1:3]
+    return found
 
 
 def _matching(key: str, known: Mapping[str, str], what: str) -> list[str]:

@@ -153,7 +153,7 @@ def _sampled(model: Model, log: Log, curve: Curve, preprocessing: Preprocessing)
         model.robot,
         curve.motion,
         log.time,
-        preprocessing.mode,
+        preprocessing.start,
         payload=log.payload,
         source=log.source,
         first_row=log.first_row,
@@ -195,7 +195,7 @@ def _slopes(
             model.robot,
             (q, dq, ddq),
             observations.time,
-            preprocessing.mode,
+            preprocessing.start,
             payload=observations.payload,
             source=observations.source,
         )

@@ -115,10 +115,7 @@ def sizes(robot: Manipulator, space: Space) -> Array:
     metres = 0.25 * float(np.mean([leg.size for leg in robot.legs]))
     if space == "joints":
         return np.array([metres / leg.lever for leg in robot.legs])
-    size = np.full(robot.freedom, metres)
-    if robot.platform.turns:
-        size[3] = 1.0
-    return size
+    return np.array([1.0 if name == "phi" else metres for name in robot.coordinates])
 
 
 def is_clear(motion: FourierMotion, limits: Limits, samples: int, clear: float = _CLEAR) -> bool:

@@ -8,6 +8,7 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pteron.equations.machine import closure_of
 from pteron.errors import DataError, UnreachablePose
 from pteron.identification.signals.states import home, home_mode
 from pteron.kernels import Array, as_array
@@ -31,7 +32,8 @@ class FourierMotion:
     robot : Manipulator
         The machine.
     space : {"platform", "joints"}
-        Whether q is the pose (x, y, z, phi) or the joint coordinates.
+        Whether q is the pose or the joint coordinates, for which direct kinematics must have a
+        closed form.
     period : float
         The time after which the motion repeats, s.
     center : array, shape (n,)
@@ -39,13 +41,14 @@ class FourierMotion:
     cosines, sines : array, shape (H, n)
         The coefficients a_h and b_h of the harmonics h = 1 ... H, in the units of `center`.
     mode : int
-        The assembly mode of `direct_kinematics` that the joints' motion is of, counted from 0;
-        that of the home pose unless given.
+        The assembly mode that the joints' motion is of, a column of direct kinematics in closed
+        form, counted from 0; that of the home pose unless given.
 
     Raises
     ------
     DataError
-        If the period is not above 0, or the shapes do not fit.
+        If the period is not above 0, the shapes do not fit, or the joints' motion does not tell the
+        platform's.
 
     Examples
     --------
@@ -70,6 +73,11 @@ class FourierMotion:
     def __post_init__(self) -> None:
         if self.space not in get_args(Space):
             raise DataError(f'space: {self.space!r} is neither "platform" nor "joints"')
+        if self.space == "joints" and not closure_of(self.robot).closed_form:
+            raise DataError(
+                'space: "joints" given, but direct kinematics of '
+                f'{self.robot.name} has no closed form; choose "platform"'
+            )
         if not 0.0 < self.period < np.inf:
             raise DataError(f"period: {self.period} s given, a number above 0 expected")
         n = self.robot.freedom
@@ -163,10 +171,10 @@ def states(motion: FourierMotion, times: Array) -> State:
         )
     poses = unchecked(robot, "closure_poses", q)
     pose: Array = poses[:, motion.mode, :].copy()
-    if robot.platform.turns:
+    if robot.platform.turns and not any(leg.follows_angle for leg in robot.legs):
         # Within a mode phi stays on one side of the singular orientations, half a turn at most.
-        around = home(robot)[3]
-        pose[:, 3] = around + (pose[:, 3] - around + np.pi) % (2.0 * np.pi) - np.pi
+        around = home(robot)[-1]
+        pose[:, -1] = around + (pose[:, -1] - around + np.pi) % (2.0 * np.pi) - np.pi
     velocity, acceleration = unchecked(robot, "platform_motion", pose, dq, ddq)
     return State(pose, velocity, acceleration, q, dq, ddq)
 

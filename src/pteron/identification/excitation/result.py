@@ -10,11 +10,13 @@ import numpy as np
 import polars as pl
 
 from pteron.atomic import write_text
+from pteron.equations.machine import closure_of
 from pteron.errors import DataError
 from pteron.identification.excitation.conditioning import Conditioning
 from pteron.identification.excitation.fourier import FourierMotion, states
 from pteron.identification.excitation.limits import Limits, Margins
 from pteron.identification.excitation.program import Criterion
+from pteron.kinematics import assembly_mode
 from pteron.kinematics.evaluate import unchecked
 from pteron.tables import write_table
 
@@ -135,10 +137,23 @@ class Excitation:
         return write_table(self.frame(rate, periods), path)
 
     def write_toml(self, path: str | Path) -> Path:
-        """Write what an evaluation of the log needs: period and assembly mode (from 1)."""
-        motion = self.motion
-        text = f"[motion]\nperiod = {motion.period!r}\nassembly_mode = {motion.mode + 1}\n"
+        """Write what an evaluation of the log needs: period and assembly mode (from 1).
+
+        Where modes have no number throughout, a log is in that of the home pose unless it says
+        otherwise, as the motion is.
+        """
+        text = f"[motion]\nperiod = {self.motion.period!r}\n"
+        if self._assembly_mode is not None:
+            text += f"assembly_mode = {self._assembly_mode}\n"
         return write_text(path, text)
+
+    @property
+    def _assembly_mode(self) -> int | None:
+        """The pose of `direct_kinematics` throughout the motion, from 1."""
+        robot = self.motion.robot
+        if not closure_of(robot).keeps_modes:
+            return None
+        return 1 + int(assembly_mode(robot, states(self.motion, np.zeros(1)).pose[0]))
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything but the machine as plain data."""
@@ -159,7 +174,7 @@ class Excitation:
             "motion": {
                 "space": motion.space,
                 "period": motion.period,
-                "assembly_mode": motion.mode + 1,
+                "assembly_mode": self._assembly_mode,
                 "center": motion.center.tolist(),
                 "cosines": motion.cosines.tolist(),
                 "sines": motion.sines.tolist(),

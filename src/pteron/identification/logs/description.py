@@ -169,9 +169,9 @@ class Description:
         What is carried in phase 1.
     period : float, optional
         Period of the excitation, s.
-    assembly_mode : {1, 2}, optional
-        Which solution of the direct kinematics the machine is in, counted from 1 as a person
-        counts. (`Treatment.mode` counts columns of `direct_kinematics`, from 0.)
+    assembly_mode : int, optional
+        Which pose of `direct_kinematics` the machine is in at the first sample, counted from 1 as a
+        person counts.
     rotor_inertia : tuple of float, optional
         Of each joint's motor, kg m^2.
     ratio : tuple of float, optional
@@ -202,7 +202,9 @@ class Description:
     payload_column: Annotated[str | None, Field(alias="payload.column")] = None
     payload: KnownPayload | None = None
     period: Annotated[Number | None, Field(alias="motion.period", gt=0.0)] = None
-    assembly_mode: Annotated[Literal[1, 2] | None, Field(alias="motion.assembly_mode")] = None
+    assembly_mode: Annotated[
+        Annotated[int, Field(ge=1, strict=True)] | None, Field(alias="motion.assembly_mode")
+    ] = None
     rotor_inertia: Annotated[
         tuple[Annotated[Number, Field(ge=0.0)], ...] | None, Field(alias="drives.rotor_inertia")
     ] = None

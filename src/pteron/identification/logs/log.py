@@ -23,6 +23,7 @@ GAP = 1.5
 
 _ARRAYS = ("time", "joints", "forces", "pose", "payload")
 _POSE = ("x", "y", "z", "phi")
+"""What the coordinates of a measured pose are called where nothing else is said."""
 
 _Phases = Int[np.ndarray, "*batch"]
 
@@ -86,6 +87,9 @@ class Log:
         The usual time step of the file, s; the median step of these samples if it is not given.
     symbols : tuple of ActuatedJoint, optional
         What the joint of each leg is called; they are sliders if it is not given.
+    coordinates : tuple of str, optional
+        What the coordinates of the measured pose are called; x, y, z, phi, as many as there are, if
+        it is not given.
 
     Raises
     ------
@@ -104,6 +108,7 @@ class Log:
     first_row: int = 0
     step: float | None = None
     symbols: tuple[ActuatedJoint, ...] | None = None
+    coordinates: tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:
         for name in _ARRAYS:
@@ -192,10 +197,10 @@ def joined(pieces: Sequence[Log]) -> Log:
 def write_log(log: Log, path: str | Path) -> Path:
     """Write a log to a CSV or Parquet file, whole or not at all, at full precision.
 
-    The columns are t (s), rho1.. (m), force1.. (N) or current1.. (A), x y z phi (m, rad) and
-    payload; at a crank theta (rad) and torque (N m). Forces in volts or per cent say so in their
-    names. The description is not written: it speaks of the columns of the file that the log came
-    from.
+    The columns are t (s), rho1.. (m), force1.. (N) or current1.. (A), the pose's coordinates (m,
+    rad) and payload; at a crank theta (rad) and torque (N m). Forces in volts or per cent say so in
+    their names. The description is not written: it speaks of the columns of the file that the log
+    came from.
 
     Raises
     ------
@@ -208,7 +213,8 @@ def write_log(log: Log, path: str | Path) -> Path:
         stem = f"current{j + 1}" if unit == "A" else name
         columns[stem + (f" ({unit})" if unit in ("V", "%") else "")] = log.forces[:, j]
     if log.pose is not None:
-        columns |= dict(zip(_POSE[: log.pose.shape[1]], log.pose.T, strict=True))
+        names = log.coordinates or _POSE[: log.pose.shape[1]]
+        columns |= dict(zip(names, log.pose.T, strict=True))
     if log.payload is not None:
         columns["payload"] = log.payload
     return write_table(pl.DataFrame(columns), path)

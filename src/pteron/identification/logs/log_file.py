@@ -164,6 +164,7 @@ class LogFile:
             first_row=first,
             step=self._step,
             symbols=joint_symbols(self._robot),
+            coordinates=self._robot.coordinates,
         )
 
     def _phases(self, values: Values, first: int) -> NDArray[np.int64]:

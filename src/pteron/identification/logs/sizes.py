@@ -27,7 +27,10 @@ _SMALLER = ((1e3, "mm"), (1e6, "um"))
 
 
 class Bound(NamedTuple):
-    """How large a coordinate may be: a few times its usual size, m; two turns if it is None."""
+    """How large a coordinate may be: a few times its usual size, m; two turns if it is None.
+
+    What turns without end has an infinite size.
+    """
 
     usual: float | None
     owner: str
@@ -40,11 +43,12 @@ def joint_bounds(robot: Manipulator) -> list[Bound]:
     """Return how far each joint may travel.
 
     A joint cannot leave the others far behind: its coordinate is bound by its limits, or by the
-    machine's size, along a guide that may be oblique to the leg's plane. A crank makes few turns.
+    machine's size, along a guide that may be oblique to the leg's plane. A crank makes few turns; a
+    joint that turns the platform makes any number.
     """
     owner, key = "the joint of this machine travels", "[joints] unit"
     return [
-        Bound(_travel_of(leg, robot) if leg.joint.unit == "m" else None, owner, key)
+        Bound(_travel_of(leg, robot) if leg.joint.unit == "m" else _turns_of(leg), owner, key)
         for leg in robot.legs
     ]
 
@@ -52,9 +56,11 @@ def joint_bounds(robot: Manipulator) -> list[Bound]:
 def pose_bounds(robot: Manipulator) -> list[Bound]:
     """Return how large each coordinate of a measured pose may be."""
     far = max(float(np.linalg.norm(leg.guide_point)) for leg in robot.legs)
-    size = _size_of(robot) + far + max(_farthest(leg.limits) for leg in robot.legs)
+    limits = [leg.limits for leg in robot.legs if leg.joint.unit == "m"]
+    size = _size_of(robot) + far + max(map(_farthest, limits), default=0.0)
     length = Bound(size, "the machine extends", "[pose] length_unit")
-    angle = Bound(None, "", "[pose] angle_unit")
+    endless = any(leg.follows_angle for leg in robot.legs)
+    angle = Bound(math.inf if endless else None, "", "[pose] angle_unit")
     return [angle if one == "phi" else length for one in robot.coordinates]
 
 
@@ -136,7 +142,9 @@ def _size_of(robot: Manipulator) -> float:
     """Return the extent of a machine, m: between its guide points, along a leg and its platform."""
     points = np.array([leg.guide_point for leg in robot.legs])
     apart = np.linalg.norm(points[:, None] - points, axis=-1).max()
-    reach = max(leg.size + float(np.linalg.norm(leg.platform_point)) for leg in robot.legs)
+    offsets = [[leg.platform_point, leg.fixed_offset] for leg in robot.legs]
+    lengths = np.linalg.norm(offsets, axis=-1).sum(axis=-1)
+    reach = max(leg.size + length for leg, length in zip(robot.legs, lengths, strict=True))
     return float(apart + reach)
 
 
@@ -145,6 +153,10 @@ def _travel_of(leg: LegKind, robot: Manipulator) -> float:
         return _farthest(leg.limits)
     # Along a guide that is oblique to the leg's reach the slider travels farther.
     return _size_of(robot) * max(leg.reach_bound.radius / leg.size, 1.0)
+
+
+def _turns_of(leg: LegKind) -> float | None:
+    return math.inf if leg.follows_angle else None
 
 
 def _farthest(limits: tuple[float, float] | None) -> float:

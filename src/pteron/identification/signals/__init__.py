@@ -14,7 +14,7 @@ from pteron.identification.signals.filters import Decimation, cutoff_of, smoothe
 from pteron.identification.signals.fourier import FourierSeries, fitted_series
 from pteron.identification.signals.preprocessing import Preprocessing, Processing, preprocessing_of
 from pteron.identification.signals.samples import samples
-from pteron.identification.signals.states import States, assembly_mode
+from pteron.identification.signals.states import States, start_pose
 
 __all__ = [
     "Decimation",
@@ -23,7 +23,6 @@ __all__ = [
     "Preprocessing",
     "Processing",
     "States",
-    "assembly_mode",
     "central_differences",
     "cutoff_of",
     "fitted_series",
@@ -31,6 +30,7 @@ __all__ = [
     "samples",
     "smoothed",
     "spline_motion",
+    "start_pose",
     "uniform",
     "white_noise",
 ]

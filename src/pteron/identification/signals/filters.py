@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from scipy.signal import (  # type: ignore[import-untyped]
     butter,
     firwin,
-    freqz_sos,
     sosfiltfilt,
     upfirdn,
 )
@@ -32,9 +31,6 @@ _ON_GRID = 1e-3
 """Deviation from a multiple of the step, in steps, that is rounding of the numbers."""
 
 _ORDER = 4
-_SAFETY = 2.0
-"""Factor on the frequency that position needs: acceleration weighs what lies above it more."""
-
 _HIGHEST = 0.2
 """Share of the sampling rate beyond which a filter would take nothing worth its edges."""
 
@@ -43,6 +39,11 @@ _MARGIN = 20.0
 
 _POSITION_POWER = 0.9999
 _CANDIDATES = 40
+
+_CORRELATED = 12870.0 / 4900.0
+"""How much more a sum over the spectrum varies than one of independent powers: of Hann's window
+squared, the mean of w^4 over the square of that of w^2."""
+
 _LOOK = 60_000
 """Samples that the search for a cut-off looks at."""
 
@@ -76,6 +77,28 @@ def white_noise(signal: Array) -> Array:
     return np.asarray(np.maximum(spread, _grid(signal) / np.sqrt(12.0)))
 
 
+def position_noise(signal: Array) -> Array:
+    """Return the root mean square (k,) of the noise on uniformly sampled positions (T, k).
+
+    What they have above a quarter of the sampling rate is no motion, and noise that comes and goes
+    counts by its mean there: jitter of the sampling, which is proportional to the speed. On a grid
+    it is the rounding error at least.
+    """
+    power = _spectrum(signal)
+    high = power[len(power) // 2 :]
+    # Of noise the median of a periodogram is its mean times log 2; it forgives lines.
+    plateau = np.sqrt(np.median(high, axis=0) / np.log(2.0))
+    return np.asarray(np.maximum(plateau, _grid(signal) / np.sqrt(12.0)))
+
+
+def _spectrum(signal: Array) -> Array:
+    """Return the power (F, k) of signals (T, k): 1 for white noise of variance 1."""
+    # Squared, Hann's window lets nothing of the motion through to where noise is.
+    window = np.hanning(len(signal))[:, None] ** 2
+    transform = np.fft.rfft(window * (signal - signal.mean(axis=0)), axis=0)
+    return np.asarray(np.abs(transform) ** 2 / (window**2).sum())
+
+
 def _grid(signal: Array) -> Array:
     """Return the step (k,) of the grid that values stand on; 0 where there is none."""
     steps = np.zeros(signal.shape[1])
@@ -106,32 +129,38 @@ def smoothed(signal: Array, rate: float, cutoff: float | None) -> Array:
 def cutoff_of(signal: Array, rate: float) -> float | None:
     """Return the cut-off for positions (T, k), Hz, or None where they need no filter.
 
-    It is twice the lowest frequency at which what the filter takes away is white noise, of the
-    strength that `white_noise` finds, and no motion: the residual analysis of Winter. It is at most
+    It makes the mean square error of the filtered accelerations least, each over its signal's
+    noise, as far as the measured positions tell: by Stein's estimate, from their spectrum and
+    `position_noise`. So the filter passes what is more motion than noise. The cut-off is at most
     twenty times the frequency below which nearly all the motion is, as noise need not be white.
+
+    References
+    ----------
+    C. M. Stein, "Estimation of the mean of a multivariate normal distribution", Annals of
+    Statistics 9(6), 1981.
     """
     part = signal[:_LOOK]
-    noise = white_noise(part)
-    if (noise <= _NOISE_FREE * np.ptp(part, axis=0)).all():
+    rounding = _NOISE_FREE * np.ptp(part, axis=0)
+    if (white_noise(part) <= rounding).all():
         return None
-    inside = slice(len(part) // 10, len(part) - len(part) // 10)
-    # Both the strength of the noise and that of the residual are estimates themselves.
-    slack = 4.0 * np.sqrt(10.0 / len(part))
+    noise, power = np.maximum(position_noise(part), rounding.max()), _spectrum(part)
     # Bandwidth of the position, not of the speed: coarse encoders' noise would outweigh the motion.
-    window = np.hanning(len(part))[:, None]
-    power = np.abs(np.fft.rfft(window * (part - part.mean(axis=0)), axis=0)) ** 2
     bandwidth = bins_below(power, _POSITION_POWER) * rate / len(part)
-    lowest = min(20.0 * rate / len(part), 0.5 * _HIGHEST * rate / _SAFETY)
-    highest = min(_HIGHEST * rate, _MARGIN * bandwidth) / _SAFETY
-    for candidate in np.geomspace(lowest, max(highest, lowest), _CANDIDATES):
-        residual = (part - smoothed(part, rate, float(candidate)))[inside]
-        # The share of white noise that the filter takes away.
-        sections = butter(_ORDER, candidate, fs=rate, output="sos")
-        gain = np.abs(freqz_sos(sections, worN=2048, fs=rate)[1])
-        share = float(np.mean((1.0 - gain**2) ** 2))
-        if (np.mean(residual**2, axis=0) <= noise**2 * (share + slack)).all():
-            break
-    return float(_SAFETY * candidate)
+    lowest = min(40.0 * rate / len(part), _HIGHEST * rate)
+    highest = max(min(_HIGHEST * rate, _MARGIN * bandwidth), lowest)
+    frequencies = np.fft.rfftfreq(len(part), 1.0 / rate)[:, None]
+    candidates = np.geomspace(lowest, highest, _CANDIDATES)
+    # What a filter takes of the motion and leaves of the noise, but for a constant: sums over
+    # frequencies of power times `slopes`, and of `given`.
+    gains = 1.0 / (1.0 + (frequencies / candidates) ** (2 * _ORDER))
+    slopes, given = frequencies**4 * (gains**2 - 2.0 * gains), frequencies**4 * 2.0 * gains
+    relative = power / noise**2
+    risks = relative.sum(axis=1) @ slopes + signal.shape[1] * given.sum(axis=0)
+    best = int(np.argmin(risks))
+    # Chance may make a higher one the best: the lowest that is as good within a standard error.
+    squares = (relative**2).sum(axis=1) @ (slopes - slopes[:, [best]]) ** 2
+    errors = np.sqrt(_CORRELATED * squares)
+    return float(candidates[np.argmax(risks - risks[best] <= errors)])
 
 
 def bins_below(power: Array, share: float) -> int:

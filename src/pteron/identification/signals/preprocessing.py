@@ -23,11 +23,12 @@ from pteron.identification.signals.filters import (
     Decimation,
     bins_below,
     cutoff_of,
+    position_noise,
     smoothed,
     white_noise,
 )
 from pteron.identification.signals.fourier import FourierSeries, fitted_series
-from pteron.identification.signals.states import assembly_mode
+from pteron.identification.signals.states import start_pose
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 
@@ -55,7 +56,7 @@ _UNSURE = 0.1
 _MENTIONED = 0.1
 """Speed, as a share of a joint's root mean square, from which its sign counts: noise's does not."""
 
-_SPARED = 0.15
+_SPARED = 0.25
 """Share of the time between two reversals of a joint that is left out, at most, on each side."""
 
 _PRODUCTS = 10.0
@@ -114,8 +115,8 @@ class Preprocessing:
     ----------
     derivatives : {"periodic", "central", "spline"}
         How positions are differentiated; see `Processing`.
-    mode : int
-        The assembly mode, from 0.
+    start : tuple of float
+        A pose (m,) of the assembly mode.
     rate : float
         Samples per second.
     cutoff : float or None
@@ -125,7 +126,7 @@ class Preprocessing:
     period : float or None
         Time after which the motion repeats, s; None where it is not known to.
     joint_noise, force_noise : array, shape (n,)
-        Standard deviation of the white noise on joints (m) and forces (N).
+        Root mean square of the noise on joints (m) and forces (N).
     slow : array, shape (n,)
         Speed of each joint below which its friction is not known, m/s.
     stroke : float
@@ -133,7 +134,7 @@ class Preprocessing:
     """
 
     derivatives: Derivatives
-    mode: int
+    start: tuple[float, ...]
     rate: float
     cutoff: float | None
     band: float
@@ -175,7 +176,12 @@ class Preprocessing:
 
 
 def preprocessing_of(
-    robot: Manipulator, log: Log, processing: Processing | None = None, *, rows: int | None = None
+    robot: Manipulator,
+    log: Log,
+    processing: Processing | None = None,
+    *,
+    rows: int | None = None,
+    start: tuple[float, ...] | None = None,
 ) -> Preprocessing:
     """Return how a log is to be preprocessed.
 
@@ -189,6 +195,8 @@ def preprocessing_of(
         What the user wants.
     rows : int, optional
         How many rows the whole log has, where `log` is only a part.
+    start : tuple of float, optional
+        A pose (m,) of its assembly mode, where it is known.
 
     Raises
     ------
@@ -233,12 +241,12 @@ def preprocessing_of(
         band = min(band, cutoff)
     return Preprocessing(
         derivatives=derivatives,
-        mode=assembly_mode(robot, log),
+        start=start or start_pose(robot, log),
         rate=rate,
         cutoff=cutoff,
         band=float(band),
         period=period,
-        joint_noise=white_noise(joints),
+        joint_noise=position_noise(joints),
         force_noise=white_noise(forces),
         slow=wanted.slow * np.sqrt((rates**2).mean(axis=0)),
         stroke=_stroke(rates, rate),
@@ -284,7 +292,7 @@ def _checked_series(log: Log, period: float | None) -> FourierSeries:
 def _is_series(series: FourierSeries, joints: Array) -> bool:
     """Say whether a Fourier series leaves noise alone: jumps of acceleration take more terms."""
     least = _ROUNDING * np.ptp(joints, axis=0)
-    return bool((series.noise <= np.maximum(3.0 * white_noise(joints), least)).all())
+    return bool((series.noise <= np.maximum(3.0 * position_noise(joints), least)).all())
 
 
 def _check_frequencies(wanted: Processing, rate: float) -> None:

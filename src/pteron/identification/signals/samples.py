@@ -77,18 +77,20 @@ def samples(
         step = preprocessing.decimation.factor
         edge = step * ceil((differentiator.edge + margin) / step) - margin
         parts = blocks(parts, edge + margin, step * ceil(block / step), preprocessing.rate)
-    part = None
+    part, pose = None, preprocessing.start
     for part in parts:
         found = differentiator.differentiated(part, edge)
         states = States.of_joints(
             robot,
             found.motion,
             found.time,
-            preprocessing.mode,
+            pose,
             payload=None if part.payload is None else part.payload[edge : part.rows - edge],
             source=part.source,
             first_row=part.first_row + edge,
         )
+        # The next block overlaps this one by its margins.
+        pose = tuple(states.pose[-1 - 2 * margin].tolist())
         fresh = slice(margin, len(states) - margin)
         yield Samples(states, found.forces, fresh, part.source, found.smooth)
     if part is None:

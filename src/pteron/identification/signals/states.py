@@ -1,4 +1,8 @@
-"""States of the machine at the samples of a log: joints and platform, in one assembly mode."""
+"""States of the machine at the samples of a log: joints and platform, in one assembly mode.
+
+A mode is told by a pose in it: the others of the log follow by continuity. Where direct kinematics
+has a closed form each of its columns is one mode throughout, so that the pose only chooses one.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +17,10 @@ from pteron.errors import DataError
 from pteron.identification.errors import LogError
 from pteron.identification.logs import Log
 from pteron.kernels import Array
-from pteron.kinematics import assembly_modes, mode_of
+from pteron.kinematics import assembly_modes, direct_kinematics, follow, mode_of
 from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator
+from pteron.shapes import PoseLike, Poses
 from pteron.workspace import home_pose
 
 _REGULAR = 1e-3
@@ -56,17 +61,17 @@ class States:
         robot: Manipulator,
         motion: tuple[Array, Array, Array],
         time: Array,
-        mode: int,
+        start: PoseLike,
         *,
         payload: NDArray[np.int64] | None = None,
         source: str = "joints",
         first_row: int = 0,
     ) -> States:
-        """Return the states of joints that move so: rho = J x inverted, and differentiated twice.
+        """Return the states of joints that move so: q = J x inverted, and differentiated twice.
 
-        `motion` holds joint coordinates, rates and accelerations (R, n) at times (R,), s; `mode`
-        is the assembly mode, from 0, and `payload` the phases (R,). Messages call the log `source`;
-        its row `first_row`, from 0, is the first sample.
+        `motion` holds joint coordinates, rates and accelerations (R, n) at times (R,), s; `start`
+        is a pose (m,) of their assembly mode, and `payload` the phases (R,). Messages call the log
+        `source`; its row `first_row`, from 0, is the first sample.
 
         Raises
         ------
@@ -74,10 +79,10 @@ class States:
             If no pose has the joints of a sample, or if it is next to a singularity.
         """
         joints, rates, accelerations = motion
-        pose = np.ascontiguousarray(assembly_modes(robot, joints)[:, mode])
+        pose = path(robot, joints, start)
         lost = np.isnan(pose).any(axis=-1)
         if lost.any():
-            raise _no_pose(robot, joints, lost, mode, source, first_row)
+            raise _no_pose(robot, joints, lost, source, first_row)
         _check_regular(robot, pose, source, first_row)
         velocity, acceleration = unchecked(robot, "platform_motion", pose, rates, accelerations)
         phases = np.zeros(len(time), dtype=np.int64) if payload is None else payload
@@ -91,39 +96,67 @@ class States:
         return replace(self, **{name: value[rows] for name, value in vars(self).items()})
 
 
-def assembly_mode(robot: Manipulator, log: Log) -> int:
-    """Return the column of `assembly_modes`, from 0, that a log follows.
+def path(robot: Manipulator, joints: Array, start: PoseLike) -> Poses:
+    """Return the poses (R, m) of joints that move, (R, n), in the assembly mode of a pose (m,).
 
-    A column stands for one assembly mode throughout, between the singular poses: to follow
-    it is to follow the motion by continuity. The description's choice counts first, then the
-    measured pose, if there is one, and else the mode of the machine's home pose.
+    NaN where they have none; where that is found by following them, in all that come after too.
+    """
+    if not closure_of(robot).closed_form:
+        return follow(robot, joints, start, on_failure="nan")
+    column = mode_of(robot, tuple(np.asarray(start).tolist()))
+    poses = assembly_modes(robot, joints)
+    return np.ascontiguousarray(poses[:, column])
+
+
+def start_pose(robot: Manipulator, log: Log) -> tuple[float, ...]:
+    """Return a pose of the assembly mode that a log is in.
+
+    The description's choice counts first, then the measured pose, if there is one, and else the
+    mode of the machine's home pose.
 
     Raises
     ------
     DataError
-        If the description names a mode that the machine has not.
+        If the description names a mode that the machine has not, or that the log does not show.
     """
-    modes = closure_of(robot).modes
+    closure = closure_of(robot)
     declared = log.description.assembly_mode
-    if declared is not None:
-        if not 1 <= declared <= modes:
+    if declared is None and (log.pose is None or closure.modes == 1):
+        return home(robot)
+    step = max(log.rows // _LOOK, 1)
+    # Where modes have no columns of their own only the first sample tells them apart.
+    seen = slice(None, None, step) if closure.closed_form else slice(1)
+    if declared is None:
+        assert log.pose is not None
+        poses = assembly_modes(robot, log.joints[seen])
+        column = int(np.argmin(np.median(_apart(robot, poses, log.pose[seen]), axis=0)))
+    else:
+        poses, column = direct_kinematics(robot, log.joints[seen]), declared - 1
+        if declared > closure.modes:
             raise DataError(
                 f"{log.source}: assembly_mode = {declared}; {robot.name} has "
-                f"{' and '.join(map(str, range(1, modes + 1)))}"
+                f"{' and '.join(map(str, range(1, closure.modes + 1)))}"
             )
-        return declared - 1
-    if modes == 1:
-        return 0
-    if log.pose is None:
-        return home_mode(robot)
-    # Position and half-chord of the angle, so that whole turns count for nothing.
-    step = max(log.rows // _LOOK, 1)
-    poses, measured = assembly_modes(robot, log.joints[::step]), log.pose[::step, None]
-    off = np.linalg.norm(poses[..., :3] - measured[..., :3], axis=-1)
-    if robot.platform.turns:
-        off += np.abs(np.sin(0.5 * (poses[..., 3] - measured[..., 3])))
-    off = np.nan_to_num(off, nan=np.inf)
-    return int(np.argmin(np.median(off, axis=0)))
+    shown = poses[~np.isnan(poses[:, column]).any(axis=-1), column]
+    if not len(shown):
+        given = "its measured pose" if declared is None else f"assembly_mode = {declared}"
+        raise DataError(
+            f"{log.source}: {given} is no pose that its joints have; pteron direct lists those of "
+            "the first sample"
+        )
+    return tuple(shown[0].tolist())
+
+
+def _apart(robot: Manipulator, poses: Poses, measured: Array) -> Array:
+    """Return how far poses (R, k, m) are from measured ones (R, m), infinite where there is none.
+
+    Position and half-chord of the angle, so that whole turns count for nothing.
+    """
+    off = poses - measured[:, None]
+    lengths = len(robot.platform.directions)
+    distance = np.linalg.norm(off[..., :lengths], axis=-1)
+    distance += np.abs(np.sin(0.5 * off[..., lengths:])).sum(axis=-1)
+    return np.asarray(np.nan_to_num(distance, nan=np.inf))
 
 
 @lru_cache(maxsize=64)
@@ -138,21 +171,26 @@ def home_mode(robot: Manipulator) -> int:
 
 
 def _no_pose(
-    robot: Manipulator, joints: Array, lost: NDArray[np.bool_], mode: int, source: str, first: int
+    robot: Manipulator, joints: Array, lost: NDArray[np.bool_], source: str, first: int
 ) -> LogError:
     row = int(np.argmax(lost))
-    count = int(lost.sum())
     values = ", ".join(f"{value:.4f}" for value in joints[row])
-    others = assembly_modes(robot, joints[lost])
-    hint = "perhaps it is the log of another machine, or its joints have other zeros"
-    if others.shape[-2] > 1 and not np.isnan(others[:, 1 - mode]).any():
-        hint = f"assembly mode {2 - mode} has one: declare it in the log's description"
+    followed = not closure_of(robot).closed_form
+    rows = [row] if followed else lost  # of what comes after the first nothing is known
+    others = ~np.isnan(direct_kinematics(robot, joints[rows])).any(axis=(0, -1))
+    count = len(joints[rows])
     more = f", nor those of {count - 1} more rows" if count > 1 else ""
-    return LogError(
-        "no pose",
-        f"{source}: row {first + row + 1}",
-        f"no pose of {robot.name} has the joints ({values}){more}; {hint}",
-    )
+    what = f"no pose of {robot.name} has the joints ({values}){more}"
+    hint = "perhaps it is the log of another machine, or its joints have other zeros"
+    if others.any() and followed:
+        what = f"{robot.name} does not come to the joints ({values}) in its assembly mode"
+        hint = (
+            "perhaps samples are missing, or the mode is another: measure the pose, or declare it"
+        )
+    elif others.any():
+        mode = 1 + int(np.argmax(others))
+        hint = f"assembly mode {mode} has one: declare it in the log's description"
+    return LogError("no pose", f"{source}: row {first + row + 1}", f"{what}; {hint}")
 
 
 def _check_regular(robot: Manipulator, pose: Array, source: str, first_row: int) -> None:
