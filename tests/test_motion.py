@@ -8,7 +8,7 @@ import pytest
 from differences import along
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mechanisms import BATCH_SHAPES, MECHANISMS, NEAREST, states
+from mechanisms import BATCH_SHAPES, CATALOG, MECHANISMS, NEAREST, random_machine, states
 from scipy.spatial.transform import Rotation
 
 import pteron
@@ -20,18 +20,36 @@ NAMES = [
     *("quadrupteron", "tripteron", "delta", "quadrupteron turned", "delta on a wall"),
     *("tripteron, no gravity", "random 3T1R 0", "random PRR 0"),
 ]
+
+
+def with_tool(name, tool, **changes):
+    """Return a machine of the catalog with its tool's centre point elsewhere."""
+    robot = CATALOG[name]
+    return replace(robot, platform=replace(robot.platform, tool=tool), **changes)
+
+
+MACHINES = {
+    **{name: MECHANISMS[name] for name in (*NAMES, *NEAREST)},
+    **{name: CATALOG[name] for name in ("linear-delta", "delta-4", "par4", "five-bar", "3-prr")},
+    "3-rrr with a tool": with_tool("3-rrr", (0.03, -0.02, 0.01)),
+    "h4 with a tool": with_tool("h4", (0.05, 0.02, -0.1)),
+    "upright five-bar": replace(CATALOG["five-bar"], gravity=(3.0, -9.0, 2.0)),
+    "sliding": random_machine(0, "PRSSI"),
+}
 EVERY = pytest.mark.parametrize("name", NAMES)
+FAMILIES = pytest.mark.parametrize("name", MACHINES)
 LEAST = 0.2
+POINT = ("platform_point", "fixed_offset")
 
 
 @lru_cache
 def home(name):
-    return home_pose(MECHANISMS[name])
+    return home_pose(MACHINES[name])
 
 
 @lru_cache
 def cycle(name):
-    return pick_and_place(MECHANISMS[name], home(name), least=LEAST)
+    return pick_and_place(MACHINES[name], home(name), least=LEAST)
 
 
 @given(st.floats(-0.5, 1.5), st.floats(0.0, 0.4), st.floats(0.6, 1.0))
@@ -54,12 +72,12 @@ def test_the_quintic_rests_at_both_ends():
         np.testing.assert_allclose(found, [[s, s], [0, 0], [0, 0]], atol=1e-13)
 
 
-@EVERY
+@FAMILIES
 def test_a_cycles_derivatives_are_exact(name):
     found = cycle(name)
-    robot = MECHANISMS[name]
+    robot = MACHINES[name]
     turn = found.turn / found.scale
-    path = Cycle(np.array(home(name)), found.across, found.up, turn, found.scale)
+    path = Cycle(robot.platform, home(name), found.across, found.up, turn, found.scale)
     tau = np.random.default_rng(3).uniform(size=200)
     knots = np.array([0.0, 0.075, 0.2, 0.3, 0.425, 0.5])
     knots = np.concatenate([knots, 1.0 - knots])
@@ -80,9 +98,15 @@ def test_a_cycles_derivatives_are_exact(name):
         np.testing.assert_allclose(mine, theirs / found.duration**order, rtol=1e-12, atol=1e-12)
 
 
-@EVERY
+def tool(robot, pose):
+    """Return where the tool's centre point is."""
+    p, axes = robot.platform.at(np.asarray(pose))
+    return p + robot.platform.tool @ axes
+
+
+@FAMILIES
 def test_a_cycle_keeps_its_limits_between_the_samples(name):
-    robot, found = MECHANISMS[name], cycle(name)
+    robot, found = MACHINES[name], cycle(name)
     dense = pick_and_place(
         robot, home(name), scale=found.scale, direction=found.across, samples=20_011
     )
@@ -90,13 +114,15 @@ def test_a_cycle_keeps_its_limits_between_the_samples(name):
     assert kept.type_i.min() >= LEAST
     assert kept.type_ii.min() >= LEAST
     assert kept.clearances.min() >= 0.0
-    speed = np.linalg.norm(dense.acceleration[:, :3], axis=-1)
-    assert 10.0 * (1.0 - 1e-5) < speed.max() < 10.0 * (1.0 + 1e-9)
+    if any(robot.platform.tool[:2]):
+        return  # P is faster, or slower, than the tool
+    peak = np.linalg.norm(dense.acceleration[:, : len(robot.platform.lengths)], axis=-1).max()
+    assert 10.0 * (1.0 - 1e-5) < peak < 10.0 * (1.0 + 1e-9)
 
 
-@EVERY
+@FAMILIES
 def test_a_cycle_is_the_largest_that_fits(name):
-    robot, found = MECHANISMS[name], cycle(name)
+    robot, found = MACHINES[name], cycle(name)
     assert 0.0 < found.scale <= 1.0
     if found.scale < 1.0:
         larger = pick_and_place(
@@ -108,36 +134,41 @@ def test_a_cycle_is_the_largest_that_fits(name):
         assert min(tightest, kept.clearances.min()) < 1e-3
 
 
-@EVERY
+@FAMILIES
 def test_a_cycle_goes_up_across_down_and_back(name):
-    robot, found = MECHANISMS[name], cycle(name)
-    offset = found.pose[:, :3] - np.array(home(name))[:3]
+    robot, found = MACHINES[name], cycle(name)
+    offset = tool(robot, found.pose) - tool(robot, home(name))
     heights, widths = offset @ found.up, offset @ found.across
     assert np.ptp(heights) == pytest.approx(0.025 * found.scale)
     assert np.ptp(widths) == pytest.approx(0.305 * found.scale)
     assert heights.sum() / len(heights) > heights[0], "it lifts before it goes across"
     third = np.cross(found.up, found.across)
     np.testing.assert_allclose(offset @ third, 0.0, atol=1e-15)
-    np.testing.assert_allclose(found.pose, found.pose[::-1], atol=1e-15)
+    np.testing.assert_allclose(found.pose, found.pose[::-1], atol=2e-15)
     for ends in (found.velocity, found.acceleration):
         np.testing.assert_allclose(ends[[0, 200, -1]], 0.0, atol=1e-12)
     if robot.platform.turns:
-        assert np.ptp(found.pose[:, 3]) == pytest.approx(np.pi / 3 * found.scale)
-    gravity = np.array(robot.gravity)
-    if gravity.any():
-        np.testing.assert_allclose(found.up, -gravity / np.linalg.norm(gravity), atol=1e-15)
+        assert np.ptp(found.pose[:, -1]) == pytest.approx(np.pi / 3 * found.scale)
+    axis, pull = np.array(robot.platform.axis), np.array(robot.gravity)
+    if robot.platform.planar:
+        assert axis @ found.across == axis @ found.up == 0.0
+        pull = pull - (pull @ axis) * axis
+    if pull.any():
+        np.testing.assert_allclose(found.up, -pull / np.linalg.norm(pull), atol=1e-15)
     else:
-        np.testing.assert_allclose(found.up, robot.platform.axis)
+        expected = np.cross(axis, found.across) if robot.platform.planar else axis
+        np.testing.assert_allclose(found.up, expected, atol=1e-15)
 
 
 @pytest.mark.parametrize("name", NEAREST)
 def test_a_turned_machine_makes_the_turned_cycle(name):
     rotation = Rotation.random(rng=8).as_matrix()
-    robot, first = MECHANISMS[name], cycle(name)
+    robot, first = MACHINES[name], cycle(name)
     middle = np.array(home(name))
     middle[:3] = rotation @ middle[:3]
     turned = pteron.turned(robot, rotation)
-    second = pick_and_place(turned, middle, direction=rotation @ first.across)
+    ahead = rotation @ first.across
+    second = pick_and_place(turned, middle, direction=ahead, scale=first.scale)
     np.testing.assert_allclose(second.pose[:, :3], first.pose[:, :3] @ rotation.T, atol=1e-12)
     np.testing.assert_allclose(second.pose[:, 3:], first.pose[:, 3:], atol=1e-15)
     forces = [
@@ -175,6 +206,11 @@ def test_a_cycle_that_cannot_be_is_refused(arguments, complaint):
         pick_and_place(MECHANISMS["tripteron"], [0.0, 0.0, 0.0], **arguments)
 
 
+def test_a_direction_that_a_plane_has_not_is_refused():
+    with pytest.raises(pteron.DataError, match="no horizontal part in the machine's plane"):
+        pick_and_place(MACHINES["upright five-bar"], home("upright five-bar"), direction=[0, 0, 1])
+
+
 def test_no_cycle_fits_at_a_singular_pose():
     with pytest.raises(pteron.ModelError, match="choose a better pose"):
         pick_and_place(MECHANISMS["quadrupteron"], [0.0, 0.0, 0.0, np.pi / 2])
@@ -182,30 +218,45 @@ def test_no_cycle_fits_at_a_singular_pose():
         pick_and_place(MECHANISMS["tripteron"], [5.0, 0.0, 0.0])
 
 
-@EVERY
-def test_joint_points_close_the_chains(name):
-    robot = MECHANISMS[name]
+@FAMILIES
+def test_lines_lead_from_the_base_to_the_platform(name):
+    robot = MACHINES[name]
     pose, _, _ = states(robot, 50)
     points = joint_points(robot, pose)
     for i, (leg, line) in enumerate(zip(robot.legs, points.links, strict=True)):
-        assert line.shape == (50, 3, 3)
         np.testing.assert_allclose(line[:, -1], points.platform_points[:, i], atol=1e-15)
+        start = np.tile(leg.guide_point, (50, 1))
+        if leg.joint.noun == "slider":
+            start += np.multiply.outer(points.coordinates[:, i], leg.joint_axis)
+        np.testing.assert_allclose(line[:, 0], start, atol=1e-15)
+        links = np.diff(line, axis=1)
+        if leg.plane_normal is not None:  # places along the normal do not count
+            links = links @ robot.platform.directions.T
+        lengths = [q.value[0] for q in leg.quantities if q.role == "length"]
+        found = np.linalg.norm(links, axis=-1)
+        if lengths:  # a telescopic shaft has none
+            np.testing.assert_allclose(found, np.tile(lengths, (50, 1)), rtol=1e-12)
+        assert found.shape[1] == max(len(lengths), 1)
+        if len(lengths) < 2:
+            continue
         upper, lower = np.diff(line, axis=1).transpose(1, 0, 2)
-        np.testing.assert_allclose(np.linalg.norm(upper, axis=-1), leg.upper_length, rtol=1e-12)
-        np.testing.assert_allclose(np.linalg.norm(lower, axis=-1), leg.lower_length, rtol=1e-12)
         np.testing.assert_allclose(upper @ leg.direction, 0.0, atol=1e-14)
         side = np.cross(upper, lower) @ leg.direction
         # u x (elbow side) points along sigma d; l_u x l_l has the opposite sign.
         assert (np.sign(side) == -leg.elbow).all()
 
 
-@EVERY
+@FAMILIES
 def test_guides_lead_where_the_joints_go(name):
-    robot = MECHANISMS[name]
+    robot = MACHINES[name]
     poses, _, _ = states(robot, 50)
     points = joint_points(robot, poses)
     for i, (leg, guide) in enumerate(zip(robot.legs, joint_guides(robot, poses), strict=True)):
         assert guide.slides == (leg.joint.noun == "slider")
+        np.testing.assert_array_equal(guide.axis, leg.joint_axis)
+        if leg.joint.noun == "shaft":  # it turns where it is
+            np.testing.assert_array_equal(guide.path, [leg.guide_point])
+            continue
         ends = points.links[i][:, 0 if guide.slides else 1]
         if leg.limits is None:
             steps = np.linalg.norm(np.diff(guide.path, axis=0), axis=-1)
@@ -220,18 +271,56 @@ def test_guides_lead_where_the_joints_go(name):
             np.testing.assert_allclose(np.linalg.norm(reached, axis=-1), size, rtol=1e-12)
 
 
-@EVERY
-def test_the_platform_is_rigid_and_turns_about_its_axis(name):
-    robot = MECHANISMS[name]
+@FAMILIES
+def test_the_platforms_parts_are_rigid_and_turn_about_its_axis(name):
+    robot = MACHINES[name]
     pose, _, _ = states(robot, 20)
     points = joint_points(robot, pose)
-    angle = pose[:, 3] if robot.platform.turns else np.zeros(20)
+    angle = pose[:, -1] if robot.platform.turns else np.zeros(20)
     turn = Rotation.from_rotvec(np.multiply.outer(angle, robot.platform.axis)).as_matrix()
     frame = np.array(robot.platform.frame)
     np.testing.assert_allclose(points.axes, np.einsum("bij,kj->bki", turn, frame), atol=1e-14)
-    arms = np.array([leg.platform_point for leg in robot.legs]) @ points.axes
-    expected = points.reference[:, None] + arms
-    np.testing.assert_allclose(points.platform_points, expected, atol=1e-14)
+    s0, t0 = (np.array([getattr(leg, key) for leg in robot.legs]) for key in POINT)
+    hinges = points.reference[:, None]
+    if robot.platform.slides:
+        hinges = hinges + np.multiply.outer(angle, s0 @ frame)
+    else:
+        hinges = hinges + s0 @ points.axes
+    np.testing.assert_allclose(points.platform_points, hinges + t0, atol=1e-14)
+    np.testing.assert_allclose(points.tool - points.reference, robot.platform.tool @ points.axes)
+
+    # Every place where a leg or a hinge is, is a hub or a corner of a part, and nothing else is.
+    places = np.concatenate([hinges, hinges + t0] if robot.platform.turns else [hinges + t0], 1)
+    first, *others = points.parts
+    np.testing.assert_array_equal(first.hub, points.reference)
+    known = np.concatenate(
+        [part.corners for part in points.parts] + [part.hub[:, None] for part in points.parts], 1
+    )
+    apart = np.abs(places[:, :, None] - known[:, None]).max(axis=-1)
+    assert apart.min(axis=2).max() < 1e-14
+    corners = sum(part.corners.shape[1] for part in points.parts)
+    assert apart[:, :, :corners].min(axis=1).max(initial=0.0) < 1e-14
+    for part in others:
+        still = part.corners - part.hub[:, None]
+        np.testing.assert_allclose(still, np.broadcast_to(still[0], still.shape), atol=1e-14)
+
+
+def test_the_parts_of_articulated_platforms():
+    found = {
+        name: [part.corners.shape[0] for part in joint_points(MACHINES[name], home(name)).parts]
+        for name in ("quadrupteron", "delta-4", "par4", "five-bar")
+    }
+    # A bar of a Par4 leads to two legs; the plate of a Delta does not turn with its tool.
+    assert found == {"quadrupteron": [4], "delta-4": [0, 3], "par4": [2, 2, 2], "five-bar": [0]}
+
+
+def test_corners_go_round_the_platform():
+    (part,) = joint_points(MECHANISMS["quadrupteron"], np.zeros(4)).parts
+    first = int(part.corners[:, 0].argmax())
+    round_from_x = np.roll(part.corners, -first, axis=0)
+    np.testing.assert_allclose(
+        round_from_x, 0.04 * np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]]), atol=1e-15
+    )
 
 
 @pytest.mark.parametrize("shape", BATCH_SHAPES)

@@ -4,12 +4,14 @@ import re
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from mechanisms import MECHANISMS, random_machine
+from mechanisms import CATALOG, MECHANISMS, random_machine
 from mpl_toolkits.mplot3d.art3d import Line3D, Poly3DCollection
+from scipy.spatial.transform import Rotation
 
 import pteron
 from pteron.motion import joint_guides, joint_points
@@ -17,7 +19,6 @@ from pteron.plots import (
     LEG_COLORS,
     forces_figure,
     measure_figure,
-    outline,
     reach_figure,
     regularity_figure,
     robot_figure,
@@ -26,11 +27,13 @@ from pteron.plots import (
 from pteron.plots.space import upright
 from pteron.workspace import home_pose, reach_slice
 
-MACHINES = ["tripteron", "quadrupteron turned", "delta", "random PRR 0"]
+IN_SPACE = ["tripteron", "quadrupteron turned", "delta", "random PRR 0", "par4", "delta-4"]
+IN_A_PLANE = ["five-bar", "3-prr"]
+MACHINES = {**CATALOG, **MECHANISMS}
 
 
 def machine(name):
-    robot = MECHANISMS[name]
+    robot = MACHINES[name]
     pose = pteron.random_poses(robot, 1, seed=2)[0]
     points, guides = joint_points(robot, pose), joint_guides(robot, pose)
     return robot_figure(points, guides, gravity=np.array(robot.gravity), angle="φ = 10°")
@@ -65,6 +68,7 @@ def regularity():
 
 PICTURES = {
     "machine": (machine, "quadrupteron turned"),
+    "plane": (machine, "3-rrr"),
     "reach": (reach, "quadrupteron"),
     "measure": (measure, "delta"),
     "forces": (forces, "tripteron"),
@@ -109,23 +113,65 @@ def test_pictures_need_no_pyplot():
 
 
 def lines(figure):
-    found = [a for a in figure.axes[0].get_children() if isinstance(a, Line3D)]
-    return [(np.array(a.get_data_3d()).T, a.get_color()) for a in found]
+    """Return the points of the lines, m, and their colours."""
+    axes = figure.axes[0]
+    if axes.name == "3d":
+        found = [a for a in axes.get_children() if isinstance(a, Line3D)]
+        return [(np.array(a.get_data_3d()).T, a.get_color()) for a in found]
+    return [(1e-3 * np.array(a.get_data()).T, a.get_color()) for a in axes.lines]
 
 
-@pytest.mark.parametrize("name", MACHINES)
+@pytest.mark.parametrize("name", IN_SPACE + IN_A_PLANE)
 def test_the_drawn_links_have_their_lengths_and_their_legs_colour(name):
-    robot = MECHANISMS[name]
+    robot = MACHINES[name]
     drawn = lines(machine(name))
     for leg, color in zip(robot.legs, LEG_COLORS, strict=False):
         own = [points for points, c in drawn if c == color and len(points) == 2]
         lengths = [np.linalg.norm(points[1] - points[0]) for points in own]
-        np.testing.assert_allclose(lengths, [leg.upper_length, leg.lower_length], rtol=1e-12)
-        # Both meet in the elbow.
-        np.testing.assert_allclose(own[0][1], own[1][0], atol=1e-15)
+        known = [q.value[0] for q in leg.quantities if q.role == "length"]
+        if leg.bar is not None:  # two rods, and the bars between their ends
+            *known, rod = known
+            assert lengths[-2] == pytest.approx(lengths[-1])
+            known = [*known, rod, rod, *lengths[-2:]]
+            one, other = (np.diff(points, axis=0) for points in own[-4:-2])
+            np.testing.assert_allclose(one, other, atol=1e-15)
+        if known:  # a shaft has no length
+            np.testing.assert_allclose(lengths, known, rtol=1e-12)
+        if len(known) == 2:  # both meet in the elbow
+            np.testing.assert_allclose(own[0][1], own[1][0], atol=1e-15)
 
 
-@pytest.mark.parametrize("name", MACHINES)
+@pytest.mark.parametrize("name", IN_A_PLANE)
+def test_a_planar_machine_is_drawn_in_its_plane(name):
+    axes = machine(name).axes[0]
+    assert axes.name == "rectilinear"
+    assert axes.get_aspect() == 1.0
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("x (mm)", "y (mm)")
+    turned = Rotation.random(rng=4).as_matrix()
+    robot = MACHINES[name]
+    pose = pteron.random_poses(robot, 1, seed=2)[0]
+    other = pteron.turned(replace(robot, gravity=(0.0, -9.81, 0.0)), turned)
+    points, guides = joint_points(other, pose), joint_guides(other, pose)
+    found = robot_figure(points, guides, gravity=np.array(other.gravity))
+    # The plane's own axes are the picture's, wherever the plane is in space; gravity points down.
+    for (mine, _), (theirs, _) in zip(lines(machine(name)), lines(found), strict=False):
+        np.testing.assert_allclose(mine, theirs, atol=1e-12)
+    words = [text.get_text() for text in found.axes[0].texts]
+    assert "g" in words
+    assert "g" not in [text.get_text() for text in axes.texts], "along the normal"
+
+
+@pytest.mark.parametrize(("name", "drawn"), [("h4", True), ("delta", False)])
+def test_the_tool_is_drawn_where_it_is_not_at_p(name, drawn):
+    robot = CATALOG[name]
+    pose = pteron.random_poses(robot, 1, seed=2)[0]
+    points = joint_points(robot, pose)
+    way = np.array([points.reference, points.tool])
+    found = lines(robot_figure(points, joint_guides(robot, pose)))
+    assert any(line.shape == way.shape and np.array_equal(line, way) for line, _ in found) == drawn
+
+
+@pytest.mark.parametrize("name", IN_SPACE)
 def test_the_drawn_machine_is_not_distorted(name):
     figure = machine(name)
     axes = figure.axes[0]
@@ -134,10 +180,10 @@ def test_the_drawn_machine_is_not_distorted(name):
     ratio = np.ptp(limits, axis=1) / aspect
     np.testing.assert_allclose(ratio, ratio[0], rtol=1e-9)
     texts = [text.get_text() for text in axes.texts]
-    n = MECHANISMS[name].freedom
+    n = MACHINES[name].freedom
     assert [text for text in texts if text.isdigit()] == [str(i + 1) for i in range(n)]
     assert {"x", "y", "z", "g"} < set(texts)
-    sliders = sum(leg.joint.noun == "slider" for leg in MECHANISMS[name].legs)
+    sliders = sum(leg.joint.noun == "slider" for leg in MACHINES[name].legs)
     assert sum(isinstance(a, Poly3DCollection) for a in axes.get_children()) > sliders
 
 
@@ -152,15 +198,6 @@ def test_gravity_points_down_in_the_picture():
             rotation @ gravity, [0.0, 0.0, -np.linalg.norm(gravity)], atol=1e-14
         )
     np.testing.assert_allclose(upright(np.array([0.0, 0.0, 2.0])), np.eye(3), atol=1e-15)
-
-
-def test_the_outline_goes_round_the_platform():
-    robot = MECHANISMS["quadrupteron"]
-    order = outline(joint_points(robot, np.zeros(4)))
-    # Points at -y, -x, +y and +x: round from one to its neighbour.
-    at = [("-y", "-x", "+y", "+x")[i] for i in order]
-    start = at.index("+x")
-    assert at[start:] + at[:start] == ["+x", "+y", "-x", "-y"]
 
 
 def test_forces_are_drawn_as_given():
