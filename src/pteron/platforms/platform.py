@@ -128,6 +128,10 @@ class Platform:
             raise ModelError(
                 f"slides: a {self.motion} platform has no halves that slide; only 3T1R"
             )
+        if self.slides and any(bar.hinge[2] != 0.0 for bar in self.bars):
+            raise ModelError(
+                "bars: what slides moves across the axis; give 0 as hinge's third number"
+            )
         if self.geared and not self.turns:
             raise ModelError(f"geared: a {self.motion} platform has no angle for a gear to turn")
         if self.limits is not None:
