@@ -27,8 +27,11 @@ each_mechanism = pytest.mark.parametrize("name", SOME)
 def passive_rates(robot, pose, velocity):
     """Return the rates of what has a column: the passive joints of each leg, and the platform."""
     passive = pteron.joint_rates(robot, pose, velocity).passive
-    legs, numbers = np.array(passive_joints(robot)).T - 1
-    return np.hstack([passive[:, legs, numbers], velocity[:, 3:]])
+    rates = [
+        velocity[:, -1] if leg is None else passive[:, leg - 1, number - 1]
+        for leg, number, _ in passive_joints(robot)
+    ]
+    return np.column_stack(rates)
 
 
 @each_mechanism

@@ -402,7 +402,10 @@ def test_a_description_is_given_by_value_or_path(tmp_path):
         ("[joints]\ncolumns = ['a','b','c','d']\n", r"no column a, b, c, d, which .*\[joints\]"),
         ("[time]\ncolumn = 'a'\n[payload]\ncolumn = 'a'\n", "columns: 'a' is named twice"),
         ("[motion]\nperiod = 0\n", "motion.period: 0 given, a number above 0 expected"),
-        ("[motion]\nassembly_mode = 3\n", "motion.assembly_mode: 3 given, 1 or 2 expected"),
+        (
+            "[motion]\nassembly_mode = 0\n",
+            "motion.assembly_mode: 0 given, a number of at least 1 exp",
+        ),
         (
             "[drives]\nrotor_inertia = [-1, 1, 1, 1]\n",
             "item 1: -1 given, a number of at least 0 exp",

@@ -1,17 +1,18 @@
 """Show how near the simulated machines are to rigid bodies with dry friction.
 
 Run it as `python benchmarks/identification/check.py`, with `--quick` for 5 s of motion. Pteron's
-forces for MuJoCo's own motion of the sliders, with friction, are compared with the forces applied;
+forces for MuJoCo's own motion of the joints, with friction, are compared with the forces applied;
 then the base parameters and the friction are fitted to the noise-free recording, and their errors
-set against the standard deviations that 1 % of noise in the forces would give. Samples of a slider
-slower than 1 mm/s are left out, but for the column "all": it may stick, and sign(v) does not say
-what friction holds it.
+set against the standard deviations that 1 % of noise in the forces would give. Samples of a joint
+slower than 1 mm/s (1 mrad/s) are left out, but for the column "all": it may stick, and sign(v) does
+not say what friction holds it.
 """
 
 from __future__ import annotations
 
 import sys
 from time import process_time
+from typing import NamedTuple
 
 import numpy as np
 from plant import (
@@ -27,11 +28,28 @@ from plant.model import Array
 
 import pteron
 
-_MACHINES = ("quadrupteron", "quadrupteron-oblique", "tripteron", "tripteron-oblique")
-_COULOMB = (6.0, 7.0, 9.0, 8.0)
-_VISCOUS = (10.0, 12.0, 16.0, 14.0)
-_OFFSET = (-1.0, 1.5, 0.5, 0.0)
-_JOINTS = 0.02
+
+class Case(NamedTuple):
+    """What brakes a machine, and how fast it moves."""
+
+    coulomb: tuple[float, ...] = (6.0, 7.0, 9.0, 8.0)
+    viscous: tuple[float, ...] = (10.0, 12.0, 16.0, 14.0)
+    offset: tuple[float, ...] = (-1.0, 1.5, 0.5, 0.0)
+    joints: float = 0.02
+    speed: float = 0.8
+    acceleration: float = 8.0
+
+
+_CASES = {
+    "quadrupteron": Case(),
+    "quadrupteron-oblique": Case(),
+    "tripteron": Case(),
+    "tripteron-oblique": Case(),
+    "delta": Case((4.0, 3.0, 5.0), (1.0, 1.5, 1.2), (0.5, -0.3, 0.0), 0.02, 6.0, 80.0),
+    "par4": Case(
+        (0.2, 0.15, 0.25, 0.3), (0.05, 0.06, 0.04, 0.07), (0.02, -0.01, 0.0, 0.03), 1e-3, 6.0, 80.0
+    ),
+}
 _NOISE = 0.01
 
 
@@ -43,12 +61,14 @@ def main() -> None:
         "the\nworst actuator; biases are in standard deviations of the parameters.\n"
     )
     print(_row("", "speed", "acc.", "gap", "error", "slow", "bias", "bias", "all", "run"))
-    print(_row("", "m/s", "m/s^2", "m", "force", "samples", "worst", "rms", "worst", "CPU s"))
-    for name in _MACHINES:
+    print(_row("", "m/s *", "m/s^2 *", "m", "force", "samples", "worst", "rms", "worst", "CPU s"))
+    for name, case in _CASES.items():
         drawn = pteron.load(name)
         robot, n = as_built(drawn, seed=1), len(drawn.legs)
-        friction = Friction(_COULOMB[:n], _VISCOUS[:n], _OFFSET[:n], _JOINTS)
-        reference = fourier_reference(drawn, seed=3)
+        friction = Friction(case.coulomb[:n], case.viscous[:n], case.offset[:n], case.joints)
+        reference = fourier_reference(
+            drawn, seed=3, speed=case.speed, acceleration=case.acceleration
+        )
         begin = process_time()
         recording = simulate(robot, reference, friction, duration=duration, drawn=drawn)
         seconds = process_time() - begin
@@ -66,8 +86,10 @@ def main() -> None:
                 f"{np.sqrt(np.mean(bias**2)):.3f}",
                 f"{np.abs(bias_of_all).max():.1f}",
                 f"{seconds:.0f}",
-            )
+            ),
+            flush=True,
         )
+    print("\n* rad/s and rad/s^2 of cranks")
 
 
 def compared(
@@ -75,7 +97,7 @@ def compared(
 ) -> tuple[Array, float, Array]:
     """Return the force errors, the share of slow samples, and the parameters' biases.
 
-    Samples of a slider that is slower than `least`, m/s, are left out.
+    Samples of a joint that is slower than `least`, m/s or rad/s, are left out.
     """
     rates, n = recording.rates, recording.rates.shape[1]
     state = platform_state(robot, recording.joints, rates, recording.accelerations)

@@ -50,7 +50,6 @@ _HERE = Path(__file__).parent
 _QUICK = "--quick" in sys.argv
 
 
-
 @dataclass(frozen=True)
 class Drives:
     """What drives a machine: friction of its joints, encoders, and how fast they move.
@@ -70,8 +69,11 @@ class Drives:
 
     def friction(self, n: int) -> plant.Friction:
         """Return the friction of n joints."""
-        parts = self.coulomb, self.viscous, self.offset
-        return plant.Friction(*(tuple((a + b * np.arange(n)).tolist()) for a, b in parts))
+        coulomb, viscous, offset = (
+            tuple((first + more * np.arange(n)).tolist())
+            for first, more in (self.coulomb, self.viscous, self.offset)
+        )
+        return plant.Friction(coulomb, viscous, offset)
 
 
 _TWENTY_BITS = 2.0 * np.pi / 2**20
@@ -169,7 +171,9 @@ class Bench:
             usual_sizes(model.base, pteron.parameters(robot)),
             np.full(len(terms), np.mean(np.r_[friction.coulomb, friction.viscous])),
         ]
-        return cls(drives, robot, model, np.r_[model.base.values(built), terms], usual, fitted, other)
+        return cls(
+            drives, robot, model, np.r_[model.base.values(built), terms], usual, fitted, other
+        )
 
     def log(self, noise: tuple[float, float], seed: int, *, held_out: bool = False) -> Log:
         """Return what the sensors say."""

@@ -21,18 +21,16 @@ def as_built(robot: pteron.Manipulator, seed: int = 0, spread: float = 0.2) -> p
     """
     rng = np.random.default_rng(seed)
 
-    def factors(count: int) -> list[float]:
-        found: list[float] = rng.uniform(1.0 - spread, 1.0 + spread, count).tolist()
-        return found
+    def factor() -> float:
+        return float(rng.uniform(1.0 - spread, 1.0 + spread))
 
     def built(body: Any) -> Any:
         if isinstance(body, PointMass):
-            return PointMass(body.mass * factors(1)[0])
+            return PointMass(body.mass * factor())
         center = np.array(body.center_of_mass)
         about_center = body.inertia - body.mass * float(center @ center)
-        mass, *shifts, turning = factors(len(center) + 2)
-        mass, center = mass * body.mass, shifts * center
-        inertia = turning * about_center + mass * float(center @ center)
+        mass, center = factor() * body.mass, center * [factor() for _ in center]
+        inertia = factor() * about_center + mass * float(center @ center)
         return body.of_body(mass, center.tolist(), inertia)
 
     legs = tuple(
@@ -42,9 +40,9 @@ def as_built(robot: pteron.Manipulator, seed: int = 0, spread: float = 0.2) -> p
     platform = replace(
         robot.platform,
         inertia=built(robot.platform.inertia),
-        bars=tuple(replace(bar, mass=bar.mass * factors(1)[0]) for bar in robot.platform.bars),
+        bars=tuple(replace(bar, mass=bar.mass * factor()) for bar in robot.platform.bars),
         geared=tuple(
-            replace(part, inertia=part.inertia * factors(1)[0]) for part in robot.platform.geared
+            replace(part, inertia=part.inertia * factor()) for part in robot.platform.geared
         ),
     )
     return replace(robot, legs=legs, platform=platform)

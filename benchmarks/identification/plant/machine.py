@@ -173,7 +173,11 @@ class _Plant:
         self.guides = Guides(friction, model, data, first, loop_rows(robot))
         self.damping = friction.joints * joint_damping(robot) if friction.joints else None
         # Views: MuJoCo's arrays stay where they are.
-        self.poses, self.joints, self.rates = data.qpos[:m], data.qpos[first::3], data.qvel[first::3]
+        self.poses, self.joints, self.rates = (
+            data.qpos[:m],
+            data.qpos[first::3],
+            data.qvel[first::3],
+        )
         self.accelerations, self.applied = data.qacc[first::3], data.qfrc_applied[first::3]
         self.forces = np.zeros(m)
         self.sites = [[data.site(f"{a} {i}").id for i in range(m)] for a in ("leg", "platform")]

@@ -79,9 +79,7 @@ def mujoco_model(robot: pteron.Manipulator, step: float) -> Any:
     if robot.platform.turns:
         platform.add_joint(name="turn", type=hinge, axis=axis)
     for i, part in enumerate(robot.platform.geared):
-        tool = platform.add_body(
-            mass=1e-9, inertia=np.full(3, part.inertia), explicitinertial=True
-        )
+        tool = platform.add_body(mass=1e-9, inertia=np.full(3, part.inertia), explicitinertial=True)
         tool.add_joint(name=f"gear {i}", type=hinge, axis=axis)
     bars = []
     for i, bar in enumerate(robot.platform.bars):
@@ -170,7 +168,8 @@ def leg_coordinates(robot: pteron.Manipulator, pose: Array) -> Array:
     upper, lower = pteron.link_vectors(robot, pose)
     joints = pteron.inverse_kinematics(robot, pose)
     found = []
-    for i, leg in enumerate(robot.legs):
+    legs: tuple[Any, ...] = robot.legs
+    for i, leg in enumerate(legs):
         u, v = (link[..., i, :] @ _axes(leg) for link in (upper, lower))
         turns = [np.arctan2(link[..., 1], link[..., 0]) for link in (u, v)]
         if isinstance(leg, pteron.Leg):

@@ -10,7 +10,13 @@ from pteron.identification.signals.derivatives import (
     spline_motion,
     uniform,
 )
-from pteron.identification.signals.filters import Decimation, cutoff_of, smoothed, white_noise
+from pteron.identification.signals.filters import (
+    Decimation,
+    cutoff_of,
+    position_noise,
+    smoothed,
+    white_noise,
+)
 from pteron.identification.signals.fourier import FourierSeries, fitted_series
 from pteron.identification.signals.preprocessing import Preprocessing, Processing, preprocessing_of
 from pteron.identification.signals.samples import samples
@@ -26,6 +32,7 @@ __all__ = [
     "central_differences",
     "cutoff_of",
     "fitted_series",
+    "position_noise",
     "preprocessing_of",
     "samples",
     "smoothed",

@@ -154,12 +154,14 @@ def cutoff_of(signal: Array, rate: float) -> float | None:
     # frequencies of power times `slopes`, and of `given`.
     gains = 1.0 / (1.0 + (frequencies / candidates) ** (2 * _ORDER))
     slopes, given = frequencies**4 * (gains**2 - 2.0 * gains), frequencies**4 * 2.0 * gains
-    relative = power / noise**2
-    risks = relative.sum(axis=1) @ slopes + signal.shape[1] * given.sum(axis=0)
+    count = signal.shape[1]
+    relative = (power / noise**2).sum(axis=1)
+    risks = relative @ slopes + count * given.sum(axis=0)
     best = int(np.argmin(risks))
     # Chance may make a higher one the best: the lowest that is as good within a standard error.
-    squares = (relative**2).sum(axis=1) @ (slopes - slopes[:, [best]]) ** 2
-    errors = np.sqrt(_CORRELATED * squares)
+    # The noise makes a power 1 + s vary by 1 + 2 s, s being the motion's.
+    variances = np.maximum(2.0 * relative - count, 0.0) @ (slopes - slopes[:, [best]]) ** 2
+    errors = np.sqrt(_CORRELATED * variances)
     return float(candidates[np.argmax(risks - risks[best] <= errors)])
 
 
