@@ -474,7 +474,7 @@ def test_the_working_mode_may_be_chosen():
     assert "force1" in json.loads(done("forces tripteron --pose 0 0 0 --elbows --- --json"))
 
 
-@pytest.mark.parametrize("robot", ["quadrupteron", "delta"])
+@pytest.mark.parametrize("robot", ["quadrupteron", "delta", "five-bar", "3-rrr"])
 def test_forces_of_a_table_with_and_without_a_wrench(robot: str):
     machine = pteron.load(robot)
     m = machine.freedom
@@ -484,7 +484,8 @@ def test_forces_of_a_table_with_and_without_a_wrench(robot: str):
     forces = frame(done(f"forces {robot} --table motion.csv"))[machine.force_names].to_numpy()
     np.testing.assert_array_equal(forces, pteron.inverse_dynamics(machine, *states))
     wrench = np.random.default_rng(2).normal(size=(20, m))
-    loads = pl.DataFrame(wrench, schema=["fx", "fy", "fz", "mk"][:m])
+    names = {"x": "fx", "y": "fy", "z": "fz", "phi": "mk"}
+    loads = pl.DataFrame(wrench, schema=[names[one] for one in machine.coordinates])
     table.hstack(loads).write_csv("loaded.csv")
     forces = frame(done(f"forces {robot} --table loaded.csv"))[machine.force_names].to_numpy()
     np.testing.assert_array_equal(forces, pteron.inverse_dynamics(machine, *states, wrench))
@@ -538,7 +539,7 @@ def test_the_catalog_is_listed():
     assert max(map(len, text.splitlines())) <= 60
 
 
-@pytest.mark.parametrize("robot", ["quadrupteron", "delta", "mixed"])
+@pytest.mark.parametrize("robot", ["quadrupteron", "delta", "mixed", "h4", "delta-4", "five-bar"])
 def test_a_good_file_is_described(robot: str, mixed: str, monkeypatch: pytest.MonkeyPatch):
     machine = pteron.load(mixed if robot == "mixed" else robot)
     pteron.save(machine, "robot.toml")
@@ -552,8 +553,14 @@ def test_a_good_file_is_described(robot: str, mixed: str, monkeypatch: pytest.Mo
     assert found["legs"][1]["lengths"]["upper_length"] == machine.legs[1].upper_length
     assert all(f" {leg.type} " in text for leg in machine.legs)
     assert found["working_mode"] == "".join("+-"[leg.elbow < 0] for leg in machine.legs)
-    assert found["singular_orientations"] == pteron.singular_orientations(machine).tolist()
-    assert np.isfinite(pteron.inverse_kinematics(machine, found["home_pose"])).all()
+    home = found["home_pose"]
+    assert np.isfinite(pteron.inverse_kinematics(machine, home)).all()
+    at_home = pteron.singular_orientations(machine, home[: len(machine.platform.lengths)])
+    assert found["singular_orientations"] == at_home.tolist()
+    assert len(at_home) == (2 if robot in ("quadrupteron", "h4") else 0)
+    assert ("at the home position" in text) == (robot == "h4")
+    assert found["tool"] == list(machine.platform.tool)
+    assert ("Tool: " in text) == (robot == "h4")
 
 
 def test_a_name_is_no_markup():

@@ -455,6 +455,53 @@ def test_the_catalogs_quadrupteron_is_singular_at_right_angles():
     np.testing.assert_allclose(np.degrees(angles), [-90.0, 90.0], rtol=1e-15)
 
 
+@pytest.mark.parametrize("name", ["par4", "h4", "3-rrr", "3-prr", "delta-4", "sliding"])
+def test_singular_orientations_at_a_position(name):
+    robot = random_machine(0, "PRSSI") if name == "sliding" else CATALOG[name]
+    assert pteron.singular_orientations(robot).shape == (0,), "at every position"
+    for pose in pteron.random_poses(robot, 5, seed=3, type_i=0.1, type_ii=0.01):
+        angles = pteron.singular_orientations(robot, pose[:-1])
+        assert (np.diff(angles) > 0.0).all()
+
+        def determinant(phi, pose=pose):
+            poses = np.tile(pose, (len(phi), 1))
+            poses[:, -1] = phi
+            J = pteron.jacobian(robot, poses, on_failure="nan")
+            reached = ~np.isnan(J).any(axis=(1, 2))
+            found = np.full(len(phi), np.nan)
+            found[reached] = np.linalg.det(J[reached])
+            return found
+
+        if len(angles):
+            around = determinant(angles - 1e-7) * determinant(angles + 1e-7)
+            assert (around[~np.isnan(around)] < 0.0).all()
+        # Between them, and within reach, it has one sign.
+        phi = np.linspace(-np.pi, np.pi, 999)
+        part, sign = np.searchsorted(angles, phi), np.sign(determinant(phi))
+        steps = np.flatnonzero((part[1:] == part[:-1]) & ~np.isnan(sign[1:] * sign[:-1]))
+        np.testing.assert_array_equal(sign[steps + 1], sign[steps])
+
+
+def test_singular_orientations_where_they_cannot_be():
+    robot = CATALOG["par4"]
+    assert pteron.singular_orientations(robot, [0.0, 0.0, 9.0]).shape == (0,), "out of reach"
+    assert pteron.singular_orientations(CATALOG["delta"], [0.0, 0.0, -1.0]).shape == (0,)
+    both = pteron.singular_orientations(CATALOG["quadrupteron"], [0.1, 0.0, 0.0])
+    np.testing.assert_array_equal(both, pteron.singular_orientations(CATALOG["quadrupteron"]))
+    with pytest.raises(DataError, match="position: shape"):
+        pteron.singular_orientations(robot, [0.0, 0.0, -0.4, 0.1])
+    with pytest.raises(DataError, match="finite numbers expected"):
+        pteron.singular_orientations(robot, [0.0, np.nan, -0.4])
+    # Where the rods of a Delta lie in a plane it is singular, however its shaft is turned.
+    *legs, shaft = CATALOG["delta-4"].legs
+    short = tuple(replace(leg, lower_length=0.55) for leg in legs)
+    flat = replace(CATALOG["delta-4"], legs=(*short, shaft))
+    measure = pteron.compile(flat, "type_ii")
+    z = brentq(lambda z: float(measure([0.0, 0.0, z, 0.0])), -0.4, 0.4, xtol=1e-16)
+    with pytest.raises(SingularPose, match="in every orientation"):
+        pteron.singular_orientations(flat, [0.0, 0.0, z])
+
+
 @pytest.mark.parametrize("name", [n for n in MECHANISMS if n not in TURNING])
 def test_a_translating_platform_has_no_singular_orientation(name):
     assert pteron.singular_orientations(MECHANISMS[name]).shape == (0,)

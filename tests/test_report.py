@@ -15,11 +15,12 @@ from mechanisms import CATALOG, MECHANISMS, with_elbows
 from test_workspace import fourfold, with_limits
 
 import pteron
+from pteron.legs.cones import Cone
 from pteron.reduction import FORMS
 from pteron.report import write_report
 from pteron.report.contents import contents
 from pteron.report.costs import dense_operations
-from pteron.report.page import in_symbols, lettered, page
+from pteron.report.page import bodies, in_symbols, lettered, page
 from pteron.report.typeset import fixed, significant, triple
 from pteron.report.write import checked_folder, numbers
 from pteron.workspace import REACHABLE, reserve
@@ -35,6 +36,14 @@ def doubtful(robot):
     return replace(robot, legs=(replace(leg, lower=lower), *robot.legs[1:]))
 
 
+def with_a_tool(robot):
+    """Return the machine with its tool's centre point aside and one ball joint limited."""
+    cone = Cone((0.0, 0.0, 1.0), 1.5)
+    legs = (replace(robot.legs[0], platform_cone=cone), *robot.legs[1:])
+    platform = replace(robot.platform, tool=(0.05, 0.02, -0.1))
+    return replace(robot, name="with a shaft", platform=platform, legs=legs)
+
+
 MACHINES = {
     "quadrupteron": CATALOG["quadrupteron"],
     "weightless, other mode": replace(
@@ -43,6 +52,8 @@ MACHINES = {
     "hostile": replace(with_limits(doubtful(CATALOG["tripteron"]), -0.05, 0.08), name=HOSTILE),
     "delta": CATALOG["delta"],
     "mixed": MECHANISMS["random PRR 0"],
+    "shaft": with_a_tool(CATALOG["delta-4"]),
+    "planar": CATALOG["3-rrr"],
 }
 EVERY = pytest.mark.parametrize("name", MACHINES)
 
@@ -131,8 +142,8 @@ def test_the_page_is_whole_and_needs_nothing_else(name):
     wanted = set(re.findall(r'getElementById\("(\w+)"\)', found.scripts[None]))
     assert wanted <= set(found.ids)
     assert found.counts["canvas"] == 1
-    singular = {"quadrupteron": 1, "delta": 2, "mixed": 2}.get(name, 0)
-    assert found.counts["svg"] == 5 + singular
+    measures = {"quadrupteron": 1, "delta": 2, "mixed": 2, "shaft": 2, "planar": 3}.get(name, 0)
+    assert found.counts["svg"] == (3 if name == "planar" else 5) + measures
     assert found.counts["h1"] == 1
 
 
@@ -161,10 +172,10 @@ def test_a_name_is_text_wherever_it_stands():
 
 @EVERY
 def test_3t_machines_have_no_angle(name):
-    turns = MACHINES[name].platform.turns
+    turns, shown = MACHINES[name].platform.turns, name in ("quadrupteron", "planar")
     assert ("φ" in read(name).text) == turns
-    assert ("singular, " in read(name).text) == turns
-    assert (report(name).orientations is None) != turns
+    assert ("singular, " in read(name).text) == shown
+    assert (report(name).orientations is None) != shown
 
 
 def test_a_page_is_the_same_each_time():
@@ -176,24 +187,37 @@ def test_the_moving_picture_is_the_machine(name):
     robot, data = MACHINES[name], scene(name)
     frames = len(data["time"])
     assert 60 <= frames <= 120
-    chains = np.array(data["chains"])
-    assert chains.shape == (frames, robot.freedom, 3, 3)
-    lengths = [(leg.upper_length, leg.lower_length) for leg in robot.legs]
-    links = np.linalg.norm(np.diff(chains, axis=2), axis=-1)
-    np.testing.assert_allclose(links, np.tile(lengths, (frames, 1, 1)), atol=3e-6)
+    for i, leg in enumerate(robot.legs):
+        chain = np.array([legs[i] for legs in data["chains"]])
+        lengths = [q.value[0] for q in leg.quantities if q.role == "length"]
+        links = np.linalg.norm(np.diff(chain, axis=1), axis=-1)
+        assert links.shape == (frames, max(len(lengths), 1))
+        if lengths:  # a shaft has none
+            np.testing.assert_allclose(links, np.tile(lengths, (frames, 1)), atol=3e-6)
     pose = np.array(data["pose"])
     np.testing.assert_allclose(
         pteron.inverse_kinematics(robot, pose), data["coordinates"], atol=5e-5
     )
-    assert sorted(data["outline"]) == list(range(robot.freedom))
     assert data["slides"] == [leg.joint.noun == "slider" for leg in robot.legs]
     for i, slides in enumerate(data["slides"]):
-        path, at = np.array(data["guides"][i]), chains[:, i, 0 if slides else 1]
-        step = np.linalg.norm(np.diff(path, axis=0), axis=-1).max()
+        path = np.array(data["guides"][i])
+        at = np.array([legs[i] for legs in data["chains"]])[:, 0 if slides or len(path) == 1 else 1]
+        step = np.linalg.norm(np.diff(path, axis=0), axis=-1).max(initial=1e-6)
         assert np.linalg.norm(at[:, None] - path, axis=-1).min(axis=-1).max() <= step
+    assert [bar is not None for bar in data["bars"]] == [leg.bar is not None for leg in robot.legs]
+    assert [np.shape(part["corners"])[:1] for part in data["parts"]] == [
+        (frames,) for _ in report(name).points.parts
+    ]
+    assert (data["tool"] is None) == (not any(robot.platform.tool))
+    assert data["planar"] == robot.platform.planar
+    k = len(robot.platform.lengths)
+    np.testing.assert_allclose(np.array(data["position"])[:, :k], pose[:, :k], atol=2e-6)
     gravity = np.array(robot.gravity)
-    assert data["gravity"] == bool(gravity.any())
-    if gravity.any():
+    assert np.any(data["gravity"]) == bool(gravity.any())
+    if data["planar"]:  # seen along the normal
+        assert data["up"] == [0.0, 0.0, 1.0]
+        assert not np.array(data["position"])[:, 2].any()
+    elif gravity.any():
         np.testing.assert_allclose(data["up"], -gravity / np.linalg.norm(gravity), atol=1e-6)
     # The last frame is followed by the first: no jump, and no frame twice.
     steps = np.diff(np.append(data["time"], data["duration"]))
@@ -235,9 +259,11 @@ def test_the_numbers_are_the_librarys(name):
     base = pteron.base_parameters(robot)
     assert data["base_parameters"]["rank"] == base.rank == len(data["base_parameters"]["values"])
     np.testing.assert_allclose(data["base_parameters"]["values"], base.values())
-    if robot.platform.turns:
-        singular = data["singular_orientations"]
-        np.testing.assert_allclose(singular, pteron.singular_orientations(robot))
+    assert data["reach"]["unit"] == ("m^2" if robot.platform.planar else "m^3")
+    if name in ("quadrupteron", "planar"):
+        singular = pteron.singular_orientations(robot, home["pose"][:-1])
+        assert len(singular) == 2
+        np.testing.assert_allclose(data["singular_orientations"], singular)
     else:
         assert data["singular_orientations"] is None
 
@@ -248,9 +274,13 @@ def test_the_page_shows_the_numbers(name):
     for value in (*found.peak_forces, *found.rms_forces, *found.peak_speeds):
         assert significant(float(value)) in text
     joints = {leg.joint.noun: leg.joint.force_unit for leg in found.robot.legs}
-    for noun in ("slider", "crank"):
+    for noun in ("slider", "crank", "shaft"):
         assert (noun in text.replace("the slider is tilted", "")) == (noun in joints)
     assert ("torque" in text) == ("crank" in joints)
+    for words in ("in a plane", "Area in reach", "dm²", "lies in the machine's plane"):
+        assert (words in text) == (name == "planar")
+    for words in ("counts as a point mass", "way of the tool's centre point", "Passive joints"):
+        assert (words in text) == (name == "shaft")
     assert significant(found.jacobian.condition, 4) in text
     for i, value in enumerate(found.base.values(), start=1):
         assert significant(float(value), 4) in text
@@ -278,6 +308,7 @@ def test_costs_come_in_pairs_with_percentages_of_the_counts():
 
 def test_measures_are_shown_where_they_depend_on_the_position():
     assert report("quadrupteron").measures is report("hostile").measures is None
+    assert report("planar").measures.cut.plane == "xy"
     found = report("delta").measures
     assert found.cut.plane == "xz", "upright"
     inside = found.cut.status == REACHABLE
@@ -299,6 +330,20 @@ def test_the_slices_share_a_scale():
             assert axis[0] < low < high < axis[-1]
 
 
+def test_the_platforms_inertia_is_told_with_all_its_parts():
+    robot = MACHINES["shaft"]
+    rows = [(name, values) for name, leg, values in bodies(robot) if leg is None]
+    names = [name for name, _ in rows]
+    assert names[0] == "platform"
+    assert names[-1] == "platform with all of it"
+    own = robot.platform
+    assert len(names) == 2 + len(own.bars) + len(own.geared)
+    parts = [values.get("m", 0.0) for _, values in rows[:-1]]
+    assert rows[-1][1]["m"] == pytest.approx(sum(parts))
+    assert rows[-1][1]["I"] == own.joined.inertia
+    assert [name for name, leg, _ in bodies(MACHINES["delta"]) if leg is None] == ["platform"]
+
+
 def test_the_condition_number_mixes_no_units():
     # In millimetres a machine is the same machine.
     robot = CATALOG["quadrupteron"]
@@ -309,6 +354,10 @@ def test_the_condition_number_mixes_no_units():
     assert found.condition == pytest.approx(np.linalg.cond(scaled))
     assert robot.platform.turns
     assert report("hostile").jacobian.condition == pytest.approx(1.0)
+    # The shaft of a Delta adds what the legs have nothing to do with.
+    assert report("shaft").jacobian.radius is None
+    three = np.linalg.cond(report("shaft").jacobian.matrix[:3, :3] * CATALOG["delta"].legs[0].lever)
+    assert report("shaft").jacobian.condition == pytest.approx(three)
 
 
 def test_symbols_stand_for_their_numbers():

@@ -49,7 +49,7 @@ def _machine(found: dict[str, Any]) -> Table:
     made.add_row("home pose", " ".join(f"{value:.4g}" for value in home["pose"]))
     made.add_row("reserve there", f"{home['reserve']:.3f} of 1")
     made.add_row("condition number there", f"{home['condition_number']:.4g}")
-    made.add_row("singular orientations there", f"{singular} deg" if singular else "none")
+    made.add_row("singular phi there", f"{singular} deg" if singular else "none")
     made.add_row("reach", f"{factor * reach['volume']:.4g} {unit}")
     made.add_row("cycle", f"{found['cycle']['duration']:.3g} s")
     made.add_row("base parameters", f"{base['rank']} of {base['of']}")
