@@ -127,6 +127,12 @@ def test_limits_are_ordered():
     assert leg((-1, 2))().limits == (-1.0, 2.0)
 
 
+@pytest.mark.parametrize("rods", [0, -1, 1.5, True, "2"])
+def test_rods_are_counted(rods):
+    words = f"rods: {rods!r} is not a whole number of at least 1"
+    refused(lambda: replace(CATALOG["delta"].legs[0], rods=rods), words)
+
+
 @pytest.mark.parametrize("mass", [0.0, -1.0])
 def test_a_body_has_mass(mass):
     words = f"mass: {mass:g} kg is not positive; give a value above 0 kg"

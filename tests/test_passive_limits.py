@@ -1,14 +1,17 @@
 """Limits of passive joints: where the joints are, and that whatever asks for reach keeps them."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from mechanisms import CATALOG
 from scipy.spatial.transform import Rotation
+from typer.testing import CliRunner
 
 import pteron
 from pteron import Cone, ModelError
+from pteron.cli.main import app
 from pteron.kernels import numeric
 from pteron.motion import pick_and_place
 from pteron.workspace import (
@@ -188,6 +191,18 @@ def test_the_platform_s_angle_has_limits_too():
     assert reserve(narrow, [0.0, 0.0, -0.45, 0.5]).smallest == pytest.approx(0.0, abs=1e-12)
     (at,) = (joint for joint in limited_joints(narrow, [0.0, 0.0, -0.45, 0.2]) if joint.leg == 0)
     assert (at.noun, at.value, at.least, at.most) == ("phi", 0.2, -0.7, 0.5)
+
+
+def test_check_tells_where_they_are_at_home(tmp_path):
+    file = str(pteron.save(limited("3-rrr", elbow_limits=(0.2, 3.0)), tmp_path / "robot.toml"))
+    text = CliRunner().invoke(app, ["check", file]).stdout
+    assert text.count("elbow") == 3
+    assert text.count("0.2 to 3 rad") == 3
+    found = json.loads(CliRunner().invoke(app, ["check", file, "--json"]).stdout)
+    joints = [joint for joint in found["limited_joints"] if not joint["actuated"]]
+    assert [joint["leg"] for joint in joints] == [1, 2, 3]
+    right = elbows(pteron.load(file), np.array(found["home_pose"]))["elbow"]
+    np.testing.assert_allclose([joint["value"] for joint in joints], right, atol=1e-7)
 
 
 def test_inverse_kinematics_does_not_apply_them():

@@ -44,7 +44,9 @@ def _list(json: bool) -> None:
 def new(
     kind: Annotated[
         str | None,
-        Argument(metavar="KIND", help="A machine of the catalog, or a TOML file.", show_default=""),
+        Argument(
+            metavar="KIND", help="A machine of the catalog, or a TOML file.", show_default=False
+        ),
     ] = None,
     out: Annotated[str | None, option("out", "Write it to this TOML file.", "FILE")] = None,
     overwrite: Annotated[bool, option("overwrite", "Replace the file if it is there.")] = False,

@@ -133,6 +133,8 @@ def _checked(value: Any, name: str, role: KeyRole) -> Any:
         return positive(value, name, "m")
     if role == "number":
         return number(value, name)
+    if role == "count" and (type(value) is not int or value < 1):
+        raise ModelError(f"{name}: {value!r} is not a whole number of at least 1")
     if role == "slider":
         return positive(value, "slider.mass", "kg")
     if role == "sign":

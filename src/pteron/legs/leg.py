@@ -14,9 +14,10 @@ Two lines bind them: `MyLeg.equations_class = MyEquations`, and `pteron.legs.KIN
 MyLeg`, after which files may name the kind.
 
 That is all: Jacobian, dynamics, regressor, energies, limits, drawings, logs, exported code follow.
-`examples/new_leg.py` is a complete kind of leg. `needs`, `transfers` and `named` may be
-overridden: a cheaper form of the same forces, the mass transfers that explain base parameters in
-symbols, and names in exported code.
+`examples/new_leg.py` is a complete kind of leg. More may be overridden: `needs`, a cheaper form of
+the same forces; `named`, names in exported code; and of the data `passive`, the passive joints that
+have limits, `doubts`, what is unlikely in its numbers, and `transfers`, the mass transfers that
+explain base parameters in symbols.
 
 All vectors are in the base frame, columns (3, 1). An expression has no branch on a value: the side
 of an elbow is a quantity, +1 or -1.
