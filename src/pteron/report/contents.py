@@ -259,4 +259,5 @@ def _orientations(robot: Manipulator, home: Array) -> Orientations | None:
 
 def _type_ii(robot: Manipulator, poses: Array) -> Array:
     """Return the size of the type-II measure as a share of its best, NaN where it has none."""
-    return np.minimum(np.abs(numeric(robot, "type_ii")(poses)[0]) / best_type_ii(robot), 1.0)
+    measure: Array = np.abs(numeric(robot, "type_ii")(poses)[0])
+    return np.asarray(np.minimum(measure / best_type_ii(robot), 1.0))
