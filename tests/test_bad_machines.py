@@ -166,6 +166,9 @@ def test_a_shaft_needs_an_angle_to_turn_and_turns_it_alone():
 
 def test_all_faults_are_told_at_once_those_of_the_machine_too(tmp_path):
     text = text_of("3-prr").replace("lower_length = 0.2", "lower_length = -0.2", 1)
+    text = text.replace("limits = [0.05, 0.3]", "limits = [0.3, 0.05]", 1)
+    text = text.replace("inertia = 0.00237530060951", "inertia = 0.0001", 1)
+    text = text.replace("inertia = 0.0268381389195", "inertia = 0.0")
     text = text.replace("slider_direction = [-0.5, 0.8", "direction = [0.0, 1.0, 0.0]\n" + SLIDER)
     text = text.replace('motion = "2T1R"', 'motion = "2T"').replace('name = "3-prr"', 'name = " "')
     file = tmp_path / "bad.toml"
@@ -173,12 +176,15 @@ def test_all_faults_are_told_at_once_those_of_the_machine_too(tmp_path):
     with pytest.raises(ModelError) as caught:
         pteron.load(file)
     assert [fault.split(":")[0] for fault in caught.value.faults] == [
+        "platform.inertia",
+        "leg 1",
+        "leg 1",
         "leg 1",
         "name",
         "legs",
         "leg 2",
     ]
-    assert str(caught.value).splitlines()[0] == f"{file}: 4 faults"
+    assert str(caught.value).splitlines()[0] == f"{file}: 7 faults"
 
 
 SLIDER = "slider_direction = [-0.5, 0.0, 0.8660254037844386] # "

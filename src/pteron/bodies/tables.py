@@ -55,6 +55,12 @@ class _Body(Table):
 
     kind: ClassVar[type[PlanarInertia] | type[RodInertia]]
 
+    @property
+    def unit(self) -> Any:
+        """A body that stands for one that cannot be."""
+        kinds = self.kind.kinds
+        return self.kind.of_values([float(kind in ("m", "I")) for kind in kinds])
+
     def inertia_of(self, key: str) -> Any:
         """Build the inertia; `key` goes before what an error names."""
         try:

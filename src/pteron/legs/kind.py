@@ -17,6 +17,7 @@ from pteron.bodies.parameters import LEG_BODIES
 from pteron.bodies.vectors import Vector, interval, number, positive, unit_vector, vector
 from pteron.errors import ModelError
 from pteron.legs.leg import LegEquations, LegMotion, Passive
+from pteron.toml import told
 
 
 @dataclass(frozen=True)
@@ -190,13 +191,20 @@ class LegKind(ABC):
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
     def __post_init__(self) -> None:
+        faults: list[str] = []
         if self.elbow not in self.branches:
             valid = "neither 1 nor -1" if len(self.branches) > 1 else "not 1, its only branch"
-            raise ModelError(f"elbow: {self.elbow!r} is {valid}")
+            faults.append(f"elbow: {self.elbow!r} is {valid}")
         for name, key in self.every_key().items():
             value = getattr(self, name)
-            if value is not None or key.default is not None:
+            if value is None and key.default is None:
+                continue
+            try:
                 object.__setattr__(self, name, _checked(value, name, key.role))
+            except ModelError as error:
+                faults += error.faults
+        if faults:
+            raise ModelError(told(faults), faults=faults)
 
     @classmethod
     def every_key(cls) -> dict[str, Key]:

@@ -101,7 +101,7 @@ def _machine(document: dict[str, Any], source: str) -> Manipulator:
 
     reading = _Reading()
     machine = reading.table(MachineTable, document, "")
-    platform = machine and reading.built("platform.", lambda: _platform(machine.platform))
+    platform = machine and reading.platform(machine.platform)
     given = document.get("legs")
     legs = given if isinstance(given, list) else []
     built: list[Any] = [reading.leg(i, leg) for i, leg in enumerate(legs, start=1)]
@@ -130,12 +130,30 @@ class _Reading:
             return None
 
     def built(self, prefix: str, build: Callable[[], _Built]) -> _Built | None:
-        """Return what `build` makes, or None with its fault noted under the key it names."""
+        """Return what `build` makes, or None with its faults noted under the keys they name."""
         try:
             return build()
         except ModelError as error:
-            self.faults.append(f"{prefix}{error}")
+            self.faults += [f"{prefix}{fault}" for fault in error.faults]
             return None
+
+    def platform(self, table: Any) -> Platform | None:
+        """Return the platform, or None; with a fault in its inertia it serves to check the legs."""
+        inertia = self.built("platform.", lambda: table.inertia_of("")) or table.unit
+        return self.built(
+            "platform.",
+            lambda: Platform(
+                table.motion,
+                inertia,
+                axis=table.axis,
+                x_axis=table.x_axis,
+                slides=table.slides,
+                limits=table.limits,
+                tool=table.tool,
+                bars=tuple(Bar(bar.mass, bar.hinge) for bar in table.bars),
+                geared=tuple(Geared(part.inertia, part.ratio) for part in table.geared),
+            ),
+        )
 
     def leg(self, i: int, given: object) -> LegKind | None:
         """Return leg i, from 1, or None."""
@@ -152,20 +170,6 @@ class _Reading:
             return None
         table = self.table(leg_table(kind), given, prefix)
         return table and self.built(prefix, lambda: leg_of(kind, table))
-
-
-def _platform(table: Any) -> Platform:
-    return Platform(
-        table.motion,
-        table.inertia_of(""),
-        axis=table.axis,
-        x_axis=table.x_axis,
-        slides=table.slides,
-        limits=table.limits,
-        tool=table.tool,
-        bars=tuple(Bar(bar.mass, bar.hinge) for bar in table.bars),
-        geared=tuple(Geared(part.inertia, part.ratio) for part in table.geared),
-    )
 
 
 def save(robot: Manipulator, path: str | Path) -> Path:

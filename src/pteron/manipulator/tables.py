@@ -29,6 +29,7 @@ from pteron.legs.cones import Cone
 from pteron.legs.kind import Key, KeyRole
 from pteron.manipulator.manipulator import STANDARD_GRAVITY
 from pteron.platforms.platform import Motion
+from pteron.toml import told
 
 
 class ConeTable(Table):
@@ -146,19 +147,30 @@ def leg_of(kind: type[LegKind], table: Any) -> LegKind:
     Raises
     ------
     ModelError
-        If there is no such leg; the message begins with the key.
+        If there is no such leg; with all faults, each of which begins with its key.
     """
-    values = {}
+    values: dict[str, Any] = {}
+    faults: list[str] = []
     for name, key in kind.every_key().items():
-        given = getattr(table, toml_key(name, key))
-        if key.role == "slider":
-            given = given.mass
-        elif key.body:
-            given = given.inertia_of(name)
-        elif key.role == "cone" and given is not None:
-            given = given.cone_of(name)
-        values[name] = given
-    return kind(**values)
+        values[name] = given = getattr(table, toml_key(name, key))
+        try:
+            if key.role == "slider":
+                values[name] = given.mass
+            elif key.body:
+                values[name] = given.unit  # the rest of the leg is looked at, too
+                values[name] = given.inertia_of(name)
+            elif key.role == "cone" and given is not None:
+                values[name] = None
+                values[name] = given.cone_of(name)
+        except ModelError as error:
+            faults += error.faults
+    try:
+        leg = kind(**values)
+    except ModelError as error:
+        faults += error.faults
+    if faults:
+        raise ModelError(told(faults), faults=faults)
+    return leg
 
 
 def leg_items(leg: LegKind) -> Mapping[str, Any]:
