@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-import casadi as ca
 import numpy as np
 
 from pteron.dynamics import inverse_dynamics
-from pteron.equations.kinematics import passive_joints
-from pteron.equations.machine import Machine, closure_of
+from pteron.equations.machine import closure_of
 from pteron.kernels import Array, numeric
 from pteron.kinematics import jacobian, joint_rates, singular_orientations
 from pteron.kinematics.singularities import best_type_ii
-from pteron.legs.leg import Passive
 from pteron.manipulator import Manipulator
 from pteron.motion import (
     Guide,
@@ -30,11 +27,13 @@ from pteron.report.costs import Cost, costs
 from pteron.workspace import (
     BEYOND_LIMITS,
     JointRanges,
+    LimitedJoint,
     ReachSlice,
     ReachVolume,
     Reserve,
     home_pose,
     joint_ranges,
+    limited_joints,
     reach_slice,
     reach_volume,
     reserve,
@@ -111,8 +110,8 @@ class Report:
     The cycle keeps the reserve `least`; its forces and joint speeds (T, n) are in N and m/s, or
     N m and rad/s. The slices go through the home pose and are all of one width. Of `orientations`
     and `measures` there is what the type-II measure depends on; neither where J is constant. The
-    squares of the machine's pictures have sides of `grid`, m. `passive` has the legs' passive
-    joints that have limits, at home, each with its leg, from 0.
+    squares of the machine's pictures have sides of `grid`, m. `passive` has the passive joints
+    that have limits, at home.
     """
 
     robot: Manipulator
@@ -128,7 +127,7 @@ class Report:
     forces: Array
     joint_speeds: Array
     joints: JointRanges
-    passive: tuple[tuple[int, Passive], ...]
+    passive: tuple[LimitedJoint, ...]
     slices: tuple[ReachSlice, ...]
     volume: ReachVolume
     jacobian: JacobianAtHome
@@ -184,7 +183,7 @@ def contents(robot: Manipulator) -> Report:
         forces=inverse_dynamics(robot, cycle.pose, cycle.velocity, cycle.acceleration),
         joint_speeds=joint_rates(robot, cycle.pose, cycle.velocity).actuated,
         joints=joint_ranges(robot, cycle.pose),
-        passive=_passive(robot, home),
+        passive=tuple(joint for joint in limited_joints(robot, home) if not joint.actuated),
         slices=tuple(
             reach_slice(robot, home, plane, extent=_extent(volume.box, plane, [half] * 3))
             for plane in slice_planes(robot)
@@ -195,16 +194,6 @@ def contents(robot: Manipulator) -> Report:
         measures=_measures(robot, home, volume.box),
         base=base,
         costs=costs(base),
-    )
-
-
-def _passive(robot: Manipulator, home: Array) -> tuple[tuple[int, Passive], ...]:
-    platform = replace(robot.platform, limits=None)  # which count for every leg
-    machine = Machine.of(replace(robot, platform=platform))
-    return tuple(
-        (i, joint._replace(value=float(joint.value)))
-        for i, joints in enumerate(passive_joints(machine, ca.SX(ca.DM(home))))
-        for joint in joints
     )
 
 
@@ -259,5 +248,5 @@ def _orientations(robot: Manipulator, home: Array) -> Orientations | None:
 
 def _type_ii(robot: Manipulator, poses: Array) -> Array:
     """Return the size of the type-II measure as a share of its best, NaN where it has none."""
-    measure: Array = np.abs(numeric(robot, "type_ii")(poses)[0])
-    return np.asarray(np.minimum(measure / best_type_ii(robot), 1.0))
+    share = np.abs(numeric(robot, "type_ii")(poses)[0]) / best_type_ii(robot)
+    return np.asarray(np.minimum(share, 1.0))

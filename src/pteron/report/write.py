@@ -86,11 +86,7 @@ def numbers(report: Report) -> dict[str, Any]:
             "type_ii": float(report.reserve.type_ii),
             "clearances": report.reserve.clearances.tolist(),
             "reserve": float(report.reserve.smallest),
-            "passive_joints": [
-                {"leg": i + 1, "joint": joint.noun, "unit": joint.unit, "coordinate": joint.value}
-                | {"limits": [joint.least, joint.most]}
-                for i, joint in report.passive
-            ],
+            "passive_joints": [vars(joint) for joint in report.passive],
             "jacobian": report.jacobian.matrix.tolist(),
             "condition_number": report.jacobian.condition,
             "condition_radius": report.jacobian.radius,
