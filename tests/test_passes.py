@@ -64,8 +64,10 @@ def test_a_reciprocal_stays_one_division():
 
 
 def test_what_divides_several_is_divided_by_once():
-    found = optimised(function(A / X * (B - C) + D, B / X * Y - A, C / X + Y))
-    assert (divisions(found), count_operations(found)) == (1, 9)
+    given = function(A / X * (B - C) + D, B / X * Y - A, C / X + Y)
+    found = optimised(given)
+    assert divisions(found) == 1
+    assert effort(found) < effort(given)
 
 
 @st.composite
