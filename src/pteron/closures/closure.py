@@ -17,7 +17,7 @@ from operator import mul
 import casadi as ca
 
 from pteron.bodies.motion import Expression
-from pteron.closures.determinants import adjugate, determinant
+from pteron.closures.determinants import adjugate, determinant, solved_across
 from pteron.legs.leg import LegEquations, LegMotion
 from pteron.platforms.motion import PlatformEquations, PlatformMotion
 
@@ -45,11 +45,9 @@ class Closure(ABC):
 
         With J = B^-1 A, B being the divisors: F = B A^-T wrench.
         """
-        rows = plain_rows(platform, legs)
-        across = adjugate(rows)
-        divisors = ca.vertcat(*(leg.divisor for leg in legs))
-        share = divisors / ca.mtimes(rows[0, :], across[:, 0])
-        return ca.repmat(share, 1, wrench.shape[1]) * ca.mtimes(across.T, wrench)
+        shares, volume = solved_across(plain_rows(platform, legs), wrench)
+        rows = zip(legs, ca.vertsplit(shares), strict=True)
+        return ca.vertcat(*(leg.divisor / volume * share for leg, share in rows))
 
     def rates(
         self, joints: Expression, platform: PlatformMotion, legs: Sequence[LegMotion]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import casadi as ca
 
 from pteron.bodies.motion import Expression
@@ -25,12 +27,34 @@ def adjugate(m: Expression) -> Expression:
     return ca.horzcat(*columns)
 
 
+def solved_across(rows: Expression, right: Expression) -> tuple[Expression, Expression]:
+    """Return x (n, K) and d with A^T x = d w, d = det A, for A's rows, n = 2 to 4, and w (n, K)."""
+    if right.shape[1] > 1 or rows.shape[0] == 2:
+        across = adjugate(rows)
+        return ca.mtimes(across.T, right), ca.mtimes(rows[0, :], across[:, 0])
+    # Cramer's rule, with each minor computed once.
+    if rows.shape[0] == 3:
+        a, b, c = (row.T for row in ca.vertsplit(rows))
+        minor, turned = ca.cross(b, c), ca.cross(a, right)
+        parts = ca.dot(minor, right), ca.dot(c, turned), -ca.dot(b, turned)
+        return ca.vertcat(*parts), ca.dot(a, minor)
+    vectors = ca.horzcat(rows.T, right)
+    upper, lower = _minors(vectors[:2, :]), _minors(vectors[2:, :])
+
+    def volume(i: int, j: int, k: int, m: int) -> Expression:
+        terms = ((i, j), (k, m), 1), ((i, k), (j, m), -1), ((i, m), (j, k), 1)
+        return sum(s * (upper[a] * lower[b] + upper[b] * lower[a]) for a, b, s in terms)
+
+    others = [[k for k in range(4) if k != i] for i in range(4)]
+    parts = [(-1) ** (3 - i) * volume(*kept, 4) for i, kept in enumerate(others)]
+    return ca.vertcat(*parts), volume(0, 1, 2, 3)
+
+
 def _minors(rows: Expression) -> dict[tuple[int, int], Expression]:
     """Return the minors of two rows, by their columns."""
     return {
         (i, j): rows[0, i] * rows[1, j] - rows[0, j] * rows[1, i]
-        for i in range(4)
-        for j in range(i + 1, 4)
+        for i, j in combinations(range(rows.shape[1]), 2)
     }
 
 

@@ -14,8 +14,8 @@ import casadi as ca
 from pteron.bodies.motion import Expression
 from pteron.closures.closure import Closure
 from pteron.closures.loci import meeting_points, moved
-from pteron.legs.leg import LegEquations, LegMotion
-from pteron.platforms.motion import PlatformEquations, PlatformMotion
+from pteron.legs.leg import LegEquations
+from pteron.platforms.motion import PlatformEquations
 
 
 class ThreeLoci(Closure):
@@ -26,21 +26,6 @@ class ThreeLoci(Closure):
     @classmethod
     def fits(cls, legs: Sequence[type[LegEquations]], platform: type[PlatformEquations]) -> bool:
         return platform.coordinates == ("x", "y", "z")
-
-    def forces(
-        self, wrench: Expression, platform: PlatformMotion, legs: Sequence[LegMotion]
-    ) -> Expression:
-        """Return B A^-T w for J = B^-1 A, by Cramer's rule, each minor computed once."""
-        a, b, c = (leg.row[:, :3].T for leg in legs)
-        minor, turned = ca.cross(b, c), ca.mtimes(ca.skew(a), wrench)
-        shares = (minor.T, wrench), (c.T, turned), (-b.T, turned)
-        volume = ca.dot(a, minor)
-        return ca.vertcat(
-            *(
-                leg.divisor * (ca.mtimes(row, column) / volume)
-                for leg, (row, column) in zip(legs, shares, strict=True)
-            )
-        )
 
     def poses(self, joints: Expression) -> Expression:
         pairs = zip(self.legs, ca.vertsplit(joints), self.platform.offsets, strict=True)

@@ -328,7 +328,7 @@ def program(
 
 
 def specialised(given: Program, values: dict[str, NDArray[np.float64]]) -> Program:
-    """Return the program with numbers in place of some of its inputs."""
+    """Return a plain program with numbers in place of some of its inputs, after the pass."""
     symbols = given.function.sx_in()
     folded = [
         ca.SX(ca.DM(values[port.name])) if port.name in values else symbol
@@ -343,7 +343,8 @@ def specialised(given: Program, values: dict[str, NDArray[np.float64]]) -> Progr
         [given.inputs[k].name for k in left],
         [port.name for port in given.outputs],
     )
-    return Program(given.name, function, tuple(given.inputs[k] for k in left), given.outputs)
+    inputs = tuple(given.inputs[k] for k in left)
+    return Program(given.name, optimised(function), inputs, given.outputs)
 
 
 @lru_cache(maxsize=256)
@@ -380,7 +381,8 @@ def _built(
         for j in members:
             selection[j, k] = 1
     if what == "base_regressor":
-        return _program(machine, what, constants={"selection": selection}, guarded=guarded)
+        constants: Symbols = {"selection": selection}
+        return _program(machine, what, constants=constants, guarded=guarded, plain=plain)
     base = ca.SX.sym("base_parameters", len(columns))
     # A mass on a platform point may be the leg's or the platform's, whichever costs less.
     given, extra = ca.mtimes(selection, base), {"base_parameters": base}

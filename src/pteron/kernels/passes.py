@@ -7,6 +7,7 @@ What a person would do to it by hand to save operations is done here, once, for 
     x + y - z  and  w - y - x  ->  s = x + y; s - z, w - s  a part of two sums (or two products)
     -(a - b)  and  b - a       ->  b - a                    one difference: signs stand outside
     a/2.5                      ->  0.4*a                    a number's quotient is a product
+    a/x  and  b/x              ->  r = 1/x; a*r, b*r        one division, which takes longer
 
 Such savings do not show in a graph of pairs, hence the sums of many terms of `terms`. Three steps
 are repeated on them for as long as they save something:
@@ -15,7 +16,8 @@ are repeated on them for as long as they save something:
     factor    the factor that most terms of a sum have is taken out of them, again and again
     share     the pair that most sums hold becomes a sum of its own, again and again
 
-Products are flattened and shared like sums. This is the greedy algebraic elimination of common
+Products are flattened and shared like sums; divisions are saved last, for one operation more each.
+This is the greedy algebraic elimination of common
 subexpressions of A. Hosangadi, F. Fallah and R. Kastner, IEEE Transactions on CAD 25 (2006)
 2012-2022. No product of sums is multiplied out and nothing is divided that was not divided before,
 so that a result differs from the plain one by the rounding of its terms only.
@@ -38,7 +40,8 @@ from pteron.kernels.translation import read, written
 def optimised(function: ca.Function) -> ca.Function:
     """Return an SX function of the same inputs, outputs and values with fewer operations.
 
-    Where nothing is saved it is the function given.
+    Where nothing is saved it is the function given. A division takes as long as several products:
+    to save one, an operation more is taken.
 
     Examples
     --------
@@ -59,7 +62,23 @@ def optimised(function: ca.Function) -> ca.Function:
             break
         best, least = (graph, roots), cost
     found = written(*best, function)
-    return found if count_operations(found) < count_operations(function) else function
+    if count_operations(found) >= count_operations(function):
+        best, found = given, function
+    divided = _divided(*best)
+    return found if divided is None else written(*divided, function)
+
+
+def _divided(old: TermGraph, roots: list[int]) -> tuple[TermGraph, list[int]] | None:
+    """Return the graph with one division for what several quotients are divided by, if any."""
+    uses = old.uses(roots)
+    if not any(old.is_a("inverse", k) and uses[k] > 1 for k in uses):
+        return None
+
+    def rule(new: TermGraph, k: int, values: list[int]) -> int:
+        several = old.is_a("inverse", k) and uses[k] > 1
+        return new.reciprocal(values[0]) if several else old.copied(new, k, values)
+
+    return old.rebuilt(roots, rule)
 
 
 def _cost(graph: TermGraph, roots: list[int]) -> int:

@@ -162,7 +162,8 @@ def _compiled(
     dtype: str,
     threads: int,
 ) -> Kernel:
-    built = program(robot, what, columns, wrench=wrench)
+    folded = grade == "specialised"
+    built = program(robot, what, columns, wrench=wrench, plain=folded)
     fixed: dict[str, Array] = {}
     for port in built.inputs:
         if port.name == "parameters":
@@ -170,7 +171,7 @@ def _compiled(
         elif port.name == "base_parameters":
             fixed[port.name] = np.array(base_values)
     made: dict[str, ca.Function] = {}
-    if grade == "specialised" and fixed:
+    if folded:
         built, fixed = specialised(built, fixed), {}
     elif base_values is not None and target not in _TRANSPARENT and "base_parameters" in fixed:
         # What depends on base parameters alone is worked out once.

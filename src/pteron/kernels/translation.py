@@ -87,7 +87,12 @@ def _wanted_signs(graph: TermGraph, order: list[int], roots: list[int]) -> Count
         kind, operands = graph.nodes[k][0], graph.operands(k)
         if kind == "product":
             turning = [f for f in operands if graph.is_a("sum", f) or graph.is_a("product", f)]
-            wanted.update(dict.fromkeys(turning[:1], wanted[k]))  # one that turns is enough
+            # One that turns is enough, or -1/x in the place of 1/x: see `_product`.
+            reciprocals = [f for f in operands if graph.is_a("reciprocal", f)]
+            sign = (-1) ** len(reciprocals)
+            wanted.update(dict.fromkeys(turning[:1], sign * wanted[k]))
+            if not turning:
+                wanted.update(dict.fromkeys(reciprocals[:1], wanted[k]))
         elif kind not in ("sum", "inverse", "reciprocal"):
             wanted.update({abs(v): sign_of(v) for v in operands})
     return wanted

@@ -15,13 +15,13 @@ from typing import ClassVar, Self
 import casadi as ca
 
 from pteron.bodies.inertia import RodInertia
-from pteron.bodies.motion import AngleMotion, Expression, PointMotion
+from pteron.bodies.motion import AngleMotion, Expression, Moments, PointMotion
 from pteron.bodies.vectors import Vector
 from pteron.errors import ModelError
 from pteron.legs.circles import perpendicular_to, random_fraction, random_vector
 from pteron.legs.cones import within
 from pteron.legs.kind import SHAFT, Key, LegKind, Quantity, Transfer
-from pteron.legs.leg import Joint, LegEquations, LegMotion, Passive, Reach, Turned
+from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Passive, Reach, Turned
 from pteron.legs.rods import rod_body, universal_joints
 
 _FAST = 10.0
@@ -220,6 +220,32 @@ class RUPUEquations(LegEquations):
         return LegMotion(
             self.ratio * angle.angle, *turned, row, ca.SX(1), bodies, chain, links=(None, w)
         )
+
+    def needs(
+        self,
+        point: PointMotion,
+        angle: AngleMotion | None,
+        gravity: Expression,
+        inertia: Mapping[str, Moments],
+    ) -> Needs:
+        """Return the forces that both parts need: all of them at the platform point.
+
+        With mu = (I_u + I_l) / L^2, eta = m gamma_x / L of the lower part and nu that of the upper,
+        kappa = L' / L and P = 1 - n n^T, they are P v - 2 kappa (mu + eta) P c' - eta (n'.n') w
+        beside the mass that rides, v = (mu + 2 eta) c'' - (eta + nu) g.
+        """
+        dc, ddc, w = point.velocity, point.acceleration, point.position - self.r
+        square, forward = ca.dot(w, w), ca.dot(w, dc)
+        length, kappa = ca.sqrt(square), forward / square
+        mu = (inertia["u"].i + inertia["l"].i) / square
+        eta, nu = inertia["l"].hx / length, inertia["u"].hx / length
+        swing = mu + eta
+        v = ca.mtimes(ddc, swing + eta) - ca.mtimes(gravity, eta + nu)
+        turning = ca.dot(dc, dc) - kappa * forward  # L^2 n'.n'
+        along = (ca.mtimes(w.T, v) + turning * eta) / square - 2 * kappa * kappa * swing
+        force = v - ca.mtimes(w, along) - ca.mtimes(dc, 2 * kappa * swing)
+        none = ca.SX(1, swing.shape[1])
+        return Needs(none, ca.vertcat(force, none), inertia["l"].m)
 
     def reach(self, c: Expression) -> Reach:
         w = c - self.r
