@@ -42,12 +42,13 @@ def solved_across(rows: Expression, right: Expression) -> tuple[Expression, Expr
     upper, lower = _minors(vectors[:2, :]), _minors(vectors[2:, :])
 
     def volume(i: int, j: int, k: int, m: int) -> Expression:
+        """Return the determinant of four of the vectors."""
         terms = ((i, j), (k, m), 1), ((i, k), (j, m), -1), ((i, m), (j, k), 1)
         return sum(s * (upper[a] * lower[b] + upper[b] * lower[a]) for a, b, s in terms)
 
-    others = [[k for k in range(4) if k != i] for i in range(4)]
-    parts = [(-1) ** (3 - i) * volume(*kept, 4) for i, kept in enumerate(others)]
-    return ca.vertcat(*parts), volume(0, 1, 2, 3)
+    # With w in place of one row's vector, put last: its sign is that of the way there.
+    swapped = -volume(1, 2, 3, 4), volume(0, 2, 3, 4), -volume(0, 1, 3, 4), volume(0, 1, 2, 4)
+    return ca.vertcat(*swapped), volume(0, 1, 2, 3)
 
 
 def _minors(rows: Expression) -> dict[tuple[int, int], Expression]:
