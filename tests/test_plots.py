@@ -222,6 +222,10 @@ def test_singular_orientations_are_marked():
         "singular, \u221290.0°",
         "singular, 90.0°",
     ]
+    near = regularity_figure(np.linspace(-3.0, 3.0, 9), np.ones(9), np.radians([-60, 20, 30]))
+    marks = [text for text in near.axes[0].texts if "°" in text.get_text()]
+    assert [mark.get_text() for mark in marks] == ["\u221260°", "20°", "30°"]
+    assert marks[1].xyann != marks[2].xyann, "neighbours stand in two rows"
     curve = max(axes.lines, key=lambda line: len(line.get_xdata()))
     assert curve.get_ydata().min() >= 0.0
     np.testing.assert_allclose(

@@ -23,6 +23,9 @@ from pteron.plots.canvas import (
     spot,
 )
 
+_ROOM = 75.0
+"""Degrees that a remark takes which says in words what an orientation is."""
+
 
 def forces_figure(
     time: Array,
@@ -59,7 +62,7 @@ def regularity_figure(
     home: float | None = None,
     used: tuple[float, float] | None = None,
 ) -> Figure:
-    """Return the size of the type-II measure over phi, where it depends on nothing else.
+    """Return the size of the type-II measure over phi, NaN where it has none.
 
     The angles (A,) ascend; the singular orientations, phi of the home pose, and the least and
     greatest phi that a motion uses are marked. All are in rad.
@@ -72,10 +75,12 @@ def regularity_figure(
         axes.axvspan(low, high, color=GRID, alpha=0.6, linewidth=0.0, zorder=0.5)
         remark(axes, "used by the cycle", (low + high) / 2.0, 0.04, MUTED)
     axes.plot(degrees, np.abs(type_ii), color=REACH, linewidth=2.0, zorder=3)
-    for angle in np.degrees(singular):
+    roomy = np.degrees(np.diff(singular)).min(initial=np.inf) > _ROOM
+    for i, angle in enumerate(np.degrees(singular)):
         axes.axvline(angle, color=WARNING, linewidth=1.2, linestyle=(0, (4, 2)))
-        text = f"singular, {angle:.1f}°".replace("-", "\u2212")
-        remark(axes, text, float(angle), inf, WARNING, 3.0)
+        text = f"singular, {angle:.1f}°" if roomy else f"{angle:.0f}°"
+        rise = 3.0 if roomy or i % 2 else 14.0
+        remark(axes, text.replace("-", "\u2212"), float(angle), inf, WARNING, rise)
     if home is not None:
         at, value = float(np.degrees(home)), float(np.interp(home, angles, np.abs(type_ii)))
         spot(axes, at, value, INK, PAPER, 6.0, zorder=4)
