@@ -5,10 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import lru_cache
 
+import casadi as ca
 import numpy as np
 
+from pteron.bodies.motion import Expression
 from pteron.bodies.parameters import JOINED, OWN
-from pteron.kernels import Array, count_operations, program
+from pteron.equations.machine import Machine, State
+from pteron.equations.virtual_work import inverse_dynamics
+from pteron.kernels import Array, Port, count_operations, program
+from pteron.kernels.graph import graph_of
 from pteron.kernels.hoisting import hoisted
 from pteron.manipulator import Manipulator, parameter_data
 from pteron.reduction.find import base_parameters
@@ -23,9 +28,10 @@ def cheapest_parameters(robot: Manipulator) -> BaseParameters:
     """Return base parameters with which the inverse dynamics need fewest operations.
 
     Any invertible combination of a base set is a base set. The masses that the lower links' m and
-    m gamma_x amount to are left to the joints, and m_u to the slider; among what remains (the lower
-    links' masses or the platform's four parameters, for one) columns are exchanged as long as the
-    reduced model gets cheaper. It is a local search, from two starts.
+    m gamma_x amount to are left to the joints, and m_u to the slider, where there is a choice; among
+    what remains (the lower links' masses or the platform's four parameters, for one) columns are
+    exchanged as long as the reduced model gets cheaper. It is a local search, from two starts; what
+    `base_parameters` keeps by itself is never cheaper than its result.
 
     Parameters
     ----------
@@ -53,15 +59,15 @@ def cheapest_parameters(robot: Manipulator) -> BaseParameters:
     columns = parameter_data(robot)
     base = base_parameters(robot)
     grouping = _without_units(robot, base)
-    candidates = [k for k, p in enumerate(columns) if (p.kind, p.body) not in JOINED]
-    always = [k for k in candidates if (columns[k].kind, columns[k].body) in OWN]
-    others = [k for k in candidates if k not in always]
-    # Not all are left to the joints: a telescopic shaft's lower part hands its mass to no other.
-    joined = [k for k in range(len(columns)) if k not in candidates]
+    places = [(p.kind, p.body) for p in columns]
+    own = [k for k, place in enumerate(places) if place in OWN]
+    joined = [k for k, place in enumerate(places) if place in JOINED]
+    others = [k for k in range(len(columns)) if k not in own and k not in joined]
+    model = _Model(robot)
     found = {base.kept}
     for order in (others, others[::-1]):
-        start = _independent(grouping, always + order + joined)
-        found.add(_improved(robot, grouping, start, candidates)[1])
+        start = _independent(grouping, [*own, *order, *joined])
+        found.add(_improved(model, grouping, start, [*own, *others]))
     best = min(found, key=lambda kept: (_final_cost(robot, kept), kept))
     return base_parameters(robot, keep=[columns[k].name for k in best])
 
@@ -87,10 +93,10 @@ def _independent(grouping: Array, order: Sequence[int]) -> tuple[int, ...]:
 
 
 def _improved(
-    robot: Manipulator, grouping: Array, kept: tuple[int, ...], candidates: Sequence[int]
-) -> tuple[int, tuple[int, ...]]:
+    model: _Model, grouping: Array, kept: tuple[int, ...], candidates: Sequence[int]
+) -> tuple[int, ...]:
     """Exchange columns one by one as long as that saves operations."""
-    cost = _cost(robot, kept)
+    cost = model.cost(kept)
     while True:
         basis = grouping[:, kept]
         better = (cost, kept)
@@ -100,16 +106,43 @@ def _improved(
             shares = np.linalg.solve(basis, grouping[:, column])
             for place in np.flatnonzero(np.abs(shares) > _NONZERO):
                 other = tuple(sorted({*kept, column} - {kept[place]}))
-                better = min(better, (_cost(robot, other), other))
+                better = min(better, (model.cost(other), other))
         if better[0] >= cost:
-            return cost, kept
+            return kept
         cost, kept = better
 
 
-def _cost(robot: Manipulator, kept: tuple[int, ...]) -> int:
-    """Return the operations before the pass that saves some, which would take far longer."""
-    columns = tuple((column,) for column in kept)
-    return count_operations(program(robot, "inverse_dynamics", columns, plain=True).function)
+class _Model:
+    """The reduced model of a machine, which costs something for every choice of base parameters."""
+
+    def __init__(self, robot: Manipulator) -> None:
+        self.machine = Machine.of(robot)
+        names = ("pose", "velocity", "acceleration")
+        self.motion = [ca.SX.sym(name, robot.freedom) for name in names]
+        self.state = self.machine.state(*self.motion)
+        self.known: dict[tuple[int, ...], int] = {}
+
+    def cost(self, kept: tuple[int, ...]) -> int:
+        """Return the operations of a state before the pass that saves some, which takes longer."""
+        if kept not in self.known:
+            base = ca.SX.sym("base", len(kept))
+            given = ca.SX(len(self.machine.parameters), 1)
+            given[list(kept)] = base
+            self.known[kept] = min(
+                self._operations(base, inverse_dynamics(*self._of(given), carried=carried))
+                for carried in (True, False)
+            )
+        return self.known[kept]
+
+    def _of(self, given: Expression) -> tuple[Machine, State, Expression]:
+        return self.machine, self.state, given
+
+    def _operations(self, base: Expression, forces: Expression) -> int:
+        """Count what depends on the state; what depends on base parameters alone is done once."""
+        inputs = [Port("", (symbol.shape[0],)) for symbol in self.motion]
+        ports = (*inputs, Port("base", (base.shape[0],), shared=True))
+        graph = graph_of(ca.Function("forces", [*self.motion, base], [ca.cse(forces)]), ports)
+        return sum(not graph.nodes[k].shared for k in graph.operations())
 
 
 def _final_cost(robot: Manipulator, kept: tuple[int, ...]) -> int:
