@@ -114,10 +114,10 @@ def compile(
     >>> robot = pteron.load("quadrupteron")
     >>> kernel = pteron.compile(robot, "inverse_dynamics")
     >>> kernel.operations, [port.name for port in kernel.inputs]
-    (382, ['pose', 'velocity', 'acceleration'])
+    (385, ['pose', 'velocity', 'acceleration'])
     >>> kernel = pteron.compile(robot, "inverse_dynamics", grade="parametric")
     >>> kernel.operations, [port.name for port in kernel.ports]
-    (407, ['pose', 'velocity', 'acceleration', 'parameters'])
+    (409, ['pose', 'velocity', 'acceleration', 'parameters'])
     """
     if target not in TARGETS:
         raise ModelError(f"target: {target!r} is not known; choose from {', '.join(TARGETS)}")
