@@ -28,10 +28,10 @@ def cheapest_parameters(robot: Manipulator) -> BaseParameters:
     """Return base parameters with which the inverse dynamics need fewest operations.
 
     Any invertible combination of a base set is a base set. The masses that the lower links' m and
-    m gamma_x amount to are left to the joints, and m_u to the slider, where there is a choice; among
-    what remains (the lower links' masses or the platform's four parameters, for one) columns are
-    exchanged as long as the reduced model gets cheaper. It is a local search, from two starts; what
-    `base_parameters` keeps by itself is never cheaper than its result.
+    m gamma_x amount to are left to the joints, and m_u to the slider, where there is a choice;
+    among what remains (the lower links' masses or the platform's four parameters, for one) columns
+    are exchanged as long as the reduced model gets cheaper. It is a local search, from two starts;
+    what `base_parameters` keeps by itself is never cheaper than its result.
 
     Parameters
     ----------
