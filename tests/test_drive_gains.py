@@ -124,9 +124,9 @@ def test_what_was_found_can_be_read_and_declared():
     data = found.as_dict()
     assert data["gains"] == found.gains.tolist()
     assert set(data["units"]) == {"N/A"}
-    # The currents' noise is what was put on them.
+    # The currents' noise is what was put on them; it is known from some fifty rows.
     size = np.sqrt((current_log("tripteron").forces ** 2).mean(axis=0))
-    np.testing.assert_allclose(found.residual, NOISE[1] * size, rtol=0.15)
+    np.testing.assert_allclose(found.residual, NOISE[1] * size, rtol=0.2)
 
 
 def test_a_payload_that_no_actuator_feels_is_refused():

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from pteron.equations.machine import closure_of
 from pteron.errors import DataError, UnreachablePose
-from pteron.identification.signals.states import home, home_mode
+from pteron.identification.signals.states import home_mode
 from pteron.kernels import Array, as_array
 from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator
@@ -169,12 +169,11 @@ def states(motion: FourierMotion, times: Array) -> State:
         return State(
             q, dq, ddq, joints, rates, unchecked(robot, "joint_accelerations", q, dq, ddq)[0]
         )
-    poses = unchecked(robot, "closure_poses", q)
-    pose: Array = poses[:, motion.mode, :].copy()
+    poses: Array = unchecked(robot, "closure_poses", np.vstack([motion.center, q]))
+    center, pose = poses[0, motion.mode], poses[1:, motion.mode].copy()
     if robot.platform.turns and not any(leg.follows_angle for leg in robot.legs):
         # Within a mode phi stays on one side of the singular orientations, half a turn at most.
-        around = home(robot)[-1]
-        pose[:, -1] = around + (pose[:, -1] - around + np.pi) % (2.0 * np.pi) - np.pi
+        pose[:, -1] = center[-1] + (pose[:, -1] - center[-1] + np.pi) % (2.0 * np.pi) - np.pi
     velocity, acceleration = unchecked(robot, "platform_motion", pose, dq, ddq)
     return State(pose, velocity, acceleration, q, dq, ddq)
 

@@ -126,13 +126,15 @@ def smoothed(signal: Array, rate: float, cutoff: float | None) -> Array:
     return np.asarray(sosfiltfilt(sections, signal, axis=0, padlen=padding))
 
 
-def cutoff_of(signal: Array, rate: float) -> float | None:
+def cutoff_of(signal: Array, rate: float, *, harmless: float = 0.0) -> float | None:
     """Return the cut-off for positions (T, k), Hz, or None where they need no filter.
 
     It makes the mean square error of the filtered accelerations least, each over its signal's
     noise, as far as the measured positions tell: by Stein's estimate, from their spectrum and
-    `position_noise`. So the filter passes what is more motion than noise. The cut-off is at most
-    twenty times the frequency below which nearly all the motion is, as noise need not be white.
+    `position_noise`. So the filter passes what is more motion than noise. It passes more, since it
+    then mixes less, as long as noise is a `harmless` share of each acceleration. The cut-off is at
+    most twenty times the frequency below which nearly all the motion is, as noise need not be
+    white.
 
     References
     ----------
@@ -148,21 +150,34 @@ def cutoff_of(signal: Array, rate: float) -> float | None:
     bandwidth = bins_below(power, _POSITION_POWER) * rate / len(part)
     lowest = min(40.0 * rate / len(part), _HIGHEST * rate)
     highest = max(min(_HIGHEST * rate, _MARGIN * bandwidth), lowest)
-    frequencies = np.fft.rfftfreq(len(part), 1.0 / rate)[:, None]
     candidates = np.geomspace(lowest, highest, _CANDIDATES)
-    # What a filter takes of the motion and leaves of the noise, but for a constant: sums over
-    # frequencies of power times `slopes`, and of `given`.
-    gains = 1.0 / (1.0 + (frequencies / candidates) ** (2 * _ORDER))
-    slopes, given = frequencies**4 * (gains**2 - 2.0 * gains), frequencies**4 * 2.0 * gains
-    count = signal.shape[1]
-    relative = (power / noise**2).sum(axis=1)
-    risks = relative @ slopes + count * given.sum(axis=0)
+    frequencies: Array = np.fft.rfftfreq(len(part), 1.0 / rate)[:, None].astype(float)
+    gains, fourth = 1.0 / (1.0 + (frequencies / candidates) ** (2 * _ORDER)), frequencies**4
+    best = _least_risk(power / noise**2, gains, fourth)
+
+    # What the noise makes of the accelerations' power, over what the motion makes of it
+    passed = (fourth * gains**2).mean(axis=0)
+    motion = (fourth * gains[:, [best]] ** 2 * power).mean(axis=0) - noise**2 * passed[best]
+    share = np.outer(passed, noise**2 / np.maximum(motion, np.finfo(float).tiny)).max(axis=1)
+    return float(candidates[max(best, int((share <= harmless**2).sum()) - 1)])
+
+
+def _least_risk(relative: Array, gains: Array, weights: Array) -> int:
+    """Return which filter's mean square error, at these weights (F, 1), is estimated least.
+
+    `relative` (F, k) is the power of signals over that of their noise, `gains` (F, C) are those of
+    filters, from the lowest on.
+    """
+    # What a filter takes of the motion and leaves of the noise, but for a constant: the power times
+    # `slopes`, and what is `given`.
+    slopes, given = weights * (gains**2 - 2.0 * gains), weights * 2.0 * gains
+    total, count = relative.sum(axis=1), relative.shape[1]
+    risks = total @ slopes + count * given.sum(axis=0)
     best = int(np.argmin(risks))
     # Chance may make a higher one the best: the lowest that is as good within a standard error.
-    # The noise makes a power 1 + s vary by 1 + 2 s, s being the motion's.
-    variances = np.maximum(2.0 * relative - count, 0.0) @ (slopes - slopes[:, [best]]) ** 2
-    errors = np.sqrt(_CORRELATED * variances)
-    return float(candidates[np.argmax(risks - risks[best] <= errors)])
+    # Noise makes a power 1 + s vary by 1 + 2 s, s being the motion's.
+    variances = np.maximum(2.0 * total - count, 0.0) @ (slopes - slopes[:, [best]]) ** 2
+    return int(np.argmax(risks - risks[best] <= np.sqrt(_CORRELATED * variances)))
 
 
 def bins_below(power: Array, share: float) -> int:

@@ -41,6 +41,9 @@ _LOOK = 120_000
 _POWER = 0.999
 """Share of the speed's power that says how fast a motion is."""
 
+_HARMLESS = 0.2
+"""Noise of the accelerations, relative to that of the forces, that adds next to nothing to it."""
+
 _REPEATS = 0.02
 """What a series may leave of a motion, as a share of its span, where it is said to repeat."""
 
@@ -210,7 +213,11 @@ def preprocessing_of(
     rate = (len(time) - 1) / float(time[-1] - time[0])
     joints, forces = np.hsplit(values, 2)
     _check_frequencies(wanted, rate)
-    cutoff = wanted.cutoff or cutoff_of(joints, rate)
+    noise = white_noise(forces)
+    # A median, which single wild forces do not change.
+    size = np.median(np.abs(forces - np.median(forces, axis=0)), axis=0)
+    relative = float((noise / np.maximum(size, np.finfo(float).tiny)).min())
+    cutoff = wanted.cutoff or cutoff_of(joints, rate, harmless=_HARMLESS * relative)
 
     # How positions are differentiated
     period = wanted.period or log.description.period
@@ -247,7 +254,7 @@ def preprocessing_of(
         band=float(band),
         period=period,
         joint_noise=position_noise(joints),
-        force_noise=white_noise(forces),
+        force_noise=noise,
         slow=wanted.slow * np.sqrt((rates**2).mean(axis=0)),
         stroke=_stroke(rates, rate),
     )
