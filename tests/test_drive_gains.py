@@ -124,7 +124,7 @@ def test_what_was_found_can_be_read_and_declared():
     data = found.as_dict()
     assert data["gains"] == found.gains.tolist()
     assert set(data["units"]) == {"N/A"}
-    # The currents' noise is what was put on them; it is known from some fifty rows.
+    # The currents' noise is what was put on them; it is known from some hundred rows.
     size = np.sqrt((current_log("tripteron").forces ** 2).mean(axis=0))
     np.testing.assert_allclose(found.residual, NOISE[1] * size, rtol=0.2)
 
