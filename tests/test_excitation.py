@@ -124,7 +124,7 @@ def test_the_angle_does_not_jump_at_half_a_turn():
     )
     robot = replace(robot, legs=legs)
     center = np.array([0.0, 0.0, 0.0, np.pi])
-    swing = 0.03 * np.random.default_rng(3).normal(size=(2, 2, 4))
+    swing = 0.015 * np.random.default_rng(3).normal(size=(2, 2, 4))
     joints = pteron.inverse_kinematics(robot, center)
     motion = FourierMotion(
         robot, "joints", 5.0, joints, *swing, mode=int(pteron.assembly_mode(robot, center))

@@ -279,7 +279,7 @@ def test_intermediate_quantities_have_the_names_of_the_equations(tmp_path):
     """However sums were regrouped: a value that is a known quantity is called after it."""
     known = {
         "quadrupteron": (60, {"cos_phi", "leg1_u_a", "leg3_delta", "leg4_theta_l_acceleration"}),
-        "delta": (35, {"leg1_n2", "leg2_quarter", "leg3_l_l_z", "leg3_joint_acceleration"}),
+        "delta": (34, {"leg1_n2", "leg2_quarter", "leg3_l_l_z", "leg3_joint_acceleration"}),
     }
     for name, (least, expected) in known.items():
         files = pteron.export_c(
