@@ -163,7 +163,7 @@ def test_without_a_covariance_the_distance_is_relative():
 
 
 def test_the_projection_against_a_general_optimiser():
-    """An interior-point method, on the Tripteron's parameters when all legs share: 13 unknowns, 3 bodies."""
+    """An interior-point method on a Tripteron whose legs share: 13 unknowns, 3 bodies."""
     robot = CATALOG["tripteron"]
     base = base_of(robot, True)
     values = base.values()
