@@ -334,7 +334,7 @@ def test_a_unit_vector_across_d_in_a_field(name):
         assert sum(x * y for x, y in zip(a, d, strict=True)) % prime == 0
 
 
-KINDS = {type(leg).__name__: leg for leg in MECHANISMS["random PRR 0"].legs}
+KINDS = {leg.type: leg for kinds in ("PRSU", "CL") for leg in random_machine(0, kinds).legs}
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -343,20 +343,15 @@ def test_a_leg_closes_without_a_root(kind):
     x, y, z = (tuple(Fraction(int(i == k)) for i in range(3)) for k in range(3))
     for seed in range(10):
         rng = random.Random(seed)
-        directions = {"direction": z, "slider_direction": z, "plane_axis": x, "zero_direction": y}
+        e = x if kind == "PRR" else (Fraction(3, 5), Fraction(0), Fraction(4, 5))
+        directions = {"direction": z, "slider_direction": e, "plane_axis": x, "zero_direction": y}
         lengths = {"upper_length": (Fraction(2, 7),), "lower_length": (Fraction(3, 5),)}
         w, sigma = type(KINDS[kind]).closing(directions | lengths, rng)
         assert all(isinstance(value, Fraction) for value in w)
         fields = {key: [float(v) for v in value] for key, value in directions.items()}
+        fields |= {"upper_length": 2 / 7, "lower_length": 0.6, "guide_point": (0.0, 0.0, 0.0)}
         own = {key: value for key, value in fields.items() if hasattr(KINDS[kind], key)}
-        leg = replace(
-            KINDS[kind],
-            **own,
-            guide_point=(0.0, 0.0, 0.0),
-            upper_length=2 / 7,
-            lower_length=0.6,
-            elbow=sigma,
-        )
+        leg = replace(KINDS[kind], **own, elbow=sigma)
         reach = leg.equations().reach([float(v) for v in w])
         assert float(reach.discriminant) >= 0
         # The root of what stands under the radical is rational.
