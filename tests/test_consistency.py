@@ -13,6 +13,7 @@ from scipy.stats import chi2
 import pteron
 from pteron.bodies.parameters import body_places
 from pteron.identification.consistency import Bounds, Consistency, consistent_model, real_bodies
+from pteron.identification.plausibility import usual_sizes
 from pteron.manipulator import parameter_data
 
 pytest.importorskip("cvxpy")
@@ -26,6 +27,8 @@ SOME = [
     "random 3T 0",
     "delta",
     "mixed",
+    "five-bar",
+    "delta-4",
 ]
 BASES = {}
 
@@ -40,7 +43,7 @@ def base_of(robot, shared=False):
 def reproduces(result, base, values):
     """Return the relative error of the returned machine's base parameters."""
     found = base.values(result.robot)
-    size = np.abs(base.grouping) @ np.abs(result.parameters)
+    size = usual_sizes(base, result.parameters)
     return float((np.abs(found - values) / size).max())
 
 

@@ -36,7 +36,6 @@ from pteron.identification.excitation.draws import within_limits
 from pteron.identification.excitation.limits import UNITS
 from pteron.identification.excitation.program import measure
 from pteron.identification.logs import read_log
-from pteron.workspace import home_pose
 
 MACHINES = {
     **CATALOG,
