@@ -245,6 +245,26 @@ def test_bounds_hold_and_can_be_active():
     assert "nothing against the fit" in result.summary()
 
 
+def test_a_rod_has_its_centre_of_mass_between_its_ends():
+    robot = CATALOG["delta"]
+    base = base_of(robot)
+    values = pteron.parameters(robot)
+    names = pteron.parameter_names(robot)
+    # The drawing says so of a rod that it has it beyond its tip.
+    beyond = values.copy()
+    length = robot.legs[0].lower_length
+    beyond[names.index("mgx_l1")] = -1.1 * length * values[names.index("m_l1")]
+    beyond[names.index("I_l1")] = 1.3 * length**2 * values[names.index("m_l1")]
+    result = consistent_model(robot, base, base.values(), cad=beyond)
+    assert not result.cad_feasible
+    assert "centre after its tip" in result.cad_violations[0]
+    assert result.feasible
+    for leg in result.robot.legs:
+        (x,) = leg.lower.center_of_mass
+        assert -leg.lower_length * (1.0 + 1e-7) <= x <= 1e-9
+    assert reproduces(result, base, base.values()) < 1e-12
+
+
 def test_a_small_box_makes_a_fit_infeasible_and_says_which():
     base = base_of(QUADRUPTERON)
     tight = ((-0.001, 0.001), (-0.001, 0.001))
