@@ -5,7 +5,7 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from mechanisms import MECHANISMS
+from mechanisms import CATALOG, MECHANISMS
 
 import pteron
 from pteron.identification.logs import Description, Log
@@ -14,9 +14,10 @@ from pteron.workspace import home_pose
 
 @lru_cache
 def machine(name):
-    """Return a machine that the tests share: one of `MECHANISMS`, or a file of `data`."""
-    if name in MECHANISMS:
-        return MECHANISMS[name]
+    """Return a machine that the tests share: of `MECHANISMS`, the catalog, or a file of `data`."""
+    for known in (MECHANISMS, CATALOG):
+        if name in known:
+            return known[name]
     return pteron.load(Path(__file__).with_name("data") / f"{name}.toml")
 
 
@@ -60,7 +61,8 @@ def motion(robot, time, *, seed=0, period=4.0, harmonics=4, size=0.04, turn=0.3)
 
     # The same motion, whatever the instants are at which it is asked for.
     largest = np.abs(series(np.linspace(0.0, period, 1000))[0]).max(axis=0)
-    parts = series(time) * np.array([size] * 3 + [turn])[: len(home)] / largest
+    sizes = [turn if name == "phi" else size for name in robot.coordinates]
+    parts = series(time) * np.array(sizes) / largest
     parts[0] += home
     return parts
 
@@ -91,8 +93,8 @@ def log_of(
     joints = joints + joint_noise * rng.normal(size=joints.shape)
     forces = forces + force_noise * rng.normal(size=forces.shape)
     about = description or Description()
-    symbols = tuple(leg.joint for leg in robot.legs)
-    return Log("log.csv", time, joints, forces, description=about, symbols=symbols)
+    names = {"symbols": tuple(leg.joint for leg in robot.legs), "coordinates": robot.coordinates}
+    return Log("log.csv", time, joints, forces, description=about, **names)
 
 
 def truth(model):

@@ -13,6 +13,7 @@ from scipy.stats import chi2
 import pteron
 from pteron.bodies.parameters import body_places
 from pteron.identification.consistency import Bounds, Consistency, consistent_model, real_bodies
+from pteron.identification.plausibility import usual_sizes
 from pteron.manipulator import parameter_data
 
 pytest.importorskip("cvxpy")
@@ -26,6 +27,8 @@ SOME = [
     "random 3T 0",
     "delta",
     "mixed",
+    "five-bar",
+    "delta-4",
 ]
 BASES = {}
 
@@ -40,7 +43,7 @@ def base_of(robot, shared=False):
 def reproduces(result, base, values):
     """Return the relative error of the returned machine's base parameters."""
     found = base.values(result.robot)
-    size = np.abs(base.grouping) @ np.abs(result.parameters)
+    size = usual_sizes(base, result.parameters)
     return float((np.abs(found - values) / size).max())
 
 
@@ -242,6 +245,26 @@ def test_bounds_hold_and_can_be_active():
     assert not result.cad_feasible
     assert any(line.startswith("m_u2 >= 0.37: by 0.05") for line in result.cad_violations)
     assert "nothing against the fit" in result.summary()
+
+
+def test_a_rod_has_its_centre_of_mass_between_its_ends():
+    robot = CATALOG["delta"]
+    base = base_of(robot)
+    values = pteron.parameters(robot)
+    names = pteron.parameter_names(robot)
+    # The drawing says so of a rod that it has it beyond its tip.
+    beyond = values.copy()
+    length = robot.legs[0].lower_length
+    beyond[names.index("mgx_l1")] = -1.1 * length * values[names.index("m_l1")]
+    beyond[names.index("I_l1")] = 1.3 * length**2 * values[names.index("m_l1")]
+    result = consistent_model(robot, base, base.values(), cad=beyond)
+    assert not result.cad_feasible
+    assert "centre after its tip" in result.cad_violations[0]
+    assert result.feasible
+    for leg in result.robot.legs:
+        (x,) = leg.lower.center_of_mass
+        assert -leg.lower_length * (1.0 + 1e-7) <= x <= 1e-9
+    assert reproduces(result, base, base.values()) < 1e-12
 
 
 def test_a_small_box_makes_a_fit_infeasible_and_says_which():

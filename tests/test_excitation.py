@@ -46,6 +46,7 @@ MACHINES = {
 PLAIN = {"COLUMNS": "100", "NO_COLOR": "1", "FORCE_COLOR": None, "TTY_COMPATIBLE": None}
 
 each_machine = pytest.mark.parametrize("name", ["quadrupteron +-+-", "random 3T1R", "random 3T"])
+FAMILY = ["linear-delta", "five-bar", "3-rrr", "delta-4", "par4"]
 each_space = pytest.mark.parametrize("space", ["platform", "joints"])
 
 
@@ -99,6 +100,39 @@ def test_platform_and_sliders_are_one_motion(name: str, space: str):
     seconds = pteron.joint_accelerations(robot, state.pose, state.velocity, state.acceleration)
     assert rates.actuated == pytest.approx(drho, abs=1e-11)
     assert seconds.actuated == pytest.approx(ddrho, abs=1e-10)
+
+
+@pytest.mark.parametrize("name", FAMILY)
+def test_every_machine_has_motions_that_keep_the_limits(name: str):
+    limits = Limits(speed=2.0, acceleration=20.0, force=200.0)
+    motion = random_excitation(CATALOG[name], harmonics=2, period=4.0, limits=limits, seed=1)
+    found = margins(motion, limits)
+    assert found.kept
+    assert min(margin.least for margin in found) < 0.2
+    if name in ("3-rrr", "par4"):
+        with pytest.raises(pteron.DataError, match=r'"joints" given, .* closed form; choose "pl'):
+            random_excitation(CATALOG[name], space="joints", harmonics=2, limits=limits)
+    else:
+        joints = random_excitation(
+            CATALOG[name], space="joints", harmonics=2, period=4.0, limits=limits, seed=1
+        )
+        assert margins(joints, limits).kept
+
+
+@pytest.mark.parametrize("name", ["five-bar", "par4"])
+def test_a_motion_of_every_machine_can_be_improved(name: str):
+    found = optimal_excitation(
+        CATALOG[name],
+        harmonics=3,
+        period=3.0,
+        limits=Limits(speed=6.0, acceleration=100.0),
+        starts=1,
+        draws=4,
+        workers=1,
+    )
+    assert found.margins.kept
+    assert found.gain > 1.2
+    assert found.frame(100.0).columns[1:3] == ["theta1", "theta2"]
 
 
 @each_space

@@ -20,6 +20,11 @@ SOME = [
     "random 3T 0",
     "delta",
     "mixed",
+    "linear-delta",
+    "five-bar",
+    "3-rrr",
+    "delta-4",
+    "par4",
 ]
 each_mechanism = pytest.mark.parametrize("name", SOME)
 

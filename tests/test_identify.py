@@ -54,10 +54,15 @@ LARGE = {"size": 0.15, "harmonics": 5}
 """A motion of the Delta and the mixed machine, which are larger than the others."""
 
 
-@pytest.mark.parametrize("name", ["quadrupteron", "delta", "mixed"])
+FAMILY = ["linear-delta", "five-bar", "3-rrr", "delta-4", "par4"]
+
+
+@pytest.mark.parametrize("name", ["quadrupteron", "delta", "mixed", "mixed, planar", *FAMILY])
 def test_noise_free_logs_give_back_the_machine(name):
-    robot, size = machine(name), LARGE if name in RODS else {}
-    log, other = (log_of(as_built(robot), period=period, **size) for period in (4.0, 5.0))
+    robot = random_machine(0, "CCL") if name == "mixed, planar" else machine(name)
+    size = 0.1 * np.mean([leg.size for leg in robot.legs if leg.size])
+    how = {"size": size, "harmonics": 5, "duration": 6.0}
+    log, other = (log_of(as_built(robot), period=period, **how) for period in (3.0, 4.0))
     found = identify(robot, log, held_out=other)
     true = truth(identification_model(as_built(robot)))
     assert np.abs(found.estimate.values - true).max() < 1e-9
@@ -255,17 +260,19 @@ def _slider_accelerations(robot, log):
     return spline_motion(log.time, log.joints, None)[2]
 
 
-@pytest.mark.parametrize("name", ["quadrupteron", "mixed"])
+@pytest.mark.parametrize("name", ["quadrupteron", "mixed", "delta-4", "3-rrr"])
 def test_passive_joints_are_identified(name):
     robot = machine(name)
-    log = log_of(robot, **LARGE) if name in RODS else log_of(robot)
+    log = log_of(robot, **LARGE) if name in (*RODS, "delta-4") else log_of(robot)
     model = identification_model(robot, Terms(passive="each"))
     from pteron.identification import observations_of, preprocessing_of
 
     equations = observations_of(model, log, preprocessing_of(robot, log))
-    # The legs' R3 of the mixed machine's rods turns as R2 does.
+    # The legs' R3 of rods turns as R2 does; the shaft's two universal joints turn alike.
     passive = model.kinds.count("passive")
-    assert passive == {"quadrupteron": 13, "mixed": 9}[name]
+    assert passive == {"quadrupteron": 13, "mixed": 9, "delta-4": 12, "3-rrr": 6}[name]
+    units = {term.unit for term in model.kept_terms if term.kind == "passive"}
+    assert units == ({"N m s", "N s/m"} if name == "delta-4" else {"N m s"})
     truths = np.r_[truth(identification_model(robot)), np.full(passive, 0.05)]
     found = np.linalg.lstsq(
         equations.matrix.reshape(-1, len(truths)), (equations.matrix @ truths).ravel(), rcond=None

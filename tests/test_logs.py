@@ -584,6 +584,42 @@ def test_degrees_are_found_by_name_and_told_by_size(tmp_path):
         np.testing.assert_allclose(read_log(path, robot).joints, log.joints, rtol=1e-14)
 
 
+@pytest.mark.parametrize("name", ["five-bar", "3-rrr", "delta-4"])
+def test_poses_have_the_names_of_the_machine(tmp_path, name):
+    robot = machine(name)
+    n = robot.freedom
+    log = replace(motion(TRIPTERON if n == 3 else QUADRUPTERON, rows=200), symbols=None)
+    log = replace(
+        log,
+        joints=log.joints[:, :n],
+        forces=log.forces[:, :n],
+        pose=log.pose[:, :n],
+        symbols=joint_symbols(robot),
+        coordinates=robot.coordinates,
+    )
+    path = write_log(log, tmp_path / "motion.csv")
+    header = path.read_text().partition("\n")[0].split(",")
+    assert header[1 + 2 * n : -1] == list(robot.coordinates)
+    assert header[1 : 1 + 2 * n] == [f"{w}{i + 1}" for w in ("theta", "torque") for i in range(n)]
+    back = read_log(path, robot)
+    assert back.coordinates == robot.coordinates
+    assert_same(log, back)
+
+
+def test_a_shaft_may_turn_without_end(tmp_path):
+    robot = machine("delta-4")
+    log = replace(motion(), symbols=joint_symbols(robot))
+    turns = np.linspace(0.0, 40.0, log.rows)
+    log = replace(log, joints=np.column_stack([log.joints[:, :3], turns]))
+    log = replace(log, pose=np.column_stack([log.pose[:, :3], turns]))
+    np.testing.assert_array_equal(
+        read_log(write_log(log, tmp_path / "a.csv"), robot).joints, log.joints
+    )
+    cranks = replace(log, joints=log.joints[:, [3, 0, 1, 2]])
+    with pytest.raises(DataError, match=r"theta1.* is over two turns"):
+        read_log(write_log(cranks, tmp_path / "b.csv"), robot)
+
+
 def test_a_currents_unit_holds_for_all_joints(tmp_path):
     robot = machine("mixed")
     log = replace(motion(TRIPTERON, pose=False), symbols=joint_symbols(robot))

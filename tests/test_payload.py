@@ -15,10 +15,9 @@ from pteron.identification.logs.description import Description
 from pteron.identification.model import Terms
 from pteron.identification.payload import identify_payload
 from pteron.identification.signals import Processing
-from pteron.kinematics.evaluate import unchecked
 from pteron.workspace import home_pose
 
-SOME = ["quadrupteron", "random 3T 0", "mixed"]
+SOME = ["quadrupteron", "random 3T 0", "mixed", "five-bar", "3-rrr", "par4", "delta-4"]
 CENTRAL = Processing(derivatives="central")
 
 LOAD = pteron.PlanarInertia(0.35, (0.006, -0.009), 0.0011)
@@ -39,16 +38,17 @@ def motion(name, seed):
     robot = machine(name)
     rng = np.random.default_rng(seed)
     time = np.arange(round(2 * PERIOD * RATE)) / RATE
-    m = 4 if robot.platform.turns else 3
+    m = robot.freedom
     q = np.zeros((3, len(time), m))
     for h in range(1, 6):
         w = 2.0 * np.pi * h / PERIOD
         a, b = rng.normal(size=(2, m)) / h
         s, c = np.sin(w * time)[:, None], np.cos(w * time)[:, None]
         q += [a * s + b * c, w * (a * c - b * s), -w * w * (a * s + b * c)]
-    # The mixed machine is four times as large as the others.
-    size = 0.2 if name == "mixed" else 0.05
-    q *= np.array([size, size, size, 0.3])[:m] / np.abs(q[0]).max(axis=0)
+    # The mixed machine and the Delta are four times as large as most others.
+    size = {"mixed": 0.2, "delta-4": 0.2, "five-bar": 0.02}.get(name, 0.05)
+    sizes = [0.3 if one == "phi" else size for one in robot.coordinates]
+    q *= np.array(sizes) / np.abs(q[0]).max(axis=0)
     q[0] += home_pose(robot)
     return time, q
 
@@ -72,9 +72,7 @@ def clean(name, seed, load):
     forces = np.where(phase[:, None] == 1, full, empty)
     forces += 2.0 * (1.0 + 0.1 * legs) * np.sign(rates) + (1.0 + 0.2 * legs) * rates + 0.3 * legs
     sliders = pteron.inverse_kinematics(robot, q[0])
-    mode = None
-    if robot.platform.turns:
-        mode = 1 + int(unchecked(robot, "type_ii", q[0, 0]) < 0.0)
+    mode = 1 + int(pteron.assembly_mode(robot, q[0, 0]))
     return time, sliders, forces, phase, mode
 
 

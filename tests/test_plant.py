@@ -1,6 +1,7 @@
 """The benchmark's machine in MuJoCo, for two seconds: it is accurate, and it can be identified."""
 
 import sys
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -19,29 +20,44 @@ from pteron.identification import (
 FOLDER = Path(__file__).parent.parent / "benchmarks" / "identification"
 
 
-@pytest.fixture(scope="module")
-def recorded():
+FRICTION = {
+    "tripteron": ((6.0, 7.0, 8.0), (4.0, 5.0, 6.0), (0.1, 0.2, 0.3)),
+    "delta": ((4.0, 3.0, 5.0), (1.0, 1.5, 1.2), (0.5, -0.3, 0.0)),
+    "par4": ((0.2, 0.15, 0.25, 0.3), (0.05, 0.06, 0.04, 0.07), (0.02, -0.01, 0.0, 0.03)),
+}
+
+
+@lru_cache
+def recorded(name, duration):
     pytest.importorskip("mujoco")
     sys.path.insert(0, str(FOLDER))
     try:
         import plant
     finally:
         sys.path.remove(str(FOLDER))
-    robot = pteron.load("tripteron")
+    robot = pteron.load(name)
     built = plant.as_built(robot)
-    friction = plant.Friction((6.0, 7.0, 8.0), (4.0, 5.0, 6.0), (0.1, 0.2, 0.3))
+    friction = plant.Friction(*FRICTION[name])
     recording = plant.simulate(
-        built, plant.fourier_reference(robot, 0), friction, duration=2.5, drawn=robot
+        built,
+        plant.fourier_reference(robot, 0, speed=2.0, acceleration=20.0),
+        friction,
+        duration=duration,
+        settle=0.5,
+        drawn=robot,
     )
     return robot, built, friction, recording
 
 
-def test_its_forces_are_those_of_the_model(recorded):
-    _, built, friction, recording = recorded
-    poses = pteron.direct_kinematics(built, recording.joints)[:, 0]
+@pytest.mark.parametrize(("name", "duration"), [("tripteron", 2.5), ("delta", 0.5), ("par4", 0.5)])
+def test_its_forces_are_those_of_the_model(name, duration):
+    _, built, friction, recording = recorded(name, duration)
+    poses = pteron.follow(built, recording.joints, recording.poses[0])
+    assert np.abs(poses - recording.poses).max() < 1e-6
     jacobian = pteron.jacobian(built, poses)
     velocity = np.linalg.solve(jacobian, recording.rates[..., None])[..., 0]
-    acceleration = np.linalg.solve(jacobian, recording.accelerations[..., None])[..., 0]
+    drift = pteron.joint_accelerations(built, poses, velocity, np.zeros_like(poses)).actuated
+    acceleration = np.linalg.solve(jacobian, (recording.accelerations - drift)[..., None])[..., 0]
     forces = pteron.inverse_dynamics(built, poses, velocity, acceleration)
     rates = recording.rates
     forces = forces + friction.coulomb * np.sign(rates) + np.array(friction.viscous) * rates
@@ -50,10 +66,10 @@ def test_its_forces_are_those_of_the_model(recorded):
     assert np.sqrt((off**2).mean()) < 1e-4 * np.sqrt((recording.forces**2).mean())
 
 
-def test_it_is_identified_through_its_sensors(recorded):
+def test_it_is_identified_through_its_sensors():
+    robot, built, friction, recording = recorded("tripteron", 2.5)
     import plant
 
-    robot, built, friction, recording = recorded
     seen = plant.measured(recording, encoder=1e-6, force=0.01, jitter=1e-5, seed=0)
     log = Log("plant", seen.time, seen.joints, seen.forces)
     model = identification_model(robot)

@@ -404,6 +404,57 @@ def test_a_tripteron_has_one_assembly_mode():
         start_pose(robot, replace(log, description=Description(assembly_mode=2)))
 
 
+def par4_log(mode=0, **more):
+    """Return a log of a Par4, of the home pose's assembly mode or of what else its joints allow."""
+    robot = CATALOG["par4"]
+    log = log_of(robot, duration=2.0, harmonics=2, size=0.06, turn=0.6, **more)
+    poses = motion(robot, log.time, harmonics=2, size=0.06, turn=0.6)[0]
+    if mode:
+        others = pteron.direct_kinematics(robot, log.joints[:1])[0]
+        other = others[np.nanargmax(np.abs(others[:, 3] - poses[0, 3]))]
+        poses = pteron.follow(robot, log.joints, other)
+        assert np.abs(poses[:, 3]).min() > 1.5
+    return robot, replace(log, pose=poses)
+
+
+@pytest.mark.parametrize("mode", [0, 1])
+def test_a_machine_without_closed_form_is_followed_in_the_mode_of_a_pose(mode):
+    robot, log = par4_log(mode)
+    still = (log.joints, np.zeros_like(log.joints), np.zeros_like(log.joints))
+    found = States.of_joints(robot, still, log.time, start_pose(robot, log))
+    assert found.pose == pytest.approx(log.pose, abs=1e-11)
+    rows = pteron.direct_kinematics(robot, log.joints[0])
+    row = np.nanargmin(np.abs(rows - log.pose[0]).max(axis=-1))
+    about = Description(assembly_mode=int(row) + 1)
+    declared = start_pose(robot, replace(log, pose=None, description=about))
+    assert declared == pytest.approx(log.pose[0], abs=1e-11)
+    if mode == 0:
+        unsaid = start_pose(robot, replace(log, pose=None))
+        found = States.of_joints(robot, still, log.time, unsaid)
+        assert found.pose == pytest.approx(log.pose, abs=1e-11)
+    with pytest.raises(DataError, match="assembly_mode = 5 is no pose that its joints have"):
+        start_pose(robot, replace(log, description=Description(assembly_mode=5)))
+
+
+def test_blocks_of_a_followed_motion_continue_each_other():
+    robot, log = par4_log(1)
+    treatment = preprocessing_of(robot, log, Processing(derivatives="central", band=100.0))
+    found = [part.states.pose[part.fresh] for part in samples(robot, log, treatment, block=300)]
+    assert len(found) > 2
+    lost = (log.rows - sum(map(len, found))) // 2
+    assert np.concatenate(found) == pytest.approx(log.pose[lost : log.rows - lost], abs=1e-11)
+
+
+def test_a_followed_log_names_the_sample_that_it_does_not_come_to():
+    robot, log = par4_log()
+    still = np.zeros_like(log.joints)
+    start = start_pose(robot, log)
+    wild = log.joints.copy()
+    wild[700] += [1.5, 0.0, -1.5, 0.0]
+    with pytest.raises(LogError, match=r"row 701: no pose of par4 has the joints .*zeros$"):
+        States.of_joints(robot, (wild, still, still), log.time, start)
+
+
 def unreachable(log, row):
     """Return a log with one row that no pose has."""
     sliders = log.joints.copy()
