@@ -28,13 +28,14 @@ TILTED = (0.6, 0.0, 0.8)
 
 
 def limited(name, **limits):
-    """Return a catalog machine with limits on every leg that has the fields."""
+    """Return a catalog machine with limits on every leg that has the fields, and none of phi."""
 
     def of(leg):
         return replace(leg, **{key: v for key, v in limits.items() if hasattr(leg, key)})
 
     robot = CATALOG[name]
-    return replace(robot, legs=tuple(map(of, robot.legs)))
+    platform = replace(robot.platform, limits=None)
+    return replace(robot, legs=tuple(map(of, robot.legs)), platform=platform)
 
 
 def angle(a, b):

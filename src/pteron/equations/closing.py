@@ -22,6 +22,13 @@ _STEPS = 4
 _CLOSED = 1e-6
 """What may be missed before the last of them, which squares it: enough for single precision."""
 
+_STEADY = 0.01
+"""By how much the determinants of the last two steps may differ, relatively.
+
+Next to a pose they are alike. Where there is none, next to a singularity, so little may be missed
+that it counts as closed, but each step's determinant is half of the last one's or less.
+"""
+
 
 class Rows(NamedTuple):
     """The closures of legs whose joints are held, for v = (p - origin) / size.
@@ -148,13 +155,14 @@ def direct_step(
     """
     missed = misses(machine, joints, pose)
     start = machine.closure.measure_of(missed.rows)
+    step, determinant = missed.step
     for _ in range(_STEPS - 1):
-        step, determinant = missed.step
-        pose = pose + step / determinant
+        before, pose = determinant, pose + step / determinant
         missed = misses(machine, joints, pose)
+        step, determinant = missed.step
     measure = machine.closure.measure_of(missed.rows)
     lost = nan_below_zero(_CLOSED - missed.relative) + nan_below_zero(start * measure)
+    lost += nan_below_zero(_STEADY - ca.fabs(determinant / before - 1))
     # The last step's divisor vanishes where the measure is too small.
-    step, determinant = missed.step
     enough = ca.fmax(measure * measure - least * least, 0) / (measure * measure)
     return pose + step / (determinant * enough) + lost, measure
