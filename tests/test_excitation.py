@@ -254,6 +254,24 @@ def test_every_limit_binds_when_it_is_the_tight_one(limits: Limits, space: str):
     assert found[tight].least < 0.01 * scale
 
 
+@pytest.mark.parametrize("search", [random_excitation, optimal_excitation])
+def test_passive_joints_and_phi_keep_their_limits(search):
+    robot = CATALOG["par4"]
+    given = {"limits": None, "platform_cone": pteron.Cone((0.0, 0.0, 1.0), 1.3)}
+    robot = replace(robot, legs=tuple(replace(leg, **given) for leg in robot.legs))
+    limits, few = Limits(speed=10.0, acceleration=100.0, passive_clearance=0.6), {}
+    if search is optimal_excitation:
+        few = {"starts": 1, "draws": 4, "workers": 1, "criterion": "logdet"}
+    found = search(robot, harmonics=2, period=2.0, limits=limits, **few)
+    motion = getattr(found, "motion", found)
+    pose = motion.at(motion.uniform_times(2000)).pose
+    shares = pteron.workspace.reserve(robot, pose).clearances
+    assert 0.6 <= shares.min() < 0.61
+    assert np.abs(pose[:, 3]).max() < 0.4 * np.pi / 4
+    found = margins(motion, limits)["passive_clearance"].least  # exact between the samples
+    assert found == pytest.approx(shares.min() - 0.6, abs=1e-6)
+
+
 @pytest.mark.parametrize(
     ("given", "words"),
     [
@@ -279,6 +297,7 @@ def test_limits_that_the_machine_cannot_keep_at_rest_are_named(given: dict, word
         ({"type_i": 1.0}, "type_i 1 given"),
         ({"type_ii": -0.1}, "type_ii -0.1"),
         ({"joint_clearance": -1.0}, "joint_clearance -1"),
+        ({"passive_clearance": 1.0}, "passive_clearance 1 given, at least 0 and below 1"),
     ],
 )
 def test_limits_that_are_none_are_refused(given: dict, words: str):

@@ -14,7 +14,11 @@ from pteron.errors import OutputError
 if TYPE_CHECKING:
     from pteron.identification.excitation import Excitation
 
-_MEASURES = {"type_i": "type-I measure", "type_ii": "type-II measure"}
+_MEASURES = {
+    "type_i": "type-I measure",
+    "type_ii": "type-II measure",
+    "passive_clearance": "passive clearance (of half the range)",
+}
 
 _STEPS = 1000
 """Steps of the progress bar."""
@@ -41,6 +45,9 @@ def excite(
     clearance: Annotated[
         float, option("clearance", "Of the joints from their limits, m or rad.")
     ] = 0.005,
+    passive_clearance: Annotated[
+        float, option("passive-clearance", "Of passive joints and phi, share of half their range.")
+    ] = 0.02,
     criterion: Annotated[
         Literal["condition", "logdet"], option("criterion", "What is made small.")
     ] = "condition",
@@ -87,7 +94,9 @@ def excite(
             space=space,
             harmonics=harmonics,
             period=period,
-            limits=Limits(speed, acceleration, force, type_i, type_ii, clearance),
+            limits=Limits(
+                *(speed, acceleration, force, type_i, type_ii, clearance, passive_clearance)
+            ),
             criterion=criterion,
             starts=starts,
             draws=draws,

@@ -5,22 +5,26 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from pteron.equations.machine import closure_of
 from pteron.errors import DataError, ModelError
 from pteron.identification.excitation.fourier import FourierMotion, State, states
+from pteron.identification.signals.states import home
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import unchecked
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator
+from pteron.workspace.limits import limited_joints
 from pteron.workspace.reserve import clearances
 
 UNITS = {
     "type_i": "",
     "type_ii": "",
     "joint_clearance": "{unit}",
+    "passive_clearance": "",
     "speed": "{unit}/s",
     "acceleration": "{unit}/s^2",
     "force": "{force_unit}",
@@ -53,8 +57,11 @@ class Limits:
         Least share, in (0, 1), of the best type-II measure that the machine has: the distance from
         poses where the actuators do not hold the platform. Without meaning where J is constant.
     joint_clearance : float
-        Least distance of the joints from their limits, m or rad; without effect on a joint that
-        has none.
+        Least distance of the actuated joints from their limits, m or rad; without effect on a joint
+        that has none.
+    passive_clearance : float
+        Least distance of the passive joints and of phi from their limits, over half their ranges,
+        in [0, 1).
 
     Raises
     ------
@@ -74,6 +81,7 @@ class Limits:
     type_i: float = 0.25
     type_ii: float = 0.3
     joint_clearance: float = 0.005
+    passive_clearance: float = 0.02
 
     def __post_init__(self) -> None:
         for name in PER_JOINT:
@@ -92,6 +100,11 @@ class Limits:
         if _number("joint_clearance", self.joint_clearance) < 0.0:
             raise DataError(
                 f"limits: joint_clearance {self.joint_clearance:g} given, 0 or more expected"
+            )
+        if not 0.0 <= _number("passive_clearance", self.passive_clearance) < 1.0:
+            raise DataError(
+                f"limits: passive_clearance {self.passive_clearance:g} given, at least 0 and below "
+                "1 expected"
             )
 
 
@@ -255,6 +268,13 @@ def check_rest(robot: Manipulator, home: Array, limits: Limits) -> None:
         )
 
 
+@lru_cache(maxsize=64)
+def _limits_passive(robot: Manipulator) -> bool:
+    """Return whether any passive joint has limits."""
+    joints = limited_joints(robot, np.array(home(robot)))
+    return not all(joint.actuated for joint in joints)
+
+
 def _margins_of(robot: Manipulator, limits: Limits, state: State) -> dict[str, Array]:
     """Return every limit's margins (T, n) or (T, 1), -inf where the machine cannot be."""
     found = {"type_i": unchecked(robot, "reach", state.pose)[1] - limits.type_i}
@@ -263,6 +283,9 @@ def _margins_of(robot: Manipulator, limits: Limits, state: State) -> dict[str, A
         found["type_ii"] = type_ii / best_type_ii(robot) - limits.type_ii
     if any(leg.limits for leg in robot.legs):
         found["joint_clearance"] = clearances(robot, state.joints) - limits.joint_clearance
+    if _limits_passive(robot):
+        room = unchecked(robot, "passive_room", state.pose)[0]
+        found["passive_clearance"] = room - limits.passive_clearance
     found["speed"] = per_joint(limits, "speed", robot) - np.abs(state.rates)
     found["acceleration"] = per_joint(limits, "acceleration", robot) - np.abs(state.accelerations)
     if limits.force is not None:
