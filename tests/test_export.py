@@ -40,6 +40,8 @@ ROBOTS = {
     "oblique": replace(with_elbows(CATALOG["tripteron-oblique"], "--+"), name="oblique"),
     "delta": DELTA,
     "mixed": replace(DELTA, name="mixed", legs=(SLIDER, *DELTA.legs[1:])),
+    "par4": CATALOG["par4"],
+    "five_bar": replace(CATALOG["five-bar"], name="five_bar"),
 }
 
 COMPILERS = {
@@ -133,6 +135,8 @@ def test_random_states_give_the_bits_that_casadi_gives(name):
         given["joints"] = pteron.inverse_kinematics(robot, pose)
         given["forces"] = pteron.inverse_dynamics(robot, pose, velocity, acceleration)
         for function in FUNCTIONS:
+            if (name, function) == ("par4", "direct_kinematics"):
+                continue  # it has no closed form
             columns = columns_of(base) if function.endswith("_base") else None
             program = pteron.kernels.program(robot, function.removesuffix("_base"), columns)
             inputs = [given[port.name] for port in program.inputs]
