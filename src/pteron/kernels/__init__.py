@@ -5,18 +5,17 @@ Batching, threads and caching live here and only here.
 
 from pteron.kernels.choice import numeric
 from pteron.kernels.fields import Field, NoSquareRoot, PrimeField, RationalField, evaluate
-from pteron.kernels.functions import (
-    FUNCTIONS,
+from pteron.kernels.functions import FUNCTIONS, needs_of
+from pteron.kernels.graph import Graph, graph_of
+from pteron.kernels.kernel import Array, Kernel, Port, as_array, count_operations
+from pteron.kernels.programs import (
     Columns,
     Program,
     bare,
     general_program,
-    needs_of,
     program,
     specialised,
 )
-from pteron.kernels.graph import Graph, graph_of
-from pteron.kernels.kernel import Array, Kernel, Port, as_array, count_operations
 from pteron.kernels.targets import (
     OTHER_LAYOUT,
     TARGETS,

@@ -13,8 +13,8 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from pteron.kernels.c import Code, compiler
-from pteron.kernels.functions import Columns, bare, program
 from pteron.kernels.kernel import Array, Kernel, sliced
+from pteron.kernels.programs import Columns, bare, program
 from pteron.kernels.targets import Selects, columns_of
 from pteron.kernels.vm import VirtualMachine
 from pteron.manipulator import Manipulator, parameters

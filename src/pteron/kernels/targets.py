@@ -12,11 +12,11 @@ from pteron.equations.machine import numbers
 from pteron.errors import ModelError
 from pteron.kernels.c import Compiled
 from pteron.kernels.fields import Exact
-from pteron.kernels.functions import Columns, Program, general_program, program, specialised
 from pteron.kernels.hoisting import hoisted
 from pteron.kernels.jax import Traced
 from pteron.kernels.kernel import Array, Kernel
 from pteron.kernels.numba import Jitted
+from pteron.kernels.programs import Columns, Program, general_program, program, specialised
 from pteron.kernels.vm import VirtualMachine
 from pteron.manipulator import Manipulator, parameters
 

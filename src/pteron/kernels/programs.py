@@ -1,0 +1,251 @@
+"""From a machine and the name of a function to its CasADi program, with ports and status."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.bodies.motion import Expression
+from pteron.equations import kinematics
+from pteron.equations.machine import Machine
+from pteron.errors import ModelError
+from pteron.kernels.functions import FUNCTIONS, TABLE, TYPE_I, TYPE_II, Entry, Output, Symbols
+from pteron.kernels.kernel import Port, count_operations
+from pteron.kernels.passes import optimised
+from pteron.manipulator import Manipulator, expect_manipulator
+
+_HUGE = 1e75
+"""Inputs or outputs beyond this count as not finite: their squares might overflow."""
+
+_TINY = 1e-300
+
+_REDUCIBLE = ("inverse_dynamics", "base_regressor")
+"""What may be asked for base parameters."""
+
+_LOADED = ("inverse_dynamics", "forward_dynamics")
+"""What may take a wrench on the platform as well."""
+
+_SHARED = ("geometry", "parameters", "base_parameters")
+"""Inputs of which one value serves a whole batch."""
+
+Columns = tuple[tuple[int, ...], ...]
+"""For each column of a base regressor, the inertial parameters whose columns it adds up."""
+
+
+@dataclass(frozen=True)
+class Program:
+    """A named CasADi function of one state, with its ports."""
+
+    name: str
+    function: ca.Function
+    inputs: tuple[Port, ...]
+    outputs: tuple[Port, ...]
+
+
+def program(
+    robot: Manipulator,
+    what: str,
+    columns: Columns | None = None,
+    *,
+    wrench: bool = False,
+    guarded: bool = False,
+    plain: bool = False,
+) -> Program:
+    """Return the function `what` of a machine's geometry; inertial parameters stay inputs.
+
+    With `columns` the dynamics are those of base parameters, which are then the input; with
+    `wrench` a wrench on the platform is an input too; with `guarded` a last output, `status`, is 1
+    where the result counts and 0 where the pose, or a number, does not serve; with `plain` the
+    equations are as they are written, without the pass that saves operations.
+
+    Raises
+    ------
+    ModelError
+        If there is no function of that name, or an option is out of place.
+    """
+    if what not in TABLE:
+        raise ModelError(f"what: {what!r} cannot be compiled; choose from {', '.join(FUNCTIONS)}")
+    if what == "base_regressor" and columns is None:
+        raise ModelError('base: missing; "base_regressor" needs base=base_parameters(robot)')
+    if what not in _REDUCIBLE and columns is not None:
+        raise ModelError(f"base: {what!r} has no use for it; it goes with {', '.join(_REDUCIBLE)}")
+    if what not in _LOADED and wrench:
+        raise ModelError(f"wrench: {what!r} has no use for it; it goes with {', '.join(_LOADED)}")
+    return _built(bare(robot), what, columns, wrench, guarded, plain)
+
+
+def specialised(given: Program, values: dict[str, NDArray[np.float64]]) -> Program:
+    """Return a plain program with numbers in place of some of its inputs, after the pass."""
+    symbols = given.function.sx_in()
+    folded = [
+        ca.SX(ca.DM(values[port.name])) if port.name in values else symbol
+        for port, symbol in zip(given.inputs, symbols, strict=True)
+    ]
+    left = [k for k, port in enumerate(given.inputs) if port.name not in values]
+    outputs = given.function.call(folded)
+    function = ca.Function(
+        given.name,
+        [symbols[k] for k in left],
+        ca.cse([ca.densify(output) for output in outputs]),
+        [given.inputs[k].name for k in left],
+        [port.name for port in given.outputs],
+    )
+    inputs = tuple(given.inputs[k] for k in left)
+    return Program(given.name, optimised(function), inputs, given.outputs)
+
+
+@lru_cache(maxsize=256)
+def bare(robot: Manipulator) -> Manipulator:
+    """Return the machine with unit inertia, so that machines of one geometry share programs."""
+    expect_manipulator(robot)
+    unit = {"m": 1.0, "mgx": 0.0, "mgy": 0.0, "I": 1.0}
+
+    def plain(body: Any) -> Any:
+        return body.of_values([unit[kind] for kind in body.kinds])
+
+    legs = tuple(
+        leg.with_bodies({letter: plain(body) for letter, body in leg.bodies.items()})
+        for leg in robot.legs
+    )
+    platform = robot.platform.with_joined(plain(robot.platform.joined))
+    return replace(robot, name="any", legs=legs, platform=platform)
+
+
+@lru_cache(maxsize=512)
+def _built(
+    robot: Manipulator,
+    what: str,
+    columns: Columns | None,
+    wrench: bool,
+    guarded: bool,
+    plain: bool,
+) -> Program:
+    machine = Machine.of(robot)
+    if columns is None:
+        return _program(machine, what, wrench=wrench, guarded=guarded, plain=plain)
+    selection = ca.SX(len(machine.parameters), len(columns))
+    for k, members in enumerate(columns):
+        for j in members:
+            selection[j, k] = 1
+    if what == "base_regressor":
+        constants: Symbols = {"selection": selection}
+        return _program(machine, what, constants=constants, guarded=guarded, plain=plain)
+    base = ca.SX.sym("base_parameters", len(columns))
+    # A mass on a platform point may be the leg's or the platform's, whichever costs less.
+    given, extra = ca.mtimes(selection, base), {"base_parameters": base}
+    forms = [
+        _program(
+            machine,
+            what,
+            constants={"parameters": given, "carried": carried},
+            extra=extra,
+            wrench=wrench,
+            plain=plain,
+        )
+        for carried in (True, False)
+    ]
+    return min(forms, key=lambda form: count_operations(form.function))
+
+
+def general_program(robot: Manipulator, what: str) -> Program:
+    """Return the function `what` of a machine's topology: its first input is `geometry`.
+
+    The vector's order is that of `equations.machine.numbers`.
+    """
+    return _general(bare(robot), what)
+
+
+@lru_cache(maxsize=64)
+def _general(robot: Manipulator, what: str) -> Program:
+    machine, vector = Machine.symbols(robot)
+    # Exact arithmetic wants the equations as they stand.
+    return _program(machine, what, vector, plain=True)
+
+
+def _program(
+    machine: Machine,
+    what: str,
+    vector: Expression | None = None,
+    constants: Symbols | None = None,
+    extra: dict[str, Expression] | None = None,
+    wrench: bool = False,
+    guarded: bool = False,
+    plain: bool = False,
+) -> Program:
+    """Return a function of the table; `constants` stand for inputs, `extra` are more inputs."""
+    entry = TABLE[what]
+    asked = [name for name in entry.inputs if name not in (constants or {})]
+    asked += ["wrench"] if wrench else []
+    asked.sort(key=lambda name: name in _SHARED)
+    count = len(machine.parameters)
+    symbols = {
+        name: ca.SX.sym(name, count if name == "parameters" else machine.freedom) for name in asked
+    } | (extra or {})
+    built = entry.build(machine, symbols | (constants or {}))
+    outputs = {name: _shaped(output) for name, output in built.items()}
+    if guarded:
+        results = [expression for expression, _ in outputs.values()]
+        outputs["status"] = _status(machine, entry, symbols, results), ()
+    # A matrix goes out transposed: CasADi stores columns, NumPy rows.
+    dense = [ca.densify(expression).T for expression, _ in outputs.values()]
+    if vector is not None:
+        symbols = {"geometry": vector, **symbols}
+    function = ca.Function(
+        what, list(symbols.values()), ca.cse(dense), list(symbols), list(outputs)
+    )
+    if not plain:
+        function = optimised(function)
+    inputs = tuple(
+        Port(name, symbol.shape[:1], shared=name in _SHARED) for name, symbol in symbols.items()
+    )
+    ports = tuple(Port(name, tuple(shape)) for name, (_, shape) in outputs.items())
+    return Program(what, function, inputs, ports)
+
+
+def _shaped(output: Output) -> tuple[Expression, tuple[int, ...]]:
+    """Return an output's expression and its shape; one that is stacked is vertical."""
+    if isinstance(output, tuple):
+        return output
+    if isinstance(output, list):
+        return ca.vertcat(*output), (len(output), *output[0].shape)
+    rows, columns = output.shape
+    return output, (rows, columns) if columns > 1 else (rows,) if rows > 1 else ()
+
+
+def _status(
+    machine: Machine, entry: Entry, symbols: dict[str, Expression], results: list[Expression]
+) -> Expression:
+    """Return 1 where everything holds that the result needs, else 0; also for NaN."""
+    states = [symbol for name, symbol in symbols.items() if name not in _SHARED]
+    sums = [
+        sum(
+            ca.fabs(v)
+            for group in groups
+            for v in ca.vertsplit(ca.vec(ca.densify(group)))
+            if not _is_nan(v)
+        )
+        for groups in (states, results)
+    ]
+    status = ca.SX(1)
+    for total in sums if entry.needs == ("reach",) else sums[:1]:
+        status = ca.if_else(total < _HUGE, status, 0)
+    if {"reach", "rows"} & set(entry.needs):
+        found = kinematics.reach(machine, symbols["pose"])
+        for leg, at in zip(machine.legs, found, strict=True):
+            if "reach" in entry.needs or not leg.row_is_constant:
+                least = -_TINY if entry.needs == ("reach",) else TYPE_I**2 * at.scale
+                status = ca.if_else(least < at.discriminant, status, 0)
+    if "type II" in entry.needs:
+        state = machine.state(symbols["pose"])
+        measure = machine.closure.measure(state.platform, state.legs)
+        status = ca.if_else(measure * measure > TYPE_II**2, status, 0)
+    return status
+
+
+def _is_nan(value: Expression) -> bool:
+    return bool(value.is_constant()) and bool(np.isnan(float(value)))
