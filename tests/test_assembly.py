@@ -303,6 +303,34 @@ def test_a_motion_beyond_its_mode_is_told():
         pteron.follow(robot, start, np.zeros(3))
 
 
+@pytest.mark.parametrize("name", ["quadrupteron", "tripteron"])
+def test_a_motion_ends_where_a_leg_does_not_reach(name):
+    """A leg's plane goes on, where its links do not."""
+    robot = pteron.load(name)
+    start = np.zeros(robot.freedom)
+    along_x = pteron.jacobian(robot, start)[:, 0]
+    joints = pteron.inverse_kinematics(robot, start) + np.linspace(0, 0.4, 41)[:, None] * along_x
+    found = pteron.follow(robot, joints, start, on_failure="nan")
+    lost = np.isnan(pteron.direct_kinematics(robot, joints)[:, 0, 0])
+    np.testing.assert_array_equal(np.isnan(found[:, 0]), lost)
+    assert 0 < lost.sum() < 41
+    with pytest.raises(UnreachablePose, match="the platform does not follow"):
+        pteron.follow(robot, joints, start)
+
+
+@pytest.mark.parametrize("away", [1e-2, 1e-3, 1e-4])
+def test_poses_next_to_parallel_rods_are_found(away):
+    """Rods 3 and 4 of one side, whose cranks have nearly one angle: their spheres all but agree."""
+    robot = pteron.load("par4")
+    singular = np.array([0.21319231, -0.46344404, -0.24188617, -0.17646013])
+    pose = singular + away * np.array([-0.0780375, -0.02449757, -0.02217865, 0.99640259])
+    joints = pteron.inverse_kinematics(robot, pose)
+    found = pteron.direct_kinematics(robot, joints)
+    assert np.isfinite(found[:, 0]).sum() == 2
+    # The type-II measure falls with the square of the distance, and as many digits are lost.
+    assert np.nanmin(np.abs(found - pose).max(axis=-1)) < 1e-14 / away**2
+
+
 def test_which_modes_a_pose_is_in():
     robot = pteron.load("par4")
     poses = pteron.random_poses(robot, 50)

@@ -13,6 +13,7 @@ import casadi as ca
 from pteron.bodies.motion import Expression
 from pteron.closures.closure import nan_below_zero
 from pteron.closures.determinants import adjugate
+from pteron.equations.kinematics import reach
 from pteron.equations.machine import Machine
 from pteron.legs.leg import Circle, Plane, Sphere, Turned
 
@@ -150,8 +151,8 @@ def direct_step(
 ) -> tuple[Expression, Expression]:
     """Return the pose of joints next to a pose, and its type-II measure.
 
-    NaN where Newton's steps do not converge, or come to another side of the singularities; not
-    finite where the measure is not above `least`.
+    NaN where Newton's steps do not converge, come to another side of the singularities, or to where
+    a leg does not reach; not finite where the measure is not above `least`.
     """
     missed = misses(machine, joints, pose)
     start = machine.closure.measure_of(missed.rows)
@@ -165,4 +166,8 @@ def direct_step(
     lost += nan_below_zero(_STEADY - ca.fabs(determinant / before - 1))
     # The last step's divisor vanishes where the measure is too small.
     enough = ca.fmax(measure * measure - least * least, 0) / (measure * measure)
-    return pose + step / (determinant * enough) + lost, measure
+    found = pose + step / (determinant * enough)
+    for leg, q, at in zip(machine.legs, ca.vertsplit(joints), reach(machine, found), strict=True):
+        if isinstance(leg.locus(q), Plane):  # it goes on where the leg does not reach
+            lost += nan_below_zero(at.discriminant)
+    return found + lost, measure

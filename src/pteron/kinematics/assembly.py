@@ -33,9 +33,13 @@ _BATCH = 4096
 _HUGE = 1e30
 """Sizes of the machine beyond which joints have no pose; det G stays finite."""
 
+_COINCIDING = 1e-10
+"""What is left of a row, in numbers about 1, once those before it are taken out, for it to count:
+ten digits of it are rounding then."""
+
 _VANISHING = 1e-14
-"""The size of det G, of a matrix whose diagonal is 1, below which it is all rounding: the platform
-can move with the joints held."""
+"""The size of det G, of orthonormal rows, below which it is all rounding: the platform can move
+with the joints held."""
 
 _MARGIN = 5e-3
 """rad from the real axis within which a zero of det G may be real: a fourfold one loses 3/4 of the
@@ -81,6 +85,7 @@ def _poses(robot: Manipulator, joints: Array, most: int) -> Array:
     zeroth, first, second, origin, size, _ = numeric(robot, "closure_rows")(joints)
     rows = np.stack([zeroth, first, second], axis=-1)
     rows[~(np.abs(rows) < _HUGE).all(axis=(-3, -2, -1))] = 0.0
+    rows = _apart(rows)
     which, phi = _angles(rows, slides)
     which, points, phi = _points(_at(rows[which], phi, slides), which, phi)
     starts = np.column_stack([origin[which] + size[which, None] * points, phi])
@@ -88,6 +93,19 @@ def _poses(robot: Manipulator, joints: Array, most: int) -> Array:
     if not slides:
         poses[:, -1] = within_a_turn(poses[:, -1])
     return in_order(_table(poses, which, size, most, slides))[:, :most]
+
+
+def _apart(rows: Array) -> Array:
+    """Return rows (B, n, d + 2, 3) that span the same at each phi, and are orthonormal as numbers.
+
+    0 where one is a sum of others, so that the platform can move with the joints held. Two spheres
+    that move alike may all but coincide, as where two rods of a Par4's side are parallel: only
+    their difference, well scaled, tells where they meet.
+    """
+    across, r = np.linalg.qr(rows.reshape(*rows.shape[:2], -1).swapaxes(-1, -2))
+    apart = np.abs(np.diagonal(r, axis1=-2, axis2=-1)).min(axis=-1) > _COINCIDING
+    found = across.swapaxes(-1, -2).reshape(rows.shape)
+    return np.where(apart[:, None, None, None], found, 0.0)
 
 
 def _angles(rows: Array, slides: bool) -> tuple[NDArray[np.int64], Array]:
