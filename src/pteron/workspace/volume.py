@@ -19,6 +19,17 @@ from pteron.workspace.reserve import room_to_limits
 _SAMPLES = 20_000
 _STARTS = 5
 
+_FRONT = 100
+"""Positions that are kept of those that are furthest to a side; as many twenty times are drawn
+about them in each of the rounds, ever nearer."""
+
+_ROUNDS = 24
+_SPREAD = 0.2
+"""How far about them at first, over the size of the machine."""
+
+_NEARER = 0.75
+"""From round to round."""
+
 _FAR = 1e3
 """What stands for no limit, m: the optimiser wants finite numbers."""
 
@@ -67,8 +78,8 @@ class ReachVolume:
 def bounding_box(robot: Manipulator, pose: PoseLike) -> Array:
     """Return the box that bounds all positions in reach at the orientation of a pose.
 
-    Random positions in reach are moved as far as each side allows; what is too near to a leg whose
-    links differ is left out.
+    Random positions in reach are moved to each side: at first at random, ever nearer about those
+    that are furthest, as limits leave corners and edges; then as far as the side allows.
 
     Parameters
     ----------
@@ -125,10 +136,9 @@ def bounding_box(robot: Manipulator, pose: PoseLike) -> Array:
     sides = np.empty((2, count))
     for axis in range(count):
         for side, sign in enumerate((1.0, -1.0)):
-            firsts = good[np.argsort(sign * good[:, axis])[:_STARTS]]
-            sides[side, axis] = sign * min(
-                _furthest(room, p, sign * np.eye(count)[axis]) for p in firsts
-            )
+            objective = sign * np.eye(count)[axis]
+            front = _front(room, good, objective, radius, rng)
+            sides[side, axis] = sign * min(_furthest(room, p, objective) for p in front[:_STARTS])
     if not (np.abs(sides - center) <= _ENDLESS * radius).all():
         raise ModelError(
             "the reach has no end: the guides let the platform move along them for ever; give the "
@@ -148,6 +158,24 @@ def _deepest(room: Callable[[Array], Array], start: Array) -> Array:
         options=_OPTIONS,
     )
     return np.asarray(found.x[:-1])
+
+
+def _front(
+    room: Callable[[Array], Array],
+    inside: Array,
+    objective: Array,
+    size: float,
+    rng: np.random.Generator,
+) -> Array:
+    """Return positions inside every bound of small objective . p, the least first."""
+    spread = _SPREAD * size
+    for _ in range(_ROUNDS):
+        inside = inside[np.argsort(inside @ objective)[:_FRONT]]
+        tried = np.repeat(inside, 20 * _FRONT // len(inside), axis=0)
+        tried = tried + spread * rng.normal(size=tried.shape)
+        inside = np.vstack([inside, tried[room(tried).min(axis=-1) > _TOUCH]])
+        spread *= _NEARER
+    return inside[np.argsort(inside @ objective)]
 
 
 def _furthest(room: Callable[[Array], Array], start: Array, objective: Array) -> float:
