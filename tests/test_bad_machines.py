@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import pteron
 from pteron import ModelError, PlanarInertia
+from pteron.legs.cones import Cone
 from pteron.manipulator.manipulator import turned
 from pteron.workspace import home_pose
 from pteron.workspace.doubts import doubts
@@ -356,6 +357,24 @@ def test_rods_too_short_to_meet_are_named_with_what_they_lack(name, change, word
     )
 
 
+def test_a_cone_that_no_pose_or_next_to_none_keeps_is_named():
+    def with_cone(axis, angle):
+        first, *others = CATALOG["par4"].legs
+        return replace(
+            CATALOG["par4"], legs=(replace(first, platform_cone=Cone(axis, angle)), *others)
+        )
+
+    with pytest.raises(ModelError) as caught:
+        home_pose(with_cone(Y, 0.8))
+    assert "leg 1: rod at the platform at" in str(caught.value)
+    assert "nan" not in str(caught.value)
+    words = (
+        r"only \d+ of \d{5} random .* passive joints: leg 1: rod at the platform at 0.\d+ %; widen"
+    )
+    with pytest.raises(ModelError, match=words):
+        home_pose(with_cone(Z, 0.05))
+
+
 def test_limits_that_no_pose_keeps_are_named_with_where_the_joints_are():
     robot = CATALOG["3-rrr"]
     elbows = legs_of("3-rrr", lambda i, leg: replace(leg, elbow_limits=(3.0, 3.1)))
@@ -380,8 +399,11 @@ DOUBTS = {
     "upper: center_of_mass: x = -0.2463 m is not between": lambda leg: {
         "upper": crank(leg, center_of_mass=(-0.2463, 0.0))
     },
-    "upper: center_of_mass: 27 m beside it: are these mm?": lambda leg: {
+    "upper.center_of_mass: [0.2, 27.0] m: are these mm?": lambda leg: {
         "upper": crank(leg, center_of_mass=(0.2, 27.0), inertia=3000.0)
+    },
+    "upper: center_of_mass: 2.7 m beside it: are these mm?": lambda leg: {
+        "upper": crank(leg, center_of_mass=(0.2, 2.7), inertia=30.0)
     },
     "kg m^2 leaves 2.07e+05 about the centre of mass": lambda leg: {
         "upper": crank(leg, inertia=207308.0)
@@ -405,9 +427,10 @@ def test_a_leg_s_unlikely_numbers_are_doubted(words):
 def test_a_shaft_s_unlikely_numbers_are_doubted():
     robot = CATALOG["delta-4"]
     shaft = robot.legs[3]
-    odd = replace(shaft, ratio=28.11, upper=shaft.lower, lower=shaft.upper)
+    odd = replace(shaft, ratio=28.11, upper=shaft.lower, lower=shaft.upper, travel=(900.0, 1300.0))
     found = doubts(replace(robot, legs=(*robot.legs[:3], odd)))
     for words in (
+        "travel: [900.0, 1300.0] m: are these mm?",
         "ratio: 28.11",
         "upper: center_of_mass: x is neg",
         "lower: center_of_mass: x is po",

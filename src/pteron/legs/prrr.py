@@ -111,6 +111,7 @@ class PRRR(LegKind):
             "e, of the guide; direction where left out",
             default=None,
             example=[1.0, 0.0, 0.0],
+            like="direction",
         ),
         "upper_length": Key("length", "lu, of the upper link, R1 to R2, m"),
         "lower_length": Key("length", "ll, of the lower link, R2 to R3, m"),
