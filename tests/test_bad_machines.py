@@ -313,6 +313,12 @@ def test_a_leg_with_faults_is_held_against_the_platform_too(tmp_path):
     assert all("not along the platform's axis" in fault for fault in found[-2:])
 
 
+def test_a_centre_of_mass_of_another_shape_is_one_fault(tmp_path):
+    text = text_of("five-bar").replace("center_of_mass = [0.0, 0.0]", "center_of_mass = [0.0]")
+    (only,) = faults_in(text, tmp_path)
+    assert only == "platform.center_of_mass: [0.0] given, a list of 2 numbers expected"
+
+
 def test_legs_that_are_one_table_are_not_counted(tmp_path):
     head, leg, *_ = text_of("five-bar").split("[[legs]]")
     (only,) = faults_in(f"{head}[legs]{leg}", tmp_path)

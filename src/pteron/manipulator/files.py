@@ -168,8 +168,11 @@ class _Reading:
 
     def platform(self, table: Any) -> Platform | None:
         """Return the platform, or None; one with faults serves to check the legs, where it may."""
+        from pteron.manipulator.tables import PlatformTable
+
         inertia = table.unit
-        if table.mass is not None and table.inertia is not None:
+        given = table.mass, table.inertia, table.center_of_mass or table.first_moment
+        if type(table) is PlatformTable or None not in given:
             inertia = self.built("platform.", lambda: table.inertia_of("")) or inertia
         bars = self.parts("bars", table.bars, Bar)
         geared = self.parts("geared", table.geared, Geared)
