@@ -319,6 +319,21 @@ def test_a_centre_of_mass_of_another_shape_is_one_fault(tmp_path):
     assert only == "platform.center_of_mass: [0.0] given, a list of 2 numbers expected"
 
 
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("axis = [0.0, 0.0, 1.0]", "axis = [0.0, 1.0]"),
+        ("lower_length", "fixed_offset = [0.1, 0.0]\nlower_length"),
+    ],
+)
+def test_nothing_is_told_that_hangs_on_a_value_of_another_shape(old, new, tmp_path):
+    text = text_of("five-bar").replace(old, new)
+    # Whether both points coincide in the plane hangs on it.
+    text = text.replace("platform_point = [0.0, 0.0, 0.0]", "platform_point = [0.1, 0.0, 0.0]", 1)
+    found = faults_in(text, tmp_path)
+    assert all(" given, a list of 3 numbers expected" in fault for fault in found), found
+
+
 def test_legs_that_are_one_table_are_not_counted(tmp_path):
     head, leg, *_ = text_of("five-bar").split("[[legs]]")
     (only,) = faults_in(f"{head}[legs]{leg}", tmp_path)

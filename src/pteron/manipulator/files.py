@@ -138,7 +138,7 @@ class _Reading:
             return self.rest(model, given)
 
     def rest(self, model: Any, given: object) -> Any:
-        """Return what of a table has the right shape, None for the keys that it must give."""
+        """Return what of a table has the right shape, None for the rest and for what is missing."""
         from pydantic import ValidationError
 
         from pteron.manipulator.tables import part_of
@@ -147,8 +147,9 @@ class _Reading:
         try:
             return part.model_validate(kept)
         except ValidationError as error:
-            wrong = {fault["loc"][0] for fault in error.errors()}
-            return part.model_validate({k: v for k, v in kept.items() if k not in wrong})
+            wrong = {str(fault["loc"][0]) for fault in error.errors()}
+            found = part.model_validate({k: v for k, v in kept.items() if k not in wrong})
+            return found.model_copy(update=dict.fromkeys(wrong.intersection(part.model_fields)))
 
     def built(self, prefix: str, build: Callable[[], _Built]) -> _Built | None:
         """Return what `build` makes, or None with its faults noted under the keys they name."""
@@ -174,9 +175,9 @@ class _Reading:
         given = table.mass, table.inertia, table.center_of_mass or table.first_moment
         if type(table) is PlatformTable or None not in given:
             inertia = self.built("platform.", lambda: table.inertia_of("")) or inertia
-        bars = self.parts("bars", table.bars, Bar)
-        geared = self.parts("geared", table.geared, Geared)
-        if table.motion is None:
+        bars = self.parts("bars", table.bars or [], Bar)
+        geared = self.parts("geared", table.geared or [], Geared)
+        if table.motion is None or table.axis is None:
             return None
         whole = self.built(
             "platform.",
@@ -185,9 +186,9 @@ class _Reading:
                 inertia,
                 axis=table.axis,
                 x_axis=table.x_axis,
-                slides=table.slides,
+                slides=bool(table.slides),
                 limits=table.limits,
-                tool=table.tool,
+                tool=table.tool or (0.0, 0.0, 0.0),
                 bars=tuple(bars),
                 geared=tuple(geared),
             ),
@@ -196,7 +197,7 @@ class _Reading:
             return whole
         with suppress(ModelError):
             axis = unit_vector(table.axis, "axis")
-            slides = table.slides and table.motion == "3T1R"
+            slides = bool(table.slides) and table.motion == "3T1R"
             return Platform(
                 table.motion, inertia, axis, vector(perpendicular_to(axis), "x_axis"), slides
             )

@@ -191,7 +191,7 @@ def leg_of(kind: type[LegKind], table: Any) -> tuple[LegKind | None, list[str]]:
             refused[name] = error.faults
     sound, others = kind.checked(values)
     filled = {
-        name: _ORDINARY.get(key.role) if key.default is ... else key.default
+        name: _ORDINARY.get(key.role) if key.default is ... or key.role == "point" else key.default
         for name, key in keys.items()
     }
     try:
