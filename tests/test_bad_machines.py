@@ -1,17 +1,29 @@
 """What a file may get wrong about a machine: one clear line each, and all of them at once."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from mechanisms import CATALOG
+from scipy.spatial.transform import Rotation
 
 import pteron
 from pteron import ModelError, PlanarInertia
+from pteron.legs.cones import Cone
+from pteron.manipulator.manipulator import turned
 from pteron.workspace import home_pose
 from pteron.workspace.doubts import doubts
 
 FOLDER = Path(pteron.__file__).parent / "manipulator" / "catalog"
+
+
+def text_of(name):
+    return (FOLDER / f"{name}.toml").read_text(encoding="utf-8")
+
+
+BARS = re.search(r"(?ms)^\[\[platform.bars.*?\[\[platform.g", text_of("par4"))[0]
 
 BAD = {
     "a crank whose zero direction is along its axis": (
@@ -73,6 +85,46 @@ BAD = {
         "leg 1: tip_cone.angle: 30 rad given, one above 0 and up to pi expected; are these "
         "degrees?",
     ),
+    "a crank whose zero direction leans and is too long": (
+        "five-bar",
+        ["zero_direction = [1.0, 0.0, 0.0]", "zero_direction = [2.0, 0.0, 0.5]"],
+        "leg 1: zero_direction: [2.0, 0.0, 0.5] is not perpendicular to direction [0.0, 0.0, 1.0]; "
+        "[1.0, 0.0, 0.0] is",
+    ),
+    "a shaft that turns about another axis": (
+        "delta-4",
+        ['"RUPU"', '"RUPU"\ndirection = [1.0, 0.0, 0.0]'],
+        "leg 4: direction: [1.0, 0.0, 0.0] is not along the platform's axis [0.0, 0.0, 1.0], about "
+        "which a shaft turns it; leave direction out",
+    ),
+    "a shaft that turns backwards": (
+        "delta-4",
+        ['"RUPU"', '"RUPU"\ndirection = [0.0, 0.0, -1.0]'],
+        "leg 4: direction: [0.0, 0.0, -1.0] is the platform's axis [0.0, 0.0, 1.0] reversed; leave "
+        "direction out, and give a negative ratio where the joint's angle counts the other way",
+    ),
+    "a shaft shorter than nothing": (
+        "delta-4",
+        ['"RUPU"', '"RUPU"\ntravel = [-0.3, 0.6]'],
+        "leg 4: travel: -0.3 m given, but no length is below 0; give 0 or more",
+    ),
+    "a centre of mass beyond the rod": (
+        "linear-delta",
+        ["[-0.1147]", "[-0.9]"],
+        "leg 1: lower.center_of_mass: x = -0.9 m is not between slider and platform, where its x "
+        "is zero: -0.2294 to 0 m is usual; with it no real body has inertia 0.000701658 kg m^2",
+    ),
+    "true for 1": (
+        "five-bar",
+        ["elbow = 1", "elbow = true"],
+        "leg 1: elbow: True given, 1 or -1 expected",
+    ),
+    "one table of bars": (
+        "par4",
+        [BARS, "[platform.bars]\nmass = 0.1\nhinge = [0.0, 0.0, 0.0]\n\n[[platform.g"],
+        "platform.bars: [platform.bars] is one table, a list of tables expected; write "
+        "[[platform.bars]] above each",
+    ),
     "inertia about the centre of mass": (
         "five-bar",
         ["inertia = 0.000162", "inertia = 4.05e-5"],
@@ -100,10 +152,6 @@ EVERYWHERE = {
     ),
 }
 """The same, replaced throughout."""
-
-
-def text_of(name):
-    return (FOLDER / f"{name}.toml").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("case", [*BAD, *EVERYWHERE])
@@ -164,6 +212,26 @@ def test_a_shaft_needs_an_angle_to_turn_and_turns_it_alone():
     refused(robot, "legs 3 and 4: all turn the platform, which takes one such leg", legs=twice)
 
 
+def test_a_shaft_turns_the_platform_about_its_axis_and_no_other(tmp_path):
+    oblique = (2 / 3, -1 / 3, 2 / 3)
+    robot = turned(CATALOG["delta-4"], Rotation.align_vectors([oblique], [Z])[0].as_matrix())
+    axis = robot.platform.axis
+    np.testing.assert_allclose(axis, oblique, atol=1e-15)
+    shaft = replace(robot.legs[3], direction=None, ratio=-2.5)
+    robot = replace(robot, legs=(*robot.legs[:3], shaft))
+    pose, rates = home_pose(robot) + np.array([0.0, 0.0, 0.0, 0.3]), [0.1, -0.2, 0.3, 0.7]
+    found = pteron.joint_rates(robot, pose, rates)
+    joints = np.nan_to_num([found.actuated[3], *found.passive[3]])
+    twist = joints @ np.nan_to_num(pteron.joint_screws(robot, pose)[3])
+    np.testing.assert_allclose(twist[:3], 0.7 * np.array(axis), atol=1e-14)
+    assert found.actuated[3] == pytest.approx(-2.5 * 0.7)
+    for direction, words in [(X, "is not along"), (tuple(-a for a in axis), "reversed")]:
+        other = replace(shaft, direction=direction)
+        refused(
+            robot, f"leg 4: direction: {list(direction)} is", words, legs=(*robot.legs[:3], other)
+        )
+
+
 def test_all_faults_are_told_at_once_those_of_the_machine_too(tmp_path):
     text = text_of("3-prr").replace("lower_length = 0.2", "lower_length = -0.2", 1)
     text = text.replace("limits = [0.05, 0.3]", "limits = [0.3, 0.05]", 1)
@@ -185,6 +253,91 @@ def test_all_faults_are_told_at_once_those_of_the_machine_too(tmp_path):
         "leg 2",
     ]
     assert str(caught.value).splitlines()[0] == f"{file}: 7 faults"
+
+
+def faults_in(text, tmp_path):
+    """Return what is told of a file."""
+    file = tmp_path / "bad.toml"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(ModelError) as caught:
+        pteron.load(file)
+    return caught.value.faults
+
+
+def test_a_fault_hides_none_that_does_not_hang_on_it(tmp_path):
+    text = text_of("par4").replace('motion = "3T1R"', 'motion = "3T"')
+    four = "legs: 4 given, but a 3T platform has 3 freedoms and needs 3 legs"
+    assert [fault.split(":")[0] for fault in faults_in(text, tmp_path)] == [
+        "platform.limits",
+        "platform.geared",
+        "legs",
+    ]
+    first, second, *others = text.split("[[legs]]")[1:]
+    for old, new in [
+        ("upper_length = 0.2", "upper_length = -0.2"),
+        ("limits = [-0.9, 1.5]", "limits = [1.5, -0.9]"),
+        ("mass = 0.35", "mass = -0.35"),
+    ]:
+        first = first.replace(old, new)
+    second = second.replace("fixed_offset", "fixd_offset").replace("lower_length = 0.51\n", "")
+    second = second.replace("zero_direction = [1.0, 0.0", "zero_direction = [0.0, 1.0")
+    head = text.split("[[legs]]")[0].replace('name = "par4"', "nam = 1").replace("0.32", "-0.32", 1)
+    found = faults_in("[[legs]]".join([head, first, second, *others]), tmp_path)
+    assert [fault.split(": ")[0:2] for fault in found[:4]] == [
+        ["name", "missing; the file must give a text"],
+        ["nam", "unknown key; the valid ones there are name, gravity, platform, legs"],
+        ["platform.bars, item 1", "mass"],
+        ["platform.limits", "a 3T platform has no angle to limit"],
+    ]
+    assert [fault.split(": ")[0:2] for fault in found[5:-1]] == [
+        ["leg 1", "upper.mass"],
+        ["leg 1", "upper_length"],
+        ["leg 1", "limits"],
+        ["leg 2", "lower_length"],
+        ["leg 2", "fixd_offset"],
+        ["leg 2", "zero_direction"],
+    ]
+    assert found[-1] == four
+
+
+def test_a_leg_with_faults_is_held_against_the_platform_too(tmp_path):
+    text = text_of("five-bar").replace("direction = [0.0, 0.0, 1.0]", "direction = [0.0, 0.6, 0.8]")
+    text = text.replace("upper_length = 0.09", "upper_length = -0.09").replace(
+        "[0.3, 3.4]", "[4, 3]"
+    )
+    found = faults_in(text.replace("elbow = -1", "elbow = 2"), tmp_path)
+    assert [fault.split(":")[0] for fault in found] == ["leg 1"] * 2 + ["leg 2"] * 2 + [
+        "leg 1",
+        "leg 2",
+    ]
+    assert all("not along the platform's axis" in fault for fault in found[-2:])
+
+
+def test_a_centre_of_mass_of_another_shape_is_one_fault(tmp_path):
+    text = text_of("five-bar").replace("center_of_mass = [0.0, 0.0]", "center_of_mass = [0.0]")
+    (only,) = faults_in(text, tmp_path)
+    assert only == "platform.center_of_mass: [0.0] given, a list of 2 numbers expected"
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("axis = [0.0, 0.0, 1.0]", "axis = [0.0, 1.0]"),
+        ("lower_length", "fixed_offset = [0.1, 0.0]\nlower_length"),
+    ],
+)
+def test_nothing_is_told_that_hangs_on_a_value_of_another_shape(old, new, tmp_path):
+    text = text_of("five-bar").replace(old, new)
+    # Whether both points coincide in the plane hangs on it.
+    text = text.replace("platform_point = [0.0, 0.0, 0.0]", "platform_point = [0.1, 0.0, 0.0]", 1)
+    found = faults_in(text, tmp_path)
+    assert all(" given, a list of 3 numbers expected" in fault for fault in found), found
+
+
+def test_legs_that_are_one_table_are_not_counted(tmp_path):
+    head, leg, *_ = text_of("five-bar").split("[[legs]]")
+    (only,) = faults_in(f"{head}[legs]{leg}", tmp_path)
+    assert only == "legs: [legs] is one table, a list of tables expected; write [[legs]] above each"
 
 
 SLIDER = "slider_direction = [-0.5, 0.0, 0.8660254037844386] # "
@@ -225,6 +378,24 @@ def test_rods_too_short_to_meet_are_named_with_what_they_lack(name, change, word
     )
 
 
+def test_a_cone_that_no_pose_or_next_to_none_keeps_is_named():
+    def with_cone(axis, angle):
+        first, *others = CATALOG["par4"].legs
+        return replace(
+            CATALOG["par4"], legs=(replace(first, platform_cone=Cone(axis, angle)), *others)
+        )
+
+    with pytest.raises(ModelError) as caught:
+        home_pose(with_cone(Y, 0.8))
+    assert "leg 1: rod at the platform at" in str(caught.value)
+    assert "nan" not in str(caught.value)
+    words = (
+        r"only \d+ of \d{5} random .* passive joints: leg 1: rod at the platform at 0.\d+ %; widen"
+    )
+    with pytest.raises(ModelError, match=words):
+        home_pose(with_cone(Z, 0.05))
+
+
 def test_limits_that_no_pose_keeps_are_named_with_where_the_joints_are():
     robot = CATALOG["3-rrr"]
     elbows = legs_of("3-rrr", lambda i, leg: replace(leg, elbow_limits=(3.0, 3.1)))
@@ -249,8 +420,11 @@ DOUBTS = {
     "upper: center_of_mass: x = -0.2463 m is not between": lambda leg: {
         "upper": crank(leg, center_of_mass=(-0.2463, 0.0))
     },
-    "upper: center_of_mass: 27 m beside it: are these mm?": lambda leg: {
+    "upper.center_of_mass: [0.2, 27.0] m: are these mm?": lambda leg: {
         "upper": crank(leg, center_of_mass=(0.2, 27.0), inertia=3000.0)
+    },
+    "upper: center_of_mass: 2.7 m beside it: are these mm?": lambda leg: {
+        "upper": crank(leg, center_of_mass=(0.2, 2.7), inertia=30.0)
     },
     "kg m^2 leaves 2.07e+05 about the centre of mass": lambda leg: {
         "upper": crank(leg, inertia=207308.0)
@@ -274,9 +448,10 @@ def test_a_leg_s_unlikely_numbers_are_doubted(words):
 def test_a_shaft_s_unlikely_numbers_are_doubted():
     robot = CATALOG["delta-4"]
     shaft = robot.legs[3]
-    odd = replace(shaft, ratio=28.11, upper=shaft.lower, lower=shaft.upper)
+    odd = replace(shaft, ratio=28.11, upper=shaft.lower, lower=shaft.upper, travel=(900.0, 1300.0))
     found = doubts(replace(robot, legs=(*robot.legs[:3], odd)))
     for words in (
+        "travel: [900.0, 1300.0] m: are these mm?",
         "ratio: 28.11",
         "upper: center_of_mass: x is neg",
         "lower: center_of_mass: x is po",

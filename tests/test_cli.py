@@ -646,7 +646,7 @@ def test_millimetres_in_a_file_are_doubted():
     robot = pteron.load("tripteron")
     assert all(doubts(pteron.load(name)) == () for name in pteron.catalog())
     far = replace(robot.legs[0], upper_length=154.0, guide_point=(260.0, 0.0, 0.0))
-    heavy = pteron.PlanarInertia.of_body(0.8, (6.0, -4.0), 2100.0)
+    heavy = pteron.PlanarInertia.of_body(0.8, (0.006, -0.004), 2100.0)
     odd = replace(
         robot,
         gravity=(0.0, 0.0, -9810.0),
@@ -654,9 +654,48 @@ def test_millimetres_in_a_file_are_doubted():
         legs=(far, *robot.legs[1:]),
     )
     found = doubts(odd)
-    for place in ("gravity", "platform: center", "platform: inertia", "leg 1: upper_length"):
-        assert any(text.startswith(place) for text in found), place
-    assert any("guide_point: [260.0, 0.0, 0.0] m: are these mm?" in text for text in found)
+    # First the cause, in one line, and nothing that follows from it.
+    assert [text.split(": ")[0] for text in found] == ["leg 1", "gravity", "platform"]
+    assert found[0] == "leg 1: upper_length, guide_point: beyond 10 m: are these mm?"
+    assert found[2].startswith("platform: inertia: 2100 kg m^2")
+
+
+def test_lengths_in_millimetres_are_one_doubt_however_many():
+    def scaled(values):
+        return tuple(1000.0 * x for x in values)
+
+    robot = pteron.load("par4")
+    legs = tuple(
+        replace(
+            leg,
+            **{key: scaled(leg.metres[key]) for key in leg.metres if "length" not in key},
+            **{key: 1000.0 * leg.metres[key][0] for key in leg.metres if "length" in key},
+        )
+        for leg in robot.legs
+    )
+    bars = tuple(replace(bar, hinge=scaled(bar.hinge)) for bar in robot.platform.bars)
+    tool = scaled(robot.platform.tool)
+    platform = replace(robot.platform, bars=bars, tool=tool)
+    assert doubts(replace(robot, platform=platform, legs=legs)) == (
+        "platform: tool, hinge of bars item 1, hinge of bars item 2; legs 1, 2, 3 and 4: "
+        "upper_length, lower_length, guide_point, platform_point, fixed_offset: beyond 10 m: are "
+        "these mm?",
+    )
+    bars = (replace(bars[0], hinge=(44.9, -44.9, 0.0)), robot.platform.bars[1])
+    assert doubts(replace(robot, platform=replace(robot.platform, bars=bars))) == (
+        "platform: hinge of bars item 1: [44.9, -44.9, 0.0] m: are these mm?",
+    )
+
+
+def test_what_keeps_a_machine_from_working_and_what_is_doubted_are_lines_of_their_own():
+    text = Path(pteron.save(pteron.load("linear-delta"), "mm.toml")).read_text()
+    Path("mm.toml").write_text(text.replace("lower_length = 0.2294", "lower_length = 217.95", 1))
+    told = run("check mm.toml")
+    assert told.exit_code == 2
+    doubt, error = told.stderr.splitlines()
+    assert doubt == "Warning: mm.toml: leg 1: lower_length: 217.95 m: are these mm?"
+    assert error.startswith("Error: mm.toml: no pose in reach of all legs keeps")
+    assert "mm?" not in error
 
 
 def test_a_machine_that_cannot_work_is_refused_with_the_file_s_name():
@@ -677,7 +716,11 @@ def test_a_machine_without_a_common_reach_is_refused():
         text = text.replace(f"upper_length = {leg.upper_length}", "upper_length = 0.01")
         text = text.replace(f"lower_length = {leg.lower_length}", "lower_length = 0.01")
     Path("short.toml").write_text(text)
-    refused("check short.toml", "short.toml: no pose is in reach of all legs")
+    told = run("check short.toml")
+    assert told.exit_code == 2
+    *unlikely, error = told.stderr.splitlines()
+    assert error.startswith("Error: short.toml: no pose is in reach of all legs")
+    assert all(text.startswith("Warning: short.toml: leg ") for text in unlikely)
 
 
 # The report

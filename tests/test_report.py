@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mechanisms import CATALOG, MECHANISMS, with_elbows
+from mechanisms import CATALOG, MECHANISMS, random_machine, with_elbows
 from test_workspace import fourfold, with_limits
 
 import pteron
@@ -20,7 +20,7 @@ from pteron.reduction import FORMS
 from pteron.report import write_report
 from pteron.report.contents import contents
 from pteron.report.costs import dense_operations
-from pteron.report.page import bodies, in_symbols, lettered, page
+from pteron.report.page import bodies, geometry, in_symbols, lettered, page
 from pteron.report.typeset import fixed, significant, triple
 from pteron.report.write import checked_folder, numbers
 from pteron.workspace import REACHABLE, reserve
@@ -420,3 +420,9 @@ def test_numbers_as_people_read_them():
     assert lettered(account) == (
         "its point <b>s</b><sub>0</sub> is <b>p</b> \u2212 <b>r</b> \u00b7 <b>d</b>, \u03c1"
     )
+
+
+@pytest.mark.parametrize("kinds", ["SRP", "LCC"])
+def test_of_mixed_legs_the_upper_length_stands_before_the_lower(kinds):
+    columns = [name for name, _, _ in geometry(random_machine(3, kinds))]
+    assert columns.index("lower length") == columns.index("upper length") + 1

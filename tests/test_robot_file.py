@@ -68,6 +68,17 @@ def test_what_may_be_left_out_has_a_value_that_could_stand_there():
             assert told or key in ("first_moment", "center_of_mass"), (name, key)
 
 
+@pytest.mark.parametrize("name", ["par4", "quadrupteron", "linear-delta", "delta-4", "3-prr"])
+def test_what_a_leg_may_have_may_stand_there_as_it_is_written(name, tmp_path):
+    head, first, *others = explained(name).split("[[legs]]")
+    keys = re.findall(r"(?m)^#\w+ = ", first)
+    assert keys
+    for key in keys:
+        file = tmp_path / "robot.toml"
+        file.write_text("[[legs]]".join([head, first.replace(key, key[1:]), *others]))
+        pteron.load(file)
+
+
 def test_it_is_written_to_a_file_and_none_is_replaced_unasked(program):
     assert program("new", "delta", "--out", "robot.toml").exit_code == 0
     text = Path("robot.toml").read_text(encoding="utf-8")

@@ -187,7 +187,11 @@ def _fault(fault: Any, schema: _Node, location: tuple[int | str, ...]) -> str:
         if location[-1] in valid:
             return f"{given} given, a table expected"
         return f"unknown key; the valid ones there are {', '.join(valid)}"
-    expected = _words(_at(schema, location))
+    node = _at(schema, location)
+    if kind == "list_type" and isinstance(fault["input"], dict):
+        key = ".".join(str(part) for part in location)
+        return f"[{key}] is one table, a list of tables expected; write [[{key}]] above each"
+    expected = _words(node)
     if kind == "missing" and fault["loc"] == location:
         return f"missing; the file must give {expected or 'it'}"
     if kind in _BOUNDS:
@@ -249,4 +253,5 @@ def _words(node: _Node) -> str:
     several = node.get("prefixItems", [])
     item = _words(several[0] if several else node.get("items", {}))
     count = f"{len(several)} " if several else ""
-    return f"a list of {count}{item.removeprefix('a ')}s" if item else "a list"
+    plural = "s" * (len(several) != 1)
+    return f"a list of {count}{item.removeprefix('a ')}{plural}" if item else "a list"

@@ -9,14 +9,22 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from pteron.bodies.inertia import PlanarInertia, RodInertia
-from pteron.errors import ModelError
+from pteron.errors import ModelError, shown
 
 Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 Count = Annotated[int, Field(ge=1, strict=True)]
-One = tuple[Number]
+
+
+def _only_x(given: Any) -> Any:
+    if isinstance(given, list) and len(given) > 1:
+        raise ValueError(f"{shown(given)} given, a list of 1 number expected: a rod has x only")
+    return given
+
+
+One = Annotated[tuple[Number], BeforeValidator(_only_x)]
 Two = tuple[Number, Number]
 Three = tuple[Number, Number, Number]
 

@@ -84,24 +84,35 @@ def unit_vector(values: Sequence[object], key: str) -> Vector:
     return scaled(given, 1.0 / length)
 
 
-def perpendicular(v: Vector, axis: Vector, key: str, other: str) -> Vector:
-    """Return the unit vector v, perpendicular to another but for rounding, made so to rounding."""
+def perpendicular(values: Sequence[object], axis: Vector, key: str, other: str) -> Vector:
+    """Return `values` as `unit_vector` does, made perpendicular to a unit vector to rounding.
+
+    One that leans is refused first, whatever its length: what to write is then right in both.
+    """
+    given = vector(values, key)
+    lean, size = dot(given, axis), norm(given)
+    if abs(lean) > UNIT_TOLERANCE * size:
+        upright = _across(given, axis)
+        if norm(upright) < UNIT_TOLERANCE * size:
+            raise ModelError(
+                f"{key}: {list(given)} is along {other} {list(axis)}; give one at right angles to "
+                "it"
+            )
+        near = [float(f"{c / norm(upright):.12g}") + 0.0 for c in upright]
+        raise ModelError(
+            f"{key}: {list(given)} is not perpendicular to {other} {list(axis)}; {near} is"
+        )
+    unit = unit_vector(given, key)
+    if abs(dot(unit, axis)) <= _UPRIGHT:
+        return unit
+    upright = _across(unit, axis)
+    return scaled(upright, 1.0 / norm(upright))
+
+
+def _across(v: Vector, axis: Vector) -> Vector:
+    """Return the part of a vector that is perpendicular to a unit vector."""
     lean = dot(v, axis)
-    if abs(lean) <= _UPRIGHT:
-        return v
-    upright = (v[0] - lean * axis[0], v[1] - lean * axis[1], v[2] - lean * axis[2])
-    size = norm(upright)
-    if size < UNIT_TOLERANCE:
-        raise ModelError(
-            f"{key}: {list(v)} is along {other} {list(axis)}; give one at right angles to it"
-        )
-    upright = scaled(upright, 1.0 / size)
-    if abs(lean) > UNIT_TOLERANCE:
-        near = [float(f"{c:.12g}") + 0.0 for c in upright]
-        raise ModelError(
-            f"{key}: {list(v)} is not perpendicular to {other} {list(axis)}; {near} is"
-        )
-    return upright
+    return (v[0] - lean * axis[0], v[1] - lean * axis[1], v[2] - lean * axis[2])
 
 
 def dot(a: Vector, b: Vector) -> float:

@@ -103,14 +103,14 @@ def check(
         raise Exit(_FAULTY) from None
     from pteron.workspace.doubts import doubts
 
+    unlikely = doubts(robot)
+    for text in unlikely:
+        note(f"Warning: {file}: {text}")
     try:
         with spinner(f"Looking where {robot.name} can work"):
-            found = _findings(robot, doubts(robot))
+            found = _findings(robot, unlikely)
     except PteronError as error:
-        unlikely = "".join(f"; {text}" for text in doubts(robot))
-        raise ModelError(f"{error.message}{unlikely}", subject=file) from None
-    for text in found["doubts"]:
-        note(f"Warning: {file}: {text}")
+        raise ModelError(error.message, subject=file) from None
     if json:
         show_json(found)
     else:

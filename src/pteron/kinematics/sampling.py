@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from operator import itemgetter
+
+import casadi as ca
 import numpy as np
 
+from pteron.equations.kinematics import passive_joints
+from pteron.equations.machine import Machine
 from pteron.errors import DataError, ModelError
 from pteron.kernels import Array, numeric
 from pteron.manipulator import Manipulator
@@ -12,6 +17,11 @@ from pteron.shapes import Poses
 _BATCH = 4096
 _ATTEMPTS = 250
 _SCOUTS = 100
+
+_SEEN = 1000
+"""Poses that tell how often limits are kept."""
+
+_SELDOM = 0.1
 
 
 def random_poses(
@@ -86,7 +96,8 @@ def _drawn(
 ) -> Array:
     """Return at least `count` usable poses with positions drawn from a box."""
     found: list[Array] = []
-    total = 0
+    total = reached = 0
+    seen = np.empty((0, robot.freedom))
     for _ in range(_ATTEMPTS + count // 16):
         poses = rng.uniform(-1.0, 1.0, (_BATCH, robot.freedom))
         lengths = len(low)
@@ -98,16 +109,42 @@ def _drawn(
             # Of a machine that is singular everywhere the measure is 0: all poses count.
             measure = np.abs(numeric(robot, "type_ii")(poses)[0])
             good &= (measure >= type_ii) | ~(measure > 0.0).any()
+        reached += int(good.sum())
+        seen = seen if len(seen) >= _SEEN else np.concatenate([seen, poses[good]])
         good &= (numeric(robot, "passive_room")(poses)[0] >= 0.0).all(axis=-1)
         found.append(poses[good])
         total += int(good.sum())
         if total >= count:
             return np.concatenate(found)
+    if reached >= count:
+        raise ModelError(
+            f"only {total} of {reached} random poses in reach of all legs keep the limits of "
+            f"passive joints: {_seldom_kept(robot, seen)}; widen these limits",
+            subject=robot.name,
+        )
     raise ModelError(
         f"only {total} of {_ATTEMPTS * _BATCH} random poses are in reach of all legs and away from "
         "singularities; bring the guide points nearer or lengthen the links",
         subject=robot.name,
     )
+
+
+def _seldom_kept(robot: Manipulator, poses: Array) -> str:
+    """Return which passive joints seldom keep their limits at given poses, and how often."""
+    pose = ca.SX.sym("pose", robot.freedom)
+    angle, *legs = passive_joints(Machine.of(robot), pose)
+    found = [("", joint) for joint in angle]
+    found += [(f"leg {i}: ", joint) for i, leg in enumerate(legs, start=1) for joint in leg]
+    value = ca.Function("value", [pose], [ca.vertcat(*(joint.value for _, joint in found))])
+    low, high = np.array([(joint.least, joint.most) for _, joint in found]).T
+    values = np.asarray(value(poses.T)).T
+    kept = ((low <= values) & (values <= high)).mean(axis=0)
+    told = [
+        f"{leg}{joint.noun} at {100.0 * share:.2g} %"
+        for share, (leg, joint) in sorted(zip(kept, found, strict=True), key=itemgetter(0))
+        if share <= max(_SELDOM, kept.min())
+    ]
+    return ", ".join(told)
 
 
 def search_ball(robot: Manipulator) -> tuple[Array, float]:

@@ -16,7 +16,7 @@ import casadi as ca
 
 from pteron.bodies.inertia import PlanarInertia
 from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, PointMotion
-from pteron.bodies.vectors import Vector, cross, perpendicular, vertical
+from pteron.bodies.vectors import Vector, cross, vertical
 from pteron.legs.circles import perpendicular_to, plane_of, quarter_turn
 from pteron.legs.kind import CRANK, Key, LegKind, Quantity, ReachBound, Transfer
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Reach
@@ -36,7 +36,9 @@ CRANK_KEYS: dict[str, Key] = {
     "guide_point": Key("point", "r, the centre of the crank's circle, m"),
     "direction": Key("direction", "d, the crank's axis: its angle counts by the right hand"),
     "zero_direction": Key(
-        "direction", "a, where the crank points at angle 0: perpendicular to direction"
+        "direction",
+        "a, where the crank points at angle 0: perpendicular to direction",
+        across="direction",
     ),
     "upper_length": Key("length", "lu, of the crank, m"),
     "elbow": Key(
@@ -73,11 +75,6 @@ class CrankLeg(LegKind):
     fixed_offset: Vector = (0.0, 0.0, 0.0)
 
     joint = CRANK
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        zero = perpendicular(self.zero_direction, self.direction, "zero_direction", "direction")
-        object.__setattr__(self, "zero_direction", zero)
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:

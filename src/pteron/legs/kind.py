@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from random import Random
@@ -14,7 +14,15 @@ import casadi as ca
 from pteron.bodies.inertia import Inertia, PointMass
 from pteron.bodies.motion import Expression
 from pteron.bodies.parameters import LEG_BODIES
-from pteron.bodies.vectors import Vector, interval, number, positive, unit_vector, vector
+from pteron.bodies.vectors import (
+    Vector,
+    interval,
+    number,
+    perpendicular,
+    positive,
+    unit_vector,
+    vector,
+)
 from pteron.errors import ModelError
 from pteron.legs.leg import LegEquations, LegMotion, Passive
 from pteron.toml import told
@@ -84,6 +92,10 @@ class Key(NamedTuple):
     """What stands where a file does not give it; `...` where it must."""
     example: Any = None
     """A usual value, where the default is None."""
+    like: str = ""
+    """The key whose value is an example, where the file gives it."""
+    across: str = ""
+    """The direction to which it is perpendicular, by its key."""
 
 
 COMMON: dict[str, Key] = {
@@ -121,6 +133,16 @@ class ReachBound(NamedTuple):
     radius: float
 
 
+class Condition(NamedTuple):
+    """What else must hold of fields that are right by themselves."""
+
+    names: tuple[str, ...]
+    check: Callable[..., None]
+    """It takes their values and raises a `ModelError` if it does not hold."""
+
+
+_ROUNDING = 1e-9
+
 _EquationsClass = type[LegEquations]
 
 
@@ -139,7 +161,7 @@ def _checked(value: Any, name: str, role: KeyRole) -> Any:
     if role == "slider":
         return positive(value, "slider.mass", "kg")
     if role == "sign":
-        return 1 if value == 1 else -1
+        return int(value)
     if role == "limits":
         return interval(value, name)
     return value
@@ -187,24 +209,49 @@ class LegKind(ABC):
     """How it stands where that is zero, as a clause for messages."""
     keys: ClassVar[Mapping[str, Key]]
     """The fields of its own, which are its TOML keys, and what they hold; see `every_key`."""
+    conditions: ClassVar[tuple[Condition, ...]] = ()
     equations_class: ClassVar[_EquationsClass]
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
     def __post_init__(self) -> None:
-        faults: list[str] = []
-        if self.elbow not in self.branches:
-            valid = "neither 1 nor -1" if len(self.branches) > 1 else "not 1, its only branch"
-            faults.append(f"elbow: {self.elbow!r} is {valid}")
-        for name, key in self.every_key().items():
-            value = getattr(self, name)
-            if value is None and key.default is None:
-                continue
-            try:
-                object.__setattr__(self, name, _checked(value, name, key.role))
-            except ModelError as error:
-                faults += error.faults
+        sound, faults = self.checked({name: getattr(self, name) for name in self.every_key()})
         if faults:
             raise ModelError(told(faults), faults=faults)
+        for name, value in sound.items():
+            object.__setattr__(self, name, value)
+
+    @classmethod
+    def checked(cls, given: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
+        """Return those of the given fields that are sound, as a leg holds them, and all faults.
+
+        What hangs on a field that is not among the sound ones is not checked.
+        """
+        keys = cls.every_key()
+        sound: dict[str, Any] = {}
+        faults: list[str] = []
+        for name in sorted(given, key=lambda name: bool(keys[name].across)):
+            key, value = keys[name], given[name]
+            try:
+                if key.role == "sign" and (isinstance(value, bool) or value not in cls.branches):
+                    valid = (
+                        "neither 1 nor -1" if len(cls.branches) > 1 else "not 1, its only branch"
+                    )
+                    raise ModelError(f"{name}: {value!r} is {valid}")
+                if value is None and key.default is None:
+                    sound[name] = None
+                elif axis := sound.get(key.across):
+                    sound[name] = perpendicular(value, axis, name, key.across)
+                else:
+                    sound[name] = _checked(value, name, key.role)
+            except ModelError as error:
+                faults += error.faults
+        for names, check in cls.conditions:
+            if all(name in sound for name in names):
+                try:
+                    check(*(sound[name] for name in names))
+                except ModelError as error:
+                    faults += error.faults
+        return sound, faults
 
     @classmethod
     def every_key(cls) -> dict[str, Key]:
@@ -287,6 +334,29 @@ class LegKind(ABC):
     def extents(self) -> dict[str, tuple[str, float, float, str]]:
         """Where a body's mass is expected: its TOML key, least and greatest x, what is there."""
         return {}
+
+    def beyond_ends(self, letter: str, x: float) -> str | None:
+        """Return what is said of a body whose centre of mass is at an x beyond its ends."""
+        if letter not in self.extents:
+            return None
+        _, low, high, ends = self.extents[letter]
+        room = _ROUNDING * (high - low)
+        if low - room <= x <= high + room:
+            return None
+        turned = f"; is it {-x:g}?" if low <= -x <= high else ""
+        return f"x = {x:g} m is not between {ends}: {low:g} to {high:g} m is usual{turned}"
+
+    @property
+    def metres(self) -> dict[str, Sequence[float]]:
+        """What of it is in metres, by its keys: values that tell if a file is in millimetres."""
+        found: dict[str, Sequence[float]] = {
+            q.name: q.value for q in self.quantities if q.role == "length"
+        }
+        for key in ("guide_point", "platform_point", "fixed_offset"):
+            found[key] = getattr(self, key)
+        if self.limits is not None and self.joint.unit == "m":
+            found["limits"] = self.limits
+        return found
 
     @property
     def size(self) -> float:

@@ -16,10 +16,14 @@ from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, P
 from pteron.bodies.vectors import Vector, cross, perpendicular
 from pteron.legs.circles import perpendicular_to, plane_of, quarter_turn, random_vector
 from pteron.legs.cones import check_elbow, within
-from pteron.legs.kind import Key, Quantity
+from pteron.legs.kind import Condition, Key, Quantity
 from pteron.legs.leg import Circle, Joint, LegMotion, Needs, Passive
 from pteron.legs.planar_links import Turning, last_joints, lower_link_body
 from pteron.legs.slide import SLIDER_KEYS, SlideEquations, SlideLeg, SlideState
+
+
+def _check_elbow(limits: tuple[float, float] | None) -> None:
+    check_elbow(limits, -0.5 * math.pi, 0.5 * math.pi)
 
 
 @dataclass(frozen=True)
@@ -69,7 +73,9 @@ class PRR(SlideLeg):
 
     keys: ClassVar = {
         **SLIDER_KEYS,
-        "slider_direction": Key("direction", "e, of the guide, in the platform's plane"),
+        "slider_direction": Key(
+            "direction", "e, of the guide, in the platform's plane", across="direction"
+        ),
         "direction": Key(
             "direction",
             "d, of the revolute axes: along the platform's axis, and this where left out",
@@ -89,14 +95,7 @@ class PRR(SlideLeg):
         ),
     }
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_elbow(self.elbow_limits, -0.5 * math.pi, 0.5 * math.pi)
-        if self.direction is not None:
-            e = perpendicular(
-                self.slider_direction, self.direction, "slider_direction", "the plane's normal"
-            )
-            object.__setattr__(self, "slider_direction", e)
+    conditions = (Condition(("elbow_limits",), _check_elbow),)
 
     def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
         # The branch keeps the link ahead of the slider along sigma e.
@@ -106,7 +105,10 @@ class PRR(SlideLeg):
         return within("link", "rad", angle, self.elbow_limits, self.lower_length)
 
     def under(self, axis: Vector) -> Self:
-        return replace(self, direction=axis) if self.direction is None else self
+        if self.direction is not None:
+            return self
+        perpendicular(self.slider_direction, axis, "slider_direction", "the plane's normal")
+        return replace(self, direction=axis)
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:

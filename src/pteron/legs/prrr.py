@@ -28,13 +28,21 @@ from pteron.legs.circles import (
 )
 from pteron.legs.cones import ELBOW_LIMITS, between, check_elbow, within
 from pteron.legs.crank import ELBOW
-from pteron.legs.kind import SLIDER, Key, LegKind, Quantity, ReachBound, Transfer
+from pteron.legs.kind import SLIDER, Condition, Key, LegKind, Quantity, ReachBound, Transfer
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Passive, Plane, Reach
 from pteron.legs.planar_links import Turning, last_joints, link_body, lower_link_body
 from pteron.legs.slide import SLIDER_KEYS
 from pteron.legs.two_bar import two_bar_needs
 
 _LEAST_SLIDE = 1e-6
+
+
+def _check_slide(e: Vector | None, d: Vector) -> None:
+    if e is not None and abs(dot(d, e)) < _LEAST_SLIDE:
+        raise ModelError(
+            f"slider_direction: {list(e)} is perpendicular to direction {list(d)}, so that the "
+            "slider cannot move the leg's plane; tilt one against the other"
+        )
 
 
 @dataclass(frozen=True)
@@ -103,6 +111,7 @@ class PRRR(LegKind):
             "e, of the guide; direction where left out",
             default=None,
             example=[1.0, 0.0, 0.0],
+            like="direction",
         ),
         "upper_length": Key("length", "lu, of the upper link, R1 to R2, m"),
         "lower_length": Key("length", "ll, of the lower link, R2 to R3, m"),
@@ -117,15 +126,10 @@ class PRRR(LegKind):
         "lower": Key("planar", "the lower link: origin on R3, x along it from R2 to R3", "l"),
     }
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_elbow(self.elbow_limits)
-        if abs(dot(self.direction, self.e)) < _LEAST_SLIDE:
-            raise ModelError(
-                f"slider_direction: {list(self.e)} is perpendicular to direction "
-                f"{list(self.direction)}, so that the slider cannot move the leg's plane; tilt one "
-                "against the other"
-            )
+    conditions = (
+        Condition(("elbow_limits",), check_elbow),
+        Condition(("slider_direction", "direction"), _check_slide),
+    )
 
     @property
     def e(self) -> Vector:

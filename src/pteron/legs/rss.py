@@ -21,9 +21,17 @@ from pteron.errors import ModelError
 from pteron.legs.circles import random_vector
 from pteron.legs.cones import Cone
 from pteron.legs.crank import CRANK_KEYS, CrankEquations, CrankLeg, CrankState
-from pteron.legs.kind import Key
+from pteron.legs.kind import Condition, Key
 from pteron.legs.leg import Joint, LegMotion, Passive, Sphere
 from pteron.legs.rods import ROD_KEYS, cones, free_axes, hinge_doubts, rod_body, universal_joints
+
+
+def _check_bar(bar: Vector | None, direction: Vector) -> None:
+    if bar is not None and not parallel(bar, direction):
+        raise ModelError(
+            f"bar_direction: {list(bar)} is not along direction {list(direction)}, so that the "
+            "crank turns the bar and with it the platform"
+        )
 
 
 @dataclass(frozen=True)
@@ -89,6 +97,7 @@ class RSS(CrankLeg):
             "of the bars at the ends of parallel rods: along direction",
             default=None,
             example=[0.0, 1.0, 0.0],
+            like="direction",
         ),
         "tip_cone": Key(
             "cone",
@@ -98,13 +107,7 @@ class RSS(CrankLeg):
         ),
     }
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.bar_direction is not None and not parallel(self.bar_direction, self.direction):
-            raise ModelError(
-                f"bar_direction: {list(self.bar_direction)} is not along direction "
-                f"{list(self.direction)}, so that the crank turns the bar and with it the platform"
-            )
+    conditions = (Condition(("bar_direction", "direction"), _check_bar),)
 
     @property
     def bar(self) -> Vector | None:

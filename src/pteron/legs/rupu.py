@@ -16,16 +16,26 @@ import casadi as ca
 
 from pteron.bodies.inertia import RodInertia
 from pteron.bodies.motion import AngleMotion, Expression, Moments, PointMotion
-from pteron.bodies.vectors import Vector
+from pteron.bodies.vectors import Vector, dot, parallel
 from pteron.errors import ModelError
 from pteron.legs.circles import perpendicular_to, random_fraction, random_vector
 from pteron.legs.cones import within
-from pteron.legs.kind import SHAFT, Key, LegKind, Quantity, Transfer
+from pteron.legs.kind import SHAFT, Condition, Key, LegKind, Quantity, Transfer
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Passive, Reach, Turned
 from pteron.legs.rods import rod_body, universal_joints
 
 _FAST = 10.0
 """Ratio beyond which a gear is likelier to be the motor's."""
+
+
+def _check_ratio(ratio: float) -> None:
+    if ratio == 0.0:
+        raise ModelError("ratio: 0 given; the joint would not turn the platform")
+
+
+def _check_travel(travel: tuple[float, float] | None) -> None:
+    if travel is not None and travel[0] < 0.0:
+        raise ModelError(f"travel: {travel[0]:g} m given, but no length is below 0; give 0 or more")
 
 
 @dataclass(frozen=True)
@@ -43,7 +53,7 @@ class RUPU(LegKind):
     lower : RodInertia
         Inertia of the part at the platform, about the platform point, x pointing there.
     ratio : float
-        The joint's angle over phi.
+        The joint's angle over phi; negative where it counts the other way.
     elbow : {1}
         A shaft has but one branch.
     limits : (float, float), optional
@@ -51,7 +61,7 @@ class RUPU(LegKind):
     fixed_offset : vector
         t0, the part of the platform point that does not turn with phi, in the base frame, m.
     direction : unit vector, optional
-        Of the joint's axis: the platform's, which is its default.
+        Of the joint's axis: the platform's axis, which is its default.
     travel : (float, float), optional
         Least and greatest length of the shaft, m.
     """
@@ -84,11 +94,15 @@ class RUPU(LegKind):
         "guide_point": Key("point", "r, the shaft's universal joint on the base, m"),
         "direction": Key(
             "direction",
-            "of the actuated joint's axis: the platform's where left out",
+            "of the actuated joint's axis: the platform's axis, and this where left out",
             default=None,
             example=[0.0, 0.0, 1.0],
         ),
-        "ratio": Key("number", "the joint's angle over phi", default=1.0),
+        "ratio": Key(
+            "number",
+            "the joint's angle over phi; negative where it counts the other way",
+            default=1.0,
+        ),
         "elbow": Key("sign", "1: a shaft has but one branch", default=1),
         "limits": Key(
             "limits",
@@ -112,13 +126,26 @@ class RUPU(LegKind):
         ),
     }
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.ratio == 0.0:
-            raise ModelError("ratio: 0 given; the joint would not turn the platform")
+    conditions = (
+        Condition(("ratio",), _check_ratio),
+        Condition(("travel",), _check_travel),
+    )
 
     def under(self, axis: Vector) -> Self:
-        return replace(self, direction=axis) if self.direction is None else self
+        if self.direction is None:
+            return replace(self, direction=axis)
+        given = f"direction: {list(self.direction)}"
+        if not parallel(self.direction, axis):
+            raise ModelError(
+                f"{given} is not along the platform's axis {list(axis)}, about which a shaft turns "
+                "it; leave direction out"
+            )
+        if dot(self.direction, axis) < 0.0:
+            raise ModelError(
+                f"{given} is the platform's axis {list(axis)} reversed; leave direction out, and "
+                "give a negative ratio where the joint's angle counts the other way"
+            )
+        return self
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -147,6 +174,10 @@ class RUPU(LegKind):
             yield "upper: center_of_mass: x is negative, towards the base joint's other side"
         if self.lower.first_moment[0] > 0.0:
             yield "lower: center_of_mass: x is positive, beyond the platform point"
+
+    @property
+    def metres(self) -> dict[str, Sequence[float]]:
+        return {**super().metres, **({} if self.travel is None else {"travel": self.travel})}
 
     @property
     def joint_axis(self) -> Vector:

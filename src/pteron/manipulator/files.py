@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, is_dataclass
 from difflib import get_close_matches
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, TypeVar
 
 from pteron.atomic import write_text
+from pteron.bodies.vectors import unit_vector, vector
 from pteron.errors import ModelError, shown
 from pteron.legs import KINDS, LegKind
+from pteron.legs.circles import perpendicular_to
 from pteron.manipulator.manipulator import Manipulator, faults_of
 from pteron.platforms import Bar, Geared, Platform
 from pteron.toml import fault_lines, parsed_toml, read_toml, told
@@ -97,18 +101,22 @@ def explained(name_or_path: str | Path) -> str:
 
 
 def _machine(document: dict[str, Any], source: str) -> Manipulator:
-    from pteron.manipulator.tables import MachineTable
+    from pteron.manipulator.tables import MachineTable, PlatformTable
 
     reading = _Reading()
     machine = reading.table(MachineTable, document, "")
-    platform = machine and reading.platform(machine.platform)
+    table = machine.platform or reading.rest(PlatformTable, document.get("platform"))
+    platform = table and reading.platform(table)
     given = document.get("legs")
     legs = given if isinstance(given, list) else []
     built: list[Any] = [reading.leg(i, leg) for i, leg in enumerate(legs, start=1)]
     if platform is not None:
-        reading.faults += faults_of(machine.name, platform, built)
+        # What was told already is not told again.
+        name = "?" if machine.name is None else machine.name
+        known = built if machine.legs is not None else [None] * len(platform.coordinates)
+        reading.faults += faults_of(name, platform, known)
         if not reading.faults:
-            return Manipulator(machine.name, platform, tuple(built), machine.gravity)
+            return Manipulator(name, platform, tuple(built), machine.gravity)
     subject = shown(source, bare=True, longest=1000)
     raise ModelError(told(reading.faults), subject=subject, faults=reading.faults)
 
@@ -120,14 +128,28 @@ class _Reading:
     faults: list[str] = field(default_factory=list)
 
     def table(self, model: Any, given: object, prefix: str) -> Any:
-        """Return a table as its model holds it, or None with the faults noted."""
+        """Return a table as its model holds it; with its faults noted, what of it `rest` gives."""
         from pydantic import ValidationError
 
         try:
             return model.model_validate(given)
         except ValidationError as error:
             self.faults += [prefix + line for line in fault_lines(error, model)]
-            return None
+            return self.rest(model, given)
+
+    def rest(self, model: Any, given: object) -> Any:
+        """Return what of a table has the right shape, None for the rest and for what is missing."""
+        from pydantic import ValidationError
+
+        from pteron.manipulator.tables import part_of
+
+        part, kept = part_of(model), given if isinstance(given, dict) else {}
+        try:
+            return part.model_validate(kept)
+        except ValidationError as error:
+            wrong = {str(fault["loc"][0]) for fault in error.errors()}
+            found = part.model_validate({k: v for k, v in kept.items() if k not in wrong})
+            return found.model_copy(update=dict.fromkeys(wrong.intersection(part.model_fields)))
 
     def built(self, prefix: str, build: Callable[[], _Built]) -> _Built | None:
         """Return what `build` makes, or None with its faults noted under the keys they name."""
@@ -137,27 +159,53 @@ class _Reading:
             self.faults += [f"{prefix}{fault}" for fault in error.faults]
             return None
 
+    def parts(self, key: str, given: Sequence[Any], kind: Callable[..., _Built]) -> list[_Built]:
+        """Return those of the platform's parts in a list of tables that can be."""
+        found = [
+            self.built(f"platform.{key}, item {i}: ", partial(kind, **dict(part)))
+            for i, part in enumerate(given, start=1)
+        ]
+        return [part for part in found if part is not None]
+
     def platform(self, table: Any) -> Platform | None:
-        """Return the platform, or None; with a fault in its inertia it serves to check the legs."""
-        inertia = self.built("platform.", lambda: table.inertia_of("")) or table.unit
-        return self.built(
+        """Return the platform, or None; one with faults serves to check the legs, where it may."""
+        from pteron.manipulator.tables import PlatformTable
+
+        inertia = table.unit
+        given = table.mass, table.inertia, table.center_of_mass or table.first_moment
+        if type(table) is PlatformTable or None not in given:
+            inertia = self.built("platform.", lambda: table.inertia_of("")) or inertia
+        bars = self.parts("bars", table.bars or [], Bar)
+        geared = self.parts("geared", table.geared or [], Geared)
+        if table.motion is None or table.axis is None:
+            return None
+        whole = self.built(
             "platform.",
             lambda: Platform(
                 table.motion,
                 inertia,
                 axis=table.axis,
                 x_axis=table.x_axis,
-                slides=table.slides,
+                slides=bool(table.slides),
                 limits=table.limits,
-                tool=table.tool,
-                bars=tuple(Bar(bar.mass, bar.hinge) for bar in table.bars),
-                geared=tuple(Geared(part.inertia, part.ratio) for part in table.geared),
+                tool=table.tool or (0.0, 0.0, 0.0),
+                bars=tuple(bars),
+                geared=tuple(geared),
             ),
         )
+        if whole is not None:
+            return whole
+        with suppress(ModelError):
+            axis = unit_vector(table.axis, "axis")
+            slides = bool(table.slides) and table.motion == "3T1R"
+            return Platform(
+                table.motion, inertia, axis, vector(perpendicular_to(axis), "x_axis"), slides
+            )
+        return None
 
     def leg(self, i: int, given: object) -> LegKind | None:
-        """Return leg i, from 1, or None."""
-        from pteron.manipulator.tables import leg_of, leg_table
+        """Return leg i, from 1, or None; one with faults serves to check the machine."""
+        from pteron.manipulator.tables import FORMER, leg_of, leg_table
 
         prefix = f"leg {i}: "
         if not isinstance(given, dict):
@@ -168,8 +216,15 @@ class _Reading:
         if kind is None:
             self.faults.append(f"{prefix}type: {shown(name)} is not one of {', '.join(KINDS)}")
             return None
-        table = self.table(leg_table(kind), given, prefix)
-        return table and self.built(prefix, lambda: leg_of(kind, table))
+        for key, former in FORMER.items():
+            if key in given and former in given:
+                self.faults.append(
+                    f"{prefix}{former}: the former name of {key}, which is given too; give one"
+                )
+                given = {k: v for k, v in given.items() if k != former}
+        leg, faults = leg_of(kind, self.table(leg_table(kind), given, prefix))
+        self.faults += [prefix + fault for fault in faults]
+        return leg
 
 
 def save(robot: Manipulator, path: str | Path) -> Path:

@@ -142,6 +142,7 @@ def _misfits(platform: Platform, leg: object) -> Iterator[str]:
             f"a {leg.type} leg turns the platform, but this {platform.motion} platform does not "
             "turn; give it another leg or another motion"
         )
+        return
     if platform.slides and leg.platform_point[2] != 0.0:
         yield (
             f"platform_point: {leg.platform_point[2]:g} m/rad along the axis; what slides moves "

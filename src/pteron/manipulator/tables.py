@@ -7,10 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import lru_cache
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import AliasChoices, Field, create_model
+from pydantic import AliasChoices, BeforeValidator, Field, create_model
 
+from pteron.bodies.inertia import PlanarInertia, RodInertia
 from pteron.bodies.tables import (
     Bar,
     Count,
@@ -29,7 +30,6 @@ from pteron.legs.cones import Cone
 from pteron.legs.kind import Key, KeyRole
 from pteron.manipulator.manipulator import STANDARD_GRAVITY
 from pteron.platforms.platform import Motion
-from pteron.toml import told
 
 
 class ConeTable(Table):
@@ -100,13 +100,19 @@ class MachineTable(Table):
     legs: list[Any] = Field(description="one table for each freedom of the platform")
 
 
+def _no_truth(given: Any) -> Any:
+    if isinstance(given, bool):  # which Python takes for 1 or 0
+        raise ValueError(f"{given} given, 1 or -1 expected")
+    return given
+
+
 _TYPES: dict[KeyRole, Any] = {
     "point": Three,
     "direction": Three,
     "length": Number,
     "number": Number,
     "count": Count,
-    "sign": Literal[1, -1],
+    "sign": Annotated[Literal[1, -1], BeforeValidator(_no_truth)],
     "limits": Two,
     "cone": ConeTable,
     "slider": Slider,
@@ -114,7 +120,7 @@ _TYPES: dict[KeyRole, Any] = {
     "rod": RodBody,
 }
 
-_FORMER = {"limits": "slider_limits"}
+FORMER = {"limits": "slider_limits"}
 """What keys were called in files of version 0.1."""
 
 
@@ -123,17 +129,29 @@ def leg_table(kind: type[LegKind]) -> type[Table]:
     """Return what a table of `[[legs]]` may hold, for a kind of leg."""
     fields: dict[str, Any] = {"type": (str, Field(kind.type, description="the kind of leg"))}
     for key, about in kind.every_key().items():
-        held, former = _TYPES[about.role], _FORMER.get(key)
+        held, former = _TYPES[about.role], FORMER.get(key)
         fields[toml_key(key, about)] = (
             held | None if about.default is None else held,
             Field(
                 about.default,
                 description=about.help,
                 examples=None if about.example is None else [about.example],
+                json_schema_extra={"like": about.like} if about.like else None,
                 validation_alias=former and AliasChoices(key, former),
             ),
         )
     return create_model(f"{kind.type}Table", __base__=Table, **fields)
+
+
+@lru_cache(maxsize=16)
+def part_of(model: type[Table]) -> type[Table]:
+    """Return the same table, in which no key must be given: what is missing is None."""
+    required: dict[str, Any] = {
+        key: (field.rebuild_annotation() | None, None)
+        for key, field in model.model_fields.items()
+        if field.is_required()
+    }
+    return create_model(f"PartOf{model.__name__}", __base__=model, **required)
 
 
 def toml_key(name: str, key: Key) -> str:
@@ -141,36 +159,67 @@ def toml_key(name: str, key: Key) -> str:
     return "slider" if key.role == "slider" else name
 
 
-def leg_of(kind: type[LegKind], table: Any) -> LegKind:
-    """Build a leg from its table.
+_ORDINARY: dict[KeyRole, Any] = {
+    "length": 1.0,
+    "number": 1.0,
+    "slider": 1.0,
+    "planar": PlanarInertia(1.0, (0.0, 0.0), 1.0),
+    "rod": RodInertia(1.0, (0.0,), 1.0),
+}
+"""What stands for a value with a fault while the rest of the machine is checked."""
 
-    Raises
-    ------
-    ModelError
-        If there is no such leg; with all faults, each of which begins with its key.
+
+def leg_of(kind: type[LegKind], table: Any) -> tuple[LegKind | None, list[str]]:
+    """Build a leg from its table, in which keys that must be given may be None.
+
+    Returns
+    -------
+    leg : leg or None
+        With faults it is one with ordinary values for those that cannot be, where a direction or a
+        point is not among them.
+    faults : list of str
+        Each begins with its key; what is missing is none of them.
     """
-    values: dict[str, Any] = {}
-    faults: list[str] = []
-    for name, key in kind.every_key().items():
-        values[name] = given = getattr(table, toml_key(name, key))
+    keys = kind.every_key()
+    given = {name: getattr(table, toml_key(name, key)) for name, key in keys.items()}
+    given = {n: v for n, v in given.items() if v is not None or keys[n].default is None}
+    values, refused = {}, {}
+    for name, value in given.items():
         try:
-            if key.role == "slider":
-                values[name] = given.mass
-            elif key.body:
-                values[name] = given.unit  # the rest of the leg is looked at, too
-                values[name] = given.inertia_of(name)
-            elif key.role == "cone" and given is not None:
-                values[name] = None
-                values[name] = given.cone_of(name)
+            values[name] = _held(value, name, keys[name])
         except ModelError as error:
-            faults += error.faults
+            refused[name] = error.faults
+    sound, others = kind.checked(values)
+    filled = {
+        name: _ORDINARY.get(key.role) if key.default is ... or key.role == "point" else key.default
+        for name, key in keys.items()
+    }
     try:
-        leg = kind(**values)
-    except ModelError as error:
-        faults += error.faults
-    if faults:
-        raise ModelError(told(faults), faults=faults)
-    return leg
+        leg = kind(**filled | sound)
+    except ModelError:
+        leg = None
+    if leg is not None and all(n in sound for n, key in keys.items() if key.role == "length"):
+        for name in refused:
+            if text := _beyond_ends(leg, keys[name].body, given[name]):
+                refused[name] = (f"{name}.center_of_mass: {text}",)
+    return leg, [*(fault for several in refused.values() for fault in several), *others]
+
+
+def _held(given: Any, name: str, key: Key) -> Any:
+    """Return what a leg holds of what its table does."""
+    if key.role == "slider":
+        return given.mass
+    if key.body:
+        return given.inertia_of(name)
+    return given.cone_of(name) if key.role == "cone" and given is not None else given
+
+
+def _beyond_ends(leg: LegKind, letter: str, body: Any) -> str | None:
+    """Return what is said of a body that cannot be as its centre of mass is beyond its ends."""
+    if not letter or body.center_of_mass is None or min(body.mass, body.inertia) <= 0.0:
+        return None
+    text = leg.beyond_ends(letter, body.center_of_mass[0])
+    return text and f"{text}; with it no real body has inertia {body.inertia:g} kg m^2"
 
 
 def leg_items(leg: LegKind) -> Mapping[str, Any]:

@@ -74,13 +74,21 @@ def _block(name: str, model: type[Table], given: Mapping[str, Any], explained: b
             entries.append((f"{key} = {_toml(value)}", fields.get(key)))
     if explained:
         entries += [
-            (f"#{key} = {_toml(field.examples[0] if field.examples else field.default)}", field)
+            (f"#{key} = {_toml(_example(field, given))}", field)
             for key, field in fields.items()
             if key not in given and (field.examples or field.default is not None)
             if not field.is_required()
         ]
         return [*lines, *_commented(entries), *inner]
     return [*lines, *(text for text, _ in entries), *inner]
+
+
+def _example(field: FieldInfo, given: Mapping[str, Any]) -> Any:
+    """Return what could stand behind a key in a table that gives others."""
+    like = field.json_schema_extra
+    if isinstance(like, Mapping) and like["like"] in given:
+        return given[str(like["like"])]
+    return field.examples[0] if field.examples else field.default
 
 
 def _commented(entries: list[tuple[str, FieldInfo | None]]) -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from pteron.bodies.vectors import (
     vector,
 )
 from pteron.errors import ModelError
+from pteron.toml import told
 
 Motion = Literal["3T", "3T1R", "2T", "2T1R"]
 """3T: the platform only translates. 3T1R: it also turns about its axis (Schoenflies motion). 2T and
@@ -113,41 +114,49 @@ class Platform:
         if self.motion not in get_args(Motion):
             valid = " or ".join(f'"{m}"' for m in get_args(Motion))
             raise ModelError(f"motion: {self.motion!r} is not {valid}")
-        axis = unit_vector(self.axis, "axis")
-        if self.x_axis is not None:
-            x = unit_vector(self.x_axis, "x_axis")
-            x = perpendicular(x, axis, "x_axis", "axis")
-        elif axis == _BASE_Z:
-            x = (1.0, 0.0, 0.0)
-        else:
-            raise ModelError(
-                f"x_axis: missing; axis {list(axis)} is not the base frame's z, so x_axis must say "
-                "where the platform frame's x points at phi = 0"
-            )
-        if self.slides and self.motion != "3T1R":
-            raise ModelError(
-                f"slides: a {self.motion} platform has no halves that slide; only 3T1R"
-            )
-        if self.slides and any(bar.hinge[2] != 0.0 for bar in self.bars):
-            raise ModelError(
-                "bars: what slides moves across the axis; give 0 as hinge's third number"
-            )
-        if self.geared and not self.turns:
-            raise ModelError(f"geared: a {self.motion} platform has no angle for a gear to turn")
-        if self.limits is not None:
-            if not self.turns:
-                raise ModelError(f"limits: a {self.motion} platform has no angle to limit")
-            low, high = interval(self.limits, "limits")
-            if not -math.pi <= low < high <= math.pi:
-                raise ModelError(
-                    f"limits: [{low:g}, {high:g}] rad reaches beyond -pi to pi; are these degrees?"
-                )
-            object.__setattr__(self, "limits", (low, high))
-        object.__setattr__(self, "axis", axis)
-        object.__setattr__(self, "x_axis", x)
-        object.__setattr__(self, "tool", vector(self.tool, "tool"))
+        faults: list[str] = []
+        for checked in (self._checked_axes, self._checked_limits, self._checked_tool):
+            try:
+                for name, value in checked().items():
+                    object.__setattr__(self, name, value)
+            except ModelError as error:
+                faults += error.faults
         for name in ("bars", "geared"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
+        if self.slides and self.motion != "3T1R":
+            faults.append(f"slides: a {self.motion} platform has no halves that slide; only 3T1R")
+        if self.slides and any(bar.hinge[2] != 0.0 for bar in self.bars):
+            faults.append("bars: what slides moves across the axis; give 0 as hinge's third number")
+        if self.geared and not self.turns:
+            faults.append(f"geared: a {self.motion} platform has no angle for a gear to turn")
+        if faults:
+            raise ModelError(told(faults), faults=faults)
+
+    def _checked_axes(self) -> dict[str, Any]:
+        axis = unit_vector(self.axis, "axis")
+        if self.x_axis is not None:
+            return {"axis": axis, "x_axis": perpendicular(self.x_axis, axis, "x_axis", "axis")}
+        if axis == _BASE_Z:
+            return {"axis": axis, "x_axis": (1.0, 0.0, 0.0)}
+        raise ModelError(
+            f"x_axis: missing; axis {list(axis)} is not the base frame's z, so x_axis must say "
+            "where the platform frame's x points at phi = 0"
+        )
+
+    def _checked_limits(self) -> dict[str, Any]:
+        if self.limits is None:
+            return {}
+        if not self.turns:
+            raise ModelError(f"limits: a {self.motion} platform has no angle to limit")
+        low, high = interval(self.limits, "limits")
+        if not -math.pi <= low < high <= math.pi:
+            raise ModelError(
+                f"limits: [{low:g}, {high:g}] rad reaches beyond -pi to pi; are these degrees?"
+            )
+        return {"limits": (low, high)}
+
+    def _checked_tool(self) -> dict[str, Any]:
+        return {"tool": vector(self.tool, "tool")}
 
     @property
     def frame(self) -> tuple[Vector, Vector, Vector]:

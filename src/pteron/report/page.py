@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from math import prod
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -118,7 +119,10 @@ def kinds(robot: Manipulator) -> list[tuple[LegKind, list[int]]]:
 def geometry(robot: Manipulator) -> list[tuple[str, bool, list[str]]]:
     """Return the columns of the legs' geometry, mm: heading, whether of numbers, a text a leg."""
     roles = {"guide_point": "point"}
-    roles |= {name: key.role for leg in robot.legs for name, key in leg.keys.items()}
+    # A leg with more lengths has those of the others among them, in its order.
+    counts = [sum(q.role == "length" for q in leg.quantities) for leg in robot.legs]
+    for _, leg in sorted(zip(counts, robot.legs, strict=True), key=itemgetter(0), reverse=True):
+        roles |= {name: key.role for name, key in leg.keys.items()}
     roles["platform_point"] = "point of the platform"
     if any(any(leg.fixed_offset) for leg in robot.legs):
         roles["fixed_offset"] = "point of the platform"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from math import hypot, pi, sqrt
 from typing import Any
 
@@ -12,11 +12,11 @@ from pteron.bodies.vectors import Vector, cross
 from pteron.kernels import Array
 from pteron.legs import LegKind
 from pteron.manipulator import Manipulator
+from pteron.manipulator.manipulator import told_legs
+from pteron.platforms import Platform
 
 _LARGE = 10.0
 """Length, m, beyond which millimetres are likelier."""
-
-_ROUNDING = 1e-9
 
 _UNLIKE = 20.0
 """How many times a uniform bar's, about its centre, a link's inertia may be, or the inverse: two
@@ -46,57 +46,80 @@ def doubts(robot: Manipulator) -> tuple[str, ...]:
     >>> doubts(pteron.load("quadrupteron"))
     ()
     """
-    found = []
+    platform, far = robot.platform, _far(robot)
+    found = _in_millimetres(far)
     if hypot(*robot.gravity) > _PULL:
         found.append(f"gravity: {hypot(*robot.gravity):g} m/s^2: is that mm/s^2?")
-    platform = robot.platform
-    if hypot(*platform.tool) > _LARGE:
-        found.append(f"platform: tool: {list(platform.tool)} m: are these mm?")
     radius = max(hypot(*leg.platform_point) for leg in robot.legs)
-    if radius > 0.0:
-        found += [f"platform: {text}" for text in _spread(platform.joined, 3.0 * radius)]
+    points = any("platform_point" in keys for keys in far.values())
+    # What follows from lengths in millimetres is not told beside them.
+    if radius > 0.0 and not points and 0 not in far:
+        found += [f"platform: {text}" for text in _spread(platform, radius)]
     axis = platform.axis if platform.turns and not platform.slides else None
     for i, leg in enumerate(robot.legs, start=1):
-        found += [f"leg {i}: {text}" for text in (*_leg_doubts(leg), *leg.doubts(axis))]
+        own = () if i in far else _leg_doubts(leg)
+        found += [f"leg {i}: {text}" for text in (*own, *leg.doubts(axis))]
     if axis is not None:
         found += _turning_offsets(robot.legs, axis)
     return tuple(found)
 
 
+def _far(robot: Manipulator) -> dict[int, dict[str, Sequence[float]]]:
+    """Return, by leg from 1 or 0 for the platform, what lies beyond `_LARGE`, by its key; m."""
+    platform = robot.platform
+    given: dict[int, dict[str, Sequence[float]]] = {
+        0: {
+            "tool": platform.tool,
+            "center_of_mass": platform.inertia.center_of_mass,
+            **{f"hinge of bars item {i}": b.hinge for i, b in enumerate(platform.bars, start=1)},
+        }
+    }
+    for i, leg in enumerate(robot.legs, start=1):
+        bodies: Any = {key: leg.bodies[at.body] for key, at in leg.every_key().items() if at.body}
+        centers = {
+            f"{key}.center_of_mass": body.center_of_mass
+            for key, body in bodies.items()
+            if hasattr(body, "center_of_mass")
+        }
+        given[i] = {**leg.metres, **centers}
+    far = {
+        i: {key: v for key, v in values.items() if max(map(abs, v)) > _LARGE}
+        for i, values in given.items()
+    }
+    return {i: values for i, values in far.items() if values}
+
+
+def _in_millimetres(far: Mapping[int, Mapping[str, Sequence[float]]]) -> list[str]:
+    """Return the question whether lengths are in millimetres: one, since the cause is one."""
+    if not far:
+        return []
+    alike: dict[tuple[str, ...], list[int]] = {}
+    for i, values in far.items():
+        alike.setdefault(tuple(values), []).append(i)
+    where = "; ".join(
+        f"{told_legs(legs) if legs[0] else 'platform'}: {', '.join(keys)}"
+        for keys, legs in alike.items()
+    )
+    first, *others = (value for values in far.values() for value in values.values())
+    size = f"{first[0]:g}" if len(first) == 1 else f"{list(first)}"
+    return [f"{where}: {f'beyond {_LARGE:g}' if others else size} m: are these mm?"]
+
+
 def _leg_doubts(leg: LegKind) -> Iterator[str]:
     """Yield what a person should look at again, one line each."""
-    for q in leg.quantities:
-        if q.role == "length" and q.value[0] > _LARGE:
-            yield f"{q.name}: {q.value[0]:g} m: are these mm?"
-    for key in ("guide_point", "platform_point", "fixed_offset"):
-        if hypot(*getattr(leg, key)) > _LARGE:
-            yield f"{key}: {list(getattr(leg, key))} m: are these mm?"
     far = hypot(*leg.platform_point)
-    if 0.0 < leg.size < far <= _LARGE:
+    if 0.0 < leg.size < far:
         yield (
             f"platform_point: {far:g} m from P, farther than the leg is long: is it in the "
             "platform's frame?"
         )
-    if leg.limits is not None:
-        yield from (f"limits: {text}" for text in _range(leg.limits, leg.joint.unit))
-    for letter, (key, low, high, ends) in leg.extents.items():
+    if leg.limits is not None and leg.joint.unit == "rad" and max(map(abs, leg.limits)) > 2.0 * pi:
+        yield f"limits: {list(leg.limits)} rad: are these degrees?"
+    for letter, (key, low, high, _) in leg.extents.items():
         body: Any = leg.bodies[letter]
-        x, length = body.center_of_mass[0], high - low
-        if not low - _ROUNDING * length <= x <= high + _ROUNDING * length:
-            turned = f"; is it {-x:g}?" if low <= -x <= high else ""
-            yield (
-                f"{key}: center_of_mass: x = {x:g} m is not between {ends}: {low:g} to {high:g} m "
-                f"is usual{turned}"
-            )
-        yield from (f"{key}: {text}" for text in _unlike_a_bar(body, length))
-
-
-def _range(limits: tuple[float, float], unit: str) -> Iterator[str]:
-    most = max(map(abs, limits))
-    if unit == "m" and most > _LARGE:
-        yield f"{list(limits)} m: are these mm?"
-    if unit == "rad" and most > 2.0 * pi:
-        yield f"{list(limits)} rad: are these degrees?"
+        if text := leg.beyond_ends(letter, body.center_of_mass[0]):
+            yield f"{key}: center_of_mass: {text}"
+        yield from (f"{key}: {text}" for text in _unlike_a_bar(body, high - low))
 
 
 def _turning_offsets(legs: Sequence[LegKind], axis: Vector) -> Iterator[str]:
@@ -129,8 +152,9 @@ def _unlike_a_bar(body: Any, length: float) -> Iterator[str]:
         )
 
 
-def _spread(body: Any, size: float) -> Iterator[str]:
-    """Yield what lies farther from the platform's P than a platform of a size has it."""
+def _spread(platform: Platform, radius: float) -> Iterator[str]:
+    """Yield what lies farther from P than a platform has it whose points are within a radius."""
+    body, size = platform.inertia, 3.0 * radius
     off = hypot(*body.center_of_mass)
     if off > size:
         yield f"center_of_mass: {off:g} m away: are these mm?"
@@ -139,6 +163,21 @@ def _spread(body: Any, size: float) -> Iterator[str]:
             f"inertia: {body.inertia:g} kg m^2 with {body.mass:g} kg is mass "
             f"{sqrt(body.inertia / body.mass):g} m away: is it in kg m^2?"
         )
+    for i, bar in enumerate(platform.bars, start=1):
+        off = hypot(*bar.hinge)
+        if off > size:
+            yield (
+                f"hinge of bars item {i}: {off:g} m from P, while the legs' points are within "
+                f"{radius:g} m: is it in m, in the platform's frame?"
+            )
+    for i, part in enumerate(platform.geared, start=1):
+        joined = part.ratio**2 * part.inertia
+        away = sqrt(joined / platform.joined.mass)
+        if away > 3.0 * size:
+            yield (
+                f"geared item {i}: {part.ratio:g}^2 times {part.inertia:g} kg m^2 is the "
+                f"platform's mass {away:g} m away: is it in kg m^2?"
+            )
 
 
 def value_doubts(robot: Manipulator, columns: Sequence[str], values: Array) -> tuple[str, ...]:

@@ -76,7 +76,8 @@ def home_pose(robot: Manipulator) -> Array:
     reserves = _worth(robot, refined)
     most = float(reserves.max())
     if most <= 0.0:
-        raise beyond_limits(robot, refined[reserves.argmax()])
+        reached = ~np.isnan(inverse_kinematics(robot, refined, on_failure="nan")).any(axis=-1)
+        raise beyond_limits(robot, np.concatenate([refined[reached], drawn]))
     # Zero says where the joints are meant to be, where nothing else tells.
     equals = refined[reserves >= _WORTH * most]
     travel = np.abs(inverse_kinematics(robot, equals)).max(axis=-1)

@@ -31,8 +31,7 @@ def nowhere(robot: Manipulator) -> ModelError:
     margin = numeric(robot, "reach")(pose)[0]
     if float(margin.min()) > _TOUCH:
         reached = drawn[(numeric(robot, "reach")(drawn)[0] > _TOUCH).all(axis=-1)]
-        poses = np.array([pose, *reached])
-        return beyond_limits(robot, poses[room_to_limits(robot, poses).min(axis=-1).argmax()])
+        return beyond_limits(robot, np.array([pose, *reached]))
     missed: dict[str, list[int]] = {}
     for i, m in enumerate(margin, start=1):
         if m < _TOUCH:
@@ -70,8 +69,9 @@ def _deepest(robot: Manipulator) -> tuple[Array, Array]:
     return best[np.nanargmax(margins(best).min(axis=-1))], drawn
 
 
-def beyond_limits(robot: Manipulator, pose: Array) -> ModelError:
-    """Return what is said of a machine that at its best pose, in reach, passes joints' limits."""
+def beyond_limits(robot: Manipulator, poses: Array) -> ModelError:
+    """Return what is said of a machine that at the best of poses, in reach, passes limits."""
+    pose = poses[room_to_limits(robot, poses).min(axis=-1).argmax()]
     told = [
         f"{f'leg {at.leg}: ' if at.leg else ''}{at.noun} at {at.value:.4g} {at.unit} of "
         f"{at.least:g} to {at.most:g}"
