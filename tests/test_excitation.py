@@ -585,6 +585,22 @@ def test_the_command_writes_both_files_and_a_table(tmp_path: Path, monkeypatch):
     assert read_log("motion.csv", pteron.load("tripteron")).description.period == 4.0
 
 
+def test_the_command_says_what_it_leaves_out(tmp_path: Path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    # A base parameter of the five-bar is 0: its column has no nominal size.
+    result = run(f"excite five-bar {QUICK} --seconds 1")
+    assert result.exit_code == 0
+    assert result.stderr == (
+        "Note: no file will be written; to have the trajectory, add --out FILE.csv\n"
+    )
+    assert "inf" not in result.stdout
+    assert "nan" not in result.stdout
+    assert "nominal value is 0" in " ".join(result.stdout.split())
+    assert not list(tmp_path.iterdir())
+    found = json.loads(run(f"excite five-bar {QUICK} --seconds 1 --json").stdout)
+    assert found["conditioning"]["nominal"] is None
+
+
 def test_the_command_prints_json(tmp_path: Path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     result = run(f"excite quadrupteron {QUICK} --space joints --seconds 2 --elbows +-+- --json")
@@ -602,7 +618,10 @@ def test_the_command_prints_json(tmp_path: Path, monkeypatch):
     ("line", "words"),
     [
         ("excite tripteron --out there/motion.csv", "no folder there"),
-        ("excite tripteron --type-i 0.9999", "type_i of at least 0.9999 is impossible"),
+        (
+            "excite tripteron --type-i 0.9999 --out motion.csv",
+            "type_i of at least 0.9999 is impossible",
+        ),
         ("excite tripteron --speed -1", "speed -1"),
         ("excite tripteron --period -1", "period: -1"),
         ("excite tripteron --space sliders", "'sliders' is not one of"),

@@ -80,11 +80,12 @@ def excite(
 
         if check_output(out).with_suffix(".toml").is_dir():
             raise OutputError(f"{Path(out).with_suffix('.toml')}: is a folder; name another file")
-    else:
-        note("Note: no --out FILE.csv given: the trajectory will be judged, and not written")
     from pteron.identification.excitation import Limits, check_sampling, optimal_excitation
 
     check_sampling(period, rate, periods)
+    limits = Limits(speed, acceleration, force, type_i, type_ii, clearance, passive_clearance)
+    if out is None and not json:
+        note("Note: no file will be written; to have the trajectory, add --out FILE.csv")
     with progress_bar(f"Exciting {machine.name}", _STEPS) as advance:
         done = 0
 
@@ -98,9 +99,7 @@ def excite(
             space=space,
             harmonics=harmonics,
             period=period,
-            limits=Limits(
-                *(speed, acceleration, force, type_i, type_ii, clearance, passive_clearance)
-            ),
+            limits=limits,
             criterion=criterion,
             starts=starts,
             draws=draws,

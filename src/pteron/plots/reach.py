@@ -131,11 +131,13 @@ def _finish(axes: Axes, cut: ReachSlice, path: Array | None) -> None:
 def _territories(legs: Array) -> Iterator[tuple[Array, str]]:
     """Yield fields (B, A) above 0 where a pose is missed, and colours, to be painted in this order.
 
-    In the end a pose has the colour of the leg, the first of equals, that misses it by most: the
-    last leg's is painted wherever one does, then the others' over it where none after them does
-    worse.
+    In the end a pose has the colour of the leg that misses it by most: the last leg's is painted
+    wherever one does, then the others' over it where none after them does worse. Of legs that miss
+    alike in the whole slice, as mirrored ones do, the first counts.
     """
-    missed = -legs.min(axis=0)
-    for i in range(len(legs), 0, -1):
-        others = legs[i:].min(axis=0, initial=np.inf) + _TIE
-        yield np.minimum(missed, others - legs[:i].min(axis=0)), LEG_COLORS[i - 1]
+    far = np.abs(legs[:, None] - legs).max(axis=(-2, -1))
+    first = [i for i in range(len(legs)) if not (far[i, :i] <= _TIE).any()]
+    ranked, missed = legs[first], -legs.min(axis=0)
+    for count in range(len(first), 0, -1):
+        others = ranked[count:].min(axis=0, initial=np.inf)
+        yield np.minimum(missed, others - ranked[:count].min(axis=0)), LEG_COLORS[first[count - 1]]

@@ -192,7 +192,7 @@ def contents(robot: Manipulator) -> Report:
             for plane in slice_planes(robot)
         ),
         volume=volume,
-        jacobian=_jacobian(robot, home),
+        jacobian=jacobian_at(robot, home),
         orientations=_orientations(robot, home),
         measures=_measures(robot, home, volume.box),
         base=base,
@@ -238,7 +238,8 @@ def _measures(robot: Manipulator, home: Array, box: Array) -> Measures | None:
     return Measures(cut, type_i, np.where(np.isnan(type_i), np.nan, type_ii))
 
 
-def _jacobian(robot: Manipulator, home: Array) -> JacobianAtHome:
+def jacobian_at(robot: Manipulator, home: Array) -> JacobianAtHome:
+    """Return the Jacobian at a pose, and its condition number."""
     matrix = jacobian(robot, home)
     held = [leg.platform_point[:2] for leg in robot.legs if not leg.follows_angle]
     radius = float(np.sqrt((np.array(held) ** 2).sum(axis=-1).mean()))
