@@ -20,6 +20,7 @@ from typer.testing import CliRunner, Result
 import pteron
 from pteron.cli.arguments import regrouped
 from pteron.cli.main import app
+from pteron.manipulator.manipulator import with_elbows
 from pteron.workspace.doubts import doubts
 
 PROGRAM = [sys.executable, "-c", "from pteron_command import main; main()"]
@@ -113,6 +114,20 @@ def test_the_version_is_the_library_s():
 )
 def test_wrong_usage_is_one_line(line: str, words: list[str]):
     refused(line, *words)
+
+
+def test_help_names_every_function_that_can_be_exported():
+    text = "".join(run("export --help", COLUMNS="60").stdout.replace("\u2502", " ").split())
+    with pytest.raises(pteron.ModelError) as caught:
+        pteron.export_c(pteron.load("tripteron"), "none", "there")
+    names = str(caught.value).split("choose from ")[1]
+    assert f"again for more: {names}.".replace(" ", "") in text
+
+
+def test_the_package_runs_as_a_module():
+    command = [sys.executable, "-m", "pteron", "--version"]
+    result = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert result.stdout == f"pteron {pteron.__version__}\n"
 
 
 def test_help_loads_nothing_heavy():
@@ -274,7 +289,7 @@ def test_columns_and_units_are_those_of_the_joints(mixed: str, monkeypatch: pyte
     monkeypatch.setattr("pteron.cli.rows.is_terminal", lambda: True)
     assert "rho1 (m)  theta2 (rad)" in done(f"inverse {mixed} 0 0 -0.9")
     assert "force1 (N)  torque2 (N m)" in done(f"forces {mixed} --pose 0 0 -0.9")
-    assert "are these mm?" in refused("inverse delta 0 0 -900")
+    assert "is it in millimetres?" in refused("inverse delta 0 0 -900")
     degrees = run(f"direct {mixed} --table -", "rho1,theta2,theta3\n0.1,30,0\n").stderr
     assert "theta2, theta3 up to 30: are these degrees?" in degrees
 
@@ -396,7 +411,8 @@ def test_a_folder_that_may_not_be_written_is_one_line():
 
 def test_values_in_other_units_are_doubted():
     for line in ("inverse quadrupteron 10 20 -30 0", "inverse quadrupteron 0 0 300 0"):
-        assert "are these mm?" in refused(line)
+        assert "is it in millimetres?" in refused(line)
+        assert refused(line).count("?") == 1
     assert "mm" not in refused("inverse quadrupteron 0 0 0.9 0")
     degrees = run("inverse quadrupteron --table -", "x,y,z,phi\n0,0,0,0\n0,0,0,45\n")
     assert (degrees.exit_code, degrees.stderr.count("\n")) == (0, 1)
@@ -472,6 +488,15 @@ def test_the_working_mode_may_be_chosen():
     expected = pteron.inverse_dynamics(robot, [0.0, 0.0, 0.01], rest, rest)
     assert [row[f"force{i}"] for i in (1, 2, 3)] == expected.tolist()
     assert "force1" in json.loads(done("forces tripteron --pose 0 0 0 --elbows --- --json"))
+    # A crank's angle depends on the side of its elbow.
+    delta = with_elbows(pteron.load("delta"), [1, -1, 1])
+    row = json.loads(done("inverse delta 0 0 -0.9 --elbows +-+ --json"))
+    angles = pteron.inverse_kinematics(delta, [0.0, 0.0, -0.9])
+    assert [row[f"theta{i}"] for i in (1, 2, 3)] == angles.tolist()
+    back = frame(done(f"direct delta {' '.join(map(str, angles))} --elbows +-+"))
+    assert np.abs(back.select("x", "y", "z").to_numpy() - [0, 0, -0.9]).max(axis=1).min() < 1e-9
+    pteron.save(pteron.load("tripteron"), "robot.toml")
+    assert json.loads(done("check robot.toml --elbows --+ --json"))["working_mode"] == "--+"
 
 
 @pytest.mark.parametrize("robot", ["quadrupteron", "delta", "five-bar", "3-rrr"])
@@ -559,6 +584,7 @@ def test_a_good_file_is_described(robot: str, mixed: str, monkeypatch: pytest.Mo
     assert found["singular_orientations"] == at_home.tolist()
     assert len(at_home) == (2 if robot in ("quadrupteron", "h4") else 0)
     assert ("at the home position" in text) == (robot == "h4")
+    assert ("Singular orientations" in text) == machine.platform.turns
     assert found["tool"] == list(machine.platform.tool)
     assert ("Tool: " in text) == (robot == "h4")
 
@@ -736,6 +762,8 @@ def test_a_report_is_a_page_with_its_numbers(monkeypatch: pytest.MonkeyPatch):
     assert written["elbows"] == [1, -1, 1]
     assert "base parameters         16 of 31" in text
     assert "factored inverse dynamics, 16 parameters" in text
+    assert "peak force  RMS force" in text
+    assert "singular phi" not in text
     assert f"Written to {page}" in text
     assert max(map(len, text.splitlines())) <= 60
     monkeypatch.setattr("pteron.report.write_report", lambda machine, folder: page)

@@ -204,6 +204,10 @@ def test_check_tells_where_they_are_at_home(tmp_path):
     assert [joint["leg"] for joint in joints] == [1, 2, 3]
     right = elbows(pteron.load(file), np.array(found["home_pose"]))["elbow"]
     np.testing.assert_allclose([joint["value"] for joint in joints], right, atol=1e-7)
+    # An angle to a cone's axis is never below zero.
+    cone = Cone((0.0, 0.0, 1.0), 1.5)
+    pteron.save(limited("delta", platform_cone=cone), file)
+    assert CliRunner().invoke(app, ["check", file]).stdout.count("at most 1.5 rad") == 3
 
 
 def test_inverse_kinematics_does_not_apply_them():

@@ -24,6 +24,7 @@ from pteron.plots import (
     robot_figure,
     svg,
 )
+from pteron.plots.canvas import PAPER
 from pteron.plots.space import upright
 from pteron.workspace import home_pose, reach_slice
 
@@ -231,6 +232,40 @@ def test_singular_orientations_are_marked():
     np.testing.assert_allclose(
         curve.get_ydata(), np.abs(np.cos(np.radians(curve.get_xdata()))), atol=1e-12
     )
+
+
+@pytest.mark.parametrize(
+    ("name", "plane"), [("delta-4", "xz"), ("h4", "yz"), ("quadrupteron", "xy"), ("3-rrr", "xy")]
+)
+def test_a_map_of_the_reach_has_no_gaps(name, plane):
+    robot = CATALOG[name]
+    cut = reach_slice(robot, home_pose(robot), plane)
+    figure = reach_figure(cut)
+    figure.canvas.draw()
+    axes, picture = figure.axes[0], np.asarray(figure.canvas.buffer_rgba())[::-1].astype(int)
+    box = axes.get_window_extent()
+    rows, columns = (
+        np.arange(int(low) + 3, int(high) - 2) for low, high in (box.intervaly, box.intervalx)
+    )
+    red, green, blue, opacity = np.moveaxis(picture[np.ix_(rows, columns)], -1, 0)
+    # The home pose's dot has a white rim.
+    i, j = ("xyz".index(letter) for letter in plane)
+    x, y = axes.transData.transform(1e3 * cut.center[[i, j]])
+    away = np.hypot(columns - x, rows[:, None] - y) > 10.0
+    assert opacity.min() > 20, "transparent: not painted"
+    white = np.array([int(PAPER[k : k + 2], 16) for k in (1, 3, 5)]).sum()
+    assert (white - red - green - blue)[away].min() > 10
+
+
+def test_a_thread_of_reach_leaves_no_dots():
+    robot = CATALOG["3-rrr"]
+    # Through the tip of a cusp of the reach, which is thinner than the grid.
+    extent = (-0.145, 0.108, -0.134, 0.142)
+    cut = reach_slice(robot, [0.0, 0.0, 0.0], extent=extent, points=121)
+    lines = measure_figure(cut, np.where(cut.status == 0, 0.5, np.nan)).axes[0].collections
+    (rims,) = [line.get_paths()[0].to_polygons(closed_only=False) for line in lines[-1:]]
+    assert rims
+    assert min(np.ptp(rim, axis=0).max() for rim in rims) > 20.0
 
 
 def test_a_map_keeps_its_aspect():

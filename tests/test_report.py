@@ -18,7 +18,7 @@ import pteron
 from pteron.legs.cones import Cone
 from pteron.reduction import FORMS
 from pteron.report import write_report
-from pteron.report.contents import contents
+from pteron.report.contents import contents, jacobian_at
 from pteron.report.costs import dense_operations
 from pteron.report.page import bodies, geometry, in_symbols, lettered, page
 from pteron.report.typeset import fixed, significant, triple
@@ -358,6 +358,47 @@ def test_the_condition_number_mixes_no_units():
     assert report("shaft").jacobian.radius is None
     three = np.linalg.cond(report("shaft").jacobian.matrix[:3, :3] * CATALOG["delta"].legs[0].lever)
     assert report("shaft").jacobian.condition == pytest.approx(three)
+    assert "the shaft's angle as \u03c6, whatever its ratio" in read("shaft").text
+
+
+def test_a_shafts_gear_does_not_count_in_the_condition_number():
+    robot = CATALOG["delta-4"]
+    *cranks, shaft = robot.legs
+    found = []
+    for point in ((0.0, 0.0, 0.0), (0.1, 0.05, 0.0)):  # the second: the legs' joints turn with phi
+        legs = [replace(leg, platform_point=point) for leg in cranks]
+        for ratio in (1.0, -8.0):
+            geared = replace(shaft, ratio=ratio, limits=(-25.0, 25.0))
+            machine = replace(robot, legs=(*legs, geared))
+            found.append(jacobian_at(machine, np.array([0.1, 0.0, -1.0, 0.0])).condition)
+    assert found[0] == pytest.approx(found[1])
+    assert found[2] == pytest.approx(found[3])
+
+
+def test_what_turns_a_platform_does_not_carry_it():
+    assert "three legs of crank and rod carry a platform that translates" in read("shaft").text
+    assert "(3T1R, Schoenflies motion); a shaft turns it." in read("shaft").text
+
+
+def test_a_cone_has_one_limit_on_the_page():
+    assert "at most 85.9\u00b0" in read("shaft").text
+    assert "\u221285.9" not in read("shaft").text
+
+
+def test_the_geometry_has_a_column_a_leg():
+    for name, machine in MACHINES.items():
+        rows = geometry(machine)
+        assert len({label for label, _ in rows}) == len(rows)
+        assert all(len(texts) == len(machine.legs) for _, texts in rows), name
+
+
+def test_the_measures_show_what_is_reached():
+    for name in ("delta", "mixed", "shaft", "planar"):
+        inside = report(name).measures.cut.status == REACHABLE
+        for axis in (0, 1):
+            reached = np.flatnonzero(inside.any(axis=axis))
+            assert np.ptp(reached) > 0.8 * len(inside)
+            assert 0 < reached[0] < reached[-1] < len(inside) - 1
 
 
 def test_symbols_stand_for_their_numbers():

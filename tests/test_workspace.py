@@ -9,6 +9,7 @@ from mechanisms import CATALOG, MECHANISMS, random_machine, states
 from scipy.spatial.transform import Rotation
 
 import pteron
+from pteron.kinematics.singularities import best_type_ii
 from pteron.workspace import (
     BEYOND_LIMITS,
     REACHABLE,
@@ -111,6 +112,20 @@ def test_measures_are_sines_and_volumes(name):
     np.testing.assert_allclose(found.type_ii, determinants, rtol=0.03)
     everything = np.c_[found.type_i, found.clearances, found.type_ii]
     np.testing.assert_array_equal(found.smallest, everything.min(axis=-1))
+
+
+@pytest.mark.parametrize("name", ["3-rrr", "par4", "linear-delta", "random PRR 0"])
+def test_no_pose_is_better_than_the_best(name):
+    robot = MACHINES[name]
+    wide = pteron.random_poses(robot, 50_000, seed=3, type_i=0.0, type_ii=0.0, limits=False)
+    share = np.abs(pteron.compile(robot, "type_ii")(wide)) / best_type_ii(robot)
+    assert 0.96 < share.max() <= 1.0
+
+
+def test_limits_leave_the_best_as_it_is():
+    robot = MACHINES["par4"]
+    tight = replace(robot, platform=replace(robot.platform, limits=(-0.2, 0.2)))
+    assert best_type_ii(tight) == best_type_ii(robot)
 
 
 def test_clearance_is_the_share_of_the_half_range_to_the_nearer_limit():

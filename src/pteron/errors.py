@@ -61,10 +61,21 @@ class UnreachablePose(PteronError):
         By how many metres it misses the platform point.
     index : tuple of int
         Which element of the batch; empty for a single pose.
+    millimetres : bool
+        Whether it misses by so much that the message asks whether millimetres were meant.
     """
 
-    def __init__(self, message: str, *, leg: int, shortfall: float, index: tuple[int, ...]) -> None:
+    def __init__(
+        self,
+        message: str,
+        *,
+        leg: int,
+        shortfall: float,
+        index: tuple[int, ...],
+        millimetres: bool = False,
+    ) -> None:
         super().__init__(message)
+        self.millimetres = millimetres
         self.leg = leg
         self.shortfall = shortfall
         self.index = index

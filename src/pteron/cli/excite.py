@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -27,7 +28,8 @@ _STEPS = 1000
 def excite(
     robot: Robot,
     out: Annotated[
-        str | None, option("out", "Write it to FILE.csv, and FILE.toml beside it.", "FILE")
+        str | None,
+        option("out", "Write it to a .csv or .parquet file, and a .toml file beside it.", "FILE"),
     ] = None,
     space: Annotated[
         Literal["platform", "joints"],
@@ -81,6 +83,9 @@ def excite(
     from pteron.identification.excitation import Limits, check_sampling, optimal_excitation
 
     check_sampling(period, rate, periods)
+    limits = Limits(speed, acceleration, force, type_i, type_ii, clearance, passive_clearance)
+    if out is None and not json:
+        note("Note: no file will be written; to have the trajectory, add --out FILE.csv")
     with progress_bar(f"Exciting {machine.name}", _STEPS) as advance:
         done = 0
 
@@ -94,9 +99,7 @@ def excite(
             space=space,
             harmonics=harmonics,
             period=period,
-            limits=Limits(
-                *(speed, acceleration, force, type_i, type_ii, clearance, passive_clearance)
-            ),
+            limits=limits,
             criterion=criterion,
             starts=starts,
             draws=draws,
@@ -120,15 +123,22 @@ def excite(
 
 def _quality(found: Excitation) -> Table:
     headings = ("optimised", f"best of {found.draws} random", "ratio")
-    made = table("condition number, columns", *headings, numbers=headings)
     best, random = found.conditioning, found.random
+    caption = None
+    if not math.isfinite(best.nominal):
+        caption = "-: no number, as a base parameter's nominal value is 0"
+    made = table("condition number, columns", *headings, numbers=headings, caption=caption)
     for name, one, other in (
         ("of length 1", best.scaled, random.scaled),
         ("times nominal values", best.nominal, random.nominal),
         ("in SI units", best.unscaled, random.unscaled),
     ):
-        made.add_row(name, f"{one:.4g}", f"{other:.4g}", f"{other / one:.3g}")
+        made.add_row(name, _number(one, 4), _number(other, 4), _number(other / one, 3))
     return made
+
+
+def _number(value: float, digits: int) -> str:
+    return f"{value:.{digits}g}" if math.isfinite(value) else "-"
 
 
 def _margins(found: Excitation) -> Table:

@@ -8,13 +8,52 @@ from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
 from pteron.cli.screen import plain, show, show_json, spinner
 from pteron.errors import DataError
 
+_FUNCTIONS = (
+    "bias_forces",
+    "closure_poses",
+    "closure_rows",
+    "coriolis_matrix",
+    "direct_kinematics",
+    "direct_step",
+    "discriminants",
+    "forward_dynamics",
+    "gravity_forces",
+    "inverse_dynamics",
+    "inverse_dynamics_base",
+    "inverse_kinematics",
+    "jacobian",
+    "joint_accelerations",
+    "joint_coordinates",
+    "joint_points",
+    "joint_rates",
+    "joint_screws",
+    "kinetic_energy",
+    "link_jacobians",
+    "link_vectors",
+    "mass_matrix",
+    "newton_step",
+    "paper_regressor",
+    "paper_terms",
+    "passive_friction",
+    "passive_room",
+    "platform_motion",
+    "platform_points",
+    "potential_energy",
+    "reach",
+    "regressor",
+    "squared_type_i",
+    "type_ii",
+)
+"""Written out: help is shown before CasADi is loaded. A test holds it against what there is."""
+
 
 def export(
     robot: Robot,
     c: Annotated[str | None, option("c", "Write C99 to this folder.", "DIR")] = None,
     st: Annotated[str | None, option("st", "Write Structured Text to this folder.", "DIR")] = None,
     function: Annotated[
-        list[str] | None, option("function", "What to write; again for more.", "NAME")
+        list[str] | None,
+        option("function", f"What to write; again for more: {', '.join(_FUNCTIONS)}.", "NAME"),
     ] = None,
     single: Annotated[bool, option("float", "C: float instead of double.")] = False,
     specialised: Annotated[

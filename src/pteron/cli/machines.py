@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from rich.table import Table
 from typer import Argument, Exit
 
-from pteron.cli.arguments import Json, load_robot, option, signs
+from pteron.cli.arguments import Elbows, Json, load_robot, option, signs
 from pteron.cli.screen import complain, note, plain, show, show_json, spinner, table, write
 from pteron.errors import ModelError, OutputError, PteronError
 
@@ -87,6 +87,7 @@ def _machine(robot: Manipulator) -> dict[str, Any]:
 
 def check(
     file: Annotated[str, Argument(metavar="FILE", help="A machine's TOML file.")],
+    elbows: Elbows = None,
     json: Json = False,
 ) -> None:
     """Check a machine's file and say what the machine is.
@@ -96,7 +97,7 @@ def check(
     in millimetres or a centre of mass beyond its link, is told as a warning.
     """
     try:
-        robot = load_robot(file)
+        robot = load_robot(file, elbows)
     except ModelError as error:
         for fault in error.faults:
             complain(f"{error.subject}: {fault}")
@@ -162,6 +163,8 @@ def _show(robot: Manipulator, found: dict[str, Any]) -> None:
         )
     angles = ", ".join(f"{math.degrees(angle):.4g}" for angle in found["singular_orientations"])
     where = "" if found["singular_at_every_position"] or not angles else " at the home position"
+    singular = [f"Singular orientations{where}: {f'{angles} deg' if angles else 'none'}"]
+    singular = singular if robot.platform.turns else []
     tool = [f"Tool: {_vector(found['tool'])} m from P, in the platform frame"]
     tool = tool if any(found["tool"]) else []
     work = "[green]This machine can work.[/green]"
@@ -172,7 +175,7 @@ def _show(robot: Manipulator, found: dict[str, Any]) -> None:
         f"{len(robot.legs)} legs, pose {' '.join(robot.coordinates)}, "
         f"working mode {signs(robot)}",
         made,
-        f"Singular orientations{where}: {f'{angles} deg' if angles else 'none'}",
+        *singular,
         f"Home pose: {_vector(found['home_pose'])}, reserve {found['home_reserve']:.2f} of 1",
         *_passive(found["limited_joints"]),
         *tool,
@@ -182,11 +185,14 @@ def _show(robot: Manipulator, found: dict[str, Any]) -> None:
 
 def _passive(joints: list[dict[str, Any]]) -> list[Table]:
     """Return where the passive joints that have limits are at home."""
+    from pteron.workspace import LimitedJoint
+
     passive = [joint for joint in joints if not joint["actuated"]]
     made = table("leg", "passive joint", "at home", "limits", numbers=("leg", "at home"))
     for joint in passive:
-        of = f"{joint['least']:.4g} to {joint['most']:.4g} {joint['unit']}"
-        made.add_row(str(joint["leg"] or ""), joint["noun"], f"{joint['value']:.4g}", of)
+        of = LimitedJoint(**joint).told_limits(lambda value, unit: f"{value:.4g}")
+        told = f"{joint['value']:.4g}", f"{of} {joint['unit']}"
+        made.add_row(str(joint["leg"] or ""), joint["noun"], *told)
     return [made] if passive else []
 
 

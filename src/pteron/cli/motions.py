@@ -43,6 +43,7 @@ def inverse(
     ] = None,
     table: TableFile = None,
     out: Out = None,
+    elbows: Elbows = None,
     on_failure: OnFailure = "raise",
     json: Json = False,
 ) -> None:
@@ -53,7 +54,7 @@ def inverse(
     """
     from pteron.kinematics import inverse_kinematics
 
-    machine = load_robot(robot)
+    machine = load_robot(robot, elbows)
     columns = machine.coordinates
     rows = given_rows(table, pose, "pose", columns)
     added = machine.joint_names
@@ -80,6 +81,7 @@ def direct(
     ] = None,
     table: TableFile = None,
     out: Out = None,
+    elbows: Elbows = None,
     on_failure: Annotated[
         Failure | None,
         option(
@@ -99,7 +101,7 @@ def direct(
     """
     from pteron.kinematics import direct_kinematics
 
-    machine = load_robot(robot)
+    machine = load_robot(robot, elbows)
     columns = machine.joint_names
     rows = given_rows(table, joints, "joints", columns)
     failure: Failure = on_failure or ("raise" if rows.single else "nan")

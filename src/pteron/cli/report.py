@@ -49,7 +49,8 @@ def _machine(found: dict[str, Any]) -> Table:
     made.add_row("home pose", " ".join(f"{value:.4g}" for value in home["pose"]))
     made.add_row("reserve there", f"{home['reserve']:.3f} of 1")
     made.add_row("condition number there", f"{home['condition_number']:.4g}")
-    made.add_row("singular phi there", f"{singular} deg" if singular else "none")
+    if "phi" in found["coordinates"]:
+        made.add_row("singular phi there", f"{singular} deg" if singular else "none")
     made.add_row("reach", f"{factor * reach['volume']:.4g} {unit}")
     made.add_row("cycle", f"{found['cycle']['duration']:.3g} s")
     made.add_row("base parameters", f"{base['rank']} of {base['of']}")
@@ -57,12 +58,13 @@ def _machine(found: dict[str, Any]) -> Table:
 
 
 def _legs(cycle: dict[str, Any], joints: list[dict[str, str]]) -> Table:
-    headings = ("leg", "peak force", "RMS force", "peak speed")
+    force = " or ".join(dict.fromkeys(joint["force"] for joint in joints))
+    headings = ("leg", f"peak {force}", f"RMS {force}", "peak speed")
     made = table(*headings, numbers=headings)
     columns = (cycle[key] for key in ("peak_forces", "rms_forces", "peak_speeds"))
     for i, (peak, rms, speed) in enumerate(zip(*columns, strict=True), start=1):
-        force, rate = joints[i - 1]["force_unit"], f"{joints[i - 1]['unit']}/s"
-        made.add_row(str(i), f"{peak:.3f} {force}", f"{rms:.3f} {force}", f"{speed:.3f} {rate}")
+        unit, rate = joints[i - 1]["force_unit"], f"{joints[i - 1]['unit']}/s"
+        made.add_row(str(i), f"{peak:.3f} {unit}", f"{rms:.3f} {unit}", f"{speed:.3f} {rate}")
     return made
 
 

@@ -48,23 +48,23 @@ class Rows:
 
         values = self.table.numbers(columns, on_failure)
         unlikely = "; ".join(value_doubts(robot, columns, values))
-        try:
-            if len(values) <= LONG:
-                parts = list(self._chunks(serve, values))
-            else:
-                parts = []
-                with progress_bar(self.table.source, len(values)) as advance:
-                    for part in self._chunks(serve, values):
-                        parts.append(part)
-                        advance(len(part))
-        except PteronError as error:
-            raise (PteronError(f"{error}; {unlikely}") if unlikely else error) from None
+        if len(values) <= LONG:
+            parts = list(self._chunks(serve, values, unlikely))
+        else:
+            parts = []
+            with progress_bar(self.table.source, len(values)) as advance:
+                for part in self._chunks(serve, values, unlikely):
+                    parts.append(part)
+                    advance(len(part))
         if unlikely:
             note(f"Note: {self.table.source}: {unlikely}")
         return np.concatenate(parts)
 
     def _chunks(
-        self, serve: Callable[[NDArray[Any]], NDArray[Any]], values: NDArray[Any]
+        self,
+        serve: Callable[[NDArray[Any]], NDArray[Any]],
+        values: NDArray[Any],
+        unlikely: str,
     ) -> Iterator[NDArray[Any]]:
         for start in range(0, len(values), CHUNK):
             try:
@@ -72,20 +72,27 @@ class Rows:
             except (UnreachablePose, SingularPose) as error:
                 if not error.index:
                     raise
-                self._refuse(serve, values, start + error.index[0])
+                self._refuse(serve, values, start + error.index[0], unlikely)
                 raise
 
     def _refuse(
-        self, serve: Callable[[NDArray[Any]], NDArray[Any]], values: NDArray[Any], row: int
+        self,
+        serve: Callable[[NDArray[Any]], NDArray[Any]],
+        values: NDArray[Any],
+        row: int,
+        unlikely: str,
     ) -> None:
         """Serve the row that fails alone: its message then speaks of it, and of no batch."""
         try:
             serve(values[row])
         except PteronError as error:
+            asked = isinstance(error, UnreachablePose) and error.millimetres
+            doubt = f"; {unlikely}" if unlikely and not asked else ""
             if self.single:
-                raise PteronError(str(error)) from None
+                raise PteronError(f"{error}{doubt}") from None
             raise PteronError(
                 f"{self.table.place(row)}, {error}, or leave such rows empty with --on-failure nan"
+                f"{doubt}"
             ) from None
 
 

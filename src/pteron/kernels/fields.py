@@ -17,15 +17,15 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pteron.errors import DataError
+from pteron.errors import DataError, PteronError
 from pteron.kernels.graph import CONSTANT, Node, graph_of
 from pteron.kernels.kernel import Kernel, unmasked
 
 Element = TypeVar("Element")
 
 
-class NoSquareRoot(ArithmeticError):
-    """The number has no square root in the field."""
+class NoSquareRoot(PteronError, ArithmeticError):
+    """A number has no square root in the field."""
 
 
 class Field(Protocol, Generic[Element]):
@@ -65,7 +65,7 @@ class RationalField:
             root = Fraction(isqrt(a.numerator), isqrt(a.denominator))
             if root * root == a:
                 return root
-        raise NoSquareRoot(a)
+        raise NoSquareRoot
 
 
 class PrimeField:
@@ -103,7 +103,7 @@ class PrimeField:
         """Return one of the two square roots, always the same one."""
         root = pow(a, (self.prime + 1) // 4, self.prime)
         if root * root % self.prime != a:
-            raise NoSquareRoot(a)
+            raise NoSquareRoot
         return root
 
 
@@ -131,7 +131,7 @@ def evaluate(
     def select(test: Element, value: Element) -> Element:
         # What is left out of range is NaN in floats; an exact number it is not.
         if test != zero:
-            raise NoSquareRoot("out of reach")
+            raise NoSquareRoot
         return zero
 
     operations: dict[str, Callable[..., Element]] = {
@@ -185,7 +185,13 @@ class Exact(Kernel):
                     f"{port.name}: shape {array.shape} given, {port.shape} expected: one state"
                 )
             inputs.append([Fraction(value) for value in array.ravel().tolist()])
-        found = evaluate(self.function, RationalField(), inputs)
+        try:
+            found = evaluate(self.function, RationalField(), inputs)
+        except NoSquareRoot:
+            raise NoSquareRoot(
+                f"{self.function.name()}: in fractions a square root of this state does not exist "
+                '(it is irrational, or the pose out of reach); use another target, such as "c"'
+            ) from None
         results = tuple(
             np.array(value, dtype=object).reshape(port.shape)
             for value, port in zip(found, self.outputs, strict=True)

@@ -131,9 +131,10 @@ def _bad_pose(
     if np.isnan(type_i).any():
         i = int(np.isnan(type_i).argmax())
         leg, shortfall = robot.legs[i], max(-float(margin[i]), 0.0)
+        millimetres = shortfall > _MILLIMETRES * leg.size
         doubt = (
             "is it in millimetres? lengths are in metres"
-            if shortfall > _MILLIMETRES * leg.size
+            if millimetres
             else "move the pose towards the legs' reach"
         )
         return UnreachablePose(
@@ -141,6 +142,7 @@ def _bad_pose(
             leg=i + 1,
             shortfall=shortfall,
             index=index,
+            millimetres=millimetres,
         )
     for i, leg in enumerate(robot.legs):
         undetermined = bool(spread[i] <= _COINCIDENT * leg.size)

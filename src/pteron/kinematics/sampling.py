@@ -31,11 +31,12 @@ def random_poses(
     seed: int | np.random.Generator = 0,
     type_i: float = 0.1,
     type_ii: float = 0.1,
+    limits: bool = True,
 ) -> Poses:
     """Return poses drawn at random from those in reach and away from singularities.
 
     Uniformly in position and orientation, within a box that holds all but the rarest corners.
-    Passive joints keep their limits; the actuated ones need not.
+    Passive joints and the platform's angle keep their limits; the actuated joints need not.
 
     Parameters
     ----------
@@ -49,6 +50,8 @@ def random_poses(
         Least type-I measure of every leg: 0 where it is singular, 1 at best.
     type_ii : float
         Least type-II measure of the machine.
+    limits : bool
+        Whether limits are kept as said above, or none are.
 
     Returns
     -------
@@ -75,14 +78,14 @@ def random_poses(
     rng = np.random.default_rng(seed)
     center, radius = search_ball(robot)
     low, high = center - radius, center + radius
-    coarse = _drawn(robot, low, high, min(count, _SCOUTS), rng, type_i, type_ii)
+    coarse = _drawn(robot, low, high, min(count, _SCOUTS), rng, type_i, type_ii, limits)
     if len(coarse) >= count:
         return coarse[:count]
     # The ball is generous: with scouts in, their bounding box, widened, serves the rest.
     least, most = (coarse[:, : len(low)].min(axis=0), coarse[:, : len(low)].max(axis=0))
     margin = 0.25 * (most - least)
     low, high = np.maximum(least - margin, low), np.minimum(most + margin, high)
-    return _drawn(robot, low, high, count, rng, type_i, type_ii)[:count]
+    return _drawn(robot, low, high, count, rng, type_i, type_ii, limits)[:count]
 
 
 def _drawn(
@@ -93,6 +96,7 @@ def _drawn(
     rng: np.random.Generator,
     type_i: float,
     type_ii: float,
+    limits: bool,
 ) -> Array:
     """Return at least `count` usable poses with positions drawn from a box."""
     found: list[Array] = []
@@ -111,7 +115,8 @@ def _drawn(
             good &= (measure >= type_ii) | ~(measure > 0.0).any()
         reached += int(good.sum())
         seen = seen if len(seen) >= _SEEN else np.concatenate([seen, poses[good]])
-        good &= (numeric(robot, "passive_room")(poses)[0] >= 0.0).all(axis=-1)
+        if limits:
+            good &= (numeric(robot, "passive_room")(poses)[0] >= 0.0).all(axis=-1)
         found.append(poses[good])
         total += int(good.sum())
         if total >= count:

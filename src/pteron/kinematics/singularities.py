@@ -18,6 +18,15 @@ _SAMPLES = 64
 _DRAWN = 4096
 """Random poses among which the best type-II measure is sought."""
 
+_FOREMOST = 6
+"""How many of them are improved."""
+
+_TRIES = 200
+"""Poses that are tried to improve one."""
+
+_IMPROVED = 1e-7
+"""Improvements that count as none."""
+
 _ANGLES = 720
 """Samples of phi."""
 
@@ -58,11 +67,33 @@ def is_singular_everywhere(robot: Manipulator) -> bool:
 
 @lru_cache(maxsize=64)
 def best_type_ii(robot: Manipulator) -> float:
-    """Return the largest type-II measure, in size, of many random poses; 1 if all are singular."""
+    """Return the largest type-II measure, in size, of poses in reach; 1 if all are singular.
+
+    It is the best of many random poses, the foremost of them improved by Nelder and Mead's method.
+    Limits do not count: it is a measure of the geometry, which another limit leaves as it is.
+    """
+    # Kinematics load without SciPy.
+    from scipy.optimize import minimize  # type: ignore[import-untyped]
+
     from pteron.kinematics.sampling import random_poses
 
-    drawn = random_poses(robot, _DRAWN, type_i=0.0, type_ii=0.0)
-    return float(np.abs(numeric(robot, "type_ii")(drawn)[0]).max()) or 1.0
+    def measure(poses: Array) -> Array:
+        reached = ~np.isnan(numeric(robot, "reach")(poses)[1]).any(axis=-1)
+        sizes = np.abs(numeric(robot, "type_ii")(poses)[0])
+        return np.where(reached, np.nan_to_num(sizes), 0.0)
+
+    drawn = random_poses(robot, _DRAWN, type_i=0.0, type_ii=0.0, limits=False)
+    sizes = measure(drawn)
+    improved = [
+        -minimize(
+            lambda pose: -float(measure(pose)),
+            start,
+            method="Nelder-Mead",
+            options={"maxfev": _TRIES, "fatol": _IMPROVED, "xatol": np.inf},
+        ).fun
+        for start in drawn[np.argsort(-sizes, kind="stable")[:_FOREMOST]]
+    ]
+    return float(max(improved)) or 1.0
 
 
 def singular_orientations(robot: Manipulator, position: ArrayLike | None = None) -> Array:

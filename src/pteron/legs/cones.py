@@ -73,7 +73,7 @@ def within_cone(
         return []
     angle = between(ca.mtimes(socket, ca.SX(list(cone.axis))), rod)
     # Nothing is too near to the axis: a limit below zero is never met.
-    return [Passive(noun, "rad", angle, -cone.angle, cone.angle, length)]
+    return [Passive(noun, "rad", angle, -cone.angle, cone.angle, length, True)]
 
 
 def within(

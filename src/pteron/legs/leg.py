@@ -90,6 +90,8 @@ class Passive(NamedTuple):
     most: float
     lever: float
     """Metres that the leg moves per unit of it."""
+    only_most: bool = False
+    """Whether it is never below zero, and only its greatest value a limit."""
 
 
 class Needs(NamedTuple):

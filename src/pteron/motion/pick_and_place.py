@@ -111,6 +111,8 @@ def pick_and_place(
 
     Raises
     ------
+    UnreachablePose
+        If no scale is given and a leg does not reach the pose.
     ModelError
         If no scale is given and not even the smallest cycle fits.
     DataError

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from pteron.equations.machine import closure_of
 from pteron.errors import ModelError
 from pteron.kernels import Array, numeric
+from pteron.kinematics import inverse_kinematics
 from pteron.kinematics.evaluate import checked
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator
@@ -75,6 +76,8 @@ def scaled_to_reach(
 
     Raises
     ------
+    UnreachablePose
+        If a leg does not reach the pose.
     ModelError
         If not even the smallest cycle fits.
     DataError
@@ -95,6 +98,7 @@ def scaled_to_reach(
         if best is None or fits > _WORTH * scale:
             scale, best = fits, across
     if best is None or scale == 0:
+        inverse_kinematics(robot, middle)  # says which leg misses the pose, and by how much
         raise ModelError(
             f"no pick-and-place cycle about pose {middle.tolist()} keeps a reserve of {least:g} to "
             "the singularities and the joints' limits; choose a better pose",

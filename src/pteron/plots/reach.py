@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.path import Path
 from matplotlib.ticker import MultipleLocator
 from scipy.ndimage import distance_transform_edt  # type: ignore[import-untyped]
 
@@ -31,6 +34,9 @@ _TENTHS = [tenth / 10.0 for tenth in range(10)]
 _TIE = 1e-9
 """Metres."""
 
+_SPECK = 2.0
+"""Cells of the grid: what is smaller is not drawn."""
+
 _DASHES = ("-", "-", (0, (3, 2)), (0, (3, 2)))
 """Legs 1 to 4: lines which coincide, as those of mirrored legs do, both show."""
 
@@ -51,10 +57,13 @@ def reach_figure(cut: ReachSlice, *, path: Array | None = None) -> Figure:
             axes.contourf(first, second, field, levels=[level, np.inf], colors=[color], alpha=alpha)
 
     legs = np.moveaxis(cut.leg_margins, -1, 0)
-    for field, color in zip(_territories(legs), LEG_COLORS, strict=False):
+    # What is painted over begins and ends elsewhere by less than a cell of the grid: so no gaps.
+    for field, color in _territories(legs):
+        fill(field, PAPER, 1.0)
         fill(field, color, 0.16)
     if (cut.status == BEYOND_LIMITS).any():
-        fill(np.minimum(legs.min(axis=0), -cut.margin), MUTED, 0.4)
+        fill(legs.min(axis=0), MUTED, 0.4)
+        fill(cut.margin, PAPER, 1.0)
     for level in np.linspace(0.0, max(float(cut.margin.max()), 0.0), _BANDS, endpoint=False):
         fill(cut.margin, REACH, 0.24, float(level))
     for i, margin in enumerate(legs):
@@ -88,8 +97,17 @@ def measure_figure(cut: ReachSlice, measure: Array, *, path: Array | None = None
         lines = axes.contour(first, second, inside, levels=named, colors=[INK], linewidths=0.7)
         axes.clabel(lines, fmt="%.1f", fontsize=FONT_SIZE - 1.0, colors=[INK])
     edge = axes.contour(first, second, cut.margin, levels=[0.0], colors=[MUTED], linewidths=1.0)
+    # Where the reach ends in a thread thinner than the grid, single cells of it are no picture.
+    cell = 1e3 * np.array([np.ptp(cut.first), np.ptp(cut.second)]) / np.subtract(inside.shape, 1)
+    rims = [
+        rim
+        for rim in edge.get_paths()[0].to_polygons(closed_only=False)
+        if (np.ptp(rim, axis=0) > _SPECK * cell).any()
+    ]
+    outline = Path.make_compound_path(*map(Path, rims))
+    edge.set_paths([outline])
     for one in drawn:
-        one.set_clip_path(edge.get_paths()[0], axes.transData)
+        one.set_clip_path(outline, axes.transData)
     _finish(axes, cut, path)
     return figure
 
@@ -110,11 +128,16 @@ def _finish(axes: Axes, cut: ReachSlice, path: Array | None) -> None:
     axes.yaxis.set_major_locator(MultipleLocator(step))
 
 
-def _territories(legs: Array) -> Array:
-    """Return, for each leg (n, B, A), a field above 0 where it, first of equals, misses by most."""
-    fields = np.empty_like(legs)
-    ranked = legs + _TIE * np.arange(len(legs))[:, None, None]
-    for i, margin in enumerate(legs):
-        others = np.delete(ranked, i, axis=0).min(axis=0)
-        fields[i] = np.minimum(-margin, others - ranked[i])
-    return fields
+def _territories(legs: Array) -> Iterator[tuple[Array, str]]:
+    """Yield fields (B, A) above 0 where a pose is missed, and colours, to be painted in this order.
+
+    In the end a pose has the colour of the leg that misses it by most: the last leg's is painted
+    wherever one does, then the others' over it where none after them does worse. Of legs that miss
+    alike in the whole slice, as mirrored ones do, the first counts.
+    """
+    far = np.abs(legs[:, None] - legs).max(axis=(-2, -1))
+    first = [i for i in range(len(legs)) if not (far[i, :i] <= _TIE).any()]
+    ranked, missed = legs[first], -legs.min(axis=0)
+    for count in range(len(first), 0, -1):
+        others = ranked[count:].min(axis=0, initial=np.inf)
+        yield np.minimum(missed, others - ranked[:count].min(axis=0)), LEG_COLORS[first[count - 1]]

@@ -26,6 +26,7 @@ from pteron.reduction import BaseParameters, base_parameters
 from pteron.report.costs import Cost, costs
 from pteron.workspace import (
     BEYOND_LIMITS,
+    REACHABLE,
     JointRanges,
     LimitedJoint,
     ReachSlice,
@@ -61,10 +62,12 @@ _FINE = 121
 class JacobianAtHome:
     """The Jacobian (n, m) at the home pose, Eq. (10), and its condition number.
 
-    The number is that of J with a crank's row times its length, a shaft's times `radius`, and the
-    angle's column divided by `radius`, so that no unit is mixed with another. The radius is the
-    root mean square distance of the platform points, as far as they turn, from the platform's axis
-    through P; None where the platform does not turn, or none of them does.
+    The number is that of J with a crank's row times its length and the angle's column divided by
+    `radius`, so that no unit is mixed with another. The joint of a leg that follows the angle, such
+    as a shaft, is measured as that angle times the same radius: its gear does not count. The radius
+    is the root mean square distance of the platform points, as far as they turn, from the
+    platform's axis through P; None where the platform does not turn, or none of them does: then
+    nothing but such a leg moves with the angle.
     """
 
     matrix: Array
@@ -189,7 +192,7 @@ def contents(robot: Manipulator) -> Report:
             for plane in slice_planes(robot)
         ),
         volume=volume,
-        jacobian=_jacobian(robot, home),
+        jacobian=jacobian_at(robot, home),
         orientations=_orientations(robot, home),
         measures=_measures(robot, home, volume.box),
         base=base,
@@ -204,6 +207,17 @@ def _extent(box: Array, plane: str, half: Sequence[float]) -> tuple[float, float
     return x - half[i], x + half[i], y - half[j], y + half[j]
 
 
+def _reached(cut: ReachSlice) -> tuple[float, float, float, float]:
+    """Return the sides of a rectangle about what a slice shows in reach, with a rim."""
+    inside = cut.status == REACHABLE
+    sides: list[float] = []
+    for values, axis in ((cut.first, 0), (cut.second, 1)):
+        found = values[inside.any(axis=axis)]
+        rim = max(_RIM * float(np.ptp(found)), float(values[1] - values[0]))
+        sides += [float(found[0]) - rim, float(found[-1]) + rim]
+    return sides[0], sides[1], sides[2], sides[3]
+
+
 def _measures(robot: Manipulator, home: Array, box: Array) -> Measures | None:
     """Return the measures on a plane of home, upright if it may be, where type II varies in it."""
     closure = closure_of(robot)
@@ -213,7 +227,9 @@ def _measures(robot: Manipulator, home: Array, box: Array) -> Measures | None:
     vertical = np.abs(robot.gravity if any(robot.gravity) else robot.platform.axis)
     plane: Plane = "xy" if robot.platform.planar or vertical[1] > vertical[2] else "xz"
     half = (0.5 + _RIM) * (box[1] - box[0])
-    cut = reach_slice(robot, home, plane, extent=_extent(box, plane, half.tolist()), points=_FINE)
+    whole = reach_slice(robot, home, plane, extent=_extent(box, plane, half.tolist()), points=_FINE)
+    # The box is that of all planes: this one may be reached in a small part of it.
+    cut = reach_slice(robot, home, plane, extent=_reached(whole), points=_FINE)
     poses = np.tile(home, (*cut.status.shape, 1))
     i, j = (robot.coordinates.index(letter) for letter in plane)
     poses[..., i], poses[..., j] = np.meshgrid(cut.first, cut.second)
@@ -222,12 +238,16 @@ def _measures(robot: Manipulator, home: Array, box: Array) -> Measures | None:
     return Measures(cut, type_i, np.where(np.isnan(type_i), np.nan, type_ii))
 
 
-def _jacobian(robot: Manipulator, home: Array) -> JacobianAtHome:
+def jacobian_at(robot: Manipulator, home: Array) -> JacobianAtHome:
+    """Return the Jacobian at a pose, and its condition number."""
     matrix = jacobian(robot, home)
     held = [leg.platform_point[:2] for leg in robot.legs if not leg.follows_angle]
     radius = float(np.sqrt((np.array(held) ** 2).sum(axis=-1).mean()))
     unit = radius or 1.0
-    levers = [unit if leg.follows_angle else leg.lever for leg in robot.legs]
+    levers = [
+        unit / abs(row[-1]) if leg.follows_angle else leg.lever
+        for leg, row in zip(robot.legs, matrix, strict=True)
+    ]
     columns = [unit if name == "phi" else 1.0 for name in robot.coordinates]
     condition = float(np.linalg.cond(matrix * np.array(levers)[:, None] / columns))
     return JacobianAtHome(matrix, radius or None if robot.platform.turns else None, condition)

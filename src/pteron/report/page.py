@@ -69,12 +69,14 @@ def page(report: Report) -> str:
         bodies=bodies(robot),
         letters=_letters(robot),
         reasons=_reasons(robot),
+        weighed=_weighed(report),
         coordinate=coordinate(joints),
         force=force(joints),
         speed=speed(joints),
         joint=nouns(joints),
         joint_units=dict.fromkeys(joint.unit for joint in joints),
         gravity=_gravity(robot),
+        passive=[(joint, joint.told_limits(readable)) for joint in report.passive],
         paired=any(leg.bar for leg in robot.legs),
         modes=prod(len(leg.branches) for leg in robot.legs),
         figures=_figures(report),
@@ -116,8 +118,8 @@ def kinds(robot: Manipulator) -> list[tuple[LegKind, list[int]]]:
     return [(robot.legs[members[0] - 1], members) for members in found.values()]
 
 
-def geometry(robot: Manipulator) -> list[tuple[str, bool, list[str]]]:
-    """Return the columns of the legs' geometry, mm: heading, whether of numbers, a text a leg."""
+def geometry(robot: Manipulator) -> list[tuple[str, list[str]]]:
+    """Return the rows of the legs' geometry, mm: what it is, and a text a leg."""
     roles = {"guide_point": "point"}
     # A leg with more lengths has those of the others among them, in its order.
     counts = [sum(q.role == "length" for q in leg.quantities) for leg in robot.legs]
@@ -127,7 +129,7 @@ def geometry(robot: Manipulator) -> list[tuple[str, bool, list[str]]]:
     if any(any(leg.fixed_offset) for leg in robot.legs):
         roles["fixed_offset"] = "point of the platform"
     order = ("point", "direction", "point of the platform", "length", "number", "count")
-    columns = []
+    rows = []
     shown = [name for name, role in roles.items() if role in order]
     for name in sorted(shown, key=lambda name: order.index(roles[name])):
         role, texts = roles[name], []
@@ -144,8 +146,8 @@ def geometry(robot: Manipulator) -> list[tuple[str, bool, list[str]]]:
             else:
                 texts.append(triple(value, 1e3) if "point" in role else triple(value, digits=3))
         if any(text != "\u2013" for text in texts):
-            columns.append((name.replace("_", " "), role in ("length", "number", "count"), texts))
-    return columns
+            rows.append((name.replace("_", " "), texts))
+    return rows
 
 
 def bodies(robot: Manipulator) -> list[tuple[str, int | None, dict[str, float]]]:
@@ -187,6 +189,22 @@ def _reasons(robot: Manipulator) -> list[str]:
     ]
     still = [] if robot.platform.turns else ["the platform does not turn"]
     return list(dict.fromkeys(reason.format("") for reason in (*own, *rides, *still)))
+
+
+def _weighed(report: Report) -> list[str]:
+    """Return how what is no length is measured in the condition number of the Jacobian."""
+    legs, radius = report.robot.legs, report.jacobian.radius
+    followers = [leg.joint.noun for leg in legs if leg.follows_angle]
+    found = []
+    if any(leg.joint.unit == "rad" and not leg.follows_angle for leg in legs):
+        found.append("a crank's angle measured as the way of its end")
+    if radius is not None:
+        way = f"a point {fixed(1e3 * radius)} mm from its axis (the root mean square distance"
+        if report.robot.platform.slides:
+            way = f"what slides, {fixed(1e3 * radius)} mm/rad (the root mean square"
+        found.append(f"the platform's angle \u03c6 as the way of {way} of the platform points)")
+    found += [f"the {noun}'s angle as \u03c6, whatever its ratio" for noun in followers]
+    return found
 
 
 def _figures(report: Report) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import casadi as ca
@@ -74,7 +75,7 @@ def beyond_limits(robot: Manipulator, poses: Array) -> ModelError:
     pose = poses[room_to_limits(robot, poses).min(axis=-1).argmax()]
     told = [
         f"{f'leg {at.leg}: ' if at.leg else ''}{at.noun} at {at.value:.4g} {at.unit} of "
-        f"{at.least:g} to {at.most:g}"
+        f"{at.told_limits('{:g}'.format)}"
         for at in limited_joints(robot, pose)
         if not at.least < at.value < at.most
     ]
@@ -101,6 +102,8 @@ class LimitedJoint:
         Of the numbers, "m" or "rad".
     value, least, most : float
         Where it is, and its limits.
+    only_most : bool
+        Whether it is never below zero, as the angle in a cone, and only its greatest value a limit.
     """
 
     leg: int
@@ -110,6 +113,12 @@ class LimitedJoint:
     value: float
     least: float
     most: float
+    only_most: bool = False
+
+    def told_limits(self, told: Callable[..., str]) -> str:
+        """Return its limits as words; `told` turns a value and the unit into text."""
+        most = told(self.most, self.unit)
+        return f"at most {most}" if self.only_most else f"{told(self.least, self.unit)} to {most}"
 
 
 def limited_joints(robot: Manipulator, pose: Array) -> tuple[LimitedJoint, ...]:
@@ -126,4 +135,5 @@ def limited_joints(robot: Manipulator, pose: Array) -> tuple[LimitedJoint, ...]:
 
 
 def _limited(leg: int, at: Passive) -> LimitedJoint:
-    return LimitedJoint(leg, at.noun, False, at.unit, float(at.value), at.least, at.most)
+    limits = at.least, at.most, at.only_most
+    return LimitedJoint(leg, at.noun, False, at.unit, float(at.value), *limits)

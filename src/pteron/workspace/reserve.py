@@ -27,8 +27,8 @@ class Reserve:
         The type-I measure of each leg: 0 where it is stretched or folded. Out of reach it is
         negative: the missing metres over the leg's size.
     type_ii : array, shape (...)
-        The size of the type-II measure over the best that the machine has, as far as random poses
-        tell: 0 where the actuators do not hold the platform.
+        The size of the type-II measure over the best that the machine's geometry allows, limits or
+        not: 0 where the actuators do not hold the platform.
     clearances : array, shape (..., n)
         Distance of each leg's joint, or of a passive one, from its nearer limit, over half its
         range, the least; negative beyond it, and 1 for a leg without limits.

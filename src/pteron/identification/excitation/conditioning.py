@@ -29,7 +29,7 @@ class Conditioning:
         That of the regressor as it is, in SI units.
     nominal : float
         That with every column times the machine's own value of its base parameter, so that all
-        columns are forces; infinite if a value is 0.
+        columns are forces; infinite, and no measure of anything, if a value is 0.
     logdet : float
         log det of the information matrix of one sample on average, W^T W / T; the larger the
         smaller the volume of the confidence ellipsoid. Other units only add a constant.
