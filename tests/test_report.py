@@ -465,5 +465,5 @@ def test_numbers_as_people_read_them():
 
 @pytest.mark.parametrize("kinds", ["SRP", "LCC"])
 def test_of_mixed_legs_the_upper_length_stands_before_the_lower(kinds):
-    columns = [name for name, _, _ in geometry(random_machine(3, kinds))]
-    assert columns.index("lower length") == columns.index("upper length") + 1
+    rows = [name for name, _ in geometry(random_machine(3, kinds))]
+    assert rows.index("lower length") == rows.index("upper length") + 1

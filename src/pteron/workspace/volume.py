@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,8 +33,8 @@ _NEARER = 0.75
 _FAR = 1e3
 """What stands for no limit, m: the optimiser wants finite numbers."""
 
-_ENDLESS = 10.0
-"""A reach that is so many times the size of the machine has no end."""
+_ENDLESS = 100.0
+"""A way of so many sizes of the machine that stays in reach has no end."""
 
 _SLACK = 1e-8
 """Metres by which the optimiser may overstep a bound."""
@@ -133,19 +133,27 @@ def bounding_box(robot: Manipulator, pose: PoseLike) -> Array:
                 subject=robot.name,
             )
     good = np.vstack([drawn[inside > _TOUCH], starts[room(starts).min(axis=-1) > _TOUCH]])
+    if any((room(good + way).min(axis=-1) > _TOUCH).any() for way in _long_ways(robot, radius)):
+        raise ModelError(
+            "the reach has no end: the guides let the platform move along them for ever; give the "
+            "legs limits",
+            subject=robot.name,
+        )
     sides = np.empty((2, count))
     for axis in range(count):
         for side, sign in enumerate((1.0, -1.0)):
             objective = sign * np.eye(count)[axis]
             front = _front(room, good, objective, radius, rng)
             sides[side, axis] = sign * min(_furthest(room, p, objective) for p in front[:_STARTS])
-    if not (np.abs(sides - center) <= _ENDLESS * radius).all():
-        raise ModelError(
-            "the reach has no end: the guides let the platform move along them for ever; give the "
-            "legs limits",
-            subject=robot.name,
-        )
     return sides
+
+
+def _long_ways(robot: Manipulator, size: float) -> Iterator[Array]:
+    """Yield ways along the guides, far longer than the machine."""
+    for leg in robot.legs:
+        if leg.reach_bound is not None and leg.reach_bound.line is not None:
+            way = _ENDLESS * size * (robot.platform.directions @ leg.reach_bound.line)
+            yield from (way, -way)
 
 
 def _deepest(room: Callable[[Array], Array], start: Array) -> Array:
