@@ -93,9 +93,9 @@ def _prrr(leg: Any, count: int) -> list[Body]:
 
 def _pss(leg: Any, count: int) -> list[Body]:
     mass = leg.slider_mass
-    x, nowhere = np.array([1.0, 0.0, 0.0]), np.zeros(3)
+    x, nowhere, base = np.array([1.0, 0.0, 0.0]), np.zeros(3), np.array(leg.guide_point)
     # A body that does not turn: its moments of inertia do not matter, but MuJoCo wants some.
-    slider = Body(-1, frame_of(leg), np.array(leg.guide_point), (x,), "", mass, nowhere, mass * x)
+    slider = Body(-1, frame_of(leg), base, (x,), "", mass, nowhere, np.full(3, mass))
     return [slider, _rod(leg, count, nowhere)]
 
 
