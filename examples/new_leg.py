@@ -17,7 +17,7 @@ import pteron
 from pteron.bodies.inertia import PlanarInertia, PointMass, RodInertia
 from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, PointMotion
 from pteron.bodies.vectors import Vector
-from pteron.legs import KINDS
+from pteron.legs import KINDS, Drive
 from pteron.legs.kind import SLIDER, Key, LegKind, Quantity, ReachBound
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Reach, Sphere
 from pteron.legs.rods import rod_body, universal_joints
@@ -37,6 +37,7 @@ class SliderRod(LegKind):
     elbow: int = 1
     limits: tuple[float, float] | None = None
     fixed_offset: Vector = (0.0, 0.0, 0.0)
+    drive: Drive | None = None
 
     type = "SliderRod"
     joint = SLIDER

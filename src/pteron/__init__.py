@@ -16,6 +16,8 @@ from pteron.bodies.parameters import Parameter
 from pteron.dynamics import (
     bias_forces,
     coriolis_matrix,
+    drive_accelerations,
+    drive_forces,
     forward_dynamics,
     gravity_forces,
     inverse_dynamics,
@@ -50,7 +52,7 @@ from pteron.kinematics import (
     singular_orientations,
     working_mode,
 )
-from pteron.legs import PRR, PRRR, PSS, RRR, RSS, RUPU, Cone
+from pteron.legs import PRR, PRRR, PSS, RRR, RSS, RUPU, Cone, Drive, Stribeck
 from pteron.manipulator import (
     Manipulator,
     catalog,
@@ -110,6 +112,7 @@ __all__ = [
     "BaseParameters",
     "Cone",
     "DataError",
+    "Drive",
     "Geared",
     "JointMotion",
     "Leg",
@@ -128,6 +131,7 @@ __all__ = [
     "RUPU",
     "RodInertia",
     "SingularPose",
+    "Stribeck",
     "UnreachablePose",
     "assembly_mode",
     "base_parameters",
@@ -138,6 +142,8 @@ __all__ = [
     "compile",
     "coriolis_matrix",
     "direct_kinematics",
+    "drive_accelerations",
+    "drive_forces",
     "export_c",
     "export_st",
     "follow",

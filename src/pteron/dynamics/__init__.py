@@ -1,6 +1,12 @@
 """Dynamics in numbers: batched, validated, documented."""
 
-from pteron.dynamics.forces import forward_dynamics, inverse_dynamics, regressor
+from pteron.dynamics.forces import (
+    drive_accelerations,
+    drive_forces,
+    forward_dynamics,
+    inverse_dynamics,
+    regressor,
+)
 from pteron.dynamics.model import (
     bias_forces,
     coriolis_matrix,
@@ -13,6 +19,8 @@ from pteron.dynamics.model import (
 __all__ = [
     "bias_forces",
     "coriolis_matrix",
+    "drive_accelerations",
+    "drive_forces",
     "forward_dynamics",
     "gravity_forces",
     "inverse_dynamics",

@@ -1,4 +1,4 @@
-"""Inverse and forward dynamics, and the regressor: from a motion to actuator forces and back."""
+"""Inverse and forward dynamics, with drives or without, and the regressor."""
 
 from __future__ import annotations
 
@@ -106,6 +106,118 @@ def forward_dynamics(
     """
     values = [pose, velocity, forces, *([] if wrench is None else [wrench])]
     return evaluated(robot, "forward_dynamics", on_failure, *values, wrench=wrench is not None)
+
+
+def drive_forces(
+    robot: Manipulator,
+    pose: PoseLike,
+    velocity: PoseLike,
+    acceleration: PoseLike,
+    wrench: PoseLike | None = None,
+    *,
+    smooth: bool = False,
+    on_failure: OnFailure = "raise",
+) -> PerJoint:
+    """Return what the drives must give: `inverse_dynamics`, friction and the motors' inertia.
+
+    F + ratio^2 rotor_inertia q'' + (coulomb + stribeck exp(-(q'/v_s)^2)) s(q') + viscous q' +
+    offset, by each leg's `drive`; a leg without one has neither friction nor a rotor.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    pose, velocity, acceleration : array, shape (..., m)
+        The platform's motion; m, rad and s. Leading axes broadcast.
+    wrench : array, shape (..., m), optional
+        What acts on the platform at P: a force in N and, where it turns, a moment about k in N m.
+    smooth : bool
+        s is the sign of q', exact where a joint moves, which suits logs; or tanh(q'/rest_speed),
+        which suits simulation and controllers (the kernel `feed_forward`).
+    on_failure : {"raise", "nan"}
+        Whether a pose that fails raises, or gives NaN.
+
+    Returns
+    -------
+    array, shape (..., n)
+        N at a slider, N m at a crank; positive along +q.
+
+    Raises
+    ------
+    UnreachablePose
+        If a leg does not reach a pose.
+    SingularPose
+        If a leg is stretched or folded (type I), or the actuators do not hold the platform
+        (type II).
+
+    Examples
+    --------
+    >>> import numpy as np, pteron
+    >>> from dataclasses import replace
+    >>> robot = pteron.load("tripteron")
+    >>> legs = [replace(leg, drive=pteron.Drive(coulomb=3.0, viscous=10.0)) for leg in robot.legs]
+    >>> state = np.zeros(3), [0.1, 0.2, -0.3], np.zeros(3)
+    >>> driven = pteron.drive_forces(replace(robot, legs=legs), *state)
+    >>> (driven - pteron.inverse_dynamics(robot, *state)).round(9)
+    array([ 4.,  5., -6.])
+    """
+    values = [pose, velocity, acceleration, *([] if wrench is None else [wrench])]
+    what = "feed_forward" if smooth else "drive_forces"
+    return evaluated(robot, what, on_failure, *values, wrench=wrench is not None)
+
+
+def drive_accelerations(
+    robot: Manipulator,
+    pose: PoseLike,
+    velocity: PoseLike,
+    forces: JointsLike,
+    wrench: PoseLike | None = None,
+    *,
+    on_failure: OnFailure = "raise",
+) -> PerCoordinate:
+    """Return the platform's acceleration under what the drives give.
+
+    The inverse of `drive_forces` with ``smooth=True``: friction and the motors' inertia take their
+    part of the forces.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    pose, velocity : array, shape (..., m)
+        The platform's state; m, rad and s.
+    forces : array, shape (..., n)
+        Of the drives, N at a slider, N m at a crank; positive along +q.
+    wrench : array, shape (..., m), optional
+        What acts on the platform at P: a force in N and, where it turns, a moment about k in N m.
+    on_failure : {"raise", "nan"}
+        Whether a pose that fails raises, or gives NaN.
+
+    Returns
+    -------
+    array, shape (..., m)
+        m/s^2 and rad/s^2.
+
+    Raises
+    ------
+    UnreachablePose
+        If a leg does not reach a pose.
+    SingularPose
+        If a leg is stretched or folded (type I).
+
+    Examples
+    --------
+    >>> import numpy as np, pteron
+    >>> from dataclasses import replace
+    >>> robot = pteron.load("tripteron")
+    >>> legs = [replace(leg, drive=pteron.Drive(rotor_inertia=2.0)) for leg in robot.legs]
+    >>> robot, rest = replace(robot, legs=legs), np.zeros(3)
+    >>> forces = pteron.drive_forces(robot, rest, rest, [1.0, 2.0, 3.0], smooth=True)
+    >>> pteron.drive_accelerations(robot, rest, rest, forces).round(9)
+    array([1., 2., 3.])
+    """
+    values = [pose, velocity, forces, *([] if wrench is None else [wrench])]
+    return evaluated(robot, "drive_accelerations", on_failure, *values, wrench=wrench is not None)
 
 
 def regressor(

@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike
 from pteron.kernels.c import Code, compiler
 from pteron.kernels.kernel import Array, Kernel, sliced
 from pteron.kernels.programs import Columns, bare, program
-from pteron.kernels.targets import Selects, columns_of
+from pteron.kernels.targets import FIXED, Selects, columns_of
 from pteron.kernels.vm import VirtualMachine
-from pteron.manipulator import Manipulator, parameters
+from pteron.manipulator import Manipulator
 
 VARIABLE = "PTERON_KERNELS"
 """Environment variable: `vm` keeps the public functions on CasADi's virtual machine."""
@@ -45,7 +45,7 @@ def numeric(
 @lru_cache(maxsize=512)
 def _known(robot: Manipulator, what: str, columns: Columns | None, wrench: bool) -> Adaptive:
     built = program(robot, what, columns, wrench=wrench, guarded=True)
-    fixed = {port.name: parameters(robot) for port in built.inputs if port.name == "parameters"}
+    fixed = {p.name: FIXED[p.name](robot) for p in built.inputs if p.name in FIXED}
     kernel = VirtualMachine(built.name, built.function, built.inputs, built.outputs, fixed)
     return Adaptive(kernel, _tier(bare(robot), what, columns, wrench))
 

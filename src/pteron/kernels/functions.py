@@ -10,7 +10,7 @@ from typing import Any, Literal
 import casadi as ca
 
 from pteron.bodies.motion import Expression
-from pteron.equations import closing, kinematics, lagrangian, regressor
+from pteron.equations import closing, drives, kinematics, lagrangian, regressor
 from pteron.equations.friction import passive_friction
 from pteron.equations.machine import Machine
 from pteron.equations.virtual_work import generalized_forces, inverse_dynamics
@@ -160,6 +160,20 @@ def _forward_dynamics(m: Machine, v: Symbols) -> Outputs:
     return {"acceleration": acceleration}
 
 
+def _drive_forces(m: Machine, v: Symbols, *, smooth: bool) -> Outputs:
+    state = _state(m, v)
+    rigid = inverse_dynamics(m, state, v["parameters"], v.get("wrench"))
+    own = drives.drive_forces(state, drives.Drives.of(v["drives"]), smooth=smooth)
+    return {"forces": rigid + own}
+
+
+def _drive_accelerations(m: Machine, v: Symbols) -> Outputs:
+    wrench = v.get("wrench", ca.SX.zeros(m.freedom))
+    given = v["pose"], v["velocity"], v["forces"], v["parameters"], wrench
+    acceleration = drives.drive_accelerations(m, *given, drives.Drives.of(v["drives"]))
+    return {"acceleration": acceleration}
+
+
 def _coriolis_matrix(m: Machine, v: Symbols) -> Outputs:
     return {"coriolis": lagrangian.coriolis_matrix(m, v["pose"], v["velocity"], v["parameters"])}
 
@@ -230,6 +244,15 @@ TABLE: dict[str, Entry] = {
     "passive_friction": Entry(_RATE, _passive_friction, _HELD),
     "inverse_dynamics": Entry((*_MOTION, "parameters"), _inverse_dynamics, _HELD),
     "forward_dynamics": Entry((*_RATE, "forces", "parameters"), _forward_dynamics, _BENT),
+    "drive_forces": Entry(
+        (*_MOTION, "parameters", "drives"), partial(_drive_forces, smooth=False), _HELD
+    ),
+    "feed_forward": Entry(
+        (*_MOTION, "parameters", "drives"), partial(_drive_forces, smooth=True), _HELD
+    ),
+    "drive_accelerations": Entry(
+        (*_RATE, "forces", "parameters", "drives"), _drive_accelerations, _BENT
+    ),
     "mass_matrix": Entry(
         (*_POSE, "parameters"),
         lambda m, v: {"mass": lagrangian.mass_matrix(m, v["pose"], v["parameters"])},

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from pteron.bodies.motion import Expression
 from pteron.equations import kinematics
+from pteron.equations.drives import Drives
 from pteron.equations.machine import Machine
 from pteron.errors import ModelError
 from pteron.kernels.functions import FUNCTIONS, TABLE, TYPE_I, TYPE_II, Entry, Output, Symbols
@@ -27,10 +28,13 @@ _TINY = 1e-300
 _REDUCIBLE = ("inverse_dynamics", "base_regressor")
 """What may be asked for base parameters."""
 
-_LOADED = ("inverse_dynamics", "forward_dynamics")
+_LOADED = (
+    *("inverse_dynamics", "forward_dynamics"),
+    *("drive_forces", "feed_forward", "drive_accelerations"),
+)
 """What may take a wrench on the platform as well."""
 
-_SHARED = ("geometry", "parameters", "base_parameters")
+_SHARED = ("geometry", "parameters", "base_parameters", "drives")
 """Inputs of which one value serves a whole batch."""
 
 Columns = tuple[tuple[int, ...], ...]
@@ -101,7 +105,7 @@ def specialised(given: Program, values: dict[str, NDArray[np.float64]]) -> Progr
 
 @lru_cache(maxsize=256)
 def bare(robot: Manipulator) -> Manipulator:
-    """Return the machine with unit inertia, so that machines of one geometry share programs."""
+    """Return the machine with unit inertia and no drives: those of one geometry share programs."""
     expect_manipulator(robot)
     unit = {"m": 1.0, "mgx": 0.0, "mgy": 0.0, "I": 1.0}
 
@@ -109,7 +113,10 @@ def bare(robot: Manipulator) -> Manipulator:
         return body.of_values([unit[kind] for kind in body.kinds])
 
     legs = tuple(
-        leg.with_bodies({letter: plain(body) for letter, body in leg.bodies.items()})
+        replace(
+            leg.with_bodies({letter: plain(body) for letter, body in leg.bodies.items()}),
+            drive=None,
+        )
         for leg in robot.legs
     )
     platform = robot.platform.with_joined(plain(robot.platform.joined))
@@ -182,10 +189,13 @@ def _program(
     asked = [name for name in entry.inputs if name not in (constants or {})]
     asked += ["wrench"] if wrench else []
     asked.sort(key=lambda name: name in _SHARED)
-    count = len(machine.parameters)
-    symbols = {
-        name: ca.SX.sym(name, count if name == "parameters" else machine.freedom) for name in asked
-    } | (extra or {})
+    sizes = {
+        "parameters": len(machine.parameters),
+        "drives": len(Drives._fields) * machine.freedom,
+    }
+    symbols = {name: ca.SX.sym(name, sizes.get(name, machine.freedom)) for name in asked} | (
+        extra or {}
+    )
     built = entry.build(machine, symbols | (constants or {}))
     outputs = {name: _shaped(output) for name, output in built.items()}
     if guarded:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, Literal, Protocol, get_args, runtime_checkable
 
 import casadi as ca
 import numpy as np
 
+from pteron.equations.drives import drive_numbers
 from pteron.equations.machine import numbers
 from pteron.errors import ModelError
 from pteron.kernels.c import Compiled
@@ -30,6 +32,12 @@ TARGETS: dict[str, type[Kernel]] = {
 """The targets by name."""
 
 Grade = Literal["specialised", "parametric", "general"]
+
+FIXED: dict[str, Callable[[Manipulator], Array]] = {
+    "parameters": parameters,
+    "drives": drive_numbers,
+}
+"""The inputs that have a machine's own values unless a call gives others."""
 
 _TRANSPARENT = ("jax", "exact")
 """Targets whose numbers may be traced or fractions, and go into the code as they are given."""
@@ -166,8 +174,8 @@ def _compiled(
     built = program(robot, what, columns, wrench=wrench, plain=folded)
     fixed: dict[str, Array] = {}
     for port in built.inputs:
-        if port.name == "parameters":
-            fixed[port.name] = parameters(robot)
+        if port.name in FIXED:
+            fixed[port.name] = FIXED[port.name](robot)
         elif port.name == "base_parameters":
             fixed[port.name] = np.array(base_values)
     made: dict[str, ca.Function] = {}

@@ -1,6 +1,7 @@
 """Kinds of legs, one file each; `legs.leg` is the page to read before writing another."""
 
 from pteron.legs.cones import Cone
+from pteron.legs.drive import Drive, Stribeck
 from pteron.legs.kind import LegKind
 from pteron.legs.prr import PRR
 from pteron.legs.prrr import PRRR
@@ -12,4 +13,16 @@ from pteron.legs.rupu import RUPU
 KINDS: dict[str, type[LegKind]] = {kind.type: kind for kind in (PRRR, PSS, RSS, RRR, PRR, RUPU)}
 """The kinds of legs that files may name, by their key `type`; add another here."""
 
-__all__ = ["KINDS", "PRR", "PRRR", "PSS", "RRR", "RSS", "RUPU", "Cone", "LegKind"]
+__all__ = [
+    "KINDS",
+    "PRR",
+    "PRRR",
+    "PSS",
+    "RRR",
+    "RSS",
+    "RUPU",
+    "Cone",
+    "Drive",
+    "LegKind",
+    "Stribeck",
+]

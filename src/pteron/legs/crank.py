@@ -18,6 +18,7 @@ from pteron.bodies.inertia import PlanarInertia
 from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, PointMotion
 from pteron.bodies.vectors import Vector, cross, vertical
 from pteron.legs.circles import perpendicular_to, plane_of, quarter_turn
+from pteron.legs.drive import Drive
 from pteron.legs.kind import CRANK, Key, LegKind, Quantity, ReachBound, Transfer
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Reach
 
@@ -73,6 +74,7 @@ class CrankLeg(LegKind):
     elbow: int = 1
     limits: tuple[float, float] | None = None
     fixed_offset: Vector = (0.0, 0.0, 0.0)
+    drive: Drive | None = None
 
     joint = CRANK
 

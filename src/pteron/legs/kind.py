@@ -24,6 +24,7 @@ from pteron.bodies.vectors import (
     vector,
 )
 from pteron.errors import ModelError
+from pteron.legs.drive import Drive
 from pteron.legs.leg import LegEquations, LegMotion, Passive
 from pteron.toml import told
 
@@ -74,10 +75,11 @@ KeyRole = Literal[
     "slider",
     "planar",
     "rod",
+    "drive",
 ]
 """What a key holds: a vector, a unit vector, a length, a number, a whole number, +1 or -1, least
 and greatest value, a ball joint's cone, a slider's mass (TOML key `slider`), a body in a plane, a
-rod. Files and pages give a leg's keys in this order."""
+rod, a drive. Files and pages give a leg's keys in this order."""
 
 
 class Key(NamedTuple):
@@ -108,6 +110,12 @@ COMMON: dict[str, Key] = {
     ),
     "elbow": Key("sign", "sigma, 1 or -1: the side of the elbow", default=1),
     "limits": Key("limits", "least and greatest joint coordinate, m or rad", default=None),
+    "drive": Key(
+        "drive",
+        "what drives the joint: friction, motor, limits",
+        default=None,
+        example={"coulomb": 3.0, "viscous": 12.0},
+    ),
 }
 """The keys that every kind of leg has; a kind may say more closely what they are."""
 
@@ -164,6 +172,8 @@ def _checked(value: Any, name: str, role: KeyRole) -> Any:
         return int(value)
     if role == "limits":
         return interval(value, name)
+    if role == "drive" and not isinstance(value, Drive):
+        raise ModelError(f"{name}: {type(value).__name__} given, a Drive expected")
     return value
 
 
@@ -184,6 +194,8 @@ class LegKind(ABC):
         sigma, the side of the elbow: the leg's branch.
     limits : (float, float), optional
         Least and greatest joint coordinate, m or rad.
+    drive : Drive, optional
+        What drives its joint.
     """
 
     guide_point: Vector
@@ -191,6 +203,7 @@ class LegKind(ABC):
     fixed_offset: Vector
     elbow: int
     limits: tuple[float, float] | None
+    drive: Drive | None
 
     type: ClassVar[str]
     """What the file's key `type` says."""

@@ -52,6 +52,8 @@ class PRR(SlideLeg):
         Least and greatest slider coordinate, m.
     fixed_offset : vector
         t0, the part of the platform point that does not turn with phi, in the base frame, m.
+    drive : Drive, optional
+        What drives its joint.
     direction : unit vector, optional
         d, of the two revolute axes: the normal of the platform's plane, which is its default.
     elbow_limits : (float, float), optional

@@ -28,6 +28,7 @@ from pteron.legs.circles import (
 )
 from pteron.legs.cones import ELBOW_LIMITS, between, check_elbow, within
 from pteron.legs.crank import ELBOW
+from pteron.legs.drive import Drive
 from pteron.legs.kind import SLIDER, Condition, Key, LegKind, Quantity, ReachBound, Transfer
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Passive, Plane, Reach
 from pteron.legs.planar_links import Turning, last_joints, link_body, lower_link_body
@@ -74,6 +75,8 @@ class PRRR(LegKind):
         Least and greatest slider coordinate, m.
     fixed_offset : vector
         t0, the part of the platform point that does not turn with phi, in the base frame, m.
+    drive : Drive, optional
+        What drives its joint.
     elbow_limits : (float, float), optional
         Least and greatest angle between the links: 0 where stretched, pi where folded.
     """
@@ -90,6 +93,7 @@ class PRRR(LegKind):
     elbow: int = 1
     limits: tuple[float, float] | None = None
     fixed_offset: Vector = (0.0, 0.0, 0.0)
+    drive: Drive | None = None
     elbow_limits: tuple[float, float] | None = None
 
     type = "PRRR"

@@ -49,6 +49,8 @@ class PSS(SlideLeg):
         Least and greatest slider coordinate, m.
     fixed_offset : vector
         t0, the part of the platform point that does not turn with phi, in the base frame, m.
+    drive : Drive, optional
+        What drives its joint.
     rods : int
         How many parallel rods `lower` is the sum of.
     bar_direction : unit vector, optional

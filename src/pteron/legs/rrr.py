@@ -51,6 +51,8 @@ class RRR(CrankLeg):
         Least and greatest crank angle, rad.
     fixed_offset : vector
         t0, the part of the platform point that does not turn with phi, in the base frame, m.
+    drive : Drive, optional
+        What drives its joint.
     elbow_limits : (float, float), optional
         Least and greatest angle between the links: 0 where stretched, pi where folded.
     """

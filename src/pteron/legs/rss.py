@@ -63,6 +63,8 @@ class RSS(CrankLeg):
         Least and greatest crank angle, rad.
     fixed_offset : vector
         t0, the part of the platform point that does not turn with phi, in the base frame, m.
+    drive : Drive, optional
+        What drives its joint.
     rods : int
         How many parallel rods `lower` is the sum of.
     bar_direction : unit vector, optional

@@ -20,6 +20,7 @@ from pteron.bodies.vectors import Vector, dot, parallel
 from pteron.errors import ModelError
 from pteron.legs.circles import perpendicular_to, random_fraction, random_vector
 from pteron.legs.cones import within
+from pteron.legs.drive import Drive
 from pteron.legs.kind import SHAFT, Condition, Key, LegKind, Quantity, Transfer
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Passive, Reach, Turned
 from pteron.legs.rods import rod_body, universal_joints
@@ -60,6 +61,8 @@ class RUPU(LegKind):
         Least and greatest joint angle, rad.
     fixed_offset : vector
         t0, the part of the platform point that does not turn with phi, in the base frame, m.
+    drive : Drive, optional
+        What drives its joint.
     direction : unit vector, optional
         Of the joint's axis: the platform's axis, which is its default.
     travel : (float, float), optional
@@ -74,6 +77,7 @@ class RUPU(LegKind):
     elbow: int = 1
     limits: tuple[float, float] | None = None
     fixed_offset: Vector = (0.0, 0.0, 0.0)
+    drive: Drive | None = None
     direction: Vector | None = None
     travel: tuple[float, float] | None = None
 

@@ -18,6 +18,7 @@ import casadi as ca
 from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, PointMotion
 from pteron.bodies.vectors import Vector
 from pteron.legs.circles import random_fraction
+from pteron.legs.drive import Drive
 from pteron.legs.kind import SLIDER, Key, LegKind, ReachBound, Transfer
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Reach
 
@@ -54,6 +55,7 @@ class SlideLeg(LegKind):
     elbow: int = 1
     limits: tuple[float, float] | None = None
     fixed_offset: Vector = (0.0, 0.0, 0.0)
+    drive: Drive | None = None
 
     joint = SLIDER
     singular_text = "its link is at a right angle to its guide"

@@ -27,9 +27,11 @@ from pteron.bodies.tables import (
 from pteron.errors import ModelError
 from pteron.legs import LegKind
 from pteron.legs.cones import Cone
+from pteron.legs.drive import Drive, Stribeck
 from pteron.legs.kind import Key, KeyRole
 from pteron.manipulator.manipulator import STANDARD_GRAVITY
 from pteron.platforms.platform import Motion
+from pteron.toml import told
 
 
 class ConeTable(Table):
@@ -44,6 +46,58 @@ class ConeTable(Table):
             return Cone(self.axis, self.angle)
         except ModelError as error:
             raise ModelError(f"{key}.{error}") from None
+
+
+class StribeckTable(Table):
+    """`{ force, speed }` of what dry friction has more at rest."""
+
+    force: Number = Field(description="what is added at rest, N or N m")
+    speed: Number = Field(description="by which most of it is gone, m/s or rad/s")
+
+
+class DriveTable(Table):
+    """The drive of a joint: at the joint, but for what is said to be the motor's."""
+
+    coulomb: Number = Field(0.0, description="dry friction, N or N m")
+    viscous: Number = Field(0.0, description="N s/m or N m s")
+    offset: Number = Field(0.0, description="a constant force, N or N m")
+    rotor_inertia: Number = Field(
+        0.0, description="of the motor and what turns with it, kg m^2", examples=[3e-5]
+    )
+    ratio: Number = Field(
+        1.0, description="motor angle over the joint's coordinate, rad/m or rad/rad"
+    )
+    rest_speed: Number = Field(
+        1e-3, description="within which dry friction changes its sign smoothly, m/s or rad/s"
+    )
+    stribeck: StribeckTable | None = Field(
+        None,
+        description="what dry friction has more at rest",
+        examples=[{"force": 1.2, "speed": 0.01}],
+    )
+    rated_torque: Number | None = Field(
+        None, description="of the motor, N m: what commands in per cent are of", examples=[0.64]
+    )
+    max_force: Number | None = Field(
+        None, description="what the drive can do, N or N m", examples=[120.0]
+    )
+    max_speed: Number | None = Field(None, description="m/s or rad/s", examples=[1.5])
+
+    def drive_of(self, key: str) -> Drive:
+        """Build the drive; `key` goes before what an error names."""
+        more, faults = None, []
+        try:
+            more = self.stribeck and Stribeck(self.stribeck.force, self.stribeck.speed)
+        except ModelError as error:
+            faults += [f"{key}.stribeck.{fault}" for fault in error.faults]
+        given = {name: getattr(self, name) for name in type(self).model_fields}
+        try:
+            drive = Drive(**given | {"stribeck": more})
+        except ModelError as error:
+            faults += [f"{key}.{fault}" for fault in error.faults]
+        if faults:
+            raise ModelError(told(faults), faults=faults)
+        return drive
 
 
 class _Motion(Table):
@@ -118,6 +172,7 @@ _TYPES: dict[KeyRole, Any] = {
     "slider": Slider,
     "planar": PlanarBody,
     "rod": RodBody,
+    "drive": DriveTable,
 }
 
 FORMER = {"limits": "slider_limits"}
@@ -211,7 +266,11 @@ def _held(given: Any, name: str, key: Key) -> Any:
         return given.mass
     if key.body:
         return given.inertia_of(name)
-    return given.cone_of(name) if key.role == "cone" and given is not None else given
+    if given is None:
+        return None
+    if key.role == "drive":
+        return given.drive_of(name)
+    return given.cone_of(name) if key.role == "cone" else given
 
 
 def _beyond_ends(leg: LegKind, letter: str, body: Any) -> str | None:
@@ -227,4 +286,8 @@ def leg_items(leg: LegKind) -> Mapping[str, Any]:
     found: dict[str, Any] = {"type": leg.type}
     for name, key in leg.every_key().items():
         found[toml_key(name, key)] = leg.bodies[key.body] if key.body else getattr(leg, name)
+    if leg.drive is not None:
+        fields = DriveTable.model_fields
+        given = {name: getattr(leg.drive, name) for name in fields}
+        found["drive"] = {k: v for k, v in given.items() if v != fields[k].default}
     return found

@@ -1,0 +1,93 @@
+"""What the drives must give beside the rigid bodies: their friction and their motors' inertia.
+
+Stated once, here; `Drive` says what the numbers are.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.bodies.motion import Expression
+from pteron.equations.kinematics import jacobian
+from pteron.equations.lagrangian import mass_matrix, solve_positive_definite
+from pteron.equations.machine import Machine, State
+from pteron.equations.virtual_work import generalized_forces
+from pteron.legs import Drive, Stribeck
+from pteron.manipulator import Manipulator
+
+
+class Drives(NamedTuple):
+    """The numbers of all drives, (n, 1) each."""
+
+    inertia: Expression
+    coulomb: Expression
+    viscous: Expression
+    offset: Expression
+    stribeck: Expression
+    stribeck_speed: Expression
+    rest_speed: Expression
+
+    @classmethod
+    def of(cls, values: Expression) -> Drives:
+        """Take the numbers from a vector (7 n, 1), such as `drive_numbers` returns."""
+        return cls(*ca.vertsplit(values, values.shape[0] // len(cls._fields)))
+
+
+def drive_numbers(robot: Manipulator) -> NDArray[np.float64]:
+    """Return the numbers (7 n,) of a machine's drives for `Drives.of`.
+
+    A leg without a drive has neither friction nor a rotor.
+    """
+    rows = []
+    for leg in robot.legs:
+        drive = leg.drive or Drive()
+        more = drive.stribeck or Stribeck(0.0, 1.0)
+        rows.append(
+            (
+                *(drive.inertia, drive.coulomb, drive.viscous, drive.offset),
+                *(more.force, more.speed, drive.rest_speed),
+            )
+        )
+    return np.array(rows).T.ravel()
+
+
+def friction(drives: Drives, rates: Expression, *, smooth: bool) -> Expression:
+    """Return what friction and offset take (n, 1); `smooth` where a joint rests, else by sign."""
+    dry = drives.coulomb + drives.stribeck * ca.exp(-((rates / drives.stribeck_speed) ** 2))
+    side = ca.tanh(rates / drives.rest_speed) if smooth else ca.sign(rates)
+    return dry * side + drives.viscous * rates + drives.offset
+
+
+def drive_forces(state: State, drives: Drives, *, smooth: bool) -> Expression:
+    """Return what the drives need for themselves in a motion (n, 1)."""
+    rates, accelerations = (
+        ca.vertcat(*(getattr(leg, name) for leg in state.legs)) for name in ("rate", "acceleration")
+    )
+    return drives.inertia * accelerations + friction(drives, rates, smooth=smooth)
+
+
+def drive_accelerations(
+    machine: Machine,
+    pose: Expression,
+    velocity: Expression,
+    forces: Expression,
+    parameters: Expression,
+    wrench: Expression,
+    drives: Drives,
+) -> Expression:
+    """Return x'' under the drives' forces (n, 1): (M + J^T D J) x'' = J^T (F - f) + wrench - h.
+
+    D is the motors' inertia at the joints, f friction and what D needs at x'' = 0.
+    """
+    state = machine.state(pose, velocity)
+    rows = jacobian(state)
+    own = drive_forces(state, drives, smooth=True)
+    load = ca.mtimes(rows.T, forces - own) + wrench
+    load -= generalized_forces(machine, state, parameters)
+    mass = mass_matrix(machine, pose, parameters)
+    mass += ca.mtimes(rows.T, ca.mtimes(ca.diag(drives.inertia), rows))
+    return solve_positive_definite(mass, load)
