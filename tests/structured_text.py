@@ -228,6 +228,7 @@ def _call(name, given):
         ("SQRT", 1): math.sqrt,
         ("SIN", 1): math.sin,
         ("COS", 1): math.cos,
+        ("EXP", 1): math.exp,
         ("ATAN2", 2): math.atan2,
         ("MIN", 2): min,
         ("MAX", 2): max,

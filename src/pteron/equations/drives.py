@@ -55,11 +55,24 @@ def drive_numbers(robot: Manipulator) -> NDArray[np.float64]:
     return np.array(rows).T.ravel()
 
 
+def drive_names(robot: Manipulator) -> tuple[str, ...]:
+    """Return what `drive_numbers` are: "coulomb_1" for leg 1, and so on."""
+    legs = range(1, robot.freedom + 1)
+    return tuple(f"{name}_{i}" for name in Drives._fields for i in legs)
+
+
 def friction(drives: Drives, rates: Expression, *, smooth: bool) -> Expression:
     """Return what friction and offset take (n, 1); `smooth` where a joint rests, else by sign."""
     dry = drives.coulomb + drives.stribeck * ca.exp(-((rates / drives.stribeck_speed) ** 2))
-    side = ca.tanh(rates / drives.rest_speed) if smooth else ca.sign(rates)
+    side = _ahead(rates) - _ahead(-rates)
+    if smooth:  # tanh(q'/rest_speed), by an exponential that controllers have and none overflows
+        small = ca.exp(-2 * ca.fabs(rates) / drives.rest_speed)
+        side = side * (1 - small) / (1 + small)
     return dry * side + drives.viscous * rates + drives.offset
+
+
+def _ahead(rates: Expression) -> Expression:
+    return ca.if_else(rates > 0, 1, 0)
 
 
 def drive_forces(state: State, drives: Drives, *, smooth: bool) -> Expression:

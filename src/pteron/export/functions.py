@@ -8,16 +8,17 @@ from importlib.metadata import version
 
 import numpy as np
 
+from pteron.equations.drives import drive_names, drive_numbers
 from pteron.equations.machine import Machine, closure_of
 from pteron.errors import ModelError
 from pteron.export.labels import node_names
 from pteron.kernels import FUNCTIONS as COMPILED
-from pteron.kernels import Array, Graph, Port, Program, columns_of, graph_of, program
+from pteron.kernels import LOADED, Array, Graph, Port, Program, columns_of, graph_of, program
 from pteron.kernels import specialised as with_values
 from pteron.kernels.graph import CONSTANT
 from pteron.kinematics import inverse_kinematics, random_poses
 from pteron.manipulator import Manipulator, parameter_names, parameters
-from pteron.reduction import cheapest_parameters
+from pteron.reduction import BaseParameters, cheapest_parameters
 
 FUNCTIONS = (
     "inverse_kinematics",
@@ -42,6 +43,12 @@ _SUMMARIES = {
     "inverse_dynamics": "Actuator forces of a motion, from the inertial parameters; no friction.",
     "inverse_dynamics_base": "Actuator forces of a motion, from base parameters; no friction.",
     "forward_dynamics": "Acceleration of the platform under actuator forces; no friction.",
+    "drive_forces": "What the drives must give: actuator forces, friction by the sign of the "
+    "joint's rate, the motors' inertia.",
+    "feed_forward": "What the drives must give: actuator forces, friction, which is smooth where a "
+    "joint rests, the motors' inertia.",
+    "drive_accelerations": "Acceleration of the platform under what the drives give, friction and "
+    "the motors' inertia included.",
     "regressor": "Regressor: actuator forces = regressor parameters.",
 }
 
@@ -54,6 +61,12 @@ _BRANCHES = (
 
 
 _TABLE = "The machine's inertial parameters, in the paper's order; SI units."
+
+_DRIVE_TABLE = (
+    "The machine's drives, at the joints: motors' inertia, dry and viscous friction, a constant "
+    "force, what dry friction has more at rest, and the speeds by which it is gone and within which "
+    "dry friction changes its sign; SI units."
+)
 
 _BASE_TABLE = "The machine's base parameters, which inverse_dynamics_base takes; SI units."
 
@@ -138,14 +151,11 @@ def chosen(
 def _exported(robot: Manipulator, name: str, specialised: bool, wrench: bool) -> Exported:
     base = cheapest_parameters(robot) if name == "inverse_dynamics_base" else None
     what = "inverse_dynamics" if base else name
-    loaded = wrench and what in ("inverse_dynamics", "forward_dynamics")
+    loaded = wrench and what in LOADED
     given = program(robot, what, columns_of(base) if base else None, wrench=loaded)
-    values = base.values() if base else parameters(robot)
-    fixed = {port.name: values for port in given.inputs if port.shared}
-    comment, names = (
-        (_BASE_TABLE, base.expressions(digits=6)) if base else (_TABLE, parameter_names(robot))
-    )
-    tables = tuple(Table(port, comment, names, value) for port, value in fixed.items())
+    shared = [port.name for port in given.inputs if port.shared]
+    tables = tuple(_table(robot, name, base) for name in shared)
+    fixed = {table.name: table.values for table in tables}
     if specialised:
         given, tables = with_values(given, fixed), ()
     graph = graph_of(given.function, given.inputs)
@@ -173,6 +183,15 @@ def _exported(robot: Manipulator, name: str, specialised: bool, wrench: bool) ->
         tables,
         tuple(_evaluated(given, graph, state) for state in states[1:]),
     )
+
+
+def _table(robot: Manipulator, name: str, base: BaseParameters | None) -> Table:
+    """Return the machine's own numbers for a shared input."""
+    if name == "drives":
+        return Table(name, _DRIVE_TABLE, drive_names(robot), drive_numbers(robot))
+    if base is not None:
+        return Table(name, _BASE_TABLE, base.expressions(digits=6), base.values())
+    return Table(name, _TABLE, parameter_names(robot), parameters(robot))
 
 
 def _states(
@@ -244,6 +263,7 @@ def _meaning(robot: Manipulator, port: Port) -> str:
         "wrench": f"wrench on the platform at P: N{moment}",
         "parameters": "inertial parameters, in kg, kg m and kg m^2",
         "base_parameters": "base parameters; see the table of the same name",
+        "drives": "numbers of the drives; see the table of the same name",
         "jacobian": "joint rates per unit of the platform's rates",
         "regressor": "actuator forces per unit of each parameter",
         "type_ii": "type-II measure: 0 at a singularity",

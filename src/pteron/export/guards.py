@@ -29,6 +29,7 @@ _PRINTED = {
     "sqrt": "SQRT({0})",
     "sin": "SIN({0})",
     "cos": "COS({0})",
+    "exp": "EXP({0})",
     "atan2": "ATAN2({0}, {1})",
     "fabs": "ABS({0})",
     "fmin": "MIN({0}, {1})",
@@ -37,6 +38,9 @@ _PRINTED = {
 
 INPUT_POWER, _DIVISOR, _FACTOR = 6, -20, 30
 """Powers of ten: inputs and factors are not larger, divisors not smaller."""
+
+_EXPONENT = "69.0"
+"""Whose power of e is smaller than 10^`_FACTOR`."""
 
 _ZERO = "0.0"
 
@@ -109,6 +113,8 @@ class Statements:
         value = _PRINTED[node.operation].format(*arguments)
         if node.operation == "sqrt":
             self._guard(f"{arguments[0]} >= 0.0", name, value, "1.0", "Reachable")
+        elif node.operation == "exp":
+            self._guard(f"{arguments[0]} <= {_EXPONENT}", name, value, "1.0", "Regular")
         elif node.operation == "atan2":
             test = " OR ".join(f"({argument} <> 0.0)" for argument in arguments)
             self._guard(test, name, value, _ZERO, "Regular")
@@ -178,6 +184,8 @@ class Statements:
             return sizes[0] - (_magnitude(divisor.value) if constant else _DIVISOR)
         if node.operation == "sqrt":
             return max(sizes[0] / 2, 0.0)
+        if node.operation == "exp":
+            return _FACTOR
         if node.operation in ("sin", "cos", "atan2", "less"):
             return math.log10(4.0)
         if node.operation == "select":

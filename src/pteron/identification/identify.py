@@ -35,6 +35,7 @@ from pteron.identification.recordings import Recording, divided, recording
 from pteron.identification.result import Identification, verdict_of
 from pteron.identification.signals import Preprocessing, Processing
 from pteron.kernels import Array
+from pteron.legs import Drive
 from pteron.manipulator import Manipulator
 from pteron.reduction import base_parameters
 from pteron.reduction.sharing import Sharing
@@ -114,7 +115,7 @@ def identify(
 
     # Build the model
     base = base_parameters(robot, shared=shared)
-    rotors = _reflected(fit)
+    rotors = _rotors(robot, fit)
     known_rotors = replace(terms or Terms(), rotors=True) if rotors else terms
     model = identification_model(robot, known_rotors, base=base)
     if model.terms.payload:
@@ -160,7 +161,7 @@ def identify(
     again = ESTIMATORS.get(estimator, weighted) if isinstance(estimator, str) else estimator
     essential = essential_parameters(observations, estimate, again)
     known = np.zeros(len(model.names))
-    for name, mass in rotors.items():
+    for name, mass in _reflected(rotors).items():
         known += model.share_of(name, mass)
     consistency, share, missing = _real_bodies(model, estimate, known, observations, cad, bounds)
     advice = doubts(model, estimate, known, consistency, cad)
@@ -184,7 +185,8 @@ def identify(
         verdict=replace(verdict, next_steps=(*verdict.next_steps, *advice)),
         unseen=hidden,
         findings=tuple(f for one in (*whole, *others) for f in one.findings),
-        notes=(*_notes(model, estimate, rotors), *missing),
+        notes=(*_notes(model, estimate, _reflected(rotors)), *missing),
+        rotors=rotors,
     )
 
 
@@ -208,13 +210,20 @@ def _reader(report: Stage, task: str) -> Callable[[int], None]:
     return tell
 
 
-def _reflected(fit: Sequence[Recording]) -> dict[str, float]:
-    """Return what the rotors of known drives weigh on the joints, J r^2, by name."""
+def _rotors(robot: Manipulator, fit: Sequence[Recording]) -> tuple[tuple[float, float], ...] | None:
+    """Return inertia and ratio of each joint's motor, as the log says or else the machine's file."""
     description = fit[0].head().description
-    if description.rotor_inertia is None or description.ratio is None:
-        return {}
-    pairs = zip(description.rotor_inertia, description.ratio, strict=True)
-    return {f"J_m{i}": inertia * ratio**2 for i, (inertia, ratio) in enumerate(pairs, start=1)}
+    if description.rotor_inertia is not None and description.ratio is not None:
+        return tuple(zip(description.rotor_inertia, description.ratio, strict=True))
+    drives = [leg.drive or Drive() for leg in robot.legs]
+    if any(drive.rotor_inertia for drive in drives):
+        return tuple((drive.rotor_inertia, drive.ratio) for drive in drives)
+    return None
+
+
+def _reflected(rotors: tuple[tuple[float, float], ...] | None) -> dict[str, float]:
+    """Return what rotors weigh on the joints, J r^2, by name."""
+    return {f"J_m{i}": inertia * r**2 for i, (inertia, r) in enumerate(rotors or (), start=1)}
 
 
 def _with_findings(error: DataError, whole: Sequence[Recording]) -> DataError:

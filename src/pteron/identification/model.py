@@ -172,6 +172,15 @@ class Model:
             added[self.names.index(kept)] = share * value
         return added
 
+    def per_joint(self, kind: str, values: Array) -> Array | None:
+        """Return a kind of term (n,) of values (p,); 0 where it joins others, None if it is none.
+
+        What joins others is in their values already.
+        """
+        terms = [term for term in self.all_terms if term.kind == kind]
+        known = dict(zip(self.names, values.tolist(), strict=True))
+        return np.array([known.get(term.name, 0.0) for term in terms]) if terms else None
+
     def matrix(self, states: States) -> Array:
         """Return the regressor (R, n, p) of states: N or N m per unit of each value."""
         names = (*self.base.names, *(term.name for term in self.all_terms))

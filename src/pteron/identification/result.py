@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -14,6 +15,7 @@ from pteron.identification.model import Model
 from pteron.identification.prediction import Prediction
 from pteron.identification.signals import Preprocessing
 from pteron.kernels import Array
+from pteron.legs import Drive
 from pteron.manipulator import Manipulator
 
 Grade = Literal["trustworthy", "usable with care", "not trustworthy"]
@@ -145,6 +147,8 @@ class Identification:
         What was noticed in the logs.
     notes : tuple of str
         What else is to be known.
+    rotors : tuple of (float, float), optional
+        Inertia and ratio of each joint's motor, where they are known: no part of the real bodies.
     """
 
     robot: Manipulator
@@ -160,6 +164,30 @@ class Identification:
     unseen: tuple[str, ...]
     findings: tuple[Finding, ...]
     notes: tuple[str, ...] = ()
+    rotors: tuple[tuple[float, float], ...] | None = None
+
+    @cached_property
+    def machine(self) -> Manipulator | None:
+        """The machine as identified, real bodies and drives, which alone predicts the log.
+
+        None without real bodies. Friction that the fit had not is none of it.
+        """
+        if self.consistency is None:
+            return None
+        robot = self.consistency.robot
+        drives = [leg.drive or Drive() for leg in robot.legs]
+        if self.rotors is not None:
+            pairs = zip(drives, self.rotors, strict=True)
+            drives = [replace(d, rotor_inertia=j, ratio=r) for d, (j, r) in pairs]
+        for kind in ("coulomb", "viscous", "offset"):
+            found = self.model.per_joint(kind, self.estimate.values)
+            values = np.zeros(len(drives)) if found is None else found
+            if kind != "offset":
+                values = np.maximum(values, 0.0)  # below zero it is noise: no joint pushes itself
+            pairs = zip(drives, values.tolist(), strict=True)
+            drives = [replace(drive, **{kind: value}) for drive, value in pairs]
+        legs = zip(robot.legs, drives, strict=True)
+        return replace(robot, legs=tuple(replace(leg, drive=drive) for leg, drive in legs))
 
     @property
     def base_values(self) -> Array:

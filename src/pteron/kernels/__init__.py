@@ -9,6 +9,7 @@ from pteron.kernels.functions import FUNCTIONS, needs_of
 from pteron.kernels.graph import Graph, graph_of
 from pteron.kernels.kernel import Array, Kernel, Port, as_array, count_operations
 from pteron.kernels.programs import (
+    LOADED,
     Columns,
     Program,
     bare,
@@ -27,6 +28,7 @@ from pteron.kernels.targets import (
 
 __all__ = [
     "FUNCTIONS",
+    "LOADED",
     "OTHER_LAYOUT",
     "Selects",
     "needs_of",

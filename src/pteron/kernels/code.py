@@ -27,6 +27,7 @@ C = {
     "sqrt": "sqrt({0})",
     "sin": "sin({0})",
     "cos": "cos({0})",
+    "exp": "exp({0})",
     "atan2": "atan2({0}, {1})",
     "fabs": "fabs({0})",
     "floor": "floor({0})",

@@ -30,6 +30,7 @@ _CODES = {
     "sqrt": ca.OP_SQRT,
     "sin": ca.OP_SIN,
     "cos": ca.OP_COS,
+    "exp": ca.OP_EXP,
     "atan2": ca.OP_ATAN2,
     "fabs": ca.OP_FABS,
     "floor": ca.OP_FLOOR,

@@ -60,7 +60,7 @@ class Traced(Kernel):
         def stack(*values: Any) -> Any:
             return jnp.stack(jnp.broadcast_arrays(*values), axis=-1)
 
-        names = ("sqrt", "sin", "cos", "floor", "fmin", "fmax", "where", "nan")
+        names = ("sqrt", "sin", "cos", "exp", "floor", "fmin", "fmax", "where", "nan")
         space: dict[str, Any] = {name: getattr(jnp, name) for name in names}
         space |= {"atan2": jnp.arctan2, "fabs": jnp.abs, "stack": stack}
         exec(self.source, space)

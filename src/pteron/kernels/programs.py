@@ -28,7 +28,7 @@ _TINY = 1e-300
 _REDUCIBLE = ("inverse_dynamics", "base_regressor")
 """What may be asked for base parameters."""
 
-_LOADED = (
+LOADED = (
     *("inverse_dynamics", "forward_dynamics"),
     *("drive_forces", "feed_forward", "drive_accelerations"),
 )
@@ -78,8 +78,8 @@ def program(
         raise ModelError('base: missing; "base_regressor" needs base=base_parameters(robot)')
     if what not in _REDUCIBLE and columns is not None:
         raise ModelError(f"base: {what!r} has no use for it; it goes with {', '.join(_REDUCIBLE)}")
-    if what not in _LOADED and wrench:
-        raise ModelError(f"wrench: {what!r} has no use for it; it goes with {', '.join(_LOADED)}")
+    if what not in LOADED and wrench:
+        raise ModelError(f"wrench: {what!r} has no use for it; it goes with {', '.join(LOADED)}")
     return _built(bare(robot), what, columns, wrench, guarded, plain)
 
 

@@ -94,10 +94,10 @@ def model_path(folder: str | Path, name: str, sources: Iterable[str | Path] = ()
 
 def _model_text(result: Identification) -> str | None:
     """Return the model file of an identification; None where there are no real bodies."""
-    if result.consistency is None:
+    if result.machine is None:
         return None
     with tempfile.TemporaryDirectory() as folder:
-        plain = save(result.consistency.robot, Path(folder) / "robot.toml").read_text("utf-8")
+        plain = save(result.machine, Path(folder) / "robot.toml").read_text("utf-8")
     return "".join(f"# {_line(text)}\n" for text in _header(result)) + "#\n" + plain
 
 
@@ -122,7 +122,7 @@ def _header(result: Identification) -> list[str]:
         f"Bodies that have the identified base parameters {distance}.",
         "What the forces do not show of them is "
         + ("as near as can be to the CAD model." if consistency.nearest_to == "CAD" else plain),
-        "Friction and offsets are no part of a machine's file: identification.json has them.",
+        "Friction and offsets are those of the fit, in each leg's drive.",
     ]
 
 
