@@ -64,7 +64,7 @@ _TABLE = "The machine's inertial parameters, in the paper's order; SI units."
 
 _DRIVE_TABLE = (
     "The machine's drives, at the joints: motors' inertia, dry and viscous friction, a constant "
-    "force, what dry friction has more at rest, and the speeds by which it is gone and within which "
+    "force, what dry friction has more at rest, the speeds by which it is gone, and within which "
     "dry friction changes its sign; SI units."
 )
 

@@ -211,7 +211,7 @@ def _reader(report: Stage, task: str) -> Callable[[int], None]:
 
 
 def _rotors(robot: Manipulator, fit: Sequence[Recording]) -> tuple[tuple[float, float], ...] | None:
-    """Return inertia and ratio of each joint's motor, as the log says or else the machine's file."""
+    """Return inertia and ratio of each joint's motor, by the log or else by the machine's file."""
     description = fit[0].head().description
     if description.rotor_inertia is not None and description.ratio is not None:
         return tuple(zip(description.rotor_inertia, description.ratio, strict=True))

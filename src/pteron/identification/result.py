@@ -177,15 +177,15 @@ class Identification:
         robot = self.consistency.robot
         drives = [leg.drive or Drive() for leg in robot.legs]
         if self.rotors is not None:
-            pairs = zip(drives, self.rotors, strict=True)
-            drives = [replace(d, rotor_inertia=j, ratio=r) for d, (j, r) in pairs]
+            motors = zip(drives, self.rotors, strict=True)
+            drives = [replace(d, rotor_inertia=j, ratio=r) for d, (j, r) in motors]
         for kind in ("coulomb", "viscous", "offset"):
             found = self.model.per_joint(kind, self.estimate.values)
             values = np.zeros(len(drives)) if found is None else found
             if kind != "offset":
                 values = np.maximum(values, 0.0)  # below zero it is noise: no joint pushes itself
-            pairs = zip(drives, values.tolist(), strict=True)
-            drives = [replace(drive, **{kind: value}) for drive, value in pairs]
+            each = zip(drives, values.tolist(), strict=True)
+            drives = [replace(drive, **{kind: value}) for drive, value in each]
         legs = zip(robot.legs, drives, strict=True)
         return replace(robot, legs=tuple(replace(leg, drive=drive) for leg, drive in legs))
 
