@@ -11,7 +11,14 @@ from pathlib import Path
 
 from pteron.bodies.tables import Bar, Geared, PlanarBody, Table
 from pteron.legs import KINDS
-from pteron.manipulator.tables import ConeTable, MachineTable, PlatformTable, leg_table
+from pteron.manipulator.tables import (
+    ConeTable,
+    DriveTable,
+    MachineTable,
+    PlatformTable,
+    StribeckTable,
+    leg_table,
+)
 
 PAGE = Path(__file__).parent / "robot-file.md"
 
@@ -22,6 +29,8 @@ TABLES: dict[str, type[Table]] = {
     "geared": Geared,
     "a body": PlanarBody,
     "a cone": ConeTable,
+    "a drive": DriveTable,
+    "stribeck": StribeckTable,
     **{name: leg_table(kind) for name, kind in KINDS.items()},
 }
 """What the page has tables of; those of legs by their type."""
