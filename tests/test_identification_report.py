@@ -241,7 +241,7 @@ def test_the_files_are_written_whole(name, tmp_path, monkeypatch):
     assert text.startswith("# ")
     assert f"# Verdict: {result(name).verdict.grade}." in text
     robot = pteron.load(found.model)
-    assert robot == consistency.robot
+    assert robot == result(name).machine
     np.testing.assert_array_equal(pteron.parameters(robot), consistency.parameters)
 
 

@@ -15,10 +15,12 @@ from mechanisms import CATALOG, MECHANISMS, NEAREST, states
 
 import pteron
 from pteron import atomic
+from pteron.equations.drives import drive_numbers
 from pteron.equations.machine import numbers
 from pteron.errors import DataError, ModelError, OutputError
 from pteron.kernels import (
     FUNCTIONS,
+    LOADED,
     NoSquareRoot,
     PrimeField,
     RationalField,
@@ -89,7 +91,7 @@ PUBLIC = {
 @pytest.mark.parametrize("name", ["quadrupteron", "random PRR 0"])
 def test_every_function_compiles_and_gives_what_the_public_one_gives(name, what):
     robot = MECHANISMS[name]
-    for wrench in (False, *([True] if what in ("inverse_dynamics", "forward_dynamics") else [])):
+    for wrench in (False, *([True] if what in LOADED else [])):
         kernel = kernel_of(robot, what, wrench)
         values = values_for(robot, kernel, (2, 3))
         found = kernel(*values)
@@ -110,11 +112,11 @@ def test_every_function_compiles_and_gives_what_the_public_one_gives(name, what)
         assert kernel.operations == count_operations(kernel.function) == walked(kernel.function)
         assert what in kernel.source
         inputs = {port.name for port in kernel.inputs}
-        assert {port.name for port in kernel.ports} - {"parameters"} == inputs
+        sizes = {"parameters": len(pteron.parameters(robot)), "drives": len(drive_numbers(robot))}
+        assert {port.name for port in kernel.ports} - sizes.keys() == inputs
         for port in kernel.ports:
-            own = len(pteron.parameters(robot)) if port.shared else robot.freedom
-            assert port.shape == (own,)
-            assert port.shared == (port.name == "parameters")
+            assert port.shape == (sizes.get(port.name, robot.freedom),)
+            assert port.shared == (port.name in sizes)
             assert port.name in kernel.source
 
 

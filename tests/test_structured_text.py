@@ -12,6 +12,7 @@ from structured_text import Block, Trap, parse, read
 from test_export import ROBOTS
 
 import pteron
+from pteron.equations.drives import drive_numbers
 from pteron.export.structured_text import function_block
 from pteron.kernels import Port, program
 from pteron.kernels.graph import Graph, Node, graph_of
@@ -24,6 +25,7 @@ FUNCTIONS = (
     "direct_step",
     "jacobian",
     "forward_dynamics",
+    "feed_forward",
 )
 
 BLOCKS = sorted(set(product(ROBOTS, FUNCTIONS)) - {("par4", "closure_poses")})
@@ -95,6 +97,7 @@ def inputs_of(robot, given, count, seed=0):
             "joints": pteron.inverse_kinematics(robot, pose),
             "forces": rng.normal(size=len(robot.legs)),
             "parameters": pteron.parameters(robot),
+            "drives": drive_numbers(robot),
         }
         drawn.append([known[port.name] for port in given.inputs])
     return drawn

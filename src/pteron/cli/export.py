@@ -16,6 +16,9 @@ _FUNCTIONS = (
     "direct_kinematics",
     "direct_step",
     "discriminants",
+    "drive_accelerations",
+    "drive_forces",
+    "feed_forward",
     "forward_dynamics",
     "gravity_forces",
     "inverse_dynamics",
@@ -69,7 +72,8 @@ def export(
 
     Kinematics, Jacobian, dynamics and regressor, in functions that return a status, without
     allocation or state; with a test program and a CMakeLists.txt. Function blocks for a PLC are
-    inverse kinematics and inverse dynamics unless others are named.
+    inverse kinematics and inverse dynamics unless others are named. A machine with drives has
+    `feed_forward` as well: what the drives must give, with friction.
     """
     if c is None and st is None:
         raise DataError("--c, --st: neither given; say what to write, such as --c controller")

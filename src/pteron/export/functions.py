@@ -29,7 +29,8 @@ FUNCTIONS = (
     "forward_dynamics",
     "regressor",
 )
-"""What is exported unless a choice is given; direct kinematics where it has a closed form."""
+"""What is exported unless a choice is given; direct kinematics where it has a closed form, and
+`feed_forward` too of a machine with drives."""
 
 _SUMMARIES = {
     "inverse_kinematics": "Joint coordinates of a pose.",
@@ -137,6 +138,7 @@ def chosen(
         closed = closure_of(robot).closed_form
         step = {"direct_kinematics": "direct_step"}
         functions = [name if closed else step.get(name, name) for name in FUNCTIONS]
+        functions += ["feed_forward"] if any(leg.drive for leg in robot.legs) else []
     names = [functions] if isinstance(functions, str) else list(dict.fromkeys(functions))
     allowed = sorted({*COMPILED, "inverse_dynamics_base"} - {"base_regressor"})
     valid = f"choose from {', '.join(allowed)}"
