@@ -312,6 +312,12 @@ def test_an_angle_of_no_vector_is_singular():
     assert block(v={(0,): 0.0, (1,): 0.0})["status"] == 2
 
 
+def test_a_machine_with_drives_has_its_feed_forward_too(tmp_path):
+    for name, more in (("par4", ["Par4_FeedForward.st"]), ("delta", [])):
+        files = pteron.export_st(ROBOTS[name], folder=tmp_path)
+        assert [path.name for path in files[2:]] == more
+
+
 def test_exported_blocks_are_those_of_the_library(tmp_path):
     """Both closed-form poses of a Delta, its forces with the parameters folded in, a wrench."""
     robot = ROBOTS["delta"]

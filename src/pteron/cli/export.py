@@ -80,7 +80,7 @@ def export(
     machine = load_robot(robot, elbows)
     files = []
     with spinner(f"Writing code for {machine.name}"):
-        from pteron.export import BLOCKS, Real, export_c, export_st
+        from pteron.export import Real, export_c, export_st
 
         if c is not None:
             real: Real = "float" if single else "double"
@@ -88,7 +88,7 @@ def export(
                 machine, function, c, real=real, specialised=specialised, wrench=wrench
             )
         if st is not None:
-            files += export_st(machine, function or BLOCKS, st, wrench=wrench)
+            files += export_st(machine, function, st, wrench=wrench)
     if json:
         show_json({"robot": machine.name, "files": [str(path) for path in files]})
         return

@@ -2,6 +2,6 @@
 
 from pteron.export.c import Real, export_c
 from pteron.export.functions import FUNCTIONS
-from pteron.export.structured_text import BLOCKS, export_st
+from pteron.export.structured_text import export_st
 
-__all__ = ["BLOCKS", "FUNCTIONS", "Real", "export_c", "export_st"]
+__all__ = ["FUNCTIONS", "Real", "export_c", "export_st"]

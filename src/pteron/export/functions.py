@@ -118,6 +118,11 @@ class Exported:
         return len(self.graph.operations())
 
 
+def has_drives(robot: Manipulator) -> bool:
+    """Return whether the machine's file says what drives its joints."""
+    return any(leg.drive is not None for leg in robot.legs)
+
+
 def chosen(
     robot: Manipulator,
     functions: str | Sequence[str] | None,
@@ -138,7 +143,7 @@ def chosen(
         closed = closure_of(robot).closed_form
         step = {"direct_kinematics": "direct_step"}
         functions = [name if closed else step.get(name, name) for name in FUNCTIONS]
-        functions += ["feed_forward"] if any(leg.drive for leg in robot.legs) else []
+        functions += ["feed_forward"] if has_drives(robot) else []
     names = [functions] if isinstance(functions, str) else list(dict.fromkeys(functions))
     allowed = sorted({*COMPILED, "inverse_dynamics_base"} - {"base_regressor"})
     valid = f"choose from {', '.join(allowed)}"

@@ -13,13 +13,13 @@ from pathlib import Path
 from pteron.atomic import write_texts
 from pteron.equations.machine import closure_of
 from pteron.export.c import prefix_of
-from pteron.export.functions import Exported, banner, chosen
+from pteron.export.functions import Exported, banner, chosen, has_drives
 from pteron.export.guards import INPUT_POWER, Names, Statements, element, power
 from pteron.kernels import Graph, Port
 from pteron.kernels.code import rendered
 from pteron.manipulator import Manipulator
 
-BLOCKS = ("inverse_kinematics", "inverse_dynamics")
+_BLOCKS = ("inverse_kinematics", "inverse_dynamics")
 """What is exported unless a choice is given."""
 
 _LREAL = 300
@@ -33,7 +33,7 @@ _STATUSES = (("Usable", 3), ("Reachable", 1), ("Regular", 2))
 
 def export_st(
     robot: Manipulator,
-    functions: str | Sequence[str] = BLOCKS,
+    functions: str | Sequence[str] | None = None,
     folder: str | Path = ".",
     *,
     specialised: bool = True,
@@ -52,8 +52,8 @@ def export_st(
     robot : Manipulator
         The machine; its name becomes the prefix of the blocks and the files.
     functions : sequence of str
-        As for `export_c`; by default inverse kinematics and inverse dynamics. For direct
-        kinematics, `"closure_poses"` is written, whose poses a leg may not reach, or
+        As for `export_c`; by default inverse kinematics and inverse dynamics, and `feed_forward`
+        of a machine with drives. For direct kinematics, `"closure_poses"` is written, whose poses a leg may not reach, or
         `"direct_step"` where they have no closed form. Angles are computed by ATAN2, which some
         controllers have in a library only.
     folder : path
@@ -85,6 +85,8 @@ def export_st(
     """
     # A block is valid or not as a whole; but of two assembly modes one alone may be in reach.
     direct = "closure_poses" if closure_of(robot).closed_form else "direct_step"
+    if functions is None:
+        functions = (*_BLOCKS, *(["feed_forward"] if has_drives(robot) else []))
     names = [functions] if isinstance(functions, str) else functions
     closures = [direct if name == "direct_kinematics" else name for name in names]
     prefix = _camel(prefix_of(robot))
