@@ -53,9 +53,9 @@ def export_st(
         The machine; its name becomes the prefix of the blocks and the files.
     functions : sequence of str
         As for `export_c`; by default inverse kinematics and inverse dynamics, and `feed_forward`
-        of a machine with drives. For direct kinematics, `"closure_poses"` is written, whose poses a leg may not reach, or
-        `"direct_step"` where they have no closed form. Angles are computed by ATAN2, which some
-        controllers have in a library only.
+        of a machine with drives. For direct kinematics, `"closure_poses"` is written, whose poses
+        a leg may not reach, or `"direct_step"` where they have no closed form. Angles are computed
+        by ATAN2, which some controllers have in a library only.
     folder : path
         Where; made if it is missing.
     specialised : bool
