@@ -18,7 +18,8 @@ from pteron.bodies.inertia import PlanarInertia, PointMass, RodInertia
 from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, PointMotion
 from pteron.bodies.vectors import Vector
 from pteron.legs import KINDS, Drive
-from pteron.legs.kind import SLIDER, Key, LegKind, Quantity, ReachBound
+from pteron.legs.keys import Key
+from pteron.legs.kind import SLIDER, LegKind, Quantity, ReachBound
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Reach, Sphere
 from pteron.legs.rods import rod_body, universal_joints
 

@@ -10,7 +10,7 @@ import casadi as ca
 from pteron.bodies.motion import Expression
 from pteron.bodies.vectors import Vector, number, unit_vector
 from pteron.errors import ModelError
-from pteron.legs.kind import Key
+from pteron.legs.keys import Key
 from pteron.legs.leg import Passive
 
 ELBOW_LIMITS = Key(

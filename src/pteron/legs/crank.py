@@ -19,7 +19,8 @@ from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, P
 from pteron.bodies.vectors import Vector, cross, vertical
 from pteron.legs.circles import perpendicular_to, plane_of, quarter_turn
 from pteron.legs.drive import Drive
-from pteron.legs.kind import CRANK, Key, LegKind, Quantity, ReachBound, Transfer
+from pteron.legs.keys import Key
+from pteron.legs.kind import CRANK, LegKind, Quantity, ReachBound, Transfer
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Reach
 
 ELBOW: Mapping[tuple[str, str], tuple[int, tuple[str, ...]]] = {

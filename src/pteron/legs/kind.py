@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from random import Random
@@ -14,17 +14,10 @@ import casadi as ca
 from pteron.bodies.inertia import Inertia, PointMass
 from pteron.bodies.motion import Expression
 from pteron.bodies.parameters import LEG_BODIES
-from pteron.bodies.vectors import (
-    Vector,
-    interval,
-    number,
-    perpendicular,
-    positive,
-    unit_vector,
-    vector,
-)
+from pteron.bodies.vectors import Vector
 from pteron.errors import ModelError
 from pteron.legs.drive import Drive
+from pteron.legs.keys import COMMON, Condition, Key, KeyRole, sound_fields
 from pteron.legs.leg import LegEquations, LegMotion, Passive
 from pteron.toml import told
 
@@ -63,63 +56,6 @@ class Quantity(NamedTuple):
     """How a length or a direction is written: "lu" becomes lu1 for leg 1."""
 
 
-KeyRole = Literal[
-    "point",
-    "direction",
-    "length",
-    "number",
-    "count",
-    "sign",
-    "limits",
-    "cone",
-    "slider",
-    "planar",
-    "rod",
-    "drive",
-]
-"""What a key holds: a vector, a unit vector, a length, a number, a whole number, +1 or -1, least
-and greatest value, a ball joint's cone, a slider's mass (TOML key `slider`), a body in a plane, a
-rod, a drive. Files and pages give a leg's keys in this order."""
-
-
-class Key(NamedTuple):
-    """What a field of a leg, and its TOML key, holds."""
-
-    role: KeyRole
-    help: str
-    """What it is, in a line, with its letter, its frame and its unit: for files and pages."""
-    body: str = ""
-    """The letter of the body whose inertia it is: "p", "u" or "l"."""
-    default: Any = ...
-    """What stands where a file does not give it; `...` where it must."""
-    example: Any = None
-    """A usual value, where the default is None."""
-    like: str = ""
-    """The key whose value is an example, where the file gives it."""
-    across: str = ""
-    """The direction to which it is perpendicular, by its key."""
-
-
-COMMON: dict[str, Key] = {
-    "guide_point": Key("point", "r, where the leg is fixed in the base frame, m"),
-    "platform_point": Key("point", "s0, from P to the platform point, in the platform frame, m"),
-    "fixed_offset": Key(
-        "point",
-        "t0, added to it in the base frame: the part that does not turn with phi, m",
-        default=(0.0, 0.0, 0.0),
-    ),
-    "elbow": Key("sign", "sigma, 1 or -1: the side of the elbow", default=1),
-    "limits": Key("limits", "least and greatest joint coordinate, m or rad", default=None),
-    "drive": Key(
-        "drive",
-        "what drives the joint: friction, motor, limits",
-        default=None,
-        example={"coulomb": 3.0, "viscous": 12.0},
-    ),
-}
-"""The keys that every kind of leg has; a kind may say more closely what they are."""
-
-
 Monomial = tuple[int, tuple[str, ...]]
 """An integer times a product of the leg's length symbols."""
 
@@ -141,40 +77,9 @@ class ReachBound(NamedTuple):
     radius: float
 
 
-class Condition(NamedTuple):
-    """What else must hold of fields that are right by themselves."""
-
-    names: tuple[str, ...]
-    check: Callable[..., None]
-    """It takes their values and raises a `ModelError` if it does not hold."""
-
-
 _ROUNDING = 1e-9
 
 _EquationsClass = type[LegEquations]
-
-
-def _checked(value: Any, name: str, role: KeyRole) -> Any:
-    """Return what a field holds, or say what is wrong with it."""
-    if role == "point":
-        return vector(value, name)
-    if role == "direction":
-        return unit_vector(value, name)
-    if role == "length":
-        return positive(value, name, "m")
-    if role == "number":
-        return number(value, name)
-    if role == "count" and (type(value) is not int or value < 1):
-        raise ModelError(f"{name}: {value!r} is not a whole number of at least 1")
-    if role == "slider":
-        return positive(value, "slider.mass", "kg")
-    if role == "sign":
-        return int(value)
-    if role == "limits":
-        return interval(value, name)
-    if role == "drive" and not isinstance(value, Drive):
-        raise ModelError(f"{name}: {type(value).__name__} given, a Drive expected")
-    return value
 
 
 class LegKind(ABC):
@@ -223,6 +128,7 @@ class LegKind(ABC):
     keys: ClassVar[Mapping[str, Key]]
     """The fields of its own, which are its TOML keys, and what they hold; see `every_key`."""
     conditions: ClassVar[tuple[Condition, ...]] = ()
+    """What must hold between its fields."""
     equations_class: ClassVar[_EquationsClass]
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
@@ -239,32 +145,7 @@ class LegKind(ABC):
 
         What hangs on a field that is not among the sound ones is not checked.
         """
-        keys = cls.every_key()
-        sound: dict[str, Any] = {}
-        faults: list[str] = []
-        for name in sorted(given, key=lambda name: bool(keys[name].across)):
-            key, value = keys[name], given[name]
-            try:
-                if key.role == "sign" and (isinstance(value, bool) or value not in cls.branches):
-                    valid = (
-                        "neither 1 nor -1" if len(cls.branches) > 1 else "not 1, its only branch"
-                    )
-                    raise ModelError(f"{name}: {value!r} is {valid}")
-                if value is None and key.default is None:
-                    sound[name] = None
-                elif axis := sound.get(key.across):
-                    sound[name] = perpendicular(value, axis, name, key.across)
-                else:
-                    sound[name] = _checked(value, name, key.role)
-            except ModelError as error:
-                faults += error.faults
-        for names, check in cls.conditions:
-            if all(name in sound for name in names):
-                try:
-                    check(*(sound[name] for name in names))
-                except ModelError as error:
-                    faults += error.faults
-        return sound, faults
+        return sound_fields(given, cls.every_key(), cls.conditions, cls.branches)
 
     @classmethod
     def every_key(cls) -> dict[str, Key]:

@@ -16,7 +16,8 @@ from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, P
 from pteron.bodies.vectors import Vector, cross, perpendicular
 from pteron.legs.circles import perpendicular_to, plane_of, quarter_turn, random_vector
 from pteron.legs.cones import check_elbow, within
-from pteron.legs.kind import Condition, Key, Quantity
+from pteron.legs.keys import Condition, Key
+from pteron.legs.kind import Quantity
 from pteron.legs.leg import Circle, Joint, LegMotion, Needs, Passive
 from pteron.legs.planar_links import Turning, last_joints, lower_link_body
 from pteron.legs.slide import SLIDER_KEYS, SlideEquations, SlideLeg, SlideState

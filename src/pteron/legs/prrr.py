@@ -29,7 +29,8 @@ from pteron.legs.circles import (
 from pteron.legs.cones import ELBOW_LIMITS, between, check_elbow, within
 from pteron.legs.crank import ELBOW
 from pteron.legs.drive import Drive
-from pteron.legs.kind import SLIDER, Condition, Key, LegKind, Quantity, ReachBound, Transfer
+from pteron.legs.keys import Condition, Key
+from pteron.legs.kind import SLIDER, LegKind, Quantity, ReachBound, Transfer
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Passive, Plane, Reach
 from pteron.legs.planar_links import Turning, last_joints, link_body, lower_link_body
 from pteron.legs.slide import SLIDER_KEYS

@@ -19,7 +19,8 @@ from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, PointMotio
 from pteron.bodies.vectors import Vector
 from pteron.legs.circles import random_vector
 from pteron.legs.cones import Cone
-from pteron.legs.kind import Key, Quantity
+from pteron.legs.keys import Key
+from pteron.legs.kind import Quantity
 from pteron.legs.leg import Joint, LegMotion, Passive, Sphere
 from pteron.legs.rods import ROD_KEYS, cones, free_axes, hinge_doubts, rod_body, universal_joints
 from pteron.legs.slide import SLIDER_KEYS, SlideEquations, SlideLeg, SlideState

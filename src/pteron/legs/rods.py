@@ -10,7 +10,7 @@ import casadi as ca
 from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, PointMotion
 from pteron.bodies.vectors import Vector, parallel
 from pteron.legs.cones import within_cone
-from pteron.legs.kind import Key
+from pteron.legs.keys import Key
 from pteron.legs.leg import Joint, LegMotion, Passive
 
 ROD_KEYS: dict[str, Key] = {

@@ -21,7 +21,7 @@ from pteron.errors import ModelError
 from pteron.legs.circles import random_vector
 from pteron.legs.cones import Cone
 from pteron.legs.crank import CRANK_KEYS, CrankEquations, CrankLeg, CrankState
-from pteron.legs.kind import Condition, Key
+from pteron.legs.keys import Condition, Key
 from pteron.legs.leg import Joint, LegMotion, Passive, Sphere
 from pteron.legs.rods import ROD_KEYS, cones, free_axes, hinge_doubts, rod_body, universal_joints
 

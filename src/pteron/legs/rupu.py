@@ -21,7 +21,8 @@ from pteron.errors import ModelError
 from pteron.legs.circles import perpendicular_to, random_fraction, random_vector
 from pteron.legs.cones import within
 from pteron.legs.drive import Drive
-from pteron.legs.kind import SHAFT, Condition, Key, LegKind, Quantity, Transfer
+from pteron.legs.keys import Condition, Key
+from pteron.legs.kind import SHAFT, LegKind, Quantity, Transfer
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Passive, Reach, Turned
 from pteron.legs.rods import rod_body, universal_joints
 

@@ -19,7 +19,8 @@ from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, P
 from pteron.bodies.vectors import Vector
 from pteron.legs.circles import random_fraction
 from pteron.legs.drive import Drive
-from pteron.legs.kind import SLIDER, Key, LegKind, ReachBound, Transfer
+from pteron.legs.keys import Key
+from pteron.legs.kind import SLIDER, LegKind, ReachBound, Transfer
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Reach
 
 SLIDER_KEYS: dict[str, Key] = {

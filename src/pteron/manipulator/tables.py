@@ -28,7 +28,7 @@ from pteron.errors import ModelError
 from pteron.legs import LegKind
 from pteron.legs.cones import Cone
 from pteron.legs.drive import Drive, Stribeck
-from pteron.legs.kind import Key, KeyRole
+from pteron.legs.keys import Key, KeyRole
 from pteron.manipulator.manipulator import STANDARD_GRAVITY
 from pteron.platforms.platform import Motion
 from pteron.toml import told

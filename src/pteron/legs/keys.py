@@ -1,0 +1,133 @@
+"""The keys of a leg: what its fields, which are its keys in a file, hold, and the check of that."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Literal, NamedTuple
+
+from pteron.bodies.vectors import interval, number, perpendicular, positive, unit_vector, vector
+from pteron.errors import ModelError
+from pteron.legs.drive import Drive
+
+KeyRole = Literal[
+    "point",
+    "direction",
+    "length",
+    "number",
+    "count",
+    "sign",
+    "limits",
+    "cone",
+    "slider",
+    "planar",
+    "rod",
+    "drive",
+]
+"""What a key holds: a vector, a unit vector, a length, a number, a whole number, +1 or -1, least
+and greatest value, a ball joint's cone, a slider's mass (TOML key `slider`), a body in a plane, a
+rod, a drive. Files and pages give a leg's keys in this order."""
+
+
+class Key(NamedTuple):
+    """What a field of a leg, and its TOML key, holds."""
+
+    role: KeyRole
+    help: str
+    """What it is, in a line, with its letter, its frame and its unit: for files and pages."""
+    body: str = ""
+    """The letter of the body whose inertia it is: "p", "u" or "l"."""
+    default: Any = ...
+    """What stands where a file does not give it; `...` where it must."""
+    example: Any = None
+    """A usual value, where the default is None."""
+    like: str = ""
+    """The key whose value is an example, where the file gives it."""
+    across: str = ""
+    """The direction to which it is perpendicular, by its key."""
+
+
+COMMON: dict[str, Key] = {
+    "guide_point": Key("point", "r, where the leg is fixed in the base frame, m"),
+    "platform_point": Key("point", "s0, from P to the platform point, in the platform frame, m"),
+    "fixed_offset": Key(
+        "point",
+        "t0, added to it in the base frame: the part that does not turn with phi, m",
+        default=(0.0, 0.0, 0.0),
+    ),
+    "elbow": Key("sign", "sigma, 1 or -1: the side of the elbow", default=1),
+    "limits": Key("limits", "least and greatest joint coordinate, m or rad", default=None),
+    "drive": Key(
+        "drive",
+        "what drives the joint: friction, motor, limits",
+        default=None,
+        example={"coulomb": 3.0, "viscous": 12.0},
+    ),
+}
+"""The keys that every kind of leg has; a kind may say more closely what they are."""
+
+
+class Condition(NamedTuple):
+    """What else must hold of fields that are right by themselves."""
+
+    names: tuple[str, ...]
+    check: Callable[..., None]
+    """It takes their values and raises a `ModelError` if it does not hold."""
+
+
+def sound_fields(
+    given: Mapping[str, Any],
+    keys: Mapping[str, Key],
+    conditions: Sequence[Condition],
+    branches: Sequence[int],
+) -> tuple[dict[str, Any], list[str]]:
+    """Return those of the given fields that are sound, as a leg holds them, and all faults.
+
+    What hangs on a field that is not among the sound ones is not checked. `branches` are the values
+    that a sign may have.
+    """
+    sound: dict[str, Any] = {}
+    faults: list[str] = []
+    for name in sorted(given, key=lambda name: bool(keys[name].across)):
+        key, value = keys[name], given[name]
+        try:
+            if key.role == "sign" and (isinstance(value, bool) or value not in branches):
+                valid = "neither 1 nor -1" if len(branches) > 1 else "not 1, its only branch"
+                raise ModelError(f"{name}: {value!r} is {valid}")
+            if value is None and key.default is None:
+                sound[name] = None
+            elif axis := sound.get(key.across):
+                sound[name] = perpendicular(value, axis, name, key.across)
+            else:
+                sound[name] = _checked(value, name, key.role)
+        except ModelError as error:
+            faults += error.faults
+    for names, check in conditions:
+        if all(name in sound for name in names):
+            try:
+                check(*(sound[name] for name in names))
+            except ModelError as error:
+                faults += error.faults
+    return sound, faults
+
+
+def _checked(value: Any, name: str, role: KeyRole) -> Any:
+    """Return what a field holds, or say what is wrong with it."""
+    if role == "point":
+        return vector(value, name)
+    if role == "direction":
+        return unit_vector(value, name)
+    if role == "length":
+        return positive(value, name, "m")
+    if role == "number":
+        return number(value, name)
+    if role == "count" and (type(value) is not int or value < 1):
+        raise ModelError(f"{name}: {value!r} is not a whole number of at least 1")
+    if role == "slider":
+        return positive(value, "slider.mass", "kg")
+    if role == "sign":
+        return int(value)
+    if role == "limits":
+        return interval(value, name)
+    if role == "drive" and not isinstance(value, Drive):
+        raise ModelError(f"{name}: {type(value).__name__} given, a Drive expected")
+    return value
