@@ -29,7 +29,7 @@ from pteron.identification.logs import Description
 from pteron.identification.plausibility import has_negative_inertia
 from pteron.identification.prediction import Prediction
 from pteron.identification.recordings import divided, recording
-from pteron.identification.result import verdict_of
+from pteron.identification.verdict import verdict_of
 from pteron.manipulator import parameter_data
 from pteron.workspace import home_pose
 
@@ -461,6 +461,8 @@ def prediction(error, noise, friction=5.0):
         np.array(error),
         friction * np.array(error),
         np.array(error),
+        np.array(error),
+        np.zeros(2),
         np.array(noise),
         np.empty(0),
         empty,
@@ -508,9 +510,11 @@ def test_wrong_geometry_is_not_trusted():
 def test_negative_inertia_is_seen_on_every_machine():
     for robot in (CATALOG[name] for name in NEAREST):
         model = identification_model(robot)
-        values = truth(model)
-        assert not has_negative_inertia(model, values)
-        assert has_negative_inertia(model, -values)
+        values, exact = truth(model), np.zeros((len(model.names), len(model.names)))
+        assert not has_negative_inertia(model, values, exact)
+        assert has_negative_inertia(model, -values, exact)
+        # What may be chance is no finding.
+        assert not has_negative_inertia(model, -values, np.diag(values**2))
 
 
 def test_a_fault_says_what_is_wrong():

@@ -60,6 +60,14 @@ def identify(
     joints: Annotated[
         Passive, option("joints", "Viscous friction in the passive joints.")
     ] = "none",
+    stribeck: Annotated[
+        str | None,
+        option("stribeck", "Friction falls with this speed, m/s or rad/s.", "SPEED,..."),
+    ] = None,
+    delay: Annotated[
+        str | None,
+        option("delay", "How late forces are for positions, s; auto: find it.", "S|auto"),
+    ] = None,
     rotors: Annotated[bool, option("rotors", "With the inertia of the motors.")] = False,
     payload: Annotated[bool, option("payload", "With the payload carried.")] = False,
     shared: Annotated[
@@ -98,9 +106,10 @@ def identify(
         from pteron.report.identification import model_path, numbers, write_identification
         from pteron.report.write import checked_folder
 
-        terms = _terms(without, joints, rotors=rotors, payload=payload)
+        speeds = None if stribeck is None else _speeds(stribeck)
+        terms = _terms(without, joints, rotors=rotors, payload=payload, stribeck=speeds)
         bounds = _bounds(boxes, machine)
-        processing = Processing(derivatives, cutoff, band, period)
+        processing = Processing(derivatives, cutoff, band, period, delay=_delay(delay))
         fit, check = (
             [open_log(path, machine, description=description) for path in paths]
             for paths in (logs, held_out or [])
@@ -131,7 +140,35 @@ def identify(
     _show(result, files)
 
 
-def _terms(without: str | None, joints: Passive, *, rotors: bool, payload: bool) -> Terms:
+def _speeds(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise DataError(
+            f"--stribeck: {text!r} given, a speed in m/s or rad/s expected, or one for each joint, "
+            "such as 0.02,0.03"
+        ) from None
+
+
+def _delay(text: str | None) -> float | Literal["auto"]:
+    if text in (None, "auto"):
+        return 0.0 if text is None else "auto"
+    try:
+        return float(str(text))
+    except ValueError:
+        raise DataError(
+            f"--delay: {text!r} given, seconds expected, such as 0.003, or auto"
+        ) from None
+
+
+def _terms(
+    without: str | None,
+    joints: Passive,
+    *,
+    rotors: bool,
+    payload: bool,
+    stribeck: tuple[float, ...] | None,
+) -> Terms:
     from pteron.identification import Terms
 
     left_out = [] if without is None else [name.strip() for name in without.split(",")]
@@ -139,7 +176,7 @@ def _terms(without: str | None, joints: Passive, *, rotors: bool, payload: bool)
         if name not in _TERMS:
             raise DataError(f"--without: {name!r} is not one of {', '.join(_TERMS)}")
     friction = {name: name not in left_out for name in _TERMS}
-    return Terms(**friction, passive=joints, payload=payload, rotors=rotors)
+    return Terms(**friction, passive=joints, payload=payload, rotors=rotors, stribeck=stribeck)
 
 
 def _bounds(boxes: list[str] | None, machine: Manipulator) -> Bounds | None:

@@ -26,6 +26,7 @@ from pteron.identification.excitation import (
     optimal_excitation,
     random_excitation,
 )
+from pteron.identification.faults import Suspicion, Trial
 from pteron.identification.fitting import METHODS
 from pteron.identification.identify import identify
 from pteron.identification.logs import Log, open_log, read_log, write_log
@@ -33,8 +34,9 @@ from pteron.identification.model import Model, Terms, identification_model
 from pteron.identification.observation import Observations, observations_of, stacked
 from pteron.identification.payload import Payload, identify_payload
 from pteron.identification.prediction import Prediction
-from pteron.identification.result import Identification, Verdict
+from pteron.identification.result import Identification
 from pteron.identification.signals import Preprocessing, Processing, States, preprocessing_of
+from pteron.identification.verdict import Verdict
 
 __all__ = [
     "METHODS",
@@ -56,7 +58,9 @@ __all__ = [
     "Preprocessing",
     "Processing",
     "States",
+    "Suspicion",
     "Terms",
+    "Trial",
     "Verdict",
     "column_errors",
     "consistent_model",

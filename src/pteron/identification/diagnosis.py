@@ -85,7 +85,8 @@ def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> Fault 
         return swapped
     mended = observations.with_forces(observations.forces[:, list(order)] * np.array(sign))
     # Where nothing explains the forces, the sign of what is left says nothing.
-    if after < _EXPLAINED and has_negative_inertia(model, weighted(mended).values):
+    found = weighted(mended)
+    if after < _EXPLAINED and has_negative_inertia(model, found.values, found.covariance):
         sign = tuple(-s for s in sign)
     if (order, sign) == choices[0]:
         return None

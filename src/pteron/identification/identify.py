@@ -17,6 +17,7 @@ from pteron.identification.estimators import (
     essential_parameters,
     weighted,
 )
+from pteron.identification.faults import delay_of, trial
 from pteron.identification.fitting import (
     METHODS,
     check_columns,
@@ -32,8 +33,9 @@ from pteron.identification.observation import Observations, stacked
 from pteron.identification.plausibility import doubts, has_negative_inertia, left_over, unseen
 from pteron.identification.prediction import predict
 from pteron.identification.recordings import Recording, divided, recording
-from pteron.identification.result import Identification, verdict_of
+from pteron.identification.result import Identification
 from pteron.identification.signals import Preprocessing, Processing
+from pteron.identification.verdict import verdict_of
 from pteron.kernels import Array
 from pteron.legs import Drive
 from pteron.manipulator import Manipulator
@@ -122,17 +124,22 @@ def identify(
         check_payload(fit)
 
     # Preprocess, stack and solve
-    preprocessing = tuple(preprocessing_for(robot, one, wanted) for one in fit)
-    observations = stacked(
-        [
-            fit_observations(model, one, how, _reader(report, "Filtering"))
-            for one, how in zip(fit, preprocessing, strict=True)
+    def fitted_by(how: Processing) -> tuple[tuple[Preprocessing, ...], Observations, Estimate]:
+        treated = tuple(preprocessing_for(robot, one, how) for one in fit)
+        parts = [
+            fit_observations(model, one, each, _reader(report, "Filtering"))
+            for one, each in zip(fit, treated, strict=True)
         ]
-    )
-    try:
-        estimate = estimated(estimator, model, fit, preprocessing, observations)
-    except DataError as error:
-        raise _with_findings(error, whole) from None
+        rows = stacked(parts)
+        try:
+            return treated, rows, estimated(estimator, model, fit, treated, rows)
+        except DataError as error:
+            raise _with_findings(error, whole) from None
+
+    preprocessing, observations, estimate = fitted_by(wanted)
+    if wanted.delay == "auto":
+        wanted = replace(wanted, delay=delay_of(model, estimate, fit[0], preprocessing[0]))
+        preprocessing, observations, estimate = fitted_by(wanted)
 
     # Judge by what was held out, which betrays columns that are not what they are called
     modes = [None] * len(check) if others else [how.start for how in preprocessing]
@@ -146,12 +153,16 @@ def identify(
         )
         for one, start in zip(check, modes, strict=True)
     ]
-    verdict = verdict_of(held, repeats=not others)
-    if verdict.grade != "trustworthy" or has_negative_inertia(model, estimate.values):
+    by_held_out = verdict_of(held, repeats=not others)
+    negative = has_negative_inertia(model, estimate.values, estimate.covariance)
+    if by_held_out.grade != "trustworthy" or negative:
         check_columns(model, fit[0], preprocessing[0])
     hidden, too_many = unseen(model, estimate.deviations)
     if too_many:
         raise _with_findings(_too_little(model, hidden, estimate, preprocessing, fit[0]), whole)
+    report("Looking for faults", 0, 0)
+    shown = trial(model, estimate, fit[0], preprocessing[0])
+    verdict = verdict_of(held, shown, repeats=not others)
     fitted = tuple(
         predict(model, estimate.values, one.beginning(), how, _reader(report, "Predicting"))
         for one, how in zip(fit, preprocessing, strict=True)
@@ -182,6 +193,7 @@ def identify(
         fitted=fitted,
         held_out=tuple(held),
         preprocessing=preprocessing,
+        trial=shown,
         verdict=replace(verdict, next_steps=(*verdict.next_steps, *advice)),
         unseen=hidden,
         findings=tuple(f for one in (*whole, *others) for f in one.findings),

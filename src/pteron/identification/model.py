@@ -43,6 +43,9 @@ class Terms:
         r in rad/m (kg), or in rad/rad at a crank (kg m^2). Its column is q'': at a crank it joins
         I_u, on a level guide the mass of its slider, m_p; on any other guide, where gravity pulls
         at m_p but not at a rotor, m_p and the offset. `Model.joins` and the expressions say so.
+    stribeck : float or sequence of n floats, optional
+        Friction of each actuated joint that falls as it moves faster (Stribeck), with this speed:
+        Fs sign(q') exp(-(q' / speed)^2); m/s or rad/s. None, the default, for none.
     """
 
     coulomb: bool = True
@@ -51,8 +54,15 @@ class Terms:
     passive: Passive = "none"
     payload: bool = False
     rotors: bool = False
+    stribeck: float | tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
+        if self.stribeck is not None:
+            speeds = np.atleast_1d(np.array(self.stribeck, dtype=float))
+            if not (speeds.size and np.isfinite(speeds).all() and (speeds > 0.0).all()):
+                raise ModelError(f"stribeck: {self.stribeck} given, speeds above 0 expected")
+            found = tuple(speeds.tolist())
+            object.__setattr__(self, "stribeck", found if len(found) > 1 else found[0])
         if self.passive not in get_args(Passive):
             raise ModelError(
                 f"passive: {self.passive!r} is not one of {', '.join(get_args(Passive))}"
@@ -62,7 +72,7 @@ class Terms:
 class Term(NamedTuple):
     """One value beside the base parameters: what it is, and how it is written and measured."""
 
-    kind: Literal["coulomb", "viscous", "offset", "passive", "rotor", "payload"]
+    kind: Literal["coulomb", "viscous", "offset", "passive", "rotor", "payload", "stribeck"]
     name: str
     letter: str
     subscript: str
@@ -119,6 +129,8 @@ class Model:
         if self.terms.rotors:
             units = {i: "kg" if slides[i] else "kg m^2" for i in slides}
             found += [Term("rotor", f"J_m{i}", "J", f"m{i}", units[i]) for i in slides]
+        if self.terms.stribeck is not None:
+            found += [Term("stribeck", f"Fs{i}", "F", f"s{i}", j.force_unit) for i, j in joints]
         if self.terms.payload:
             found += [
                 Term("payload", "m_L", "m", "L", "kg"),
@@ -127,6 +139,12 @@ class Model:
                 Term("payload", "I_L", "I", "L", "kg m^2"),
             ]
         return tuple(found)
+
+    @property
+    def stribeck_speeds(self) -> Array | None:
+        """The speed of each joint with which friction falls (n,), where the model has that."""
+        given = self.terms.stribeck
+        return None if given is None else np.broadcast_to(given, (len(self.robot.legs),))
 
     @cached_property
     def kept_terms(self) -> tuple[Term, ...]:
@@ -225,6 +243,9 @@ class Model:
                 parts.append(columns[..., chosen].sum(axis=-1, keepdims=True))
         if terms.rotors:
             parts.append(_diagonal(states.joint_accelerations))
+        if (speeds := self.stribeck_speeds) is not None:
+            rates = states.joint_rates
+            parts.append(_diagonal(np.sign(rates) * np.exp(-((rates / speeds) ** 2))))
         if terms.payload:
             carried = unchecked(robot, "regressor", *motion)[..., -len(PLATFORM_KINDS) :]
             parts.append(carried * (states.payload != 0)[:, None, None])
@@ -259,6 +280,12 @@ def identification_model(
     (('Fc1', 'Fc2', 'Fc3', 'Fv1'), ('N', 'N', 'N', 'N s/m'))
     """
     model = Model(base or base_parameters(robot), terms or Terms())
+    speeds = np.atleast_1d(model.terms.stribeck or 1.0)
+    if speeds.size not in (1, len(robot.legs)):
+        raise ModelError(
+            f"stribeck: {speeds.size} speeds given, one expected or {len(robot.legs)}, one for "
+            f"each joint of {robot.name}"
+        )
     names = model.names
     flat = model._everything(_probes(robot)).reshape(-1, len(names))
     lengths = np.linalg.norm(flat, axis=0)

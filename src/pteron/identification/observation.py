@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,6 @@ from scipy.ndimage import minimum_filter1d  # type: ignore[import-untyped]
 
 from pteron.identification.errors import LogError
 from pteron.identification.logs import Log
-from pteron.identification.model import Model
 from pteron.identification.signals import Preprocessing, States
 from pteron.identification.signals.derivatives import EVEN, FourierFit
 from pteron.identification.signals.fourier import (
@@ -27,6 +26,31 @@ from pteron.identification.signals.fourier import (
 )
 from pteron.identification.signals.samples import BLOCK, Samples, samples
 from pteron.kernels import Array
+from pteron.manipulator import Manipulator
+
+
+class Linear(Protocol):
+    """What observations are made of: a `Model`, or one with more columns."""
+
+    @property
+    def robot(self) -> Manipulator:
+        """The machine."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the p values."""
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Their SI units."""
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """What they are, as `Model.kinds`."""
+
+    def matrix(self, states: States) -> Array:
+        """Return their columns (R, n, p) at states."""
+
 
 _LEAST_SHARE = 0.3
 """Noise of an equation, relative to the usual, below which it is made of hardly any samples."""
@@ -100,13 +124,13 @@ class Observations:
 
 
 def observations_of(
-    model: Model, log: Log | Iterable[Log], preprocessing: Preprocessing, *, block: int = BLOCK
+    model: Linear, log: Log | Iterable[Log], preprocessing: Preprocessing, *, block: int = BLOCK
 ) -> Observations:
     """Return the observations of a log.
 
     Parameters
     ----------
-    model : Model
+    model : Model or another that is linear in what is identified
         What is identified.
     log : Log or iterable of Log
         The log, or its pieces in order, which are not kept.
@@ -159,7 +183,7 @@ def in_motion(rates: Array, slow: Array, rows: int, *, wraps: bool = False) -> A
     return np.asarray(minimum_filter1d(moves, size, axis=0, mode=mode))
 
 
-def _filtered(model: Model, block: Samples, preprocessing: Preprocessing) -> Observations:
+def _filtered(model: Linear, block: Samples, preprocessing: Preprocessing) -> Observations:
     decimation = preprocessing.decimation
     settling = preprocessing.settling
     inner = slice(settling, len(block.states) - settling)
@@ -179,7 +203,7 @@ def _filtered(model: Model, block: Samples, preprocessing: Preprocessing) -> Obs
 
 
 def _assembled(
-    model: Model,
+    model: Linear,
     matrix: Array,
     forces: Array,
     noise: Array,
@@ -220,7 +244,7 @@ def _phases(log: Log, rate: float, fit: FourierFit) -> list[Log]:
 
 
 def _periodic(
-    model: Model, log: Log, preprocessing: Preprocessing, fit: FourierFit
+    model: Linear, log: Log, preprocessing: Preprocessing, fit: FourierFit
 ) -> Observations:
     """Return the observations of one period, with noise averaged over all that were recorded."""
     # The parallel filter keeps the harmonics up to the band, on both sides, and as many rows as

@@ -32,6 +32,9 @@ _FAR = 0.5
 _LEAST_SHARE = 0.02
 """Share of a body's mass and length that a parameter is usually made of, at least."""
 
+_BEYOND_DOUBT = 3.0
+"""Standard deviations by which energy is below zero where the data say so."""
+
 _CHANCE = 1e-3
 """Probability below which infeasible values are not chance."""
 
@@ -49,7 +52,7 @@ def doubts(
     the real bodies that were found, and `cad` is the machine as it is drawn.
     """
     found = []
-    if has_negative_inertia(model, estimate.values):
+    if has_negative_inertia(model, estimate.values, estimate.covariance):
         found.append("With these values the machine has negative inertia: forces do not belong.")
     if consistency is not None and consistency.p_value < _CHANCE:
         found.append(
@@ -89,8 +92,8 @@ def left_over(estimate: Estimate, preprocessing: Sequence[Preprocessing]) -> str
     )
 
 
-def has_negative_inertia(model: Model, values: Array) -> bool:
-    """Say whether values (p,) give a machine whose kinetic energy is negative."""
+def has_negative_inertia(model: Model, values: Array, covariance: Array) -> bool:
+    """Say whether values (p,) give a machine whose kinetic energy is negative beyond doubt."""
     # x''^T M x'' is positive for every real machine, whatever its CAD says.
     robot, rng = model.robot, np.random.default_rng(0)
     pose = random_poses(robot, _PROBES, seed=rng, type_i=0.3, type_ii=0.1)
@@ -98,10 +101,12 @@ def has_negative_inertia(model: Model, values: Array) -> bool:
     rest = np.zeros_like(pose)
     needed = base_regressor(robot, model.base, pose, rest, acceleration)
     still = base_regressor(robot, model.base, pose, rest, rest)
-    forces = (needed - still) @ values[: model.base.rank]
     jacobians = unchecked(robot, "jacobian", pose)
-    products = np.einsum("rn,rnm,rm->r", forces, jacobians, acceleration)
-    return bool((products < 0.0).mean() > 0.5)
+    rows = np.einsum("rnp,rnm,rm->rp", needed - still, jacobians, acceleration)
+    rank = model.base.rank
+    known = covariance[:rank, :rank]
+    spread = np.sqrt(np.maximum(np.einsum("rp,pq,rq->r", rows, known, rows), 0.0))
+    return bool((rows @ values[:rank] < -_BEYOND_DOUBT * spread).mean() > 0.5)
 
 
 def unseen(model: Model, deviations: Array) -> tuple[tuple[str, ...], bool]:

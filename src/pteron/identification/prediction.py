@@ -13,12 +13,19 @@ from pteron.identification.model import Model
 from pteron.identification.observation import in_motion
 from pteron.identification.recordings import Recording
 from pteron.identification.signals import Preprocessing, samples
+from pteron.identification.signals.filters import MEDIAN_SIZE
 from pteron.kernels import Array
 
 _KEPT = 6000
 """Samples that are kept to be looked at."""
 
-_FRICTION = ("coulomb", "viscous", "offset")
+_STANDS_OUT = 7.0
+"""What a sample is missed by, over what is usual, beyond which it is not of the same kind."""
+
+_FEW = 0.05
+"""Share of the samples beyond which what stands out is no exception."""
+
+_FRICTION = ("coulomb", "viscous", "stribeck", "offset")
 
 
 @dataclass(frozen=True)
@@ -45,6 +52,9 @@ class Prediction:
         offsets, N.
     error_of_all : array, shape (n,)
         The same over every sample, with all terms, N.
+    robust_error, outliers : array, shape (n,)
+        Root mean square of what it misses without samples that stand out, N, and their share: they
+        miss by more than seven times what is usual, and are fewer than 5 %, or there are none.
     noise : array, shape (n,)
         Standard deviation of the white noise on the measured forces, N: no model can do better.
     time : array, shape (S,)
@@ -62,6 +72,8 @@ class Prediction:
     error: Array
     error_without_friction: Array
     error_of_all: Array
+    robust_error: Array
+    outliers: Array
     noise: Array
     time: Array = field(repr=False)
     measured: Array = field(repr=False)
@@ -76,6 +88,11 @@ class Prediction:
         return np.asarray(100.0 * self.error / self.size)
 
     @property
+    def robust_nrms(self) -> Array:
+        """Error without the samples that stand out, in percent (n,)."""
+        return np.asarray(100.0 * self.robust_error / self.size)
+
+    @property
     def nrms_without_friction(self) -> Array:
         """Error of the model without friction and offsets in percent (n,)."""
         return np.asarray(100.0 * self.error_without_friction / self.size)
@@ -87,8 +104,8 @@ class Prediction:
 
     @property
     def unexplained(self) -> Array:
-        """Error beyond the noise in percent (n,): what the model itself misses."""
-        beyond = np.sqrt(np.maximum(self.error**2 - self.noise**2, 0.0))
+        """Error beyond the noise in percent (n,), without the samples that stand out."""
+        beyond = np.sqrt(np.maximum(self.robust_error**2 - self.noise**2, 0.0))
         return np.asarray(100.0 * beyond / self.size)
 
     def as_dict(self) -> dict[str, Any]:
@@ -101,6 +118,8 @@ class Prediction:
             "rms_error": self.error.tolist(),
             "rms_error_of_all_samples": self.error_of_all.tolist(),
             "nrms_percent": self.nrms.tolist(),
+            "robust_nrms_percent": self.robust_nrms.tolist(),
+            "outliers": self.outliers.tolist(),
             "nrms_percent_without_friction": self.nrms_without_friction.tolist(),
             "noise_floor_percent": self.floor.tolist(),
             "unexplained_percent": self.unexplained.tolist(),
@@ -147,14 +166,18 @@ def predict(
     parts = np.split(kept[:, 1:], 5, axis=1)
     mean = sums[0] / total
     seen = np.maximum(counts, 1.0)
+    error = np.sqrt(sums[2] / seen)
+    robust, outliers = _without_outliers(parts[0] - parts[1], parts[4] > 0.0, error)
     return Prediction(
         source=recording.source,
         samples=total,
         left_out=1.0 - counts / total,
         size=np.sqrt(np.maximum(sums[1] / total - mean**2, np.finfo(float).tiny)),
-        error=np.sqrt(sums[2] / seen),
+        error=error,
         error_without_friction=np.sqrt(sums[3] / seen),
         error_of_all=np.sqrt(sums[4] / total),
+        robust_error=robust,
+        outliers=outliers,
         noise=preprocessing.force_noise,
         time=kept[:, 0],
         measured=parts[0],
@@ -163,3 +186,17 @@ def predict(
         speed=parts[3],
         used=parts[4] > 0.0,
     )
+
+
+def _without_outliers(misses: Array, used: NDArray[np.bool_], error: Array) -> tuple[Array, Array]:
+    """Return the root mean square (n,) of misses (S, n) without outliers, and the latter's share.
+
+    `error` (n,) is that of all samples.
+    """
+    sizes = np.where(used | ~used.any(axis=0), np.abs(misses), np.nan)
+    usual = np.nanmedian(sizes, axis=0) / MEDIAN_SIZE
+    out = sizes > _STANDS_OUT * usual
+    share = out.sum(axis=0) / np.maximum(used.sum(axis=0), 1)
+    few = (share > 0.0) & (share < _FEW)
+    rest = np.sqrt(np.nanmean(np.where(out, np.nan, sizes) ** 2, axis=0))
+    return np.where(few, np.minimum(rest, error), error), np.where(few, share, 0.0)

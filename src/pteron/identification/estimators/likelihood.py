@@ -183,7 +183,7 @@ def _slopes(
     """Return the derivatives (T n, C n) of the forces by the motion's coefficients."""
     smooth = values.copy()
     # Coulomb friction has no slope, but where the rate changes its sign.
-    smooth[[k for k, kind in enumerate(model.kinds) if kind == "coulomb"]] = 0.0
+    smooth[[k for k, kind in enumerate(model.kinds) if kind in ("coulomb", "stribeck")]] = 0.0
     n = observations.actuators
     motion = curve.motion
     total = sparse.csr_matrix((len(observations.time) * n, curve.coefficients.size))

@@ -1,9 +1,10 @@
 """Differentiators: how measured positions become positions, rates and accelerations.
 
 `whole` says that one takes a log as a whole, and not in blocks; `edge` is how many rows it loses at
-each end of a block; `differentiated` is a block's motion without at least so many; `curve` is the
-log's motion as a curve; above the frequency `fastest`, Hz, nothing of the positions is left. The
-band is that of the parallel filter, Hz.
+each end of a block; `differentiated` is a block's motion without at least so many, at the forces'
+own instants: those of the samples less the forces' `delay`, s; `curve` is the log's motion as a
+curve; above the frequency `fastest`, Hz, nothing of the positions is left. The band is that of the
+parallel filter, Hz.
 """
 
 from __future__ import annotations
@@ -89,11 +90,17 @@ class Curve:
 
 @dataclass(frozen=True)
 class _Sampled:
-    """What central differences and splines share: sampling rate and cut-off, Hz."""
+    """What central differences and splines share: sampling rate and cut-off, Hz, and the delay."""
 
     rate: float
     cutoff: float | None
+    delay: float = 0.0
     whole: ClassVar[bool] = False
+
+    @property
+    def shift(self) -> int:
+        """Rows at each end whose motion a delay of the forces, s, moves out of a block."""
+        return ceil(abs(self.delay) * self.rate)
 
     def curve(self, log: Log) -> Curve:
         """Return the least-squares spline of the log's positions."""
@@ -114,7 +121,8 @@ class CentralDifferences(_Sampled):
     @property
     def edge(self) -> int:
         """What the filter needs to settle, and the differences' own ends."""
-        return LOST + (ceil(SETTLING * self.rate / self.cutoff) if self.cutoff else 0)
+        settling = ceil(SETTLING * self.rate / self.cutoff) if self.cutoff else 0
+        return LOST + settling + self.shift
 
     def differentiated(self, block: Log, edge: int) -> Differentiated:
         """Return the block at even steps of time."""
@@ -125,7 +133,10 @@ class CentralDifferences(_Sampled):
         joints = smoothed(joints, rate, self.cutoff)
         first, second = central_differences(joints, rate)
         inner, lost = slice(edge, len(time) - edge), slice(edge - LOST, len(first) - (edge - LOST))
-        motion = joints[inner], first[lost], second[lost]
+        parts = [joints[LOST:-LOST], first, second]
+        if self.delay:
+            parts = [_earlier(time[LOST:-LOST], part, self.delay) for part in parts]
+        motion = parts[0][lost], parts[1][lost], parts[2][lost]
         return Differentiated(
             time[inner], motion, forces[inner], np.ones(len(motion[0]), dtype=bool)
         )
@@ -139,12 +150,12 @@ class SmoothingSpline(_Sampled):
     def edge(self) -> int:
         """What a spline feels of a block's ends."""
         knot = 1.0 / (2.0 * self.cutoff) if self.cutoff else 1.0 / self.rate
-        return ceil(_SPLINE_SETTLING * knot * self.rate)
+        return ceil(_SPLINE_SETTLING * knot * self.rate) + self.shift
 
     def differentiated(self, block: Log, edge: int) -> Differentiated:
         """Return the block at its own times."""
         inner = slice(edge, block.rows - edge)
-        q, dq, ddq = spline_motion(block.time, block.joints, self.cutoff)
+        q, dq, ddq = spline_motion(block.time, block.joints, self.cutoff, self.delay)
         smooth = np.ones(block.rows, dtype=bool)
         if self.cutoff is None:
             smooth = _without_jumps(block.time, block.joints)
@@ -158,12 +169,14 @@ class FourierFit:
 
     period: float
     cutoff: float | None
+    delay: float = 0.0
     whole: ClassVar[bool] = True
     edge: ClassVar[int] = 0
 
     def series(self, log: Log) -> FourierSeries:
-        """Return the series of the log's positions."""
-        return fitted_series(log.time, log.joints, self.period, highest=self.cutoff)
+        """Return the series of the log's positions, as the forces are late for them."""
+        found = fitted_series(log.time, log.joints, self.period, highest=self.cutoff)
+        return found.later(self.delay)
 
     def differentiated(self, block: Log, edge: int) -> Differentiated:
         """Return the log at its own times."""
@@ -183,6 +196,11 @@ class FourierFit:
     def fastest(self, band: float) -> float | None:
         """Return the cut-off or the band: a series ends where noise begins, and mixes nothing."""
         return None if self.cutoff is None else max(self.cutoff, band)
+
+
+def _earlier(time: Array, signal: Array, delay: float) -> Array:
+    """Return smooth signals (T, k) at times (T,) less a delay, s."""
+    return np.asarray(make_interp_spline(time, signal, k=5)(time - delay))
 
 
 Differentiator = CentralDifferences | SmoothingSpline | FourierFit
@@ -229,10 +247,13 @@ def fitted_spline(time: Array, signal: Array, cutoff: float | None) -> BSpline:
     return make_interp_spline(time, signal, k=_DEGREE)
 
 
-def spline_motion(time: Array, signal: Array, cutoff: float | None) -> tuple[Array, Array, Array]:
-    """Return value, first and second derivative (T, k) of the fitted spline at the samples."""
+def spline_motion(
+    time: Array, signal: Array, cutoff: float | None, delay: float = 0.0
+) -> tuple[Array, Array, Array]:
+    """Return value, first and second derivative (T, k) of the fitted spline, `delay` s earlier."""
     spline = fitted_spline(time, signal, cutoff)
-    return spline(time), spline(time, 1), spline(time, 2)
+    at = time - delay
+    return spline(at), spline(at, 1), spline(at, 2)
 
 
 def _design(spline: BSpline, time: Array, derivative: int) -> sparse.csr_matrix:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -115,6 +115,17 @@ class FourierSeries:
             for rows in row_blocks(len(time))
         )
         return np.concatenate([part @ self.coefficients for part in parts])
+
+    def later(self, delay: float) -> FourierSeries:
+        """Return the series of the same signals, late by a delay, s."""
+        if not delay:
+            return self
+        turn = delay * 2.0 * np.pi / self.period * np.arange(1, self.harmonics + 1)[:, None]
+        cos, sin = np.cos(turn), np.sin(turn)
+        found = self.coefficients.copy()
+        sines, cosines = self.coefficients[1::2], self.coefficients[2::2]
+        found[1::2], found[2::2] = cos * sines + sin * cosines, cos * cosines - sin * sines
+        return replace(self, coefficients=found)
 
 
 def fitted_series(

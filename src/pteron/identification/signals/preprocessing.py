@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import get_args
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -62,6 +62,9 @@ _MENTIONED = 0.1
 _SPARED = 0.25
 """Share of the time between two reversals of a joint that is left out, at most, on each side."""
 
+LATEST = 1.0
+"""Delay, s, beyond which milliseconds were meant."""
+
 _PRODUCTS = 10.0
 """Forces are products of positions and accelerations, and friction has steps: they are faster than
 the motion. More rows than needed cost little."""
@@ -88,6 +91,9 @@ class Processing:
     slow : float
         Speed, as a share of each joint's root mean square, below which the joint's equation is
         not used: dry friction holds a joint at rest with any force, and turns in no time.
+    delay : float or "auto"
+        By how much the log's forces are late for its positions, s: they belong to the motion of so
+        much before; negative where positions are late. "auto" lets `identify` find it.
     """
 
     derivatives: Derivatives | None = None
@@ -95,6 +101,7 @@ class Processing:
     band: float | None = None
     period: float | None = None
     slow: float = 0.02
+    delay: float | Literal["auto"] = 0.0
 
     def __post_init__(self) -> None:
         if self.derivatives is not None and self.derivatives not in get_args(Derivatives):
@@ -108,6 +115,8 @@ class Processing:
                 raise DataError(f"{name}: {value} given, a number above 0 expected")
         if not 0.0 <= self.slow < 1.0:
             raise DataError(f"slow: {self.slow} given, a share from 0 to below 1 expected")
+        if self.delay != "auto" and not abs(float(self.delay)) <= LATEST:
+            raise DataError(f'delay: {self.delay} s given, at most {LATEST:g} s or "auto" expected')
 
 
 @dataclass(frozen=True)
@@ -134,6 +143,8 @@ class Preprocessing:
         Speed of each joint below which its friction is not known, m/s.
     stroke : float
         Mean time between two reversals of the joint that reverses most, s.
+    delay : float
+        By how much forces are late for positions, s.
     """
 
     derivatives: Derivatives
@@ -146,15 +157,16 @@ class Preprocessing:
     force_noise: Array
     slow: Array
     stroke: float
+    delay: float = 0.0
 
     @property
     def differentiator(self) -> Differentiator:
         """What differentiates the positions."""
         if self.derivatives == "periodic":
             assert self.period is not None  # `preprocessing_of` sees to it
-            return FourierFit(self.period, self.cutoff)
+            return FourierFit(self.period, self.cutoff, self.delay)
         kind = CentralDifferences if self.derivatives == "central" else SmoothingSpline
-        return kind(self.rate, self.cutoff)
+        return kind(self.rate, self.cutoff, self.delay)
 
     @property
     def decimation(self) -> Decimation:
@@ -257,6 +269,7 @@ def preprocessing_of(
         force_noise=noise,
         slow=wanted.slow * np.sqrt((rates**2).mean(axis=0)),
         stroke=_stroke(rates, rate),
+        delay=0.0 if wanted.delay == "auto" else wanted.delay,
     )
 
 

@@ -91,7 +91,7 @@ class States:
     def __len__(self) -> int:
         return len(self.time)
 
-    def part(self, rows: slice) -> States:
+    def part(self, rows: slice | NDArray[np.int64]) -> States:
         """Return some of the samples."""
         return replace(self, **{name: value[rows] for name, value in vars(self).items()})
 

@@ -12,7 +12,7 @@ from markupsafe import Markup, escape
 import pteron
 from pteron.equations.machine import closure_of
 from pteron.identification import Identification
-from pteron.identification.result import AT_THE_FLOOR, LARGE, SMALL
+from pteron.identification.verdict import AT_THE_FLOOR, CYCLE, LARGE, SMALL
 from pteron.legs.kind import ActuatedJoint
 from pteron.plots import (
     autocorrelation_figure,
@@ -52,7 +52,7 @@ def page(result: Identification, model_file: str | None = None) -> str:
         modes=closure_of(result.robot).modes,
         force=force(joints),
         nouns=nouns(joints),
-        limits=(AT_THE_FLOOR, SMALL, LARGE),
+        limits=(AT_THE_FLOOR, SMALL, LARGE, CYCLE),
         figures=figures(found),
         model_file=model_file,
         version=pteron.__version__,

@@ -1,0 +1,108 @@
+"""A pick-and-place cycle as fast as a log's motion: on it errors of a model are told.
+
+The trial of faults measures on it what each of them spoils.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.errors import PteronError
+from pteron.identification.signals import States
+from pteron.identification.signals.states import home
+from pteron.kernels import Array
+from pteron.kinematics.evaluate import unchecked
+from pteron.manipulator import Manipulator
+from pteron.motion import Motion, pick_and_place
+
+_SAMPLES = 201
+
+_MOVES = 0.02
+"""Share of a joint's largest rate below which its dry friction is uncertain: such do not count."""
+
+_LEAST = 0.1
+"""Of the forces' largest standard deviation, what that of an actuator counts as at least."""
+
+
+class Extent(NamedTuple):
+    """The mean pose of a motion (m,), and the largest rate and acceleration of each joint (n,)."""
+
+    pose: Array
+    rates: Array
+    accelerations: Array
+
+    @classmethod
+    def of(cls, states: list[States]) -> Extent:
+        """Return that of a motion in blocks."""
+        return cls(
+            np.mean([s.pose.mean(axis=0) for s in states], axis=0),
+            np.max([np.abs(s.joint_rates).max(axis=0) for s in states], axis=0),
+            np.max([np.abs(s.joint_accelerations).max(axis=0) for s in states], axis=0),
+        )
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """States of a cycle, and where each joint moves (R, n)."""
+
+    states: States
+    moves: NDArray[np.bool_]
+
+    @classmethod
+    def within(cls, robot: Manipulator, extent: Extent) -> Cycle | None:
+        """Return the cycle about a motion's mean pose, or home, as fast as the motion itself.
+
+        None where the machine has no room for one.
+        """
+        for around in (extent.pose, np.array(home(robot))):
+            try:
+                slow = pick_and_place(robot, around, duration=1.0, samples=_SAMPLES)
+            except PteronError:
+                continue
+            _, rates, accelerations = _joints(robot, slow)
+            duration = max(
+                float((np.abs(rates).max(axis=0) / extent.rates).max()),
+                float(np.sqrt((np.abs(accelerations).max(axis=0) / extent.accelerations).max())),
+            )
+            motion = pick_and_place(
+                robot,
+                around,
+                scale=slow.scale,
+                direction=slow.across,
+                duration=duration,
+                samples=_SAMPLES,
+            )
+            joints, rates, accelerations = _joints(robot, motion)
+            states = States(
+                motion.time,
+                joints,
+                rates,
+                accelerations,
+                motion.pose,
+                motion.velocity,
+                motion.acceleration,
+                np.zeros(_SAMPLES, dtype=np.int64),
+            )
+            return cls(states, np.abs(rates) > _MOVES * np.abs(rates).max(axis=0))
+        return None
+
+    def share(self, error: Array, forces: Array) -> Array:
+        """Return the size of an error (R, n), percent of the forces' standard deviation (n,)."""
+        count = np.maximum(self.moves.sum(axis=0), 1)
+        size = np.sqrt((self.moves * error**2).sum(axis=0) / count)
+        spread = forces.std(axis=0)
+        return np.asarray(100.0 * size / np.maximum(spread, max(_LEAST * spread.max(), 1e-300)))
+
+
+def _joints(robot: Manipulator, motion: Motion) -> tuple[Array, Array, Array]:
+    return (
+        unchecked(robot, "joint_coordinates", motion.pose),
+        unchecked(robot, "joint_rates", motion.pose, motion.velocity)[0],
+        unchecked(robot, "joint_accelerations", motion.pose, motion.velocity, motion.acceleration)[
+            0
+        ],
+    )

@@ -1,0 +1,176 @@
+"""Whether a model can be trusted, from what it was not fitted to and from what residuals show."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from pteron.identification.faults import Trial
+from pteron.identification.prediction import Prediction
+
+Grade = Literal["trustworthy", "usable with care", "not trustworthy"]
+
+AT_THE_FLOOR = 1.5
+"""Held-out error over the noise floor up to which noise is all there is."""
+
+DROWNED = 50.0
+"""Held-out error in percent beyond which nothing has been explained, whatever the noise."""
+
+SMALL = 5.0
+LARGE = 15.0
+"""Percent of a force's standard deviation that the model misses beyond the noise."""
+
+CYCLE = 3.0
+"""Percent of its forces by which a pick-and-place cycle may be expected to be off."""
+
+_ORDER: tuple[Grade, ...] = ("trustworthy", "usable with care", "not trustworthy")
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether a model can be trusted, and why.
+
+    Attributes
+    ----------
+    grade : {"trustworthy", "usable with care", "not trustworthy"}
+        The grade of the worst actuator: trustworthy where the held-out error is at most 1.5 times
+        the noise floor, or what is missed beyond the noise is at most 5 % of the force, and a
+        pick-and-place cycle is expected to be at most 3 % off, and no fault that matters shows; not
+        trustworthy where either is more than 15 %, or where the error is more than half of the
+        force.
+    reasons : tuple of str
+        What speaks for it and against it, in sentences.
+    next_steps : tuple of str
+        What would make it better.
+    """
+
+    grade: Grade
+    reasons: tuple[str, ...]
+    next_steps: tuple[str, ...] = ()
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the verdict as plain data."""
+        return {
+            "grade": self.grade,
+            "reasons": list(self.reasons),
+            "next_steps": list(self.next_steps),
+        }
+
+
+@dataclass
+class _Opinion:
+    """A grade, and what is said with it."""
+
+    grade: Grade
+    reasons: list[str]
+    steps: list[str]
+
+
+def verdict_of(
+    held_out: Sequence[Prediction], trial: Trial | None = None, *, repeats: bool
+) -> Verdict:
+    """Return the verdict on a model.
+
+    Parameters
+    ----------
+    held_out : sequence of Prediction
+        How it predicts recordings that were not fitted.
+    trial : Trial, optional
+        What the residuals of the fit show.
+    repeats : bool
+        Whether what was held out repeats the motion that was fitted.
+    """
+    opinions = [_of_prediction(one) for one in held_out]
+    if trial is not None:
+        opinions.append(_of_trial(trial))
+    reasons = [reason for one in opinions for reason in one.reasons]
+    steps = [step for one in opinions for step in one.steps]
+    if repeats:
+        reasons.append(
+            "What was held out repeats the motion that was fitted: it tells of noise and drift, "
+            "less of other motions."
+        )
+        steps.append("Record another motion, such as a pick-and-place cycle, and hold it out.")
+    grade = max((one.grade for one in opinions), key=_ORDER.index)
+    return Verdict(grade, tuple(reasons), tuple(dict.fromkeys(steps)))
+
+
+def _graded(percent: float, small: float) -> Grade:
+    if percent <= small:
+        return "trustworthy"
+    return "usable with care" if percent <= LARGE else "not trustworthy"
+
+
+def _of_prediction(prediction: Prediction) -> _Opinion:
+    ratio = prediction.robust_nrms / np.maximum(prediction.floor, 1e-12)
+    missed = prediction.unexplained
+    # The worst actuator is the one farthest beyond both limits.
+    worst = int(np.argmax(np.where(ratio <= AT_THE_FLOOR, 0.0, missed)))
+    found = _Opinion("trustworthy", [], [])
+    drowned = int(np.argmax(prediction.robust_nrms))
+    if not (prediction.robust_nrms <= DROWNED).all():
+        found.grade = "not trustworthy"
+        found.reasons.append(
+            f"The forces of actuator {drowned + 1} are not explained: what is left of them is "
+            f"{prediction.robust_nrms[drowned]:.0f} % of what was measured."
+        )
+        found.steps.append(
+            "Look for what else acts on the forces, or move faster than their noise."
+        )
+    elif ratio[worst] > AT_THE_FLOOR:
+        found.grade = _graded(float(missed[worst]), SMALL)
+    errors = ", ".join(f"{value:.2f}" for value in prediction.nrms)
+    floors = ", ".join(f"{value:.2f}" for value in prediction.floor)
+    found.reasons.append(
+        f"{prediction.source}: held-out NRMS of {errors} % where noise alone makes {floors} %."
+    )
+    if (share := float(prediction.outliers.max())) > 0.0:
+        robust = ", ".join(f"{value:.2f}" for value in prediction.robust_nrms)
+        found.reasons.append(
+            f"{prediction.source}: up to {100.0 * share:.2g} % of a force's samples stand out; "
+            f"without them the NRMS is {robust} %, which is what counts."
+        )
+        found.steps.append("Forces stand out: --estimator huber counts such samples less.")
+    if found.grade != "trustworthy":
+        found.reasons.append(
+            f"Actuator {worst + 1} is the worst: the model misses {missed[worst]:.1f} % of its "
+            f"force beyond the noise; up to {SMALL:g} % is trusted, above {LARGE:g} % not."
+        )
+        friction = prediction.nrms_without_friction[worst] - prediction.nrms[worst]
+        if friction < 0.1 * prediction.nrms_without_friction[worst]:
+            found.steps.append(
+                "Friction of joints explains little of the error: look at the drive gains, "
+                "the geometry and the signs of forces and joints."
+            )
+        else:
+            found.steps.append(
+                "Look at the residuals over time and speed: what repeats there is a missing "
+                "term, such as friction in the passive joints (--joints each)."
+            )
+    return found
+
+
+def _of_trial(trial: Trial) -> _Opinion:
+    found = _Opinion("trustworthy", [one.message for one in trial.suspicions], [])
+    if any(one.matters for one in trial.suspicions):
+        found.grade = "usable with care"
+        found.reasons.append("Stated errors of the values do not allow for it.")
+    if np.isnan(trial.off).any():
+        return found
+    worst = int(np.argmax(trial.off))
+    off = float(trial.off[worst])
+    found.grade = max(found.grade, _graded(off, CYCLE), key=_ORDER.index)
+    found.reasons.append(
+        f"A pick-and-place cycle as fast as this motion is expected to be up to {off:.2g} % off "
+        f"in its forces (actuator {worst + 1}); up to {CYCLE:g} % is trusted, above {LARGE:g} % "
+        "not."
+    )
+    if found.grade != "trustworthy" and trial.uncertain[worst] > trial.spoiled[worst]:
+        found.steps.append(
+            "The motion leaves such a cycle's forces open: record a motion from pteron excite, "
+            "faster or longer."
+        )
+    return found
