@@ -130,6 +130,8 @@ def trial(
     suspects = _suspects(model, estimate, log, how, states)
 
     # Which faults the residuals show
+    if np.abs(estimate.residuals).max() < _EXACT * np.abs(log.forces).max():
+        suspects = replace(suspects, families=())
     plain, named = _searched(suspects, observations_of(suspects, log, how))
     if any(one.family is DELAY for one in named):
         # A long delay is no small one: the rest is told once forces are where they belong.
@@ -245,8 +247,6 @@ def _searched(suspects: Suspects, observations: Observations) -> tuple[Estimate,
     named: list[_Named] = []
     taken: list[int] = []
     plain = weighted(observations.columns(range(p)))
-    if np.abs(plain.residuals).max() < _EXACT * np.abs(observations.forces).max():
-        return plain, []
     while len(named) < _MOST:
         clear = []
         for k, family in enumerate(suspects.families):
