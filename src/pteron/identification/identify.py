@@ -108,7 +108,8 @@ def identify(
     # Read the logs, and hold some rows out
     read = _reader(report, "Reading")
     whole, others = (
-        [recording(log, read) for log in _sequence(given, robot)] for given in (logs, held_out)
+        [recording(log, read, wanted.period) for log in _sequence(given, robot)]
+        for given in (logs, held_out)
     )
     check_recordings(whole, others, wanted)
     halves = [] if others else [divided(one, wanted.period) for one in whole]

@@ -9,6 +9,7 @@ import numpy as np
 
 from pteron.errors import DataError
 from pteron.identification.logs import Finding, Log, LogFile
+from pteron.identification.signals.repetition import repeating_rows
 from pteron.kernels import Array
 
 _LOOKED_AT = 2_000_000
@@ -83,13 +84,47 @@ class Recording:
         return self.head() if isinstance(self.log, Log) else self.pieces(progress)
 
 
-def recording(log: Log | LogFile, progress: Callable[[int], None] | None = None) -> Recording:
-    """Return a log as a recording; files of a usual length are read whole."""
+def recording(
+    log: Log | LogFile,
+    progress: Callable[[int], None] | None = None,
+    period: float | None = None,
+) -> Recording:
+    """Return a log as a recording; files of a usual length are read whole.
+
+    Of a log whose description says that its motion leads in and out, the rows that repeat after the
+    period (s; by default as described) are taken.
+    """
     if isinstance(log, LogFile) and (log.rows_estimate or 0) <= log.rows_in_memory:
         log = log.read(progress)
     if isinstance(log, Log):
-        return Recording(replace(log, time=_since(log.time)), 0, log.rows)
+        log = _periodic_part(replace(log, time=_since(log.time)), period)
+        return Recording(log, 0, log.rows)
     return Recording(log, 0, _END)
+
+
+def _periodic_part(log: Log, period: float | None) -> Log:
+    """Return what repeats of a log that leads in and out, with a finding that says which rows."""
+    about = log.description
+    period = period or about.period
+    if period is None or (about.start is None and about.end is None):
+        return log
+    rows = repeating_rows(log.time, log.joints, period)
+    if rows is None:
+        told, part, kept = "nothing in it repeats", log, None
+        rest = (
+            "the whole log is taken as a motion that is not periodic; correct the period if it is"
+        )
+    else:
+        first, last = (log.first_row + row + 1 for row in (rows.start, rows.stop - 1))
+        told, part, kept = f"rows {first} to {last} repeat", log.part(rows.start, rows.stop), period
+        rest = "lead-in, lead-out and rest are left out"
+    message = f"{log.source}: {told} after the period of {period:g} s; {rest}"
+    return replace(
+        part,
+        time=part.time - part.time[0],
+        description=replace(about, period=kept, start=None, end=None),
+        findings=(*log.findings, Finding("periodic", message, part.first_row + 1)),
+    )
 
 
 def same(one: Recording, other: Recording) -> bool:

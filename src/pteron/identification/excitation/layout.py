@@ -1,0 +1,165 @@
+"""How a motion is written for a controller: which columns, in which units, in what kind of CSV."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, cast, get_args
+
+import numpy as np
+import polars as pl
+
+from pteron.dynamics import drive_forces
+from pteron.errors import DataError, shown
+from pteron.identification.excitation.movement import Movement
+from pteron.identification.logs import Description
+from pteron.identification.logs.description import AngleUnit, LengthUnit, TimeUnit
+from pteron.kernels import Array
+from pteron.manipulator import Manipulator
+from pteron.tables import Dialect
+
+Contents = Literal["all", "joints", "poses"]
+"""What a file holds beside time: everything, the joint coordinates, or the poses."""
+
+_PER_UNIT = {"ms": 1e3, "us": 1e6, "mm": 1e3, "um": 1e6, "deg": 180.0 / math.pi}
+_MOST_SAMPLES = 10_000_000
+_ROUNDING = 1e-6
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Columns and units of a motion's file; a log in the same layout is read by its TOML file.
+
+    Parameters
+    ----------
+    contents : {"all", "joints", "poses"}
+        Everything; or only time and joint coordinates, or time and poses.
+    joint_columns : sequence of n str, optional
+        What the joint coordinates are called, in the order of the legs.
+    length_unit : {"m", "mm", "um"}
+        Of sliders and poses. Rates and accelerations are in that unit a second, forces in N (N m).
+    angle_unit : {"rad", "deg"}
+        Of cranks and phi.
+    time_unit : {"s", "ms", "us"}
+        Of the column t.
+    separator, decimal : str, optional
+        Of a CSV file: ``,`` and ``.`` unless given, and ``;`` with a decimal comma.
+
+    Raises
+    ------
+    DataError
+        If a unit or sign is not known.
+    """
+
+    contents: Contents = "all"
+    joint_columns: Sequence[str] | None = None
+    length_unit: LengthUnit = "m"
+    angle_unit: AngleUnit = "rad"
+    time_unit: TimeUnit = "s"
+    separator: str | None = None
+    decimal: str | None = None
+
+    def __post_init__(self) -> None:
+        for name, known in (
+            ("contents", Contents),
+            ("length_unit", LengthUnit),
+            ("angle_unit", AngleUnit),
+            ("time_unit", TimeUnit),
+        ):
+            given = getattr(self, name)
+            if given not in get_args(known):
+                raise DataError(f"{name}: {given!r} is not one of {', '.join(get_args(known))}")
+        if self.joint_columns is not None:
+            object.__setattr__(self, "joint_columns", tuple(self.joint_columns))
+        _ = self.dialect  # which refuses signs that cannot be
+
+    @property
+    def dialect(self) -> Dialect | None:
+        """How a CSV file is written, where that was said."""
+        if self.separator is None and self.decimal is None:
+            return None
+        decimal = self.decimal or "."
+        separator = self.separator or (";" if decimal == "," else ",")
+        return Dialect(cast(Any, separator), cast(Any, decimal))
+
+    def description(self, robot: Manipulator) -> Description:
+        """Return what a log in this layout is described by.
+
+        Raises
+        ------
+        DataError
+            If the machine has another number of joints.
+        """
+        joints = {leg.joint.unit: self._unit(leg.joint.unit) for leg in robot.legs}
+        turns, poses = "phi" in robot.coordinates, self.contents != "joints"
+        found = Description(
+            csv=self.dialect,
+            time_unit=self.time_unit,
+            joint_columns=cast(Any, self.joint_columns),
+            joint_unit=cast(Any, joints.get("m", joints.get("rad"))),
+            joint_angle_unit=cast(Any, joints.get("rad") if len(joints) > 1 else None),
+            length_unit=self.length_unit if poses else None,
+            angle_unit=self.angle_unit if poses and turns else None,
+        )
+        found.check(robot)
+        return found
+
+    def frame(self, movement: Movement, rate: float) -> pl.DataFrame:
+        """Return a movement from its beginning to its end, at so many samples a second.
+
+        Raises
+        ------
+        DataError
+            If the machine has another number of joints, or two columns would be called alike.
+        """
+        robot = movement.robot
+        self.description(robot)
+        ticks = np.arange(math.ceil(movement.duration * rate - _ROUNDING) + 1)
+        state = movement.states(ticks / rate)
+        joint_names = tuple(self.joint_columns or robot.joint_names)
+        of_joints = [leg.joint.unit for leg in robot.legs]
+        of_pose = ["rad" if name == "phi" else "m" for name in robot.coordinates]
+        joints = (joint_names, of_joints)
+        pose = (robot.coordinates, of_pose)
+        found = {"joints": [("", joints, state.joints)], "poses": [("", pose, state.pose)]}
+        parts = found.get(self.contents) or [
+            *(found["joints"] + found["poses"]),
+            ("d", joints, state.rates),
+            ("dd", joints, state.accelerations),
+            ("d", pose, state.velocity),
+            ("dd", pose, state.acceleration),
+            ("", (robot.force_names, [""] * robot.freedom), drive_forces(robot, *state[:3])),
+        ]
+        columns: dict[str, Array] = {"t": ticks * self._factor("s") / rate}
+        for order, (names, units), values in parts:
+            for name, unit, column in zip(names, units, values.T, strict=True):
+                if f"{order}{name}" in columns:
+                    raise DataError(
+                        f"columns: {shown(name)} would be the name of two columns; choose another"
+                    )
+                columns[f"{order}{name}"] = column * self._factor(unit) + 0.0  # no minus zero
+        return pl.DataFrame(columns)
+
+    def _unit(self, si: str) -> str:
+        units = {"m": self.length_unit, "rad": self.angle_unit, "s": self.time_unit}
+        return units.get(si, si)
+
+    def _factor(self, si: str) -> float:
+        return _PER_UNIT.get(self._unit(si), 1.0)
+
+
+def check_sampling(period: float, rate: float, periods: int) -> None:
+    """Refuse, before any work, a period and samples a second that give no table."""
+    if not 0.0 < period < np.inf:
+        raise DataError(f"period: {period} s given, a number above 0 expected")
+    if not 0.0 < rate < np.inf:
+        raise DataError(f"rate: {rate} given, samples a second above 0 expected")
+    if periods < 1:
+        raise DataError(f"periods: {periods} given, 1 or more expected")
+    count = periods * period * rate
+    if not 0.5 < count <= _MOST_SAMPLES:
+        raise DataError(
+            f"rate: {rate:g} a second gives {count:.0f} samples in {periods * period:g} s; 1 to "
+            f"{_MOST_SAMPLES} are served"
+        )
