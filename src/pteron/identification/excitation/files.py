@@ -25,7 +25,7 @@ def motion_paths(path: str | Path, layout: Layout | None = None) -> tuple[Path, 
         If they cannot: a folder is missing, an ending unknown, or the TOML file beside one is a
         folder or describes a machine.
     """
-    dialect = layout and layout.dialect
+    dialect = None if layout is None else layout.dialect
     first = check_output(path, dialect)
     both = first, check_output(first.with_stem(first.stem + _HELD_OUT), dialect)
     for one in both:

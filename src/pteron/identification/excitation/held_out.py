@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pteron.errors import ModelError
-from pteron.identification.excitation.draws import is_clear
+from pteron.identification.excitation.draws import is_clear, sizes
 from pteron.identification.excitation.limits import Limits
 from pteron.identification.excitation.margins import Margins, margins
 from pteron.identification.excitation.movement import State, state_of_platform
@@ -17,11 +17,14 @@ from pteron.identification.signals.states import home
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.motion import pick_and_place
-from pteron.motion.cycle import Cycle
+from pteron.motion.cycle import Cycle, moves
 
 _LEAST_CYCLES = 4
 _LEAST_DURATION = 10.0
 """How many cycles there are, and how long they take together, s, at least."""
+
+_DIRECTIONS = 12
+"""Directions across that are tried, all round."""
 
 _SAMPLES = 4000
 """Samples of a cycle at which limits are looked at."""
@@ -94,9 +97,9 @@ def held_out_cycle(
 ) -> RepeatedCycle:
     """Return pick-and-place cycles about the home pose that keep the limits of an excitation.
 
-    The standard cycle (`pteron.motion.pick_and_place`) is made smaller until its places keep their
-    limits and the machine can stop anywhere, then slower until it keeps those of speed,
-    acceleration and force.
+    The standard cycle (`pteron.motion.pick_and_place`), across in the direction that moves every
+    joint most, is made smaller until its places keep their limits and the machine can stop
+    anywhere, then slower until it keeps those of speed, acceleration and force.
 
     Parameters
     ----------
@@ -121,22 +124,40 @@ def held_out_cycle(
     (True, True)
     """
     limits = limits or Limits.of(robot)
-    middle = np.array(home(robot))
-    standard = pick_and_place(robot, middle, least=max(limits.type_i, limits.type_ii))
-    turn, scale = standard.turn / standard.scale, standard.scale
-    cycle = Cycle(robot.platform, middle, standard.across, standard.up, turn, scale)
-    found = RepeatedCycle(robot, cycle, standard.duration)
+    found = _standard(robot, min(limits.type_i, limits.type_ii))
+    cycle = found.cycle
     while not is_clear(replace(found, length=_AT_REST), limits, _SAMPLES, _CLEAR):
-        scale *= _SMALLER
-        if scale < _SMALLEST:
+        cycle = replace(cycle, scale=_SMALLER * cycle.scale)
+        if cycle.scale < _SMALLEST:
             raise ModelError(
                 f"no pick-and-place cycle of {robot.name} about its home pose keeps the limits; "
                 "loosen those that it barely keeps at rest",
                 subject=robot.name,
             )
-        found = replace(found, cycle=replace(cycle, scale=scale))
+        found = replace(found, cycle=cycle)
     while not is_clear(found, limits, _SAMPLES, _CLEAR):
         found = replace(found, length=_SLOWER * found.length)
     length = math.ceil(rate * found.length) / rate
     count = max(_LEAST_CYCLES, math.ceil(_LEAST_DURATION / length))
     return replace(found, length=length, count=count)
+
+
+def _standard(robot: Manipulator, least: float) -> RepeatedCycle:
+    """Return the standard cycle, as large as it fits, across where it moves every joint most.
+
+    A joint that rests says nothing of its forces.
+    """
+    middle = np.array(home(robot))
+    found: list[tuple[float, RepeatedCycle]] = []
+    for across, up in moves(robot, None, _DIRECTIONS):
+        try:
+            fits = pick_and_place(robot, middle, direction=across, least=least)
+        except ModelError:
+            continue
+        cycle = Cycle(robot.platform, middle, across, up, fits.turn / fits.scale, fits.scale)
+        once = RepeatedCycle(robot, cycle, fits.duration)
+        joints = once.states(np.linspace(0.0, once.length, _SAMPLES)).joints
+        found.append((float((np.ptp(joints, axis=0) / sizes(robot, "joints")).min()), once))
+    if not found:
+        pick_and_place(robot, middle, least=least)  # says why there is none
+    return max(found, key=lambda one: one[0])[1]

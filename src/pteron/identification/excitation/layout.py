@@ -15,7 +15,6 @@ from pteron.errors import DataError, shown
 from pteron.identification.excitation.movement import Movement
 from pteron.identification.logs import Description
 from pteron.identification.logs.description import AngleUnit, LengthUnit, TimeUnit
-from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.tables import Dialect
 
@@ -131,7 +130,7 @@ class Layout:
             ("dd", pose, state.acceleration),
             ("", (robot.force_names, [""] * robot.freedom), drive_forces(robot, *state[:3])),
         ]
-        columns: dict[str, Array] = {"t": ticks * self._factor("s") / rate}
+        columns = {"t": np.asarray(ticks * self._factor("s") / rate, dtype=np.float64)}
         for order, (names, units), values in parts:
             for name, unit, column in zip(names, units, values.T, strict=True):
                 if f"{order}{name}" in columns:

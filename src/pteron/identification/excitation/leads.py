@@ -142,13 +142,14 @@ def found_lead(motion: FourierMotion, limits: Limits) -> Lead:
         If there is none, as of a motion that does not keep the limits itself.
     """
     fine, coarse = (count * motion.harmonics for count in (_FINE, _COARSE))
-    phases = motion.uniform_times(_PHASES)
+    phases = [float(phase) for phase in motion.uniform_times(_PHASES)]
     for length in _LENGTHS:
-        both = [LedMotion(motion, Lead(length * motion.period, at), 0) for at in phases.tolist()]
-        rooms = [_room(led, limits, 2 * length * coarse) for led in both]
-        for best in np.argsort(rooms)[::-1][:_TRIED].tolist():
-            if rooms[best] > _CLEAR and is_clear(both[best], limits, 2 * length * fine, _CLEAR):
-                return both[best].lead
+        leads = [Lead(length * motion.period, phase) for phase in phases]
+        rooms = [_room(LedMotion(motion, lead, 0), limits, 2 * length * coarse) for lead in leads]
+        for best in np.argsort(rooms)[::-1][:_TRIED]:
+            led = LedMotion(motion, leads[best], 0)
+            if rooms[best] > _CLEAR and is_clear(led, limits, 2 * length * fine, _CLEAR):
+                return led.lead
     raise ModelError(
         f"limits: no lead-in of up to {_LENGTHS[-1]} periods takes {motion.robot.name} from rest "
         "to the motion within them; loosen the force's limit, or make the motion smaller"

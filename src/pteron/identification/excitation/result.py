@@ -186,8 +186,8 @@ class Excitation:
 
     def _description(self, periods: int, layout: Layout) -> Description:
         led = self.with_leads(periods)
-        period = {"period": self.motion.period, "start": led.start, "end": led.end}
-        return replace(_described(led, layout), **period)
+        described = _described(led, layout)
+        return replace(described, period=self.motion.period, start=led.start, end=led.end)
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything but the machine as plain data."""

@@ -23,6 +23,10 @@ _SPIKES = 10
 _MOVES = 0.5
 """Share of each joint's span that it goes through in the part: at rest all repeats."""
 
+_LONGER = 0.002
+"""Part of a period by which the stretch is longer than one, at least: a motion that crosses its own
+way is there again for an instant."""
+
 _WHOLE = 0.02
 """Part of a period that may be missing from the last one."""
 
@@ -46,10 +50,10 @@ def repeating_rows(time: Array, joints: Array, period: float) -> slice | None:
     --------
     >>> import numpy as np
     >>> from pteron.identification.signals.repetition import repeating_rows
-    >>> t = np.arange(1000) / 100
-    >>> phase = np.clip(t - 2.0, 0.0, 6.0) ** 2 * (t < 4.0) + (4.0 * t - 12.0) * (t >= 4.0)
-    >>> repeating_rows(t, np.cos(phase)[:, None], 2.0 * np.pi / 4.0)
-    slice(420, 891, None)
+    >>> t = np.arange(800) / 100  # rest for 1 s, three swings of 2 s, and rest again
+    >>> swings = np.cos(np.pi * np.clip(t - 1.0, 0.0, 6.0))
+    >>> repeating_rows(t, swings[:, None], 2.0)
+    slice(100, 700, None)
     """
     last = int(np.searchsorted(time, time[-1] - period, side="right"))
     if last < 2:
@@ -66,8 +70,9 @@ def repeating_rows(time: Array, joints: Array, period: float) -> slice | None:
     for start, stop in _runs(same):
         begin, end = float(time[start]), float(time[stop - 1]) + period
         through = joints[start : int(np.searchsorted(time, end, side="right"))]
-        moves = (np.ptp(through, axis=0) >= _MOVES * span).all()
-        if moves and (best is None or end - begin > best[1] - best[0]):
+        moves = (np.ptp(through, axis=0) >= _MOVES * span).all() and span.all()
+        lasts = time[stop - 1] - time[start] >= _LONGER * period
+        if moves and lasts and (best is None or end - begin > best[1] - best[0]):
             best = begin, end
     if best is None:
         return None
