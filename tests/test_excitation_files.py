@@ -97,12 +97,11 @@ def left_of(robot, limits: Limits, movement, rate: float) -> dict[str, float]:
     joints = pteron.inverse_kinematics(robot, pose)
     found = {
         "type_i": room.type_i.min() - limits.type_i,
+        "type_ii": room.type_ii.min() - limits.type_ii,
         "speed": (1.0 - np.abs(rates) / limits.speed).min(),
         "acceleration": (1.0 - np.abs(second) / limits.acceleration).min(),
         "force": (1.0 - np.abs(forces) / limits.force).min(),
     }
-    if robot.platform.turns:
-        found["type_ii"] = room.type_ii.min() - limits.type_ii
     for k, leg in enumerate(robot.legs):
         if leg.limits is not None:
             low, high = leg.limits
@@ -233,7 +232,7 @@ def written_log(folder: Path, movement, layout: Layout, stem: str, *, delay: flo
         **{name: forces[:, k] for k, name in enumerate(robot.force_names)},
     )
     path = folder / f"{stem}.csv"
-    comma = (layout.decimal or ".") == ","
+    comma = layout.decimal == ","
     frame.write_csv(path, separator=layout.dialect.separator, decimal_comma=comma)
     return path
 

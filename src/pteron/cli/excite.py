@@ -41,7 +41,7 @@ def excite(
     robot: Robot,
     out: Annotated[
         str | None,
-        option("out", "Write it to a .csv or .parquet file, and a .toml file beside it.", "FILE"),
+        option("out", "Write it to a .csv or .parquet file, with others beside it.", "FILE"),
     ] = None,
     space: Annotated[
         Literal["platform", "joints"],
@@ -85,9 +85,7 @@ def excite(
         Literal[",", ";", "tab", "|"] | None,
         _file("separator", "Of the cells.", show_default=", or ; with a decimal comma"),
     ] = None,
-    decimal: Annotated[
-        Literal[".", ","] | None, _file("decimal", "The decimal sign.", show_default=".")
-    ] = None,
+    decimal: Annotated[Literal[".", ","], _file("decimal", "The decimal sign.")] = ".",
     criterion: Annotated[
         Literal["condition", "logdet"], _search("criterion", "What is made small.")
     ] = "condition",
@@ -104,14 +102,14 @@ def excite(
     """Find a periodic trajectory from whose forces the base parameters are seen best.
 
     The file leads in from rest, repeats the trajectory, and leads out to rest in the pose where it
-    began, all on the trajectory's own way: take the machine to the first row, and play it. It keeps
-    every limit at ten times the samples of the file. Beside it, FILE-held-out holds pick-and-place
-    cycles within the same limits, to judge the identified model by.
+    began, all on the trajectory's own way: take the machine to the first row, and play it. Every
+    limit is kept, at ten times as many samples too. Beside motion.csv, motion-held-out.csv has
+    pick-and-place cycles within the same limits, to judge the identified model by.
 
     The columns are t rho1 ... x y z phi and their rates (d..., dd..., per s), and force1 ... by the
-    machine's nominal inertia and its drives' friction; theta1 ... and torque1 ... of cranks. A log
-    in the same layout is read by the TOML file beside the motion, under the log's own name: it
-    tells units, columns, period and assembly mode.
+    machine's nominal inertia and its drives' friction; theta1 ... and torque1 ... of cranks. The
+    TOML file beside each motion tells units, columns, period and assembly mode. Copy it beside the
+    log, log.toml beside log.csv, and pteron identify reads a log in the same layout.
 
     Ctrl-C ends the search and keeps the best until then.
     """

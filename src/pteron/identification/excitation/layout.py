@@ -42,8 +42,10 @@ class Layout:
         Of cranks and phi.
     time_unit : {"s", "ms", "us"}
         Of the column t.
-    separator, decimal : str, optional
-        Of a CSV file: ``,`` and ``.`` unless given, and ``;`` with a decimal comma.
+    separator : str, optional
+        Of a CSV file's cells: ``,`` unless given, and ``;`` with a decimal comma.
+    decimal : {".", ","}
+        The decimal sign.
 
     Raises
     ------
@@ -57,7 +59,7 @@ class Layout:
     angle_unit: AngleUnit = "rad"
     time_unit: TimeUnit = "s"
     separator: str | None = None
-    decimal: str | None = None
+    decimal: str = "."
 
     def __post_init__(self) -> None:
         for name, known in (
@@ -75,12 +77,11 @@ class Layout:
 
     @property
     def dialect(self) -> Dialect | None:
-        """How a CSV file is written, where that was said."""
-        if self.separator is None and self.decimal is None:
+        """How a CSV file is written; None as usual, so that a log's own dialect can be found."""
+        if self.separator is None and self.decimal == ".":
             return None
-        decimal = self.decimal or "."
-        separator = self.separator or (";" if decimal == "," else ",")
-        return Dialect(cast(Any, separator), cast(Any, decimal))
+        separator = self.separator or (";" if self.decimal == "," else ",")
+        return Dialect(cast(Any, separator), cast(Any, self.decimal))
 
     def description(self, robot: Manipulator) -> Description:
         """Return what a log in this layout is described by.
