@@ -89,7 +89,7 @@ class Layout:
         Raises
         ------
         DataError
-            If the machine has another number of joints.
+            If the machine has another number of joints, or two columns would be called alike.
         """
         joints = {leg.joint.unit: self._unit(leg.joint.unit) for leg in robot.legs}
         turns, poses = "phi" in robot.coordinates, self.contents != "joints"
@@ -103,6 +103,12 @@ class Layout:
             angle_unit=self.angle_unit if poses and turns else None,
         )
         found.check(robot)
+        names = ["t", *(name for name, _ in self._columns(robot))]
+        twice = next((name for k, name in enumerate(names) if name in names[:k]), None)
+        if twice is not None:
+            raise DataError(
+                f"columns: {shown(twice)} would be the name of two columns; choose another"
+            )
         return found
 
     def frame(self, movement: Movement, rate: float) -> pl.DataFrame:
@@ -111,35 +117,32 @@ class Layout:
         Raises
         ------
         DataError
-            If the machine has another number of joints, or two columns would be called alike.
+            As `description`.
         """
         robot = movement.robot
         self.description(robot)
         ticks = np.arange(math.ceil(movement.duration * rate - _ROUNDING) + 1)
         state = movement.states(ticks / rate)
-        joint_names = tuple(self.joint_columns or robot.joint_names)
-        of_joints = [leg.joint.unit for leg in robot.legs]
-        of_pose = ["rad" if name == "phi" else "m" for name in robot.coordinates]
-        joints = (joint_names, of_joints)
-        pose = (robot.coordinates, of_pose)
-        found = {"joints": [("", joints, state.joints)], "poses": [("", pose, state.pose)]}
-        parts = found.get(self.contents) or [
-            *(found["joints"] + found["poses"]),
-            ("d", joints, state.rates),
-            ("dd", joints, state.accelerations),
-            ("d", pose, state.velocity),
-            ("dd", pose, state.acceleration),
-            ("", (robot.force_names, [""] * robot.freedom), drive_forces(robot, *state[:3])),
+        values = {"joints": [state.joints], "poses": [state.pose]}.get(self.contents) or [
+            *(state.joints, state.pose, state.rates, state.accelerations),
+            *(state.velocity, state.acceleration, drive_forces(robot, *state[:3])),
         ]
         columns = {"t": np.asarray(ticks * self._factor("s") / rate, dtype=np.float64)}
-        for order, (names, units), values in parts:
-            for name, unit, column in zip(names, units, values.T, strict=True):
-                if f"{order}{name}" in columns:
-                    raise DataError(
-                        f"columns: {shown(name)} would be the name of two columns; choose another"
-                    )
-                columns[f"{order}{name}"] = column * self._factor(unit) + 0.0  # no minus zero
+        for (name, unit), column in zip(self._columns(robot), np.hstack(values).T, strict=True):
+            columns[name] = column * self._factor(unit) + 0.0  # no minus zero
         return pl.DataFrame(columns)
+
+    def _columns(self, robot: Manipulator) -> list[tuple[str, str]]:
+        """Return the columns behind t, and what they are in, in SI units."""
+        names = self.joint_columns or robot.joint_names
+        joints = [(name, leg.joint.unit) for name, leg in zip(names, robot.legs, strict=True)]
+        pose = [(name, "rad" if name == "phi" else "m") for name in robot.coordinates]
+        if self.contents != "all":
+            return joints if self.contents == "joints" else pose
+        found = joints + pose
+        for part in (joints, pose):
+            found += [(f"{order}{name}", unit) for order in ("d", "dd") for name, unit in part]
+        return found + [(name, "") for name in robot.force_names]
 
     def _unit(self, si: str) -> str:
         units = {"m": self.length_unit, "rad": self.angle_unit, "s": self.time_unit}
