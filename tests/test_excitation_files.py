@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 
 import pteron
 from pteron.cli.main import app
-from pteron.identification import identify
+from pteron.identification import identify, identify_payload
 from pteron.identification.excitation import (
     FourierMotion,
     Layout,
@@ -29,7 +29,8 @@ from pteron.identification.excitation import (
     optimal_excitation,
     random_excitation,
 )
-from pteron.identification.logs import read_log
+from pteron.identification.logs import Description, Log, read_log
+from pteron.identification.recordings import periodic_part
 from pteron.workspace import home_pose, reserve
 
 RATE = 200.0
@@ -302,6 +303,28 @@ def test_a_log_that_never_repeats_is_taken_as_it_is(tmp_path: Path):
     words = "nothing in it repeats after the period of 1.37 s; the whole log is taken"
     assert any(words in one.message for one in result.findings)
     assert result.base_values == pytest.approx(result.model.base.values(driven("delta")), rel=1e-2)
+
+
+def test_a_payload_is_found_from_logs_that_lead_in_and_out():
+    found = excited("delta")
+    led = found.with_leads(2)
+    platform = driven("delta").platform
+    heavy = replace(platform, inertia=replace(platform.inertia, mass=platform.inertia.mass + 0.4))
+    loaded = replace(driven("delta"), platform=heavy)
+    about = Description(period=2.0, start=led.start, end=led.end)
+    logs = []
+    for robot in (driven("delta"), loaded):
+        times = np.arange(0.0, led.duration, 1.0 / RATE)
+        state = led.states(times)
+        forces = pteron.drive_forces(robot, *state[:3])
+        symbols = tuple(leg.joint for leg in robot.legs)
+        logs.append(Log("log", times, state.joints, forces, description=about, symbols=symbols))
+    result = identify_payload(driven("delta"), *logs)
+    assert result.mass == pytest.approx(0.4, rel=1e-6)
+    both = periodic_part(replace(logs[0], payload=np.arange(len(logs[0])) // 600 % 2))
+    assert both.rows == logs[0].rows
+    assert both.description.period is None
+    assert "two phases of payload" in both.findings[0].message
 
 
 @pytest.mark.parametrize(

@@ -97,33 +97,41 @@ def recording(
     if isinstance(log, LogFile) and (log.rows_estimate or 0) <= log.rows_in_memory:
         log = log.read(progress)
     if isinstance(log, Log):
-        log = _periodic_part(replace(log, time=_since(log.time)), period)
+        log = periodic_part(replace(log, time=_since(log.time)), period)
         return Recording(log, 0, log.rows)
     return Recording(log, 0, _END)
 
 
-def _periodic_part(log: Log, period: float | None) -> Log:
-    """Return what repeats of a log that leads in and out, with a finding that says which rows."""
+def periodic_part(log: Log, period: float | None = None) -> Log:
+    """Return what repeats of a log that leads in and out, with a finding that says which rows.
+
+    Another log is returned as it is. Where nothing repeats after the period (s; by default as
+    described), or the log has a phase with a payload and one without, all of it is returned as a
+    motion that is not periodic.
+    """
     about = log.description
     period = period or about.period
     if period is None or (about.start is None and about.end is None):
         return log
-    rows = repeating_rows(log.time, log.joints, period)
+    phases = log.payload is not None and bool(np.ptp(log.payload))
+    rows = None if phases else repeating_rows(log.time, log.joints, period)
     if rows is None:
-        told, part, kept = "nothing in it repeats", log, None
-        rest = (
-            "the whole log is taken as a motion that is not periodic; correct the period if it is"
-        )
+        told = "it has two phases of payload" if phases else "nothing in it repeats"
+        part, kept, rest = log, None, "the whole log is taken as a motion that is not periodic"
     else:
         first, last = (log.first_row + row + 1 for row in (rows.start, rows.stop - 1))
         told, part, kept = f"rows {first} to {last} repeat", log.part(rows.start, rows.stop), period
         rest = "lead-in, lead-out and rest are left out"
-    message = f"{log.source}: {told} after the period of {period:g} s; {rest}"
+    if not phases:
+        told += f" after the period of {period:g} s"
     return replace(
         part,
         time=part.time - part.time[0],
         description=replace(about, period=kept, start=None, end=None),
-        findings=(*log.findings, Finding("periodic", message, part.first_row + 1)),
+        findings=(
+            *log.findings,
+            Finding("periodic", f"{log.source}: {told}; {rest}", part.first_row + 1),
+        ),
     )
 
 
