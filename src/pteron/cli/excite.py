@@ -170,7 +170,9 @@ def excite(
         left["held out"] = cycles.margins(limits, rate)
     for name, margins in left.items():
         if not margins.kept:
-            raise ModelError(f"{name}: the limits are not kept between samples; raise --harmonics")
+            raise ModelError(
+                f"{name}: the limits are not kept between samples; choose another --seed"
+            )
     files = [] if out is None else found.write(out, rate, periods, layout, cycles)
     if json:
         show_json(

@@ -25,8 +25,9 @@ from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.motion.cycle import quintic
 
-_LENGTHS = (1, 2, 4, 8, 16, 32)
-"""Periods that a lead takes, the first that will do: a whole number ends where it began."""
+_LENGTHS = (1, 2, 4, 8)
+"""Periods that a lead takes, the first that will do: a whole number ends where it began. One has
+sufficed for every machine of the catalog."""
 
 _PHASES = 48
 """Phases that are tried for the end of the lead-in."""
