@@ -28,6 +28,7 @@ _SCRIPTS = {
     "Memory traffic": "memory_traffic.py",
     "The paper's 41 %": "paper_claim.py",
     "Excitation": "excitation.py",
+    "Limits of excitation": "excitation_limits.py",
 }
 _PACKAGES = ("pteron", "numpy", "casadi", "numba", "jax", "pin", "mujoco")
 

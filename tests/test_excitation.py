@@ -55,6 +55,13 @@ def drawn(name: str, space: str, seed: int = 1) -> FourierMotion:
     return random_excitation(MACHINES[name], space=space, harmonics=2, period=4.0, seed=seed)
 
 
+def forces_and_held(robot, state):
+    """Return the forces in a motion, and those of rest in its poses: (2, T, n)."""
+    moving = pteron.inverse_dynamics(robot, state.pose, state.velocity, state.acceleration)
+    still = np.zeros_like(state.pose)
+    return np.stack([moving, pteron.inverse_dynamics(robot, state.pose, still, still)])
+
+
 @lru_cache(maxsize=8)
 def small(criterion: str = "condition", space: str = "platform", robot: str = "tripteron"):
     """Return a search small enough for a test."""
@@ -222,14 +229,14 @@ def test_margins_are_those_of_the_public_functions(space: str):
         *("type_i", "type_ii", "joint_clearance", "speed", "acceleration", "force")
     ]
     state = motion.at(motion.uniform_times(4000))
-    forces = np.abs(pteron.inverse_dynamics(robot, state.pose, state.velocity, state.acceleration))
+    forces = np.abs(forces_and_held(robot, state)).max(axis=0)
     assert found["force"].least == pytest.approx(200.0 - forces.max(), abs=0.05)
     speeds = np.abs(motion.joints(state.time)[1])
     assert found["speed"].least == pytest.approx((np.array(limits.speed) - speeds).min(), abs=1e-4)
     force = found["force"]
     at = motion.at(np.array([force.time]))
-    there = pteron.inverse_dynamics(robot, at.pose, at.velocity, at.acceleration)[0]
-    assert abs(there[force.leg - 1]) == pytest.approx(200.0 - force.least)
+    there = np.abs(forces_and_held(robot, at)).max(axis=(0, 1))
+    assert there[force.leg - 1] == pytest.approx(200.0 - force.least)
 
 
 @pytest.mark.parametrize(
@@ -539,16 +546,16 @@ def test_the_table_for_the_controller(tmp_path: Path):
         *(f"dd{c}" for c in pose),
         *(f"force{i}" for i in legs),
     ]
-    assert len(frame) == 400
-    assert frame["t"].to_numpy() == pytest.approx(np.arange(400) / 50.0)
+    assert len(frame) == 801  # two periods of 4 s, and a lead of one before and behind
+    assert frame["t"].to_numpy() == pytest.approx(np.arange(801) / 50.0)
     state = [frame.select([f"{d}{c}" for c in pose]).to_numpy() for d in ("", "d", "dd")]
     forces = frame.select([f"force{i}" for i in legs]).to_numpy()
     assert pteron.inverse_dynamics(robot, *state) == pytest.approx(forces)
     rho = frame.select([f"rho{i}" for i in legs]).to_numpy()
     assert pteron.inverse_kinematics(robot, state[0]) == pytest.approx(rho)
-    assert rho[:200] == pytest.approx(rho[200:])
-    text = tomllib.loads(found.write_toml(tmp_path / "motion.toml").read_text())
-    assert text["motion"] == {"period": 4.0, "assembly_mode": 1}
+    assert rho[200:400] == pytest.approx(rho[400:600])
+    text = tomllib.loads(found.write_toml(tmp_path / "motion.toml", periods=2).read_text())
+    assert text["motion"] == {"period": 4.0, "start": 4.0, "end": 12.0, "assembly_mode": 1}
 
 
 @pytest.mark.parametrize(
@@ -580,9 +587,13 @@ def test_the_command_writes_both_files_and_a_table(tmp_path: Path, monkeypatch):
         "motion.toml",
     ):
         assert words in result.stdout
-    assert len(pl.read_csv("motion.csv")) == 400
-    # What belongs to the log of the motion is understood where logs are read.
-    assert read_log("motion.csv", pteron.load("tripteron")).description.period == 4.0
+    assert len(pl.read_csv("motion.csv")) == 2001
+    # What belongs to the logs of the motions is understood where logs are read.
+    about = read_log("motion.csv", pteron.load("tripteron")).description
+    assert (about.period, about.start, about.end) == (4.0, 4.0, 16.0)
+    held_out = read_log("motion-held-out.csv", pteron.load("tripteron"))
+    assert held_out.description.period is None
+    assert held_out.duration >= 10.0
 
 
 def test_the_command_says_what_it_leaves_out(tmp_path: Path, monkeypatch):

@@ -28,6 +28,7 @@ from pteron.identification.signals import (
     white_noise,
 )
 from pteron.identification.signals.derivatives import LOST
+from pteron.identification.signals.repetition import repeating_rows
 from pteron.identification.signals.samples import blocks
 from pteron.kinematics.evaluate import unchecked
 from pteron.workspace import home_pose
@@ -619,3 +620,39 @@ def test_the_longest_stretch_decides_the_treatment():
     whole, cut = preprocessing_of(robot, log), preprocessing_of(robot, without(log, 400, 700))
     assert cut.rate == pytest.approx(whole.rate, rel=1e-9)
     assert cut.cutoff == pytest.approx(whole.cutoff, rel=0.5)
+
+
+# The part that repeats
+
+
+def led(time, period):
+    """Return two coordinates that set off at 1 s, repeat from 3 s on, and rest from 13 s on."""
+    begin, steady, end = np.clip(time - 1.0, 0.0, 2.0), np.clip(time, 3.0, 11.0), 13.0 - time
+    end = 2.0 - np.clip(end, 0.0, 2.0)
+    # A phase whose rate goes from 0 to 1, and back, without a jump of its second derivative.
+    ramp = [2.0 * u**4 * (2.5 - 3.0 * u + u**2) for u in (begin / 2.0, 1.0 - end / 2.0)]
+    return waves((ramp[0] + steady - ramp[1]) / period * 10.0)
+
+
+@pytest.mark.parametrize("periods", [1, 2, 3])
+@pytest.mark.parametrize("noise", [0.0, 1e-6, 1e-3])
+def test_the_part_of_a_log_that_repeats_is_found_by_itself(periods, noise):
+    time = np.arange(15_000) / RATE
+    joints = led(time, 8.0 / periods) + noise * np.random.default_rng(0).normal(size=(15_000, 2))
+    rows = repeating_rows(time, joints, 8.0 / periods)
+    # The lead joins so smoothly that noise hides where.
+    assert time[rows.start] == pytest.approx(3.0, abs=0.02 if noise < 1e-4 else 0.2)
+    assert rows.stop - rows.start == pytest.approx(8000, abs=1)
+    joints[5000:5004] += 0.3  # spikes
+    again = repeating_rows(time, joints, 8.0 / periods)
+    assert time[again.start] == pytest.approx(3.0, abs=0.3)
+    assert again.stop - again.start == pytest.approx(8000, abs=1)
+
+
+def test_nothing_repeats_in_a_motion_that_only_crosses_its_own_way():
+    time = np.arange(15_000) / RATE
+    there_and_back = np.abs(7.5 - time)[:, None] * [1.0, 0.5]
+    assert repeating_rows(time, there_and_back, 5.0) is None
+    assert repeating_rows(time, led(time, 4.0), 3.3) is None
+    assert repeating_rows(time, np.zeros((15_000, 2)), 2.0) is None
+    assert repeating_rows(time[:100], led(time[:100], 4.0), 2.0) is None

@@ -22,7 +22,9 @@ def write_texts(folder: str | Path, texts: Mapping[str, str]) -> list[Path]:
         are left as they were.
     """
     target = make_folder(folder)
-    return _write({target / name: _encoded(target / name, text) for name, text in texts.items()})
+    return write_files(
+        {target / name: _encoded(target / name, text) for name, text in texts.items()}
+    )
 
 
 def write_text(path: str | Path, text: str) -> Path:
@@ -38,7 +40,34 @@ def write_bytes(path: str | Path, data: bytes) -> Path:
     OutputError
         If the folder is missing or cannot be written; a file that was there is left as it was.
     """
-    return _write({Path(path): data})[0]
+    return write_files({Path(path): data})[0]
+
+
+def write_files(files: Mapping[Path, bytes]) -> list[Path]:
+    """Write files, all of them or none, and return their paths.
+
+    Every file is written beside its place before the first is renamed: a full disk loses nothing.
+
+    Raises
+    ------
+    OutputError
+        If one cannot be written.
+    """
+    written: dict[Path, Path] = {}
+    try:
+        for target, data in files.items():
+            handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+            written[target] = Path(name)
+            with os.fdopen(handle, "wb") as file:
+                file.write(data)
+            written[target].chmod(0o666 & ~_umask())
+        for target, temporary in written.items():
+            temporary.replace(target)
+    except OSError as error:
+        for temporary in written.values():
+            temporary.unlink(missing_ok=True)
+        raise OutputError(f"{target}: cannot be written ({error.strerror or error})") from None
+    return list(written)
 
 
 def make_folder(path: str | Path) -> Path:
@@ -67,25 +96,6 @@ def plain(data: Any) -> Any:
         return [plain(value) for value in data]
     data = data.item() if hasattr(data, "item") else data
     return None if isinstance(data, float) and not math.isfinite(data) else data
-
-
-def _write(files: Mapping[Path, bytes]) -> list[Path]:
-    """Write every file beside its place before the first is renamed: a full disk loses nothing."""
-    written: dict[Path, Path] = {}
-    try:
-        for target, data in files.items():
-            handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
-            written[target] = Path(name)
-            with os.fdopen(handle, "wb") as file:
-                file.write(data)
-            written[target].chmod(0o666 & ~_umask())
-        for target, temporary in written.items():
-            temporary.replace(target)
-    except OSError as error:
-        for temporary in written.values():
-            temporary.unlink(missing_ok=True)
-        raise OutputError(f"{target}: cannot be written ({error.strerror or error})") from None
-    return list(written)
 
 
 def _encoded(path: str | Path, text: str) -> bytes:

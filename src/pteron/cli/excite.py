@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from rich.table import Table
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
 from pteron.cli.screen import note, plain, progress_bar, show, show_json, table
-from pteron.errors import OutputError
+from pteron.errors import ModelError
 
 if TYPE_CHECKING:
-    from pteron.identification.excitation import Excitation
+    from pteron.identification.excitation import Excitation, Margins, RepeatedCycle
 
 _MEASURES = {
     "type_i": "type-I measure",
@@ -24,76 +25,129 @@ _MEASURES = {
 _STEPS = 1000
 """Steps of the progress bar."""
 
+_SIGNS = {"tab": "\t"}
+"""Separators by name."""
+
+
+def _in(panel: str) -> Callable[..., Any]:
+    """Return what makes the options of a panel of the help."""
+    return lambda *given, **more: option(*given, rich_help_panel=panel, **more)
+
+
+_motion, _limit, _search, _file = map(_in, ("Motion", "Limits", "Search", "File"))
+
 
 def excite(
     robot: Robot,
     out: Annotated[
         str | None,
-        option("out", "Write it to a .csv or .parquet file, and a .toml file beside it.", "FILE"),
+        option("out", "Write it to a .csv or .parquet file, with others beside it.", "FILE"),
     ] = None,
     space: Annotated[
         Literal["platform", "joints"],
-        option("space", "Whose coordinates the Fourier series are of."),
+        _motion("space", "Whose coordinates the Fourier series are of."),
     ] = "platform",
-    harmonics: Annotated[int, option("harmonics", "How many.")] = 5,
-    period: Annotated[float, option("period", "In s.")] = 5.0,
-    speed: Annotated[float, option("speed", "The joints' limit, m/s or rad/s.")] = 1.0,
-    acceleration: Annotated[float, option("acceleration", "Their limit, the same per s.")] = 10.0,
-    force: Annotated[
-        float | None, option("force", "The actuators' limit, N or N m.", show_default=False)
+    harmonics: Annotated[int, _motion("harmonics", "How many.")] = 5,
+    period: Annotated[float, _motion("period", "In s.")] = 5.0,
+    periods: Annotated[int, _motion("periods", "Between lead-in and lead-out.")] = 3,
+    speed: Annotated[
+        float | None,
+        _limit("speed", "Of the joints, m/s or rad/s.", show_default="the drives', else 1"),
     ] = None,
-    type_i: Annotated[float, option("type-i", "Least type-I measure of every leg.")] = 0.25,
-    type_ii: Annotated[float, option("type-ii", "Least type-II measure.")] = 0.3,
+    acceleration: Annotated[float, _limit("acceleration", "The same per s.")] = 10.0,
+    force: Annotated[
+        float | None,
+        _limit("force", "Of the drives, N or N m.", show_default="the drives', else none"),
+    ] = None,
+    type_i: Annotated[float, _limit("type-i", "Least type-I measure of every leg.")] = 0.25,
+    type_ii: Annotated[float, _limit("type-ii", "Least type-II measure.")] = 0.3,
     clearance: Annotated[
-        float, option("clearance", "Of the joints from their limits, m or rad.")
+        float, _limit("clearance", "Of the joints from their limits, m or rad.")
     ] = 0.005,
     passive_clearance: Annotated[
-        float, option("passive-clearance", "Of passive joints and phi, share of half their range.")
+        float,
+        _limit("passive-clearance", "Of passive joints and phi, share of half their range."),
     ] = 0.02,
+    rate: Annotated[float, _file("rate", "Samples a second.")] = 1000.0,
+    contents: Annotated[
+        Literal["all", "joints", "poses"],
+        _file("contents", "All columns, or t with the joints or the poses only."),
+    ] = "all",
+    columns: Annotated[
+        str | None, _file("columns", "Names of the joints' columns, such as A1,A2.", "NAMES")
+    ] = None,
+    length_unit: Annotated[
+        Literal["m", "mm", "um"], _file("length-unit", "Of sliders and poses.")
+    ] = "m",
+    angle_unit: Annotated[Literal["rad", "deg"], _file("angle-unit", "Of cranks and phi.")] = "rad",
+    time_unit: Annotated[Literal["s", "ms", "us"], _file("time-unit", "Of t.")] = "s",
+    separator: Annotated[
+        Literal[",", ";", "tab", "|"] | None,
+        _file("separator", "Of the cells.", show_default=", or ; with a decimal comma"),
+    ] = None,
+    decimal: Annotated[Literal[".", ","], _file("decimal", "The decimal sign.")] = ".",
     criterion: Annotated[
-        Literal["condition", "logdet"], option("criterion", "What is made small.")
+        Literal["condition", "logdet"], _search("criterion", "What is made small.")
     ] = "condition",
-    rate: Annotated[float, option("rate", "Samples a second in the file.")] = 1000.0,
-    periods: Annotated[int, option("periods", "Periods in the file.")] = 1,
-    starts: Annotated[int, option("starts", "Random motions improved.")] = 12,
-    draws: Annotated[int, option("draws", "Random motions drawn.")] = 100,
-    seconds: Annotated[float, option("seconds", "Time for the search.")] = 60.0,
-    seed: Annotated[int, option("seed", "Of the random motions.")] = 0,
+    starts: Annotated[int, _search("starts", "Random motions improved.")] = 12,
+    draws: Annotated[int, _search("draws", "Random motions drawn.")] = 100,
+    seconds: Annotated[float, _search("seconds", "Time for the search.")] = 60.0,
+    seed: Annotated[int, _search("seed", "Of the random motions.")] = 0,
     workers: Annotated[
-        int | None, option("workers", "Processes at a time.", show_default="one a core, up to 4")
+        int | None, _search("workers", "Processes at a time.", show_default="one a core, up to 4")
     ] = None,
     elbows: Elbows = None,
     json: Json = False,
 ) -> None:
     """Find a periodic trajectory from whose forces the base parameters are seen best.
 
-    It keeps every limit throughout the period, and does not begin at rest. The file has the columns
-    t rho1 ... x y z phi and their rates (d..., dd...), and force1 ... by the machine's nominal
-    inertia; theta1 ... and torque1 ... of cranks. The period and the assembly mode go to a TOML
-    file beside it, for the evaluation of the log.
+    The file leads in from rest, repeats the trajectory, and leads out to rest in the pose where it
+    began, all on the trajectory's own way: take the machine to the first row, and play it. Every
+    limit is kept, at ten times as many samples too. Beside motion.csv, motion-held-out.csv has
+    pick-and-place cycles within the same limits, to judge the identified model by.
+
+    The columns are t rho1 ... x y z phi and their rates (d..., dd..., per s), and force1 ... by the
+    machine's nominal inertia and its drives' friction; theta1 ... and torque1 ... of cranks. The
+    TOML file beside each motion tells units, columns, period and assembly mode. Copy it beside the
+    log, log.toml beside log.csv, and pteron identify reads a log in the same layout.
 
     Ctrl-C ends the search and keeps the best until then.
     """
     machine = load_robot(robot, elbows)
-    if out is not None:
-        from pteron.tables import check_output
-
-        if check_output(out).with_suffix(".toml").is_dir():
-            raise OutputError(f"{Path(out).with_suffix('.toml')}: is a folder; name another file")
-    from pteron.identification.excitation import Limits, check_sampling, optimal_excitation
+    from pteron.identification.excitation import (
+        Layout,
+        Limits,
+        check_sampling,
+        motion_paths,
+        optimal_excitation,
+    )
 
     check_sampling(period, rate, periods)
-    limits = Limits(speed, acceleration, force, type_i, type_ii, clearance, passive_clearance)
+    layout = Layout(
+        contents,
+        None if columns is None else tuple(name.strip() for name in columns.split(",")),
+        length_unit,
+        angle_unit,
+        time_unit,
+        _SIGNS.get(separator or "", separator),
+        decimal,
+    )
+    layout.description(machine)
+    if out is not None:
+        motion_paths(out, layout)
+    limits = Limits.of(
+        machine,
+        speed=speed,
+        acceleration=acceleration,
+        force=force,
+        type_i=type_i,
+        type_ii=type_ii,
+        joint_clearance=clearance,
+        passive_clearance=passive_clearance,
+    )
     if out is None and not json:
         note("Note: no file will be written; to have the trajectory, add --out FILE.csv")
-    with progress_bar(f"Exciting {machine.name}", _STEPS) as advance:
-        done = 0
-
-        def progress(share: float) -> None:
-            nonlocal done
-            advance(round(_STEPS * share) - done)
-            done = round(_STEPS * share)
-
+    with _progress(f"Exciting {machine.name}") as progress:
         found = optimal_excitation(
             machine,
             space=space,
@@ -110,15 +164,62 @@ def excite(
         )
     if found.interrupted:
         note("Note: interrupted; this is the best until then")
-    files = []
-    if out is not None:
-        description = Path(out).with_suffix(".toml")
-        files = [found.write_csv(out, rate, periods), found.write_toml(description)]
+    led, cycles = found.with_leads(periods), _held_out(found, rate)
+    left = {"motion": led.margins(limits, rate)}
+    if cycles is not None:
+        left["held out"] = cycles.margins(limits, rate)
+    for name, margins in left.items():
+        if not margins.kept:
+            raise ModelError(
+                f"{name}: the limits are not kept between samples; choose another --seed"
+            )
+    files = [] if out is None else found.write(out, rate, periods, layout, cycles)
     if json:
-        show_json({**found.as_dict(), "files": [str(path) for path in files]})
+        show_json(
+            {
+                **found.as_dict(),
+                "start": led.start,
+                "end": led.end,
+                "duration": led.duration,
+                "held_out": cycles and cycles.as_dict(),
+                "files": [str(path) for path in files],
+            }
+        )
         return
-    show(_quality(found), _margins(found))
+    show(_quality(found), _margins(left))
+    show(
+        f"From rest to rest in {led.duration:g} s: periodic from {led.start:g} to {led.end:g} s, "
+        "lead-in before, lead-out behind."
+    )
+    if cycles is not None:
+        show(
+            f"To hold out: {cycles.count} pick-and-place cycles of {cycles.length:.4g} s, "
+            f"{cycles.cycle.scale:.0%} of the standard size."
+        )
     show(*(f"Written: {plain(str(path))}" for path in files))
+
+
+@contextmanager
+def _progress(title: str) -> Iterator[Callable[[float], None]]:
+    """Show a progress bar, and give what moves it on to a share of the work."""
+    with progress_bar(title, _STEPS) as advance:
+        done = 0
+
+        def progress(share: float) -> None:
+            nonlocal done
+            advance(round(_STEPS * share) - done)
+            done = round(_STEPS * share)
+
+        yield progress
+
+
+def _held_out(found: Excitation, rate: float) -> RepeatedCycle | None:
+    """Return the motion to be held out, or say why there is none."""
+    try:
+        return found.held_out(rate)
+    except ModelError as error:
+        note(f"Note: no motion to hold out: {error}")
+        return None
 
 
 def _quality(found: Excitation) -> Table:
@@ -141,15 +242,17 @@ def _number(value: float, digits: int) -> str:
     return f"{value:.{digits}g}" if math.isfinite(value) else "-"
 
 
-def _margins(found: Excitation) -> Table:
+def _margins(left: dict[str, Margins]) -> Table:
     headings = ("least margin", "leg", "at (s)")
-    made = table("limit", *headings, numbers=headings)
-    for margin in found.margins:
+    others = list(left)[1:]
+    made = table("limit", *headings, *others, numbers=(*headings, *others))
+    for margin in left["motion"]:
         name = _MEASURES.get(margin.limit, margin.limit.replace("_", " "))
         made.add_row(
             f"{name} ({margin.unit})" if margin.unit else name,
             f"{margin.least:.4g}",
             "-" if margin.leg is None else str(margin.leg),
             f"{margin.time:.3f}",
+            *(f"{left[other][margin.limit].least:.4g}" for other in others),
         )
     return made

@@ -175,6 +175,7 @@ _add(
     excite,
     "pteron excite quadrupteron --out exciting.csv",
     "pteron excite my-robot.toml --out exciting.csv --period 5 --speed 0.5 --force 60",
+    "pteron excite delta --out exciting.csv --angle-unit deg --time-unit ms --decimal ,",
 )
 _add(
     identify,

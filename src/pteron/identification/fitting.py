@@ -99,7 +99,8 @@ def preprocessing_for(
     period = wanted.period or head.description.period
     # What lasts less than a period is no periodic log.
     if wanted.derivatives is None and period is not None and head.duration < 0.999 * period:
-        head = replace(head, description=replace(head.description, period=None))
+        described = replace(head.description, period=None, start=None, end=None)
+        head = replace(head, description=described)
         wanted = replace(wanted, period=None)
     # A file that is read in pieces is never fitted in one.
     rows = one.rows if isinstance(one.log, Log) else 1 << 30

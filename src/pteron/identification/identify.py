@@ -108,7 +108,8 @@ def identify(
     # Read the logs, and hold some rows out
     read = _reader(report, "Reading")
     whole, others = (
-        [recording(log, read) for log in _sequence(given, robot)] for given in (logs, held_out)
+        [recording(log, read, wanted.period) for log in _sequence(given, robot)]
+        for given in (logs, held_out)
     )
     check_recordings(whole, others, wanted)
     halves = [] if others else [divided(one, wanted.period) for one in whole]
@@ -180,8 +181,9 @@ def identify(
         weak = ", ".join(dict.fromkeys((*hidden, *essential.dropped)))
         advice.insert(
             0,
-            f"Weak with this motion: {weak}. A motion from pteron excite, faster or longer, would "
-            "show more of them.",
+            f"Weak with this motion: {weak}. pteron excite ROBOT --out motion.csv writes a motion "
+            "that shows more of them; the faster (--speed, --acceleration) and longer (--periods), "
+            "the more.",
         )
     return Identification(
         robot=robot,
@@ -262,8 +264,8 @@ def _too_little(
         first.source,
         f"{cause or 'too little motion'}: {len(hidden)} of {rank} base parameters cannot be seen "
         f"({names}), their standard deviations are larger than their usual size; "
-        f"{'mend that, or ' if cause else ''}move faster and along all coordinates, as pteron "
-        "excite proposes",
+        f"{'mend that, or ' if cause else ''}move faster and along all coordinates, as the motion "
+        "does that pteron excite ROBOT --out motion.csv writes",
     )
 
 

@@ -15,6 +15,7 @@ from pteron.identification.estimators import Estimate, weighted
 from pteron.identification.logs import Log
 from pteron.identification.model import Model, Terms, identification_model
 from pteron.identification.observation import Observations, observations_of, stacked
+from pteron.identification.recordings import periodic_part
 from pteron.identification.signals import Processing, preprocessing_of
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
@@ -212,6 +213,8 @@ def observations_with_payload(
         _check_phases(without)
     else:
         logs = [_in_phase(without, 0), _in_phase(with_payload, 1)]
+    period = None if processing is None else processing.period
+    logs = [periodic_part(log, period) for log in logs]
     plans = [preprocessing_of(model.robot, log, processing) for log in logs]
     observations = stacked(
         [observations_of(model, *pair) for pair in zip(logs, plans, strict=True)]

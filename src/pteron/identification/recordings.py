@@ -9,6 +9,7 @@ import numpy as np
 
 from pteron.errors import DataError
 from pteron.identification.logs import Finding, Log, LogFile
+from pteron.identification.signals.repetition import repeating_rows
 from pteron.kernels import Array
 
 _LOOKED_AT = 2_000_000
@@ -83,13 +84,55 @@ class Recording:
         return self.head() if isinstance(self.log, Log) else self.pieces(progress)
 
 
-def recording(log: Log | LogFile, progress: Callable[[int], None] | None = None) -> Recording:
-    """Return a log as a recording; files of a usual length are read whole."""
+def recording(
+    log: Log | LogFile,
+    progress: Callable[[int], None] | None = None,
+    period: float | None = None,
+) -> Recording:
+    """Return a log as a recording; files of a usual length are read whole.
+
+    Of a log whose description says that its motion leads in and out, the rows that repeat after the
+    period (s; by default as described) are taken.
+    """
     if isinstance(log, LogFile) and (log.rows_estimate or 0) <= log.rows_in_memory:
         log = log.read(progress)
     if isinstance(log, Log):
-        return Recording(replace(log, time=_since(log.time)), 0, log.rows)
+        log = periodic_part(replace(log, time=_since(log.time)), period)
+        return Recording(log, 0, log.rows)
     return Recording(log, 0, _END)
+
+
+def periodic_part(log: Log, period: float | None = None) -> Log:
+    """Return what repeats of a log that leads in and out, with a finding that says which rows.
+
+    Another log is returned as it is. Where nothing repeats after the period (s; by default as
+    described), or the log has a phase with a payload and one without, all of it is returned as a
+    motion that is not periodic.
+    """
+    about = log.description
+    period = period or about.period
+    if period is None or (about.start is None and about.end is None):
+        return log
+    phases = log.payload is not None and bool(np.ptp(log.payload))
+    rows = None if phases else repeating_rows(log.time, log.joints, period)
+    if rows is None:
+        told = "it has two phases of payload" if phases else "nothing in it repeats"
+        part, kept, rest = log, None, "the whole log is taken as a motion that is not periodic"
+    else:
+        first, last = (log.first_row + row + 1 for row in (rows.start, rows.stop - 1))
+        told, part, kept = f"rows {first} to {last} repeat", log.part(rows.start, rows.stop), period
+        rest = "lead-in, lead-out and rest are left out"
+    if not phases:
+        told += f" after the period of {period:g} s"
+    return replace(
+        part,
+        time=part.time - part.time[0],
+        description=replace(about, period=kept, start=None, end=None),
+        findings=(
+            *log.findings,
+            Finding("periodic", f"{log.source}: {told}; {rest}", part.first_row + 1),
+        ),
+    )
 
 
 def same(one: Recording, other: Recording) -> bool:

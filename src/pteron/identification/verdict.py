@@ -93,7 +93,10 @@ def verdict_of(
             "What was held out repeats the motion that was fitted: it tells of noise and drift, "
             "less of other motions."
         )
-        steps.append("Record another motion, such as a pick-and-place cycle, and hold it out.")
+        steps.append(
+            "Record another motion, such as a pick-and-place cycle, and hold it out (--held-out): "
+            "pteron excite ROBOT --out motion.csv writes one too, motion-held-out.csv."
+        )
     grade = max((one.grade for one in opinions), key=_ORDER.index)
     return Verdict(grade, tuple(reasons), tuple(dict.fromkeys(steps)))
 

@@ -12,6 +12,7 @@ from pteron.tables.files import (
     check_output,
     open_table,
     read_table,
+    table_bytes,
     write_table,
 )
 from pteron.tables.parquet_file import ParquetFile
@@ -28,5 +29,6 @@ __all__ = [
     "listed",
     "open_table",
     "read_table",
+    "table_bytes",
     "write_table",
 ]

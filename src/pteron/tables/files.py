@@ -121,13 +121,14 @@ def _told_by_name(source: str) -> Iterator[None]:
         raise DataError(f"{source}: cannot be read ({error.strerror or error})") from None
 
 
-def check_output(path: str | Path) -> Path:
+def check_output(path: str | Path, dialect: Dialect | None = None) -> Path:
     """Return `path` after a check, before the work begins, that a table can be written there.
 
     Raises
     ------
     OutputError
-        If its ending is unknown, its folder is missing, or it is a folder.
+        If its ending is unknown, its folder is missing, or it is a folder; if a dialect is given
+        for a file that has none.
     """
     file = Path(path)
     if file.is_dir():
@@ -136,30 +137,48 @@ def check_output(path: str | Path) -> Path:
         raise OutputError(f"{path}: {_unknown(file, 'table')}")
     if not file.parent.is_dir():
         raise OutputError(f"{path}: there is no folder {file.parent}; make it first")
+    if dialect is not None and file.suffix.lower() != ".csv":
+        raise OutputError(f"{path}: only a CSV file has a separator and a decimal sign")
     return file
 
 
-def write_table(frame: pl.DataFrame, path: str | Path) -> Path:
+def write_table(frame: pl.DataFrame, path: str | Path, dialect: Dialect | None = None) -> Path:
     """Write a table to a CSV or Parquet file, whole or not at all.
+
+    Parameters
+    ----------
+    frame : polars.DataFrame
+        The table.
+    path : str or path
+        Its ending says which it is.
+    dialect : Dialect, optional
+        Separator and decimal sign of a CSV file.
 
     Raises
     ------
     OutputError
         If it cannot be written, or if a column cannot stand in such a file.
     """
-    file = check_output(path)
+    return write_bytes(path, table_bytes(frame, path, dialect))
+
+
+def table_bytes(frame: pl.DataFrame, path: str | Path, dialect: Dialect | None = None) -> bytes:
+    """Return what `write_table` writes."""
+    file = check_output(path, dialect)
     buffer = io.BytesIO()
     try:
-        ENDINGS[file.suffix.lower()](frame, buffer)
+        ENDINGS[file.suffix.lower()](frame, buffer, dialect or Dialect())
     except pl.exceptions.PolarsError as error:
         reason = str(error).splitlines()[0]
         raise OutputError(f"{path}: cannot hold this table ({reason})") from None
-    return write_bytes(file, buffer.getvalue())
+    return buffer.getvalue()
 
 
-ENDINGS: dict[str, Callable[[pl.DataFrame, io.BytesIO], None]] = {
-    ".csv": lambda frame, buffer: frame.write_csv(buffer),
-    ".parquet": lambda frame, buffer: typed(frame).write_parquet(buffer),
+ENDINGS: dict[str, Callable[[pl.DataFrame, io.BytesIO, Dialect], None]] = {
+    ".csv": lambda frame, buffer, how: frame.write_csv(
+        buffer, separator=how.separator, decimal_comma=how.decimal == ","
+    ),
+    ".parquet": lambda frame, buffer, how: typed(frame).write_parquet(buffer),
 }
 """The endings of the files that hold tables, each with what writes one."""
 

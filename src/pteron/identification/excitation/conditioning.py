@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pteron.identification.excitation.fourier import FourierMotion, states
+from pteron.identification.excitation.fourier import FourierMotion
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import unchecked
 from pteron.reduction import BaseParameters
@@ -113,7 +113,7 @@ def conditioning(
 
 def stacked_regressor(motion: FourierMotion, base: BaseParameters, times: Array) -> Array:
     """Return the base regressors at times (T,) below one another, (T n, rank)."""
-    state = states(motion, times)
+    state = motion.states(times)
     path = state.pose, state.velocity, state.acceleration
     found: Array = unchecked(motion.robot, "base_regressor", *path, base=base)
     return found.reshape(-1, base.rank)

@@ -8,7 +8,9 @@ import numpy as np
 
 from pteron.errors import DataError, ModelError
 from pteron.identification.excitation.fourier import FourierMotion, Space
-from pteron.identification.excitation.limits import Limits, check_rest, relative_margins
+from pteron.identification.excitation.limits import Limits
+from pteron.identification.excitation.margins import check_rest, relative_margins
+from pteron.identification.excitation.movement import Movement
 from pteron.identification.signals.states import home
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import unchecked
@@ -66,7 +68,7 @@ def random_excitation(
     period : float
         The time after which the motion repeats, s.
     limits : Limits, optional
-        What the motion keeps at every instant.
+        What the motion keeps at every instant; by default `Limits.of` the machine.
     seed : int or numpy Generator
         Where the randomness comes from.
 
@@ -87,7 +89,7 @@ def random_excitation(
     >>> motion.coefficients.shape
     (7, 3)
     """
-    limits = limits or Limits()
+    limits = limits or Limits.of(robot)
     if harmonics < 1:
         raise DataError(f"harmonics: {harmonics} given, 1 or more expected")
     rng = np.random.default_rng(seed)
@@ -118,9 +120,9 @@ def sizes(robot: Manipulator, space: Space) -> Array:
     return np.array([1.0 if name == "phi" else metres for name in robot.coordinates])
 
 
-def is_clear(motion: FourierMotion, limits: Limits, samples: int, clear: float = _CLEAR) -> bool:
+def is_clear(motion: Movement, limits: Limits, samples: int, clear: float = _CLEAR) -> bool:
     """Say whether all limits are kept at so many samples, and how clearly is given."""
-    found = relative_margins(motion, limits, motion.uniform_times(samples))
+    found = relative_margins(motion, limits, np.linspace(0.0, motion.duration, samples))
     return all(float(values.min()) >= clear for values in found.values())
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Literal, NamedTuple, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pteron.equations.machine import closure_of
 from pteron.errors import DataError, UnreachablePose
+from pteron.identification.excitation.movement import State, state_of_platform
 from pteron.identification.signals.states import home_mode
 from pteron.kernels import Array, as_array
 from pteron.kinematics.evaluate import unchecked
@@ -122,7 +123,7 @@ class FourierMotion:
             If a motion of the joints leaves what the machine can do.
         """
         times = _times(time)
-        found = states(self, times)
+        found = self.states(times)
         lost = ~np.isfinite(found.pose).all(axis=-1)
         if lost.any():
             k = int(np.argmax(lost))
@@ -137,45 +138,39 @@ class FourierMotion:
 
     def joints(self, time: ArrayLike) -> tuple[Array, Array, Array]:
         """Return the joints' coordinates, rates and accelerations, (T, n) each, at times (T,)."""
-        found = states(self, _times(time))
+        found = self.states(_times(time))
         return found.joints, found.rates, found.accelerations
+
+    @property
+    def duration(self) -> float:
+        """The time after which the motion repeats, s."""
+        return self.period
+
+    def states(self, phase: Array, rate: ArrayLike = 1.0, gain: ArrayLike = 0.0) -> State:
+        """Return the motion of platform and joints at phases (T,), s.
+
+        The phase itself may go on at another rate than 1 s a second, (T,), and gain speed, (T,) in
+        1/s: q' = dq/dphase rate, and q'' = d2q/dphase2 rate^2 + dq/dphase gain.
+        """
+        robot = self.robot
+        q, first, second = (
+            rows @ self.coefficients for rows in basis(phase, self.harmonics, self.period)
+        )
+        rate, gain = np.reshape(rate, (-1, 1)), np.reshape(gain, (-1, 1))
+        dq, ddq = first * rate, second * rate**2 + first * gain
+        if self.space == "platform":
+            return state_of_platform(robot, q, dq, ddq)
+        poses: Array = unchecked(robot, "closure_poses", np.vstack([self.center, q]))
+        center, pose = poses[0, self.mode], poses[1:, self.mode].copy()
+        if robot.platform.turns and not any(leg.follows_angle for leg in robot.legs):
+            # Within a mode phi stays on one side of the singular orientations, half a turn at most.
+            pose[:, -1] = center[-1] + (pose[:, -1] - center[-1] + np.pi) % (2.0 * np.pi) - np.pi
+        velocity, acceleration = unchecked(robot, "platform_motion", pose, dq, ddq)
+        return State(pose, velocity, acceleration, q, dq, ddq)
 
     def uniform_times(self, count: int) -> Array:
         """Return so many times (count,) evenly over one period, without its end."""
         return np.asarray(np.arange(count) * (self.period / count), dtype=np.float64)
-
-
-class State(NamedTuple):
-    """Motion of platform and joints, (T, n) each; NaN where the joints have no pose."""
-
-    pose: Array
-    velocity: Array
-    acceleration: Array
-    joints: Array
-    rates: Array
-    accelerations: Array
-
-
-def states(motion: FourierMotion, times: Array) -> State:
-    """Return the motion of platform and joints at times (T,)."""
-    robot = motion.robot
-    q, dq, ddq = (
-        rows @ motion.coefficients for rows in basis(times, motion.harmonics, motion.period)
-    )
-    if motion.space == "platform":
-        # A slider's motion is finite out of the legs' reach too; that of the links is not.
-        joints = unchecked(robot, "joint_coordinates", q)
-        rates = unchecked(robot, "joint_rates", q, dq)[0]
-        return State(
-            q, dq, ddq, joints, rates, unchecked(robot, "joint_accelerations", q, dq, ddq)[0]
-        )
-    poses: Array = unchecked(robot, "closure_poses", np.vstack([motion.center, q]))
-    center, pose = poses[0, motion.mode], poses[1:, motion.mode].copy()
-    if robot.platform.turns and not any(leg.follows_angle for leg in robot.legs):
-        # Within a mode phi stays on one side of the singular orientations, half a turn at most.
-        pose[:, -1] = center[-1] + (pose[:, -1] - center[-1] + np.pi) % (2.0 * np.pi) - np.pi
-    velocity, acceleration = unchecked(robot, "platform_motion", pose, dq, ddq)
-    return State(pose, velocity, acceleration, q, dq, ddq)
 
 
 def basis(times: Array, harmonics: int, period: float) -> tuple[Array, Array, Array]:

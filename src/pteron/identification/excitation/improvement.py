@@ -17,7 +17,7 @@ import numpy as np
 
 from pteron.identification.excitation.draws import within_limits
 from pteron.identification.excitation.fourier import FourierMotion
-from pteron.identification.excitation.limits import relative_margins
+from pteron.identification.excitation.margins import relative_margins
 from pteron.identification.excitation.program import Setting, minimised
 from pteron.kernels import Array
 

@@ -1,24 +1,19 @@
-"""What an exciting trajectory must keep at every instant, and how far a motion stays from it."""
+"""What an exciting motion must keep at every instant: limits that are given, or the drives' own."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from pteron.equations.machine import closure_of
-from pteron.errors import DataError, ModelError
-from pteron.identification.excitation.fourier import FourierMotion, State, states
-from pteron.identification.signals.states import home
+from pteron.equations.drives import Drives, drive_numbers
+from pteron.errors import DataError
 from pteron.kernels import Array
-from pteron.kinematics.evaluate import unchecked
-from pteron.kinematics.singularities import best_type_ii
+from pteron.legs import Drive
 from pteron.manipulator import Manipulator
-from pteron.workspace.limits import limited_joints
-from pteron.workspace.reserve import clearances
 
 UNITS = {
     "type_i": "",
@@ -34,8 +29,8 @@ UNITS = {
 PER_JOINT = ("speed", "acceleration", "force")
 """Those that may be given for each joint."""
 
-_REFINED = 33
-"""Samples between the neighbours of the tightest sample, for its exact place."""
+_SPEED = 1.0
+"""Of joints whose drives do not say more, m/s or rad/s."""
 
 
 @dataclass(frozen=True)
@@ -49,8 +44,9 @@ class Limits:
     acceleration : float or sequence of n floats
         Largest acceleration of the joints, m/s^2 or rad/s^2.
     force : float or sequence of n floats, optional
-        Largest actuator force, N or N m, by the machine's nominal inertia without friction; None
-        for no limit.
+        Largest force of the drives, N or N m, infinite or None for no limit: by the machine's
+        nominal inertia and what its drives need for themselves, dry friction in full whichever way
+        a joint moves. It holds at rest in every pose too, so that the machine can stop anywhere.
     type_i : float
         Least type-I measure of each leg, in (0, 1): the distance from stretched and folded legs.
     type_ii : float
@@ -82,6 +78,24 @@ class Limits:
     type_ii: float = 0.3
     joint_clearance: float = 0.005
     passive_clearance: float = 0.02
+
+    @classmethod
+    def of(cls, robot: Manipulator, **given: Any) -> Limits:
+        """Return the limits given and, of speed and force, else those of the machine's drives.
+
+        Examples
+        --------
+        >>> import pteron
+        >>> from pteron.identification.excitation import Limits
+        >>> Limits.of(pteron.load("tripteron"), acceleration=5.0).speed
+        1.0
+        """
+        drives = [leg.drive or Drive() for leg in robot.legs]
+        for name, fallback in (("speed", _SPEED), ("force", math.inf)):
+            own = [getattr(drive, f"max_{name}") for drive in drives]
+            if given.get(name) is None and any(value is not None for value in own):
+                given[name] = tuple(fallback if value is None else value for value in own)
+        return cls(**{name: value for name, value in given.items() if value is not None})
 
     def __post_init__(self) -> None:
         for name in PER_JOINT:
@@ -137,159 +151,25 @@ def _number(name: str, value: object) -> float:
         number = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
         raise DataError(f"limits: {name} {value!r} given, a number expected") from None
-    if not math.isfinite(number):
+    if not math.isfinite(number) and (name, number) != ("force", math.inf):
         raise DataError(f"limits: {name} {number} given, a finite number expected")
     return number
 
 
-@dataclass(frozen=True)
-class Margin:
-    """How near a motion comes to one limit.
+class DriveLoad(NamedTuple):
+    """What the drives need beside the rigid bodies' forces, (n,) each.
 
-    Attributes
-    ----------
-    limit : str
-        The name of the limit, a field of `Limits`.
-    least : float
-        What is left of it at the tightest instant, in `unit`; below 0 it is violated.
-    leg : int or None
-        The leg it happens to, counted from 1; None for the platform's orientation.
-    time : float
-        When, s.
-    unit : str
-        The unit of `least`.
+    inertia q'' + viscous q' + offset, and `dry` friction against the motion, at most.
     """
 
-    limit: str
-    least: float
-    leg: int | None
-    time: float
-    unit: str
+    inertia: Array
+    viscous: Array
+    offset: Array
+    dry: Array
 
 
-@dataclass(frozen=True)
-class Margins:
-    """The least margin to every limit that is in force.
-
-    Attributes
-    ----------
-    each : tuple of Margin
-        One for each limit.
-    samples : int
-        Instants of the period that were looked at; near the tightest ones, many more.
-    """
-
-    each: tuple[Margin, ...]
-    samples: int
-
-    @property
-    def kept(self) -> bool:
-        """Whether no limit is violated."""
-        return all(margin.least >= 0.0 for margin in self.each)
-
-    def __iter__(self) -> Iterator[Margin]:
-        return iter(self.each)
-
-    def __getitem__(self, limit: str) -> Margin:
-        return {margin.limit: margin for margin in self.each}[limit]
-
-
-def margins(motion: FourierMotion, limits: Limits, samples: int = 4000) -> Margins:
-    """Return how far a motion stays from its limits.
-
-    Parameters
-    ----------
-    motion : FourierMotion
-        The motion.
-    limits : Limits
-        What it is to keep.
-    samples : int
-        Instants, evenly over the period, at which every limit is looked at.
-
-    Examples
-    --------
-    >>> import pteron
-    >>> from pteron.identification.excitation import Limits, margins, random_excitation
-    >>> motion = random_excitation(pteron.load("tripteron"), harmonics=2, seed=1)
-    >>> margins(motion, Limits()).kept
-    True
-    """
-    times = motion.uniform_times(samples)
-    step = motion.period / samples
-    found = []
-    coarse = _margins_of(motion.robot, limits, states(motion, times))
-    for name, values in coarse.items():
-        tightest = times[int(values.min(axis=-1).argmin())]
-        near = tightest + np.linspace(-step, step, _REFINED)
-        values = _margins_of(motion.robot, limits, states(motion, near))[name]
-        k, leg = np.unravel_index(int(values.argmin()), values.shape)
-        found.append(
-            Margin(
-                name,
-                float(values[k, leg]),
-                None if name == "type_ii" else int(leg) + 1,
-                float(near[k] % motion.period),
-                unit_of(motion.robot, name, int(leg)),
-            )
-        )
-    return Margins(tuple(found), samples)
-
-
-def relative_margins(motion: FourierMotion, limits: Limits, times: Array) -> dict[str, Array]:
-    """Return the margins at times (T,), each over its limit's size: (T, n), or (T, 1)."""
-    robot = motion.robot
-    # Half its range for a joint, 1 for the two measures, else the limit itself.
-    sizes = {name: per_joint(limits, name, robot) for name in PER_JOINT}
-    sizes["joint_clearance"] = joint_sizes(robot)
-    found = _margins_of(robot, limits, states(motion, times))
-    return {name: values / sizes.get(name, 1.0) for name, values in found.items()}
-
-
-def check_rest(robot: Manipulator, home: Array, limits: Limits) -> None:
-    """Refuse limits that the machine at rest in its home pose does not keep, naming the limit."""
-    zero = np.zeros_like(home)
-    rest = State(home, zero, zero, unchecked(robot, "joint_coordinates", home), zero, zero)
-    rows = State(*(value[None] for value in rest))
-    for name, values in _margins_of(robot, limits, rows).items():
-        leg = int(values[0].argmin())
-        left = values[0, leg]
-        if left > 0.0:
-            continue
-        whose = "the platform" if name == "type_ii" else f"leg {leg + 1}"
-        given = getattr(limits, name)
-        if name == "force":
-            wanted, has = f"at most {given}", per_joint(limits, name, robot)[leg] - left
-        else:
-            wanted, has = f"at least {given:g}", given + left
-        raise ModelError(
-            f"limits: {name} of {wanted} {unit_of(robot, name, leg)}".rstrip()
-            + f" is impossible: {whose} of {robot.name} has {has:.4g} at rest in the home pose, "
-            "the best one; loosen it"
-        )
-
-
-@lru_cache(maxsize=64)
-def _limits_passive(robot: Manipulator) -> bool:
-    """Return whether any passive joint has limits."""
-    joints = limited_joints(robot, np.array(home(robot)))
-    return not all(joint.actuated for joint in joints)
-
-
-def _margins_of(robot: Manipulator, limits: Limits, state: State) -> dict[str, Array]:
-    """Return every limit's margins (T, n) or (T, 1), -inf where the machine cannot be."""
-    found = {"type_i": unchecked(robot, "reach", state.pose)[1] - limits.type_i}
-    if closure_of(robot).vanishes() is None or robot.platform.turns:
-        type_ii = np.abs(unchecked(robot, "type_ii", state.pose))[:, None]
-        found["type_ii"] = type_ii / best_type_ii(robot) - limits.type_ii
-    if any(leg.limits for leg in robot.legs):
-        found["joint_clearance"] = clearances(robot, state.joints) - limits.joint_clearance
-    if _limits_passive(robot):
-        room = unchecked(robot, "passive_room", state.pose)[0]
-        found["passive_clearance"] = room - limits.passive_clearance
-    found["speed"] = per_joint(limits, "speed", robot) - np.abs(state.rates)
-    found["acceleration"] = per_joint(limits, "acceleration", robot) - np.abs(state.accelerations)
-    if limits.force is not None:
-        motion = state.pose, state.velocity, state.acceleration
-        forces = unchecked(robot, "inverse_dynamics", *motion)
-        found["force"] = per_joint(limits, "force", robot) - np.abs(forces)
-    return {name: np.where(np.isnan(values), -np.inf, values) for name, values in found.items()}
+def drive_load(robot: Manipulator) -> DriveLoad:
+    """Return what the drives of a machine need; nothing, of a leg without one."""
+    drives = Drives(*np.split(drive_numbers(robot), len(Drives._fields)))
+    dry = drives.coulomb + drives.stribeck
+    return DriveLoad(drives.inertia, drives.viscous, drives.offset, dry)

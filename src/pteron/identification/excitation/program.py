@@ -12,7 +12,7 @@ import numpy as np
 from pteron.bodies.motion import Expression
 from pteron.identification.excitation.draws import sizes
 from pteron.identification.excitation.fourier import Space, basis
-from pteron.identification.excitation.limits import Limits, joint_sizes, per_joint
+from pteron.identification.excitation.limits import Limits, drive_load, joint_sizes, per_joint
 from pteron.identification.signals.states import home, home_mode
 from pteron.kernels import Array, Columns, program
 from pteron.kinematics.evaluate import unchecked
@@ -153,9 +153,16 @@ def _path(setting: Setting, watched: tuple[str, ...]) -> tuple[ca.Function, Arra
     found["joint_clearance"] = joints, ranges[:, 0] + clearance, ranges[:, 1] - clearance
     room = program(robot, "passive_room").function(pose)[0].T
     found["passive_clearance"] = room, limits.passive_clearance + _BACK_OFF, np.inf
-    forces = program(robot, "inverse_dynamics").function(*state, ca.DM(parameters(robot))).T
-    for name, value in (("speed", rates), ("acceleration", seconds), ("force", forces)):
+    for name, value in (("speed", rates), ("acceleration", seconds)):
         found[name] = value / per_joint(limits, name, robot), _BACK_OFF - 1.0, 1.0 - _BACK_OFF
+    dynamics, still = program(robot, "inverse_dynamics").function, ca.SX(pose.shape[0], 1)
+    inertia, viscous, offset, dry = map(ca.DM, drive_load(robot))
+    values = ca.DM(parameters(robot))
+    moving = dynamics(*state, values).T + inertia * seconds + viscous * rates
+    held = dynamics(pose, still, still, values).T
+    most = ca.DM(per_joint(limits, "force", robot)) - dry
+    needed = ca.vertcat(*((forces + offset) / most for forces in (moving, held)))
+    found["force"] = needed, _BACK_OFF - 1.0, 1.0 - _BACK_OFF
     values, *sides = zip(*(found[name] for name in watched), strict=True)
     low, high = (
         np.concatenate([np.broadcast_to(b, v.shape[0]) for v, b in zip(values, side, strict=True)])

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import polars as pl
 
-from pteron.atomic import write_text
 from pteron.equations.machine import closure_of
-from pteron.errors import DataError
 from pteron.identification.excitation.conditioning import Conditioning
-from pteron.identification.excitation.fourier import FourierMotion, states
-from pteron.identification.excitation.limits import Limits, Margins
+from pteron.identification.excitation.files import motion_paths, write_motions
+from pteron.identification.excitation.fourier import FourierMotion
+from pteron.identification.excitation.held_out import RepeatedCycle, held_out_cycle
+from pteron.identification.excitation.layout import Layout, check_sampling
+from pteron.identification.excitation.leads import Lead, LedMotion
+from pteron.identification.excitation.limits import Limits
+from pteron.identification.excitation.margins import Margins
+from pteron.identification.excitation.movement import Movement
 from pteron.identification.excitation.program import Criterion
+from pteron.identification.logs import Description, write_description
 from pteron.kinematics import assembly_mode
-from pteron.kinematics.evaluate import unchecked
 from pteron.tables import write_table
-
-_MOST_SAMPLES = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -61,6 +63,8 @@ class Excitation:
         How well the best of the random motions does, which keep the same limits.
     margins : Margins
         What it leaves of every limit.
+    lead : Lead
+        How it sets off from rest, and comes to rest, within the same limits.
     starts : tuple of Start
         The random motions that were improved, the best of them first.
     draws : int
@@ -79,6 +83,7 @@ class Excitation:
     conditioning: Conditioning
     random: Conditioning
     margins: Margins
+    lead: Lead
     starts: tuple[Start, ...]
     draws: int
     seed: int
@@ -90,70 +95,99 @@ class Excitation:
         """How many times the scaled condition number of the best random motion is larger."""
         return self.random.scaled / self.conditioning.scaled
 
-    def frame(self, rate: float = 1000.0, periods: int = 1) -> pl.DataFrame:
-        """Return the trajectory sampled for a controller (see `write_csv`)."""
-        check_sampling(self.motion.period, rate, periods)
-        motion, robot = self.motion, self.motion.robot
-        times = np.arange(round(periods * motion.period * rate)) / rate
-        state = states(motion, times)
-        path = state.pose, state.velocity, state.acceleration
-        columns = {"t": times}
-        for order, names, values in (
-            ("", robot.joint_names, state.joints),
-            ("", robot.coordinates, state.pose),
-            ("d", robot.joint_names, state.rates),
-            ("dd", robot.joint_names, state.accelerations),
-            ("d", robot.coordinates, state.velocity),
-            ("dd", robot.coordinates, state.acceleration),
-            ("", robot.force_names, unchecked(robot, "inverse_dynamics", *path)),
-        ):
-            columns |= {f"{order}{name}": values[:, k] for k, name in enumerate(names)}
-        return pl.DataFrame(columns)
+    def with_leads(self, periods: int = 1) -> LedMotion:
+        """Return the trajectory from rest to rest: lead-in, so many periods, lead-out."""
+        return LedMotion(self.motion, self.lead, periods)
 
-    def write_csv(self, path: str | Path, rate: float = 1000.0, periods: int = 1) -> Path:
-        """Write the trajectory for a controller to a CSV (or Parquet) file.
+    def held_out(self, rate: float = 1000.0) -> RepeatedCycle:
+        """Return a motion of another kind, within the same limits, to judge a model by.
 
-        Columns t; rho1 ...; x y z phi; drho1 ...; ddrho1 ...; dx ...; ddx ...; force1 ..., in SI
-        units; theta and torque at a crank. The forces are those of the machine's nominal inertia,
-        without friction. The motion is periodic: the sample after the last is the first one again.
-        It does not begin at rest.
+        See `held_out_cycle` for `rate` and errors.
+        """
+        return held_out_cycle(self.motion.robot, self.limits, rate)
+
+    def write(
+        self,
+        path: str | Path,
+        rate: float = 1000.0,
+        periods: int = 3,
+        layout: Layout | None = None,
+        held_out: RepeatedCycle | None = None,
+    ) -> list[Path]:
+        """Write what `pteron excite` writes: motions, and descriptions of their logs beside them.
+
+        motion.csv (or .parquet) and motion.toml, as `write_csv` and `write_toml` do; and
+        motion-held-out.csv and .toml of what is given to be held out. All of them, or none.
 
         Parameters
         ----------
         path : str or path
-            It ends in ``.csv`` or ``.parquet``.
+            Of the motion; it ends in ``.csv`` or ``.parquet``.
         rate : float
             Samples a second.
         periods : int
-            How many periods.
+            How many periods there are between lead-in and lead-out.
+        layout : Layout, optional
+            Columns, units and how a CSV file is written.
+        held_out : RepeatedCycle, optional
+            Such as `held_out` returns.
 
         Raises
         ------
         OutputError
-            If it cannot be written.
+            If they cannot be written.
         DataError
-            If there would be no sample.
+            If there would be no sample, or the layout does not fit the machine.
         """
-        return write_table(self.frame(rate, periods), path)
+        layout = layout or Layout()
+        check_sampling(self.motion.period, rate, periods)
+        paths = motion_paths(path, layout)
+        motions: dict[Path, tuple[Movement, Description]] = {
+            paths[0]: (self.with_leads(periods), self._description(periods, layout))
+        }
+        if held_out is not None:
+            motions[paths[1]] = held_out, _described(held_out, layout)
+        return write_motions(motions, layout, rate)
 
-    def write_toml(self, path: str | Path) -> Path:
-        """Write what an evaluation of the log needs: period and assembly mode (from 1).
+    def frame(
+        self, rate: float = 1000.0, periods: int = 1, layout: Layout | None = None
+    ) -> pl.DataFrame:
+        """Return the trajectory from rest to rest, sampled for a controller (see `write_csv`)."""
+        check_sampling(self.motion.period, rate, periods)
+        return (layout or Layout()).frame(self.with_leads(periods), rate)
 
-        Where modes have no number throughout, a log is in that of the home pose unless it says
-        otherwise, as the motion is.
+    def write_csv(
+        self,
+        path: str | Path,
+        rate: float = 1000.0,
+        periods: int = 1,
+        layout: Layout | None = None,
+    ) -> Path:
+        """Write the trajectory for a controller to a CSV (or Parquet) file, from rest to rest.
+
+        Columns t; rho1 ...; x y z phi; drho1 ...; ddrho1 ...; dx ...; ddx ...; force1 ..., in SI
+        units; theta and torque at a crank; by a layout, some of them, under other names and in
+        other units. The forces are what the drives need by the machine's nominal inertia and, where
+        its file knows it, friction (`pteron.drive_forces`).
+
+        Parameters and errors are those of `write`.
         """
-        text = f"[motion]\nperiod = {self.motion.period!r}\n"
-        if self._assembly_mode is not None:
-            text += f"assembly_mode = {self._assembly_mode}\n"
-        return write_text(path, text)
+        layout = layout or Layout()
+        return write_table(self.frame(rate, periods, layout), path, layout.dialect)
 
-    @property
-    def _assembly_mode(self) -> int | None:
-        """The pose of `direct_kinematics` throughout the motion, from 1."""
-        robot = self.motion.robot
-        if not closure_of(robot).keeps_modes:
-            return None
-        return 1 + int(assembly_mode(robot, states(self.motion, np.zeros(1)).pose[0]))
+    def write_toml(self, path: str | Path, periods: int = 1, layout: Layout | None = None) -> Path:
+        """Write what an evaluation of the log needs, of as many periods as `write_csv` wrote.
+
+        That is the period, where the periodic part begins and ends (s from the first row), the
+        assembly mode (from 1), and the layout. Where modes have no number throughout, a log is in
+        that of the home pose unless it says otherwise, as the motion is.
+        """
+        return write_description(self._description(periods, layout or Layout()), path)
+
+    def _description(self, periods: int, layout: Layout) -> Description:
+        led = self.with_leads(periods)
+        described = _described(led, layout)
+        return replace(described, period=self.motion.period, start=led.start, end=led.end)
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything but the machine as plain data."""
@@ -174,7 +208,8 @@ class Excitation:
             "motion": {
                 "space": motion.space,
                 "period": motion.period,
-                "assembly_mode": self._assembly_mode,
+                "lead": self.lead._asdict(),
+                "assembly_mode": _mode_of(motion),
                 "center": motion.center.tolist(),
                 "cosines": motion.cosines.tolist(),
                 "sines": motion.sines.tolist(),
@@ -182,17 +217,14 @@ class Excitation:
         }
 
 
-def check_sampling(period: float, rate: float, periods: int) -> None:
-    """Refuse, before any work, a period and samples a second that give no table."""
-    if not 0.0 < period < np.inf:
-        raise DataError(f"period: {period} s given, a number above 0 expected")
-    if not 0.0 < rate < np.inf:
-        raise DataError(f"rate: {rate} given, samples a second above 0 expected")
-    if periods < 1:
-        raise DataError(f"periods: {periods} given, 1 or more expected")
-    count = periods * period * rate
-    if not 0.5 < count <= _MOST_SAMPLES:
-        raise DataError(
-            f"rate: {rate:g} a second gives {count:.0f} samples in {periods * period:g} s; 1 to "
-            f"{_MOST_SAMPLES} are served"
-        )
+def _described(movement: Movement, layout: Layout) -> Description:
+    """Return the description of a movement's log."""
+    return replace(layout.description(movement.robot), assembly_mode=_mode_of(movement))
+
+
+def _mode_of(movement: Movement) -> int | None:
+    """Return the pose of `direct_kinematics` throughout a movement, from 1."""
+    robot = movement.robot
+    if not closure_of(robot).keeps_modes:
+        return None
+    return 1 + int(assembly_mode(robot, movement.states(np.zeros(1)).pose[0]))

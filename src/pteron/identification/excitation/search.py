@@ -17,7 +17,9 @@ from pteron.identification.excitation.conditioning import Conditioning, conditio
 from pteron.identification.excitation.draws import random_excitation
 from pteron.identification.excitation.fourier import FourierMotion, Space
 from pteron.identification.excitation.improvement import ROUNDS, Improvement, Round, improved
-from pteron.identification.excitation.limits import Limits, margins
+from pteron.identification.excitation.leads import found_lead
+from pteron.identification.excitation.limits import Limits
+from pteron.identification.excitation.margins import margins
 from pteron.identification.excitation.program import Criterion, Setting
 from pteron.identification.excitation.result import Excitation, Start
 from pteron.kernels import columns_of
@@ -75,7 +77,7 @@ def optimal_excitation(
     period : float
         The time after which the motion repeats, s.
     limits : Limits, optional
-        What the trajectory keeps at every instant.
+        What the trajectory keeps at every instant; by default `Limits.of` the machine.
     criterion : {"condition", "logdet"}
         What is made small: the condition number of the base regressor with columns of length 1
         (see `scaled_condition`), or the volume of the confidence ellipsoid, -log det.
@@ -98,7 +100,8 @@ def optimal_excitation(
     Returns
     -------
     Excitation
-        The trajectory, how good it is, the best random motion to compare with, and its margins.
+        The trajectory, how good it is, the best random motion to compare with, its margins, and how
+        it sets off from rest within the same limits.
 
     Raises
     ------
@@ -129,7 +132,7 @@ def optimal_excitation(
     >>> found.margins.kept, found.gain > 2.0
     (True, True)
     """
-    limits = limits or Limits()
+    limits = limits or Limits.of(robot)
     _check(criterion, starts, draws, seconds, workers)
     base = base or base_parameters(robot)
     search = _Search(criterion, base, progress or (lambda share: None))
@@ -252,6 +255,7 @@ class _Search:
             best.conditioning,
             random.conditioning,
             margins(best.motion, limits),
+            found_lead(best.motion, limits),
             tuple(self.starts),
             len(self.drawn),
             seed,

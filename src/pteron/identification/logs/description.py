@@ -169,6 +169,10 @@ class Description:
         What is carried in phase 1.
     period : float, optional
         Period of the excitation, s.
+    start, end : float, optional
+        Where in the motion its periodic part begins and ends, s from where it sets off: before and
+        after, it leads in and out. The log may begin earlier or later: the part that repeats is
+        found in it.
     assembly_mode : int, optional
         Which pose of `direct_kinematics` the machine is in at the first sample, counted from 1 as a
         person counts.
@@ -202,6 +206,8 @@ class Description:
     payload_column: Annotated[str | None, Field(alias="payload.column")] = None
     payload: KnownPayload | None = None
     period: Annotated[Number | None, Field(alias="motion.period", gt=0.0)] = None
+    start: Annotated[Number | None, Field(alias="motion.start", ge=0.0)] = None
+    end: Annotated[Number | None, Field(alias="motion.end", gt=0.0)] = None
     assembly_mode: Annotated[
         Annotated[int, Field(ge=1, strict=True)] | None, Field(alias="motion.assembly_mode")
     ] = None
@@ -232,6 +238,10 @@ class Description:
         twice = next((name for i, name in enumerate(columns) if name in columns[:i]), None)
         if twice is not None:
             raise ValueError(f"columns: {shown(twice)} is named twice; each column has one meaning")
+        if self.end is not None and not (self.start or 0.0) < self.end:
+            raise ValueError(f"motion.end: {self.end:g} s is not behind motion.start")
+        if self.period is None and (self.start is not None or self.end is not None):
+            raise ValueError("motion.start, motion.end: are of a periodic part; give its period")
         return self
 
     @property

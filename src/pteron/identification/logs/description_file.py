@@ -39,8 +39,8 @@ def read_description(path: str | Path) -> Description:
     Its tables: ``[csv]`` separator, decimal, encoding, header_lines; ``[time]`` column, unit;
     ``[joints]`` (``[sliders]`` in older files) columns, unit, angle_unit; ``[forces]`` columns,
     unit, gains, limits; ``[pose]`` columns, length_unit, angle_unit; ``[payload]`` column, mass,
-    center_of_mass or first_moment, inertia; ``[motion]`` period, assembly_mode; ``[drives]``
-    rotor_inertia, ratio.
+    center_of_mass or first_moment, inertia; ``[motion]`` period, start, end, assembly_mode;
+    ``[drives]`` rotor_inertia, ratio.
 
     Raises
     ------
@@ -76,6 +76,11 @@ def write_description(description: Description, path: str | Path) -> Path:
     OutputError
         If the file cannot be written; one that was there is left as it was.
     """
+    return write_text(path, description_text(description))
+
+
+def description_text(description: Description) -> str:
+    """Return what `write_description` writes."""
     import tomlkit
 
     given = TypeAdapter(Description).dump_python(
@@ -89,4 +94,4 @@ def write_description(description: Description, path: str | Path) -> Path:
     document.add(tomlkit.comment("A log for Pteron: its columns, their units, what is known."))
     for name, entries in tables.items():
         document.add(name, tomlkit.item(entries))
-    return write_text(path, tomlkit.dumps(document))
+    return tomlkit.dumps(document)

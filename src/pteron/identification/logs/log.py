@@ -28,9 +28,9 @@ _POSE = ("x", "y", "z", "phi")
 _Phases = Int[np.ndarray, "*batch"]
 
 
-Kind = Literal["gap", "jitter", "clipped", "frozen", "spike", "guessed", "units"]
+Kind = Literal["gap", "jitter", "clipped", "frozen", "spike", "guessed", "units", "periodic"]
 """Missing samples, uneven steps, saturated forces, a channel that stops, single samples that stand
-out, a name or a unit guessed, a unit that looks wrong."""
+out, a name or a unit guessed, a unit that looks wrong, which rows repeat."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,51 @@
+"""The files of an excitation: motions as tables, each with the TOML file that describes its log."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from pteron.atomic import write_files
+from pteron.errors import OutputError
+from pteron.identification.excitation.layout import Layout
+from pteron.identification.excitation.movement import Movement
+from pteron.identification.logs import Description, find_description
+from pteron.identification.logs.description_file import description_text
+from pteron.tables import check_output, table_bytes
+
+_HELD_OUT = "-held-out"
+
+
+def motion_paths(path: str | Path, layout: Layout | None = None) -> tuple[Path, Path]:
+    """Return where a motion and the one to be held out go, after a check that they can be written.
+
+    Raises
+    ------
+    OutputError
+        If they cannot: a folder is missing, an ending unknown, or the TOML file beside one is a
+        folder or describes a machine.
+    """
+    dialect = None if layout is None else layout.dialect
+    first = check_output(path, dialect)
+    both = first, check_output(first.with_stem(first.stem + _HELD_OUT), dialect)
+    for one in both:
+        beside = one.with_suffix(".toml")
+        if beside.is_dir():
+            raise OutputError(f"{beside}: is a folder; name another file")
+        if beside.is_file() and find_description(one) is None:
+            raise OutputError(f"{beside}: describes a machine, and is kept; name another file")
+    return both
+
+
+def write_motions(
+    motions: Mapping[Path, tuple[Movement, Description]], layout: Layout, rate: float
+) -> list[Path]:
+    """Write motions and the descriptions of their logs, all of them or none.
+
+    Each is sampled so many times a second.
+    """
+    files: dict[Path, bytes] = {}
+    for path, (movement, description) in motions.items():
+        files[path] = table_bytes(layout.frame(movement, rate), path, layout.dialect)
+        files[path.with_suffix(".toml")] = description_text(description).encode()
+    return write_files(files)

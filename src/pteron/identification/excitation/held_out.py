@@ -1,0 +1,163 @@
+"""A motion of another kind to judge a model by: pick-and-place cycles within the same limits."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from pteron.errors import ModelError
+from pteron.identification.excitation.draws import is_clear, sizes
+from pteron.identification.excitation.limits import Limits
+from pteron.identification.excitation.margins import Margins, margins
+from pteron.identification.excitation.movement import State, state_of_platform
+from pteron.identification.signals.states import home
+from pteron.kernels import Array
+from pteron.manipulator import Manipulator
+from pteron.motion import pick_and_place
+from pteron.motion.cycle import Cycle, moves
+
+_LEAST_CYCLES = 4
+_LEAST_DURATION = 10.0
+"""How many cycles there are, and how long they take together, s, at least."""
+
+_DIRECTIONS = 12
+"""Directions across that are tried, all round."""
+
+_SAMPLES = 4000
+"""Samples of a cycle at which limits are looked at."""
+
+_CLEAR = 1e-4
+"""By what share of its size a limit is kept clear at those samples."""
+
+_SMALLER, _SLOWER = 0.9, 1.05
+"""Factors on size and duration of a cycle, until it keeps the limits."""
+
+_SMALLEST = 0.02
+"""Scale below which a cycle is none."""
+
+_AT_REST = 1e4
+"""Duration of a cycle in which nothing but gravity is felt, s."""
+
+
+@dataclass(frozen=True, eq=False)
+class RepeatedCycle:
+    """Pick-and-place cycles one after the other; each begins and ends at rest in the same pose.
+
+    Attributes
+    ----------
+    robot : Manipulator
+        The machine.
+    cycle : Cycle
+        Its path, over one unit of time.
+    length : float
+        How long a cycle takes, s.
+    count : int
+        How many there are.
+    """
+
+    robot: Manipulator
+    cycle: Cycle
+    length: float
+    count: int = 1
+
+    @property
+    def duration(self) -> float:
+        """How long they take together, s."""
+        return self.count * self.length
+
+    def states(self, times: Array) -> State:
+        """Return the motion of platform and joints at times (T,), s."""
+        pose, first, second = self.cycle.at(np.remainder(times / self.length, 1.0))
+        return state_of_platform(self.robot, pose, first / self.length, second / self.length**2)
+
+    def margins(self, limits: Limits, rate: float = 1000.0) -> Margins:
+        """Return how far a cycle stays from its limits, at ten times as many samples a second."""
+        once = replace(self, count=1)
+        return margins(once, limits, max(round(10.0 * rate * self.length), _SAMPLES))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return everything but the machine as plain data."""
+        cycle = self.cycle
+        return {
+            "count": self.count,
+            "length": self.length,
+            "scale": cycle.scale,
+            "around": cycle.around.tolist(),
+            "across": cycle.across.tolist(),
+            "up": cycle.up.tolist(),
+            "turn": cycle.scale * cycle.turn,
+        }
+
+
+def held_out_cycle(
+    robot: Manipulator, limits: Limits | None = None, rate: float = 1000.0
+) -> RepeatedCycle:
+    """Return pick-and-place cycles about the home pose that keep the limits of an excitation.
+
+    The standard cycle (`pteron.motion.pick_and_place`), across in the direction that moves every
+    joint most, is made smaller until its places keep their limits and the machine can stop
+    anywhere, then slower until it keeps those of speed, acceleration and force.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    limits : Limits, optional
+        What it keeps at every instant; by default `Limits.of` the machine.
+    rate : float
+        Samples a second: a cycle takes a whole number of them.
+
+    Raises
+    ------
+    ModelError
+        If no cycle fits.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.identification.excitation import Limits, held_out_cycle, margins
+    >>> cycles = held_out_cycle(pteron.load("delta"), Limits(speed=2.0))
+    >>> cycles.count >= 4, margins(cycles, Limits(speed=2.0)).kept
+    (True, True)
+    """
+    limits = limits or Limits.of(robot)
+    found = _standard(robot, min(limits.type_i, limits.type_ii))
+    cycle = found.cycle
+    while not is_clear(replace(found, length=_AT_REST), limits, _SAMPLES, _CLEAR):
+        cycle = replace(cycle, scale=_SMALLER * cycle.scale)
+        if cycle.scale < _SMALLEST:
+            raise ModelError(
+                f"no pick-and-place cycle of {robot.name} about its home pose keeps the limits; "
+                "loosen those that it barely keeps at rest",
+                subject=robot.name,
+            )
+        found = replace(found, cycle=cycle)
+    while not is_clear(found, limits, _SAMPLES, _CLEAR):
+        found = replace(found, length=_SLOWER * found.length)
+    length = math.ceil(rate * found.length) / rate
+    count = max(_LEAST_CYCLES, math.ceil(_LEAST_DURATION / length))
+    return replace(found, length=length, count=count)
+
+
+def _standard(robot: Manipulator, least: float) -> RepeatedCycle:
+    """Return the standard cycle, as large as it fits, across where it moves every joint most.
+
+    A joint that rests says nothing of its forces.
+    """
+    middle = np.array(home(robot))
+    found: list[tuple[float, RepeatedCycle]] = []
+    for across, up in moves(robot, None, _DIRECTIONS):
+        try:
+            fits = pick_and_place(robot, middle, direction=across, least=least)
+        except ModelError:
+            continue
+        cycle = Cycle(robot.platform, middle, across, up, fits.turn / fits.scale, fits.scale)
+        once = RepeatedCycle(robot, cycle, fits.duration)
+        joints = once.states(np.linspace(0.0, once.length, _SAMPLES)).joints
+        found.append((float((np.ptp(joints, axis=0) / sizes(robot, "joints")).min()), once))
+    if not found:
+        pick_and_place(robot, middle, least=least)  # says why there is none
+    return max(found, key=lambda one: one[0])[1]

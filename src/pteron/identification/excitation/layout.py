@@ -1,0 +1,168 @@
+"""How a motion is written for a controller: which columns, in which units, in what kind of CSV."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, cast, get_args
+
+import numpy as np
+import polars as pl
+
+from pteron.dynamics import drive_forces
+from pteron.errors import DataError, shown
+from pteron.identification.excitation.movement import Movement
+from pteron.identification.logs import Description
+from pteron.identification.logs.description import AngleUnit, LengthUnit, TimeUnit
+from pteron.manipulator import Manipulator
+from pteron.tables import Dialect
+
+Contents = Literal["all", "joints", "poses"]
+"""What a file holds beside time: everything, the joint coordinates, or the poses."""
+
+_PER_UNIT = {"ms": 1e3, "us": 1e6, "mm": 1e3, "um": 1e6, "deg": 180.0 / math.pi}
+_MOST_SAMPLES = 10_000_000
+_ROUNDING = 1e-6
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Columns and units of a motion's file; a log in the same layout is read by its TOML file.
+
+    Parameters
+    ----------
+    contents : {"all", "joints", "poses"}
+        Everything; or only time and joint coordinates, or time and poses.
+    joint_columns : sequence of n str, optional
+        What the joint coordinates are called, in the order of the legs.
+    length_unit : {"m", "mm", "um"}
+        Of sliders and poses. Rates and accelerations are in that unit a second, forces in N (N m).
+    angle_unit : {"rad", "deg"}
+        Of cranks and phi.
+    time_unit : {"s", "ms", "us"}
+        Of the column t.
+    separator : str, optional
+        Of a CSV file's cells: ``,`` unless given, and ``;`` with a decimal comma.
+    decimal : {".", ","}
+        The decimal sign.
+
+    Raises
+    ------
+    DataError
+        If a unit or sign is not known.
+    """
+
+    contents: Contents = "all"
+    joint_columns: Sequence[str] | None = None
+    length_unit: LengthUnit = "m"
+    angle_unit: AngleUnit = "rad"
+    time_unit: TimeUnit = "s"
+    separator: str | None = None
+    decimal: str = "."
+
+    def __post_init__(self) -> None:
+        for name, known in (
+            ("contents", Contents),
+            ("length_unit", LengthUnit),
+            ("angle_unit", AngleUnit),
+            ("time_unit", TimeUnit),
+        ):
+            given = getattr(self, name)
+            if given not in get_args(known):
+                raise DataError(f"{name}: {given!r} is not one of {', '.join(get_args(known))}")
+        if self.joint_columns is not None:
+            object.__setattr__(self, "joint_columns", tuple(self.joint_columns))
+        _ = self.dialect  # which refuses signs that cannot be
+
+    @property
+    def dialect(self) -> Dialect | None:
+        """How a CSV file is written; None as usual, so that a log's own dialect can be found."""
+        if self.separator is None and self.decimal == ".":
+            return None
+        separator = self.separator or (";" if self.decimal == "," else ",")
+        return Dialect(cast(Any, separator), cast(Any, self.decimal))
+
+    def description(self, robot: Manipulator) -> Description:
+        """Return what a log in this layout is described by.
+
+        Raises
+        ------
+        DataError
+            If the machine has another number of joints, or two columns would be called alike.
+        """
+        joints = {leg.joint.unit: self._unit(leg.joint.unit) for leg in robot.legs}
+        turns, poses = "phi" in robot.coordinates, self.contents != "joints"
+        found = Description(
+            csv=self.dialect,
+            time_unit=self.time_unit,
+            joint_columns=cast(Any, self.joint_columns),
+            joint_unit=cast(Any, joints.get("m", joints.get("rad"))),
+            joint_angle_unit=cast(Any, joints.get("rad") if len(joints) > 1 else None),
+            length_unit=self.length_unit if poses else None,
+            angle_unit=self.angle_unit if poses and turns else None,
+        )
+        found.check(robot)
+        names = ["t", *(name for name, _ in self._columns(robot))]
+        twice = next((name for k, name in enumerate(names) if name in names[:k]), None)
+        if twice is not None:
+            raise DataError(
+                f"columns: {shown(twice)} would be the name of two columns; choose another"
+            )
+        return found
+
+    def frame(self, movement: Movement, rate: float) -> pl.DataFrame:
+        """Return a movement from its beginning to its end, at so many samples a second.
+
+        Raises
+        ------
+        DataError
+            As `description`.
+        """
+        robot = movement.robot
+        self.description(robot)
+        ticks = np.arange(math.ceil(movement.duration * rate - _ROUNDING) + 1)
+        state = movement.states(ticks / rate)
+        values = {"joints": [state.joints], "poses": [state.pose]}.get(self.contents) or [
+            *(state.joints, state.pose, state.rates, state.accelerations),
+            *(state.velocity, state.acceleration, drive_forces(robot, *state[:3])),
+        ]
+        columns = {"t": np.asarray(ticks * self._factor("s") / rate, dtype=np.float64)}
+        for (name, unit), column in zip(self._columns(robot), np.hstack(values).T, strict=True):
+            columns[name] = column * self._factor(unit) + 0.0  # no minus zero
+        return pl.DataFrame(columns)
+
+    def _columns(self, robot: Manipulator) -> list[tuple[str, str]]:
+        """Return the columns behind t, and what they are in, in SI units."""
+        names = self.joint_columns or robot.joint_names
+        joints = [(name, leg.joint.unit) for name, leg in zip(names, robot.legs, strict=True)]
+        pose = [(name, "rad" if name == "phi" else "m") for name in robot.coordinates]
+        if self.contents != "all":
+            return joints if self.contents == "joints" else pose
+        found = joints + pose
+        for part in (joints, pose):
+            found += [(f"{order}{name}", unit) for order in ("d", "dd") for name, unit in part]
+        return found + [(name, "") for name in robot.force_names]
+
+    def _unit(self, si: str) -> str:
+        units = {"m": self.length_unit, "rad": self.angle_unit, "s": self.time_unit}
+        return units.get(si, si)
+
+    def _factor(self, si: str) -> float:
+        return _PER_UNIT.get(self._unit(si), 1.0)
+
+
+def check_sampling(period: float, rate: float, periods: int) -> None:
+    """Refuse, before any work, a period and samples a second that give no table."""
+    if not 0.0 < period < np.inf:
+        raise DataError(f"period: {period} s given, a number above 0 expected")
+    if not 0.0 < rate < np.inf:
+        raise DataError(f"rate: {rate} given, samples a second above 0 expected")
+    if periods < 1:
+        raise DataError(f"periods: {periods} given, 1 or more expected")
+    count = periods * period * rate
+    if not 0.5 < count <= _MOST_SAMPLES:
+        raise DataError(
+            f"rate: {rate:g} a second gives {count:.0f} samples in {periods * period:g} s; 1 to "
+            f"{_MOST_SAMPLES} are served"
+        )

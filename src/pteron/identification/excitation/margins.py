@@ -1,0 +1,193 @@
+"""How far a motion stays from its limits, at its tightest instants."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from pteron.equations.machine import closure_of
+from pteron.errors import ModelError
+from pteron.identification.excitation.limits import (
+    PER_JOINT,
+    Limits,
+    drive_load,
+    joint_sizes,
+    per_joint,
+    unit_of,
+)
+from pteron.identification.excitation.movement import Movement, State
+from pteron.identification.signals.states import home
+from pteron.kernels import Array
+from pteron.kinematics.evaluate import unchecked
+from pteron.kinematics.singularities import best_type_ii
+from pteron.manipulator import Manipulator
+from pteron.workspace.limits import limited_joints
+from pteron.workspace.reserve import clearances
+
+_REFINED = 33
+"""Samples between the neighbours of the tightest sample, for its exact place."""
+
+
+@dataclass(frozen=True)
+class Margin:
+    """How near a motion comes to one limit.
+
+    Attributes
+    ----------
+    limit : str
+        The name of the limit, a field of `Limits`.
+    least : float
+        What is left of it at the tightest instant, in `unit`; below 0 it is violated.
+    leg : int or None
+        The leg it happens to, counted from 1; None for the platform's orientation.
+    time : float
+        When, s.
+    unit : str
+        The unit of `least`.
+    """
+
+    limit: str
+    least: float
+    leg: int | None
+    time: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Margins:
+    """The least margin to every limit that is in force.
+
+    Attributes
+    ----------
+    each : tuple of Margin
+        One for each limit.
+    samples : int
+        Instants of the motion that were looked at; near the tightest ones, many more.
+    """
+
+    each: tuple[Margin, ...]
+    samples: int
+
+    @property
+    def kept(self) -> bool:
+        """Whether no limit is violated."""
+        return all(margin.least >= 0.0 for margin in self.each)
+
+    def __iter__(self) -> Iterator[Margin]:
+        return iter(self.each)
+
+    def __getitem__(self, limit: str) -> Margin:
+        return {margin.limit: margin for margin in self.each}[limit]
+
+
+def margins(motion: Movement, limits: Limits, samples: int = 4000) -> Margins:
+    """Return how far a motion stays from its limits.
+
+    Parameters
+    ----------
+    motion : FourierMotion or another movement
+        The motion; a `FourierMotion`, a `LedMotion` or a `RepeatedCycle`.
+    limits : Limits
+        What it is to keep.
+    samples : int
+        Instants, evenly over the motion, at which every limit is looked at.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.identification.excitation import Limits, margins, random_excitation
+    >>> motion = random_excitation(pteron.load("tripteron"), harmonics=2, seed=1)
+    >>> margins(motion, Limits()).kept
+    True
+    """
+    times, step = np.linspace(0.0, motion.duration, samples, retstep=True)
+    found = []
+    coarse = _margins_of(motion.robot, limits, motion.states(times))
+    for name, values in coarse.items():
+        tightest = times[int(values.min(axis=-1).argmin())]
+        near = tightest + np.linspace(-step, step, _REFINED)
+        values = _margins_of(motion.robot, limits, motion.states(near))[name]
+        k, leg = np.unravel_index(int(values.argmin()), values.shape)
+        found.append(
+            Margin(
+                name,
+                float(values[k, leg]),
+                None if name == "type_ii" else int(leg) + 1,
+                float(near[k] % motion.duration),
+                unit_of(motion.robot, name, int(leg)),
+            )
+        )
+    return Margins(tuple(found), samples)
+
+
+def relative_margins(motion: Movement, limits: Limits, times: Array) -> dict[str, Array]:
+    """Return the margins at times (T,), each over its limit's size: (T, n), or (T, 1)."""
+    robot = motion.robot
+    # Half its range for a joint, 1 for the two measures, else the limit itself.
+    sizes = {name: per_joint(limits, name, robot) for name in PER_JOINT}
+    sizes["joint_clearance"] = joint_sizes(robot)
+    found = _margins_of(robot, limits, motion.states(times))
+    relative = {}
+    for name, values in found.items():
+        size = np.broadcast_to(sizes.get(name, 1.0), values.shape[1:])
+        # Of no limit all is left.
+        relative[name] = np.divide(
+            values, size, out=np.full(values.shape, np.inf), where=np.isfinite(size)
+        )
+    return relative
+
+
+def check_rest(robot: Manipulator, home: Array, limits: Limits) -> None:
+    """Refuse limits that the machine at rest in its home pose does not keep, naming the limit."""
+    zero = np.zeros_like(home)
+    rest = State(home, zero, zero, unchecked(robot, "joint_coordinates", home), zero, zero)
+    rows = State(*(value[None] for value in rest))
+    for name, values in _margins_of(robot, limits, rows).items():
+        leg = int(values[0].argmin())
+        left = values[0, leg]
+        if left > 0.0:
+            continue
+        whose = "the platform" if name == "type_ii" else f"leg {leg + 1}"
+        given = getattr(limits, name)
+        if name == "force":
+            wanted, has = f"at most {given}", per_joint(limits, name, robot)[leg] - left
+        else:
+            wanted, has = f"at least {given:g}", given + left
+        raise ModelError(
+            f"limits: {name} of {wanted} {unit_of(robot, name, leg)}".rstrip()
+            + f" is impossible: {whose} of {robot.name} has {has:.4g} at rest in the home pose, "
+            "the best one; loosen it"
+        )
+
+
+@lru_cache(maxsize=64)
+def _limits_passive(robot: Manipulator) -> bool:
+    """Return whether any passive joint has limits."""
+    joints = limited_joints(robot, np.array(home(robot)))
+    return not all(joint.actuated for joint in joints)
+
+
+def _margins_of(robot: Manipulator, limits: Limits, state: State) -> dict[str, Array]:
+    """Return every limit's margins (T, n) or (T, 1), -inf where the machine cannot be."""
+    found = {"type_i": unchecked(robot, "reach", state.pose)[1] - limits.type_i}
+    if closure_of(robot).vanishes() is None or robot.platform.turns:
+        type_ii = np.abs(unchecked(robot, "type_ii", state.pose))[:, None]
+        found["type_ii"] = type_ii / best_type_ii(robot) - limits.type_ii
+    if any(leg.limits for leg in robot.legs):
+        found["joint_clearance"] = clearances(robot, state.joints) - limits.joint_clearance
+    if _limits_passive(robot):
+        room = unchecked(robot, "passive_room", state.pose)[0]
+        found["passive_clearance"] = room - limits.passive_clearance
+    found["speed"] = per_joint(limits, "speed", robot) - np.abs(state.rates)
+    found["acceleration"] = per_joint(limits, "acceleration", robot) - np.abs(state.accelerations)
+    if limits.force is not None:
+        drives, still = drive_load(robot), np.zeros_like(state.pose)
+        moving = unchecked(robot, "inverse_dynamics", *state[:3])
+        moving = moving + drives.inertia * state.accelerations + drives.viscous * state.rates
+        held = unchecked(robot, "inverse_dynamics", state.pose, still, still)
+        needed = np.maximum(np.abs(moving + drives.offset), np.abs(held + drives.offset))
+        found["force"] = per_joint(limits, "force", robot) - drives.dry - needed
+    return {name: np.where(np.isnan(values), -np.inf, values) for name, values in found.items()}

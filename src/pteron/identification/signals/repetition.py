@@ -1,0 +1,89 @@
+"""The part of a log that repeats: a periodic motion between lead-in and lead-out, and rest."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from scipy.interpolate import make_interp_spline  # type: ignore[import-untyped]
+from scipy.ndimage import binary_closing  # type: ignore[import-untyped]
+
+from pteron.identification.signals.filters import position_noise
+from pteron.kernels import Array
+
+_NOISE = 6.0
+"""Positions that are apart by less than so many times their noise are the same."""
+
+_ROUNDING = 1e-6
+"""They are so by less than this part of their span, too."""
+
+_SPIKES = 10
+"""Samples in a row that may be elsewhere."""
+
+_MOVES = 0.5
+"""Share of each joint's span that it goes through in the part: at rest all repeats."""
+
+_LONGER = 0.002
+"""Part of a period by which the stretch is longer than one, at least: a motion that crosses its own
+way is there again for an instant."""
+
+_WHOLE = 0.02
+"""Part of a period that may be missing from the last one."""
+
+
+def repeating_rows(time: Array, joints: Array, period: float) -> slice | None:
+    """Return the rows of the longest stretch that repeats after a period, or None.
+
+    The clock of the log does not matter: what counts is that the joints are after the period where
+    they were, to within their noise. Whole periods are returned, in the middle of the stretch.
+
+    Parameters
+    ----------
+    time : array, shape (T,)
+        s, rising.
+    joints : array, shape (T, n)
+        Joint coordinates, m or rad.
+    period : float
+        s.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from pteron.identification.signals.repetition import repeating_rows
+    >>> t = np.arange(800) / 100  # rest for 1 s, three swings of 2 s, and rest again
+    >>> swings = np.cos(np.pi * np.clip(t - 1.0, 0.0, 6.0))
+    >>> repeating_rows(t, swings[:, None], 2.0)
+    slice(100, 700, None)
+    """
+    last = int(np.searchsorted(time, time[-1] - period, side="right"))
+    if last < 2:
+        return None
+    rate = (len(time) - 1) / float(time[-1] - time[0])
+    after = make_interp_spline(time, joints, k=5)(time[:last] + period)
+    span = np.ptp(joints, axis=0)
+    near = np.maximum(_NOISE * position_noise(joints), _ROUNDING * span)
+    same = (np.abs(after - joints[:last]) <= near).all(axis=1)
+    ends = np.pad(same, _SPIKES, mode="edge")
+    same = binary_closing(ends, np.ones(_SPIKES + 1))[_SPIKES:-_SPIKES]
+
+    best: tuple[float, float] | None = None
+    for start, stop in _runs(same):
+        begin, end = float(time[start]), float(time[stop - 1]) + period
+        through = joints[start : int(np.searchsorted(time, end, side="right"))]
+        moves = (np.ptp(through, axis=0) >= _MOVES * span).all() and span.all()
+        lasts = time[stop - 1] - time[start] >= _LONGER * period
+        if moves and lasts and (best is None or end - begin > best[1] - best[0]):
+            best = begin, end
+    if best is None:
+        return None
+    begin, end = best
+    periods = max(int((end - begin) / period + _WHOLE), 1)
+    begin = max(begin + 0.5 * (end - begin - periods * period), begin)
+    first = int(np.searchsorted(time, begin - 0.5 / rate))
+    return slice(first, int(np.searchsorted(time, begin + periods * period - 0.5 / rate)))
+
+
+def _runs(true: Array) -> list[tuple[int, int]]:
+    """Return where each run of what is true starts, and where it stops."""
+    edges = np.flatnonzero(np.diff(np.r_[False, true, False])).tolist()
+    return list(pairwise(edges))[::2]
