@@ -8,22 +8,29 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter  # type: ignore[import-untyped]
 
 from pteron.identification.model import Model
 from pteron.identification.observation import in_motion
 from pteron.identification.recordings import Recording
 from pteron.identification.signals import Preprocessing, samples
-from pteron.identification.signals.filters import MEDIAN_SIZE
 from pteron.kernels import Array
 
 _KEPT = 6000
 """Samples that are kept to be looked at."""
 
 _STANDS_OUT = 7.0
-"""What a sample is missed by, over what is usual, beyond which it is not of the same kind."""
+"""How far from those around it, over the noise, an error stands out."""
 
-_FEW = 0.05
-"""Share of the samples beyond which what stands out is no exception."""
+_AROUND = 9
+"""Samples around an error, and it."""
+
+_LEAST_NOISE = 1e-3
+"""Noise of a force, over its size, that counts as at least."""
+
+_RARE, _FEW = 1e-3, 0.05
+"""Shares of the samples up to which what stands out may be chance, and from which it is no
+exception."""
 
 _FRICTION = ("coulomb", "viscous", "stribeck", "offset")
 
@@ -54,7 +61,8 @@ class Prediction:
         The same over every sample, with all terms, N.
     robust_error, outliers : array, shape (n,)
         Root mean square of what it misses without samples that stand out, N, and their share: they
-        miss by more than seven times what is usual, and are fewer than 5 %, or there are none.
+        are missed by seven times the noise more than those around them. Up to 0.1 % may be chance
+        and beyond 5 % they are no exception: then there are none.
     noise : array, shape (n,)
         Standard deviation of the white noise on the measured forces, N: no model can do better.
     time : array, shape (S,)
@@ -141,7 +149,7 @@ def predict(
     plain = values.copy()
     plain[[k for k, kind in enumerate(model.kinds) if kind in _FRICTION]] = 0.0
     counts, total = np.zeros(n), 0
-    sums = np.zeros((5, n))
+    sums = np.zeros((7, n))
     shown: list[Array] = []
     step = max(recording.rows // _KEPT, 1)
     for block in samples(model.robot, recording.samples(progress), preprocessing):
@@ -150,12 +158,16 @@ def predict(
         predicted, without = matrix @ values, matrix @ plain
         used = in_motion(states.joint_rates, preprocessing.slow, preprocessing.turning)
         error, bare = measured - predicted, measured - without
+        least = _LEAST_NOISE * np.sqrt((measured**2).mean(axis=0))
+        out = used * _stands_out(error, np.maximum(preprocessing.force_noise, least))
         sums += [
             measured.sum(axis=0),
             (measured**2).sum(axis=0),
             (used * error**2).sum(axis=0),
             (used * bare**2).sum(axis=0),
             (error**2).sum(axis=0),
+            (out * error**2).sum(axis=0),
+            out.sum(axis=0),
         ]
         counts += used.sum(axis=0)
         rows = slice(-total % step, None, step)
@@ -167,7 +179,10 @@ def predict(
     mean = sums[0] / total
     seen = np.maximum(counts, 1.0)
     error = np.sqrt(sums[2] / seen)
-    robust, outliers = _without_outliers(parts[0] - parts[1], parts[4] > 0.0, error)
+    share = sums[6] / seen
+    outliers = np.where((share > _RARE) & (share < _FEW), share, 0.0)
+    rest = (sums[2] - sums[5]) / np.maximum(counts - sums[6], 1.0)
+    robust = np.where(outliers > 0.0, np.sqrt(np.maximum(rest, 0.0)), error)
     return Prediction(
         source=recording.source,
         samples=total,
@@ -188,15 +203,10 @@ def predict(
     )
 
 
-def _without_outliers(misses: Array, used: NDArray[np.bool_], error: Array) -> tuple[Array, Array]:
-    """Return the root mean square (n,) of misses (S, n) without outliers, and the latter's share.
+def _stands_out(error: Array, noise: Array) -> NDArray[np.bool_]:
+    """Return which errors (R, n) are far from those around them, for noise (n,).
 
-    `error` (n,) is that of all samples.
+    What is missed for longer than a few samples is no outlier, but not understood.
     """
-    sizes = np.where(used | ~used.any(axis=0), np.abs(misses), np.nan)
-    usual = np.nanmedian(sizes, axis=0) / MEDIAN_SIZE
-    out = sizes > _STANDS_OUT * usual
-    share = out.sum(axis=0) / np.maximum(used.sum(axis=0), 1)
-    few = (share > 0.0) & (share < _FEW)
-    rest = np.sqrt(np.nanmean(np.where(out, np.nan, sizes) ** 2, axis=0))
-    return np.where(few, np.minimum(rest, error), error), np.where(few, share, 0.0)
+    around = median_filter(error, size=(_AROUND, 1), mode="nearest")
+    return np.asarray(np.abs(error - around) > _STANDS_OUT * noise)

@@ -43,6 +43,12 @@ _SEEN = 1e-3
 _AS_WELL = 0.7
 """Share of the clearest fault's statistic with which one of fewer sizes is taken in its place."""
 
+_ENOUGH = 2
+"""Equations for each value, from which residuals tell of more values."""
+
+_BESIDE = 0.1
+"""Share of the first fault's statistic that another one has at least."""
+
 _LENGTH = 0.05
 """Error of the geometry, over the legs' size, beyond which it is another fault, told badly."""
 
@@ -246,6 +252,7 @@ def _searched(suspects: Suspects, observations: Observations) -> tuple[Estimate,
     p = len(suspects.model.names)
     named: list[_Named] = []
     taken: list[int] = []
+    first = 0.0
     plain = weighted(observations.columns(range(p)))
     while len(named) < _MOST:
         clear = []
@@ -255,10 +262,12 @@ def _searched(suspects: Suspects, observations: Observations) -> tuple[Estimate,
             one, wald = _taken_in(suspects, observations, [*taken, k])
             if one is not None and one.chance < _CHANCE and _is_possible(one, suspects):
                 clear.append((wald, k, one))
-        if not clear:
+        best = max((wald for wald, _, _ in clear), default=0.0)
+        first = first or best
+        # What is left beside a clear fault may be its own shape, which no column has exactly.
+        if not best > _BESIDE * first:
             break
         # Of those that explain as much, the one of fewest sizes.
-        best = max(clear, key=lambda item: item[0])[0]
         _, k, one = min(
             (item for item in clear if item[0] >= _AS_WELL * best),
             key=lambda item: (len(item[2].sizes), -item[0]),
@@ -286,7 +295,7 @@ def _taken_in(
         parts.append(observations.matrix[..., places] @ mixes[-1])
         known = np.hstack([known, np.linalg.qr(new @ seen)[0]])
     q = mixes[-1].shape[1]
-    if q == 0:
+    if q == 0 or observations.rows < _ENOUGH * (p + q):
         return None, 0.0
     matrix = np.concatenate(parts, axis=-1)
     names = tuple(map(str, range(matrix.shape[-1])))

@@ -1,0 +1,363 @@
+"""Logs with one fault each: what `identify` says, and how far a pick-and-place cycle is off.
+
+A machine 20 % off its drawing moves along random Fourier series; its joints have friction, encoders
+round and 1 % of each force is noise. One fault is put in, the log is identified with another motion
+held out, and the model file's forces are compared with the machine's on a cycle as fast as the
+motion. Printed, and written to FAULTS.md beside this file: grades, what was named, and that error.
+
+    python benchmarks/identification/faults.py [--seeds 5] [--jobs 2] [MACHINE ...]
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from scipy.interpolate import interp1d
+from scipy.signal import lfilter
+
+import pteron
+from pteron import atomic
+from pteron.bodies.parameters import body_places
+from pteron.identification import Limits, Log, LogError, States, identify, random_excitation
+from pteron.identification.excitation import FourierMotion
+from pteron.identification.faults.cycle import Cycle, Extent
+from pteron.kernels import Array
+from pteron.legs import Drive, Stribeck
+from pteron.manipulator import parameter_data
+from pteron.workspace import home_pose
+
+_RATE = 1000.0
+_NOISE = 0.01
+"""Of each force's root mean square."""
+
+_TWENTY_BITS = 2.0 * np.pi / 2**20
+
+
+@dataclass(frozen=True)
+class Usual:
+    """How a machine is driven: dry and viscous friction, encoder, and limits of its joints."""
+
+    dry: float
+    viscous: float
+    encoder: float
+    speed: float
+    acceleration: float
+    period: float
+
+
+MACHINES = {
+    "quadrupteron": Usual(6.0, 4.0, 1e-6, 0.8, 8.0, 5.0),
+    "delta": Usual(4.0, 1.0, _TWENTY_BITS, 6.0, 80.0, 5.0),
+    "par4": Usual(0.2, 0.05, _TWENTY_BITS, 10.0, 120.0, 4.0),
+}
+
+
+@dataclass
+class Case:
+    """A machine as built and what it records; a fault changes some of it."""
+
+    usual: Usual
+    rng: np.random.Generator
+    robot: pteron.Manipulator
+    motion: FourierMotion
+    time: Array
+    joints: Array
+    forces: Array
+    seed: int
+
+    @property
+    def actuator(self) -> int:
+        """The actuator that a fault of one is of."""
+        return self.seed % self.forces.shape[1]
+
+
+def as_built(name: str, seed: int) -> pteron.Manipulator:
+    """Return a machine whose bodies are up to 20 % denser or lighter than drawn, with friction."""
+    robot, usual = pteron.load(name), MACHINES[name]
+    rng = np.random.default_rng(seed)
+    sizes = [len(place) for place in body_places(parameter_data(robot)).values()]
+    factors = rng.uniform(0.8, 1.2, len(sizes)).repeat(sizes)
+    built = pteron.with_parameters(robot, pteron.parameters(robot) * factors)
+    return with_friction(built, usual)
+
+
+def with_friction(
+    robot: pteron.Manipulator, usual: Usual, *, share: float = 1.0, stribeck: bool = False
+) -> pteron.Manipulator:
+    """Return the machine with friction, `share` of the usual dry friction, that falls or not."""
+    legs = []
+    for k, leg in enumerate(robot.legs):
+        dry = share * usual.dry * (1.0 + 0.15 * k)
+        law = Stribeck(0.5 * dry, 0.05 * usual.speed) if stribeck else None
+        drive = Drive(dry, usual.viscous * (1.0 + 0.2 * k), 0.1 * k * usual.dry, stribeck=law)
+        legs.append(replace(leg, drive=drive))
+    return replace(robot, legs=tuple(legs))
+
+
+@lru_cache
+def excitation(name: str, seed: int) -> FourierMotion:
+    """Return a random motion within the machine's limits."""
+    usual = MACHINES[name]
+    limits = Limits(usual.speed, usual.acceleration, type_i=0.3)
+    return random_excitation(
+        pteron.load(name), harmonics=5, period=usual.period, limits=limits, seed=seed
+    )
+
+
+# Faults of the machine, put in before it moves -------------------------------------------------
+
+
+def other_geometry(robot: pteron.Manipulator, rng: np.random.Generator) -> pteron.Manipulator:
+    """Return the machine with every length and point 1 mm off, in a direction at random."""
+    legs = []
+    for leg in robot.legs:
+        changed = {}
+        for name, key in leg.every_key().items():
+            if key.role == "point" and name != "fixed_offset":
+                way = rng.normal(size=3)
+                changed[name] = tuple(getattr(leg, name) + 1e-3 * way / np.linalg.norm(way))
+            elif key.role == "length":
+                changed[name] = getattr(leg, name) + 1e-3 * rng.choice((-1, 1))
+        legs.append(replace(leg, **changed))
+    return replace(robot, legs=tuple(legs))
+
+
+def tilted(robot: pteron.Manipulator, rng: np.random.Generator) -> pteron.Manipulator:
+    """Return the machine with gravity 2 degrees off, towards anywhere."""
+    g = np.array(robot.gravity)
+    across = np.cross(g, rng.normal(size=3))
+    across *= np.linalg.norm(g) / np.linalg.norm(across)
+    angle = np.radians(2.0)
+    return replace(robot, gravity=tuple(np.cos(angle) * g + np.sin(angle) * across))
+
+
+MACHINE_FAULTS: dict[str, Callable[[pteron.Manipulator, Case], pteron.Manipulator]] = {
+    "geometry 1 mm off": lambda robot, case: other_geometry(robot, case.rng),
+    "gravity 2 degrees off": lambda robot, case: tilted(robot, case.rng),
+    "Stribeck friction": lambda robot, case: with_friction(robot, case.usual, stribeck=True),
+}
+
+
+# Faults of the log, put into what was recorded -------------------------------------------------
+
+
+def late(milliseconds: float) -> Callable[[Case], None]:
+    """Return what makes the forces of a log late."""
+
+    def change(case: Case) -> None:
+        ends = case.forces[0], case.forces[-1]
+        at = interp1d(case.time, case.forces, axis=0, bounds_error=False, fill_value=ends)
+        case.forces = at(case.time - 1e-3 * milliseconds)
+
+    return change
+
+
+def scaled(case: Case) -> None:
+    """Make one force 7 % too large."""
+    case.forces[:, case.actuator] *= 1.07
+
+
+def drifting(case: Case) -> None:
+    """Let dry friction begin 30 % higher than it ends."""
+    more = forces_of(with_friction(case.robot, case.usual, share=1.3), case)
+    later = (case.time / case.time[-1])[:, None]
+    case.forces += (more - forces_of(case.robot, case)) * (1.0 - later)
+
+
+def elastic(case: Case) -> None:
+    """Measure motors whose drives give, so that they swing at 25 Hz while the joints are held."""
+    pose, velocity, acceleration = states_of(case.robot, case)
+    load = pteron.inverse_dynamics(case.robot, pose, velocity, acceleration)
+    seconds = np.gradient(np.gradient(case.joints, case.time, axis=0), case.time, axis=0)
+    inertia = load.std(axis=0) / seconds.std(axis=0)
+    case.joints = case.joints + load / (inertia * (2.0 * np.pi * 25.0) ** 2)
+
+
+LOG_FAULTS: dict[str, Callable[[Case], None]] = {
+    "delay 3 ms": late(3.0),
+    "delay 8 ms": late(8.0),
+    "one force 7 % too large": scaled,
+    "friction drifts by 30 %": drifting,
+    "elastic drives": elastic,
+}
+NOISE_FAULTS = ("1 % outliers", "coloured noise")
+CASES = (
+    "none",
+    "delay 3 ms",
+    "delay 8 ms",
+    "1 % outliers",
+    "one force 7 % too large",
+    "gravity 2 degrees off",
+    "geometry 1 mm off",
+    "Stribeck friction",
+    "friction drifts by 30 %",
+    "coloured noise",
+    "elastic drives",
+    "motion of a tenth",
+)
+CORRECT = ("none", "coloured noise", "motion of a tenth")
+"""Cases without a fault."""
+
+
+def noise(fault: str, shape: tuple[int, int], rng: np.random.Generator) -> Array:
+    """Return noise of unit variance, coloured if that is the case, or with outliers."""
+    white = rng.normal(size=shape)
+    if fault == "coloured noise":
+        return lfilter([np.sqrt(1.0 - 0.9**2)], [1.0, -0.9], white, axis=0)
+    if fault == "1 % outliers":
+        sizes = rng.uniform(10.0, 60.0, shape) * rng.choice((-1.0, 1.0), shape)
+        return white + (rng.random(shape) < 0.01) * sizes
+    return white
+
+
+# A log, and what is made of it -----------------------------------------------------------------
+
+
+def commanded(case: Case) -> tuple[Array, Array, Array]:
+    """Return coordinates, rates and accelerations of the joints, by the drawn geometry."""
+    moved, drawn = case.motion.at(case.time), case.motion.robot
+    rates = pteron.joint_rates(drawn, moved.pose, moved.velocity)
+    seconds = pteron.joint_accelerations(drawn, moved.pose, moved.velocity, moved.acceleration)
+    return pteron.inverse_kinematics(drawn, moved.pose), rates.actuated, seconds.actuated
+
+
+def states_of(robot: pteron.Manipulator, case: Case) -> tuple[Array, Array, Array]:
+    """Return the platform's motion on a machine whose joints move as commanded."""
+    states = States.of_joints(robot, commanded(case), case.time, home_pose(robot))
+    return states.pose, states.velocity, states.acceleration
+
+
+def forces_of(robot: pteron.Manipulator, case: Case) -> Array:
+    """Return the drives' forces along the case's motion."""
+    return pteron.drive_forces(robot, *states_of(robot, case))
+
+
+def recorded(name: str, fault: str, seed: int, *, other: bool = False) -> tuple[Log, Case]:
+    """Return a log with a fault, or another motion of the same machine, and the case."""
+    usual = MACHINES[name]
+    rng = np.random.default_rng((seed, CASES.index(fault)))
+    motion = excitation(name, seed + 50 * other)
+    if fault == "motion of a tenth":
+        sizes = motion.coefficients.copy()
+        sizes[1:] *= 0.1
+        motion = motion.with_coefficients(sizes)
+    time = np.arange(round(3.0 * usual.period * _RATE)) / _RATE
+    joints = pteron.inverse_kinematics(motion.robot, motion.at(time).pose)
+    case = Case(usual, rng, as_built(name, seed), motion, time, joints, joints, seed)
+    if fault in MACHINE_FAULTS:
+        case.robot = MACHINE_FAULTS[fault](case.robot, case)
+    case.forces = forces_of(case.robot, case)
+    if fault in LOG_FAULTS:
+        LOG_FAULTS[fault](case)
+    case.rng = np.random.default_rng((seed, other))
+    size = np.sqrt((case.forces**2).mean(axis=0))
+    forces = case.forces + _NOISE * size * noise(fault, case.forces.shape, case.rng)
+    coded = np.round(case.joints / usual.encoder) * usual.encoder
+    names = {"symbols": tuple(leg.joint for leg in motion.robot.legs)}
+    return Log("held-out.csv" if other else "log.csv", time, coded, forces, **names), case
+
+
+@dataclass(frozen=True)
+class Said:
+    """What was said of one log, and how far a cycle's forces are off (%)."""
+
+    grade: str
+    faults: tuple[str, ...]
+    off: float
+
+
+def judged(name: str, fault: str, seed: int) -> Said:
+    """Identify a log, and compare the model file's forces with the machine's."""
+    log, case = recorded(name, fault, seed)
+    held, _ = recorded(name, fault, seed, other=True)
+    try:
+        found = identify(pteron.load(name), log, held_out=held)
+    except LogError as error:
+        return Said("refused", (error.reason,), np.nan)
+    _, rates, seconds = commanded(case)
+    pose = case.motion.at(case.time).pose.mean(axis=0)
+    extent = Extent(pose, np.abs(rates).max(axis=0), np.abs(seconds).max(axis=0))
+    cycle = Cycle.within(case.motion.robot, extent)
+    assert cycle is not None
+    assert found.machine is not None
+    s = cycle.states
+    joints = s.joints, s.joint_rates, s.joint_accelerations
+    true = States.of_joints(case.robot, joints, s.time, tuple(s.pose[0]))
+    forces = pteron.drive_forces(case.robot, true.pose, true.velocity, true.acceleration)
+    told = pteron.drive_forces(found.machine, s.pose, s.velocity, s.acceleration)
+    named: tuple[str, ...] = tuple(one.fault for one in found.trial.suspicions if one.matters)
+    if any((one.outliers > 0.0).any() for one in found.held_out):
+        named = (*named, "outliers")
+    return Said(found.verdict.grade, named, float(cycle.share(told - forces, forces).max()))
+
+
+def cell(said: list[Said]) -> str:
+    """Return what was said of some logs, in short."""
+    grades = Counter(one.grade for one in said)
+    faults = Counter(fault for one in said for fault in one.faults)
+    parts = [", ".join(f"{count} {grade}" for grade, count in grades.items())]
+    if faults:
+        parts.append(", ".join(f"{fault} {count}" for fault, count in faults.items()))
+    if not np.isnan(off := [one.off for one in said]).all():
+        parts.append(f"{np.nanmin(off):.2g} to {np.nanmax(off):.2g} %")
+    return "<br>".join(parts)
+
+
+def main() -> None:
+    """Run the benchmark."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("machines", nargs="*", default=list(MACHINES))
+    parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--jobs", type=int, default=2)
+    asked = parser.parse_args()
+    keys = [(m, f, s) for m in asked.machines for f in CASES for s in range(asked.seeds)]
+    with ProcessPoolExecutor(asked.jobs) as pool:
+        said = dict(zip(keys, pool.map(judged, *zip(*keys, strict=True)), strict=True))
+    lines = [
+        f"| fault | {' | '.join(asked.machines)} |",
+        "| --- |" + " --- |" * len(asked.machines),
+    ]
+    for fault in CASES:
+        cells = [
+            cell([said[machine, fault, seed] for seed in range(asked.seeds)])
+            for machine in asked.machines
+        ]
+        lines.append(f"| {fault} | {' | '.join(cells)} |")
+    bad = [key for key, one in said.items() if one.grade == "trustworthy" and one.off > 3.0]
+    accused = [
+        key
+        for key, one in said.items()
+        if key[1] in CORRECT and one.faults[:1] != () and one.grade != "refused"
+    ]
+    lines += [
+        "",
+        f"Trustworthy, but a cycle is more than 3 % off: {bad or 'none'}.",
+        f"Correct logs of which a fault was named: {accused or 'none'}.",
+    ]
+    text = "\n".join(lines)
+    print(text)
+    if asked.machines == list(MACHINES):
+        atomic.write_text(
+            Path(__file__).with_name("FAULTS.md"), _HEAD.format(asked.seeds) + text + "\n"
+        )
+
+
+_HEAD = """# What identify says of logs with a fault
+
+`python benchmarks/identification/faults.py`, {} logs a cell. A machine 20 % off its drawing moves
+along random Fourier series, 15 s (Par4: 12 s) at 1 kHz, with friction, encoders (1 um, or 20 bits a
+turn) and noise of 1 % of each force; another motion is held out. Each cell: grades; what was named,
+and in how many logs; how far the model file's forces are off on a pick-and-place cycle as fast as
+the motion (largest of the actuators, percent of the forces' standard deviation).
+
+"""
+
+if __name__ == "__main__":
+    main()
