@@ -13,7 +13,8 @@ import polars as pl
 
 from pteron.atomic import write_bytes
 from pteron.errors import DataError, OutputError, shown
-from pteron.tables.csv_file import CsvFile, Dialect
+from pteron.tables.csv_file import CsvFile
+from pteron.tables.dialect import Dialect
 from pteron.tables.parquet_file import ParquetFile
 from pteron.tables.table import Table, listed, typed
 
@@ -35,7 +36,8 @@ def open_table(
     noun : str
         What messages call such files.
     dialect : Dialect, optional
-        How a CSV file is written, where a TOML file beside it may declare that.
+        How a CSV file is written, as far as that is declared; the rest is found. By default it must
+        be plain.
 
     Raises
     ------

@@ -1,57 +1,55 @@
-"""Which columns of a file hold what, and in which unit: declared, documented or guessed."""
+"""Which columns of a file hold what, and in which unit: declared, documented or taken by name."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from pteron.errors import DataError, shown
 from pteron.identification.logs.description import Description, joint_symbols
 from pteron.identification.logs.log import Finding
-from pteron.manipulator import Manipulator
-from pteron.tables import listed
-
-_DRIVE = {"a": "A", "v": "V", "%": "%"}
-_UNITS = {
-    "s": {"s": "s", "sec": "s", "ms": "ms", "us": "us", "µs": "us"},
-    "m": {"m": "m", "mm": "mm", "um": "um", "µm": "um"},
-    "rad": {"rad": "rad", "deg": "deg", "°": "deg"},
-    "N": {"n": "N"} | _DRIVE,
-    "N m": {"nm": "N m", "n m": "N m", "n*m": "N m", "n·m": "N m"} | _DRIVE,
-}
-"""Spellings of the units, in small letters, by the SI unit of what they measure."""
-
-_WORDS: dict[str, tuple[str, ...]] = {
-    "t": ("t", "time", "timestamp"),
-    "rho": ("rho", "q", "s", "joint"),
-    "theta": ("theta", "q", "angle", "crank"),
-    "force": ("force", "f", "tau", "current", "i"),
-    "torque": ("torque", "moment", "tau", "current", "i"),
-}
-"""What columns are called, by the documented word."""
-_CURRENTS = ("current", "i")
-
-_NAME = re.compile(
-    r"(?P<stem>(?P<word>[a-z]+)[ _]?)(?P<number>[1-9]\d*)?"
-    r"(?P<tail>(?:[ _]*[\[(] *(?P<inside>[^\])]+?) *[\])]|[ _](?P<behind>[^\d\W]+|[%°]))?)",
-    re.IGNORECASE,
+from pteron.identification.logs.names import (
+    CURRENTS,
+    RATED,
+    Called,
+    called,
+    means,
+    stamp_columns,
+    unit_called,
 )
-"""The parts of a name such as ``Rho_1 (mm)``."""
+from pteron.manipulator import Manipulator
+from pteron.tables import declaration, listed
+
+_NO_UNIT = ("", "-", "1", "none")
+"""What a line of units has where there is none."""
+_LONGEST = 60
+"""A name longer than this is in no example."""
+_ROW_A_VALUE = {"VarName", "VarValue"}
+"""Columns of a log of WinCC, which has a row for each value."""
 
 
 class Group(NamedTuple):
-    """The columns of one part of a log, their units, and whether anything said these."""
+    """The columns of one part of a log, and their units."""
 
     names: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
     said: bool = True
+    """Whether the file or its description says the units."""
+    told: bool = False
+    """Whether names or units come from the file's own words, which the user should know."""
+    guessed: bool = False
+    """Whether the columns are taken by names that are not the documented ones."""
 
     @property
     def shown(self) -> tuple[str, ...]:
         """The names as messages may show them: a name may hold anything."""
         return tuple(shown(name, bare=True) for name in self.names)
+
+    def in_words(self, noun: str) -> str:
+        """Return how the columns are read, for a person."""
+        unit = " and ".join(dict.fromkeys(self.units))
+        return f"{noun} {listed(self.names)} in {unit}"
 
 
 class Columns(NamedTuple):
@@ -66,26 +64,30 @@ class Columns(NamedTuple):
 
 
 def find_columns(
-    names: Sequence[str], robot: Manipulator, description: Description, source: str, hint: str
+    names: Sequence[str],
+    units: Mapping[str, str],
+    robot: Manipulator,
+    description: Description,
+    source: str,
+    hint: str,
 ) -> Columns:
-    """Return where a file's columns are, after what is declared, documented, or else guessed.
+    """Return where a file's columns are, after what is declared, documented, or else their names.
 
-    `source` is what messages call the file, `hint` what may be amiss with its header where nothing
-    is found.
+    `units` are those that a line of the file says, `source` is what messages call the file, `hint`
+    what may be amiss with its header where nothing is found.
 
     Raises
     ------
     DataError
-        If a needed column is missing, or if a guess would be ambiguous.
+        If a needed column is missing, if several could be meant, or if a unit is unknown.
     """
     d, joints = description, joint_symbols(robot)
     needed = [d.time_column or "t"]
     needed += d.joint_columns or [f"{one.coordinate}{i}" for i, one in enumerate(joints, 1)]
     needed += d.force_columns or [f"{one.force}{i}" for i, one in enumerate(joints, 1)]
-    search = _Search(tuple(names), len(joints), needed, source, hint)
-    clock = _Wanted("time", "t", "time", "time", "s", d.time_unit)
+    search = _Search(tuple(names), units, len(joints), needed, source, hint)
     travels = [
-        _Wanted("joints", one.coordinate, f"{one.noun}s", f"{one.noun} coordinates", one.unit, unit)
+        _Wanted("joints", one.coordinate, f"{one.noun}s", one.unit, unit)
         for one, unit in zip(joints, d.joint_units(robot), strict=True)
     ]
     si = d.column_force_unit in ("N", "N m")
@@ -94,14 +96,13 @@ def find_columns(
             "forces",
             one.force,
             f"{one.force}s",
-            f"actuator {one.force}s",
             one.force_unit,
             one.force_unit if si else d.column_force_unit,
         )
         for one in joints
     ]
     numbers = range(1, len(joints) + 1)
-    time = search.group([clock], None if d.time_column is None else [d.time_column], [0])
+    time = search.time(_Wanted("time", "t", "time", "s", d.time_unit), d.time_column)
     coordinates = search.group(travels, d.joint_columns, numbers)
     forces = search.group(actuators, d.force_columns, numbers)
     if len({unit if unit not in ("N", "N m") else "SI" for unit in forces.units}) > 1:
@@ -110,9 +111,9 @@ def find_columns(
             "SI units, or all in one unit of the drives"
         )
     pose = [
-        _Wanted("pose", one, "pose", "measured pose", "rad", d.angle_unit)
+        _Wanted("pose", one, "pose", "rad", d.angle_unit)
         if one == "phi"
-        else _Wanted("pose", one, "pose", "measured pose", "m", d.length_unit)
+        else _Wanted("pose", one, "pose", "m", d.length_unit)
         for one in robot.coordinates
     ]
     measured, payload = search.pose(pose, d.pose_columns), search.payload(d.payload_column)
@@ -120,32 +121,46 @@ def find_columns(
 
 
 class _Wanted(NamedTuple):
-    """A column looked for: its table, documented name, words for messages, SI and declared unit."""
+    """A column looked for: its table, documented name, word for messages, SI and declared unit."""
 
     table: str
     stem: str
     noun: str
-    meaning: str
     unit: str
     declared: str | None
 
 
-def _unit_in(name: str, si: str) -> str | None:
-    """Return the unit that a name ends in, if it is one of what is measured in `si`."""
-    match = _NAME.fullmatch(name)
-    return match and _UNITS[si].get((match["inside"] or match["behind"] or "").lower())
-
-
 @dataclass
 class _Search:
-    """The names of a file, and what was guessed about them so far."""
+    """The names of a file, and what was found out about them so far."""
 
     names: tuple[str, ...]
+    units: Mapping[str, str]
     legs: int
     needed: Sequence[str]
     source: str
     hint: str
     findings: list[Finding] = field(default_factory=list)
+
+    def time(self, kind: _Wanted, declared: str | None) -> Group:
+        """Return the column of the times, or those of seconds and nanoseconds."""
+        stamps = stamp_columns(self.names)
+        if declared is not None:
+            columns = next((s for s in stamps if s[0] == declared), (declared,))
+            self.declared("time", columns)
+        elif "t" in self.names:
+            columns = ("t",)
+        elif len(stamps) == 1:
+            columns = stamps[0]
+        elif stamps:
+            raise self.ambiguous(kind, [list(one[:1]) for one in stamps])
+        else:
+            columns = tuple(self.family(kind, [0])[0])
+        named = self.unit_of(columns[0], kind) if len(columns) == 1 else None
+        unit = self.unit(kind, named)
+        guessed = declared is None and columns != ("t",)
+        said = (kind.declared or named) is not None
+        return Group(columns, (unit,) * len(columns), said, guessed or named is not None, guessed)
 
     def group(
         self,
@@ -155,40 +170,49 @@ class _Search:
     ) -> Group:
         """Return the columns wanted, one for each number, that are declared or called alike."""
         columns, units, said = [""] * len(wanted), [""] * len(wanted), True
+        told = guessed = False
         for kind in dict.fromkeys(wanted):
             at = [j for j, one in enumerate(wanted) if one == kind]
             if declared is not None:
                 found = [self.declared(kind.table, declared)[j] for j in at]
-                named = _unit_in(found[0], kind.unit)
+                named = self.common_unit(found, kind)
+                told = told or (named is not None and not kind.declared)
             else:
-                found, named = self.family(kind, [numbers[j] for j in at])
+                found, by_name = self.family(kind, [numbers[j] for j in at])
+                named = self.common_unit(found, kind)
+                guessed = guessed or by_name
             unit = self.unit(kind, named)
             said = said and (kind.declared or named) is not None
             for j, name in zip(at, found, strict=True):
                 columns[j], units[j] = name, unit
-        return Group(tuple(columns), tuple(units), said)
+        return Group(tuple(columns), tuple(units), said, told or guessed, guessed)
 
-    def matches(self, kind: _Wanted) -> Iterator[tuple[str, re.Match[str]]]:
+    def matches(self, kind: _Wanted) -> Iterator[tuple[str, Called]]:
         """Yield the columns that are called by a word for it, in a unit of it if in any."""
         for name in self.names:
-            match = _NAME.fullmatch(name)
+            parts = called(name)
             if (
-                match is not None
-                and match["word"].lower() in _WORDS.get(kind.stem, (kind.stem,))
-                and (not match["tail"] or _unit_in(name, kind.unit))
+                parts is not None
+                and means(parts.word, kind.stem)
+                and (not parts.unit or unit_called(parts.unit, kind.unit))
             ):
-                yield name, match
+                yield name, parts
 
-    def family(self, kind: _Wanted, numbers: Sequence[int]) -> tuple[list[str], str | None]:
-        """Return the columns of these numbers, 0 for none, and the unit that their names say."""
-        families: dict[tuple[str, str], dict[int, str]] = {}
-        for name, match in self.matches(kind):
-            number = int(match["number"] or 0)
-            if (number > 0) == (numbers[0] > 0):
-                families.setdefault((match["stem"], match["tail"]), {})[number] = name
-        exact = (kind.stem, "")
+    def family(self, kind: _Wanted, numbers: Sequence[int]) -> tuple[list[str], bool]:
+        """Return the columns of these numbers, 0 for none, and whether by another name."""
+        families: dict[str, dict[int, str]] = {}
+        for name, parts in self.matches(kind):
+            if (parts.number is not None) == (numbers[0] > 0):
+                families.setdefault(parts.family, {})[parts.number or 0] = name
+        if numbers[0] > 0:
+            # Programs count from 0 as well.
+            families = {
+                key: {i + 1: name for i, name in one.items()} if 0 in one else one
+                for key, one in families.items()
+            }
+        exact = kind.stem + "#" * (numbers[0] > 0)
         if exact not in families and kind.table == "forces":
-            exact = ("current", "")
+            exact = "current#"
         if exact in families:
             families = {exact: families[exact]}
         known = set(range(self.legs + 1))
@@ -196,15 +220,10 @@ class _Search:
         if not complete:
             raise self.incomplete(kind, numbers, list(families.values()))
         if len(complete) > 1:
-            raise self.ambiguous(kind, [families[key][numbers[0]] for key in complete])
-        key = complete[0]
-        columns = [families[key][number] for number in numbers]
-        # A word such as current says another unit than the documented one; rho and force do not.
-        implied = "A" if key[0].strip(" _").lower() in _CURRENTS else None
-        unit = _unit_in(columns[0], kind.unit) or implied
-        if key != exact:
-            self.guess(kind, columns, kind.declared or unit or kind.unit)
-        return columns, unit
+            several = [[one[i] for i in sorted(one)] for one in map(families.get, complete) if one]
+            raise self.ambiguous(kind, several)
+        columns = [families[complete[0]][number] for number in numbers]
+        return columns, complete[0] != exact
 
     def pose(self, wanted: Sequence[_Wanted], declared: Sequence[str] | None) -> Group:
         """Return the columns of a measured pose, none where it is not whole."""
@@ -221,23 +240,26 @@ class _Search:
                     f"{self.source}: {listed(columns)} alone are no pose ({', '.join(stems)} "
                     "needed), so that no measured pose is read"
                 )
-                self.guessed(message, columns)
+                first = shown(columns[0], bare=True)
+                self.findings.append(Finding("guessed", message, column=first, count=len(columns)))
             return Group()
-        named = [_unit_in(name, one.unit) for name, one in zip(columns, wanted, strict=True)]
+        named = [self.unit_of(name, one) for name, one in zip(columns, wanted, strict=True)]
         kinds = {one.unit: one for one in wanted}
         told = {one.unit: unit for one, unit in reversed([*zip(wanted, named, strict=True)])}
-        if declared is None and columns != stems:
-            if any(unit != told[one.unit] for one, unit in zip(wanted, named, strict=True)):
-                raise self.ambiguous(wanted[0], columns)
-            self.guess(wanted[0], columns, f"{told['m'] or 'm'} and {told.get('rad') or 'rad'}")
+        guessed = declared is None and columns != stems
+        if any(unit != told[one.unit] for one, unit in zip(wanted, named, strict=True)):
+            raise self.ambiguous(wanted[0], [columns])
         units = {si: self.unit(one, told[si]) for si, one in kinds.items()}
-        return Group(tuple(columns), tuple(units[one.unit] for one in wanted))
+        heard = guessed or any(told[si] and not one.declared for si, one in kinds.items())
+        return Group(
+            tuple(columns), tuple(units[one.unit] for one in wanted), told=heard, guessed=guessed
+        )
 
     def lone(self, kind: _Wanted) -> list[str]:
         """Return the column without a number that may be meant, if any."""
-        found = [name for name, match in self.matches(kind) if match["number"] is None]
+        found = [name for name, parts in self.matches(kind) if parts.number is None]
         if len(found) > 1:
-            raise self.ambiguous(kind, found)
+            raise self.ambiguous(kind, [[name] for name in found])
         return found
 
     def payload(self, declared: str | None) -> Group:
@@ -245,16 +267,63 @@ class _Search:
         if declared is not None:
             found = self.declared("payload", [declared])
         if len(found) > 1:
-            raise self.ambiguous(_Wanted("payload", "payload", "payload", "", "", None), found)
+            kind = _Wanted("payload", "payload", "payload", "", None)
+            raise self.ambiguous(kind, [[name] for name in found])
         return Group(tuple(found), ("",) * len(found))
 
+    def unit_of(self, name: str, kind: _Wanted) -> str | None:
+        """Return the unit that a line of units says, or else the column's name; None for none.
+
+        A word such as current says another unit than the documented one; rho and force do not.
+        """
+        parts = called(name)
+        text = self.units.get(name, "")
+        if text.lower() not in _NO_UNIT:
+            unit = unit_called(text, kind.unit)
+            if unit is None and kind.declared is None:
+                raise DataError(
+                    f"{self.source}: column {shown(name, bare=True)} is in {shown(text)}, which is "
+                    f"not known for {kind.noun}; say the unit, with one that is, in a TOML file "
+                    "beside it:"
+                    + declaration(kind.table, **{self.unit_key(kind): kind.unit})
+                )
+            return unit
+        if parts is None:
+            return None
+        implied = "A" if kind.table == "forces" and parts.word in CURRENTS else None
+        return unit_called(parts.unit, kind.unit) or implied
+
+    @staticmethod
+    def unit_key(kind: _Wanted) -> str:
+        if kind.table != "pose":
+            return "unit"
+        return "angle_unit" if kind.unit == "rad" else "length_unit"
+
+    def common_unit(self, columns: Sequence[str], kind: _Wanted) -> str | None:
+        """Return the unit of columns that belong together."""
+        units = dict.fromkeys(self.unit_of(name, kind) for name in columns)
+        if len(units) > 1 and kind.declared is None:
+            said = ", ".join(unit or "no unit" for unit in units)
+            raise DataError(
+                f"{self.source}: {listed(columns)} are in {said}; {kind.noun} have one unit: say "
+                "which in a TOML file beside it:" + declaration(kind.table, unit=kind.unit)
+            )
+        words = {parts.word for parts in map(called, columns) if parts}
+        if kind.declared is None and words & set(RATED) and None in units:
+            raise DataError(
+                f"{self.source}: {listed(columns)}: the unit of these torques is not said; drives "
+                "write per cent of the rated torque, or N m; say which in a TOML file beside it, "
+                "with gains where they are no SI unit:" + declaration("forces", unit="%")
+            )
+        return next(iter(units))
+
     def unit(self, kind: _Wanted, named: str | None) -> str:
-        """Return the unit declared, else the one the names say, else the documented one."""
+        """Return the unit declared, else the one the file says, else the documented one."""
         if kind.declared and named and kind.declared != named:
             # Currents called F1 are the file's business; that the two differ must be said.
             message = (
-                f"{self.source}: the names of the {kind.noun} columns say {named}, but the "
-                f"description declares {kind.declared}; taken as {kind.declared}"
+                f"{self.source}: the {kind.noun} columns say {named}, but the description declares "
+                f"{kind.declared}; taken as {kind.declared}"
             )
             self.findings.append(Finding("units", message))
         return kind.declared or named or kind.unit
@@ -269,27 +338,20 @@ class _Search:
             )
         return list(columns)
 
-    def guess(self, kind: _Wanted, columns: Sequence[str], unit: str) -> None:
-        message = (
-            f"{self.source}: {listed(columns)} taken for the {kind.meaning} in {unit}, by name; "
-            f"declare it in the log's TOML file, under [{kind.table}], to be sure"
-        )
-        self.guessed(message, columns)
-
-    def guessed(self, message: str, columns: Sequence[str]) -> None:
-        first = shown(columns[0], bare=True)
-        self.findings.append(Finding("guessed", message, column=first, count=len(columns)))
-
     def incomplete(
         self, kind: _Wanted, numbers: Sequence[int], families: list[dict[int, str]]
     ) -> DataError:
+        if set(self.names) >= _ROW_A_VALUE:
+            return DataError(
+                f"{self.source}: has a row for each value ({listed(self.names)}); put the "
+                "variables beside each other, one row a sample"
+            )
         others = next((one for one in families if numbers[0] in one), None)
         if others is None:
-            key = 'column = "..."' if kind.table == "time" else "columns = [...]"
             return DataError(
                 f"{self.source}: no columns for the {kind.noun} (found: {listed(self.names)}; "
                 f"needed: {listed(self.needed)}); {self.hint}, or declare the file's own names in "
-                f"a TOML file beside it: [{kind.table}] {key}"
+                f"a TOML file beside it{self.example(kind)}"
             )
         names = [others[i] for i in sorted(others)]
         stem = others[numbers[0]].removesuffix(str(numbers[0]))
@@ -299,11 +361,38 @@ class _Search:
             f"{self.source}: the columns {listed(names)} are for {len(names)} {kind.noun}, but the "
             f"machine has {self.legs} legs (needed: {listed(self.needed)}); {fault}"
             "perhaps it is the log of another machine; else declare the columns in a TOML file "
-            f"beside it: [{kind.table}] columns = [...]"
+            f"beside it{self.example(kind)}"
         )
 
-    def ambiguous(self, kind: _Wanted, names: Sequence[str]) -> DataError:
+    def example(self, kind: _Wanted) -> str:
+        """Return a declaration with columns that nothing else is called like."""
+        stems = ("t", "rho", "theta", "force", "torque", "payload")
+        parts = {name: called(name) for name in self.names}
+        free = [
+            name
+            for name, one in parts.items()
+            if name.isprintable()
+            and len(name) < _LONGEST
+            and (one is None or not any(means(one.word, s) for s in stems if s != kind.stem))
+        ]
+        if kind.table == "time":
+            return ", such as" + declaration("time", column=free[0]) if free else ""
+        if len(free) < self.legs:
+            return f": [{kind.table}] columns, one for each leg"
+        return ", in the order of the legs, such as" + declaration(
+            kind.table, columns=free[-self.legs :] if kind.table == "forces" else free[: self.legs]
+        )
+
+    def ambiguous(self, kind: _Wanted, choices: Sequence[Sequence[str]]) -> DataError:
+        """Return the error for columns that are as good as others; the first are shown declared."""
+        names = [one[0] for one in choices] if len(choices) > 1 else choices[0]
+        single = kind.table in ("time", "payload")
+        entry = {"column": choices[0][0]} if single else {"columns": list(choices[0])}
+        if kind.table == "pose" or (not single and len(choices[0]) != self.legs):
+            example = f", under [{kind.table}]"
+        else:
+            example = ", such as" + declaration(kind.table, **entry)
         return DataError(
-            f"{self.source}: {listed(names)} could each be meant for the {kind.noun}; declare "
-            f"which in a TOML file beside the log, under [{kind.table}]"
+            f"{self.source}: {listed(names)} could each be meant for the {kind.noun}; say which in "
+            f"a TOML file beside it{example}"
         )
