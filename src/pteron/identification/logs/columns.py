@@ -141,6 +141,7 @@ class _Search:
     source: str
     hint: str
     findings: list[Finding] = field(default_factory=list)
+    taken: set[str] = field(default_factory=set)
 
     def time(self, kind: _Wanted, declared: str | None) -> Group:
         """Return the column of the times, or those of seconds and nanoseconds."""
@@ -158,6 +159,7 @@ class _Search:
             columns = tuple(self.family(kind, [0])[0])
         named = self.unit_of(columns[0], kind) if len(columns) == 1 else None
         unit = self.unit(kind, named)
+        self.taken.update(columns)
         guessed = declared is None and columns != ("t",)
         said = (kind.declared or named) is not None
         return Group(columns, (unit,) * len(columns), said, guessed or named is not None, guessed)
@@ -185,6 +187,7 @@ class _Search:
             said = said and (kind.declared or named) is not None
             for j, name in zip(at, found, strict=True):
                 columns[j], units[j] = name, unit
+        self.taken.update(columns)
         return Group(tuple(columns), tuple(units), said, told or guessed, guessed)
 
     def matches(self, kind: _Wanted) -> Iterator[tuple[str, Called]]:
@@ -377,10 +380,11 @@ class _Search:
         ]
         if kind.table == "time":
             return ", such as" + declaration("time", column=free[0]) if free else ""
+        free = [name for name in free if name not in self.taken]
         if len(free) < self.legs:
             return f": [{kind.table}] columns, one for each leg"
         return ", in the order of the legs, such as" + declaration(
-            kind.table, columns=free[-self.legs :] if kind.table == "forces" else free[: self.legs]
+            kind.table, columns=free[: self.legs]
         )
 
     def ambiguous(self, kind: _Wanted, choices: Sequence[Sequence[str]]) -> DataError:

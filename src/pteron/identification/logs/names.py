@@ -34,7 +34,9 @@ CURRENTS = ("current", "i", "actcurrent", "actualcurrent")
 RATED = ("acttorque", "actualtorque")
 """Words for what drives write in per cent, in per mille or in N m: their unit must be said."""
 
-_SPELLED = "|".join(re.escape(one) for units in UNITS.values() for one in units)
+_SPELLED = "|".join(re.escape(one) for units in UNITS.values() for one in units if len(one) > 1)
+_SPELLED += "|(?-i:[smANV%°])"
+"""Units without brackets: a last single letter is one only as it is usually written."""
 _UNIT = (
     rf"(?P<tail>(?:[ _]*[\[(] *(?P<inside>[^\])\d][^\])]*?) *[\])]"
     rf"|[ _](?P<behind>{_SPELLED})|/(?P<under>{_SPELLED}))?)"

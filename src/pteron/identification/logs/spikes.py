@@ -25,14 +25,13 @@ _BACK = 0.25
 """What may be missing from the way back, as a share of the largest distance."""
 _SUDDEN = 0.5
 """Share of that distance that the first jump and the last have at least: an edge, not a slope."""
-_PUSHED = 0.1
-"""Jump of an acceleration, as a share of its span, that explains a jump of the forces."""
-_RARE = 3.0
-"""How large such a jump is at least, in what nineteen of twenty samples have: noise is smaller."""
 _REVERSING = 0.05
 """Speed, as a share of a joint's usual one, below which friction may turn."""
 _BEYOND = 0.1
 """How far beyond its usual values, in their span, a force is that no turn of friction explains."""
+_UNUSUAL = 3.0
+"""How much more a joint is accelerated by a stop than before and after, in what nine of ten times
+have at most."""
 _MOST = 0.01
 """Share of the rows that are left out at most: where spikes are more, they are no exception."""
 _SPAN = (1.0, 99.0)
@@ -67,23 +66,29 @@ def force_spikes(values: Values, joints: Values, own: int) -> Mask:
     found = _groups(values, _SHARE_OF_FORCE, 0.0)
     if not found.any():
         return found
-    explained = np.zeros(len(values), dtype=bool)
-    for column in joints.T:
-        second = np.diff(column, n=2)
-        jumps = np.abs(np.diff(second))
-        least = max(_PUSHED * _span(second), _RARE * float(np.percentile(jumps, 95.0)))
-        explained[1:-2] |= jumps > least
     speed = np.abs(np.gradient(joints[:, own]))
     turns = speed < _REVERSING * np.percentile(speed, 95.0)
     low, high = np.percentile(values, _SPAN)
     room = _BEYOND * (high - low)
     usual = (values > low - room) & (values < high + room)
-    explained, turns = (maximum_filter1d(m.astype(np.int8), 5) > 0 for m in (explained, turns))
+    turns = maximum_filter1d(turns.astype(np.int8), 5) > 0
     for start, stop in _runs(found):
         group = slice(start, stop)
-        if explained[group].any() or (turns[group].any() and usual[group].all()):
+        turned = turns[group].any() and usual[group].all()
+        if turned or _is_pushed(joints, start, stop):
             found[group] = False
     return found
+
+
+def _is_pushed(joints: Values, start: int, stop: int) -> bool:
+    """Say whether a joint (T, n) is accelerated in some samples as it is not before and after."""
+    length = stop - start
+    steps = np.diff(joints, axis=0)
+    gain = steps[length:] - steps[:-length]
+    apart = np.abs(gain[length:-length] - (gain[: -2 * length] + gain[2 * length :]) / 2.0)
+    # Derivatives and forces may be a sample apart.
+    at = slice(max(start - length - 2, 0), max(start - length + 1, 0))
+    return bool((apart[at] > _UNUSUAL * np.percentile(apart, 90.0, axis=0)).any())
 
 
 def _groups(values: Values, share: float, least: Values | float) -> Mask:
