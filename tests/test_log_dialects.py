@@ -34,11 +34,10 @@ class Sheet:
         self.milliseconds = [STEP_MS * i for i in range(ROWS)]
 
     def rows(self, times: list[str], *, decimal: str = ".") -> list[list[str]]:
-        values = [
+        return [
             [t, *(v.replace(".", decimal) for v in (*q, *f))]
             for t, q, f in zip(times, self.joints, self.forces, strict=True)
         ]
-        return values
 
     def names(self, time: str, joint: str, force: str, first: int = 1) -> list[str]:
         legs = range(first, first + len(self.robot.legs))
@@ -81,14 +80,25 @@ def seconds(sheet: Sheet) -> list[str]:
 @each_machine
 @pytest.mark.parametrize(
     ("separator", "decimal"),
-    [(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), ("|", ","), (" ", "."), (" ", ",")],
+    [
+        (",", "."),
+        (";", "."),
+        (";", ","),
+        ("\t", "."),
+        ("\t", ","),
+        ("|", ","),
+        (" ", "."),
+        (" ", ","),
+    ],
 )
 def test_separators_and_decimal_signs_are_found(tmp_path, name, separator, decimal):
     sheet = Sheet(name)
     joint, force = ("rho{}", "force{}") if sheet.sliders else ("theta{}", "torque{}")
     times = [t.replace(".", decimal) for t in seconds(sheet)]
     rows = sheet.rows(times, decimal=decimal)
-    log = read_log(written(tmp_path, [sheet.names("t", joint, force), *rows], separator), sheet.robot)
+    log = read_log(
+        written(tmp_path, [sheet.names("t", joint, force), *rows], separator), sheet.robot
+    )
     sheet.check(log)
     if (separator, decimal) == (",", "."):
         assert log.findings == ()
@@ -171,7 +181,9 @@ def test_what_is_declared_is_not_found_again(tmp_path):
     rows = [["# t", "not these", *["x"] * 7], sheet.names("t", "rho{}", "force{}")]
     rows += sheet.rows([t.replace(".", ",") for t in seconds(sheet)], decimal=",")
     path = written(tmp_path, rows, ";")
-    path.with_suffix(".toml").write_text('[csv]\nseparator = ";"\ndecimal = ","\nheader_lines = 2\n')
+    path.with_suffix(".toml").write_text(
+        '[csv]\nseparator = ";"\ndecimal = ","\nheader_lines = 2\n'
+    )
     log = read_log(path, sheet.robot)
     sheet.check(log)
     assert log.findings == ()
@@ -184,9 +196,7 @@ START = datetime(2026, 11, 22, 23, 59, 59, 940_000)
 
 def stamps(sheet: Sheet, pattern: str) -> list[str]:
     """Return times as text; midnight passes within them."""
-    return [
-        (START + timedelta(milliseconds=t)).strftime(pattern)[:-3] for t in sheet.milliseconds
-    ]
+    return [(START + timedelta(milliseconds=t)).strftime(pattern)[:-3] for t in sheet.milliseconds]
 
 
 @pytest.mark.parametrize(
@@ -219,15 +229,15 @@ def test_zones_and_halves_of_the_day_are_understood(tmp_path):
     times = [f"2026-11-22T11:59:59.{t + 800:03d}+01:00" for t in sheet.milliseconds]
     times[30:] = [t.replace("T11", "T12").replace("+01:00", "+02:00") for t in times[30:]]
     names = sheet.names("t", "rho{}", "force{}")
-    sheet.check(read_log(written(tmp_path, [names, *sheet.rows(times)]), sheet.robot), start=39599.8)
+    sheet.check(
+        read_log(written(tmp_path, [names, *sheet.rows(times)]), sheet.robot), start=39599.8
+    )
     times = [f"22.11.2026 01:00:00.{t:03d} PM" for t in sheet.milliseconds]
     log = read_log(written(tmp_path, [names, *sheet.rows(times)]), sheet.robot)
     sheet.check(log, start=13 * 3600.0)
 
 
-@pytest.mark.parametrize(
-    ("unit", "ticks"), [("us", 1000), ("ns", 1_000_000), ("100 ns", 10_000)]
-)
+@pytest.mark.parametrize(("unit", "ticks"), [("us", 1000), ("ns", 1_000_000), ("100 ns", 10_000)])
 def test_units_of_time_are_declared(tmp_path, unit, ticks):
     sheet = Sheet("five-bar")
     rows = sheet.rows([str(t * ticks) for t in sheet.milliseconds])
@@ -251,7 +261,9 @@ def test_dates_as_numbers_tell_their_unit_and_lose_no_digit(tmp_path, origin, ti
     log = read_log(written(tmp_path, [sheet.names("t", "theta{}", "torque{}"), *rows]), sheet.robot)
     if unit in ("ns", "100 ns"):  # floats cannot hold them
         sheet.check(log)
-    np.testing.assert_allclose(log.time - log.time[0], np.array(sheet.milliseconds) / 1e3, atol=1e-6)
+    np.testing.assert_allclose(
+        log.time - log.time[0], np.array(sheet.milliseconds) / 1e3, atol=1e-6
+    )
     assert f"time t in {unit} (guessed from its size)" in message(log)
 
 
@@ -278,7 +290,11 @@ def scope(sheet: Sheet, *, shared: bool, stamps: int = 0) -> list[list[str]]:
         "Unit": unit,
         "Unit Offset": ["0"] * 2 * n,
     }
-    top = [["Name", "motion"], ["File", "motion.csv"], ["Starttime of export", str(stamps), "Montag"]]
+    top = [
+        ["Name", "motion"],
+        ["File", "motion.csv"],
+        ["Starttime of export", str(stamps), "Montag"],
+    ]
     times = [str(stamps + t * (10_000 if stamps else 1)) for t in sheet.milliseconds]
     if shared:
         rows = sheet.rows(times, decimal=",")
@@ -309,12 +325,14 @@ def test_channels_that_were_not_sampled_together_are_refused(tmp_path):
     sheet = Sheet("quadrupteron", millimetres=True)
     cells = scope(sheet, shared=False)
     cells[-20][4] = "81,5"
-    with pytest.raises(DataError, match=r"row 41 \(line 56\): its channels were not sampled at one"):
+    with pytest.raises(
+        DataError, match=r"row 41 \(line 56\): its channels were not sampled at one"
+    ):
         read_log(written(tmp_path, cells, "\t"), sheet.robot)
 
 
 def test_a_trace_of_codesys_2_is_read(tmp_path):
-    """As the help of ABB Automation Builder shows "Trace in ASCII-File": three lines, blanks, ms."""
+    """As the help of ABB Automation Builder shows a trace in an ASCII file: three lines, blanks."""
     sheet = Sheet("delta")
     names = sheet.names("Cycle", "PLC_PRG.theta{}", "PLC_PRG.torque{}")
     above = "CoDeSys Trace\r\nD:\\PROJECTS\\DELTA.PRO"
@@ -332,16 +350,18 @@ def test_variables_below_one_another_are_refused(tmp_path):
     for i, name in enumerate(sheet.names("t", "theta{}", "torque{}")[1:]):
         lines.append([f"{i}.Variable", f" PLC_PRG.{name}"])
         lines += [["", f" {t}.0", " 0.5"] for t in sheet.milliseconds]
-    with pytest.raises(DataError, match="variables stand one below another.*one row a sample"):
+    with pytest.raises(DataError, match=r"variables stand one below another.*one row a sample"):
         read_log(written(tmp_path, lines, ";"), sheet.robot)
 
 
 def test_a_log_of_wincc_with_a_row_for_each_value_is_refused(tmp_path):
     """As the help of WinCC shows the structure of a CSV file with tags."""
     names = [f'"{n}"' for n in ("VarName", "TimeString", "VarValue", "Validity", "Time_ms")]
-    rows = [[f'"Var_{i % 2}"', f'"01.04.98 11:02:{i:02d}"', "66,00", "1", "35886460322,81"]
-            for i in range(ROWS)]
-    with pytest.raises(DataError, match="has a row for each value.*one row a sample"):
+    rows = [
+        [f'"Var_{i % 2}"', f'"01.04.98 11:02:{i:02d}"', "66,00", "1", "35886460322,81"]
+        for i in range(ROWS)
+    ]
+    with pytest.raises(DataError, match=r"has a row for each value.*one row a sample"):
         read_log(written(tmp_path, [names, *rows], ";"), CATALOG["delta"])
 
 
@@ -352,8 +372,9 @@ def test_messages_of_ros_as_rostopic_prints_them_are_read(tmp_path, name):
     n = len(sheet.robot.legs)
     origin = 1_795_000_000_123_456_789
     names = ["%time", "field.header.seq", "field.header.stamp", "field.header.frame_id"]
-    names += [f"field.{what}{i}" for what in ("name", "position", "velocity", "effort")
-              for i in range(n)]
+    names += [
+        f"field.{what}{i}" for what in ("name", "position", "velocity", "effort") for i in range(n)
+    ]
     rows = []
     for i, (q, f) in enumerate(zip(sheet.joints, sheet.forces, strict=True)):
         stamp = origin + sheet.milliseconds[i] * 1_000_000
@@ -434,7 +455,10 @@ def test_thousands_or_decimals_are_asked_for(tmp_path):
     sheet.forces = [[f"{v:.3f}" for v in 100 + np.arange(4) + i / 8] for i in range(ROWS)]
     rows = sheet.rows([str(t) for t in sheet.milliseconds], decimal=",")
     path = written(tmp_path, [sheet.names("t [ms]", "rho{} [mm]", "force{}"), *rows], ";")
-    assert refused_then_read(path, sheet, r"'\d\d,\d{3}' may have a decimal comma or a mark of") is not None
+    assert (
+        refused_then_read(path, sheet, r"'\d\d,\d{3}' may have a decimal comma or a mark of")
+        is not None
+    )
 
 
 def test_marks_of_thousands_are_refused(tmp_path):
@@ -442,7 +466,9 @@ def test_marks_of_thousands_are_refused(tmp_path):
     rows = sheet.rows([t.replace(".", ",") for t in seconds(sheet)], decimal=",")
     rows[40][5] = "1.234,5"
     path = written(tmp_path, [sheet.names("t", "rho{}", "force{}"), *rows], ";")
-    with pytest.raises(DataError, match=r"row 41 .*'1\.234,5' given, a number with a decimal comma"):
+    with pytest.raises(
+        DataError, match=r"row 41 .*'1\.234,5' given, a number with a decimal comma"
+    ):
         read_log(path, sheet.robot)
 
 
@@ -450,7 +476,7 @@ def test_commas_that_separate_cells_and_decimals_are_refused(tmp_path):
     sheet = Sheet("quadrupteron")
     rows = sheet.rows([t.replace(".", ",") for t in seconds(sheet)], decimal=",")
     path = written(tmp_path, [sheet.names("t", "rho{}", "force{}"), *rows], ",")
-    with pytest.raises(DataError, match="line 1 has 9 cells .*the rows below have 18.*be decimal"):
+    with pytest.raises(DataError, match=r"line 1 has 9 cells .*the rows below have 18.*be decimal"):
         read_log(path, sheet.robot)
 
 
@@ -468,7 +494,7 @@ def test_names_with_blanks_between_blanks_are_refused(tmp_path):
     sheet = Sheet("delta")
     rows = sheet.rows(seconds(sheet))
     names = sheet.names("t", "Axis {} Actual Position", "torque{}")
-    with pytest.raises(DataError, match="line 1 has 16 cells .*have 7, separated by blanks"):
+    with pytest.raises(DataError, match=r"line 1 has 16 cells .*have 7, separated by blanks"):
         read_log(written(tmp_path, [names, *rows], " "), sheet.robot)
     rows[30].pop()
     names = sheet.names("t", "theta{}", "torque{}")

@@ -175,10 +175,19 @@ def test_too_few_rows_are_refused(tmp_path, ending, rows):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"t": "when"}, r"no columns for the time \(found: when, rho1(?s:.*)\[time\]\ncolumn = .when"),
+        (
+            {"t": "when"},
+            r"no columns for the time \(found: when, rho1(?s:.*)\[time\]\ncolumn = .when",
+        ),
         ({"rho2": "spot"}, r"the columns rho1, rho3, rho4 are for 3 sliders, but .* 4 legs"),
-        ({f"rho{j}": f"spot{j}" for j in range(1, 5)}, r"no columns for the sliders (?s:.*)\[joints\]\n"),
-        ({f"force{j}": f"x{j}" for j in range(1, 5)}, r"no columns for the forces (?s:.*)\[forces\]\n"),
+        (
+            {f"rho{j}": f"spot{j}" for j in range(1, 5)},
+            r"no columns for the sliders (?s:.*)\[joints\]\n",
+        ),
+        (
+            {f"force{j}": f"x{j}" for j in range(1, 5)},
+            r"no columns for the forces (?s:.*)\[forces\]\n",
+        ),
         ({"force4": "effort"}, "3 forces, but the machine has 4 legs.*another machine"),
     ],
 )
@@ -552,7 +561,9 @@ def test_degrees_are_found_by_name_and_told_by_size(tmp_path):
     back = read_log(saved(tmp_path, given), robot)
     np.testing.assert_allclose(back.joints, log.joints, rtol=1e-14)
     (finding,) = back.findings
-    assert "joints rho1, theta2 (deg), theta3 (deg) in m and deg, forces force1, " in finding.message
+    assert (
+        "joints rho1, theta2 (deg), theta3 (deg) in m and deg, forces force1, " in finding.message
+    )
     plain = renamed(given, {f"theta{j} (deg)": f"theta{j}" for j in (2, 3)})
     path = saved(tmp_path, plain)
     words = r'column theta2: .* rad, read as rad, is over two turns; .*\n\[joints\]\nunit = "deg"'

@@ -71,8 +71,8 @@ def declaration(table: str, **entries: object) -> str:
 
     Examples
     --------
-    >>> print("say so in a TOML file beside it:" + declaration("csv", separator=";", header_lines=2))
-    say so in a TOML file beside it:
+    >>> print("say so:" + declaration("csv", separator=";", header_lines=2))
+    say so:
     [csv]
     separator = ";"
     header_lines = 2

@@ -13,7 +13,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import NamedTuple, get_args
 
 from pteron.errors import DataError, shown
 from pteron.tables.dialect import SEPARATORS, Decimal, Dialect, Separator, declaration
@@ -36,7 +36,9 @@ _OF_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 """A number that is another one where the comma marks thousands."""
 
 _ONE_UNIT = r"(?:[mkunµ]?(?:s|m|rad|deg|N|A|V|W|g|Hz)|sec|°C?|%|1|-)(?:\^?-?\d|[²³])?"
-_UNIT = re.compile(rf"(?P<open>[\[(])?{_ONE_UNIT}(?:[ ·*/]?{_ONE_UNIT})*(?(open)[\])])|\[.{{0,9}}\]")
+_UNIT = re.compile(
+    rf"(?P<open>[\[(])?{_ONE_UNIT}(?:[ ·*/]?{_ONE_UNIT})*(?(open)[\])])|\[.{{0,9}}\]"
+)
 """A cell in a line of units below the names."""
 
 _KEYS = {"SymbolName", "SymbolComment", "SampleTime[ms]", "Data-Type", "Unit", "NetID"}
@@ -100,8 +102,10 @@ class _Rows(NamedTuple):
 
     def is_row(self, record: _Record) -> bool:
         """Say whether all its numbers are numbers."""
-        return bool(self.columns) and len(record.cells) == self.width and all(
-            _DATA[self.decimal].fullmatch(record.cells[j]) for j in self.columns
+        return (
+            bool(self.columns)
+            and len(record.cells) == self.width
+            and all(_DATA[self.decimal].fullmatch(record.cells[j]) for j in self.columns)
         )
 
     def may_be_row(self, record: _Record) -> bool:
@@ -200,10 +204,11 @@ def single_blanks(text: bytes) -> bytes:
 def _best(text: Sequence[str], declared: Dialect) -> _Rows | None:
     """Return the file as that separator cuts it which makes most of its cells numbers."""
     separators = [declared.separator] if declared.separator else list(SEPARATORS)
+    decimals = [declared.decimal] if declared.decimal else list(get_args(Decimal))
     cut = [
         rows
         for separator in separators
-        for decimal in ([declared.decimal] if declared.decimal else [".", ","])
+        for decimal in decimals
         if separator != decimal and (rows := _rows(text, separator, decimal)).records
     ]
 

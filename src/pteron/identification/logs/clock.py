@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field, replace
 from typing import cast
 
@@ -32,6 +33,7 @@ _DATES: dict[str, TimeFormat] = {
     "": "hh:mm:ss",
 }
 """What dates look like, with their format; with slashes the month may come first too."""
+_DATE = ("YYYY", "MM", "DD")
 _MONTH_FIRST: TimeFormat = "MM/DD/YYYY hh:mm:ss"
 _TEXT = (
     r"^(?:(\d+)[-./](\d+)[-./](\d+)[T ] ?)?(\d\d?):(\d\d):(\d\d)(?:[.,:](\d{1,9}))?"
@@ -207,29 +209,23 @@ def _format_of(table: Table, name: str) -> TimeFormat | None:
 
 def _nanoseconds(cells: pl.Series, form: TimeFormat) -> pl.Series:
     """Return times as text in ns since a midnight, or since 1970 with a date; null for others."""
-    date = form.partition(" ")[0] if " " in form else ""
-    order = [date.replace("/", ".").replace("-", ".").split(".").index(p) for p in _parts(date)]
     groups = cells.str.strip_chars().str.extract_groups(_TEXT).struct.unnest()
-    *dates, h, m, s, fraction, half, zone, minutes = groups.get_columns()
+    *date, h, m, s, fraction, half, zone, minutes = map(pl.col, groups.columns)
     hour, minute, second = (part.cast(pl.Int64) for part in (h, m, s))
-    half = half.str.to_uppercase()
-    noon = pl.select(
-        pl.when(half.is_null()).then(hour).otherwise(hour % 12 + 12 * (half == "PM").cast(pl.Int64))
-    ).to_series()
-    total = (noon * 60 + minute) * 60 + second
-    if order:
-        year, month, day = (dates[j].cast(pl.Int64) for j in order)
-        century = (year < 100).cast(pl.Int64) * 2000
-        days = pl.select(pl.date(year + century, month, day)).to_series().cast(pl.Int64)
-        total += days * _DAY
-    elif not dates[0].is_null().all():
-        return pl.Series([None] * len(cells), dtype=pl.Int64)
-    sign = pl.select(pl.when(zone.str.starts_with("-")).then(-1).otherwise(1)).to_series()
-    offset = zone.cast(pl.Int64, strict=False) * 60 + sign * minutes.cast(pl.Int64)
-    total -= offset.fill_null(0) * 60
+    after_noon = (half.str.to_uppercase() == "PM").cast(pl.Int64)
+    hour = pl.when(half.is_null()).then(hour).otherwise(hour % 12 + 12 * after_noon)
+    total = (hour * 60 + minute) * 60 + second
+    if form == "hh:mm:ss":
+        total = pl.when(date[0].is_null()).then(total)
+    else:
+        order = re.split("[-./]", form.partition(" ")[0])
+        year, month, day = (date[order.index(part)].cast(pl.Int64) for part in _DATE)
+        year = pl.when(year < 100).then(year + 2000).otherwise(year)
+        day_of = pl.concat_str(year, month, day, separator="-").str.to_date(
+            "%Y-%m-%d", strict=False
+        )
+        total = total + day_of.cast(pl.Int64) * _DAY
+    sign = pl.when(zone.str.starts_with("-")).then(-1).otherwise(1)
+    offset = zone.cast(pl.Int64) * 60 + sign * minutes.cast(pl.Int64)
     nano = fraction.fill_null("0").str.pad_end(9, "0").cast(pl.Int64)
-    return total * _NANO + nano
-
-
-def _parts(date: str) -> tuple[str, ...]:
-    return ("YYYY", "MM", "DD") if date else ()
+    return groups.select((total - offset.fill_null(0) * 60) * _NANO + nano).to_series()

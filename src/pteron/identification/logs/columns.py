@@ -287,8 +287,7 @@ class _Search:
                 raise DataError(
                     f"{self.source}: column {shown(name, bare=True)} is in {shown(text)}, which is "
                     f"not known for {kind.noun}; say the unit, with one that is, in a TOML file "
-                    "beside it:"
-                    + declaration(kind.table, **{self.unit_key(kind): kind.unit})
+                    "beside it:" + declaration(kind.table, **{self.unit_key(kind): kind.unit})
                 )
             return unit
         if parts is None:

@@ -244,7 +244,9 @@ class LogFile:
             np.ascontiguousarray(
                 np.transpose([_in_si(*both) for both in zip(part.T, group.units, strict=True)])
             )
-            for group, part in zip(self._groups, np.split(values[:, 1:], edges, axis=1), strict=True)
+            for group, part in zip(
+                self._groups, np.split(values[:, 1:], edges, axis=1), strict=True
+            )
         )
         of_joints, of_pose = self._bounds
         check_bounds(joints, of_joints, c.joints, source, first)

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, median_filter  # type: ignore[import-untyped]
 
-from pteron.errors import shown
 from pteron.identification.logs.log import Finding
 
 LONGEST = 16
@@ -32,6 +31,8 @@ _BEYOND = 0.1
 _UNUSUAL = 3.0
 """How much more a joint is accelerated by a stop than before and after, in what nine of ten times
 have at most."""
+_RESTS, _MOVES = 0.1, 0.2
+"""Way of the joints at rest at most, and in motion at least, as a share of their usual one."""
 _MOST = 0.01
 """Share of the rows that are left out at most: where spikes are more, they are no exception."""
 _SPAN = (1.0, 99.0)
@@ -72,23 +73,52 @@ def force_spikes(values: Values, joints: Values, own: int) -> Mask:
     room = _BEYOND * (high - low)
     usual = (values > low - room) & (values < high + room)
     turns = maximum_filter1d(turns.astype(np.int8), 5) > 0
+    motion = _Motion(joints)
     for start, stop in _runs(found):
         group = slice(start, stop)
         turned = turns[group].any() and usual[group].all()
-        if turned or _is_pushed(joints, start, stop):
+        if turned or motion.is_pushed(start, stop):
             found[group] = False
     return found
 
 
-def _is_pushed(joints: Values, start: int, stop: int) -> bool:
-    """Say whether a joint (T, n) is accelerated in some samples as it is not before and after."""
-    length = stop - start
-    steps = np.diff(joints, axis=0)
+class _Motion:
+    """The joints (T, n) of a piece, and what is usual for them."""
+
+    def __init__(self, joints: Values) -> None:
+        self._steps = np.diff(joints, axis=0)
+        self._joints = joints
+        self._usual: dict[int, Values] = {}
+        ways = np.percentile(np.abs(joints[LONGEST:] - joints[:-LONGEST]), 90.0, axis=0)
+        self._way = np.maximum(ways, np.finfo(float).tiny)
+
+    def is_pushed(self, start: int, stop: int) -> bool:
+        """Say whether joints are accelerated in some samples as they are not before and after.
+
+        They may stop in them, or start.
+        """
+        length = stop - start
+        if length not in self._usual:
+            self._usual[length] = np.percentile(_pushes(self._steps, length), 90.0, axis=0)
+        # Derivatives and forces may be a sample apart.
+        first = max(start - length - 2, 0)
+        pushes = _pushes(self._steps[first : first + 3 * length + 3], length)
+        if (pushes > _UNUSUAL * self._usual[length]).any():
+            return True
+        # Noise of the positions may hide that, but not that all joints rest.
+        last = len(self._joints) - 1
+        before = self._way_between(max(start - 1 - LONGEST, 0), max(start - 1, 0))
+        after = self._way_between(min(stop, last), min(stop + LONGEST, last))
+        return min(before, after) < _RESTS < _MOVES < max(before, after)
+
+    def _way_between(self, start: int, stop: int) -> float:
+        return float((np.abs(self._joints[stop] - self._joints[start]) / self._way).max())
+
+
+def _pushes(steps: Values, length: int) -> Values:
+    """Return how much more speed is gained in so many steps than in those before and after."""
     gain = steps[length:] - steps[:-length]
-    apart = np.abs(gain[length:-length] - (gain[: -2 * length] + gain[2 * length :]) / 2.0)
-    # Derivatives and forces may be a sample apart.
-    at = slice(max(start - length - 2, 0), max(start - length + 1, 0))
-    return bool((apart[at] > _UNUSUAL * np.percentile(apart, 90.0, axis=0)).any())
+    return np.abs(gain[length:-length] - (gain[: -2 * length] + gain[2 * length :]) / 2.0)
 
 
 def _groups(values: Values, share: float, least: Values | float) -> Mask:
