@@ -37,7 +37,7 @@ def started(time, period, ramp):
 def correct(name, seed):
     """Return joints and forces of a correct log: fast moves, stops, rests, friction, noise."""
     rng, robot = np.random.default_rng(seed), machine(name)
-    rate, rows = float(rng.choice([100.0, 250.0, 1000.0])), 1500
+    rate, rows = float(rng.choice([100.0, 250.0, 1000.0])), 1000
     time = np.arange(rows) / rate
     path = time, np.ones(rows), np.zeros(rows)
     if seed % 3 == 1:

@@ -14,8 +14,9 @@ from pathlib import Path
 import polars as pl
 
 from pteron.errors import DataError, shown
+from pteron.tables.cells import single_blanks
 from pteron.tables.dialect import PLAIN, SEPARATORS, Dialect, declaration
-from pteron.tables.layout import find_encoding, find_layout, single_blanks
+from pteron.tables.layout import find_encoding, find_layout
 from pteron.tables.table import Table, listed
 
 BLOCK = 16 << 20

@@ -7,30 +7,19 @@ encoding of what is not UTF-8.
 from __future__ import annotations
 
 import codecs
-import csv
 import io
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple, get_args
 
 from pteron.errors import DataError, shown
-from pteron.tables.dialect import SEPARATORS, Decimal, Dialect, Separator, declaration
+from pteron.tables.cells import Cut, Record, best_cut, single_blanks
+from pteron.tables.dialect import SEPARATORS, Dialect, declaration
 from pteron.tables.table import listed
 
 _LINES = 1000
 """Lines looked at."""
-_MOST = 0.5
-"""Share of a column's cells that are numbers or times, beyond which it is a column of these."""
-
-_NUMBER = r"[+-]?(?:\d+{0}?\d*|{0}\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf)"
-_STAMP = r"(?:\d[\d./-]*[T ] ?)?\d\d?:\d\d:\d\d(?:[.,:]\d+)?(?: ?[AP]M|Z|[+-]\d\d:?\d\d)?"
-_DATA = {
-    sign: re.compile(f"{_NUMBER.format(re.escape(sign))}|{_STAMP}", re.IGNORECASE)
-    for sign in (".", ",")
-}
-"""What a cell of data looks like, by the decimal sign: a number, or a time of day."""
 _WITH_COMMA = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
 _OF_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 """A number that is another one where the comma marks thousands."""
@@ -79,44 +68,6 @@ class Layout:
     found: tuple[str, ...]
 
 
-class _Record(NamedTuple):
-    """A line that is not blank, or several with a quoted line end; lines count from 0."""
-
-    line: int
-    after: int
-    cells: tuple[str, ...]
-
-
-class _Rows(NamedTuple):
-    """A file as one separator cuts it."""
-
-    separator: Separator
-    decimal: Decimal
-    records: list[_Record]
-    width: int
-    """Cells of most records."""
-    columns: tuple[int, ...]
-    """Those that hold numbers or times."""
-    matched: int
-    """Cells that are one."""
-
-    def is_row(self, record: _Record) -> bool:
-        """Say whether all its numbers are numbers."""
-        return (
-            bool(self.columns)
-            and len(record.cells) == self.width
-            and all(_DATA[self.decimal].fullmatch(record.cells[j]) for j in self.columns)
-        )
-
-    def may_be_row(self, record: _Record) -> bool:
-        """Say whether it is more like a row with a bad cell than like a line above the rows."""
-        if len(record.cells) != self.width or not self.columns:
-            return False
-        cells = [record.cells[j] for j in self.columns]
-        good = [bool(_DATA[self.decimal].fullmatch(cell)) for cell in cells]
-        return (good[0] or not cells[0]) and sum(good) > _MOST * len(good)
-
-
 def find_encoding(head: bytes, declared: str | None, source: str) -> str:
     """Return the encoding of a text: as declared, as its mark says, UTF-8, or else cp1252.
 
@@ -163,7 +114,7 @@ def find_layout(head: bytes, declared: Dialect, encoding: str, source: str) -> L
     """
     lines = io.BytesIO(head).readlines()
     text = [line.decode() for line in lines[:_LINES]]
-    rows = _best(text, declared)
+    rows = best_cut(text, declared)
     if rows is None or not rows.records:
         raise DataError(f"{source}: is empty; its first line must name the columns")
     if declared.decimal is None:
@@ -196,57 +147,7 @@ def find_layout(head: bytes, declared: Dialect, encoding: str, source: str) -> L
     return Layout(known, named, units, repeated, start, first + 1, tuple(found))
 
 
-def single_blanks(text: bytes) -> bytes:
-    """Return lines with single blanks and none at their ends."""
-    return re.sub(rb"(?m)^ | $", b"", re.sub(rb" +", b" ", text))
-
-
-def _best(text: Sequence[str], declared: Dialect) -> _Rows | None:
-    """Return the file as that separator cuts it which makes most of its cells numbers."""
-    separators = [declared.separator] if declared.separator else list(SEPARATORS)
-    decimals = [declared.decimal] if declared.decimal else list(get_args(Decimal))
-    cut = [
-        rows
-        for separator in separators
-        for decimal in decimals
-        if separator != decimal and (rows := _rows(text, separator, decimal)).records
-    ]
-
-    def sense(rows: _Rows) -> tuple[float, int, int]:
-        return len(rows.columns) / rows.width, len(rows.columns), rows.matched
-
-    several = [rows for rows in cut if len(rows.columns) > 1]
-    if several:
-        return max(several, key=sense)
-    # Without rows of numbers the names alone tell the separator.
-    return max(cut, key=lambda rows: len(rows.records[0].cells), default=None)
-
-
-def _rows(text: Sequence[str], separator: Separator, decimal: Decimal) -> _Rows:
-    records = list(_records(text, separator))
-    width = Counter(len(one.cells) for one in records).most_common(1)[0][0] if records else 0
-    whole = [one.cells for one in records if len(one.cells) == width]
-    is_data = _DATA[decimal].fullmatch
-    counts = [sum(map(bool, map(is_data, column))) for column in zip(*whole, strict=True)]
-    columns = tuple(j for j, count in enumerate(counts) if count > _MOST * len(whole))
-    return _Rows(separator, decimal, records, width, columns, sum(counts))
-
-
-def _records(text: Sequence[str], separator: Separator) -> Iterator[_Record]:
-    if separator == " ":
-        text = [single_blanks(line.encode()).decode() for line in text]
-    reader, before = csv.reader(text, delimiter=separator), 0
-    try:
-        for cells in reader:
-            stripped = tuple(cell.strip() for cell in cells)
-            if any(stripped):
-                yield _Record(before, reader.line_num, stripped)
-            before = reader.line_num
-    except csv.Error:  # told where the rows are read
-        return
-
-
-def _check_commas(rows: _Rows, source: str) -> None:
+def _check_commas(rows: Cut, source: str) -> None:
     """Refuse numbers with commas that may be decimal commas or marks of thousands."""
     if rows.decimal != ",":
         return
@@ -260,7 +161,7 @@ def _check_commas(rows: _Rows, source: str) -> None:
         )
 
 
-def _first_row(rows: _Rows, header_lines: int | None) -> int:
+def _first_row(rows: Cut, header_lines: int | None) -> int:
     """Return the line, from 0, that the rows begin with."""
     if header_lines is not None:
         below = [one for one in rows.records if one.line >= header_lines]
@@ -276,7 +177,7 @@ def _first_row(rows: _Rows, header_lines: int | None) -> int:
 
 
 def _names(
-    rows: _Rows, above: Sequence[_Record], header_lines: int | None, source: str
+    rows: Cut, above: Sequence[Record], header_lines: int | None, source: str
 ) -> tuple[tuple[str, ...], tuple[str, ...], bool]:
     """Return names and units of the columns, and whether the units have a line of their own."""
     width = rows.width
@@ -306,13 +207,13 @@ def _names(
     return (*cells, *fill)[: max(width, len(cells))], (*of_units, *fill)[:width], bool(units)
 
 
-def _are_units(record: _Record) -> bool:
+def _are_units(record: Record) -> bool:
     cells = [cell for cell in record.cells if cell]
     return len(cells) > 1 and all(map(_UNIT.fullmatch, cells))
 
 
 def _of_scope(
-    rows: _Rows, title: _Record, keyed: Sequence[_Record]
+    rows: Cut, title: Record, keyed: Sequence[Record]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return names and units in an export of TwinCAT Scope, whose lines have keys over the times.
 
@@ -329,7 +230,7 @@ def _of_scope(
     return tuple(names), tuple(units)
 
 
-def _nameless(rows: _Rows, above: Sequence[_Record], source: str) -> DataError:
+def _nameless(rows: Cut, above: Sequence[Record], source: str) -> DataError:
     if not above:
         return DataError(f"{source}: no line names the columns; the first line must name them")
     last = above[-1]

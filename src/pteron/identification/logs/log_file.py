@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import chain, cycle, pairwise
 from pathlib import Path
@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.errors import DataError, shown
+from pteron.identification.logs.as_read import RepeatedTimes, as_read, check_names
 from pteron.identification.logs.channels import Channel
 from pteron.identification.logs.clock import Clock, find_clock
 from pteron.identification.logs.columns import find_columns
 from pteron.identification.logs.description import Description, joint_symbols
 from pteron.identification.logs.description_file import find_description, read_description
-from pteron.identification.logs.log import Finding, Log, joined
-from pteron.identification.logs.names import called, means
+from pteron.identification.logs.log import Log, joined
 from pteron.identification.logs.sizes import (
     check_bounds,
     check_forces,
@@ -31,11 +31,9 @@ from pteron.identification.logs.sizes import (
 from pteron.identification.logs.spikes import MARGIN, Spikes
 from pteron.identification.logs.time_stamps import TimeStamps
 from pteron.manipulator import Manipulator
-from pteron.tables import CsvFile, Dialect, ParquetFile, Table, open_table
+from pteron.tables import CsvFile, Dialect, ParquetFile, open_table
 
 _FEWEST = 50
-_ONCE = ("rho", "theta", "force", "torque")
-"""Words for columns that there is one of; those of times some programs repeat."""
 _AHEAD = 10_000
 """Rows looked at when a log is opened: the usual step is their median."""
 _PER_METRE = {"mm": 1e3, "um": 1e6}
@@ -70,13 +68,9 @@ class LogFile:
     ) -> None:
         self.source = source = file.source
         self._robot, self._file = robot, file
-        repeated = file.repeated
-        for name in repeated.values():
-            parts = called(name)
-            if parts and any(means(parts.word, stem) for stem in _ONCE):
-                raise self._twice(name)
-        names = [name for name in file.columns if name not in repeated]
+        names = [name for name in file.columns if name not in file.repeated]
         units = dict(zip(file.columns, file.units, strict=False))
+        check_names(file.repeated, source)
         self._columns = c = find_columns(names, units, robot, description, source, file.hint)
         if description.column_force_unit is None and description.gains is None:
             unit: Any = c.forces.units[0]
@@ -85,10 +79,13 @@ class LogFile:
         self.rows_estimate = file.rows_estimate
         self._groups = (c.joints, c.forces, c.pose, c.payload)
         self._names = tuple(name for group in self._groups for name in group.names)
-        self._again = self._same_times(repeated)
+        self._again = RepeatedTimes(file.repeated, c, source)
         self._bounds = joint_bounds(robot), pose_bounds(robot)
         self._clock, self._step = self._usual_step()
-        self._read = (*self._as_read(), *c.findings)
+        self._read = (
+            *as_read(source, file.found, c, description, self._clock, self._again),
+            *c.findings,
+        )
         self.findings = self._read
 
     def pieces(
@@ -177,8 +174,8 @@ class LogFile:
         held: list[Values] = []
         count = 0
         clock = self._clock.fresh()
-        for table in self._file.tables((*clock.columns, *self._names, *self._again)):
-            self._check_again(table)
+        for table in self._file.tables((*clock.columns, *self._names, *self._again.names)):
+            self._again.check(table)
             held.append(np.column_stack([clock.seconds(table), table.numbers(self._names)]))
             count += len(table)
             while count >= rows:
@@ -188,54 +185,6 @@ class LogFile:
                 count -= rows
         if count:
             yield np.concatenate(held)
-
-    def _same_times(self, repeated: Mapping[str, str]) -> tuple[str, ...]:
-        """Return the other columns of times, where a program writes them for each channel anew."""
-        used = {*self._columns.time.names, *self._names}
-        for name in repeated.values():
-            if name in used and name not in self._columns.time.names:
-                raise self._twice(name)
-        return tuple(new for new, name in repeated.items() if name in used)
-
-    def _twice(self, name: str) -> DataError:
-        return DataError(
-            f"{self.source}: two columns are called {shown(name)}; rename or remove one"
-        )
-
-    def _check_again(self, table: Table) -> None:
-        first = self._columns.time.names[0]
-        for name in self._again:
-            apart = (table.frame[name] != table.frame[first]).fill_null(value=True)
-            if apart.any():
-                row = int(np.argmax(apart.to_numpy()))
-                one, other = (shown(str(table.frame[key][row])) for key in (first, name))
-                raise DataError(
-                    f"{table.place(row)}: its channels were not sampled at one time: {first} is "
-                    f"{one}, {name} is {other}; record all channels with one sample time, or "
-                    "export them with one time column"
-                )
-
-    def _as_read(self) -> tuple[Finding, ...]:
-        """Return how the file was read, in one finding, where that is not as documented."""
-        c, clock = self._columns, self._clock
-        parts = list(self._file.found)
-        time = c.time.in_words("time")
-        if clock.format is not None:
-            time = f"{time.removesuffix(' in s')} as text, {clock.format}"
-        elif clock.guessed:
-            time = f"{time.removesuffix(' in s')} in {clock.unit} (guessed from its size)"
-        if c.time.told or clock.guessed or (clock.format and not self.description.time_format):
-            parts.append(time)
-        if self._again:
-            parts.append(f"{len(self._again) + 1} equal columns of times")
-        for group, noun in ((c.joints, "joints"), (c.forces, "forces"), (c.pose, "pose")):
-            if group.told:
-                parts.append(group.in_words(noun))
-        if not parts:
-            return ()
-        guessed = any(group.guessed for group in (c.time, *self._groups))
-        advice = "; columns are taken by name: declare them in its TOML file to be sure" * guessed
-        return (Finding("read", f"{self.source}: read as: {', '.join(parts)}{advice}"),)
 
     def _piece(self, values: Values, first: int) -> Log:
         c, source = self._columns, self.source

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.errors import DataError
-from pteron.identification.logs.columns import Group
 from pteron.identification.logs.description import joint_symbols
 from pteron.identification.logs.log import Finding
+from pteron.identification.logs.search import Group
 from pteron.legs import LegKind
 from pteron.manipulator import Manipulator
 from pteron.tables import declaration
