@@ -7,11 +7,14 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 from mechanisms import CATALOG
 
 from pteron.errors import DataError
 from pteron.identification.logs import Log, joint_symbols, open_log, read_log
+from pteron.identification.logs.clock import find_clock
+from pteron.tables import Table
 
 MACHINES = ("quadrupteron", "delta", "par4", "five-bar")
 each_machine = pytest.mark.parametrize("name", MACHINES)
@@ -189,6 +192,24 @@ def test_what_is_declared_is_not_found_again(tmp_path):
     assert log.findings == ()
 
 
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({0: "fast"}, r"row 1 \(line 2\), column t: 'fast' given, a number expected"),
+        ({3: ""}, r"row 1 \(line 2\), column theta3: the cell is empty"),
+        ({7: "0.5"}, r"row 1 \(line 2\) has 8 cells, but the header names 7"),
+    ],
+)
+def test_a_first_row_with_a_fault_is_no_header(tmp_path, change, words):
+    sheet = Sheet("delta")
+    rows = sheet.rows(seconds(sheet))
+    rows[0] = [change.get(i, cell) for i, cell in enumerate([*rows[0], ""])][: max(*change, 6) + 1]
+    with pytest.raises(DataError, match=words):
+        read_log(
+            written(tmp_path, [sheet.names("t", "theta{}", "torque{}"), *rows], ";"), sheet.robot
+        )
+
+
 # Time ------------------------------------------------------------------------------------------
 
 START = datetime(2026, 11, 22, 23, 59, 59, 940_000)
@@ -265,6 +286,28 @@ def test_dates_as_numbers_tell_their_unit_and_lose_no_digit(tmp_path, origin, ti
         log.time - log.time[0], np.array(sheet.milliseconds) / 1e3, atol=1e-6
     )
     assert f"time t in {unit} (guessed from its size)" in message(log)
+
+
+def test_dates_in_parquet_are_times(tmp_path):
+    sheet = Sheet("delta")
+    names = sheet.names("t", "theta{}", "torque{}")
+    columns = np.array(sheet.rows(seconds(sheet)), dtype=float).T
+    when = [START + timedelta(milliseconds=t) for t in sheet.milliseconds]
+    frame = pl.DataFrame(dict(zip(names, columns, strict=True)) | {"t": when})
+    frame.write_parquet(tmp_path / "a.parquet")
+    sheet.check(read_log(tmp_path / "a.parquet", sheet.robot))
+
+
+def test_midnight_passes_between_blocks_of_a_file():
+    parts = [["23:59:59.9", "00:00:00.1"], ["00:00:00.3"], ["23:59:59.5"], ["00:00:00.5"]]
+    tables = [Table("a.csv", pl.DataFrame({"t": cells})) for cells in parts]
+    clock = find_clock(tables[0], ("t",), None, None)
+    for _ in range(2):
+        one = clock.fresh()
+        found = np.concatenate([one.seconds(table) for table in tables])
+        np.testing.assert_allclose(
+            found, [86399.9, 86400.1, 86400.3, 172799.5, 172800.5], rtol=0, atol=1e-10
+        )
 
 
 # Layouts of programs ---------------------------------------------------------------------------
@@ -498,7 +541,7 @@ def test_names_with_blanks_between_blanks_are_refused(tmp_path):
         read_log(written(tmp_path, [names, *rows], " "), sheet.robot)
     rows[30].pop()
     names = sheet.names("t", "theta{}", "torque{}")
-    with pytest.raises(DataError, match=r"row 31 \(line 32\) has 6 cells"):
+    with pytest.raises(DataError, match=r"row 31 \(line 32\) has 6 cells.*blanks cannot mark"):
         read_log(written(tmp_path, [names, *rows], " "), sheet.robot)
 
 

@@ -52,12 +52,12 @@ class Cut(NamedTuple):
         )
 
     def may_be_row(self, record: Record) -> bool:
-        """Say whether it is more like a row with a bad cell than like a line above the rows."""
-        if len(record.cells) != self.width or not self.columns:
-            return False
-        cells = [record.cells[j] for j in self.columns]
-        good = [bool(_DATA[self.decimal].fullmatch(cell)) for cell in cells]
-        return (good[0] or not cells[0]) and sum(good) > _MOST * len(good)
+        """Say whether it is more like a row with a fault than like a line above the rows."""
+        cells = record.cells
+        if len(cells) == self.width and self.columns:
+            cells = tuple(cells[j] for j in self.columns)
+        good = sum(bool(_DATA[self.decimal].fullmatch(cell)) for cell in cells)
+        return good > _MOST * len(cells)
 
 
 def single_blanks(text: bytes) -> bytes:

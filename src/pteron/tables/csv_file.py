@@ -97,6 +97,8 @@ class CsvFile:
         other = self._other_dialect(header.decode(), sample.partition(b"\n")[0])
         self.hint = other or "the first line must name the columns"
         self._mend = other or "mend the row"
+        if self._separator == " ":
+            self._mend += ", or export with another separator: blanks cannot mark an empty cell"
 
     def tables(self, columns: Sequence[str] | None = None) -> Iterator[Table]:
         """Yield the cells as text, a block of rows at a time; blank lines are skipped.

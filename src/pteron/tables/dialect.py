@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal
 
 from pteron.errors import DataError, shown
 
@@ -44,12 +44,6 @@ class Dialect:
     header_lines: int | None = None
 
     def __post_init__(self) -> None:
-        for key, value, valid in (
-            ("separator", self.separator, get_args(Separator)),
-            ("decimal", self.decimal, get_args(Decimal)),
-        ):
-            if value is not None and value not in valid:
-                raise DataError(f"{key}: {value!r} given, one of {valid} expected")
         if self.decimal is not None and self.decimal == self.separator:
             raise DataError('decimal: "," cannot be the separator too')
         if self.header_lines is not None and self.header_lines < 1:
