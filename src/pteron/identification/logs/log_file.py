@@ -53,7 +53,7 @@ class LogFile:
     rows_estimate : int or None
         About how many rows it has, for a progress bar; exact in Parquet.
     findings : tuple of Finding
-        What was guessed and, after a full pass, all that was noticed.
+        How it was read and, after a full pass, all that was noticed.
     rows_in_memory : int
         Rows up to which `identify` reads it whole: 2 million, 150 MB for four joints.
     rows_in_piece : int
