@@ -14,7 +14,7 @@ from pteron.errors import DataError, shown
 from pteron.identification.logs.description import TimeFormat, TimeUnit
 from pteron.tables import Table, declaration
 
-PER_SECOND: dict[TimeUnit, float] = {"s": 1.0, "ms": 1e3, "us": 1e6, "100 ns": 1e7, "ns": 1e9}
+PER_SECOND: dict[str, float] = {"s": 1.0, "ms": 1e3, "us": 1e6, "100 ns": 1e7, "ns": 1e9}
 """Units of time, each with how many make a second."""
 
 _EPOCHS: tuple[tuple[float, float, TimeUnit], ...] = (
