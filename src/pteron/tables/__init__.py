@@ -5,7 +5,8 @@ file too. A file is read a block of rows at a time. The cells of a CSV file are 
 is asked for, so that columns which Pteron does not use are written back as they came.
 """
 
-from pteron.tables.csv_file import CsvFile, Dialect
+from pteron.tables.csv_file import CsvFile
+from pteron.tables.dialect import Dialect, declaration
 from pteron.tables.files import (
     ENDINGS,
     STANDARD_INPUT,
@@ -26,6 +27,7 @@ __all__ = [
     "ParquetFile",
     "Table",
     "check_output",
+    "declaration",
     "listed",
     "open_table",
     "read_table",

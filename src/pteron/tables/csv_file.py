@@ -7,56 +7,23 @@ import csv
 import io
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
 from itertools import chain, islice, pairwise
 from pathlib import Path
-from typing import Literal
 
 import polars as pl
 
 from pteron.errors import DataError, shown
+from pteron.tables.cells import single_blanks
+from pteron.tables.dialect import PLAIN, SEPARATORS, Dialect, declaration
+from pteron.tables.layout import find_encoding, find_layout
 from pteron.tables.table import Table, listed
 
 BLOCK = 16 << 20
 """Bytes read at a time: large enough for Polars to be fast, small beside any memory."""
 _HEAD = 1 << 20
-_SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
-
-
-@dataclass(frozen=True)
-class Dialect:
-    """How a CSV file is written.
-
-    Parameters
-    ----------
-    separator : str
-        The character between cells.
-    decimal : {".", ","}
-        The decimal sign.
-    encoding : str
-        A text encoding that Python knows.
-    header_lines : int, optional
-        Lines above the data, of which the last names the columns. By default the first line that is
-        not blank names them.
-    """
-
-    separator: Literal[",", ";", "\t", "|", " "] = ","
-    decimal: Literal[".", ","] = "."
-    encoding: str = "utf-8"
-    header_lines: int | None = None
-
-    def __post_init__(self) -> None:
-        if self.decimal == self.separator:
-            raise DataError('decimal: "," cannot be the separator too')
-        if self.header_lines is not None and self.header_lines < 1:
-            raise DataError(f"header_lines: {self.header_lines} given, at least 1 expected")
-        try:
-            "".encode(self.encoding)
-        except (LookupError, ValueError):
-            raise DataError(
-                f"encoding: {shown(self.encoding)} is no text encoding that Python knows"
-            ) from None
+_END = b"\nEOF"
+"""A last line that marks the end, as TwinCAT Scope writes it."""
 
 
 class CsvFile:
@@ -69,7 +36,8 @@ class CsvFile:
     source : str
         What messages call it.
     dialect : Dialect, optional
-        How it is written; messages then advise to declare another in the TOML file beside it.
+        How it is written, as far as that is declared in the TOML file beside it; the rest is found.
+        By default it must be plain: commas, decimal points, UTF-8, names in the first line.
     block : int
         Bytes read at a time.
 
@@ -77,6 +45,12 @@ class CsvFile:
     ----------
     columns : tuple of str
         Names of the columns, stripped of blanks.
+    units : tuple of str
+        Their units, empty where no line of the file says them.
+    repeated : dict
+        Names that the file has more than once, as they are told apart, and as it has them.
+    found : tuple of str
+        What is unlike a plain CSV file and was not declared, in words.
     rows_estimate : int or None
         About how many rows it has.
     hint : str
@@ -97,9 +71,25 @@ class CsvFile:
         block: int = BLOCK,
     ) -> None:
         self.source, self._data, self._block = source, data, block
-        self._dialect, self._describable = dialect or Dialect(), dialect is not None
+        self._found = dialect is not None
+        self._dialect = dialect or PLAIN
+        self._encoding = self._dialect.encoding or find_encoding(self._beginning(), None, source)
+        self._separator = self._dialect.separator or ","
         head = next(self._text(_HEAD), b"")
-        self.columns, self._start, self._first_line = self._header(head)
+        self.units: tuple[str, ...] = ()
+        self.repeated: dict[str, str] = {}
+        self.found: tuple[str, ...] = ()
+        if dialect is None:
+            self.columns, self._start, self._first_line = self._header(head)
+        else:
+            layout = find_layout(head, dialect, self._encoding, source)
+            self._dialect = layout.dialect
+            self._separator = layout.dialect.separator or ","
+            self.columns, self.units = layout.names, layout.units
+            self.repeated, self.found = layout.repeated, layout.found
+            self._start, self._first_line = layout.start, layout.first_line
+            if self._separator == " ":
+                head = next(self._text(_HEAD), b"")
         header, sample = head[: self._start], head[self._start :]
         rows = sample.count(b"\n")
         size = len(data) if isinstance(data, bytes) else data.stat().st_size
@@ -107,6 +97,8 @@ class CsvFile:
         other = self._other_dialect(header.decode(), sample.partition(b"\n")[0])
         self.hint = other or "the first line must name the columns"
         self._mend = other or "mend the row"
+        if self._separator == " ":
+            self._mend += ", or export with another separator: blanks cannot mark an empty cell"
 
     def tables(self, columns: Sequence[str] | None = None) -> Iterator[Table]:
         """Yield the cells as text, a block of rows at a time; blank lines are skipped.
@@ -126,6 +118,8 @@ class CsvFile:
         for chunk, following in pairwise(chain(self._text(self._block, self._start), [None])):
             assert chunk is not None
             whole = rest + chunk
+            if following is None and self._found and whole.rstrip().endswith(_END):
+                whole = whole[: whole.rindex(_END) + 1]
             cut = len(whole) if following is None else _end_of_records(whole)
             if not cut and len(whole) > self._block + _HEAD:  # a quote that is never closed
                 cut = len(whole)
@@ -135,15 +129,25 @@ class CsvFile:
                 frame = self._by_record(block, row, line).select(names)
             if len(frame):
                 line_of = partial(self._line_of, block, line)
-                yield Table(self.source, frame, self.hint, row, line_of, self._dialect.decimal)
+                decimal = self._dialect.decimal or "."
+                yield Table(self.source, frame, self.hint, row, line_of, decimal)
             row += len(frame)
             line += block.count(b"\n")
 
+    def _beginning(self) -> bytes:
+        if isinstance(self._data, bytes):
+            return self._data[:_HEAD]
+        with self._data.open("rb") as file:
+            return file.read(_HEAD)
+
     def _text(self, size: int, start: int = 0) -> Iterator[bytes]:
-        """Yield the text from `start` on, in UTF-8 and with the line ends of Unix, in pieces."""
-        decoder = codecs.getincrementaldecoder(self._dialect.encoding)()
+        """Yield the text from `start` on, in UTF-8 and with the line ends of Unix, in pieces.
+
+        Where blanks separate the cells, each line has single ones, and none at its ends.
+        """
+        decoder = codecs.getincrementaldecoder(self._encoding)()
         decode = io.IncrementalNewlineDecoder(decoder, translate=True).decode
-        data, mark = self._data, "\ufeff"
+        data, mark, held = self._data, "\ufeff", b""
         with io.BytesIO(data) if isinstance(data, bytes) else data.open("rb") as file:
             for chunk, following in pairwise(chain(iter(partial(file.read, size), b""), [b""])):
                 try:
@@ -151,16 +155,17 @@ class CsvFile:
                 except UnicodeError:
                     raise self._not_text() from None
                 whole, mark = text.removeprefix(mark).encode(), ""
+                if self._separator == " ":
+                    whole = held + whole
+                    cut = len(whole) if not following else whole.rfind(b"\n") + 1
+                    whole, held = single_blanks(whole[:cut]), whole[cut:]
                 yield whole[start:]
                 start = max(start - len(whole), 0)
 
     def _header(self, head: bytes) -> tuple[tuple[str, ...], int, int]:
         """Return the columns' names, where the rows begin, and on which line."""
         lines = io.BytesIO(head).readlines()
-        above = self._dialect.header_lines or 1
-        records = csv.reader(
-            map(bytes.decode, lines[above - 1 :]), delimiter=self._dialect.separator, strict=True
-        )
+        records = csv.reader(map(bytes.decode, lines), strict=True)
         try:
             names = next((tuple(c.strip() for c in cells) for cells in records if _any(cells)), ())
         except csv.Error as error:
@@ -168,31 +173,25 @@ class CsvFile:
                 f"{self.source}: its header is not CSV ({error}); check its quotes and line ends"
             ) from None
         if not names:
-            which = "first line" if above == 1 else f"line {above}"
-            raise DataError(f"{self.source}: is empty; its {which} must name the columns")
+            raise DataError(f"{self.source}: is empty; its first line must name the columns")
         twice = next((name for i, name in enumerate(names) if name in names[:i]), None)
         if twice is not None:
             raise DataError(
                 f"{self.source}: two columns are called {shown(twice)}; rename or remove one"
             )
-        read = above - 1 + records.line_num
+        read = records.line_num
         return names, sum(map(len, lines[:read])), read + 1
 
     def _other_dialect(self, header: str, row: bytes) -> str | None:
-        """Say in which dialect the file seems to be written, if not in the one it is read in."""
-        separator = self._dialect.separator
-        other = next((s for s in _SEPARATORS if s != separator and s in header), None)
-        if len(self.columns) > 1 or other is None:
+        """Say in which dialect a file seems to be written that must be plain."""
+        other = next((s for s in SEPARATORS if s not in ", " and s in header), None)
+        if self._found or len(self.columns) > 1 or other is None:
             return None
-        comma = other != "," and re.search(rb"\d,\d", row) is not None
-        found = _SEPARATORS[other] + ", with decimal commas" * comma
-        declare = ""
-        if self._describable:
-            declaration = f'separator = "{other}"'.replace("\t", "\\t") + ', decimal = ","' * comma
-            declare = f", or declare it in a TOML file beside it: [csv] {declaration}"
+        comma = re.search(rb"\d,\d", row) is not None
+        found = SEPARATORS[other] + ", with decimal commas" * comma
         return (
             f"its cells look separated by {found}; separate the cells with commas and decimals "
-            f"with points{declare}"
+            "with points"
         )
 
     def _at_once(self, block: bytes, names: Sequence[str]) -> pl.DataFrame | None:
@@ -201,7 +200,7 @@ class CsvFile:
         Polars fills short rows and takes blank lines for rows, which separators that are not there
         tell; and it is lenient with quotes.
         """
-        separator, last = self._dialect.separator, len(self.columns) - 1
+        separator, last = self._separator, len(self.columns) - 1
         if not last or b'"' in block:
             return None
         wanted = [self.columns.index(name) for name in names]
@@ -237,7 +236,7 @@ class CsvFile:
     def _records(self, block: bytes, line: int) -> Iterator[tuple[int, list[str]]]:
         """Yield the records that are not blank, each with the line it begins on."""
         lines = map(bytes.decode, io.BytesIO(block))
-        reader = csv.reader(lines, delimiter=self._dialect.separator, strict=True)
+        reader = csv.reader(lines, delimiter=self._separator, strict=True)
         begins = line
         for cells in reader:
             if _any(cells):
@@ -248,11 +247,11 @@ class CsvFile:
         return next(islice(self._records(block, line), index, None))[0]
 
     def _not_text(self) -> DataError:
-        declare = "; or declare its encoding in a TOML file beside it: [csv] encoding = ..."
-        return DataError(
-            f"{self.source}: not {self._dialect.encoding.upper()} text; save it as CSV in UTF-8"
-            f"{declare if self._describable else ''}"
-        )
+        message = f"{self.source}: not {self._encoding.upper()} text; save it as CSV in UTF-8"
+        if self._found:
+            message += ", or say what it is in a TOML file beside it, such as"
+            message += declaration("csv", encoding="cp1252")
+        return DataError(message)
 
 
 def _any(cells: Sequence[str]) -> bool:

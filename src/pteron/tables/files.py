@@ -13,7 +13,8 @@ import polars as pl
 
 from pteron.atomic import write_bytes
 from pteron.errors import DataError, OutputError, shown
-from pteron.tables.csv_file import CsvFile, Dialect
+from pteron.tables.csv_file import CsvFile
+from pteron.tables.dialect import PLAIN, Dialect
 from pteron.tables.parquet_file import ParquetFile
 from pteron.tables.table import Table, listed, typed
 
@@ -35,7 +36,8 @@ def open_table(
     noun : str
         What messages call such files.
     dialect : Dialect, optional
-        How a CSV file is written, where a TOML file beside it may declare that.
+        How a CSV file is written, as far as that is declared; the rest is found. By default it must
+        be plain.
 
     Raises
     ------
@@ -167,7 +169,7 @@ def table_bytes(frame: pl.DataFrame, path: str | Path, dialect: Dialect | None =
     file = check_output(path, dialect)
     buffer = io.BytesIO()
     try:
-        ENDINGS[file.suffix.lower()](frame, buffer, dialect or Dialect())
+        ENDINGS[file.suffix.lower()](frame, buffer, dialect or PLAIN)
     except pl.exceptions.PolarsError as error:
         reason = str(error).splitlines()[0]
         raise OutputError(f"{path}: cannot hold this table ({reason})") from None
@@ -176,7 +178,7 @@ def table_bytes(frame: pl.DataFrame, path: str | Path, dialect: Dialect | None =
 
 ENDINGS: dict[str, Callable[[pl.DataFrame, io.BytesIO, Dialect], None]] = {
     ".csv": lambda frame, buffer, how: frame.write_csv(
-        buffer, separator=how.separator, decimal_comma=how.decimal == ","
+        buffer, separator=how.separator or ",", decimal_comma=how.decimal == ","
     ),
     ".parquet": lambda frame, buffer, how: typed(frame).write_parquet(buffer),
 }

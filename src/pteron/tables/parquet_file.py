@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import ClassVar
 
 import polars as pl
 
@@ -23,6 +24,9 @@ class ParquetFile:
     """
 
     hint = "add what is missing"
+    units: tuple[str, ...] = ()
+    repeated: ClassVar[dict[str, str]] = {}
+    found: tuple[str, ...] = ()
 
     def __init__(self, path: Path, source: str) -> None:
         self.source = source

@@ -14,6 +14,7 @@ from pteron.dynamics import drive_forces
 from pteron.errors import DataError, shown
 from pteron.identification.excitation.movement import Movement
 from pteron.identification.logs import Description
+from pteron.identification.logs.clock import PER_SECOND
 from pteron.identification.logs.description import AngleUnit, LengthUnit, TimeUnit
 from pteron.manipulator import Manipulator
 from pteron.tables import Dialect
@@ -21,7 +22,7 @@ from pteron.tables import Dialect
 Contents = Literal["all", "joints", "poses"]
 """What a file holds beside time: everything, the joint coordinates, or the poses."""
 
-_PER_UNIT = {"ms": 1e3, "us": 1e6, "mm": 1e3, "um": 1e6, "deg": 180.0 / math.pi}
+_PER_UNIT: dict[str, float] = {**PER_SECOND, "mm": 1e3, "um": 1e6, "deg": 180.0 / math.pi}
 _MOST_SAMPLES = 10_000_000
 _ROUNDING = 1e-6
 

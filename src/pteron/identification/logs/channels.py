@@ -1,4 +1,4 @@
-"""Channels that stop or jump: dead ones are refused; clipped or frozen ones and spikes are said."""
+"""Channels that stop: dead ones are refused; clipped or frozen ones are said."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter  # type: ignore[import-untyped]
 
 from pteron.errors import DataError
 from pteron.identification.logs.log import Finding, Kind
@@ -19,14 +18,6 @@ _MOVED = 0.01
 """A channel is frozen that stays for over so many rows while another joint moves this part of
 its span."""
 _ROUNDING = 1e-9
-_FORCES, _JOINTS = 0.5, 0.05
-"""Share of a channel's span by which a spike stands out; friction makes forces jump."""
-_WINDOW = 5
-"""Samples whose median a sample is compared with: steps pass, single samples do not."""
-_USUAL = 20.0
-"""Distance from the median that makes a spike, in that which one sample in a hundred exceeds."""
-_SHARES = (1.0, 99.0)
-"""Percentiles between which a channel's usual span lies."""
 
 Values = NDArray[np.float64]
 
@@ -95,11 +86,10 @@ class Channel:
         self._rows = 0
         self._run: _Run | None = None
         self._extremes = (_Extreme("greatest", 1.0), _Extreme("least", -1.0))
-        self._frozen, self._beyond, self._spikes = _Tally(), _Tally(), _Tally()
+        self._frozen, self._beyond = _Tally(), _Tally()
 
     def take(self, values: Values, joints: Values) -> None:
         """Look at the next piece: this channel, (rows,), and all joint coordinates, (rows, n)."""
-        self._take_spikes(values)
         for extreme in self._extremes:
             extreme.look(values)
         if self._limits is not None:
@@ -169,25 +159,7 @@ class Channel:
                         f"{one.rows.row + 1}: clipped"
                     )
                     found.append(self._finding("clipped", message, one.rows))
-        if self._spikes.count:
-            message = (
-                f"row {self._spikes.row + 1}, {column}: {self._spikes.first[0]:g} stands out from "
-                f"its neighbours: spike{_more(self._spikes, 'samples')}"
-            )
-            found.append(self._finding("spike", message, self._spikes))
         return tuple(found)
-
-    def _take_spikes(self, values: Values) -> None:
-        """Count single samples far from their neighbours, which a piece's outermost lack."""
-        if len(values) <= _WINDOW:
-            return
-        apart = np.abs(values - median_filter(values, _WINDOW, mode="nearest"))
-        low, high = np.percentile(values, _SHARES)
-        usual = _USUAL * np.percentile(apart, _SHARES[1])
-        share = _FORCES if self._is_force else _JOINTS
-        found = np.flatnonzero(apart > max(usual, share * (high - low)))
-        if len(found):
-            self._spikes.add(len(found), self._rows + int(found[0]), float(values[found[0]]))
 
     def _close(self, run: _Run) -> None:
         rows = run.stop - run.start

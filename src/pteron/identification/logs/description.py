@@ -24,7 +24,15 @@ from pteron.manipulator import Manipulator
 from pteron.tables import Dialect
 from pteron.toml import fault_lines, told
 
-TimeUnit = Literal["s", "ms", "us"]
+TimeUnit = Literal["s", "ms", "us", "ns", "100 ns"]
+TimeFormat = Literal[
+    "hh:mm:ss",
+    "YYYY-MM-DD hh:mm:ss",
+    "DD.MM.YYYY hh:mm:ss",
+    "DD/MM/YYYY hh:mm:ss",
+    "MM/DD/YYYY hh:mm:ss",
+]
+"""How times are written as text; fractions of a second may follow each."""
 LengthUnit = Literal["m", "mm", "um"]
 AngleUnit = Literal["rad", "deg"]
 ForceUnit = Literal["N", "N m", "A", "V", "%"]
@@ -150,7 +158,9 @@ class Description:
         Names of columns.
     joint_columns, force_columns, pose_columns : tuple of str, optional
         Names of columns, in the order of the legs and of the pose's coordinates.
-    time_unit : {"s", "ms", "us"}, optional
+    time_unit : {"s", "ms", "us", "ns", "100 ns"}, optional
+    time_format : str, optional
+        One of `TimeFormat`, where times are text.
     joint_unit : {"m", "mm", "um", "rad", "deg"}, optional
         Unit of the joint coordinates that it can measure: lengths of sliders, angles of cranks.
     joint_angle_unit : {"rad", "deg"}, optional
@@ -191,6 +201,7 @@ class Description:
     csv: Dialect | None = None
     time_column: Annotated[str | None, Field(alias="time.column")] = None
     time_unit: Annotated[TimeUnit | None, Field(alias="time.unit")] = None
+    time_format: Annotated[TimeFormat | None, Field(alias="time.format")] = None
     joint_columns: Annotated[Names | None, Field(alias="joints.columns")] = None
     joint_unit: Annotated[JointUnit | None, Field(alias="joints.unit")] = None
     joint_angle_unit: Annotated[AngleUnit | None, Field(alias="joints.angle_unit")] = None
@@ -242,6 +253,12 @@ class Description:
             raise ValueError(f"motion.end: {self.end:g} s is not behind motion.start")
         if self.period is None and (self.start is not None or self.end is not None):
             raise ValueError("motion.start, motion.end: are of a periodic part; give its period")
+        return self
+
+    @model_validator(mode="after")
+    def _one_clock(self) -> Description:
+        if self.time_unit is not None and self.time_format is not None:
+            raise ValueError("time.format: times as text have no unit; give unit or format")
         return self
 
     @property

@@ -36,10 +36,10 @@ def find_description(log_path: str | Path) -> Path | None:
 def read_description(path: str | Path) -> Description:
     """Read the description of a log from a TOML file, in which every key is optional.
 
-    Its tables: ``[csv]`` separator, decimal, encoding, header_lines; ``[time]`` column, unit;
-    ``[joints]`` (``[sliders]`` in older files) columns, unit, angle_unit; ``[forces]`` columns,
-    unit, gains, limits; ``[pose]`` columns, length_unit, angle_unit; ``[payload]`` column, mass,
-    center_of_mass or first_moment, inertia; ``[motion]`` period, start, end, assembly_mode;
+    Its tables: ``[csv]`` separator, decimal, encoding, header_lines; ``[time]`` column, unit or
+    format; ``[joints]`` (``[sliders]`` in older files) columns, unit, angle_unit; ``[forces]``
+    columns, unit, gains, limits; ``[pose]`` columns, length_unit, angle_unit; ``[payload]`` column,
+    mass, center_of_mass or first_moment, inertia; ``[motion]`` period, start, end, assembly_mode;
     ``[drives]`` rotor_inertia, ratio.
 
     Raises

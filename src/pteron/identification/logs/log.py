@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 import polars as pl
 from jaxtyping import Int
+from numpy.typing import NDArray
 
 from pteron.errors import DataError
 from pteron.identification.logs.description import Description
@@ -28,14 +29,17 @@ _POSE = ("x", "y", "z", "phi")
 _Phases = Int[np.ndarray, "*batch"]
 
 
-Kind = Literal["gap", "jitter", "clipped", "frozen", "spike", "guessed", "units", "periodic"]
-"""Missing samples, uneven steps, saturated forces, a channel that stops, single samples that stand
-out, a name or a unit guessed, a unit that looks wrong, which rows repeat."""
+Kind = Literal[
+    "gap", "jitter", "clipped", "frozen", "spike", "read", "guessed", "units", "periodic"
+]
+"""Missing samples, uneven steps, saturated forces, a channel that stops, samples that stand out,
+how the file was read where that is not as documented, columns that may have been meant, a unit that
+looks wrong, which rows repeat."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """Something in a log that a person should know; nothing was repaired.
+    """Something about a log that a person should know; nothing was repaired.
 
     Parameters
     ----------
@@ -48,7 +52,8 @@ class Finding:
     column : str or None
         The column, as the file calls it.
     count : int
-        How often it occurs: gaps, uneven steps, clipped rows, frozen stretches, spikes or columns.
+        How often it occurs: gaps, uneven steps, clipped rows, frozen stretches, samples that stand
+        out, or columns.
     """
 
     kind: Kind
@@ -90,6 +95,8 @@ class Log:
     coordinates : tuple of str, optional
         What the coordinates of the measured pose are called; x, y, z, phi, as many as there are, if
         it is not given.
+    rows_in_file : array of int, shape (T,), optional
+        Index from 0 of each sample among the data rows of its file, where some are left out.
 
     Raises
     ------
@@ -109,6 +116,7 @@ class Log:
     step: float | None = None
     symbols: tuple[ActuatedJoint, ...] | None = None
     coordinates: tuple[str, ...] | None = None
+    rows_in_file: _Phases | None = None
 
     def __post_init__(self) -> None:
         for name in _ARRAYS:
@@ -166,7 +174,8 @@ class Log:
 
     def place(self, index: int) -> str:
         """Return where in its file a sample is, its row counted from 1."""
-        return f"{self.source}: row {self.first_row + index + 1}"
+        row = self.first_row + index if self.rows_in_file is None else self.rows_in_file[index]
+        return f"{self.source}: row {row + 1}"
 
     def part(self, start: int, stop: int) -> Log:
         """Return the samples from `start` up to, not including, `stop`, as views.
@@ -174,11 +183,23 @@ class Log:
         The findings stay those of the whole file; their rows are rows of the file.
         """
         start, stop, _ = slice(start, stop).indices(self.rows)
-        parts = {name: getattr(self, name) for name in _ARRAYS}
+        parts = {name: getattr(self, name) for name in (*_ARRAYS, "rows_in_file")}
         changed: dict[str, Any] = {
             name: None if values is None else values[start:stop] for name, values in parts.items()
         }
-        return replace(self, **changed, first_row=self.first_row + start)
+        first = self.first_row + start
+        if self.rows_in_file is not None and start < self.rows:
+            first = int(self.rows_in_file[start])
+        return replace(self, **changed, first_row=first)
+
+    def without(self, rows: NDArray[np.bool_]) -> Log:
+        """Return the samples without some, (T,): where they were is a gap."""
+        kept = np.flatnonzero(~rows)
+        parts = {name: getattr(self, name) for name in _ARRAYS}
+        changed: dict[str, Any] = {
+            name: None if values is None else values[kept] for name, values in parts.items()
+        }
+        return replace(self, **changed, rows_in_file=_rows_of(self)[kept])
 
 
 def joined(pieces: Sequence[Log]) -> Log:
@@ -191,7 +212,16 @@ def joined(pieces: Sequence[Log]) -> Log:
         for name in _ARRAYS
         if getattr(first, name) is not None
     }
+    if any(piece.rows_in_file is not None for piece in pieces):
+        changed["rows_in_file"] = np.concatenate([_rows_of(piece) for piece in pieces])
     return replace(first, **changed)
+
+
+def _rows_of(log: Log) -> NDArray[np.int64]:
+    """Return the index of each sample among the data rows of its file."""
+    if log.rows_in_file is not None:
+        return log.rows_in_file
+    return log.first_row + np.arange(log.rows)
 
 
 def write_log(log: Log, path: str | Path) -> Path:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from itertools import cycle
+from itertools import chain, cycle, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.errors import DataError, shown
+from pteron.identification.logs.as_read import RepeatedTimes, as_read, check_names
 from pteron.identification.logs.channels import Channel
+from pteron.identification.logs.clock import Clock, find_clock
 from pteron.identification.logs.columns import find_columns
 from pteron.identification.logs.description import Description, joint_symbols
 from pteron.identification.logs.description_file import find_description, read_description
@@ -26,6 +28,7 @@ from pteron.identification.logs.sizes import (
     pose_bounds,
     standstill,
 )
+from pteron.identification.logs.spikes import MARGIN, Spikes
 from pteron.identification.logs.time_stamps import TimeStamps
 from pteron.manipulator import Manipulator
 from pteron.tables import CsvFile, Dialect, ParquetFile, open_table
@@ -33,7 +36,7 @@ from pteron.tables import CsvFile, Dialect, ParquetFile, open_table
 _FEWEST = 50
 _AHEAD = 10_000
 """Rows looked at when a log is opened: the usual step is their median."""
-_PER_UNIT = {"ms": 1e3, "us": 1e6, "mm": 1e3, "um": 1e6}
+_PER_METRE = {"mm": 1e3, "um": 1e6}
 
 Values = NDArray[np.float64]
 
@@ -50,7 +53,7 @@ class LogFile:
     rows_estimate : int or None
         About how many rows it has, for a progress bar; exact in Parquet.
     findings : tuple of Finding
-        What was guessed and, after a full pass, all that was noticed.
+        How it was read and, after a full pass, all that was noticed.
     rows_in_memory : int
         Rows up to which `identify` reads it whole: 2 million, 150 MB for four joints.
     rows_in_piece : int
@@ -65,22 +68,32 @@ class LogFile:
     ) -> None:
         self.source = source = file.source
         self._robot, self._file = robot, file
-        self._columns = c = find_columns(file.columns, robot, description, source, file.hint)
+        names = [name for name in file.columns if name not in file.repeated]
+        units = dict(zip(file.columns, file.units, strict=False))
+        check_names(file.repeated, source)
+        self._columns = c = find_columns(names, units, robot, description, source, file.hint)
         if description.column_force_unit is None and description.gains is None:
             unit: Any = c.forces.units[0]
             description = replace(description, column_force_unit=unit)
         self.description = description
         self.rows_estimate = file.rows_estimate
-        self.findings = c.findings
-        self._groups = (c.time, c.joints, c.forces, c.pose, c.payload)
+        self._groups = (c.joints, c.forces, c.pose, c.payload)
         self._names = tuple(name for group in self._groups for name in group.names)
+        self._again = RepeatedTimes(file.repeated, c, source)
         self._bounds = joint_bounds(robot), pose_bounds(robot)
-        self._step = self._usual_step()
+        self._clock, self._step = self._usual_step()
+        self._read = (
+            *as_read(source, file.found, c, description, self._clock, self._again),
+            *c.findings,
+        )
+        self.findings = self._read
 
     def pieces(
         self, rows: int | None = None, progress: Callable[[int], None] | None = None
     ) -> Iterator[Log]:
         """Yield the log in pieces, checked across their borders, in bounded memory.
+
+        Rows that are spikes are left out, like a gap.
 
         Parameters
         ----------
@@ -97,12 +110,45 @@ class LogFile:
         rows = self.rows_in_piece if rows is None else rows
         if rows < 1:
             raise DataError(f"rows: {rows} given; a piece has at least 1 row")
+        held: Log | None = None
+        for piece in self._without_spikes(progress):
+            held = piece if held is None else joined([held, piece])
+            while held.rows >= rows:
+                yield held.part(0, rows)
+                held = held.part(rows, held.rows)
+        if held is not None and held.rows:
+            yield held
+
+    def _without_spikes(self, progress: Callable[[int], None] | None) -> Iterator[Log]:
+        """Yield pieces without spikes; whether a row is one, its neighbours' piece may tell."""
+        c = self._columns
+        spikes = Spikes((*c.joints.shown, *c.forces.shown), self.source)
+        before: Log | None = None
+        for piece, following in pairwise(chain(self._checked(), [None])):
+            assert piece is not None
+            around = [before, piece, following and following.part(0, MARGIN)]
+            parts = [part for part in around if part is not None]
+            joints, forces = (
+                np.concatenate([getattr(part, name) for part in parts])
+                for name in ("joints", "forces")
+            )
+            start = before.rows if before is not None else 0
+            inner = slice(start, start + piece.rows)
+            out = spikes.find(joints, forces, inner, piece.first_row)
+            before = piece.part(max(piece.rows - MARGIN, 0), piece.rows)
+            if progress is not None:
+                progress(piece.rows)
+            yield piece.without(out) if out.any() else piece
+        self.findings += spikes.findings()
+
+    def _checked(self) -> Iterator[Log]:
+        """Yield the file in pieces, in SI units; all findings but spikes stand behind the last."""
         stamps = TimeStamps(self._step, self._columns.time.shown[0], self.source)
         channels = self._channels()
         n = self._robot.freedom
         low, high = np.full(n, np.inf), np.full(n, -np.inf)
         first = 0
-        for values in self._values(rows):
+        for values in self._values(self.rows_in_piece):
             piece = self._piece(values, first)
             stamps.take(piece.time)
             both = np.hstack([piece.joints, piece.forces])
@@ -111,23 +157,26 @@ class LogFile:
             low = np.minimum(low, piece.joints.min(axis=0))
             high = np.maximum(high, piece.joints.max(axis=0))
             first += piece.rows
-            if progress is not None:
-                progress(piece.rows)
             yield piece
         found = [finding for channel in channels for finding in channel.finish()]
-        found += standstill(high - low, self._robot, self._columns.joints, self.source)
-        self.findings = (*self._columns.findings, *stamps.findings(), *found)
+        declared = any(unit is not None for unit in self.description.joint_units(self._robot))
+        found += standstill(
+            high - low, self._robot, self._columns.joints, self.source, declared=declared
+        )
+        self.findings = (*self._read, *stamps.findings(), *found)
 
     def read(self, progress: Callable[[int], None] | None = None) -> Log:
         """Return the whole log, with all findings."""
         return replace(joined(list(self.pieces(progress=progress))), findings=self.findings)
 
     def _values(self, rows: int) -> Iterator[Values]:
-        """Yield the file's numbers in arrays of so many rows; columns as in `_names`."""
+        """Yield the file's numbers in arrays of so many rows: the time in s, then `_names`."""
         held: list[Values] = []
         count = 0
-        for table in self._file.tables(self._names):
-            held.append(table.numbers(self._names))
+        clock = self._clock.fresh()
+        for table in self._file.tables((*clock.columns, *self._names, *self._again.names)):
+            self._again.check(table)
+            held.append(np.column_stack([clock.seconds(table), table.numbers(self._names)]))
             count += len(table)
             while count >= rows:
                 whole = held[0] if len(held) == 1 else np.concatenate(held)
@@ -140,11 +189,13 @@ class LogFile:
     def _piece(self, values: Values, first: int) -> Log:
         c, source = self._columns, self.source
         edges = np.cumsum([len(group.names) for group in self._groups])[:-1]
-        time, joints, forces, pose, payload = (
+        joints, forces, pose, payload = (
             np.ascontiguousarray(
                 np.transpose([_in_si(*both) for both in zip(part.T, group.units, strict=True)])
             )
-            for group, part in zip(self._groups, np.split(values, edges, axis=1), strict=True)
+            for group, part in zip(
+                self._groups, np.split(values[:, 1:], edges, axis=1), strict=True
+            )
         )
         of_joints, of_pose = self._bounds
         check_bounds(joints, of_joints, c.joints, source, first)
@@ -155,7 +206,7 @@ class LogFile:
             check_bounds(pose, of_pose, c.pose, source, first)
         return Log(
             source=source,
-            time=time[:, 0],
+            time=np.ascontiguousarray(values[:, 0]),
             joints=joints,
             forces=forces,
             pose=pose if c.pose.names else None,
@@ -177,22 +228,27 @@ class LogFile:
             )
         return values.astype(np.int64)
 
-    def _usual_step(self) -> float:
-        ahead = next(self._values(_AHEAD), None)
-        given = 0 if ahead is None else len(ahead)
-        if ahead is None or given < _FEWEST:
+    def _usual_step(self) -> tuple[Clock, float]:
+        """Return how times are written, and their median step, s."""
+        c, about = self._columns, self.description
+        column, names = c.time.shown[0], c.time.names
+        table = next(self._file.tables((*names, *self._names)), None)
+        given = 0 if table is None else len(table)
+        if table is None or given < _FEWEST:
             raise DataError(
                 f"{self.source}: {given} rows given, at least {_FEWEST} expected: a motion of that "
                 "length says nothing; record a longer one"
             )
-        column = self._columns.time
-        time = _in_si(ahead[:, 0], column.units[0])
+        table = replace(table, frame=table.frame.head(_AHEAD))
+        unit = c.time.units[0] if c.time.said else None
+        clock = find_clock(table, names, unit, about.time_format)
+        time = clock.fresh().seconds(table)
         # A fault in the order of time is told with its row, before any step is judged.
-        TimeStamps(1.0, column.shown[0], self.source).take(time)
+        TimeStamps(1.0, column, self.source).take(time)
         step = float(np.median(np.diff(time)))
-        if not column.said:
-            check_step(step, column.shown[0], self.source)
-        return step
+        if not (c.time.said or clock.format or len(names) > 1):
+            check_step(step, column, self.source)
+        return clock, step
 
     def _channels(self) -> list[Channel]:
         spans, source, c = joint_spans(self._robot), self.source, self._columns
@@ -203,8 +259,8 @@ class LogFile:
 
 
 def _in_si(values: Values, unit: str) -> Values:
-    """Return times or lengths in s or m, angles in rad, anything else as it is."""
-    return np.radians(values) if unit == "deg" else values / _PER_UNIT.get(unit, 1.0)
+    """Return lengths in m, angles in rad, anything else as it is."""
+    return np.radians(values) if unit == "deg" else values / _PER_METRE.get(unit, 1.0)
 
 
 def open_log(

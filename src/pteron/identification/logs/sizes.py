@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.errors import DataError
-from pteron.identification.logs.columns import Group
 from pteron.identification.logs.description import joint_symbols
 from pteron.identification.logs.log import Finding
+from pteron.identification.logs.search import Group
 from pteron.legs import LegKind
 from pteron.manipulator import Manipulator
+from pteron.tables import declaration
 
 _BEYOND = 3.0
 """How far beyond the machine's size a coordinate may lie; encoders have their own zero."""
@@ -22,6 +23,8 @@ _TURNS = 4.0 * math.pi
 _STRONGEST = 1e9
 """Force that no actuator has, N."""
 _LONGEST_STEP = 0.2
+_LIKELY = (("ms", 1e2), ("us", 5e4))
+"""Units of steps that are too long for seconds, each with what is too long for it."""
 _STANDSTILL = 1e-3
 _SMALLER = ((1e3, "mm"), (1e6, "um"))
 
@@ -104,20 +107,30 @@ def check_step(step: float, column: str, source: str) -> None:
     """Raise a `DataError` if a median step, s, of no declared unit is too long for a motion."""
     if step <= _LONGEST_STEP:
         return
-    likely = "ms" if step < 1e2 else "us"
+    likely = next((unit for unit, most in _LIKELY if step < most), "ns")
     raise DataError(
         f"{source}: column {column}: the median step is {step:g} s, where a motion is sampled at "
-        f"under {_LONGEST_STEP:g} s; {_declare(likely, '[time] unit', likely)}; if these are "
-        'seconds, unit = "s"'
+        f'under {_LONGEST_STEP:g} s; if these are seconds, declare unit = "s"; '
+        + _declare(likely, "[time] unit", likely)
     )
 
 
 def standstill(
-    travelled: NDArray[np.float64], robot: Manipulator, group: Group, source: str
+    travelled: NDArray[np.float64],
+    robot: Manipulator,
+    group: Group,
+    source: str,
+    *,
+    declared: bool,
 ) -> tuple[Finding, ...]:
     """Return a finding where no joint moves by a thousandth of its span: the unit may be wrong.
 
     `travelled` is between each joint's least and greatest coordinate, shape (n,), m or rad.
+
+    Raises
+    ------
+    DataError
+        If a unit that the file says, and that nobody has `declared`, would make it so.
     """
     spans = joint_spans(robot)
     j = int(np.argmax(travelled / spans))
@@ -129,6 +142,11 @@ def standstill(
         f"{source}: the {joint.noun}s, read as {group.units[j]}, travel at most {travelled[j]:.2g} "
         f"{joint.unit}{machine}; check their unit"
     )
+    if group.units[j] != joint.unit and not declared:
+        raise DataError(
+            f"{message}, and say it in a TOML file beside it:"
+            + declaration("joints", unit=joint.unit)
+        )
     return (Finding("units", message, column=group.shown[j]),)
 
 
@@ -164,4 +182,6 @@ def _farthest(limits: tuple[float, float] | None) -> float:
 
 
 def _declare(held: str, key: str, unit: str) -> str:
-    return f'if the file holds {held}, say so: {key} = "{unit}" in a TOML file beside it'
+    table, _, entry = key.partition("] ")
+    said = declaration(table.removeprefix("["), **{entry: unit})
+    return f"if the file holds {held}, say so in a TOML file beside it:{said}"

@@ -1,0 +1,130 @@
+"""Names of columns: the words, numbers and units in them, as Pteron and other programs write them.
+
+Beside Pteron's own ``rho1`` and ``Rho_1 (mm)`` these are names of controllers, ``Axis1.ActPos`` or
+``Axis 1 Actual Position [mm]``, and of ROS, ``/joint_states/position[0]`` or ``field.effort0``.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+_DRIVE = {"a": "A", "v": "V", "%": "%"}
+UNITS = {
+    "s": {"s": "s", "sec": "s", "ms": "ms", "us": "us", "µs": "us", "ns": "ns", "100 ns": "100 ns"},
+    "m": {"m": "m", "mm": "mm", "um": "um", "µm": "um"},
+    "rad": {"rad": "rad", "deg": "deg", "°": "deg"},
+    "N": {"n": "N"} | _DRIVE,
+    "N m": {"nm": "N m", "n m": "N m", "n*m": "N m", "n·m": "N m"} | _DRIVE,
+}
+"""Spellings of the units, in small letters, by the SI unit of what they measure."""
+
+_POSITION = ("position", "actpos", "actposition", "actualposition")
+_EFFORT = ("effort", "actcurrent", "actualcurrent", "acttorque", "actualtorque")
+_WORDS: dict[str, tuple[str, ...]] = {
+    "t": ("t", "time", "timestamp", "zeit"),
+    "rho": ("rho", "q", "s", "joint", *_POSITION),
+    "theta": ("theta", "q", "angle", "crank", *_POSITION),
+    "force": ("force", "f", "tau", "current", "i", "actforce", "actualforce", *_EFFORT),
+    "torque": ("torque", "moment", "tau", "current", "i", *_EFFORT),
+}
+"""What columns are called, by the documented word; small letters without blanks and lines."""
+CURRENTS = ("current", "i", "actcurrent", "actualcurrent")
+"""Words that say amperes."""
+RATED = ("acttorque", "actualtorque")
+"""Words for what drives write in per cent, in per mille or in N m: their unit must be said."""
+
+_SPELLED = "|".join(re.escape(one) for units in UNITS.values() for one in units if len(one) > 1)
+_SPELLED += "|(?-i:[smANV%°])"
+"""Units without brackets: a last single letter is one only as it is usually written."""
+_UNIT = (
+    rf"(?P<tail>(?:[ _]*[\[(] *(?P<inside>[^\])\d][^\])]*?) *[\])]"
+    rf"|[ _](?P<behind>{_SPELLED})|/(?P<under>{_SPELLED}))?)"
+)
+_NUMBERED = re.compile(
+    rf"(?P<path>(?:.*?[./])??)[%_]*(?P<word>[a-z][a-z _]*?)"
+    rf"(?P<place>[ _]?(?:\[(?P<index>\d+)\]|(?P<number>\d+)))?{_UNIT}",
+    re.IGNORECASE,
+)
+"""A word with its number behind, such as ``Rho_1 (mm)`` or ``field.position0``."""
+_OF_AXIS = re.compile(
+    r"(?P<path>.*?)(?:axis|achse|joint|drive|motor|leg|slider|crank)"
+    r"(?P<place>[ _]?[\[(]?(?P<index>\d+)[\])]?)[ _./:]+(?:.*[./])?"
+    rf"(?P<word>[a-z][a-z _]*?){_UNIT}",
+    re.IGNORECASE,
+)
+"""A numbered axis with a word behind, such as ``MAIN.Axis1.NcToPlc.ActPos``."""
+
+_STAMP = re.compile(r"(?:.*[./])?header[./]stamp(?P<part>[./](?:secs?|nsecs?|nanosec))?")
+"""The time of measurement in a message of ROS."""
+
+
+class Called(NamedTuple):
+    """What a name says."""
+
+    word: str
+    """In small letters, without blanks and lines."""
+    number: int | None
+    family: str
+    """The name with # in place of its number."""
+    unit: str
+    """In small letters, empty where there is none."""
+
+
+def called(name: str) -> Called | None:
+    """Return what a name says, or None where it is no word with a number and a unit, or without.
+
+    Examples
+    --------
+    >>> called("Rho_1 (mm)")
+    Called(word='rho', number=1, family='Rho_# (mm)', unit='mm')
+    >>> called("/joint_states/position[0]").number
+    0
+    """
+    match = _OF_AXIS.fullmatch(name) or _NUMBERED.fullmatch(name)
+    if match is None:
+        return None
+    word = re.sub("[ _]", "", match["word"].lower())
+    parts = match.groupdict()
+    number = parts["index"] or parts.get("number")
+    if match["path"] and len(word) == 1:
+        return None  # MAIN.s1 may be anything
+    family = name
+    if number is not None:
+        start = match.start("index") if parts["index"] else match.start("number")
+        family = f"{name[:start]}#{name[start + len(number) :]}"
+    unit = parts["inside"] or parts["behind"] or parts["under"] or ""
+    return Called(word, None if number is None else int(number), family, unit.lower())
+
+
+def means(word: str, stem: str) -> bool:
+    """Say whether a word may stand for the documented one."""
+    return word in _WORDS.get(stem, (stem,))
+
+
+def unit_called(text: str, si: str) -> str | None:
+    """Return the unit that is spelled like this, if it is one of what is measured in `si`."""
+    return UNITS[si].get(text.strip().lower())
+
+
+def stamp_columns(names: tuple[str, ...]) -> list[tuple[str, ...]]:
+    """Return the columns of the time of measurement in a message of ROS: one, or s and ns.
+
+    Examples
+    --------
+    >>> stamp_columns(("Time", "header.stamp.secs", "header.stamp.nsecs", "position_0"))
+    [('header.stamp.secs', 'header.stamp.nsecs')]
+    """
+    found: list[tuple[str, ...]] = []
+    for name in names:
+        match = _STAMP.fullmatch(name)
+        if match is None:
+            continue
+        part = match["part"] or ""
+        if not part:
+            found.append((name,))
+        elif part[1:] in ("sec", "secs"):
+            stem = name.removesuffix(part[1:])
+            rest = next((stem + p for p in ("nsecs", "nsec", "nanosec") if stem + p in names), None)
+            found += [(name, rest)] if rest else []
+    return found

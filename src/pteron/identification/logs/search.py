@@ -1,0 +1,289 @@
+"""The search for columns: declared ones, documented ones, or those that are called alike."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from pteron.errors import DataError, shown
+from pteron.identification.logs.log import Finding
+from pteron.identification.logs.names import (
+    CURRENTS,
+    RATED,
+    Called,
+    called,
+    means,
+    stamp_columns,
+    unit_called,
+)
+from pteron.identification.logs.refusals import ambiguous, incomplete
+from pteron.tables import declaration, listed
+
+_NO_UNIT = ("", "-", "1", "none")
+"""What a line of units has where there is none."""
+
+
+class Group(NamedTuple):
+    """The columns of one part of a log, and their units."""
+
+    names: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
+    said: bool = True
+    """Whether the file or its description says the units."""
+    told: bool = False
+    """Whether names or units come from the file's own words, which the user should know."""
+    guessed: bool = False
+    """Whether the columns are taken by names that are not the documented ones."""
+
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """The names as messages may show them: a name may hold anything."""
+        return tuple(shown(name, bare=True) for name in self.names)
+
+    def in_words(self, noun: str) -> str:
+        """Return how the columns are read, for a person."""
+        unit = " and ".join(dict.fromkeys(self.units))
+        return f"{noun} {listed(self.names)} in {unit}"
+
+
+class Wanted(NamedTuple):
+    """A column looked for: its table, documented name, word for messages, SI and declared unit."""
+
+    table: str
+    stem: str
+    noun: str
+    unit: str
+    declared: str | None
+
+
+@dataclass
+class Search:
+    """The names of a file, and what was found out about them so far."""
+
+    names: tuple[str, ...]
+    units: Mapping[str, str]
+    legs: int
+    needed: Sequence[str]
+    source: str
+    hint: str
+    findings: list[Finding] = field(default_factory=list)
+    taken: set[str] = field(default_factory=set)
+
+    def time(self, kind: Wanted, declared: str | None) -> Group:
+        """Return the column of the times, or those of seconds and nanoseconds."""
+        stamps = stamp_columns(self.names)
+        if declared is not None:
+            columns = next((s for s in stamps if s[0] == declared), (declared,))
+            self.declared("time", columns)
+        elif "t" in self.names:
+            columns = ("t",)
+        elif len(stamps) == 1:
+            columns = stamps[0]
+        elif stamps:
+            raise ambiguous(
+                self.source, self.legs, kind.table, kind.noun, [list(one[:1]) for one in stamps]
+            )
+        else:
+            columns = tuple(self.family(kind, [0])[0])
+        named = self.unit_of(columns[0], kind) if len(columns) == 1 else None
+        unit = self.unit(kind, named)
+        self.taken.update(columns)
+        guessed = declared is None and columns != ("t",)
+        said = (kind.declared or named) is not None
+        return Group(columns, (unit,) * len(columns), said, guessed or named is not None, guessed)
+
+    def group(
+        self,
+        wanted: Sequence[Wanted],
+        declared: Sequence[str] | None,
+        numbers: Sequence[int],
+    ) -> Group:
+        """Return the columns wanted, one for each number, that are declared or called alike."""
+        columns, units, said = [""] * len(wanted), [""] * len(wanted), True
+        told = guessed = False
+        for kind in dict.fromkeys(wanted):
+            at = [j for j, one in enumerate(wanted) if one == kind]
+            if declared is not None:
+                found = [self.declared(kind.table, declared)[j] for j in at]
+                named = self.common_unit(found, kind)
+                told = told or (named is not None and not kind.declared)
+            else:
+                found, by_name = self.family(kind, [numbers[j] for j in at])
+                named = self.common_unit(found, kind)
+                guessed = guessed or by_name
+            unit = self.unit(kind, named)
+            said = said and (kind.declared or named) is not None
+            for j, name in zip(at, found, strict=True):
+                columns[j], units[j] = name, unit
+        self.taken.update(columns)
+        return Group(tuple(columns), tuple(units), said, told or guessed, guessed)
+
+    def matches(self, kind: Wanted) -> Iterator[tuple[str, Called]]:
+        """Yield the columns that are called by a word for it, in a unit of it if in any."""
+        for name in self.names:
+            parts = called(name)
+            if (
+                parts is not None
+                and means(parts.word, kind.stem)
+                and (not parts.unit or unit_called(parts.unit, kind.unit))
+            ):
+                yield name, parts
+
+    def family(self, kind: Wanted, numbers: Sequence[int]) -> tuple[list[str], bool]:
+        """Return the columns of these numbers, 0 for none, and whether by another name."""
+        families: dict[str, dict[int, str]] = {}
+        for name, parts in self.matches(kind):
+            if (parts.number is not None) == (numbers[0] > 0):
+                families.setdefault(parts.family, {})[parts.number or 0] = name
+        if numbers[0] > 0:
+            # Programs count from 0 as well.
+            families = {
+                key: {i + 1: name for i, name in one.items()} if 0 in one else one
+                for key, one in families.items()
+            }
+        exact = kind.stem + "#" * (numbers[0] > 0)
+        if exact not in families and kind.table == "forces":
+            exact = "current#"
+        if exact in families:
+            families = {exact: families[exact]}
+        known = set(range(self.legs + 1))
+        complete = [key for key, one in families.items() if set(numbers) <= one.keys() <= known]
+        if not complete:
+            raise incomplete(
+                self.source,
+                self.legs,
+                kind.table,
+                kind.stem,
+                kind.noun,
+                numbers,
+                list(families.values()),
+                names=self.names,
+                taken=self.taken,
+                needed=self.needed,
+                hint=self.hint,
+            )
+        if len(complete) > 1:
+            several = [[one[i] for i in sorted(one)] for one in map(families.get, complete) if one]
+            raise ambiguous(self.source, self.legs, kind.table, kind.noun, several)
+        columns = [families[complete[0]][number] for number in numbers]
+        return columns, complete[0] != exact
+
+    def pose(self, wanted: Sequence[Wanted], declared: Sequence[str] | None) -> Group:
+        """Return the columns of a measured pose, none where it is not whole."""
+        stems = [one.stem for one in wanted]
+        if declared is not None:
+            columns = self.declared("pose", declared)
+        elif set(stems) <= set(self.names):
+            columns = stems
+        else:
+            columns = [name for one in wanted for name in self.lone(one)]
+        if len(columns) < len(wanted):
+            if columns:
+                message = (
+                    f"{self.source}: {listed(columns)} alone are no pose ({', '.join(stems)} "
+                    "needed), so that no measured pose is read"
+                )
+                first = shown(columns[0], bare=True)
+                self.findings.append(Finding("guessed", message, column=first, count=len(columns)))
+            return Group()
+        named = [self.unit_of(name, one) for name, one in zip(columns, wanted, strict=True)]
+        kinds = {one.unit: one for one in wanted}
+        told = {one.unit: unit for one, unit in reversed([*zip(wanted, named, strict=True)])}
+        guessed = declared is None and columns != stems
+        if any(unit != told[one.unit] for one, unit in zip(wanted, named, strict=True)):
+            raise ambiguous(self.source, self.legs, "pose", "pose", [columns])
+        units = {si: self.unit(one, told[si]) for si, one in kinds.items()}
+        heard = guessed or any(told[si] and not one.declared for si, one in kinds.items())
+        return Group(
+            tuple(columns), tuple(units[one.unit] for one in wanted), told=heard, guessed=guessed
+        )
+
+    def lone(self, kind: Wanted) -> list[str]:
+        """Return the column without a number that may be meant, if any."""
+        found = [name for name, parts in self.matches(kind) if parts.number is None]
+        if len(found) > 1:
+            raise ambiguous(
+                self.source, self.legs, kind.table, kind.noun, [[name] for name in found]
+            )
+        return found
+
+    def payload(self, declared: str | None) -> Group:
+        """Return the column that says when a payload is carried, if any."""
+        found = [name for name in self.names if name.lower() == "payload"]
+        if declared is not None:
+            found = self.declared("payload", [declared])
+        if len(found) > 1:
+            kind = Wanted("payload", "payload", "payload", "", None)
+            raise ambiguous(
+                self.source, self.legs, kind.table, kind.noun, [[name] for name in found]
+            )
+        return Group(tuple(found), ("",) * len(found))
+
+    def unit_of(self, name: str, kind: Wanted) -> str | None:
+        """Return the unit that a line of units says, or else the column's name; None for none.
+
+        A word such as current says another unit than the documented one; rho and force do not.
+        """
+        parts = called(name)
+        text = self.units.get(name, "")
+        if text.lower() not in _NO_UNIT:
+            unit = unit_called(text, kind.unit)
+            if unit is None and kind.declared is None:
+                raise DataError(
+                    f"{self.source}: column {shown(name, bare=True)} is in {shown(text)}, which is "
+                    f"not known for {kind.noun}; say the unit, with one that is, in a TOML file "
+                    "beside it:" + declaration(kind.table, **{self.unit_key(kind): kind.unit})
+                )
+            return unit
+        if parts is None:
+            return None
+        implied = "A" if kind.table == "forces" and parts.word in CURRENTS else None
+        return unit_called(parts.unit, kind.unit) or implied
+
+    @staticmethod
+    def unit_key(kind: Wanted) -> str:
+        """Return the key of a unit in its table."""
+        if kind.table != "pose":
+            return "unit"
+        return "angle_unit" if kind.unit == "rad" else "length_unit"
+
+    def common_unit(self, columns: Sequence[str], kind: Wanted) -> str | None:
+        """Return the unit of columns that belong together."""
+        units = dict.fromkeys(self.unit_of(name, kind) for name in columns)
+        if len(units) > 1 and kind.declared is None:
+            said = ", ".join(unit or "no unit" for unit in units)
+            raise DataError(
+                f"{self.source}: {listed(columns)} are in {said}; {kind.noun} have one unit: say "
+                "which in a TOML file beside it:" + declaration(kind.table, unit=kind.unit)
+            )
+        words = {parts.word for parts in map(called, columns) if parts}
+        if kind.declared is None and words & set(RATED) and None in units:
+            raise DataError(
+                f"{self.source}: {listed(columns)}: the unit of these torques is not said; drives "
+                "write per cent of the rated torque, or N m; say which in a TOML file beside it, "
+                "with gains where they are no SI unit:" + declaration("forces", unit="%")
+            )
+        return next(iter(units))
+
+    def unit(self, kind: Wanted, named: str | None) -> str:
+        """Return the unit declared, else the one the file says, else the documented one."""
+        if kind.declared and named and kind.declared != named:
+            # Currents called F1 are the file's business; that the two differ must be said.
+            message = (
+                f"{self.source}: the {kind.noun} columns say {named}, but the description declares "
+                f"{kind.declared}; taken as {kind.declared}"
+            )
+            self.findings.append(Finding("units", message))
+        return kind.declared or named or kind.unit
+
+    def declared(self, table: str, columns: Sequence[str]) -> list[str]:
+        """Return columns that the description names, which the file must have."""
+        absent = [name for name in columns if name not in self.names]
+        if absent:
+            raise DataError(
+                f"{self.source}: no column {listed(absent)}, which the description's [{table}] "
+                f"names (found: {listed(self.names)}); correct the description"
+                + (f"; {self.hint}" if len(self.names) == 1 else "")
+            )
+        return list(columns)

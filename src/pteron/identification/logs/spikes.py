@@ -1,0 +1,222 @@
+"""Spikes: samples, or some in a row, that jump away from a channel and back; they are left out."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d, median_filter  # type: ignore[import-untyped]
+
+from pteron.identification.logs.log import Finding
+
+LONGEST = 16
+"""Samples in a row that are a spike at most: what stays away longer is a step, and no spike."""
+MARGIN = 64
+"""Rows to each side that a search looks at."""
+_WINDOW = 21
+"""Differences whose median is the motion's own: the jumps of a group are fewer than half."""
+_USUAL = 20.0
+"""How large a jump is, in what nineteen of twenty differences leave of the motion's."""
+_SHARE_OF_JOINT, _SHARE_OF_FORCE = 0.01, 0.5
+"""Least jump, as a share of a channel's span; friction and stops make forces jump."""
+_FASTER = 3.0
+"""Least jump of a joint, in its differences nearby: a fast move is no jump."""
+_BACK = 0.25
+"""What may be missing from the way back, as a share of the largest distance."""
+_SUDDEN = 0.5
+"""Share of that distance that the first jump and the last have at least: an edge, not a slope."""
+_REVERSING = 0.05
+"""Speed, as a share of a joint's usual one, below which friction may turn."""
+_BEYOND = 0.1
+"""How far beyond its usual values, in their span, a force is that no turn of friction explains."""
+_UNUSUAL = 3.0
+"""How much more a joint is accelerated by a stop than before and after, in what nine of ten times
+have at most."""
+_RESTS, _MOVES = 0.1, 0.2
+"""Way of the joints at rest at most, and in motion at least, as a share of their usual one."""
+_MOST = 0.01
+"""Share of the rows that are left out at most: where spikes are more, they are no exception."""
+_SPAN = (1.0, 99.0)
+_TOLD = 5
+"""Groups whose rows are named."""
+
+Values = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+def joint_spikes(values: Values) -> Mask:
+    """Return which samples (T,) of a joint coordinate stand out.
+
+    A group jumps away from the motion within one sample, at most `LONGEST` samples later back onto
+    it, each time by far more than the joint moves in a sample.
+    """
+    if len(values) < 2 * _WINDOW:
+        return np.zeros(len(values), dtype=bool)
+    steps = np.diff(values)
+    nearby = median_filter(np.abs(steps), _WINDOW, mode="nearest")
+    return _groups(values, _SHARE_OF_JOINT, _FASTER * nearby)
+
+
+def force_spikes(values: Values, joints: Values, own: int) -> Mask:
+    """Return which samples (T,) of a force stand out that no motion explains.
+
+    Forces may jump where an acceleration does, as in an emergency stop, and where friction turns
+    with the joint itself: the motion (T, n) says so, in which `own` is the joint of this force.
+    """
+    if len(values) < 2 * _WINDOW:
+        return np.zeros(len(values), dtype=bool)
+    found = _groups(values, _SHARE_OF_FORCE, 0.0)
+    if not found.any():
+        return found
+    speed = np.abs(np.gradient(joints[:, own]))
+    turns = speed < _REVERSING * np.percentile(speed, 95.0)
+    low, high = np.percentile(values, _SPAN)
+    room = _BEYOND * (high - low)
+    usual = (values > low - room) & (values < high + room)
+    turns = maximum_filter1d(turns.astype(np.int8), 5) > 0
+    motion = _Motion(joints)
+    for start, stop in _runs(found):
+        group = slice(start, stop)
+        turned = turns[group].any() and usual[group].all()
+        if turned or motion.is_pushed(start, stop):
+            found[group] = False
+    return found
+
+
+class _Motion:
+    """The joints (T, n) of a piece, and what is usual for them."""
+
+    def __init__(self, joints: Values) -> None:
+        self._steps = np.diff(joints, axis=0)
+        self._joints = joints
+        self._usual: dict[int, Values] = {}
+        ways = np.percentile(np.abs(joints[LONGEST:] - joints[:-LONGEST]), 90.0, axis=0)
+        self._way = np.maximum(ways, np.finfo(float).tiny)
+
+    def is_pushed(self, start: int, stop: int) -> bool:
+        """Say whether joints are accelerated in some samples as they are not before and after.
+
+        They may stop in them, or start.
+        """
+        length = stop - start
+        if length not in self._usual:
+            self._usual[length] = np.percentile(_pushes(self._steps, length), 90.0, axis=0)
+        # Derivatives and forces may be a sample apart.
+        first = max(start - length - 2, 0)
+        pushes = _pushes(self._steps[first : first + 3 * length + 3], length)
+        if (pushes > _UNUSUAL * self._usual[length]).any():
+            return True
+        # Noise of the positions may hide that, but not that all joints rest.
+        last = len(self._joints) - 1
+        before = self._way_between(max(start - 1 - LONGEST, 0), max(start - 1, 0))
+        after = self._way_between(min(stop, last), min(stop + LONGEST, last))
+        return min(before, after) < _RESTS < _MOVES < max(before, after)
+
+    def _way_between(self, start: int, stop: int) -> float:
+        return float((np.abs(self._joints[stop] - self._joints[start]) / self._way).max())
+
+
+def _pushes(steps: Values, length: int) -> Values:
+    """Return how much more speed is gained in so many steps than in those before and after."""
+    gain = steps[length:] - steps[:-length]
+    return np.abs(gain[length:-length] - (gain[: -2 * length] + gain[2 * length :]) / 2.0)
+
+
+def _groups(values: Values, share: float, least: Values | float) -> Mask:
+    """Return the samples between a jump and its way back."""
+    steps = np.diff(values)
+    jumps = steps - median_filter(steps, _WINDOW, mode="nearest")
+    usual = _USUAL * float(np.percentile(np.abs(jumps), 95.0))
+    large = np.abs(jumps) > np.maximum(max(usual, share * _span(values)), least)
+    found = np.zeros(len(values), dtype=bool)
+    places = np.flatnonzero(large)
+    i = 0
+    while i < len(places):
+        first = places[i]
+        away = farthest = 0.0
+        i += 1
+        for k in range(i - 1, len(places)):
+            last = places[k]
+            if last - first > LONGEST:
+                break
+            away += jumps[last]
+            farthest = max(farthest, abs(away))
+            if k >= i and abs(away) <= _BACK * farthest:
+                edges = min(abs(jumps[first]), abs(jumps[last]))
+                if edges >= _SUDDEN * farthest:
+                    found[first + 1 : last + 1] = True
+                    i = k + 1
+                break
+    return found
+
+
+def _span(values: Values) -> float:
+    low, high = np.percentile(values, _SPAN)
+    return float(high - low)
+
+
+def _runs(mask: Mask) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(mask.astype(np.int8), prepend=0, append=0))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+class Spikes:
+    """The spikes of all channels, by `columns`: first the n joints, then their forces."""
+
+    def __init__(self, columns: tuple[str, ...], source: str) -> None:
+        self._columns, self._source = columns, source
+        self._counts = dict.fromkeys(columns, 0)
+        self._rows: dict[str, list[tuple[int, int]]] = {name: [] for name in columns}
+        self._first: dict[str, float] = {}
+        self._too_many = False
+
+    def find(self, joints: Values, forces: Values, inner: slice, first_row: int) -> Mask:
+        """Return which rows of a piece to leave out: none where they are too many.
+
+        `joints` and `forces` (T, n) have up to `MARGIN` rows more at each end; `inner` are the
+        piece's own, of which the first is row `first_row` of the file, from 0.
+        """
+        n = joints.shape[1]
+        out = np.zeros(inner.stop - inner.start, dtype=bool)
+        for j, name in enumerate(self._columns):
+            whole = (
+                joint_spikes(joints[:, j])
+                if j < n
+                else force_spikes(forces[:, j - n], joints, j - n)
+            )
+            mask = whole[inner]
+            if not mask.any():
+                continue
+            out |= mask
+            runs = _runs(mask)
+            start = runs[0][0]
+            channel = joints[:, j] if j < n else forces[:, j - n]
+            self._first.setdefault(name, float(channel[inner][start]))
+            self._counts[name] += int(mask.sum())
+            known = self._rows[name]
+            known += [(first_row + a, first_row + b) for a, b in runs[: _TOLD + 1 - len(known)]]
+        if out.mean() > _MOST:
+            self._too_many = True
+            out[:] = False
+        return out
+
+    def findings(self) -> tuple[Finding, ...]:
+        """Return what was found, and what became of it."""
+        found = []
+        fate = "left out like a gap, not repaired"
+        if self._too_many:
+            fate = f"left in, for over {_MOST:.0%} of the rows are spikes; record it again"
+        for name in self._columns:
+            rows, count = self._rows[name], self._counts[name]
+            if not count:
+                continue
+            named = [f"{a + 1} to {b}" if b - a > 1 else f"{b}" for a, b in rows[:_TOLD]]
+            more = ", ..." if len(rows) > _TOLD else ""
+            plural = "s" * (count > 1)
+            what = "spikes" if plural else "a spike"
+            message = (
+                f"{self._source}: row{plural} {', '.join(named)}{more}, column {name}: {what} of "
+                f"{count} sample{plural} that jump away and back (the first is "
+                f"{self._first[name]:g}); {fate}"
+            )
+            found.append(Finding("spike", message, rows[0][0] + 1, name, count))
+        return tuple(found)

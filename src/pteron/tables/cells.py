@@ -1,0 +1,110 @@
+"""The cells of a CSV file as a separator cuts them, and which separator makes them numbers."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple, get_args
+
+from pteron.tables.dialect import SEPARATORS, Decimal, Dialect, Separator
+
+_MOST = 0.5
+"""Share of a column's cells that are numbers or times, beyond which it is a column of these."""
+
+_NUMBER = r"[+-]?(?:\d+{0}?\d*|{0}\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf)"
+_STAMP = r"(?:\d[\d./-]*[T ] ?)?\d\d?:\d\d:\d\d(?:[.,:]\d+)?(?: ?[AP]M|Z|[+-]\d\d:?\d\d)?"
+_DATA = {
+    sign: re.compile(f"{_NUMBER.format(re.escape(sign))}|{_STAMP}", re.IGNORECASE)
+    for sign in (".", ",")
+}
+"""What a cell of data looks like, by the decimal sign: a number, or a time of day."""
+
+
+class Record(NamedTuple):
+    """A line that is not blank, or several with a quoted line end; lines count from 0."""
+
+    line: int
+    after: int
+    cells: tuple[str, ...]
+
+
+class Cut(NamedTuple):
+    """A file as one separator cuts it."""
+
+    separator: Separator
+    decimal: Decimal
+    records: list[Record]
+    width: int
+    """Cells of most records."""
+    columns: tuple[int, ...]
+    """Those that hold numbers or times."""
+    matched: int
+    """Cells that are one."""
+
+    def is_row(self, record: Record) -> bool:
+        """Say whether all its numbers are numbers."""
+        return (
+            bool(self.columns)
+            and len(record.cells) == self.width
+            and all(_DATA[self.decimal].fullmatch(record.cells[j]) for j in self.columns)
+        )
+
+    def may_be_row(self, record: Record) -> bool:
+        """Say whether it is more like a row with a fault than like a line above the rows."""
+        cells = record.cells
+        if len(cells) == self.width and self.columns:
+            cells = tuple(cells[j] for j in self.columns)
+        good = sum(bool(_DATA[self.decimal].fullmatch(cell)) for cell in cells)
+        return good > _MOST * len(cells)
+
+
+def single_blanks(text: bytes) -> bytes:
+    """Return lines with single blanks and none at their ends."""
+    return re.sub(rb"(?m)^ | $", b"", re.sub(rb" +", b" ", text))
+
+
+def best_cut(text: Sequence[str], declared: Dialect) -> Cut | None:
+    """Return the file as that separator cuts it which makes most of its cells numbers."""
+    separators = [declared.separator] if declared.separator else list(SEPARATORS)
+    decimals = [declared.decimal] if declared.decimal else list(get_args(Decimal))
+    cut = [
+        rows
+        for separator in separators
+        for decimal in decimals
+        if separator != decimal and (rows := _cut(text, separator, decimal)).records
+    ]
+
+    def sense(rows: Cut) -> tuple[float, int, int]:
+        return len(rows.columns) / rows.width, len(rows.columns), rows.matched
+
+    several = [rows for rows in cut if len(rows.columns) > 1]
+    if several:
+        return max(several, key=sense)
+    # Without rows of numbers the names alone tell the separator.
+    return max(cut, key=lambda rows: len(rows.records[0].cells), default=None)
+
+
+def _cut(text: Sequence[str], separator: Separator, decimal: Decimal) -> Cut:
+    records = list(_records(text, separator))
+    width = Counter(len(one.cells) for one in records).most_common(1)[0][0] if records else 0
+    whole = [one.cells for one in records if len(one.cells) == width]
+    is_data = _DATA[decimal].fullmatch
+    counts = [sum(map(bool, map(is_data, column))) for column in zip(*whole, strict=True)]
+    columns = tuple(j for j, count in enumerate(counts) if count > _MOST * len(whole))
+    return Cut(separator, decimal, records, width, columns, sum(counts))
+
+
+def _records(text: Sequence[str], separator: Separator) -> Iterator[Record]:
+    if separator == " ":
+        text = [single_blanks(line.encode()).decode() for line in text]
+    reader, before = csv.reader(text, delimiter=separator), 0
+    try:
+        for cells in reader:
+            stripped = tuple(cell.strip() for cell in cells)
+            if any(stripped):
+                yield Record(before, reader.line_num, stripped)
+            before = reader.line_num
+    except csv.Error:  # told where the rows are read
+        return

@@ -1,0 +1,84 @@
+"""Dialects of CSV: how a file is written, as far as somebody has declared it."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Literal
+
+from pteron.errors import DataError, shown
+
+Separator = Literal[",", ";", "\t", "|", " "]
+Decimal = Literal[".", ","]
+
+SEPARATORS: dict[Separator, str] = {
+    ",": "commas",
+    ";": "semicolons",
+    "\t": "tabs",
+    "|": "bars",
+    " ": "blanks",
+}
+"""The separators that are known, each with its name."""
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """How a CSV file is written; what is None is found from its beginning.
+
+    Parameters
+    ----------
+    separator : {",", ";", tab, "|", blank}, optional
+        The character between cells; of blanks there may be several.
+    decimal : {".", ","}, optional
+        The decimal sign.
+    encoding : str, optional
+        A text encoding that Python knows.
+    header_lines : int, optional
+        Lines above the data, of which the last names the columns; units may stand in the line after
+        these names.
+    """
+
+    separator: Separator | None = None
+    decimal: Decimal | None = None
+    encoding: str | None = None
+    header_lines: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.decimal is not None and self.decimal == self.separator:
+            raise DataError('decimal: "," cannot be the separator too')
+        if self.header_lines is not None and self.header_lines < 1:
+            raise DataError(f"header_lines: {self.header_lines} given, at least 1 expected")
+        try:
+            "".encode(self.encoding or "utf-8")
+        except (LookupError, ValueError):
+            raise DataError(
+                f"encoding: {shown(self.encoding)} is no text encoding that Python knows"
+            ) from None
+
+
+PLAIN = Dialect(",", ".", "utf-8")
+"""Commas, decimal points and UTF-8; the first line that is not blank names the columns."""
+
+
+def declaration(table: str, **entries: object) -> str:
+    """Return lines for the TOML file beside a log, for the end of a message.
+
+    Examples
+    --------
+    >>> print("say so:" + declaration("csv", separator=";", header_lines=2))
+    say so:
+    [csv]
+    separator = ";"
+    header_lines = 2
+    """
+    lines = [f"{key} = {_toml(value)}" for key, value in entries.items()]
+    return "\n" + "\n".join([f"[{table}]", *lines])
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_toml, value))}]"
+    if not isinstance(value, str):
+        return str(value)
+    escaped = value.replace("\\", "\\\\").replace('"', '\\"').replace("\t", "\\t")
+    return '"' + re.sub(r"[\x00-\x1f\x7f]", lambda c: f"\\u{ord(c[0]):04x}", escaped) + '"'

@@ -1,0 +1,261 @@
+"""The layout of a CSV file, found from its beginning: its dialect, where its rows begin, its names.
+
+What cannot be known for certain is refused with what to declare, and nothing is guessed but the
+encoding of what is not UTF-8.
+"""
+
+from __future__ import annotations
+
+import codecs
+import io
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from pteron.errors import DataError, shown
+from pteron.tables.cells import Cut, Record, best_cut, single_blanks
+from pteron.tables.dialect import SEPARATORS, Dialect, declaration
+from pteron.tables.table import listed
+
+_LINES = 1000
+"""Lines looked at."""
+_WITH_COMMA = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
+_OF_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
+"""A number that is another one where the comma marks thousands."""
+
+_ONE_UNIT = r"(?:[mkunµ]?(?:s|m|rad|deg|N|A|V|W|g|Hz)|sec|°C?|%|1|-)(?:\^?-?\d|[²³])?"
+_UNIT = re.compile(
+    rf"(?P<open>[\[(])?{_ONE_UNIT}(?:[ ·*/]?{_ONE_UNIT})*(?(open)[\])])|\[.{{0,9}}\]"
+)
+"""A cell in a line of units below the names."""
+
+_KEYS = {"SymbolName", "SymbolComment", "SampleTime[ms]", "Data-Type", "Unit", "NetID"}
+"""First cells of lines above the data in an export of TwinCAT Scope; that of the names is Name."""
+_VARIABLE = re.compile(r"\d+\.Variable")
+"""First cell of a line above the samples of one variable, in a trace of CODESYS."""
+_TICKS = 10**15
+"""Milliseconds since its start that no export lasts: such times are ticks of 100 ns."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How a CSV file is laid out.
+
+    Attributes
+    ----------
+    dialect : Dialect
+        Its separator, decimal sign, encoding and lines above the data, all known.
+    names, units : tuple of str
+        Of the columns; a name that occurs again has its number behind it, and a unit is empty where
+        no line of its own says it.
+    repeated : dict
+        The names that occur again, as keys, and what the file calls them.
+    start : int
+        Bytes of the text in UTF-8 above the first row.
+    first_line : int
+        The line of the first row, from 1.
+    found : tuple of str
+        What is unlike a plain CSV file and was not declared, in words.
+    """
+
+    dialect: Dialect
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    repeated: dict[str, str]
+    start: int
+    first_line: int
+    found: tuple[str, ...]
+
+
+def find_encoding(head: bytes, declared: str | None, source: str) -> str:
+    """Return the encoding of a text: as declared, as its mark says, UTF-8, or else cp1252.
+
+    Raises
+    ------
+    DataError
+        If it is no text, or UTF-16 without a mark.
+    """
+    if declared is not None:
+        return declared
+    if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return "utf-16"
+    if b"\0" not in head:
+        for encoding in ("utf-8", "cp1252"):
+            try:
+                codecs.getincrementaldecoder(encoding)().decode(head)
+            except UnicodeError:
+                continue
+            return encoding
+    raise DataError(
+        f"{source}: not UTF-8 text; save it as CSV in UTF-8, or say what it is in a TOML file "
+        "beside it, such as" + declaration("csv", encoding="utf-16-le")
+    )
+
+
+def find_layout(head: bytes, declared: Dialect, encoding: str, source: str) -> Layout:
+    """Return the layout of a CSV file.
+
+    Parameters
+    ----------
+    head : bytes
+        The beginning of its text, in UTF-8.
+    declared : Dialect
+        What is known about it.
+    encoding : str
+        From `find_encoding`.
+    source : str
+        What messages call it.
+
+    Raises
+    ------
+    DataError
+        If it is empty, if no line names its columns, or if it could be read in two ways.
+    """
+    lines = io.BytesIO(head).readlines()
+    text = [line.decode() for line in lines[:_LINES]]
+    rows = best_cut(text, declared)
+    if rows is None or not rows.records:
+        raise DataError(f"{source}: is empty; its first line must name the columns")
+    if declared.decimal is None:
+        _check_commas(rows, source)
+    first = _first_row(rows, declared.header_lines)
+    above = [one for one in rows.records if one.line < first]
+    names, units, unit_line = _names(rows, above, declared.header_lines, source)
+    known = replace(
+        declared,
+        separator=rows.separator,
+        decimal=rows.decimal,
+        encoding=encoding,
+        header_lines=first,
+    )
+    named, repeated = _told_apart(names)
+    found = []
+    if declared.separator is None and rows.separator != ",":
+        found.append(f"cells separated by {SEPARATORS[rows.separator]}")
+    if declared.decimal is None and rows.decimal == ",":
+        found.append("decimal comma")
+    if declared.encoding is None and encoding != "utf-8":
+        guessed = " (guessed: it is not UTF-8)" if encoding == "cp1252" else ""
+        found.append(f"encoding {encoding}{guessed}")
+    if declared.header_lines is None and first > 1 + above[0].line:
+        found.append(f"{first} header lines")
+    if unit_line:
+        found.append("units in a line of their own")
+    header = b"".join(lines[:first])
+    start = len(single_blanks(header) if rows.separator == " " else header)
+    return Layout(known, named, units, repeated, start, first + 1, tuple(found))
+
+
+def _check_commas(rows: Cut, source: str) -> None:
+    """Refuse numbers with commas that may be decimal commas or marks of thousands."""
+    if rows.decimal != ",":
+        return
+    cells = [cell for one in rows.records if rows.is_row(one) for cell in one.cells]
+    commas = [cell for cell in cells if _WITH_COMMA.fullmatch(cell)]
+    if commas and all(map(_OF_THOUSANDS.fullmatch, commas)):
+        raise DataError(
+            f"{source}: {shown(commas[0])} may have a decimal comma or a mark of thousands; export "
+            "it without marks of thousands, or if these are decimal commas, say so in a TOML file "
+            "beside it:" + declaration("csv", decimal=",")
+        )
+
+
+def _first_row(rows: Cut, header_lines: int | None) -> int:
+    """Return the line, from 0, that the rows begin with."""
+    if header_lines is not None:
+        below = [one for one in rows.records if one.line >= header_lines]
+        return below[0].after if below and _are_units(below[0]) else header_lines
+    found = next((i for i, one in enumerate(rows.records) if rows.is_row(one)), None)
+    if found is None:
+        return rows.records[0].after
+    while found and rows.may_be_row(rows.records[found - 1]):
+        if rows.records[found].line > rows.records[found - 1].after:
+            break
+        found -= 1
+    return rows.records[found].line
+
+
+def _names(
+    rows: Cut, above: Sequence[Record], header_lines: int | None, source: str
+) -> tuple[tuple[str, ...], tuple[str, ...], bool]:
+    """Return names and units of the columns, and whether the units have a line of their own."""
+    width = rows.width
+    if any(_VARIABLE.fullmatch(one.cells[0]) for one in above):
+        raise DataError(
+            f"{source}: its variables stand one below another, each with its own times; put them "
+            "beside each other, one row a sample"
+        )
+    # Rows may end in a separator that the names have not.
+    fitting = [one for one in above if len(one.cells) in (width, width - 1)]
+    fitting = [one for one in fitting if 2 * sum(map(bool, one.cells)) > width] or fitting[-1:]
+    if not rows.columns:
+        fitting = list(above)
+    keyed = [one for one in fitting if one.cells[0] in _KEYS]
+    titles = [one for one in fitting if one.cells[0] == "Name" and keyed]
+    if titles:
+        return *_of_scope(rows, titles[-1], keyed), False
+    units = [one for one in fitting[1:] if _are_units(one)][-1:]
+    if header_lines is not None and units and units[0].line < header_lines - 1:
+        units = []
+    named = [one for one in fitting if not units or one.line < units[0].line]
+    if not named:
+        raise _nameless(rows, above, source)
+    cells = named[-1].cells
+    of_units = [cell.strip("[]() ") for cell in units[0].cells] if units else []
+    fill = ("",) * width
+    return (*cells, *fill)[: max(width, len(cells))], (*of_units, *fill)[:width], bool(units)
+
+
+def _are_units(record: Record) -> bool:
+    cells = [cell for cell in record.cells if cell]
+    return len(cells) > 1 and all(map(_UNIT.fullmatch, cells))
+
+
+def _of_scope(
+    rows: Cut, title: Record, keyed: Sequence[Record]
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return names and units in an export of TwinCAT Scope, whose lines have keys over the times.
+
+    Times are in milliseconds from the start, or full stamps in ticks of 100 ns; a unit is written
+    like "mm (Length)" or "(None)".
+    """
+    of_units = next((one.cells for one in keyed if one.cells[0] == "Unit"), ("",) * rows.width)
+    row = next(one.cells for one in rows.records if rows.is_row(one))
+    names, units = list(title.cells), [unit.partition("(")[0].strip() for unit in of_units]
+    for j, name in enumerate(names):
+        if name == "Name":
+            ticks = float(row[j].replace(",", ".")) > _TICKS
+            names[j], units[j] = "Time", "100 ns" if ticks else "ms"
+    return tuple(names), tuple(units)
+
+
+def _nameless(rows: Cut, above: Sequence[Record], source: str) -> DataError:
+    if not above:
+        return DataError(f"{source}: no line names the columns; the first line must name them")
+    last = above[-1]
+    why = "the names stand in another line, or a separator stands in names or numbers"
+    if rows.separator == ",":
+        why += " (commas cannot separate cells and be decimal signs too)"
+    return DataError(
+        f"{source}: line {last.line + 1} has {len(last.cells)} cells ({listed(last.cells)}), but "
+        f"the rows below have {rows.width}, separated by {SEPARATORS[rows.separator]}: {why}; "
+        "export it with another separator, or say in a TOML file beside it which line names the "
+        "columns:" + declaration("csv", separator=rows.separator, header_lines=last.line + 1)
+    )
+
+
+def _told_apart(names: Sequence[str]) -> tuple[tuple[str, ...], dict[str, str]]:
+    """Return names that are all different, and which of them the file calls alike."""
+    apart: list[str] = []
+    repeated: dict[str, str] = {}
+    seen: Counter[str] = Counter()
+    for j, name in enumerate(names):
+        seen[name] += 1
+        given = name or f"column {j + 1}"
+        while given in apart or (given != name and given in names):
+            given = f"{name} ({seen[name]})" if given == name else given + "'"
+        if name and given != name:
+            repeated[given] = name
+        apart.append(given)
+    return tuple(apart), repeated
