@@ -76,7 +76,8 @@ def test_noise_free_logs_give_back_the_machine(name):
 
 def test_a_noisy_log_is_judged_by_another_motion():
     built = as_built(QUADRUPTERON)
-    found = identify(QUADRUPTERON, noisy(built, 1), held_out=noisy(built, 2))
+    fast = [noisy(built, seed, period=2.0, size=0.06, turn=0.5) for seed in (1, 2)]
+    found = identify(QUADRUPTERON, fast[0], held_out=fast[1])
     (held,) = found.held_out
     assert held.source == "log.csv"
     assert (held.nrms < 1.2 * held.floor).all()
@@ -352,7 +353,11 @@ def test_swaps_are_found_on_three_legs_too():
 def test_a_sound_log_is_not_accused():
     robot = random_machine(1, False)
     log = noisy(robot, size=0.03, turn=0.2, period=1.7)
-    assert identify(robot, log).verdict.grade == "trustworthy"
+    found = identify(robot, log)
+    assert found.trial.suspicions == ()
+    # It is small: what it leaves open of faster motions is said.
+    assert found.verdict.grade == "usable with care"
+    assert any("leaves such a cycle's forces open" in step for step in found.verdict.next_steps)
 
 
 def test_too_little_motion_names_what_is_not_seen():
@@ -567,7 +572,7 @@ def test_a_file_in_pieces_gives_what_the_log_in_memory_gives(tmp_path):
     )
     off = np.abs(streamed.estimate.values - whole.estimate.values) / whole.estimate.deviations
     assert off.max() < 1e-3
-    assert streamed.verdict.grade == "trustworthy"
+    assert streamed.verdict.grade == whole.verdict.grade
     assert {"Filtering", "Checking"} <= set(told)
 
 

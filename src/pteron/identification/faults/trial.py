@@ -208,7 +208,7 @@ def _looked_at(
     if preprocessing.derivatives != "periodic":
         return log, preprocessing
     # One period that stands for all would not tell what comes and goes.
-    wanted = Processing(derivatives="central", cutoff=preprocessing.cutoff)
+    wanted = Processing(derivatives="central")
     again = preprocessing_of(model.robot, log, wanted, start=preprocessing.start)
     return log, replace(again, slow=preprocessing.slow, delay=preprocessing.delay)
 
