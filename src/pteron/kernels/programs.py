@@ -25,12 +25,12 @@ _HUGE = 1e75
 
 _TINY = 1e-300
 
-_REDUCIBLE = ("inverse_dynamics", "base_regressor")
-"""What may be asked for base parameters."""
+REDUCIBLE = ("inverse_dynamics", "drive_forces", "feed_forward", "joint_feed_forward")
+"""Forces, which may be asked for from base parameters."""
 
 LOADED = (
     *("inverse_dynamics", "forward_dynamics"),
-    *("drive_forces", "feed_forward", "drive_accelerations"),
+    *("drive_forces", "feed_forward", "joint_feed_forward", "drive_accelerations"),
 )
 """What may take a wrench on the platform as well."""
 
@@ -76,8 +76,9 @@ def program(
         raise ModelError(f"what: {what!r} cannot be compiled; choose from {', '.join(FUNCTIONS)}")
     if what == "base_regressor" and columns is None:
         raise ModelError('base: missing; "base_regressor" needs base=base_parameters(robot)')
-    if what not in _REDUCIBLE and columns is not None:
-        raise ModelError(f"base: {what!r} has no use for it; it goes with {', '.join(_REDUCIBLE)}")
+    if what not in (*REDUCIBLE, "base_regressor") and columns is not None:
+        useful = ", ".join((*REDUCIBLE, "base_regressor"))
+        raise ModelError(f"base: {what!r} has no use for it; it goes with {useful}")
     if what not in LOADED and wrench:
         raise ModelError(f"wrench: {what!r} has no use for it; it goes with {', '.join(LOADED)}")
     return _built(bare(robot), what, columns, wrench, guarded, plain)
