@@ -90,6 +90,26 @@ def test_accelerations_come_back_from_what_the_drives_give(name):
 
 
 @EVERY
+def test_the_joints_motion_tells_what_the_drives_must_give_and_the_pose(name):
+    """From poses 1 mm and 1 mrad away, as the last one of a motion is."""
+    robot = driven(MACHINES[name])
+    motion = states(robot, 100)
+    joints = pteron.inverse_kinematics(robot, motion[0])
+    rates = pteron.joint_rates(robot, *motion[:2]).actuated
+    seconds = pteron.joint_accelerations(robot, *motion).actuated
+    kernel = pteron.compile(robot, "joint_feed_forward")
+    assert [p.name for p in kernel.inputs] == [
+        *("joints", "joint_rates", "joint_accelerations", "pose")
+    ]
+    forces, found = kernel(joints, rates, seconds, motion[0] + 1e-3)
+    expected = pteron.drive_forces(robot, *motion, smooth=True)
+    np.testing.assert_allclose(found, motion[0], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(forces, expected, rtol=0, atol=1e-11 * np.abs(expected).max())
+    far, _ = kernel(joints + 50.0 * np.arange(1, robot.freedom + 1), rates, seconds, motion[0])
+    assert np.isnan(far).any(axis=-1).all()
+
+
+@EVERY
 def test_a_machine_without_drives_needs_its_bodies_forces_alone(name):
     robot = MACHINES[name]
     motion = states(robot, 20)

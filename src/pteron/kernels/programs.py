@@ -189,14 +189,13 @@ def _program(
     entry = TABLE[what]
     asked = [name for name in entry.inputs if name not in (constants or {})]
     asked += ["wrench"] if wrench else []
-    asked.sort(key=lambda name: name in _SHARED)
     sizes = {
         "parameters": len(machine.parameters),
         "drives": len(Drives._fields) * machine.freedom,
     }
-    symbols = {name: ca.SX.sym(name, sizes.get(name, machine.freedom)) for name in asked} | (
-        extra or {}
-    )
+    given = {name: ca.SX.sym(name, sizes.get(name, machine.freedom)) for name in asked}
+    given |= extra or {}
+    symbols = {name: given[name] for name in sorted(given, key=_shared_last)}
     built = entry.build(machine, symbols | (constants or {}))
     outputs = {name: _shaped(output) for name, output in built.items()}
     if guarded:
@@ -216,6 +215,10 @@ def _program(
     )
     ports = tuple(Port(name, tuple(shape)) for name, (_, shape) in outputs.items())
     return Program(what, function, inputs, ports)
+
+
+def _shared_last(name: str) -> int:
+    return _SHARED.index(name) if name in _SHARED else -1
 
 
 def _shaped(output: Output) -> tuple[Expression, tuple[int, ...]]:
