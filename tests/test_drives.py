@@ -105,8 +105,9 @@ def test_the_joints_motion_tells_what_the_drives_must_give_and_the_pose(name):
     expected = pteron.drive_forces(robot, *motion, smooth=True)
     np.testing.assert_allclose(found, motion[0], rtol=0, atol=1e-12)
     np.testing.assert_allclose(forces, expected, rtol=0, atol=1e-11 * np.abs(expected).max())
-    far, _ = kernel(joints + 50.0 * np.arange(1, robot.freedom + 1), rates, seconds, motion[0])
-    assert np.isnan(far).any(axis=-1).all()
+    lost, _ = kernel(joints, rates, seconds, motion[0] + 20.0)
+    right = (np.abs(lost - expected) < 1e-6 * np.abs(expected).max()).all(axis=-1)
+    assert (np.isnan(lost).any(axis=-1) | right).all()
 
 
 @EVERY
