@@ -37,16 +37,16 @@ coulomb, viscous, offset = 2.0 + np.arange(n), 1.0 + 0.1 * np.arange(n), 0.2 * n
 if motion == "random":
     time = np.arange(5000) / RATE
     state = random_excitation(drawn, limits=Limits(speed=5.0, acceleration=60.0), seed=1).at(time)
-    path = state.pose, state.velocity, state.acceleration
+    path = [state.pose, state.velocity, state.acceleration]
 elif motion == "cycle":
     whole = pick_and_place(drawn, home_pose(drawn))
     cycle = pick_and_place(drawn, home_pose(drawn), samples=1 + round(whole.duration * RATE))
-    path = tuple(np.tile(part, (2, 1)) for part in (cycle.pose, cycle.velocity, cycle.acceleration))
+    path = [np.tile(part, (2, 1)) for part in (cycle.pose, cycle.velocity, cycle.acceleration)]
     time = np.arange(len(path[0])) / RATE
 else:
     table = pl.read_csv(motion)
     time = table["t"].to_numpy()
-    path = tuple(table[[d + x for x in drawn.coordinates]].to_numpy() for d in ("", "d", "dd"))
+    path = [table[[d + x for x in drawn.coordinates]].to_numpy() for d in ("", "d", "dd")]
 
 # What its controller records.
 joints = pteron.inverse_kinematics(drawn, path[0])

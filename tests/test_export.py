@@ -309,6 +309,7 @@ def identification_file(path, base, values, friction):
     }
     keys = ("coulomb", "viscous", "offset", "inertia")
     data = {
+        "verdict": {"grade": "usable with care"},
         "base_parameters": known,
         "drives": [dict(zip(keys, (*one, 0.0), strict=True)) for one in friction],
         "kinds": ["base"] * base.rank,
@@ -590,3 +591,32 @@ def test_the_command(tmp_path):
     result = runner.invoke(app, [*single, "--c", str(tmp_path / "f"), "--json"])
     assert '"robot": "quadrupteron"' in result.output
     assert "const float *QUADRUPTERON_RESTRICT pose" in (tmp_path / "f/quadrupteron.h").read_text()
+    robot = pteron.save(stiff(DELTA, rated_torque=0.64), tmp_path / "robot.toml")
+    base = pteron.base_parameters(DELTA)
+    path = identification_file(tmp_path / "i.json", base, base.values(), [(1.0, 2.0, 0.0)] * 3)
+    told = ["export", str(robot), "--c", str(tmp_path / "t"), "--output", "percent"]
+    result = runner.invoke(app, [*told, "--base", str(path)])
+    assert result.exit_code == 0, result.stderr
+    told_of = f"Warning: {path}: the verdict on these values is: usable with care"
+    assert result.stderr.replace("\n", "") == told_of
+    header = (tmp_path / "t" / "delta.h").read_text()
+    assert "Verdict of the identification: usable with care." in header.replace("\n * ", " ")
+    assert "out percent_of_rated (3): per cent of the motors' rated torques, 0.64 N m" in header
+    functions = re.findall(r"(?m)^int delta_(\w+)\(", header)
+    assert functions == [
+        *("inverse_kinematics", "direct_kinematics", "jacobian", "inverse_dynamics_base"),
+        *("regressor", "feed_forward_base", "joint_feed_forward_base"),
+    ]
+    for wrong, words in (
+        ([*told, "--base", str(robot)], "robot.toml: no JSON"),
+        (
+            ["export", "delta", "--c", str(tmp_path / "n"), "--output", "torque"],
+            "leg 1: drive.ratio",
+        ),
+        ([*told[:-1], "volt"], "'volt'"),
+    ):
+        result = runner.invoke(app, wrong)
+        assert result.exit_code == 2
+        assert words in result.stderr
+        assert result.stderr.count("\n") == 1 or "volt" in words
+    assert not (tmp_path / "n").exists()

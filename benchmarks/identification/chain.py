@@ -4,7 +4,8 @@ The machine is simulated in MuJoCo (`plant`), up to 20 % off what was drawn, wit
 sticks at rest. It records an exciting motion and a pick-and-place cycle under a controller that
 knows the drawing and no friction; encoders and forces are noisy. The fit is exported to C, which is
 compiled, and asked two things: what the drives must give over the held-out cycle, against the noisy
-record of what they gave; and to run the machine, beside feedback of position and rate.
+record of what they gave; and to run the machine, beside feedback of position and rate, which is
+free of noise and delay.
 
 It prints a table for each; `--quick` has a shorter recording, of the Delta alone.
 """
@@ -280,9 +281,13 @@ def main() -> None:
             )
     print(
         "Forces of the held-out cycle by the compiled C, worst joint: error over the noise of the "
-        "sensors,\nwhere joints move (dry friction holds them with any force else)"
+        "sensors,\nwhere joints move, for dry friction holds them with any force else. By "
+        "encoders: rates\nand accelerations are differences of noisy positions, as for the verdict; their "
+        "noise is added"
     )
-    print(f"{'':<14}{'verdict':<16}{'':>12}{'left out':>10}{'with these':>12}{'by encoders':>14}")
+    print(
+        f"{'':<14}{'verdict':<16}{'error':>12}{'left out':>10}{'with these':>12}{'by encoders':>14}"
+    )
     for name, one in outcomes.items():
         print(
             f"{name:<14}{one.found.verdict.grade:<16}{one.prediction.max():>12.2f}"

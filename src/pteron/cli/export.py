@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
-from pteron.cli.screen import plain, show, show_json, spinner
+from pteron.cli.screen import note, plain, show, show_json, spinner
 from pteron.errors import DataError
 
 _FUNCTIONS = (
@@ -53,6 +53,8 @@ _FUNCTIONS = (
 )
 """Written out: help is shown before CasADi is loaded. A test holds it against what there is."""
 
+_TRUSTED = "trustworthy"
+
 Output = Literal["force", "torque", "percent"]
 """The library's own, which is slow to import."""
 
@@ -76,8 +78,9 @@ def export(
         Output,
         option(
             "output",
-            "What drives are told: forces at the joints, torques of the motors, or per cent of "
-            "their rated torques.",
+            "What drives are told: force at the joints, torque of the motors, or percent of what "
+            "they are rated for.",
+            "UNIT",
         ),
     ] = "force",
     base: Annotated[
@@ -107,7 +110,9 @@ def export(
     files = []
     with spinner(f"Writing code for {machine.name}"):
         from pteron.export import Real, export_c, export_st
+        from pteron.export.identified import read_identified
 
+        grade = read_identified(machine, base).grade if base is not None else _TRUSTED
         if c is not None:
             real: Real = "float" if single else "double"
             files += export_c(
@@ -122,6 +127,8 @@ def export(
             )
         if st is not None:
             files += export_st(machine, function, st, wrench=wrench, output=output, base=base)
+    if grade != _TRUSTED:
+        note(f"Warning: {base}: the verdict on these values is: {grade}")
     if json:
         show_json({"robot": machine.name, "files": [str(path) for path in files]})
         return

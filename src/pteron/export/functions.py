@@ -252,7 +252,8 @@ def _table(robot: Manipulator, name: str, base: Identified | None) -> Table:
     if name == "drives":
         return Table(name, _DRIVE_TABLE, drive_names(robot), drive_numbers(robot))
     if base is not None:
-        return Table(name, _BASE_TABLE, base.comments, base.values)
+        verdict = f" Verdict of the identification: {base.grade}." if base.grade else ""
+        return Table(name, _BASE_TABLE + verdict, base.comments, base.values)
     return Table(name, _TABLE, parameter_names(robot), parameters(robot))
 
 

@@ -34,6 +34,8 @@ class Identified:
     values: Array
     comments: tuple[str, ...]
     """What each value is, and its unit."""
+    grade: str = ""
+    """The verdict of the identification."""
 
     @classmethod
     def of(cls, robot: Manipulator) -> Identified:
@@ -62,6 +64,7 @@ def read_identified(robot: Manipulator, path: str | Path) -> Identified:
         found = [Drive(d["coulomb"], d["viscous"], d["offset"], d["inertia"]) for d in drives]
         all_names, told = data["estimate"]["names"], data["expressions"]
         groups = [tuple(group) for group in known["shared"]]
+        grade = str(data["verdict"]["grade"])
     except (KeyError, TypeError, ValueError) as error:
         raise DataError(
             f"{path}: not an identification.json of this version of pteron identify "
@@ -82,7 +85,7 @@ def read_identified(robot: Manipulator, path: str | Path) -> Identified:
             f"{path}: base parameters of another machine ({data.get('robot')!r}), not of "
             f"{robot.name!r}: names or groupings differ; give the robot that was identified"
         )
-    return Identified(_driven(robot, found), base, values, _comments(base, told))
+    return Identified(_driven(robot, found), base, values, _comments(base, told), grade)
 
 
 def _object(path: str | Path) -> dict[str, Any]:
