@@ -166,6 +166,28 @@ def test_dry_friction_is_smooth_at_rest_and_by_sign_beyond():
     assert (np.abs(sharp - 3.0 * np.sign(rates)) <= 1e-12 * (3.0 + scale)).all()
 
 
+@EVERY
+def test_base_parameters_are_enough_for_what_the_drives_must_give(name):
+    robot = driven(MACHINES[name])
+    motion = states(robot, 10)
+    base = pteron.base_parameters(robot)
+    moving = (
+        pteron.joint_rates(robot, *motion[:2]).actuated,
+        pteron.joint_accelerations(robot, *motion).actuated,
+    )
+    joints = pteron.inverse_kinematics(robot, motion[0])
+    push = np.random.default_rng(1).normal(size=motion[0].shape)
+    expected = pteron.drive_forces(robot, *motion, push, smooth=True)
+    close = {"rtol": 0, "atol": 1e-11 * np.abs(expected).max()}
+    for grade in ("specialised", "parametric"):
+        given = {"base": base, "wrench": True, "grade": grade}
+        found = pteron.compile(robot, "feed_forward", **given)(*motion, push)
+        np.testing.assert_allclose(found, expected, **close)
+        kernel = pteron.compile(robot, "joint_feed_forward", **given)
+        found, _ = kernel(joints, *moving, motion[0] + 1e-3, push)
+        np.testing.assert_allclose(found, expected, **close)
+
+
 def test_machines_with_other_drives_share_their_programs():
     robot = MACHINES["quadrupteron"]
     for what in ("inverse_dynamics", "feed_forward"):

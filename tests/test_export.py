@@ -13,7 +13,7 @@ from tempfile import mkdtemp
 
 import numpy as np
 import pytest
-from logs_of_motions import log_of, motion
+from logs_of_motions import Friction, log_of, motion
 from mechanisms import CATALOG, states, with_elbows
 from typer.testing import CliRunner
 
@@ -22,7 +22,7 @@ from pteron.cli.main import app
 from pteron.equations.drives import drive_numbers
 from pteron.errors import DataError, ModelError, OutputError
 from pteron.export import FUNCTIONS
-from pteron.identification import identify
+from pteron.identification import Terms, identify
 from pteron.identification.signals import States
 from pteron.kinematics import assembly_modes
 from pteron.report.identification import numbers
@@ -320,8 +320,12 @@ def identification_file(path, base, values, friction):
     return path
 
 
-def test_an_identified_machine_goes_to_the_controller_as_it_was_printed(tmp_path):
-    """Rotors and friction too: of a machine with a level crank and inclined sliders."""
+@pytest.mark.parametrize("offset", [True, False])
+def test_an_identified_machine_goes_to_the_controller_as_it_was_printed(tmp_path, offset):
+    """Rotors and friction too, of a machine with two cranks and an inclined slider.
+
+    There a rotor joins mass and offset; without offsets it is a value of its own.
+    """
     robot = ROBOTS["mixed"]
     legs = [
         replace(leg, drive=pteron.Drive(rotor_inertia=2e-5, ratio=60.0 + i))
@@ -329,7 +333,11 @@ def test_an_identified_machine_goes_to_the_controller_as_it_was_printed(tmp_path
     ]
     robot = replace(robot, legs=tuple(legs))
     size = {"size": 0.1}
-    result = identify(robot, log_of(robot, **size), held_out=log_of(robot, seed=1, **size))
+    friction = Friction.of(3)
+    friction = replace(friction, offset=friction.offset * offset)
+    first, second = (log_of(robot, seed=seed, friction=friction, **size) for seed in (0, 1))
+    result = identify(robot, first, held_out=second, terms=Terms(offset=offset))
+    assert ("J_m1" in result.model.names) == (not offset)
     path = tmp_path / "identification.json"
     path.write_text(json.dumps(numbers(result)))
     files = pteron.export_c(robot, "feed_forward_base", tmp_path / "c", base=path)
@@ -362,6 +370,8 @@ def test_a_file_that_is_no_identification_of_the_machine_is_refused(tmp_path):
     refused("not an identification.json of this version", drives=None)
     refused("not an identification.json of this version", text="[]")
     refused("i.json: no JSON; give the identification.json", text="t,rho1")
+    refused("values are missing", expressions=[])
+    refused("values are missing", base_parameters=whole["base_parameters"] | {"values": [np.nan]})
     refused("of another machine", CATALOG["tripteron"])
     longer = [replace(leg, lower_length=leg.lower_length + 1e-3) for leg in DELTA.legs]
     refused("of another machine", replace(DELTA, legs=tuple(longer)))
@@ -552,6 +562,18 @@ def test_a_name_stays_inside_its_comment(tmp_path):
     build(tmp_path, [files[1].name, files[2].name])
     blocks = pteron.export_st(replace(ROBOT, name="a *) b"), folder=tmp_path)
     assert blocks[0].read_text().count("*)") == blocks[0].read_text().count("(*")
+
+
+def test_a_file_s_text_stays_inside_its_comment(tmp_path):
+    base = pteron.base_parameters(DELTA)
+    path = identification_file(tmp_path / "i.json", base, base.values(), [(0.0, 0.0, 0.0)] * 3)
+    data = json.loads(path.read_text())
+    data["expressions"][0] = data["verdict"]["grade"] = '*/ #error "x" (* \\\n /*'
+    path.write_text(json.dumps(data))
+    files = pteron.export_c(DELTA, "inverse_dynamics_base", tmp_path, base=path)
+    build(tmp_path, [files[1].name, files[2].name])
+    (block,) = pteron.export_st(DELTA, "inverse_dynamics_base", tmp_path, base=path)
+    assert block.read_text().count("*)") == block.read_text().count("(*")
 
 
 def test_a_project_for_cmake(tmp_path):

@@ -282,8 +282,8 @@ def main() -> None:
     print(
         "Forces of the held-out cycle by the compiled C, worst joint: error over the noise of the "
         "sensors,\nwhere joints move, for dry friction holds them with any force else. By "
-        "encoders: rates\nand accelerations are differences of noisy positions, as for the verdict; their "
-        "noise is added"
+        "encoders: rates\nand accelerations are differences of noisy positions, as for the "
+        "verdict; their noise is added"
     )
     print(
         f"{'':<14}{'verdict':<16}{'error':>12}{'left out':>10}{'with these':>12}{'by encoders':>14}"

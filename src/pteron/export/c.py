@@ -15,7 +15,8 @@ from typing import Literal, get_args
 
 from pteron.atomic import write_texts
 from pteron.errors import ModelError
-from pteron.export.functions import Exported, banner, chosen
+from pteron.export.descriptions import banner
+from pteron.export.functions import Exported, chosen
 from pteron.export.outputs import Output
 from pteron.kernels import Array
 from pteron.kernels.code import (

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +11,18 @@ import numpy as np
 from pteron.equations.drives import drive_names, drive_numbers
 from pteron.equations.machine import Machine, closure_of
 from pteron.errors import ModelError
+from pteron.export.descriptions import (
+    BASE_PARAMETERS,
+    BRANCHES,
+    DRIVES,
+    MODES,
+    PARAMETERS,
+    SUMMARIES,
+    meaning,
+)
 from pteron.export.identified import Identified, base_program, read_identified
 from pteron.export.labels import node_names
-from pteron.export.outputs import DRIVEN, NAMES, Output, factors, in_units, meaning
+from pteron.export.outputs import DRIVEN, Output, factors, in_units
 from pteron.kernels import FUNCTIONS as COMPILED
 from pteron.kernels import LOADED, REDUCIBLE, Array, Graph, Port, Program, graph_of, program
 from pteron.kernels import specialised as with_values
@@ -40,50 +48,6 @@ FEED = ("feed_forward", "joint_feed_forward")
 
 _BASE = "_base"
 """What ends the name of a function of base parameters."""
-
-_SUMMARIES = {
-    "inverse_kinematics": "Joint coordinates of a pose.",
-    "direct_kinematics": "Every pose that the joint coordinates allow, one a row; NaN where it is "
-    "not real or not in reach.",
-    "closure_poses": "Every pose that the joint coordinates allow, one a row, in reach or not.",
-    "direct_step": "The pose of the joint coordinates next to a given one, such as the last one "
-    "of a motion, by Newton's method; NaN where it does not converge, or comes to another side of "
-    "the singularities.",
-    "jacobian": "Jacobian: joint rates = J velocity.",
-    "inverse_dynamics": "Actuator forces of a motion, from the inertial parameters; no friction.",
-    "forward_dynamics": "Acceleration of the platform under actuator forces; no friction.",
-    "drive_forces": "What the drives must give: actuator forces, friction by the sign of the "
-    "joint's rate, the motors' inertia.",
-    "feed_forward": "What the drives must give: actuator forces, friction, which is smooth where a "
-    "joint rests, the motors' inertia.",
-    "joint_feed_forward": "What the drives must give, as feed_forward, from the motion of the "
-    "joints: also the pose that they have, for the next call to begin with; NaN where Newton's "
-    "method does not lead there from the pose given, such as the last one.",
-    "drive_accelerations": "Acceleration of the platform under what the drives give, friction and "
-    "the motors' inertia included.",
-    "regressor": "Regressor: actuator forces = regressor parameters.",
-}
-
-_MODES = " Each row is one assembly mode throughout: a motion between singularities keeps its row."
-
-_BRANCHES = (
-    " A leg may be bent the other way in a row: then its inverse kinematics are not the joint "
-    "coordinates given."
-)
-
-
-_TABLE = "The machine's inertial parameters, in the paper's order; SI units."
-
-_DRIVE_TABLE = (
-    "The machine's drives, at the joints: motors' inertia, dry and viscous friction, a constant "
-    "force, what dry friction has more at rest, the speeds by which it is gone, and within which "
-    "dry friction changes its sign; SI units."
-)
-
-_BASE_TABLE = (
-    "The machine's base parameters, as pteron identify lists them; SI units. A new list of it may "
-    "be put in their place."
-)
 
 
 @dataclass(frozen=True)
@@ -224,14 +188,14 @@ def _exported(
         replace(port, name=f"{port.name}_out") if port.name in taken else port
         for port in given.outputs
     )
-    summary = _SUMMARIES.get(what, f"{what.replace('_', ' ')}, as pteron.{what}.".capitalize())
+    summary = SUMMARIES.get(what, f"{what.replace('_', ' ')}, as pteron.{what}.".capitalize())
     if base:
         summary = summary.replace(", from the inertial parameters", "") + " From base parameters."
     if name in ("direct_kinematics", "closure_poses"):
-        summary += _MODES + ("" if machine.closure.keeps_modes else _BRANCHES)
+        summary += MODES + ("" if machine.closure.keeps_modes else BRANCHES)
     elif "pose" in taken and not any(node.operation == "sqrt" for node in graph.nodes):
         summary += " It does not ask whether the legs reach."
-    meanings = {port.name: _meaning(robot, port, output) for port in (*given.inputs, *outputs)}
+    meanings = {port.name: meaning(robot, port, output) for port in (*given.inputs, *outputs)}
     if {"pose", "joints"} <= taken:
         meanings["pose"] = f"near that of the joints, such as the last: {meanings['pose']}"
     return Exported(
@@ -250,11 +214,11 @@ def _exported(
 def _table(robot: Manipulator, name: str, base: Identified | None) -> Table:
     """Return the machine's own numbers for a shared input."""
     if name == "drives":
-        return Table(name, _DRIVE_TABLE, drive_names(robot), drive_numbers(robot))
+        return Table(name, DRIVES, drive_names(robot), drive_numbers(robot))
     if base is not None:
         verdict = f" Verdict of the identification: {base.grade}." if base.grade else ""
-        return Table(name, _BASE_TABLE + verdict, base.comments, base.values)
-    return Table(name, _TABLE, parameter_names(robot), parameters(robot))
+        return Table(name, BASE_PARAMETERS + verdict, base.comments, base.values)
+    return Table(name, PARAMETERS, parameter_names(robot), parameters(robot))
 
 
 def _states(
@@ -289,56 +253,3 @@ def _evaluated(given: Program, graph: Graph, inputs: list[Array]) -> Example:
     finite = np.isfinite(np.concatenate(computed))
     enough = finite.any() if given.name == "direct_kinematics" else finite.all()
     return Example(tuple(inputs), results, 0 if enough else 1)
-
-
-def banner(robot: Manipulator, language: str) -> list[str]:
-    """Return the lines that begin a generated file."""
-    what = f"{len(robot.legs)} legs, {robot.platform.motion}"
-    gravity = ", ".join(f"{g:g}" for g in robot.gravity)
-    # A name is the user's: it must not end the comment that it stands in.
-    name = "".join(c if c.isalnum() or c in " _-.," else "?" for c in " ".join(robot.name.split()))
-    return [
-        f"{name} ({what}): {language}, generated by Pteron {version('pteron')}.",
-        "",
-        f"SI units and radians; gravity ({gravity}) m/s^2 in the base frame.",
-        "Do not edit: change the machine's file and generate anew.",
-    ]
-
-
-def _meaning(robot: Manipulator, port: Port, output: Output) -> str:
-    """Return what an input or an output means, with its unit."""
-    lengths = ", ".join(name for name in robot.platform.coordinates if name != "phi")
-    units = [leg.joint.unit for leg in robot.legs]
-    joints = _by_leg(units)
-    forces = _by_leg([leg.joint.force_unit for leg in robot.legs])
-    angle, rate, second, moment = (
-        (", phi in rad", ", rad/s", ", rad/s^2", ", N m about k")
-        if robot.platform.turns
-        else ("", "", "", "")
-    )
-    texts = {
-        "pose": f"platform pose: {lengths} in m{angle}",
-        "poses": f"poses by rows: {lengths} in m{angle}",
-        "found": f"platform pose that has the joint coordinates: {lengths} in m{angle}",
-        "velocity": f"the pose's rate: m/s{rate}",
-        "acceleration": f"the pose's acceleration: m/s^2{second}",
-        "joints": f"joint coordinates, {joints}",
-        "joint_rates": f"their rates, {_by_leg([f'{unit}/s' for unit in units])}",
-        "joint_accelerations": "their accelerations, " + _by_leg([f"{unit}/s^2" for unit in units]),
-        "forces": f"actuator forces, {forces}, positive the way the joint coordinates grow",
-        "wrench": f"wrench on the platform at P: N{moment}",
-        "parameters": "inertial parameters, in kg, kg m and kg m^2",
-        "base_parameters": "base parameters; see the table of the same name",
-        "drives": "numbers of the drives; see the table of the same name",
-        "jacobian": "joint rates per unit of the platform's rates",
-        "regressor": "actuator forces per unit of each parameter",
-        "type_ii": "type-II measure: 0 at a singularity",
-        "type_i": "type-I measure of each leg: 0 where it is stretched or folded, 1 at best",
-        "margin": "from each leg to the edge of its reach, m; negative beyond it",
-    }
-    name = port.name.removesuffix("_out")
-    return meaning(robot, output) if name == NAMES[output] != "forces" else texts.get(name, "")
-
-
-def _by_leg(units: Sequence[str]) -> str:
-    return units[0] if len(set(units)) == 1 else f"{', '.join(units)} (leg by leg)"

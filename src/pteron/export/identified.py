@@ -7,6 +7,8 @@ with: another base set costs fewer operations, and one follows from the other by
 from __future__ import annotations
 
 import json
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -62,9 +64,11 @@ def read_identified(robot: Manipulator, path: str | Path) -> Identified:
         names, expressions = known["names"], known["expressions"]
         values = np.array(known["values"], dtype=float)
         found = [Drive(d["coulomb"], d["viscous"], d["offset"], d["inertia"]) for d in drives]
-        all_names, told = data["estimate"]["names"], data["expressions"]
+        all_names, told = data["estimate"]["names"], [str(one) for one in data["expressions"]]
+        if not (np.isfinite(values).all() and len(told) >= len(values)):
+            raise ValueError("values are missing")
         groups = [tuple(group) for group in known["shared"]]
-        grade = str(data["verdict"]["grade"])
+        grade = re.sub(r"[^a-z ]", "?", str(data["verdict"]["grade"])[:40])
     except (KeyError, TypeError, ValueError) as error:
         raise DataError(
             f"{path}: not an identification.json of this version of pteron identify "
@@ -117,9 +121,14 @@ def _driven(robot: Manipulator, found: list[Drive]) -> Manipulator:
     return replace(robot, legs=tuple(legs))
 
 
-def _comments(base: BaseParameters, expressions: Any) -> tuple[str, ...]:
+def _comments(base: BaseParameters, expressions: Sequence[str]) -> tuple[str, ...]:
+    """Return what stands beside the values; a file's text must not end the comment it stands in."""
     units = (base.parameters[k].unit for k in base.kept)
-    return tuple(f"{text}, {unit}" for text, unit in zip(expressions, units, strict=False))
+    safe = (
+        "".join(c if c.isascii() and c.isprintable() and c != "*" else "?" for c in text)
+        for text in expressions
+    )
+    return tuple(f"{text}, {unit}" for text, unit in zip(safe, units, strict=False))
 
 
 def base_program(what: str, given: Identified, *, wrench: bool, folded: bool) -> Program:

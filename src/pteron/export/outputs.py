@@ -72,7 +72,7 @@ def in_units(given: Program, robot: Manipulator, output: Output) -> Program:
     return Program(given.name, function, given.inputs, tuple(ports))
 
 
-def meaning(robot: Manipulator, output: Output) -> str:
+def told_meaning(robot: Manipulator, output: Output) -> str:
     """Return what the drives are told, with its unit and where it comes from."""
     drives = [leg.drive or Drive() for leg in robot.legs]
     ratios = _listed([drive.gear for drive in drives])

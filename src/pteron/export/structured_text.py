@@ -13,7 +13,8 @@ from pathlib import Path
 from pteron.atomic import write_texts
 from pteron.equations.machine import closure_of
 from pteron.export.c import prefix_of
-from pteron.export.functions import Exported, banner, chosen
+from pteron.export.descriptions import banner
+from pteron.export.functions import Exported, chosen
 from pteron.export.guards import INPUT_POWER, Names, Statements, element, power
 from pteron.export.outputs import Output
 from pteron.kernels import Graph, Port
