@@ -86,7 +86,7 @@ def read_identified(robot: Manipulator, path: str | Path) -> Identified:
         same = False
     if not same or len(found) != robot.freedom or values.shape != (base.rank,):
         raise DataError(
-            f"{path}: base parameters of another machine ({data.get('robot')!r}), not of "
+            f"{path}: base parameters of another machine ({str(data.get('robot'))[:60]!r}), not of "
             f"{robot.name!r}: names or groupings differ; give the robot that was identified"
         )
     return Identified(_driven(robot, found), base, values, _comments(base, told), grade)
