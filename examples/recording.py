@@ -5,7 +5,6 @@ encoders 20 bits a turn (1 um on sliders), and its forces 1 % of noise.
 
     python recording.py                           # a random motion of the Delta: log.csv
     python recording.py ROBOT MOTION.csv LOG.csv  # the motion of a file, as pteron excite writes it
-    python recording.py ROBOT cycle LOG.csv       # the pick-and-place cycle, twice
 """
 
 import sys
@@ -15,8 +14,6 @@ import polars as pl
 
 import pteron
 from pteron.identification import Limits, random_excitation
-from pteron.motion import pick_and_place
-from pteron.workspace import home_pose
 
 RATE = 1000.0
 
@@ -38,11 +35,6 @@ if motion == "random":
     time = np.arange(5000) / RATE
     state = random_excitation(drawn, limits=Limits(speed=5.0, acceleration=60.0), seed=1).at(time)
     path = [state.pose, state.velocity, state.acceleration]
-elif motion == "cycle":
-    whole = pick_and_place(drawn, home_pose(drawn))
-    cycle = pick_and_place(drawn, home_pose(drawn), samples=1 + round(whole.duration * RATE))
-    path = [np.tile(part, (2, 1)) for part in (cycle.pose, cycle.velocity, cycle.acceleration)]
-    time = np.arange(len(path[0])) / RATE
 else:
     table = pl.read_csv(motion)
     time = table["t"].to_numpy()

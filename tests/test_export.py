@@ -307,17 +307,24 @@ def identification_file(path, base, values, friction):
         "values": values.tolist(),
         "shared": sorted({p.legs for p in base.parameters if len(p.legs) > 1}),
     }
-    keys = ("coulomb", "viscous", "offset", "inertia")
+    keys = ("coulomb", "viscous", "offset", "inertia", "stribeck")
     data = {
         "verdict": {"grade": "usable with care"},
         "base_parameters": known,
-        "drives": [dict(zip(keys, (*one, 0.0), strict=True)) for one in friction],
+        "drives": [dict(zip(keys, (*one, 0.0, None), strict=True)) for one in friction],
         "kinds": ["base"] * base.rank,
         "estimate": {"names": base.names},
         "expressions": base.expressions(),
     }
     path.write_text(json.dumps(data))
     return path
+
+
+class Falling(Friction):
+    """Friction that falls by 1 N, or 1 N m, as a joint moves faster."""
+
+    def forces(self, rates):
+        return super().forces(rates) + np.sign(rates) * np.exp(-((rates / 0.2) ** 2))
 
 
 @pytest.mark.parametrize("offset", [True, False])
@@ -333,11 +340,12 @@ def test_an_identified_machine_goes_to_the_controller_as_it_was_printed(tmp_path
     ]
     robot = replace(robot, legs=tuple(legs))
     size = {"size": 0.1}
-    friction = Friction.of(3)
+    friction = Falling.of(3)
     friction = replace(friction, offset=friction.offset * offset)
     first, second = (log_of(robot, seed=seed, friction=friction, **size) for seed in (0, 1))
-    result = identify(robot, first, held_out=second, terms=Terms(offset=offset))
+    result = identify(robot, first, held_out=second, terms=Terms(offset=offset, stribeck=0.2))
     assert ("J_m1" in result.model.names) == (not offset)
+    assert result.machine.legs[1].drive.stribeck.force == pytest.approx(1.0, rel=0.05)
     path = tmp_path / "identification.json"
     path.write_text(json.dumps(numbers(result)))
     files = pteron.export_c(robot, "feed_forward_base", tmp_path / "c", base=path)

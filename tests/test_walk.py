@@ -17,7 +17,7 @@ from pteron.kernels.c import compiler
 
 ROOT = Path(__file__).parent.parent
 PAGE = (ROOT / "docs" / "from-log-to-controller.md").read_text(encoding="utf-8")
-COMMANDS = re.findall(r"(?m)^    ((?:pteron|python|cc|controller/test)\b.*)$", PAGE)
+COMMANDS = re.findall(r"(?m)^    ((?:pteron|python|cc|cp|controller/test)\b.*)$", PAGE)
 
 
 def done(line, monkeypatch, capsys):
@@ -31,7 +31,7 @@ def done(line, monkeypatch, capsys):
         monkeypatch.setattr("sys.argv", words)
         runpy.run_path(str(ROOT / words[0]), run_name="__main__")
         return capsys.readouterr().out
-    command = compiler() if program == "cc" else [f"./{program}"]
+    command = {"cc": compiler(), "cp": ["cp"]}.get(program, [f"./{program}"])
     return subprocess.run([*command, *words], capture_output=True, text=True, check=True).stdout
 
 
@@ -40,7 +40,7 @@ def test_the_whole_way(tmp_path, monkeypatch, capsys):
         pytest.skip("no C compiler")
     monkeypatch.chdir(tmp_path)
     printed = {line: done(line, monkeypatch, capsys) for line in COMMANDS}
-    assert len(printed) == 12
+    assert len(printed) == 13
     assert printed["controller/test"] == "all functions agree with the library\n"
     verdicts = [text for line, text in printed.items() if line.startswith("pteron identify")]
     assert all(text.startswith("my delta: trustworthy") for text in verdicts)

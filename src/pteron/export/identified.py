@@ -20,7 +20,7 @@ from pteron.errors import DataError, ModelError
 from pteron.kernels import Array, Port, Program, columns_of, count_operations, program
 from pteron.kernels import specialised as with_values
 from pteron.kernels.passes import optimised
-from pteron.legs import Drive
+from pteron.legs import Drive, Stribeck
 from pteron.manipulator import Manipulator
 from pteron.reduction import BaseParameters, base_parameters, cheapest_parameters
 
@@ -63,7 +63,7 @@ def read_identified(robot: Manipulator, path: str | Path) -> Identified:
         known, drives, kinds = data[_NAME], data["drives"], data["kinds"]
         names, expressions = known["names"], known["expressions"]
         values = np.array(known["values"], dtype=float)
-        found = [Drive(d["coulomb"], d["viscous"], d["offset"], d["inertia"]) for d in drives]
+        found = [_drive(one) for one in drives]
         all_names, told = data["estimate"]["names"], [str(one) for one in data["expressions"]]
         if not (np.isfinite(values).all() and len(told) >= len(values)):
             raise ValueError("values are missing")
@@ -104,6 +104,13 @@ def _object(path: str | Path) -> dict[str, Any]:
     return data if isinstance(data, dict) else {}
 
 
+def _drive(found: dict[str, Any]) -> Drive:
+    """Return a joint's friction and its rotor's inertia, as at a ratio of 1."""
+    law = found["stribeck"] and Stribeck(found["stribeck"]["force"], found["stribeck"]["speed"])
+    friction = found["coulomb"], found["viscous"], found["offset"]
+    return Drive(*friction, rotor_inertia=found["inertia"], stribeck=law)
+
+
 def _driven(robot: Manipulator, found: list[Drive]) -> Manipulator:
     """Return a machine with the friction and the rotors' inertia that were found."""
     legs = []
@@ -114,7 +121,7 @@ def _driven(robot: Manipulator, found: list[Drive]) -> Manipulator:
             coulomb=new.coulomb,
             viscous=new.viscous,
             offset=new.offset,
-            stribeck=None,
+            stribeck=new.stribeck,
             rotor_inertia=new.rotor_inertia / old.gear**2,
         )
         legs.append(replace(leg, drive=drive))
