@@ -15,6 +15,7 @@ from pteron.legs.cones import Cone
 from pteron.manipulator.manipulator import turned
 from pteron.workspace import home_pose, reserve
 from pteron.workspace.doubts import doubts
+from pteron.workspace.drive_doubts import load_doubts
 
 FOLDER = Path(pteron.__file__).parent / "manipulator" / "catalog"
 
@@ -480,6 +481,68 @@ def test_what_parallel_rods_would_keep_from_turning_is_asked_about():
     assert all("no leg at this platform_point keeps it from turning" in text for text in found)
     one = legs_of("par4", lambda i, leg: replace(leg, rods=1) if i < 1 else leg)
     assert doubts(replace(par4, legs=one)) == ()
+
+
+SLIDERS, CRANKS = "quadrupteron", "delta"
+DRIVE_DOUBTS = {
+    "a ratio of 1 motor radians per metre (left out)": (SLIDERS, {"rotor_inertia": 3e-5}),
+    "a ratio of 2 motor radians per metre: belts": (
+        SLIDERS,
+        {"rotor_inertia": 3e-5, "ratio": 2.0},
+    ),
+    "dry friction of 9 N is more than max_force, 8 N": (
+        SLIDERS,
+        {"coulomb": 7.0, "stribeck": pteron.Stribeck(2.0, 0.01), "max_force": 8.0},
+    ),
+    "dry friction of 4 N m is more than rated_torque gives at the joint, 0.64 N m": (
+        CRANKS,
+        {"coulomb": 4.0, "rated_torque": 0.64},
+    ),
+    "max_force is 0.0019 times what rated_torque gives at the joint, 6.4e+04 N m": (
+        CRANKS,
+        {"rated_torque": 0.64, "ratio": 1e5, "max_force": 120.0},
+    ),
+    "rest_speed of 0.2 m/s smooths dry friction over much of": (
+        SLIDERS,
+        {"rest_speed": 0.2, "max_speed": 1.5},
+    ),
+    "stribeck.speed of 10 rad/s is beyond max_speed, 5 rad/s": (
+        CRANKS,
+        {"stribeck": pteron.Stribeck(1.0, 10.0), "max_speed": 5.0},
+    ),
+}
+
+
+@pytest.mark.parametrize("words", DRIVE_DOUBTS)
+def test_a_drive_s_unlikely_numbers_are_doubted(words):
+    name, keys = DRIVE_DOUBTS[words]
+    legs = legs_of(name, lambda i, leg: replace(leg, drive=pteron.Drive(**keys)) if i else leg)
+    found = doubts(replace(CATALOG[name], legs=legs))
+    assert all(text.split(": ")[1] == "drive" for text in found)
+    assert next(text.split(":")[0] for text in found if words in text) == "leg 2", found
+    assert not any(text.startswith("leg 1") for text in found)
+
+
+def test_drives_that_cannot_hold_the_home_pose_and_rotors_that_outweigh_all_are_doubted():
+    robot = CATALOG["quadrupteron"]
+    home = pteron.workspace.home_pose(robot)
+
+    def found(**keys):
+        legs = [replace(leg, drive=pteron.Drive(**keys)) for leg in robot.legs]
+        return load_doubts(replace(robot, legs=tuple(legs)), home)
+
+    # Leg 1 carries the weight of 31 N; an offset of 5 N may hold it.
+    (text,) = found(max_force=30.0)
+    assert text.startswith("leg 1: drive: to hold the home pose takes 31.1 N, more than max_force")
+    assert found(max_force=30.0, offset=-5.0) == ()
+    assert found(max_force=32.0) == ()
+    (text,) = found(rated_torque=0.1, ratio=300.0)
+    assert "takes 31.1 N, more than rated_torque's force, 30 N" in text
+    heavy = found(rotor_inertia=0.3, ratio=392.7)  # kg cm^2
+    assert len(heavy) == 4
+    assert "the rotor is 4.63e+04 kg at the joint" in heavy[0]
+    assert heavy[0].endswith("is rotor_inertia in kg m^2?")
+    assert found(rotor_inertia=3e-5, ratio=392.7) == ()
 
 
 def test_nothing_in_the_catalog_is_doubted():

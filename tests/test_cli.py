@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -587,6 +588,60 @@ def test_a_good_file_is_described(robot: str, mixed: str, monkeypatch: pytest.Mo
     assert ("Singular orientations" in text) == machine.platform.turns
     assert found["tool"] == list(machine.platform.tool)
     assert ("Tool: " in text) == (robot == "h4")
+
+
+def driven(robot, **more):
+    drive = {"coulomb": 3.0, "viscous": 12.0, "rotor_inertia": 3e-5, "ratio": 392.7} | more
+    legs = tuple(replace(leg, drive=pteron.Drive(**drive)) for leg in robot.legs)
+    return replace(robot, legs=legs)
+
+
+def test_drives_are_a_table_and_data(mixed: str, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("pteron.cli.screen.is_terminal", lambda: True)
+    robot = driven(pteron.load("quadrupteron"), stribeck=pteron.Stribeck(1.0, 0.01))
+    pteron.save(robot, "robot.toml")
+    text = done("check robot.toml")
+    assert max(map(len, text.splitlines())) <= 60
+    assert re.search(r"dry friction \(N\) +3 +3 +3 +3 ", text)
+    assert re.search(r"rotor, at the joint \(kg\) +4.626 ", text)
+    assert json.loads(done("check robot.toml --json"))["legs"][0]["drive"] == {
+        "coulomb": 3.0,
+        "viscous": 12.0,
+        "offset": 0.0,
+        "rotor_inertia": 3e-5,
+        "ratio": 392.7,
+        "rest_speed": 0.001,
+        "stribeck": {"force": 1.0, "speed": 0.01},
+        "rated_torque": None,
+        "max_force": None,
+        "max_speed": None,
+    }
+    pteron.save(driven(pteron.load(mixed)), "mixed.toml")
+    text = done("check mixed.toml")
+    assert "3 N m" in text
+    assert max(map(len, text.splitlines())) <= 60
+    assert json.loads(done("check delta --json"))["legs"][0]["drive"] is None
+
+
+def test_forces_of_drives_and_what_they_exceed():
+    robot = driven(pteron.load("tripteron"), max_force=30.0, max_speed=1.5)
+    pteron.save(robot, "robot.toml")
+    state = "--pose 0,0,0 --velocity 1,0,-2 --acceleration 0,0,0"
+    numbers = [0, 0, 0], [1, 0, -2], [0, 0, 0]
+    rigid, driven_by = (
+        pteron.inverse_dynamics(robot, *numbers),
+        pteron.drive_forces(robot, *numbers),
+    )
+    for more, expected in (("", rigid), (" --drives", driven_by)):
+        result = run(f"forces robot.toml {state}{more} --json")
+        found = json.loads(result.stdout)
+        np.testing.assert_allclose([found[f"force{i}"] for i in (1, 2, 3)], expected)
+        # It is the drives that have limits: friction helps leg 3 to hold the weight.
+        assert rigid[2] > 30.0 > driven_by[2]
+        assert result.stderr == (
+            "Note: leg 3: the motion takes up to 2 m/s, but its drive gives 1.5 m/s (max_speed)\n"
+        )
+    assert done("forces tripteron --pose 0,0,0 --drives") == done("forces tripteron --pose 0,0,0")
 
 
 def test_a_name_is_no_markup():

@@ -90,6 +90,27 @@ def test_accelerations_come_back_from_what_the_drives_give(name):
 
 
 @EVERY
+def test_the_joints_motion_tells_what_the_drives_must_give_and_the_pose(name):
+    """From poses 1 mm and 1 mrad away, as the last one of a motion is."""
+    robot = driven(MACHINES[name])
+    motion = states(robot, 100)
+    joints = pteron.inverse_kinematics(robot, motion[0])
+    rates = pteron.joint_rates(robot, *motion[:2]).actuated
+    seconds = pteron.joint_accelerations(robot, *motion).actuated
+    kernel = pteron.compile(robot, "joint_feed_forward")
+    assert [p.name for p in kernel.inputs] == [
+        *("joints", "joint_rates", "joint_accelerations", "pose")
+    ]
+    forces, found = kernel(joints, rates, seconds, motion[0] + 1e-3)
+    expected = pteron.drive_forces(robot, *motion, smooth=True)
+    np.testing.assert_allclose(found, motion[0], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(forces, expected, rtol=0, atol=1e-11 * np.abs(expected).max())
+    lost, _ = kernel(joints, rates, seconds, motion[0] + 20.0)
+    right = (np.abs(lost - expected) < 1e-6 * np.abs(expected).max()).all(axis=-1)
+    assert (np.isnan(lost).any(axis=-1) | right).all()
+
+
+@EVERY
 def test_a_machine_without_drives_needs_its_bodies_forces_alone(name):
     robot = MACHINES[name]
     motion = states(robot, 20)
@@ -143,6 +164,28 @@ def test_dry_friction_is_smooth_at_rest_and_by_sign_beyond():
     scale = np.abs(base).max(axis=-1, keepdims=True)
     assert (np.abs(smooth - 3.0 * np.tanh(rates / 0.01)) <= 1e-12 * (3.0 + scale)).all()
     assert (np.abs(sharp - 3.0 * np.sign(rates)) <= 1e-12 * (3.0 + scale)).all()
+
+
+@EVERY
+def test_base_parameters_are_enough_for_what_the_drives_must_give(name):
+    robot = driven(MACHINES[name])
+    motion = states(robot, 10)
+    base = pteron.base_parameters(robot)
+    moving = (
+        pteron.joint_rates(robot, *motion[:2]).actuated,
+        pteron.joint_accelerations(robot, *motion).actuated,
+    )
+    joints = pteron.inverse_kinematics(robot, motion[0])
+    push = np.random.default_rng(1).normal(size=motion[0].shape)
+    expected = pteron.drive_forces(robot, *motion, push, smooth=True)
+    close = {"rtol": 0, "atol": 1e-11 * np.abs(expected).max()}
+    for grade in ("specialised", "parametric"):
+        given = {"base": base, "wrench": True, "grade": grade}
+        found = pteron.compile(robot, "feed_forward", **given)(*motion, push)
+        np.testing.assert_allclose(found, expected, **close)
+        kernel = pteron.compile(robot, "joint_feed_forward", **given)
+        found, _ = kernel(joints, *moving, motion[0] + 1e-3, push)
+        np.testing.assert_allclose(found, expected, **close)
 
 
 def test_machines_with_other_drives_share_their_programs():

@@ -1,6 +1,7 @@
 """Code for controllers: compiled without a warning, run, and compared with the library."""
 
 import ctypes
+import json
 import re
 import shutil
 import subprocess
@@ -12,16 +13,19 @@ from tempfile import mkdtemp
 
 import numpy as np
 import pytest
+from logs_of_motions import Friction, log_of, motion
 from mechanisms import CATALOG, states, with_elbows
 from typer.testing import CliRunner
 
 import pteron
 from pteron.cli.main import app
 from pteron.equations.drives import drive_numbers
-from pteron.errors import ModelError, OutputError
+from pteron.errors import DataError, ModelError, OutputError
 from pteron.export import FUNCTIONS
-from pteron.kernels import columns_of
+from pteron.identification import Terms, identify
+from pteron.identification.signals import States
 from pteron.kinematics import assembly_modes
+from pteron.report.identification import numbers
 
 ROBOT, DELTA = CATALOG["quadrupteron"], CATALOG["delta"]
 SLIDER = pteron.Leg(
@@ -138,22 +142,253 @@ def library(name, real="double"):
 @pytest.mark.parametrize("name", ROBOTS)
 def test_random_states_give_the_bits_that_casadi_gives(name):
     robot, call = ROBOTS[name], library(name)
-    base = pteron.cheapest_parameters(robot)
-    given = {"parameters": pteron.parameters(robot), "base_parameters": base.values()}
-    given["drives"] = drive_numbers(robot)
+    given = {"parameters": pteron.parameters(robot), "drives": drive_numbers(robot)}
     for pose, velocity, acceleration in zip(*states(robot, 20), strict=True):
         given |= {"pose": pose, "velocity": velocity, "acceleration": acceleration}
         given["joints"] = pteron.inverse_kinematics(robot, pose)
         given["forces"] = pteron.inverse_dynamics(robot, pose, velocity, acceleration)
         functions = FUNCTIONS if name != "par4" else (*NOT_CLOSED, "feed_forward")
         for function in functions:
-            columns = columns_of(base) if function.endswith("_base") else None
-            program = pteron.kernels.program(robot, function.removesuffix("_base"), columns)
+            if function == "inverse_dynamics_base":
+                continue  # it computes with another base set than it is given
+            program = pteron.kernels.program(robot, function)
             inputs = [given[port.name] for port in program.inputs]
             (expected,) = program.function.call(inputs)
             status, found = call(function, *inputs, shape=expected.numel())
             assert status == 0
             np.testing.assert_array_equal(found, np.array(expected).ravel("F"), function)
+
+
+def compiled(robot, functions, folder, **options):
+    """Return a machine's functions, called with arrays, and the header; they end with `shape`."""
+    files = pteron.export_c(robot, functions, folder, **options)
+    build(folder, [files[1].name, files[2].name])
+    assert run(folder)[0] == 0
+    build(folder, [files[1].name], "-shared", "-fPIC")
+    loaded, prefix = ctypes.CDLL(str(folder / "run")), files[1].stem
+
+    def call(function, *inputs, sizes):
+        outputs = [np.full(size, 77.0) for size in sizes]
+        arrays = [np.ascontiguousarray(value, float) for value in inputs]
+        pointers = [ctypes.c_void_p(array.ctypes.data) for array in (*arrays, *outputs)]
+        status = getattr(loaded, f"{prefix}_{function}")(*pointers)
+        return status, *outputs
+
+    return call, files[0].read_text()
+
+
+def stiff(robot, **more):
+    """Return a machine whose drives differ from leg to leg."""
+    legs = [
+        replace(
+            leg,
+            drive=pteron.Drive(2.0 + i, 3.0 - i, 0.2 * i, 1e-5, 80.0 - 150.0 * (i % 2), **more),
+        )
+        for i, leg in enumerate(robot.legs)
+    ]
+    return replace(robot, legs=tuple(legs))
+
+
+@pytest.mark.parametrize("name", ["quadrupteron-oblique", "delta", "par4", "five-bar"])
+def test_a_motion_of_the_joints_becomes_torques_of_the_motors(tmp_path, name):
+    """Each call begins with the pose that the last one found; the first with a pose 1 mm off."""
+    robot = stiff(CATALOG[name])
+    n = robot.freedom
+    call, header = compiled(
+        robot, ["joint_feed_forward"], tmp_path, output="torque", specialised=True
+    )
+    assert "out motor_torques" in header
+    assert "torques of the motors, N m: forces at the joints over the ratios 80, -70" in header
+    cycle = pteron.motion.pick_and_place(robot, pteron.workspace.home_pose(robot), samples=101)
+    state = cycle.pose, cycle.velocity, cycle.acceleration
+    joints = pteron.inverse_kinematics(robot, cycle.pose)
+    rates = pteron.joint_rates(robot, *state[:2]).actuated
+    seconds = pteron.joint_accelerations(robot, *state).actuated
+    expected = pteron.drive_forces(robot, *state, smooth=True)
+    expected /= [leg.drive.ratio for leg in robot.legs]
+    pose, scale = cycle.pose[0] + 1e-3, np.abs(expected).max()
+    for k in range(101):
+        motion = joints[k], rates[k], seconds[k]
+        status, torques, pose = call("joint_feed_forward", *motion, pose, sizes=(n, n))
+        assert status == 0
+        np.testing.assert_allclose(pose, cycle.pose[k], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(torques, expected[k], rtol=0, atol=1e-11 * scale)
+    status, torques, _ = call("joint_feed_forward", *motion, pose + 10.0, sizes=(n, n))
+    if name == "quadrupteron-oblique":  # J^-1 is constant over its translations: one step is all
+        assert status in (0, 1)
+    else:
+        assert status == 1
+        assert np.isnan(torques).all()
+
+
+def test_drives_are_told_per_cent_where_they_ask_for_it(tmp_path):
+    robot = stiff(DELTA, rated_torque=0.64)
+    for output, factor in (("percent", 100.0 / 0.64), ("torque", 1.0)):
+        call, header = compiled(robot, ["feed_forward"], tmp_path / output, output=output)
+        state = [part[0] for part in states(robot, 1)]
+        tables = pteron.parameters(robot), drive_numbers(robot)
+        _, found = call("feed_forward", *state, *tables, sizes=(3,))
+        forces = pteron.drive_forces(robot, *state, smooth=True)
+        expected = factor * forces / [leg.drive.ratio for leg in robot.legs]
+        np.testing.assert_allclose(found, expected, rtol=1e-11)
+        unit = {"percent": "rated torques, 0.64 N m", "torque": "N m: forces at"}[output]
+        assert unit in header
+
+
+def test_what_a_drive_lacks_for_the_output_is_told_by_leg_and_key(tmp_path):
+    def lacking(words, robot, output, functions=None):
+        for export in (pteron.export_c, pteron.export_st):
+            with pytest.raises(ModelError, match=words) as caught:
+                export(robot, functions, tmp_path, output=output)
+            assert "\n" not in str(caught.value)
+
+    robot = stiff(DELTA)
+    lacking(r"leg 1: drive.rated_torque: missing, but output \"percent\" needs", robot, "percent")
+    legs = (*robot.legs[:2], replace(robot.legs[2], drive=pteron.Drive(1.0)))
+    lacking(r"leg 3: drive.ratio: missing, but", replace(robot, legs=legs), "torque")
+    lacking(r"leg 1: drive.ratio: missing, but", DELTA, "torque")
+    lacking("output: 'volt' is not one of force, torque, percent", robot, "volt")
+    lacking("none of drive_forces, .* is written", robot, "torque", ["jacobian"])
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "shared"),
+    [
+        ("quadrupteron", False),
+        ("quadrupteron-oblique", False),
+        ("delta", True),
+        ("five-bar", False),
+    ],
+)
+def test_code_takes_base_parameters_as_identification_lists_them(tmp_path, name, shared):
+    """Any values of the printed list, through its JSON: forces are base regressor @ values."""
+    robot = CATALOG[name]
+    base = pteron.base_parameters(robot, shared=shared)
+    values = np.random.default_rng(0).normal(size=base.rank)
+    friction = [(0.5 + i, 1.0 + i, -0.3 * i) for i in range(robot.freedom)]
+    path = identification_file(tmp_path / "identification.json", base, values, friction)
+    functions = ["inverse_dynamics_base", "feed_forward_base"]
+    call, _ = compiled(robot, functions, tmp_path / "c", base=path)
+    source = next((tmp_path / "c").glob("[!t]*.c")).read_text()
+    assert listed(source) == dict(zip(base.expressions(), values.tolist(), strict=True))
+    folded, _ = compiled(
+        robot, ["feed_forward_base"], tmp_path / "folded", base=path, specialised=True
+    )
+    coulomb, viscous, offset = np.array(friction).T
+    drives = np.r_[0 * coulomb, coulomb, viscous, offset, 0 * coulomb, 0 * coulomb + 1.0]
+    drives = np.r_[drives, np.full(robot.freedom, 1e-3)]
+    for state in zip(*states(robot, 10), strict=True):
+        rigid = pteron.base_regressor(robot, base, *state) @ values
+        rates = pteron.joint_rates(robot, *state[:2]).actuated
+        driven = rigid + coulomb * np.tanh(rates / 1e-3) + viscous * rates + offset
+        close = {"rtol": 0, "atol": 1e-12 * np.abs(driven).max()}
+        n = (robot.freedom,)
+        _, found = call("inverse_dynamics_base", *state, values, sizes=n)
+        np.testing.assert_allclose(found, rigid, **close)
+        _, found = call("feed_forward_base", *state, values, drives, sizes=n)
+        np.testing.assert_allclose(found, driven, **close)
+        _, found = folded("feed_forward_base", *state, sizes=n)
+        np.testing.assert_allclose(found, driven, **close)
+
+
+def listed(source):
+    """Return the table of base parameters in C code: values by what they are."""
+    table = re.search(r"_base_parameters\[\d+\] = \{\n(.*?)\n\};", source, re.DOTALL)[1]
+    found = re.findall(r"(?m)^ *(\S+?),? /\* (.*), kg[^,]* \*/$", table)
+    return {text: float(value.strip("()")) for value, text in found}
+
+
+def identification_file(path, base, values, friction):
+    """Write what matters of an identification.json."""
+    known = {
+        "names": base.names,
+        "expressions": base.expressions(digits=12),
+        "values": values.tolist(),
+        "shared": sorted({p.legs for p in base.parameters if len(p.legs) > 1}),
+    }
+    keys = ("coulomb", "viscous", "offset", "inertia", "stribeck")
+    data = {
+        "verdict": {"grade": "usable with care"},
+        "base_parameters": known,
+        "drives": [dict(zip(keys, (*one, 0.0, None), strict=True)) for one in friction],
+        "kinds": ["base"] * base.rank,
+        "estimate": {"names": base.names},
+        "expressions": base.expressions(),
+    }
+    path.write_text(json.dumps(data))
+    return path
+
+
+class Falling(Friction):
+    """Friction that falls by 1 N, or 1 N m, as a joint moves faster."""
+
+    def forces(self, rates):
+        return super().forces(rates) + np.sign(rates) * np.exp(-((rates / 0.2) ** 2))
+
+
+@pytest.mark.parametrize("offset", [True, False])
+def test_an_identified_machine_goes_to_the_controller_as_it_was_printed(tmp_path, offset):
+    """Rotors and friction too, of a machine with two cranks and an inclined slider.
+
+    There a rotor joins mass and offset; without offsets it is a value of its own.
+    """
+    robot = ROBOTS["mixed"]
+    legs = [
+        replace(leg, drive=pteron.Drive(rotor_inertia=2e-5, ratio=60.0 + i))
+        for i, leg in enumerate(robot.legs)
+    ]
+    robot = replace(robot, legs=tuple(legs))
+    size = {"size": 0.1}
+    friction = Falling.of(3)
+    friction = replace(friction, offset=friction.offset * offset)
+    first, second = (log_of(robot, seed=seed, friction=friction, **size) for seed in (0, 1))
+    result = identify(robot, first, held_out=second, terms=Terms(offset=offset, stribeck=0.2))
+    assert ("J_m1" in result.model.names) == (not offset)
+    assert result.machine.legs[1].drive.stribeck.force == pytest.approx(1.0, rel=0.05)
+    path = tmp_path / "identification.json"
+    path.write_text(json.dumps(numbers(result)))
+    files = pteron.export_c(robot, "feed_forward_base", tmp_path / "c", base=path)
+    source = files[1].read_text()
+    values = result.base_values.tolist()
+    assert listed(source) == dict(zip(result.model.expressions, values, strict=False))
+    assert any("J_m" in text for text in listed(source))
+    call, _ = compiled(robot, "feed_forward_base", tmp_path / "c", base=path, specialised=True)
+    state = motion(robot, np.arange(100) / 100.0, seed=2, **size)
+    rates = pteron.joint_rates(robot, *state[:2]).actuated
+    seconds = pteron.joint_accelerations(robot, *state).actuated
+    every = States(rates[:, 0], rates, rates, seconds, *state, np.zeros(100))
+    fitted = result.model.matrix(every) @ result.estimate.values
+    for k in np.flatnonzero(np.abs(rates).min(axis=-1) > 0.02):
+        _, found = call("feed_forward_base", *(part[k] for part in state), sizes=(3,))
+        np.testing.assert_allclose(found, fitted[k], rtol=0, atol=1e-11 * np.abs(fitted).max())
+
+
+def test_a_file_that_is_no_identification_of_the_machine_is_refused(tmp_path):
+    base = pteron.base_parameters(DELTA)
+    path = identification_file(tmp_path / "i.json", base, base.values(), [(0.0, 0.0, 0.0)] * 3)
+    whole = json.loads(path.read_text())
+
+    def refused(words, robot=DELTA, functions=None, error=DataError, text=None, **changes):
+        path.write_text(text or json.dumps(whole | changes))
+        with pytest.raises(error, match=words) as caught:
+            pteron.export_c(robot, functions, tmp_path / "c", base=path)
+        assert "\n" not in str(caught.value)
+
+    refused("not an identification.json of this version", drives=None)
+    refused("not an identification.json of this version", text="[]")
+    refused("i.json: no JSON; give the identification.json", text="t,rho1")
+    refused("values are missing", expressions=[])
+    refused("values are missing", base_parameters=whole["base_parameters"] | {"values": [np.nan]})
+    refused("of another machine", CATALOG["tripteron"])
+    longer = [replace(leg, lower_length=leg.lower_length + 1e-3) for leg in DELTA.legs]
+    refused("of another machine", replace(DELTA, legs=tuple(longer)))
+    refused("R1_1: friction of passive joints", kinds=["passive"], estimate={"names": ["Fv_R1_1"]})
+    refused("ask for feed_forward_base", functions=["feed_forward"], error=ModelError)
+    refused("leave it out, or export the model", functions=["mass_matrix"], error=ModelError)
+    with pytest.raises(DataError, match=r"no\.json: No such file"):
+        pteron.export_c(DELTA, folder=tmp_path / "c", base=tmp_path / "no.json")
+    assert not (tmp_path / "c").exists()
 
 
 @pytest.mark.parametrize("name", ["quadrupteron", "delta"])
@@ -337,6 +572,18 @@ def test_a_name_stays_inside_its_comment(tmp_path):
     assert blocks[0].read_text().count("*)") == blocks[0].read_text().count("(*")
 
 
+def test_a_file_s_text_stays_inside_its_comment(tmp_path):
+    base = pteron.base_parameters(DELTA)
+    path = identification_file(tmp_path / "i.json", base, base.values(), [(0.0, 0.0, 0.0)] * 3)
+    data = json.loads(path.read_text())
+    data["expressions"][0] = data["verdict"]["grade"] = '*/ #error "x" (* \\\n /*'
+    path.write_text(json.dumps(data))
+    files = pteron.export_c(DELTA, "inverse_dynamics_base", tmp_path, base=path)
+    build(tmp_path, [files[1].name, files[2].name])
+    (block,) = pteron.export_st(DELTA, "inverse_dynamics_base", tmp_path, base=path)
+    assert block.read_text().count("*)") == block.read_text().count("(*")
+
+
 def test_a_project_for_cmake(tmp_path):
     if shutil.which("cmake") is None:
         pytest.skip("cmake is not installed")
@@ -374,3 +621,32 @@ def test_the_command(tmp_path):
     result = runner.invoke(app, [*single, "--c", str(tmp_path / "f"), "--json"])
     assert '"robot": "quadrupteron"' in result.output
     assert "const float *QUADRUPTERON_RESTRICT pose" in (tmp_path / "f/quadrupteron.h").read_text()
+    robot = pteron.save(stiff(DELTA, rated_torque=0.64), tmp_path / "robot.toml")
+    base = pteron.base_parameters(DELTA)
+    path = identification_file(tmp_path / "i.json", base, base.values(), [(1.0, 2.0, 0.0)] * 3)
+    told = ["export", str(robot), "--c", str(tmp_path / "t"), "--output", "percent"]
+    result = runner.invoke(app, [*told, "--base", str(path)])
+    assert result.exit_code == 0, result.stderr
+    told_of = f"Warning: {path}: the verdict on these values is: usable with care"
+    assert result.stderr.replace("\n", "") == told_of
+    header = (tmp_path / "t" / "delta.h").read_text()
+    assert "Verdict of the identification: usable with care." in header.replace("\n * ", " ")
+    assert "out percent_of_rated (3): per cent of the motors' rated torques, 0.64 N m" in header
+    functions = re.findall(r"(?m)^int delta_(\w+)\(", header)
+    assert functions == [
+        *("inverse_kinematics", "direct_kinematics", "jacobian", "inverse_dynamics_base"),
+        *("regressor", "feed_forward_base", "joint_feed_forward_base"),
+    ]
+    for wrong, words in (
+        ([*told, "--base", str(robot)], "robot.toml: no JSON"),
+        (
+            ["export", "delta", "--c", str(tmp_path / "n"), "--output", "torque"],
+            "leg 1: drive.ratio",
+        ),
+        ([*told[:-1], "volt"], "'volt'"),
+    ):
+        result = runner.invoke(app, wrong)
+        assert result.exit_code == 2
+        assert words in result.stderr
+        assert result.stderr.count("\n") == 1 or "volt" in words
+    assert not (tmp_path / "n").exists()

@@ -4,7 +4,7 @@ import getpass
 import json
 import re
 import socket
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import lru_cache
 from html.parser import HTMLParser
 from pathlib import Path
@@ -44,8 +44,17 @@ def with_a_tool(robot):
     return replace(robot, name="with a shaft", platform=platform, legs=legs)
 
 
+def driven(robot):
+    """Return the machine with drives, of which the first has neither limits nor a ratio."""
+    motor = pteron.Drive(3.0, 12.0, 0.1, 3e-5, 392.7, max_force=40.0, max_speed=9.0)
+    drives = (pteron.Drive(2.0), *(motor for _ in robot.legs[1:]))
+    legs = zip(robot.legs, drives, strict=True)
+    return replace(robot, legs=tuple(replace(leg, drive=drive) for leg, drive in legs))
+
+
 MACHINES = {
     "quadrupteron": CATALOG["quadrupteron"],
+    "driven": driven(CATALOG["tripteron"]),
     "weightless, other mode": replace(
         with_elbows(MECHANISMS["tripteron on a wall"], "+-+"), gravity=(0.0, 0.0, 0.0)
     ),
@@ -238,7 +247,12 @@ def test_the_numbers_are_the_librarys(name):
     cycle = data["cycle"]
     state = [np.array(cycle[key]) for key in ("pose", "velocity", "acceleration")]
     forces = np.array(cycle["forces"])
-    np.testing.assert_allclose(pteron.inverse_dynamics(robot, *state), forces, atol=1e-10)
+    rigid = pteron.inverse_dynamics(robot, *state)
+    expected = pteron.drive_forces(robot, *state, smooth=True) if name == "driven" else rigid
+    np.testing.assert_allclose(expected, forces, atol=1e-10)
+    assert cycle["with_drives"] == (np.abs(forces - rigid).max() > 1.0) == (name == "driven")
+    assert [text[:5] for text in cycle["overloads"]] == (["leg 3"] if name == "driven" else [])
+    assert data["drives"][1] == (asdict(robot.legs[1].drive) if name == "driven" else None)
     np.testing.assert_allclose(np.abs(forces).max(axis=0), cycle["peak_forces"])
     # Over one period, by the trapezoidal rule.
     mean = np.trapezoid(forces**2, cycle["time"], axis=0) / cycle["duration"]
@@ -281,6 +295,10 @@ def test_the_page_shows_the_numbers(name):
         assert (words in text) == (name == "planar")
     for words in ("counts as a point mass", "way of the tool's centre point", "Passive joints"):
         assert (words in text) == (name == "shaft")
+    for words in ("Drives, at the joints", "4.626 4.626", "Drive forces,"):
+        assert (words in text) == (name == "driven"), words
+    assert ("friction is left out" in text) == (name != "driven")
+    assert all(line in text for line in found.overloads)
     assert significant(found.jacobian.condition, 4) in text
     for i, value in enumerate(found.base.values(), start=1):
         assert significant(float(value), 4) in text

@@ -7,9 +7,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from mechanisms import states
+from mechanisms import CATALOG, states
 from structured_text import Block, Trap, parse, read
-from test_export import ROBOTS
+from test_export import ROBOTS, identification_file, stiff
 
 import pteron
 from pteron.equations.drives import drive_numbers
@@ -26,6 +26,7 @@ FUNCTIONS = (
     "jacobian",
     "forward_dynamics",
     "feed_forward",
+    "joint_feed_forward",
 )
 
 BLOCKS = sorted(set(product(ROBOTS, FUNCTIONS)) - {("par4", "closure_poses")})
@@ -98,6 +99,8 @@ def inputs_of(robot, given, count, seed=0):
             "forces": rng.normal(size=len(robot.legs)),
             "parameters": pteron.parameters(robot),
             "drives": drive_numbers(robot),
+            "joint_rates": velocity,
+            "joint_accelerations": acceleration,
         }
         drawn.append([known[port.name] for port in given.inputs])
     return drawn
@@ -313,7 +316,10 @@ def test_an_angle_of_no_vector_is_singular():
 
 
 def test_a_machine_with_drives_has_its_feed_forward_too(tmp_path):
-    for name, more in (("par4", ["Par4_FeedForward.st"]), ("delta", [])):
+    for name, more in (
+        ("par4", ["Par4_FeedForward.st", "Par4_JointFeedForward.st"]),
+        ("delta", []),
+    ):
         files = pteron.export_st(ROBOTS[name], folder=tmp_path)
         assert [path.name for path in files[2:]] == more
 
@@ -344,6 +350,30 @@ def test_exported_blocks_are_those_of_the_library(tmp_path):
         expected = assembly_modes(robot, np.array(list(angles.values())), all_branches=True)
         np.testing.assert_allclose(found, expected, atol=1e-13)
         assert min(np.linalg.norm(found - pose, axis=-1)) < 1e-13
+
+
+def test_blocks_take_identified_values_and_tell_drives_per_cent(tmp_path):
+    robot = stiff(CATALOG["five-bar"], rated_torque=0.5)
+    base = pteron.base_parameters(robot)
+    values = base.values() * 1.1
+    path = identification_file(tmp_path / "i.json", base, values, [(1.0, 0.2, 0.3)] * 2)
+    files = pteron.export_st(robot, folder=tmp_path, base=path, output="percent")
+    assert [file.name for file in files] == [
+        "FiveBar_InverseKinematics.st",
+        "FiveBar_FeedForwardBase.st",
+        "FiveBar_JointFeedForwardBase.st",
+    ]
+    assert "per cent of the motors' rated torques, 0.5 N m" in files[1].read_text()
+    block = Block(read(files[1].read_text()))
+    for motion in zip(*states(robot, 3), strict=True):
+        names = ("pose", "velocity", "acceleration")
+        given = {name: dict(enumerate_places(v)) for name, v in zip(names, motion, strict=True)}
+        rates = pteron.joint_rates(robot, *motion[:2]).actuated
+        forces = pteron.base_regressor(robot, base, *motion) @ values
+        forces += np.tanh(rates / 1e-3) + 0.2 * rates + 0.3
+        expected = 100.0 * forces / (0.5 * np.array([leg.drive.ratio for leg in robot.legs]))
+        found = block(**given)["percent_of_rated"]
+        np.testing.assert_allclose(list(found.values()), expected, rtol=1e-11)
 
 
 def enumerate_places(values):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 import pteron
@@ -10,9 +12,12 @@ from plant.inverse import platform_state
 from plant.model import Array
 from plant.reference import Reference
 
-__all__ = ["Controller"]
+__all__ = ["BANDWIDTH", "Controller", "FeedForward"]
 
-_BANDWIDTH = 100.0
+FeedForward = Callable[[Array, Array, Array], Array]
+"""From joint coordinates, rates and accelerations (T, n) to the actuators' forces (T, n)."""
+
+BANDWIDTH = 100.0
 """rad/s; the controller's two poles are there."""
 
 _REVERSAL = 1e-4
@@ -32,22 +37,27 @@ class Controller:
         start: float,
         duration: float,
         spacing: float,
+        bandwidth: float,
+        feed_forward: FeedForward | None,
     ) -> None:
         self.start, self.spacing = start, spacing
         instants = np.arange(round((duration - start) / spacing) + 50, dtype=np.float64)
         time = start + spacing * instants
         joints, rates, accelerations = reference(time)
-        state = platform_state(robot, joints, rates, accelerations)
         home: Array = pteron.workspace.home_pose(robot)
         inverse: Array = np.linalg.inv(pteron.jacobian(robot, home))
         masses = np.diag(inverse.T @ pteron.mass_matrix(drawn, home) @ inverse)
-        self.position_gain = masses * _BANDWIDTH**2
-        self.rate_gain = 2.0 * masses * _BANDWIDTH
-        needed = pteron.inverse_dynamics(drawn, state.pose, state.velocity, state.acceleration)
-        braking = np.array(friction.coulomb) * np.tanh(rates / _REVERSAL)
-        braking += np.array(friction.viscous) * rates + np.array(friction.offset)
-        pulling = self.position_gain * joints + self.rate_gain * rates
-        self.command = needed + compensation * braking + pulling
+        self.position_gain = masses * bandwidth**2
+        self.rate_gain = 2.0 * masses * bandwidth
+        if feed_forward is None:
+            state = platform_state(robot, joints, rates, accelerations)
+            needed = pteron.inverse_dynamics(drawn, state.pose, state.velocity, state.acceleration)
+            braking = np.array(friction.coulomb) * np.tanh(rates / _REVERSAL)
+            braking += np.array(friction.viscous) * rates + np.array(friction.offset)
+            needed = needed + compensation * braking
+        else:
+            needed = feed_forward(joints, rates, accelerations)
+        self.command = needed + self.position_gain * joints + self.rate_gain * rates
 
     def forces(self, time: float, joints: Array, rates: Array) -> Array:
         """Return the actuator forces (n,); between the table's instants the command is linear."""

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 import pteron
-from plant.controller import Controller
+from plant.controller import BANDWIDTH, Controller, FeedForward
 from plant.friction import Friction, Guides
 from plant.inverse import platform_state
 from plant.model import (
@@ -85,6 +85,8 @@ def simulate(
     settle: float = 1.0,
     drawn: pteron.Manipulator | None = None,
     compensation: float = 1.0,
+    bandwidth: float = BANDWIDTH,
+    feed_forward: FeedForward | None = None,
 ) -> Recording:
     """Let the machine follow a reference and record it; a repeated call returns the same recording.
 
@@ -109,6 +111,11 @@ def simulate(
         What the controller takes the machine for; by default, what it is.
     compensation : float
         The share of the actuated joints' friction that the controller knows.
+    bandwidth : float
+        Of the feedback, rad/s: K_p = m w^2 and K_d = 2 m w, with the masses m (kg m^2 at a crank)
+        that `drawn` has at its joints.
+    feed_forward : callable, optional
+        What gives F_ff instead, of the reference's joint coordinates, rates and accelerations.
 
     Returns
     -------
@@ -129,7 +136,16 @@ def simulate(
     start = -round(settle * rate) / rate
     # Every other instant of the controller's table is a stage in the middle of a step.
     controller = Controller(
-        robot, drawn or robot, reference, friction, compensation, start, duration, _STEP / 2.0
+        robot,
+        drawn or robot,
+        reference,
+        friction,
+        compensation,
+        start,
+        duration,
+        _STEP / 2.0,
+        bandwidth,
+        feed_forward,
     )
     _place(robot, data, reference, start)
     plant = _Plant(robot, friction, controller, model, data)

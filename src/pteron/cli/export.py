@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
-from pteron.cli.screen import plain, show, show_json, spinner
+from pteron.cli.screen import note, plain, show, show_json, spinner
 from pteron.errors import DataError
 
 _FUNCTIONS = (
@@ -18,7 +18,9 @@ _FUNCTIONS = (
     "discriminants",
     "drive_accelerations",
     "drive_forces",
+    "drive_forces_base",
     "feed_forward",
+    "feed_forward_base",
     "forward_dynamics",
     "gravity_forces",
     "inverse_dynamics",
@@ -27,6 +29,8 @@ _FUNCTIONS = (
     "jacobian",
     "joint_accelerations",
     "joint_coordinates",
+    "joint_feed_forward",
+    "joint_feed_forward_base",
     "joint_points",
     "joint_rates",
     "joint_screws",
@@ -49,6 +53,11 @@ _FUNCTIONS = (
 )
 """Written out: help is shown before CasADi is loaded. A test holds it against what there is."""
 
+_TRUSTED = "trustworthy"
+
+Output = Literal["force", "torque", "percent"]
+"""The library's own, which is slow to import."""
+
 
 def export(
     robot: Robot,
@@ -65,6 +74,24 @@ def export(
     wrench: Annotated[
         bool, option("wrench", "Dynamics take a wrench on the platform too.")
     ] = False,
+    output: Annotated[
+        Output,
+        option(
+            "output",
+            "What drives are told: force at the joints, torque of the motors, or percent of what "
+            "they are rated for.",
+            "UNIT",
+        ),
+    ] = "force",
+    base: Annotated[
+        str | None,
+        option(
+            "base",
+            "The identification.json of pteron identify: its values go into the code.",
+            "FILE",
+            show_default=False,
+        ),
+    ] = None,
     elbows: Elbows = None,
     json: Json = False,
 ) -> None:
@@ -73,7 +100,9 @@ def export(
     Kinematics, Jacobian, dynamics and regressor, in functions that return a status, without
     allocation or state; with a test program and a CMakeLists.txt. Function blocks for a PLC are
     inverse kinematics and inverse dynamics unless others are named. A machine with drives has
-    `feed_forward` as well: what the drives must give, with friction.
+    `feed_forward` as well: what the drives must give, with friction, and `joint_feed_forward`, the
+    same from the motion of the joints. With --base they take what `pteron identify` found, as it
+    lists it, and are called `feed_forward_base` and `joint_feed_forward_base`.
     """
     if c is None and st is None:
         raise DataError("--c, --st: neither given; say what to write, such as --c controller")
@@ -81,14 +110,25 @@ def export(
     files = []
     with spinner(f"Writing code for {machine.name}"):
         from pteron.export import Real, export_c, export_st
+        from pteron.export.identified import read_identified
 
+        grade = read_identified(machine, base).grade if base is not None else _TRUSTED
         if c is not None:
             real: Real = "float" if single else "double"
             files += export_c(
-                machine, function, c, real=real, specialised=specialised, wrench=wrench
+                machine,
+                function,
+                c,
+                real=real,
+                specialised=specialised,
+                wrench=wrench,
+                output=output,
+                base=base,
             )
         if st is not None:
-            files += export_st(machine, function, st, wrench=wrench)
+            files += export_st(machine, function, st, wrench=wrench, output=output, base=base)
+    if grade != _TRUSTED:
+        note(f"Warning: {base}: the verdict on these values is: {grade}")
     if json:
         show_json({"robot": machine.name, "files": [str(path) for path in files]})
         return

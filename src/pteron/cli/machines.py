@@ -110,6 +110,8 @@ def check(
     try:
         with spinner(f"Looking where {robot.name} can work"):
             found = _findings(robot, unlikely)
+        for text in found["doubts"][len(unlikely) :]:
+            note(f"Warning: {file}: {text}")
     except PteronError as error:
         raise ModelError(error.message, subject=file) from None
     if json:
@@ -121,6 +123,7 @@ def check(
 def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
     from pteron.kinematics import singular_orientations
     from pteron.workspace import home_pose, limited_joints, reserve
+    from pteron.workspace.drive_doubts import load_doubts
 
     home = home_pose(robot)
     position = home[: len(robot.platform.lengths)]
@@ -134,7 +137,7 @@ def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
         "home_pose": home.tolist(),
         "home_reserve": float(reserve(robot, home).smallest),
         "limited_joints": [asdict(joint) for joint in limited_joints(robot, home)],
-        "doubts": list(unlikely),
+        "doubts": [*unlikely, *load_doubts(robot, home)],
     }
 
 
@@ -147,6 +150,8 @@ def _leg(leg: LegKind) -> dict[str, Any]:
         "elbow": leg.elbow,
         "limits": list(leg.limits) if leg.limits else None,
         "unit": leg.joint.unit,
+        "force_unit": leg.joint.force_unit,
+        "drive": asdict(leg.drive) if leg.drive else None,
     }
 
 
@@ -175,12 +180,25 @@ def _show(robot: Manipulator, found: dict[str, Any]) -> None:
         f"{len(robot.legs)} legs, pose {' '.join(robot.coordinates)}, "
         f"working mode {signs(robot)}",
         made,
+        *_drives(robot),
         *singular,
         f"Home pose: {_vector(found['home_pose'])}, reserve {found['home_reserve']:.2f} of 1",
         *_passive(found["limited_joints"]),
         *tool,
         work,
     )
+
+
+def _drives(robot: Manipulator) -> list[Table]:
+    """Return what drives the joints, where the file says it."""
+    from pteron.legs.drive_rows import drive_rows
+
+    legs = tuple(f"leg {i}" for i in range(1, robot.freedom + 1))
+    made = table("drive", *legs, numbers=legs)
+    rows = drive_rows(robot.legs)
+    for name, texts in rows:
+        made.add_row(name, *texts)
+    return [made] if rows else []
 
 
 def _passive(joints: list[dict[str, Any]]) -> list[Table]:

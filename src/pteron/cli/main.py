@@ -170,6 +170,7 @@ _add(
     "pteron export quadrupteron --c controller",
     "pteron export my-robot.toml --c controller --float --function inverse_kinematics",
     "pteron export quadrupteron --st plc",
+    "pteron export robot.toml --base result/identification.json --c controller",
 )
 _add(
     excite,

@@ -20,6 +20,7 @@ from pteron.cli.arguments import (
     parsed_numbers,
 )
 from pteron.cli.rows import Rows, check_destination, deliver, given_rows, rows_of_table, single_row
+from pteron.cli.screen import note
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
@@ -151,6 +152,9 @@ def forces(
     wrench: Annotated[
         str | None, _vector("wrench", "fx fy fz mk on the platform at P; N and N m.")
     ] = None,
+    drives: Annotated[
+        bool, option("drives", "What the drives must give: with friction and the motors' inertia.")
+    ] = False,
     table: TableFile = None,
     out: Out = None,
     elbows: Elbows = None,
@@ -162,8 +166,14 @@ def forces(
     A table has the columns x y z phi dx dy dz dphi ddx ddy ddz ddphi and, if a wrench acts on the
     platform, fx fy fz mk: of each four those that the machine's pose has. The result has its
     columns and force1, force2, ... of sliders, N, or torque1, torque2, ... of cranks, N m.
+    They are those of the bodies or, with --drives, those of the drives. Where these are more than
+    a drive's limits in the machine's file, a note says so.
     """
-    from pteron.dynamics import inverse_dynamics
+    import numpy as np
+
+    from pteron.dynamics import drive_forces, inverse_dynamics
+    from pteron.kinematics import joint_rates
+    from pteron.motion import overloads
 
     machine = load_robot(robot, elbows)
     m = machine.freedom
@@ -180,11 +190,24 @@ def forces(
     added = machine.force_names
     check_destination(out, table, rows.table, added)
 
-    def serve(values: NDArray[Any]) -> NDArray[Any]:
-        parts = (values[..., k : k + m] for k in range(0, len(columns), m))
-        return inverse_dynamics(machine, *parts, on_failure=on_failure)
+    limited = any(
+        leg.drive and (leg.drive.max_force or leg.drive.max_speed) for leg in machine.legs
+    )
 
-    found = rows.served(machine, serve, columns, on_failure)
+    def serve(values: NDArray[Any]) -> NDArray[Any]:
+        """Return forces to deliver, and forces and rates to hold against the drives' limits."""
+        parts = [values[..., k : k + m] for k in range(0, len(columns), m)]
+        if not (drives or limited):
+            return inverse_dynamics(machine, *parts, on_failure=on_failure)
+        driven = drive_forces(machine, *parts, on_failure=on_failure)
+        given = driven if drives else inverse_dynamics(machine, *parts, on_failure=on_failure)
+        rates = joint_rates(machine, *parts[:2], on_failure=on_failure).actuated
+        return np.concatenate([given, driven, rates], axis=-1)
+
+    served = rows.served(machine, serve, columns, on_failure)
+    found = served[:, :m]
+    for text in overloads(machine, served[:, m : 2 * m], served[:, 2 * m :]) if limited else ():
+        note(f"Note: {text}")
     result = rows.table.extended(dict(zip(added, found.T, strict=True)))
     deliver(machine, result, added, out=out, as_json=json, single=rows.single)
 

@@ -33,6 +33,8 @@ def report(
     found = json.loads((page.parent / "report.json").read_text(encoding="utf-8"))
     for text in found["doubts"]:
         note(f"Warning: {text}")
+    for text in found["cycle"]["overloads"]:
+        note(f"Warning: {text}")
     if as_json:
         cycle = {key: value for key, value in found["cycle"].items() if key not in _SERIES}
         show_json({"page": str(page), **found, "cycle": cycle})
@@ -60,7 +62,8 @@ def _machine(found: dict[str, Any]) -> Table:
 def _legs(cycle: dict[str, Any], joints: list[dict[str, str]]) -> Table:
     force = " or ".join(dict.fromkeys(joint["force"] for joint in joints))
     headings = ("leg", f"peak {force}", f"RMS {force}", "peak speed")
-    made = table(*headings, numbers=headings)
+    of = "Of the drives, with friction." if cycle["with_drives"] else "Of the bodies, no friction."
+    made = table(*headings, numbers=headings, caption=of)
     columns = (cycle[key] for key in ("peak_forces", "rms_forces", "peak_speeds"))
     for i, (peak, rms, speed) in enumerate(zip(*columns, strict=True), start=1):
         unit, rate = joints[i - 1]["force_unit"], f"{joints[i - 1]['unit']}/s"

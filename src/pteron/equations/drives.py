@@ -75,11 +75,18 @@ def _ahead(rates: Expression) -> Expression:
     return ca.if_else(rates > 0, 1, 0)
 
 
-def drive_forces(state: State, drives: Drives, *, smooth: bool) -> Expression:
-    """Return what the drives need for themselves in a motion (n, 1)."""
-    rates, accelerations = (
-        ca.vertcat(*(getattr(leg, name) for leg in state.legs)) for name in ("rate", "acceleration")
+def joint_motion(state: State) -> tuple[Expression, Expression]:
+    """Return rates and accelerations (n, 1) of the actuated joints."""
+    return (
+        ca.vertcat(*(leg.rate for leg in state.legs)),
+        ca.vertcat(*(leg.acceleration for leg in state.legs)),
     )
+
+
+def drive_forces(
+    drives: Drives, rates: Expression, accelerations: Expression, *, smooth: bool
+) -> Expression:
+    """Return what the drives need for themselves (n, 1) as their joints move at q' and q''."""
     return drives.inertia * accelerations + friction(drives, rates, smooth=smooth)
 
 
@@ -98,7 +105,7 @@ def drive_accelerations(
     """
     state = machine.state(pose, velocity)
     rows = jacobian(state)
-    own = drive_forces(state, drives, smooth=True)
+    own = drive_forces(drives, *joint_motion(state), smooth=True)
     load = ca.mtimes(rows.T, forces - own) + wrench
     load -= generalized_forces(machine, state, parameters)
     mass = mass_matrix(machine, pose, parameters)

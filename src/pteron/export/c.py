@@ -15,7 +15,9 @@ from typing import Literal, get_args
 
 from pteron.atomic import write_texts
 from pteron.errors import ModelError
-from pteron.export.functions import Exported, banner, chosen
+from pteron.export.descriptions import banner
+from pteron.export.functions import Exported, chosen
+from pteron.export.outputs import Output
 from pteron.kernels import Array
 from pteron.kernels.code import (
     C,
@@ -42,6 +44,8 @@ def export_c(
     real: Real = "double",
     specialised: bool = False,
     wrench: bool = False,
+    output: Output = "force",
+    base: str | Path | None = None,
 ) -> list[Path]:
     """Write C99 for a machine: its functions, a test program and a CMakeLists.txt.
 
@@ -57,10 +61,12 @@ def export_c(
     robot : Manipulator
         The machine; its name becomes the prefix of the functions and the files.
     functions : sequence of str
-        Names of what `compile` accepts, or `"inverse_dynamics_base"`, from the cheapest base
-        parameters. By default inverse and direct kinematics, Jacobian, inverse dynamics from the
-        inertial parameters and from base parameters, forward dynamics and the regressor. Where
-        direct kinematics have no closed form, `"direct_step"` comes in their place.
+        Names of what `compile` accepts, and `"inverse_dynamics_base"`, `"feed_forward_base"` or
+        `"joint_feed_forward_base"`, from base parameters as `base_parameters` and `pteron
+        identify` list them. By default inverse and direct kinematics, Jacobian, inverse dynamics
+        from the inertial parameters and from base parameters, forward dynamics and the regressor;
+        of a machine with drives `"feed_forward"` and `"joint_feed_forward"` too. Where direct
+        kinematics have no closed form, `"direct_step"` comes in their place.
     folder : path
         Where; made if it is missing.
     real : {"double", "float"}
@@ -70,6 +76,12 @@ def export_c(
         being an argument. The constant tables of them are left out then.
     wrench : bool
         Whether inverse and forward dynamics take a wrench on the platform too, after the state.
+    output : {"force", "torque", "percent"}
+        What the functions of drives return: forces at the joints, torques of the motors (N m), or
+        per cent of their rated torques, by each drive's `ratio` and `rated_torque`.
+    base : path, optional
+        The identification.json of `pteron identify`: its base parameters, friction and offsets are
+        the values of the code, which then needs no real bodies.
 
     Returns
     -------
@@ -79,7 +91,10 @@ def export_c(
     Raises
     ------
     ModelError
-        If a function's name is unknown, or `real` is.
+        If a function's name is unknown, or `real` or `output` is; if a drive lacks what the output
+        needs.
+    DataError
+        If `base` is no identification of this machine.
     OutputError
         If the folder cannot be written.
 
@@ -93,7 +108,9 @@ def export_c(
     """
     if real not in get_args(Real):
         raise ModelError(f'real: {real!r} is neither "double" nor "float"')
-    exported = chosen(robot, functions, specialised=specialised, wrench=wrench)
+    exported = chosen(
+        robot, functions, specialised=specialised, wrench=wrench, output=output, base=base
+    )
     prefix, single = prefix_of(robot), real == "float"
     values = {
         "banner": banner(robot, "C99"),

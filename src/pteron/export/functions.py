@@ -4,21 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from importlib.metadata import version
+from pathlib import Path
 
 import numpy as np
 
 from pteron.equations.drives import drive_names, drive_numbers
 from pteron.equations.machine import Machine, closure_of
 from pteron.errors import ModelError
+from pteron.export.descriptions import (
+    BASE_PARAMETERS,
+    BRANCHES,
+    DRIVES,
+    MODES,
+    PARAMETERS,
+    SUMMARIES,
+    meaning,
+)
+from pteron.export.identified import Identified, base_program, read_identified
 from pteron.export.labels import node_names
+from pteron.export.outputs import DRIVEN, Output, factors, in_units
 from pteron.kernels import FUNCTIONS as COMPILED
-from pteron.kernels import LOADED, Array, Graph, Port, Program, columns_of, graph_of, program
+from pteron.kernels import LOADED, REDUCIBLE, Array, Graph, Port, Program, graph_of, program
 from pteron.kernels import specialised as with_values
+from pteron.kernels.functions import TABLE
 from pteron.kernels.graph import CONSTANT
 from pteron.kinematics import inverse_kinematics, random_poses
 from pteron.manipulator import Manipulator, parameter_names, parameters
-from pteron.reduction import BaseParameters, cheapest_parameters
 
 FUNCTIONS = (
     "inverse_kinematics",
@@ -30,46 +41,13 @@ FUNCTIONS = (
     "regressor",
 )
 """What is exported unless a choice is given; direct kinematics where it has a closed form, and
-`feed_forward` too of a machine with drives."""
+what `FEED` names too of a machine with drives."""
 
-_SUMMARIES = {
-    "inverse_kinematics": "Joint coordinates of a pose.",
-    "direct_kinematics": "Every pose that the joint coordinates allow, one a row; NaN where it is "
-    "not real or not in reach.",
-    "closure_poses": "Every pose that the joint coordinates allow, one a row, in reach or not.",
-    "direct_step": "The pose of the joint coordinates next to a given one, such as the last one "
-    "of a motion, by Newton's method; NaN where it does not converge, or comes to another side of "
-    "the singularities.",
-    "jacobian": "Jacobian: joint rates = J velocity.",
-    "inverse_dynamics": "Actuator forces of a motion, from the inertial parameters; no friction.",
-    "inverse_dynamics_base": "Actuator forces of a motion, from base parameters; no friction.",
-    "forward_dynamics": "Acceleration of the platform under actuator forces; no friction.",
-    "drive_forces": "What the drives must give: actuator forces, friction by the sign of the "
-    "joint's rate, the motors' inertia.",
-    "feed_forward": "What the drives must give: actuator forces, friction, which is smooth where a "
-    "joint rests, the motors' inertia.",
-    "drive_accelerations": "Acceleration of the platform under what the drives give, friction and "
-    "the motors' inertia included.",
-    "regressor": "Regressor: actuator forces = regressor parameters.",
-}
+FEED = ("feed_forward", "joint_feed_forward")
+"""What a controller adds to its feedback, from the platform's motion or from the joints'."""
 
-_MODES = " Each row is one assembly mode throughout: a motion between singularities keeps its row."
-
-_BRANCHES = (
-    " A leg may be bent the other way in a row: then its inverse kinematics are not the joint "
-    "coordinates given."
-)
-
-
-_TABLE = "The machine's inertial parameters, in the paper's order; SI units."
-
-_DRIVE_TABLE = (
-    "The machine's drives, at the joints: motors' inertia, dry and viscous friction, a constant "
-    "force, what dry friction has more at rest, the speeds by which it is gone, and within which "
-    "dry friction changes its sign; SI units."
-)
-
-_BASE_TABLE = "The machine's base parameters, which inverse_dynamics_base takes; SI units."
+_BASE = "_base"
+"""What ends the name of a function of base parameters."""
 
 
 @dataclass(frozen=True)
@@ -127,41 +105,77 @@ def chosen(
     robot: Manipulator,
     functions: str | Sequence[str] | None,
     *,
+    usual: Sequence[str] = FUNCTIONS,
     specialised: bool,
     wrench: bool,
+    output: Output,
+    base: str | Path | None,
 ) -> tuple[Exported, ...]:
-    """Return what is to be written: `FUNCTIONS` unless a choice is given.
+    """Return what is to be written: the `usual` unless a choice is given.
 
     Without a closed form for every pose that joints have, there is the step from the last one.
 
     Raises
     ------
     ModelError
-        If a name is unknown, or there is none.
+        If a name is unknown, or there is none; if a drive does not say what the output needs.
+    DataError
+        If the file of identified base parameters is not one of this machine.
     """
+    identified = None if base is None else read_identified(robot, base)
+    robot = identified.robot if identified else robot
     if functions is None:
         closed = closure_of(robot).closed_form
         step = {"direct_kinematics": "direct_step"}
-        functions = [name if closed else step.get(name, name) for name in FUNCTIONS]
-        functions += ["feed_forward"] if has_drives(robot) else []
+        functions = [name if closed else step.get(name, name) for name in usual]
+        if identified:  # which leaves the bodies unknown
+            needs = {name: TABLE[name].inputs for name in functions if name in TABLE}
+            functions = [name for name in functions if "parameters" not in needs.get(name, ())]
+            functions += [name + _BASE for name in FEED]
+        elif has_drives(robot):
+            functions += FEED
     names = [functions] if isinstance(functions, str) else list(dict.fromkeys(functions))
-    allowed = sorted({*COMPILED, "inverse_dynamics_base"} - {"base_regressor"})
+    allowed = sorted({*COMPILED, *(name + _BASE for name in REDUCIBLE)} - {"base_regressor"})
     valid = f"choose from {', '.join(allowed)}"
     for name in names:
         if name not in allowed:
             raise ModelError(f"functions: {name!r} cannot be exported; {valid}")
     if not names:
         raise ModelError(f"functions: none given; {valid}")
-    return tuple(_exported(robot, name, specialised, wrench) for name in names)
+    factors(robot, output)
+    if output != "force" and not {name.removesuffix(_BASE) for name in names} & set(DRIVEN):
+        raise ModelError(
+            f'output: "{output}" is what drives are told, but none of {", ".join(DRIVEN)} is '
+            "written; name one of them"
+        )
+    return tuple(_exported(robot, name, identified, specialised, wrench, output) for name in names)
 
 
-def _exported(robot: Manipulator, name: str, specialised: bool, wrench: bool) -> Exported:
-    base = cheapest_parameters(robot) if name == "inverse_dynamics_base" else None
-    what = "inverse_dynamics" if base else name
+def _exported(
+    robot: Manipulator,
+    name: str,
+    identified: Identified | None,
+    specialised: bool,
+    wrench: bool,
+    output: Output,
+) -> Exported:
+    what = name.removesuffix(_BASE)
     loaded = wrench and what in LOADED
-    given = program(robot, what, columns_of(base) if base else None, wrench=loaded)
+    base = (identified or Identified.of(robot)) if name.endswith(_BASE) else None
+    if base:
+        given = base_program(what, base, wrench=loaded, folded=specialised)
+    else:
+        given = program(robot, what, wrench=loaded)
+    if identified and "parameters" in {port.name for port in given.inputs}:
+        other = f"ask for {what + _BASE}" if what in REDUCIBLE else "leave it out"
+        raise ModelError(
+            f"functions: {name!r} takes every body's parameters, which identified base parameters "
+            f"do not tell; {other}, or export the model file that pteron identify wrote"
+        )
+    if what in DRIVEN:
+        given = in_units(given, robot, output)
     shared = [port.name for port in given.inputs if port.shared]
-    tables = tuple(_table(robot, name, base) for name in shared)
+    tables = tuple(_table(robot, port, base) for port in shared)
     fixed = {table.name: table.values for table in tables}
     if specialised:
         given, tables = with_values(given, fixed), ()
@@ -174,11 +188,16 @@ def _exported(robot: Manipulator, name: str, specialised: bool, wrench: bool) ->
         replace(port, name=f"{port.name}_out") if port.name in taken else port
         for port in given.outputs
     )
-    summary = _SUMMARIES.get(name, f"{what.replace('_', ' ')}, as pteron.{what}.".capitalize())
+    summary = SUMMARIES.get(what, f"{what.replace('_', ' ')}, as pteron.{what}.".capitalize())
+    if base:
+        summary = summary.replace(", from the inertial parameters", "") + " From base parameters."
     if name in ("direct_kinematics", "closure_poses"):
-        summary += _MODES + ("" if machine.closure.keeps_modes else _BRANCHES)
+        summary += MODES + ("" if machine.closure.keeps_modes else BRANCHES)
     elif "pose" in taken and not any(node.operation == "sqrt" for node in graph.nodes):
         summary += " It does not ask whether the legs reach."
+    meanings = {port.name: meaning(robot, port, output) for port in (*given.inputs, *outputs)}
+    if {"pose", "joints"} <= taken:
+        meanings["pose"] = f"near that of the joints, such as the last: {meanings['pose']}"
     return Exported(
         name,
         summary,
@@ -186,19 +205,20 @@ def _exported(robot: Manipulator, name: str, specialised: bool, wrench: bool) ->
         node_names(machine, given, graph, states[:3]),
         given.inputs,
         outputs,
-        {port.name: _meaning(robot, port) for port in (*given.inputs, *outputs)},
+        meanings,
         tables,
         tuple(_evaluated(given, graph, state) for state in states[1:]),
     )
 
 
-def _table(robot: Manipulator, name: str, base: BaseParameters | None) -> Table:
+def _table(robot: Manipulator, name: str, base: Identified | None) -> Table:
     """Return the machine's own numbers for a shared input."""
     if name == "drives":
-        return Table(name, _DRIVE_TABLE, drive_names(robot), drive_numbers(robot))
+        return Table(name, DRIVES, drive_names(robot), drive_numbers(robot))
     if base is not None:
-        return Table(name, _BASE_TABLE, base.expressions(digits=6), base.values())
-    return Table(name, _TABLE, parameter_names(robot), parameters(robot))
+        verdict = f" Verdict of the identification: {base.grade}." if base.grade else ""
+        return Table(name, BASE_PARAMETERS + verdict, base.comments, base.values)
+    return Table(name, PARAMETERS, parameter_names(robot), parameters(robot))
 
 
 def _states(
@@ -233,52 +253,3 @@ def _evaluated(given: Program, graph: Graph, inputs: list[Array]) -> Example:
     finite = np.isfinite(np.concatenate(computed))
     enough = finite.any() if given.name == "direct_kinematics" else finite.all()
     return Example(tuple(inputs), results, 0 if enough else 1)
-
-
-def banner(robot: Manipulator, language: str) -> list[str]:
-    """Return the lines that begin a generated file."""
-    what = f"{len(robot.legs)} legs, {robot.platform.motion}"
-    gravity = ", ".join(f"{g:g}" for g in robot.gravity)
-    # A name is the user's: it must not end the comment that it stands in.
-    name = "".join(c if c.isalnum() or c in " _-.," else "?" for c in " ".join(robot.name.split()))
-    return [
-        f"{name} ({what}): {language}, generated by Pteron {version('pteron')}.",
-        "",
-        f"SI units and radians; gravity ({gravity}) m/s^2 in the base frame.",
-        "Do not edit: change the machine's file and generate anew.",
-    ]
-
-
-def _meaning(robot: Manipulator, port: Port) -> str:
-    """Return what an input or an output means, with its unit."""
-    lengths = ", ".join(name for name in robot.platform.coordinates if name != "phi")
-    joints = _by_leg([leg.joint.unit for leg in robot.legs])
-    forces = _by_leg([leg.joint.force_unit for leg in robot.legs])
-    angle, rate, second, moment = (
-        (", phi in rad", ", rad/s", ", rad/s^2", ", N m about k")
-        if robot.platform.turns
-        else ("", "", "", "")
-    )
-    texts = {
-        "pose": f"platform pose: {lengths} in m{angle}",
-        "poses": f"poses by rows: {lengths} in m{angle}",
-        "found": f"platform pose that has the joint coordinates: {lengths} in m{angle}",
-        "velocity": f"the pose's rate: m/s{rate}",
-        "acceleration": f"the pose's acceleration: m/s^2{second}",
-        "joints": f"joint coordinates, {joints}",
-        "forces": f"actuator forces, {forces}, positive the way the joint coordinates grow",
-        "wrench": f"wrench on the platform at P: N{moment}",
-        "parameters": "inertial parameters, in kg, kg m and kg m^2",
-        "base_parameters": "base parameters; see the table of the same name",
-        "drives": "numbers of the drives; see the table of the same name",
-        "jacobian": "joint rates per unit of the platform's rates",
-        "regressor": "actuator forces per unit of each parameter",
-        "type_ii": "type-II measure: 0 at a singularity",
-        "type_i": "type-I measure of each leg: 0 where it is stretched or folded, 1 at best",
-        "margin": "from each leg to the edge of its reach, m; negative beyond it",
-    }
-    return texts.get(port.name.removesuffix("_out"), "")
-
-
-def _by_leg(units: Sequence[str]) -> str:
-    return units[0] if len(set(units)) == 1 else f"{', '.join(units)} (leg by leg)"

@@ -13,6 +13,7 @@ import casadi as ca
 import numpy as np
 
 from pteron.bodies.motion import Expression
+from pteron.equations.kinematics import platform_rates
 from pteron.equations.machine import Machine
 from pteron.kernels import Array, Graph, Program
 from pteron.kernels.graph import CONSTANT, INPUT, expression
@@ -38,6 +39,8 @@ def node_names(
     """
     symbols = given.function.sx_in()
     inputs = {port.name: symbol for port, symbol in zip(given.inputs, symbols, strict=True)}
+    results = zip(given.outputs, given.function.call(symbols), strict=True)
+    inputs |= {port.name: result.T for port, result in results if port.name == "found"}
     names, legs, scalars = [], [], []
     for name, leg, value in _quantities(machine, inputs):
         parts = ca.vertsplit(ca.densify(value))
@@ -54,8 +57,14 @@ def node_names(
 
 def _quantities(machine: Machine, inputs: dict[str, Expression]) -> Iterator[Quantity]:
     """Yield what may have a name, those that are preferred first."""
-    if "pose" in inputs:
-        rates = (inputs.get(name) for name in ("velocity", "acceleration"))
+    if "found" in inputs:  # the pose given is but where Newton's method begins
+        moving = [inputs.get(f"joint_{name}") for name in ("rates", "accelerations")]
+        pose = inputs["found"]
+        known = moving[0] is not None
+        rates = list(platform_rates(machine, pose, *moving)) if known else []
+        yield from _motion(machine, pose, *rates)
+    elif "pose" in inputs:
+        rates = [inputs.get(name) for name in ("velocity", "acceleration")]
         yield from _motion(machine, inputs["pose"], *rates)
     elif "joints" in inputs:
         joints = inputs["joints"]

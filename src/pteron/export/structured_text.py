@@ -13,8 +13,10 @@ from pathlib import Path
 from pteron.atomic import write_texts
 from pteron.equations.machine import closure_of
 from pteron.export.c import prefix_of
-from pteron.export.functions import Exported, banner, chosen, has_drives
+from pteron.export.descriptions import banner
+from pteron.export.functions import Exported, chosen
 from pteron.export.guards import INPUT_POWER, Names, Statements, element, power
+from pteron.export.outputs import Output
 from pteron.kernels import Graph, Port
 from pteron.kernels.code import rendered
 from pteron.manipulator import Manipulator
@@ -38,6 +40,8 @@ def export_st(
     *,
     specialised: bool = True,
     wrench: bool = False,
+    output: Output = "force",
+    base: str | Path | None = None,
 ) -> list[Path]:
     """Write function blocks in Structured Text for a machine, a file each.
 
@@ -53,15 +57,19 @@ def export_st(
         The machine; its name becomes the prefix of the blocks and the files.
     functions : sequence of str
         As for `export_c`; by default inverse kinematics and inverse dynamics, and `feed_forward`
-        of a machine with drives. For direct kinematics, `"closure_poses"` is written, whose poses
-        a leg may not reach, or `"direct_step"` where they have no closed form. Angles are computed
-        by ATAN2, which some controllers have in a library only.
+        and `joint_feed_forward` of a machine with drives. For direct kinematics, `"closure_poses"`
+        is written, whose poses a leg may not reach, or `"direct_step"` where they have no closed
+        form. Angles are computed by ATAN2, which some controllers have in a library only.
     folder : path
         Where; made if it is missing.
     specialised : bool
         Whether the machine's inertial parameters are folded in, instead of being an input.
     wrench : bool
         Whether inverse and forward dynamics take a wrench on the platform too.
+    output : {"force", "torque", "percent"}
+        As for `export_c`: what the functions of drives return.
+    base : path, optional
+        As for `export_c`: the identification.json whose values the code has.
 
     Returns
     -------
@@ -71,7 +79,9 @@ def export_st(
     Raises
     ------
     ModelError
-        If a function's name is unknown.
+        If a function's name is unknown, or `output` is; if a drive lacks what the output needs.
+    DataError
+        If `base` is no identification of this machine.
     OutputError
         If the folder cannot be written.
 
@@ -85,15 +95,20 @@ def export_st(
     """
     # A block is valid or not as a whole; but of two assembly modes one alone may be in reach.
     direct = "closure_poses" if closure_of(robot).closed_form else "direct_step"
-    if functions is None:
-        functions = (*_BLOCKS, *(["feed_forward"] if has_drives(robot) else []))
     names = [functions] if isinstance(functions, str) else functions
-    closures = [direct if name == "direct_kinematics" else name for name in names]
+    if names is not None:
+        names = [direct if name == "direct_kinematics" else name for name in names]
+    exported = chosen(
+        robot,
+        names,
+        usual=_BLOCKS,
+        specialised=specialised,
+        wrench=wrench,
+        output=output,
+        base=base,
+    )
     prefix = _camel(prefix_of(robot))
-    blocks = {
-        f"{prefix}_{_camel(item.name)}": item
-        for item in chosen(robot, closures, specialised=specialised, wrench=wrench)
-    }
+    blocks = {f"{prefix}_{_camel(item.name)}": item for item in exported}
     return write_texts(
         folder, {f"{name}.st": _block(robot, name, item) for name, item in blocks.items()}
     )

@@ -231,7 +231,7 @@ def _rotors(robot: Manipulator, fit: Sequence[Recording]) -> tuple[tuple[float, 
         return tuple(zip(description.rotor_inertia, description.ratio, strict=True))
     drives = [leg.drive or Drive() for leg in robot.legs]
     if any(drive.rotor_inertia for drive in drives):
-        return tuple((drive.rotor_inertia, drive.ratio) for drive in drives)
+        return tuple((drive.rotor_inertia, drive.gear) for drive in drives)
     return None
 
 

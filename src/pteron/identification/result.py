@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -86,23 +86,37 @@ class Identification:
         drives = [leg.drive or Drive() for leg in robot.legs]
         if self.rotors is not None:
             motors = zip(drives, self.rotors, strict=True)
-            drives = [replace(d, rotor_inertia=j, ratio=r) for d, (j, r) in motors]
-        for kind in ("coulomb", "viscous", "offset"):
-            found = self.model.per_joint(kind, self.estimate.values)
-            values = np.zeros(len(drives)) if found is None else found
-            if kind != "offset":
-                values = np.maximum(values, 0.0)  # below zero it is noise: no joint pushes itself
-            each = zip(drives, values.tolist(), strict=True)
-            drives = [replace(drive, **{kind: value}) for drive, value in each]
-        falls, speeds = self.model.per_joint("stribeck", self.estimate.values), None
-        if falls is not None and (speeds := self.model.stribeck_speeds) is not None:
-            laws = [
-                Stribeck(force, speed) if force > 0.0 else None
-                for force, speed in zip(falls.tolist(), speeds.tolist(), strict=True)
+            drives = [
+                d if (j, r) == (d.rotor_inertia, d.gear) else replace(d, rotor_inertia=j, ratio=r)
+                for d, (j, r) in motors
             ]
-            drives = [replace(d, stribeck=law) for d, law in zip(drives, laws, strict=True)]
-        legs = zip(robot.legs, drives, strict=True)
-        return replace(robot, legs=tuple(replace(leg, drive=drive) for leg, drive in legs))
+        each = zip(robot.legs, drives, self.friction, strict=True)
+        legs = [replace(leg, drive=replace(drive, **found)) for leg, drive, found in each]
+        return replace(robot, legs=tuple(legs))
+
+    @property
+    def friction(self) -> tuple[dict[str, Any], ...]:
+        """What `Drive` has of each joint's friction, as the fit found it."""
+        coulomb, viscous, falls = map(self._per_joint, ("coulomb", "viscous", "stribeck"))
+        offset = self._per_joint("offset", least=-np.inf)
+        speeds = self.model.stribeck_speeds
+        laws = [
+            Stribeck(force, speed) if force > 0.0 else None
+            for force, speed in zip(falls, falls if speeds is None else speeds, strict=True)
+        ]
+        return tuple(
+            {"coulomb": float(c), "viscous": float(v), "offset": float(o), "stribeck": law}
+            for c, v, o, law in zip(coulomb, viscous, offset, laws, strict=True)
+        )
+
+    def _per_joint(self, kind: str, least: float = 0.0) -> Array:
+        """Return a kind of term (n,), 0 where there is none.
+
+        Friction and inertia below zero are noise: no joint pushes itself.
+        """
+        values = self.model.per_joint(kind, self.estimate.values)
+        n = len(self.robot.legs)
+        return np.maximum(np.zeros(n) if values is None else values, least)
 
     @property
     def base_values(self) -> Array:
@@ -111,12 +125,28 @@ class Identification:
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything but samples and residuals as plain data."""
-        consistency = self.consistency
+        consistency, base = self.consistency, self.model.base
         return {
             "robot": self.robot.name,
             "verdict": self.verdict.as_dict(),
             "expressions": list(self.model.expressions),
+            "kinds": list(self.model.kinds),
             "left_out": list(self.model.left_out),
+            "base_parameters": {
+                "names": list(base.names),
+                "expressions": list(base.expressions(digits=12)),
+                "units": list(self.model.units[: base.rank]),
+                "values": self.base_values.tolist(),
+                "shared": sorted({p.legs for p in base.parameters if len(p.legs) > 1}),
+            },
+            "drives": [
+                {
+                    **friction,
+                    "stribeck": friction["stribeck"] and asdict(friction["stribeck"]),
+                    "inertia": float(inertia),
+                }
+                for friction, inertia in zip(self.friction, self._per_joint("rotor"), strict=True)
+            ],
             "estimate": self.estimate.as_dict(),
             "essential": {
                 "names": list(self.essential.names),

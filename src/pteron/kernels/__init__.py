@@ -10,6 +10,7 @@ from pteron.kernels.graph import Graph, graph_of
 from pteron.kernels.kernel import Array, Kernel, Port, as_array, count_operations
 from pteron.kernels.programs import (
     LOADED,
+    REDUCIBLE,
     Columns,
     Program,
     bare,
@@ -30,6 +31,7 @@ __all__ = [
     "FUNCTIONS",
     "LOADED",
     "OTHER_LAYOUT",
+    "REDUCIBLE",
     "Selects",
     "needs_of",
     "TARGETS",

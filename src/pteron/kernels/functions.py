@@ -162,9 +162,22 @@ def _forward_dynamics(m: Machine, v: Symbols) -> Outputs:
 
 def _drive_forces(m: Machine, v: Symbols, *, smooth: bool) -> Outputs:
     state = _state(m, v)
-    rigid = inverse_dynamics(m, state, v["parameters"], v.get("wrench"))
-    own = drives.drive_forces(state, drives.Drives.of(v["drives"]), smooth=smooth)
-    return {"forces": rigid + own}
+    carried = v.get("carried", True)
+    rigid = inverse_dynamics(m, state, v["parameters"], v.get("wrench"), carried=carried)
+    own = drives.Drives.of(v["drives"])
+    moving = drives.joint_motion(state)
+    return {"forces": rigid + drives.drive_forces(own, *moving, smooth=smooth)}
+
+
+def _joint_feed_forward(m: Machine, v: Symbols) -> Outputs:
+    moving = v["joint_rates"], v["joint_accelerations"]
+    found, _ = closing.direct_step(m, v["joints"], v["pose"], TYPE_II)
+    state = m.state(found, *kinematics.platform_rates(m, found, *moving))
+    rigid = inverse_dynamics(
+        m, state, v["parameters"], v.get("wrench"), carried=v.get("carried", True)
+    )
+    own = drives.drive_forces(drives.Drives.of(v["drives"]), *moving, smooth=True)
+    return {"forces": rigid + own, "found": found}
 
 
 def _drive_accelerations(m: Machine, v: Symbols) -> Outputs:
@@ -249,6 +262,10 @@ TABLE: dict[str, Entry] = {
     ),
     "feed_forward": Entry(
         (*_MOTION, "parameters", "drives"), partial(_drive_forces, smooth=True), _HELD
+    ),
+    "joint_feed_forward": Entry(
+        ("joints", "joint_rates", "joint_accelerations", "pose", "parameters", "drives"),
+        _joint_feed_forward,
     ),
     "drive_accelerations": Entry(
         (*_RATE, "forces", "parameters", "drives"), _drive_accelerations, _BENT

@@ -25,12 +25,12 @@ _HUGE = 1e75
 
 _TINY = 1e-300
 
-_REDUCIBLE = ("inverse_dynamics", "base_regressor")
-"""What may be asked for base parameters."""
+REDUCIBLE = ("inverse_dynamics", "drive_forces", "feed_forward", "joint_feed_forward")
+"""Forces, which may be asked for from base parameters."""
 
 LOADED = (
     *("inverse_dynamics", "forward_dynamics"),
-    *("drive_forces", "feed_forward", "drive_accelerations"),
+    *("drive_forces", "feed_forward", "joint_feed_forward", "drive_accelerations"),
 )
 """What may take a wrench on the platform as well."""
 
@@ -76,8 +76,9 @@ def program(
         raise ModelError(f"what: {what!r} cannot be compiled; choose from {', '.join(FUNCTIONS)}")
     if what == "base_regressor" and columns is None:
         raise ModelError('base: missing; "base_regressor" needs base=base_parameters(robot)')
-    if what not in _REDUCIBLE and columns is not None:
-        raise ModelError(f"base: {what!r} has no use for it; it goes with {', '.join(_REDUCIBLE)}")
+    if what not in (*REDUCIBLE, "base_regressor") and columns is not None:
+        useful = ", ".join((*REDUCIBLE, "base_regressor"))
+        raise ModelError(f"base: {what!r} has no use for it; it goes with {useful}")
     if what not in LOADED and wrench:
         raise ModelError(f"wrench: {what!r} has no use for it; it goes with {', '.join(LOADED)}")
     return _built(bare(robot), what, columns, wrench, guarded, plain)
@@ -188,14 +189,13 @@ def _program(
     entry = TABLE[what]
     asked = [name for name in entry.inputs if name not in (constants or {})]
     asked += ["wrench"] if wrench else []
-    asked.sort(key=lambda name: name in _SHARED)
     sizes = {
         "parameters": len(machine.parameters),
         "drives": len(Drives._fields) * machine.freedom,
     }
-    symbols = {name: ca.SX.sym(name, sizes.get(name, machine.freedom)) for name in asked} | (
-        extra or {}
-    )
+    given = {name: ca.SX.sym(name, sizes.get(name, machine.freedom)) for name in asked}
+    given |= extra or {}
+    symbols = {name: given[name] for name in sorted(given, key=_shared_last)}
     built = entry.build(machine, symbols | (constants or {}))
     outputs = {name: _shaped(output) for name, output in built.items()}
     if guarded:
@@ -215,6 +215,10 @@ def _program(
     )
     ports = tuple(Port(name, tuple(shape)) for name, (_, shape) in outputs.items())
     return Program(what, function, inputs, ports)
+
+
+def _shared_last(name: str) -> int:
+    return _SHARED.index(name) if name in _SHARED else -1
 
 
 def _shaped(output: Output) -> tuple[Expression, tuple[int, ...]]:

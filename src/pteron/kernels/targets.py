@@ -85,11 +85,12 @@ def compile(
         What executes it: CasADi's virtual machine, ready at once; Numba; the machine's C compiler,
         fastest, from Python too; JAX, which differentiates and runs on accelerators; fractions.
     base : BaseParameters, optional
-        For `"inverse_dynamics"`: compute from these base parameters alone, in the cheapest form
-        that they allow (see `pteron.cheapest_parameters`). For `"base_regressor"`: whose columns.
+        For `"inverse_dynamics"`, `"drive_forces"`, `"feed_forward"`, `"joint_feed_forward"`:
+        compute from these base parameters alone, in the cheapest form that they allow (see
+        `pteron.cheapest_parameters`). For `"base_regressor"`: whose columns.
     wrench : bool
-        For `"inverse_dynamics"` and `"forward_dynamics"`: whether a wrench on the platform is an
-        input too, after the state.
+        For these, `"forward_dynamics"` and `"drive_accelerations"`: whether a wrench on the
+        platform is an input too, after the state.
     grade : {"specialised", "parametric", "general"}
         What is folded into the code: all of the machine's numbers, for fewest operations; its
         geometry and gravity, so that inertial parameters are an input; or nothing, so that one

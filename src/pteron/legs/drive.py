@@ -43,8 +43,9 @@ class Drive:
         Friction, N, N s/m and N; at cranks N m, N m s and N m. A balancing spring is an offset.
     rotor_inertia : float
         Of the motor, about its own axis, with what turns with it, kg m^2.
-    ratio : float
-        Motor angle over the joint's coordinate, rad/m or rad/rad.
+    ratio : float, optional
+        Motor angle over the joint's coordinate, rad/m or rad/rad; left out, the motor turns, or
+        moves, as the joint does.
     rest_speed : float
         Half the width of the range of speeds within which dry friction changes its sign smoothly,
         m/s or rad/s.
@@ -60,7 +61,7 @@ class Drive:
     viscous: float = 0.0
     offset: float = 0.0
     rotor_inertia: float = 0.0
-    ratio: float = 1.0
+    ratio: float | None = None
     rest_speed: float = 1e-3
     stribeck: Stribeck | None = None
     rated_torque: float | None = None
@@ -70,15 +71,21 @@ class Drive:
     def __post_init__(self) -> None:
         _check(
             self,
-            free=("offset", "ratio"),
+            free=("offset",),
             least=("coulomb", "viscous", "rotor_inertia"),
             above=("rest_speed", "rated_torque", "max_force", "max_speed"),
+            nonzero=("ratio",),
         )
+
+    @property
+    def gear(self) -> float:
+        """The ratio, 1 where it is left out."""
+        return 1.0 if self.ratio is None else self.ratio
 
     @property
     def inertia(self) -> float:
         """The motor's inertia at the joint, ratio^2 rotor_inertia, kg or kg m^2."""
-        return self.ratio**2 * self.rotor_inertia
+        return self.gear**2 * self.rotor_inertia
 
 
 def _check(
@@ -86,12 +93,13 @@ def _check(
     free: tuple[str, ...] = (),
     least: tuple[str, ...] = (),
     above: tuple[str, ...] = (),
+    nonzero: tuple[str, ...] = (),
 ) -> None:
-    """Make a dataclass' fields floats: any, of at least zero, and above zero or None."""
+    """Make a dataclass' fields floats: any, at least zero, above zero or None, not zero or None."""
     faults: list[str] = []
-    for name in (*free, *least, *above):
+    for name in (*free, *least, *above, *nonzero):
         given = getattr(part, name)
-        if given is None and name in above:
+        if given is None and name in (*above, *nonzero):
             continue
         try:
             value = number(given, name)
@@ -101,8 +109,8 @@ def _check(
         object.__setattr__(part, name, value)
         if name in least and value < 0.0:
             faults.append(f"{name}: {value:g} given, 0 or more expected")
-        elif (name in above and value <= 0.0) or (name == "ratio" and value == 0.0):
-            wanted = "another number than 0" if name == "ratio" else "a number above 0"
+        elif (name in above and value <= 0.0) or (name in nonzero and value == 0.0):
+            wanted = "another number than 0" if name in nonzero else "a number above 0"
             faults.append(f"{name}: {value:g} given, {wanted} expected")
     if faults:
         raise ModelError(told(faults), faults=faults)

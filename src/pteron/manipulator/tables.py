@@ -64,8 +64,10 @@ class DriveTable(Table):
     rotor_inertia: Number = Field(
         0.0, description="of the motor and what turns with it, kg m^2", examples=[3e-5]
     )
-    ratio: Number = Field(
-        1.0, description="motor angle over the joint's coordinate, rad/m or rad/rad"
+    ratio: Number | None = Field(
+        None,
+        description="motor angle over the joint's coordinate, rad/m or rad/rad; 1 if left out",
+        examples=[392.7],
     )
     rest_speed: Number = Field(
         1e-3, description="within which dry friction changes its sign smoothly, m/s or rad/s"

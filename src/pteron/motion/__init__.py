@@ -1,6 +1,7 @@
-"""Motions of the platform: time laws, the pick-and-place cycle, and where the joints are."""
+"""Motions of the platform: time laws, the pick-and-place cycle, the joints, drives' limits."""
 
 from pteron.motion.joint_points import Guide, JointPoints, Part, joint_guides, joint_points
+from pteron.motion.overloads import overloads
 from pteron.motion.pick_and_place import Motion, PickAndPlace, pick_and_place
 from pteron.motion.scaling import scaled_to_reach
 
@@ -12,6 +13,7 @@ __all__ = [
     "PickAndPlace",
     "joint_guides",
     "joint_points",
+    "overloads",
     "pick_and_place",
     "scaled_to_reach",
 ]

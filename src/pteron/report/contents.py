@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pteron.dynamics import inverse_dynamics
+from pteron.dynamics import drive_forces
 from pteron.equations.machine import closure_of
 from pteron.kernels import Array, numeric
 from pteron.kinematics import jacobian, joint_rates, singular_orientations
@@ -19,6 +19,7 @@ from pteron.motion import (
     PickAndPlace,
     joint_guides,
     joint_points,
+    overloads,
     pick_and_place,
 )
 from pteron.plots import grid_step
@@ -40,6 +41,7 @@ from pteron.workspace import (
     reserve,
 )
 from pteron.workspace.doubts import doubts
+from pteron.workspace.drive_doubts import load_doubts
 from pteron.workspace.reach import Plane, slice_planes
 
 _SAMPLES = 481
@@ -111,10 +113,12 @@ class Report:
     """All that a page says about a machine; the cycle has T samples.
 
     The cycle keeps the reserve `least`; its forces and joint speeds (T, n) are in N and m/s, or
-    N m and rad/s. The slices go through the home pose and are all of one width. Of `orientations`
-    and `measures` there is what the type-II measure depends on; neither where J is constant. The
-    squares of the machine's pictures have sides of `grid`, m. `passive` has the passive joints
-    that have limits, at home.
+    N m and rad/s. The forces are what the drives must give, friction and the motors' inertia
+    included where the file tells of them (`driven`); `overloads` says which drives are exceeded.
+    The slices go through the home pose and are all of one width. Of `orientations` and `measures`
+    there is what the type-II measure depends on; neither where J is constant. The squares of the
+    machine's pictures have sides of `grid`, m. `passive` has the passive joints that have limits,
+    at home.
     """
 
     robot: Manipulator
@@ -129,6 +133,7 @@ class Report:
     grid: float
     forces: Array
     joint_speeds: Array
+    overloads: tuple[str, ...]
     joints: JointRanges
     passive: tuple[LimitedJoint, ...]
     slices: tuple[ReachSlice, ...]
@@ -138,6 +143,11 @@ class Report:
     measures: Measures | None
     base: BaseParameters
     costs: tuple[Cost, ...]
+
+    @property
+    def driven(self) -> bool:
+        """Whether the file tells of the drives."""
+        return any(leg.drive is not None for leg in self.robot.legs)
 
     @property
     def limited(self) -> bool:
@@ -170,11 +180,13 @@ def contents(robot: Manipulator) -> Report:
     volume = reach_volume(robot, home)
     base = base_parameters(robot)
     home_points, guides = joint_points(robot, home), joint_guides(robot, cycle.pose)
+    forces = drive_forces(robot, cycle.pose, cycle.velocity, cycle.acceleration, smooth=True)
+    speeds = joint_rates(robot, cycle.pose, cycle.velocity).actuated
     # Squares of one width, so that the pictures share a scale.
     half = (0.5 + _RIM) * float((volume.box[1] - volume.box[0]).max())
     return Report(
         robot=robot,
-        doubts=doubts(robot),
+        doubts=(*doubts(robot), *load_doubts(robot, home)),
         home=home,
         reserve=at_home,
         least=least,
@@ -183,8 +195,9 @@ def contents(robot: Manipulator) -> Report:
         home_points=home_points,
         guides=guides,
         grid=grid_step(home_points, guides),
-        forces=inverse_dynamics(robot, cycle.pose, cycle.velocity, cycle.acceleration),
-        joint_speeds=joint_rates(robot, cycle.pose, cycle.velocity).actuated,
+        forces=forces,
+        joint_speeds=speeds,
+        overloads=overloads(robot, forces, speeds),
         joints=joint_ranges(robot, cycle.pose),
         passive=tuple(joint for joint in limited_joints(robot, home) if not joint.actuated),
         slices=tuple(

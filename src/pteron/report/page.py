@@ -16,6 +16,7 @@ from pteron.bodies.inertia import Inertia, with_center
 from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.legs import LegKind
+from pteron.legs.drive_rows import drive_rows
 from pteron.manipulator import Manipulator
 from pteron.plots import (
     forces_figure,
@@ -66,6 +67,7 @@ def page(report: Report) -> str:
         legs=range(len(robot.legs)),
         kinds=kinds(robot),
         geometry=geometry(robot),
+        drives=drive_rows(robot.legs),
         bodies=bodies(robot),
         letters=_letters(robot),
         reasons=_reasons(robot),
@@ -223,7 +225,8 @@ def _figures(report: Report) -> dict[str, Any]:
         if robot.platform.turns
         else "",
     )
-    label = f"actuator {force([leg.joint for leg in robot.legs]).axis}"
+    whose = "drive" if report.driven else "actuator"
+    label = f"{whose} {force([leg.joint for leg in robot.legs]).axis}"
     half = cycle.duration / 2.0
     forces = forces_figure(cycle.time, report.forces, turning_point=half, ylabel=label)
     made: dict[str, Any] = {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tempfile
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -76,6 +77,7 @@ def numbers(report: Report) -> dict[str, Any]:
         "motion": robot.platform.motion,
         "coordinates": list(robot.coordinates),
         "joints": [vars(leg.joint) for leg in robot.legs],
+        "drives": [asdict(leg.drive) if leg.drive else None for leg in robot.legs],
         "elbows": [leg.elbow for leg in robot.legs],
         "gravity": list(robot.gravity),
         "tool": list(robot.platform.tool),
@@ -110,6 +112,8 @@ def numbers(report: Report) -> dict[str, Any]:
             "velocity": cycle.velocity.tolist(),
             "acceleration": cycle.acceleration.tolist(),
             "forces": report.forces.tolist(),
+            "with_drives": report.driven,
+            "overloads": list(report.overloads),
             "peak_forces": report.peak_forces.tolist(),
             "rms_forces": report.rms_forces.tolist(),
             "peak_speeds": report.peak_speeds.tolist(),

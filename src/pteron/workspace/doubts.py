@@ -14,6 +14,7 @@ from pteron.legs import LegKind
 from pteron.manipulator import Manipulator
 from pteron.manipulator.manipulator import told_legs
 from pteron.platforms import Platform
+from pteron.workspace.drive_doubts import drive_doubts
 
 _LARGE = 10.0
 """Length, m, beyond which millimetres are likelier."""
@@ -58,7 +59,7 @@ def doubts(robot: Manipulator) -> tuple[str, ...]:
     axis = platform.axis if platform.turns and not platform.slides else None
     for i, leg in enumerate(robot.legs, start=1):
         own = () if i in far else _leg_doubts(leg)
-        found += [f"leg {i}: {text}" for text in (*own, *leg.doubts(axis))]
+        found += [f"leg {i}: {text}" for text in (*own, *leg.doubts(axis), *drive_doubts(leg))]
     if axis is not None:
         found += _turning_offsets(robot.legs, axis)
     return tuple(found)

@@ -1,0 +1,310 @@
+"""From a log to a running machine: excite, record, identify, export, and run the C on the machine.
+
+The machine is simulated in MuJoCo (`plant`), up to 20 % off what was drawn, with dry friction that
+sticks at rest. It records an exciting motion and a pick-and-place cycle under a controller that
+knows the drawing and no friction; encoders and forces are noisy. The fit is exported to C, which is
+compiled, and asked two things: what the drives must give over the held-out cycle, against the noisy
+record of what they gave; and to run the machine, beside feedback of position and rate, which is
+free of noise and delay.
+
+It prints a table for each; `--quick` has a shorter recording, of the Delta alone.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import plant
+
+import pteron
+from pteron.identification import Identification, Log, identify, preprocessing_of
+from pteron.identification.excitation import FourierMotion, Limits, optimal_excitation
+from pteron.identification.observation import in_motion
+from pteron.identification.signals import samples
+from pteron.kernels import Array
+from pteron.kernels.c import compiler
+from pteron.motion import pick_and_place
+from pteron.motion.cycle import Cycle
+from pteron.report.identification import numbers
+
+BANDWIDTH = 2.0 * np.pi * 10.0
+"""Of the feedback that the cycle is run with, rad/s: 10 Hz, both poles there, with the masses that
+the drawing has at the joints."""
+
+_NOISE = 0.01
+"""Of each force's root mean square."""
+
+_JITTER = 1e-5
+_REST = 0.2
+"""Between two cycles, s."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A machine of the catalog, with what brakes its joints and how they may move."""
+
+    name: str
+    friction: plant.Friction
+    encoder: float
+    """m or rad."""
+    limits: Limits
+
+
+CASES = (
+    Case(
+        "quadrupteron",
+        plant.Friction((6.0, 7.0, 8.0, 9.0), (4.0, 5.0, 6.0, 7.0), (0.0, 0.3, 0.6, 0.9)),
+        1e-6,
+        Limits(speed=0.8, acceleration=8.0),
+    ),
+    Case(
+        "delta",
+        plant.Friction((4.0, 4.3, 4.6), (1.0, 1.1, 1.2), (0.0, 0.1, 0.2)),
+        2.0 * np.pi / 2**20,
+        Limits(speed=6.0, acceleration=80.0),
+    ),
+)
+
+
+@dataclass(frozen=True)
+class Excited:
+    """An exciting motion as a reference of the joints."""
+
+    motion: FourierMotion
+
+    def __call__(self, time: Array) -> tuple[Array, Array, Array]:
+        """Return joint coordinates, rates and accelerations, (T, n) each."""
+        joints: tuple[Array, Array, Array] = self.motion.joints(time)
+        return joints
+
+    def __hash__(self) -> int:
+        return id(self)
+
+
+@dataclass(frozen=True)
+class Cycles:
+    """Pick-and-place cycles with a rest between them, as a reference of the joints."""
+
+    robot: pteron.Manipulator
+
+    @property
+    def duration(self) -> float:
+        """Of a cycle, s."""
+        return self._whole.duration
+
+    @property
+    def _whole(self) -> pteron.motion.PickAndPlace:
+        return pick_and_place(self.robot, pteron.workspace.home_pose(self.robot))
+
+    def __call__(self, time: Array) -> tuple[Array, Array, Array]:
+        """Return joint coordinates, rates and accelerations, (T, n) each."""
+        robot, whole = self.robot, self._whole
+        home = pteron.workspace.home_pose(robot)
+        turn = whole.turn / whole.scale
+        cycle = Cycle(robot.platform, home, whole.across, whole.up, turn, whole.scale)
+        along = np.minimum(np.mod(time, whole.duration + _REST) / whole.duration, 1.0)
+        pose, velocity, acceleration = cycle.at(along)
+        state = pose, velocity / whole.duration, acceleration / whole.duration**2
+        return (
+            pteron.inverse_kinematics(robot, pose),
+            pteron.joint_rates(robot, *state[:2]).actuated,
+            pteron.joint_accelerations(robot, *state).actuated,
+        )
+
+
+class Controller:
+    """The exported C, compiled: what the drives must give, of a motion of the joints.
+
+    It is called sample by sample, each with the pose that the last one found.
+    """
+
+    def __init__(self, robot: pteron.Manipulator, base: Path, folder: Path) -> None:
+        """Export, compile and load `joint_feed_forward_base`, with its tables as they are."""
+        name = "joint_feed_forward_base"
+        files = pteron.export_c(robot, name, folder, base=base, specialised=True)
+        command = compiler()
+        assert command is not None, "a C compiler is needed"
+        library, source = folder / "controller.so", files[1]
+        flags = ["-std=c99", "-O2", "-shared", "-fPIC"]
+        subprocess.run([*command, *flags, str(source), "-o", str(library), "-lm"], check=True)
+        self._called = getattr(ctypes.CDLL(str(library)), f"{source.stem}_{name}")
+        self._robot = robot
+
+    def __call__(self, joints: Array, rates: Array, accelerations: Array) -> Array:
+        """Return the forces (T, n) of joint coordinates, rates and accelerations (T, n)."""
+        motion = [np.ascontiguousarray(part) for part in (joints, rates, accelerations)]
+        pose = np.array(pteron.workspace.home_pose(self._robot))
+        pose = np.array(pteron.follow(self._robot, joints[:1], pose)[0])
+        found, forces = pose.copy(), np.empty_like(motion[0])
+        addresses = [part.ctypes.data for part in (*motion, forces)]
+        for k in range(len(forces)):
+            *given, out = (address + k * forces.strides[0] for address in addresses)
+            inputs = (ctypes.c_void_p(address) for address in (*given, pose.ctypes.data, out))
+            if self._called(*inputs, ctypes.c_void_p(found.ctypes.data)) != 0:
+                raise ValueError(f"sample {k}: the joints have no pose next to the last")
+            pose[:] = found
+        return forces
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What the chain gave for a machine."""
+
+    found: Identification
+    prediction: Array
+    """Error of the C's forces over the noise of the recorded ones (n,) on the held-out cycle, from
+    the motion of the machine, where joints move."""
+    everywhere: Array
+    """The same over all samples (n,), those at which dry friction holds a joint among them."""
+    sensed: Array
+    """The same where joints move, from rates and accelerations as the encoders tell them."""
+    left_out: float
+    """The greatest share of samples at which a joint hardly moves."""
+    tracking: dict[str, Array]
+    """Root mean square of the joints' errors (n,), m or rad, by what the controller feeds
+    forward."""
+
+    @property
+    def gains(self) -> Array:
+        """How many times better each joint follows with the exported C than with PD alone."""
+        return np.asarray(self.tracking["nothing"] / self.tracking["exported C"])
+
+
+def run(case: Case, folder: Path, *, duration: float, seconds: float, cycles: int) -> Outcome:
+    """Go the whole way with a machine.
+
+    The exciting motion, whose search takes `seconds`, is recorded for `duration` s.
+    """
+    drawn = pteron.load(case.name)
+    built, n = plant.as_built(drawn), drawn.freedom
+
+    # Excite
+    motion = optimal_excitation(
+        drawn, limits=case.limits, seconds=seconds, draws=20, starts=4, workers=1
+    ).motion
+    exciting, placing = Excited(motion), Cycles(drawn)
+    length = cycles * (placing.duration + _REST)
+
+    # Record: the controller has the drawing, and knows of no friction
+    recordings = {
+        name: plant.simulate(
+            built, reference, case.friction, duration=length, drawn=drawn, compensation=0.0
+        )
+        for name, reference, length in (
+            ("exciting motion", exciting, duration),
+            ("pick-and-place cycle", placing, length),
+        )
+    }
+    seen = {
+        name: plant.measured(
+            one, encoder=case.encoder, force=_NOISE, jitter=_JITTER, seed=len(name)
+        )
+        for name, one in recordings.items()
+    }
+    log, held_out = (Log(name, one.time, one.joints, one.forces) for name, one in seen.items())
+
+    # Identify
+    found = identify(drawn, log, held_out=held_out)
+    path = folder / "identification.json"
+    path.write_text(json.dumps(numbers(found)), encoding="utf-8")
+
+    # Export, and predict the held-out cycle
+    controller, noise = Controller(drawn, path, folder), seen["pick-and-place cycle"].noise
+    preprocessing = preprocessing_of(drawn, held_out)
+    true = recordings["pick-and-place cycle"]
+    moving = in_motion(true.rates, preprocessing.slow, preprocessing.turning)
+    off = (controller(true.joints, true.rates, true.accelerations) - held_out.forces) / noise
+    (block,) = samples(drawn, held_out, preprocessing)
+    states, forces = block.states.part(block.fresh), block.forces[block.fresh]
+    known = in_motion(states.joint_rates, preprocessing.slow, preprocessing.turning)
+    by_encoders = controller(states.joints, states.joint_rates, states.joint_accelerations)
+
+    # Run the machine with it
+    tracking = {}
+    for name, feed_forward in (
+        ("nothing", lambda q, dq, ddq: np.zeros((len(q), n))),
+        ("the drawing", None),
+        ("exported C", controller),
+    ):
+        followed = plant.simulate(
+            built,
+            placing,
+            case.friction,
+            duration=length,
+            drawn=drawn,
+            compensation=0.0,
+            bandwidth=BANDWIDTH,
+            feed_forward=feed_forward,
+        )
+        behind = followed.joints - placing(followed.time)[0]
+        tracking[name] = np.sqrt((behind**2).mean(axis=0))
+    return Outcome(
+        found,
+        _rms(off, moving),
+        _rms(off),
+        _rms((by_encoders - forces) / noise, known),
+        float((1.0 - moving.mean(axis=0)).max()),
+        tracking,
+    )
+
+
+def _rms(values: Array, counted: Array | float = 1.0) -> Array:
+    """Return the root mean square of columns (T, n), of what counts."""
+    return np.asarray(
+        np.sqrt((counted * values**2).sum(axis=0) / (counted + 0 * values).sum(axis=0))
+    )
+
+
+def main() -> None:
+    """Print what each machine's chain gave."""
+    quick = "--quick" in sys.argv[1:]
+    cases = CASES[1:] if quick else CASES
+    duration, seconds, cycles = (5.0, 2.0, 1) if quick else (20.0, 20.0, 3)
+    print(
+        f"{duration:g} s of an exciting motion at 1 kHz are recorded, and a pick-and-place cycle; "
+        f"force noise {100 * _NOISE:g} %,\njitter 10 us, encoders 1 um (20 bits a turn on cranks). "
+        f"Feedback while tracking: {BANDWIDTH / (2 * np.pi):g} Hz, K_p = m w^2,\nK_d = 2 m w, m of "
+        "the drawing. The machine is up to 20 % off the drawing, and its friction sticks.\n"
+    )
+    outcomes = {}
+    for case in cases:
+        with tempfile.TemporaryDirectory() as folder:
+            outcomes[case.name] = run(
+                case, Path(folder), duration=duration, seconds=seconds, cycles=cycles
+            )
+    print(
+        "Forces of the held-out cycle by the compiled C, worst joint: error over the noise of the "
+        "sensors,\nwhere joints move, for dry friction holds them with any force else. By "
+        "encoders: rates\nand accelerations are differences of noisy positions, as for the "
+        "verdict; their noise is added"
+    )
+    print(
+        f"{'':<14}{'verdict':<16}{'error':>12}{'left out':>10}{'with these':>12}{'by encoders':>14}"
+    )
+    for name, one in outcomes.items():
+        print(
+            f"{name:<14}{one.found.verdict.grade:<16}{one.prediction.max():>12.2f}"
+            f"{one.left_out:>10.0%}{one.everywhere.max():>12.2f}{one.sensed.max():>14.2f}"
+        )
+    print("\nTracking of that cycle: root mean square error of all joints (um or urad)")
+    print(f"{'feed-forward:':<14}{'nothing':>12}{'the drawing':>14}{'exported C':>14}", end="")
+    print(f"{'better than nothing':>24}{'worst joint':>14}")
+    for name, one in outcomes.items():
+        size = {key: float(np.sqrt((rms**2).mean())) for key, rms in one.tracking.items()}
+        cells = [f"{1e6 * size[key]:.0f}" for key in size]
+        gain = size["nothing"] / size["exported C"]
+        print(
+            f"{name:<14}{cells[0]:>12}{cells[1]:>14}{cells[2]:>14}{gain:>22.1f} x"
+            f"{one.gains.min():>12.1f} x"
+        )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,171 @@
+"""Base parameters for exported code: a machine's own, or those that `pteron identify` found.
+
+They are the set that `pteron identify` prints, in its order and units, whatever the code computes
+with: another base set costs fewer operations, and one follows from the other by a constant matrix.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from pteron.errors import DataError, ModelError
+from pteron.kernels import Array, Port, Program, columns_of, count_operations, program
+from pteron.kernels import specialised as with_values
+from pteron.kernels.passes import optimised
+from pteron.legs import Drive, Stribeck
+from pteron.manipulator import Manipulator
+from pteron.reduction import BaseParameters, base_parameters, cheapest_parameters
+
+_NAME = "base_parameters"
+
+
+@dataclass(frozen=True)
+class Identified:
+    """Base parameters with values, and the machine with the drives that go with them."""
+
+    robot: Manipulator
+    base: BaseParameters
+    values: Array
+    comments: tuple[str, ...]
+    """What each value is, and its unit."""
+    grade: str = ""
+    """The verdict of the identification."""
+
+    @classmethod
+    def of(cls, robot: Manipulator) -> Identified:
+        """Return those of a machine as its file has it."""
+        base = base_parameters(robot)
+        return cls(robot, base, base.values(), _comments(base, base.expressions()))
+
+
+def read_identified(robot: Manipulator, path: str | Path) -> Identified:
+    """Read what `pteron identify` found of a machine: base parameters, friction, offsets.
+
+    What a drive's file says of the motor and its limits stays; a rotor's inertia is in the base
+    parameters that it joins, or among the values.
+
+    Raises
+    ------
+    DataError
+        If the file cannot be read, is none of `pteron identify`, belongs to another machine, or has
+        values that exported code has no place for.
+    """
+    data = _object(path)
+    try:
+        known, drives, kinds = data[_NAME], data["drives"], data["kinds"]
+        names, expressions = known["names"], known["expressions"]
+        values = np.array(known["values"], dtype=float)
+        found = [_drive(one) for one in drives]
+        all_names, told = data["estimate"]["names"], [str(one) for one in data["expressions"]]
+        if not (np.isfinite(values).all() and len(told) >= len(values)):
+            raise ValueError("values are missing")
+        groups = [tuple(group) for group in known["shared"]]
+        grade = re.sub(r"[^a-z ]", "?", str(data["verdict"]["grade"])[:40])
+    except (KeyError, TypeError, ValueError) as error:
+        raise DataError(
+            f"{path}: not an identification.json of this version of pteron identify "
+            f"({type(error).__name__}: {error}); run it again"
+        ) from None
+    if passive := [n for n, kind in zip(all_names, kinds, strict=False) if kind == "passive"]:
+        raise DataError(
+            f"{path}: {', '.join(passive)}: friction of passive joints, which exported code has no "
+            "place for; identify again without --joints"
+        )
+    try:
+        base = base_parameters(robot, shared=groups or False)
+        same = list(base.names) == names and list(base.expressions(digits=12)) == expressions
+    except ModelError:
+        same = False
+    if not same or len(found) != robot.freedom or values.shape != (base.rank,):
+        raise DataError(
+            f"{path}: base parameters of another machine ({str(data.get('robot'))[:60]!r}), not of "
+            f"{robot.name!r}: names or groupings differ; give the robot that was identified"
+        )
+    return Identified(_driven(robot, found), base, values, _comments(base, told), grade)
+
+
+def _object(path: str | Path) -> dict[str, Any]:
+    try:
+        data = json.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise DataError(f"{path}: {error.strerror or error}") from None
+    except (ValueError, RecursionError):
+        raise DataError(
+            f"{path}: no JSON; give the identification.json that pteron identify writes"
+        ) from None
+    return data if isinstance(data, dict) else {}
+
+
+def _drive(found: dict[str, Any]) -> Drive:
+    """Return a joint's friction and its rotor's inertia, as at a ratio of 1."""
+    law = found["stribeck"] and Stribeck(found["stribeck"]["force"], found["stribeck"]["speed"])
+    friction = found["coulomb"], found["viscous"], found["offset"]
+    return Drive(*friction, rotor_inertia=found["inertia"], stribeck=law)
+
+
+def _driven(robot: Manipulator, found: list[Drive]) -> Manipulator:
+    """Return a machine with the friction and the rotors' inertia that were found."""
+    legs = []
+    for leg, new in zip(robot.legs, found, strict=True):
+        old = leg.drive or Drive()
+        drive = replace(
+            old,
+            coulomb=new.coulomb,
+            viscous=new.viscous,
+            offset=new.offset,
+            stribeck=new.stribeck,
+            rotor_inertia=new.rotor_inertia / old.gear**2,
+        )
+        legs.append(replace(leg, drive=drive))
+    return replace(robot, legs=tuple(legs))
+
+
+def _comments(base: BaseParameters, expressions: Sequence[str]) -> tuple[str, ...]:
+    """Return what stands beside the values; a file's text must not end the comment it stands in."""
+    units = (base.parameters[k].unit for k in base.kept)
+    safe = (
+        "".join(c if c.isascii() and c.isprintable() and c != "*" else "?" for c in text)
+        for text in expressions
+    )
+    return tuple(f"{text}, {unit}" for text, unit in zip(safe, units, strict=False))
+
+
+def base_program(what: str, given: Identified, *, wrench: bool, folded: bool) -> Program:
+    """Return a function of base parameters; with `folded`, of their values.
+
+    Of the machine's base set and of the one that costs least, it computes with the one that needs
+    fewer operations in all.
+    """
+    robot, base = given.robot, given.base
+    cheapest = cheapest_parameters(robot)
+    own, other = (program(robot, what, columns_of(one), wrench=wrench) for one in (base, cheapest))
+    # Forces of base parameters b are those of the inertial parameters selection b.
+    matrix = cheapest.grouping @ base.selection
+    forms = [own, _recombined(other, matrix)]
+    if folded:
+        forms = [
+            with_values(own, {_NAME: given.values}),
+            with_values(other, {_NAME: matrix @ given.values}),
+        ]
+    return min(forms, key=lambda form: count_operations(form.function))
+
+
+def _recombined(given: Program, matrix: Array) -> Program:
+    """Return a program of the base parameters b that one of matrix @ b makes."""
+    place = next(k for k, port in enumerate(given.inputs) if port.name == _NAME)
+    symbols, ports = given.function.sx_in(), list(given.inputs)
+    symbols[place] = ca.SX.sym(_NAME, matrix.shape[1])
+    ports[place] = Port(_NAME, matrix.shape[1:], shared=True)
+    taken = list(symbols)
+    taken[place] = ca.mtimes(ca.sparsify(ca.SX(ca.DM(matrix))), symbols[place])
+    names = [port.name for port in ports], [port.name for port in given.outputs]
+    function = ca.Function(given.name, symbols, given.function.call(taken), *names)
+    return Program(given.name, optimised(function), tuple(ports), given.outputs)

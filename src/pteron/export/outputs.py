@@ -1,0 +1,86 @@
+"""What the drives are told: forces at the joints, torques of the motors, or per cent of rated."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal, get_args
+
+import casadi as ca
+
+from pteron.errors import ModelError
+from pteron.kernels import Program
+from pteron.legs import Drive
+from pteron.manipulator import Manipulator
+
+Output = Literal["force", "torque", "percent"]
+
+DRIVEN = ("drive_forces", "feed_forward", "joint_feed_forward")
+"""The functions whose forces are those of the drives."""
+
+NAMES = {"force": "forces", "torque": "motor_torques", "percent": "percent_of_rated"}
+"""How the output is called."""
+
+_NEEDS = {"force": (), "torque": ("ratio",), "percent": ("ratio", "rated_torque")}
+"""What it takes of every drive."""
+
+
+def factors(robot: Manipulator, output: Output) -> tuple[float, ...]:
+    """Return what each joint's force is multiplied by.
+
+    A motor whose angle is `ratio` times the joint's coordinate gives force / ratio: friction and
+    the rotor's inertia are at the joint already.
+
+    Raises
+    ------
+    ModelError
+        If a leg's drive does not say what is needed; it names the first leg and key.
+    """
+    if output not in get_args(Output):
+        raise ModelError(f"output: {output!r} is not one of {', '.join(get_args(Output))}")
+    found = []
+    for i, leg in enumerate(robot.legs, start=1):
+        drive = leg.drive or Drive()
+        for key in _NEEDS[output]:
+            if getattr(drive, key) is None:
+                raise ModelError(
+                    f'leg {i}: drive.{key}: missing, but output "{output}" needs it of every leg; '
+                    f"{_HINTS[key]}"
+                )
+        factor = 1.0 if output == "force" else 1.0 / drive.gear
+        found.append(factor * (100.0 / (drive.rated_torque or 1.0) if output == "percent" else 1.0))
+    return tuple(found)
+
+
+_HINTS = {
+    "ratio": "it is how far the motor turns per metre or radian of the joint, 1 for direct drives",
+    "rated_torque": "it stands on the motor's plate, N m",
+}
+
+
+def in_units(given: Program, robot: Manipulator, output: Output) -> Program:
+    """Return a program whose forces are what the drives are told."""
+    if output == "force":
+        return given
+    symbols, ports = given.function.sx_in(), list(given.outputs)
+    results = given.function.call(symbols)
+    place = next(k for k, port in enumerate(ports) if port.name == NAMES["force"])
+    ports[place] = replace(ports[place], name=NAMES[output])
+    scale = ca.reshape(ca.DM(factors(robot, output)), results[place].shape)
+    results[place] = results[place] * scale
+    names = [port.name for port in given.inputs], [port.name for port in ports]
+    function = ca.Function(given.name, symbols, results, *names)
+    return Program(given.name, function, given.inputs, tuple(ports))
+
+
+def told_meaning(robot: Manipulator, output: Output) -> str:
+    """Return what the drives are told, with its unit and where it comes from."""
+    drives = [leg.drive or Drive() for leg in robot.legs]
+    ratios = _listed([drive.gear for drive in drives])
+    if output == "torque":
+        return f"torques of the motors, N m: forces at the joints over the ratios {ratios}"
+    rated = _listed([drive.rated_torque or 0.0 for drive in drives])
+    return f"per cent of the motors' rated torques, {rated} N m, by the ratios {ratios}"
+
+
+def _listed(values: list[float]) -> str:
+    return f"{values[0]:g}" if len(set(values)) == 1 else ", ".join(f"{v:g}" for v in values)

@@ -1,0 +1,74 @@
+"""What drives the joints, as a table that people read: a row for each quantity, a text a leg."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pteron.legs.drive import Drive, Stribeck
+from pteron.legs.kind import LegKind
+
+_QUANTITIES = (
+    ("dry friction", "coulomb", "{force}"),
+    ("more of it at rest", "stribeck.force", "{force}"),
+    ("which is gone by", "stribeck.speed", "{rate}"),
+    ("viscous friction", "viscous", "{damping}"),
+    ("offset", "offset", "{force}"),
+    ("smooth below", "rest_speed", "{rate}"),
+    ("ratio", "ratio", "rad/{joint}"),
+    ("rotor, at the motor", "rotor_inertia", "kg m^2"),
+    ("rotor, at the joint", "inertia", "{inertia}"),
+    ("rated torque", "rated_torque", "N m"),
+    ("greatest force", "max_force", "{force}"),
+    ("greatest speed", "max_speed", "{rate}"),
+)
+"""Names, where a `Drive` has them, and units."""
+
+
+def drive_rows(legs: Sequence[LegKind]) -> list[tuple[str, list[str]]]:
+    """Return what the legs' drives are; "-" where one has it not, no row if none has.
+
+    Where all legs have one unit it stands with the name.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from dataclasses import replace
+    >>> legs = pteron.load("five-bar").legs
+    >>> for row in drive_rows([replace(legs[0], drive=pteron.Drive(coulomb=3.0)), legs[1]]):
+    ...     print(row)
+    ('dry friction (N m)', ['3', '-'])
+    ('smooth below (rad/s)', ['0.001', '-'])
+    """
+    rows = []
+    for name, place, unit in _QUANTITIES:
+        values = [_value(leg.drive, place) for leg in legs]
+        if any(values):
+            units = [unit.format(**_units(leg)) for leg in legs]
+            one = len(set(units)) == 1
+            texts = [
+                f"{value:.4g}{'' if one else f' {own}'}" if value else "-"
+                for value, own in zip(values, units, strict=True)
+            ]
+            rows.append((f"{name} ({units[0]})" if one else name, texts))
+    return rows
+
+
+def _value(drive: Drive | None, place: str) -> float | None:
+    """Return a number of a drive, by where it has it."""
+    if drive is None or (place == "rest_speed" and not (drive.coulomb or drive.stribeck)):
+        return None
+    found: Drive | Stribeck | float | None = drive
+    for name in place.split("."):
+        found = getattr(found, name, None)
+    return found if isinstance(found, float) else None
+
+
+def _units(leg: LegKind) -> dict[str, str]:
+    slides = leg.joint.unit == "m"
+    return {
+        "joint": leg.joint.unit,
+        "force": leg.joint.force_unit,
+        "rate": f"{leg.joint.unit}/s",
+        "damping": "N s/m" if slides else "N m s",
+        "inertia": "kg" if slides else "kg m^2",
+    }

@@ -1,0 +1,55 @@
+"""Where a motion asks more of the drives than they can do."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pteron.legs import Drive
+from pteron.manipulator import Manipulator
+
+
+def overloads(robot: Manipulator, forces: ArrayLike, speeds: ArrayLike) -> tuple[str, ...]:
+    """Return which drives a motion exceeds, one line each; nothing where a leg has no limit.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine; limits are each drive's `max_force` and `max_speed`.
+    forces : array, shape (..., n)
+        Of the drives, such as `drive_forces` returns: friction and motors count. N, N m.
+    speeds : array, shape (..., n)
+        Of the joints, m/s or rad/s.
+
+    Returns
+    -------
+    tuple of str
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from dataclasses import replace
+    >>> from pteron.motion import overloads
+    >>> robot = pteron.load("tripteron")
+    >>> legs = [replace(leg, drive=pteron.Drive(max_force=20.0)) for leg in robot.legs]
+    >>> overloads(replace(robot, legs=legs), [[3.0, -25.0, 8.0]], [[0.1, 0.2, 0.3]])
+    ('leg 2: the motion takes up to 25 N, but its drive gives 20 N (max_force)',)
+    """
+    found = []
+    peaks = [np.abs(np.atleast_2d(v)).reshape(-1, robot.freedom) for v in (forces, speeds)]
+    # Rows that no pose serves are NaN.
+    force, speed = (np.fmax.reduce(values, axis=0, initial=0.0) for values in peaks)
+    for i, leg in enumerate(robot.legs):
+        drive = leg.drive or Drive()
+        unit, rate = leg.joint.force_unit, f"{leg.joint.unit}/s"
+        if drive.max_force is not None and force[i] > drive.max_force:
+            found.append(
+                f"leg {i + 1}: the motion takes up to {force[i]:.4g} {unit}, but its drive gives "
+                f"{drive.max_force:g} {unit} (max_force)"
+            )
+        if drive.max_speed is not None and speed[i] > drive.max_speed:
+            found.append(
+                f"leg {i + 1}: the motion takes up to {speed[i]:.4g} {rate}, but its drive gives "
+                f"{drive.max_speed:g} {rate} (max_speed)"
+            )
+    return tuple(found)

@@ -1,0 +1,70 @@
+"""docs/from-log-to-controller.md: its commands run, in order, and its C is what the model says."""
+
+import ctypes
+import re
+import runpy
+import shlex
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import pteron
+from pteron.cli.main import app
+from pteron.kernels.c import compiler
+
+ROOT = Path(__file__).parent.parent
+PAGE = (ROOT / "docs" / "from-log-to-controller.md").read_text(encoding="utf-8")
+COMMANDS = re.findall(r"(?m)^    ((?:pteron|python|cc|cp|controller/test)\b.*)$", PAGE)
+
+
+def done(line, monkeypatch, capsys):
+    """Run a line of the page and return what it prints; it is for the folder of a clone."""
+    program, *words = shlex.split(line)
+    if program == "pteron":
+        result = CliRunner().invoke(app, words)
+        assert result.exit_code == 0, f"{line}\n{result.stderr}"
+        return result.stdout
+    if program == "python":
+        monkeypatch.setattr("sys.argv", words)
+        runpy.run_path(str(ROOT / words[0]), run_name="__main__")
+        return capsys.readouterr().out
+    command = {"cc": compiler(), "cp": ["cp"]}.get(program, [f"./{program}"])
+    return subprocess.run([*command, *words], capture_output=True, text=True, check=True).stdout
+
+
+def test_the_whole_way(tmp_path, monkeypatch, capsys):
+    if compiler() is None:
+        pytest.skip("no C compiler")
+    monkeypatch.chdir(tmp_path)
+    printed = {line: done(line, monkeypatch, capsys) for line in COMMANDS}
+    assert len(printed) == 13
+    assert printed["controller/test"] == "all functions agree with the library\n"
+    verdicts = [text for line, text in printed.items() if line.startswith("pteron identify")]
+    assert all(text.startswith("my delta: trustworthy") for text in verdicts)
+
+    # The C of the page, against the model file: real bodies have the values of the page's list.
+    (code,) = re.findall(r"(?s)```c\n(.*?)```", PAGE)
+    Path("loop.c").write_text(code, encoding="utf-8")
+    files = ["loop.c", "controller/my_delta.c", "-Icontroller", "-lm", "-o", "loop.so"]
+    flags = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC"]
+    subprocess.run([*compiler(), *flags, *files], check=True)
+    called = ctypes.CDLL("./loop.so").fed_forward
+    robot = pteron.load("result/my_delta.toml")
+    home = pteron.workspace.home_pose(robot)
+    assert "Home pose: (0, 0, -1)" in printed["pteron check robot.toml"]
+    np.testing.assert_array_equal(home, [0.0, 0.0, -1.0])
+    cycle = pteron.motion.pick_and_place(robot, home, samples=51)
+    state = cycle.pose, cycle.velocity, cycle.acceleration
+    motion = (
+        pteron.inverse_kinematics(robot, cycle.pose),
+        pteron.joint_rates(robot, *state[:2]).actuated,
+        pteron.joint_accelerations(robot, *state).actuated,
+    )
+    expected, found = pteron.drive_forces(robot, *state, smooth=True), np.empty(3)
+    for k, row in enumerate(expected):
+        inputs = [ctypes.c_void_p(np.ascontiguousarray(part[k]).ctypes.data) for part in motion]
+        assert called(*inputs, ctypes.c_void_p(found.ctypes.data)) == 0
+        np.testing.assert_allclose(found, row, rtol=0, atol=1e-6 * np.abs(expected).max())
