@@ -260,8 +260,9 @@ def recorded(name: str, fault: str, seed: int, *, other: bool = False) -> tuple[
     size = np.sqrt((case.forces**2).mean(axis=0))
     forces = case.forces + _NOISE * size * noise(fault, case.forces.shape, case.rng)
     coded = np.round(case.joints / usual.encoder) * usual.encoder
-    names = {"symbols": tuple(leg.joint for leg in motion.robot.legs)}
-    return Log("held-out.csv" if other else "log.csv", time, coded, forces, **names), case
+    source = "held-out.csv" if other else "log.csv"
+    symbols = tuple(leg.joint for leg in motion.robot.legs)
+    return Log(source, time, coded, forces, symbols=symbols), case
 
 
 @dataclass(frozen=True)
