@@ -19,8 +19,8 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from scipy.interpolate import interp1d
-from scipy.signal import lfilter
+from scipy.interpolate import interp1d  # type: ignore[import-untyped]
+from scipy.signal import lfilter  # type: ignore[import-untyped]
 
 import pteron
 from pteron import atomic
@@ -75,7 +75,7 @@ class Case:
     @property
     def actuator(self) -> int:
         """The actuator that a fault of one is of."""
-        return self.seed % self.forces.shape[1]
+        return int(self.seed % self.forces.shape[1])
 
 
 def as_built(name: str, seed: int) -> pteron.Manipulator:
@@ -210,10 +210,10 @@ def noise(fault: str, shape: tuple[int, int], rng: np.random.Generator) -> Array
     """Return noise of unit variance, coloured if that is the case, or with outliers."""
     white = rng.normal(size=shape)
     if fault == "coloured noise":
-        return lfilter([np.sqrt(1.0 - 0.9**2)], [1.0, -0.9], white, axis=0)
+        return np.asarray(lfilter([np.sqrt(1.0 - 0.9**2)], [1.0, -0.9], white, axis=0))
     if fault == "1 % outliers":
         sizes = rng.uniform(10.0, 60.0, shape) * rng.choice((-1.0, 1.0), shape)
-        return white + (rng.random(shape) < 0.01) * sizes
+        return np.asarray(white + (rng.random(shape) < 0.01) * sizes)
     return white
 
 
