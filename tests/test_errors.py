@@ -1,5 +1,6 @@
 """What cannot be served: which error, what it says, and NaN in its place where asked for."""
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -84,6 +85,16 @@ def test_an_unreachable_pose_names_leg_shortfall_and_index(name):
         "pose[17]: leg 1 misses it by 0.001 m: its links span 0.02 to 0.426 m across direction; "
         "move the pose towards the legs' reach"
     )
+
+
+def test_an_error_crosses_to_another_process_whole():
+    robot = pteron.load("delta")
+    with pytest.raises(pteron.UnreachablePose) as caught:
+        pteron.inverse_kinematics(robot, [5.0, 0.0, 0.0])
+    again = pickle.loads(pickle.dumps(caught.value))
+    assert type(again) is pteron.UnreachablePose
+    assert str(again) == str(caught.value)
+    assert vars(again) == vars(caught.value)
 
 
 def test_a_crank_that_does_not_reach_says_what_rod_and_crank_span():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from reprlib import Repr
+from typing import Any
 
 _LONGEST = 60
 _brief = Repr()
@@ -26,6 +27,16 @@ class PteronError(ValueError):
         super().__init__(f"{subject}: {message}" if subject else message)
         self.message = message
         self.subject = subject
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Errors cross to other processes; most ask for more than what `args` has.
+        return _restored, (type(self), self.args, self.__dict__)
+
+
+def _restored(kind: type[PteronError], args: tuple[Any, ...], state: dict[str, Any]) -> PteronError:
+    error = kind.__new__(kind, *args)
+    error.__dict__.update(state)
+    return error
 
 
 class ModelError(PteronError):
