@@ -102,7 +102,9 @@ class Bench:
         late = JITTER * np.clip(rng.normal(size=(len(self.time), 1)), -3.0, 3.0)
         joints = self.joints
         if encoder > 0.0:
-            joints = encoder * np.round((joints + late * self.rates) / encoder)
+            # The steps lie elsewhere each time, as those of a machine that was referenced anew.
+            zero = encoder * rng.uniform(size=joints.shape[1])
+            joints = encoder * np.round((joints + late * self.rates - zero) / encoder) + zero
         white = rng.normal(size=self.forces.shape)
         noise = lfilter([np.sqrt(1.0 - memory**2)], [1.0, -memory], white, axis=0)
         noise *= FORCE_NOISE * np.sqrt((self.forces**2).mean(axis=0))

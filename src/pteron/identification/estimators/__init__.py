@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from pteron.identification.estimators.essential import Essential, essential_parameters
 from pteron.identification.estimators.estimate import Estimate, Whiteness, whiteness
+from pteron.identification.estimators.instrumental import halves, instrumental
 from pteron.identification.estimators.least_squares import huber, ordinary, weighted
 from pteron.identification.estimators.likelihood import maximum_likelihood
 from pteron.identification.estimators.qr import QrFactor, qr_factor
@@ -18,7 +19,9 @@ __all__ = [
     "Whiteness",
     "column_errors",
     "essential_parameters",
+    "halves",
     "huber",
+    "instrumental",
     "maximum_likelihood",
     "ordinary",
     "qr_factor",
