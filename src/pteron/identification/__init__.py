@@ -11,6 +11,7 @@ from pteron.identification.errors import LogError
 from pteron.identification.estimators import (
     Essential,
     Estimate,
+    Reduced,
     column_errors,
     essential_parameters,
     halves,
@@ -18,6 +19,7 @@ from pteron.identification.estimators import (
     instrumental,
     maximum_likelihood,
     ordinary,
+    reduced,
     total,
     weighted,
 )
@@ -36,6 +38,7 @@ from pteron.identification.model import Model, Terms, identification_model
 from pteron.identification.observation import Observations, observations_of, stacked
 from pteron.identification.payload import Payload, identify_payload
 from pteron.identification.prediction import Prediction
+from pteron.identification.regressor import Fit, estimate
 from pteron.identification.result import Identification
 from pteron.identification.signals import Preprocessing, Processing, States, preprocessing_of
 from pteron.identification.verdict import Verdict
@@ -48,6 +51,7 @@ __all__ = [
     "Essential",
     "Estimate",
     "Excitation",
+    "Fit",
     "FourierMotion",
     "Identification",
     "Limits",
@@ -59,6 +63,7 @@ __all__ = [
     "Prediction",
     "Preprocessing",
     "Processing",
+    "Reduced",
     "States",
     "Suspicion",
     "Terms",
@@ -67,6 +72,7 @@ __all__ = [
     "column_errors",
     "consistent_model",
     "essential_parameters",
+    "estimate",
     "halves",
     "huber",
     "identification_model",
@@ -82,6 +88,7 @@ __all__ = [
     "preprocessing_of",
     "random_excitation",
     "read_log",
+    "reduced",
     "stacked",
     "total",
     "weighted",

@@ -8,6 +8,7 @@ from pteron.identification.estimators.instrumental import halves, instrumental
 from pteron.identification.estimators.least_squares import huber, ordinary, weighted
 from pteron.identification.estimators.likelihood import maximum_likelihood
 from pteron.identification.estimators.qr import QrFactor, qr_factor
+from pteron.identification.estimators.reduction import Reduced, reduced
 from pteron.identification.estimators.total import column_errors, total
 from pteron.identification.observation import Observations
 
@@ -16,6 +17,7 @@ __all__ = [
     "Essential",
     "Estimate",
     "QrFactor",
+    "Reduced",
     "Whiteness",
     "column_errors",
     "essential_parameters",
@@ -25,6 +27,7 @@ __all__ = [
     "maximum_likelihood",
     "ordinary",
     "qr_factor",
+    "reduced",
     "total",
     "weighted",
     "whiteness",
