@@ -122,7 +122,7 @@ def _autoregression(lagged: Array, rows: int) -> Noise:
     """Return the noise with autocovariances (K, n) over these lags, each actuator for itself."""
     most = 1.0 - 1.0 / np.sqrt(rows)  # beyond it memory is as long as the whole
     polynomials, sizes = [], []
-    for g in lagged.T:
+    for g in lagged.T.copy():
         if g[0] <= 0.0:
             polynomials.append(np.ones(1))
             sizes.append(0.0)
