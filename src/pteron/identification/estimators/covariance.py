@@ -51,14 +51,16 @@ class Noise:
     polynomials: tuple[Array, ...]
     root: Array
 
-    def sum_covariance(self, matrix: Array) -> Array:
-        """Return the covariance (p, p) of W^T e for rows W (R, n, p)."""
+    def sum_covariance(self, matrix: Array, weights: Array | float = 1.0) -> Array:
+        """Return the covariance (p, p) of W^T e for rows W (R, n, p) times weights (R, n)."""
         p = matrix.shape[-1]
+        factors = np.broadcast_to(weights, matrix.shape[:2])
         states = [np.zeros((len(one) - 1, p)) for one in self.polynomials]
         total = np.zeros((p, p))
         # What a row's innovation adds depends on the rows after it: from the last to the first.
         for stop in range(len(matrix), 0, -_BLOCK):
-            rows = matrix[max(stop - _BLOCK, 0) : stop][::-1]
+            block = slice(max(stop - _BLOCK, 0), stop)
+            rows = (matrix[block] * factors[block, :, None])[::-1]
             passed = np.empty(rows.shape)
             for i, one in enumerate(self.polynomials):
                 passed[:, i], states[i] = lfilter([1.0], one, rows[:, i], axis=0, zi=states[i])
@@ -78,7 +80,12 @@ class Noise:
         return np.stack(columns, axis=1)
 
 
-def noise_of(matrix: Array, residuals: Array, used: NDArray[np.bool_]) -> Noise:
+def noise_of(
+    matrix: Array,
+    residuals: Array,
+    used: NDArray[np.bool_],
+    weights: Array | float = 1.0,
+) -> Noise:
     """Return the noise that has left such residuals after a fit.
 
     With H the projection on W, residuals of noise of covariance C have (I - H) C (I - H): they are
@@ -87,18 +94,22 @@ def noise_of(matrix: Array, residuals: Array, used: NDArray[np.bool_]) -> Noise:
     Parameters
     ----------
     matrix : array, shape (R, n, p)
-        The weighted rows W of the fit, in the order of time.
+        The rows W of the fit, in the order of time.
     residuals : array, shape (R, n)
         Its weighted residuals.
     used : array of bool, shape (R, n)
         Which equations there are; rows and residuals of the others are 0.
+    weights : array, shape (R, n), or float
+        What the fit has multiplied the rows with.
     """
     counts = np.maximum(_lagged(used[..., None].astype(float)), 1.0)
     found = _lagged(residuals[..., None])
     rows, n, p = matrix.shape
     if used.sum() >= _FEW * p:
         return _shared(_autoregression(found / counts, rows), residuals, used)
-    columns = np.linalg.qr(matrix.reshape(-1, p))[0].reshape(rows, n, p)  # H = X X^T
+    factors = np.broadcast_to(weights, used.shape)
+    weighted = (matrix * factors[..., None]).reshape(-1, p)
+    columns = np.linalg.qr(weighted)[0].reshape(rows, n, p)  # H = X X^T
     noise = Noise((np.ones(1),) * n, np.diag(np.sqrt(found[0] / counts[0])))
     for _ in range(_ROUNDS):
         times = noise.times(columns) * used[..., None]

@@ -204,9 +204,9 @@ def estimate_of(
     noise = np.sqrt((rest**2).sum(axis=0) / np.maximum(observations.used, 1) / share)
     bread = factor.inverse() if inverse is None else inverse
     rows = observations.matrix if instruments is None else instruments
-    rows = rows * np.expand_dims(weights, -1)
     pulled = weights * rest if pull is None else pull
-    middle = noise_of(rows, pulled, observations.gain > 0.0).sum_covariance(rows)
+    found = noise_of(rows, pulled, observations.gain > 0.0, weights)
+    middle = found.sum_covariance(rows, weights)
     covariance = bread @ (middle + beside) @ bread.T
     return Estimate(
         method,
