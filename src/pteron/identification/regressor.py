@@ -22,8 +22,8 @@ from pteron.identification.estimators import (
 from pteron.identification.estimators.reduction import Reduced, reduced
 from pteron.identification.observation import Observations
 from pteron.identification.prediction import FRICTION, Prediction
-from pteron.identification.result import Verdict, verdict_of
 from pteron.identification.signals.filters import white_noise
+from pteron.identification.verdict import Verdict, verdict_of
 from pteron.kernels import Array
 
 _FITTED = 0.7
@@ -319,6 +319,9 @@ def _prediction(check: Observations, estimate: Estimate, *, repeats: bool) -> Pr
         error=error,
         error_without_friction=bare,
         error_of_all=error,
+        # Which of filtered samples stand out nobody knows.
+        robust_error=error,
+        outliers=np.zeros_like(error),
         noise=noise,
         time=check.time,
         measured=check.forces,
