@@ -9,7 +9,7 @@ import pytest
 
 from pteron.errors import DataError, ModelError
 from pteron.identification import estimate, ordinary, reduced, weighted
-from pteron.identification.regressor import given
+from pteron.identification.given import given
 
 ARM = Path(__file__).parent.parent / "examples" / "serial_arm.py"
 TRUE = np.array([2.0, -1.0, 0.5])
