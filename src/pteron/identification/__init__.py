@@ -2,7 +2,8 @@
 
 `identify` does all of it. Its parts can be used by themselves: `logs` reads, `signals` turns
 samples into states, `observations_of` stacks the regressor, `estimators` solve, `consistency` finds
-real bodies, `excitation` makes the motions worth recording. `estimate` takes a regressor of any robot.
+real bodies, `excitation` makes the motions worth recording. `estimate` takes a regressor of any
+robot.
 """
 
 from pteron.identification.consistency import Bounds, Consistency, consistent_model
