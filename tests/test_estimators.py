@@ -1,13 +1,14 @@
 """Estimators on equations made by hand: values, what they say of their errors, what they refuse."""
 
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from logs_of_motions import log_of, truth
 from mechanisms import CATALOG
+from scipy.signal import lfilter
 from scipy.stats import binom
 
 from pteron.errors import DataError
@@ -15,7 +16,9 @@ from pteron.identification.estimators import (
     ESTIMATORS,
     column_errors,
     essential_parameters,
+    halves,
     huber,
+    instrumental,
     maximum_likelihood,
     ordinary,
     qr_factor,
@@ -23,6 +26,7 @@ from pteron.identification.estimators import (
     weighted,
     whiteness,
 )
+from pteron.identification.estimators.covariance import Noise, noise_of
 from pteron.identification.model import identification_model
 from pteron.identification.observation import Observations, observations_of
 from pteron.identification.signals import Processing, preprocessing_of
@@ -95,12 +99,10 @@ def test_ordinary_is_that_of_numpy():
     estimate = ordinary(equations)
     assert estimate.values == pytest.approx(expected, rel=1e-11)
     covariance = rest[0] / (len(flat) - P) * np.linalg.inv(flat.T @ flat)
-    # Only ever enlarged, for correlation in time, and one value as the other.
-    larger = estimate.deviations / np.sqrt(np.diag(covariance))
-    assert (larger > 1.0 - 1e-9).all()
-    assert larger.max() < 1.5
-    assert larger.min() < 1.0 + 1e-9
-    assert estimate.covariance == pytest.approx(covariance * np.outer(larger, larger), rel=1e-9)
+    # White noise here: what little correlation in time it seems to have changes little.
+    assert estimate.deviations == pytest.approx(np.sqrt(np.diag(covariance)), rel=0.15)
+    size = np.sqrt(np.diag(covariance))
+    assert estimate.correlation == pytest.approx(covariance / np.outer(size, size), abs=0.1)
     assert estimate.condition == pytest.approx(np.linalg.cond(flat / np.linalg.norm(flat, axis=0)))
     assert estimate.residuals == pytest.approx(equations.forces - equations.matrix @ expected)
 
@@ -184,8 +186,8 @@ def test_rows_that_are_not_used_count_for_nothing(estimator):
     one, other = estimator(whole), estimator(holed)
     assert other.rows == one.rows == 300
     assert other.values == pytest.approx(one.values, rel=1e-9)
-    assert other.correlation == pytest.approx(one.correlation, rel=1e-7)
     # Holes move rows apart in time, where their correlation is looked for.
+    assert other.correlation == pytest.approx(one.correlation, abs=0.05)
     assert other.deviations == pytest.approx(one.deviations, rel=0.3)
     assert other.noise == pytest.approx(one.noise, rel=1e-9)
 
@@ -265,6 +267,19 @@ def test_huber_takes_half_of_the_equations_being_exact():
     assert huber(equations.with_forces(forces)).values == pytest.approx(TRUE, abs=0.2)
 
 
+MIX = np.eye(P)
+MIX[0, 1], MIX[2, 3] = 20.0, 0.15
+"""What makes column 1 all but column 0, and column 3 all but column 2, beside what is their own."""
+
+BASE = np.linalg.solve(np.diag([1, 0.05, 1, 0.01, 1, 1]) + MIX - np.eye(P), TRUE)
+
+
+def alike(equations):
+    """Return equations of which two pairs of columns hang together; the truth is `BASE`."""
+    mixed = equations.matrix @ (np.diag([1, 0.05, 1, 0.01, 1, 1]) + MIX - np.eye(P))
+    return replace(equations, matrix=np.ascontiguousarray(mixed))
+
+
 def coloured(seed, memory=0.8):
     rng = np.random.default_rng(seed)
     noise = rng.normal(size=(400, 3))
@@ -286,6 +301,81 @@ def test_coloured_noise_is_seen_and_allowed_for(estimator):
     # The offset feels it most; what white noise would say of it holds not even two times in three.
     assert (np.abs(errors[:, 5]) < 1.96).mean() > 0.85
     assert (np.abs(errors) < 1.96).mean() > 0.92
+
+
+@pytest.mark.parametrize("estimator", [ordinary, weighted, huber])
+def test_regions_hold_the_truth(estimator):
+    # Two pairs of columns are all but the same: what is known of each single one says little.
+    for made_by in (partial(drawn, rows=200), coloured):
+        estimates = [estimator(alike(made_by(seed))) for seed in range(DRAWS)]
+        held = [one.p_value(BASE) >= 0.05 for one in estimates]
+        assert 0.88 <= np.mean(held) <= 0.99
+        squares = [one.distance(BASE) ** 2 for one in estimates]
+        assert np.mean(squares) == pytest.approx(P, rel=0.2)
+
+
+def test_noise_that_actuators_share_is_allowed_for():
+    errors, held = [], []
+    for seed in range(DRAWS):
+        rng = np.random.default_rng(seed)
+        equations = drawn(seed, noise=0.1)
+        shared = rng.normal(size=(len(equations.forces), 1))
+        estimate = weighted(equations.with_forces(equations.forces + shared))
+        errors.append((estimate.values - TRUE) / estimate.deviations)
+        held.append(estimate.p_value(TRUE) >= 0.05)
+    assert (np.abs(errors) < 1.96).mean() == pytest.approx(0.95, abs=0.03)
+    assert 0.88 <= np.mean(held) <= 0.99
+
+
+def dense(noise, rows):
+    """Return the covariance (R n, R n) of noise, row by row: inverse filters as matrices."""
+    n = len(noise.root)
+    total = np.zeros((rows, n, rows, n))
+    responses = []
+    for polynomial in noise.polynomials:
+        band = np.zeros((rows, rows))
+        for k, value in enumerate(polynomial):
+            band += value * np.eye(rows, k=-k)
+        responses.append(np.linalg.inv(band))
+    for i, j in np.ndindex(n, n):
+        share = (noise.root @ noise.root.T)[i, j]
+        total[:, i, :, j] = share * responses[i] @ responses[j].T
+    return total.reshape(rows * n, rows * n)
+
+
+NOISE = Noise(
+    (np.array([1.0, -0.6, 0.2]), np.array([1.0, 0.3]), np.ones(1)),
+    np.array([[1.0, 0.0, 0.0], [0.4, 2.0, 0.0], [-0.2, 0.1, 0.5]]),
+)
+
+
+def test_the_noise_of_a_sum_is_that_of_its_dense_covariance():
+    matrix = regressor(40)
+    covariance = dense(NOISE, 40)
+    flat = matrix.reshape(-1, P)
+    assert NOISE.sum_covariance(matrix) == pytest.approx(flat.T @ covariance @ flat, rel=1e-10)
+    assert NOISE.times(matrix).reshape(-1, P) == pytest.approx(covariance @ flat, rel=1e-10)
+    # Whatever the blocks.
+    long = regressor(9000)
+    ends = NOISE.sum_covariance(long[:40]), NOISE.sum_covariance(np.r_[long[:40], 0.0 * long[40:]])
+    assert ends[0] == pytest.approx(ends[1], rel=1e-10)
+
+
+@pytest.mark.parametrize(("memory", "rows"), [(0.0, 12), (0.5, 40)])
+def test_what_a_fit_has_taken_of_the_noise_is_given_back(memory, rows):
+    matrix = regressor(rows)
+    flat = matrix.reshape(-1, P)
+    left = np.eye(len(flat)) - flat @ np.linalg.pinv(flat)
+    noise = Noise((np.array([1.0, -memory]),) * 3, np.diag([1.0, 2.0, 0.5]))
+    root = np.linalg.cholesky(dense(noise, rows))
+    rng = np.random.default_rng(0)
+    found, used = [], np.ones((rows, 3), dtype=bool)
+    for _ in range(300):
+        rest = (left @ root @ rng.normal(size=len(flat))).reshape(rows, 3)
+        found.append(np.diag(noise_of(matrix, rest, used).sum_covariance(matrix)))
+    expected = np.diag(noise.sum_covariance(matrix))
+    # Without it a sixth and more would be missing.
+    assert np.mean(found, axis=0) == pytest.approx(expected, rel=0.12)
 
 
 def test_white_noise_is_called_white_as_often_as_it_should():
@@ -367,6 +457,94 @@ def test_noise_in_every_column_explains_all_or_nothing():
     equations = made(rng.normal(size=(400, 2, P)), rng.normal(size=(400, 2)))
     estimate = total(equations)
     assert (np.abs(estimate.values) < 5.0 * estimate.deviations).all()
+
+
+# Instrumental variables
+
+
+def measured_twice(seed, noise=0.1):
+    """Return two regressors with noise of their own on the columns, and the same noisy forces."""
+    rng = np.random.default_rng(seed)
+    matrix = regressor(400)
+    forces = matrix @ TRUE + noise * rng.normal(size=(400, 3))
+    first, second = (matrix + ERRORS * rng.normal(size=matrix.shape) for _ in range(2))
+    return made(first, forces), made(second, forces)
+
+
+@pytest.mark.parametrize("mutual", [False, True])
+def test_instruments_take_out_the_bias_of_noisy_columns(mutual):
+    plain, found, errors = [], [], []
+    for seed in range(DRAWS):
+        one, other = measured_twice(seed)
+        estimate = instrumental(one, other, mutual=mutual)
+        assert estimate.converged
+        plain.append(ordinary(one).values - TRUE)
+        found.append(estimate.values - TRUE)
+        errors.append(found[-1] / estimate.deviations)
+    # Chance alone makes mean errors of 0.1 standard deviations.
+    assert np.abs(np.mean(errors, axis=0)).max() < 0.4
+    assert (np.abs(errors) < 1.96).mean() > 0.92
+    bias, deviations = np.mean(plain, axis=0), np.std(found, axis=0)
+    assert np.abs(bias[:2] / deviations[:2]).max() > 0.8
+
+
+def test_the_regressor_as_its_own_instrument_is_weighted_least_squares():
+    equations = drawn(2, noise=np.array([0.1, 1.0, 5.0]))
+    one, other = instrumental(equations, equations), weighted(equations)
+    assert one.values == pytest.approx(other.values, rel=1e-3)
+    assert one.covariance == pytest.approx(other.covariance, rel=1e-2, abs=1e-9)
+
+
+def test_a_simulated_model_gives_instruments_until_its_values_settle():
+    one, _ = measured_twice(0)
+    asked = []
+
+    def simulated(values):
+        # States that are off as far as the values are: instruments need only be near.
+        asked.append(values)
+        return made(regressor(400) * (1.0 + 0.1 * (values - TRUE)), np.zeros((400, 3)))
+
+    estimate = instrumental(one, simulated)
+    assert estimate.converged
+    assert len(asked) == estimate.iterations > 1
+    assert asked[0] == pytest.approx(ordinary(one).values)
+    expected = instrumental(one, made(regressor(400), np.zeros((400, 3))))
+    assert (np.abs(estimate.values - expected.values) < 0.1 * expected.deviations).all()
+    assert not instrumental(one, simulated, iterations=1).converged
+
+
+def test_rows_without_an_instrument_are_left_out():
+    one, other = measured_twice(0)
+    used = np.ones((400, 3), dtype=bool)
+    used[100:150, 1] = False
+    part = instrumental(one, made(other.matrix, other.forces, used=used))
+    assert part.rows == 1150
+    assert not part.residuals[100:150, 1].any()
+
+
+def test_instruments_of_another_shape_are_refused():
+    one, _ = measured_twice(0)
+    with pytest.raises(DataError, match=r"instruments: shape \(399, 3, 6\) given"):
+        instrumental(one, made(one.matrix[1:], one.forces[1:]))
+
+
+def test_halves_of_the_samples_are_instruments_of_each_other():
+    robot = CATALOG["tripteron"]
+    model = identification_model(robot)
+    plain = log_of(robot, rate=1000.0, duration=6.0, harmonics=3, period=2.0, seed=2)
+    rng = np.random.default_rng(0)
+    log = replace(plain, joints=plain.joints + 1e-5 * rng.normal(size=plain.joints.shape))
+    log = replace(log, forces=log.forces + 0.05 * rng.normal(size=log.forces.shape))
+    # A cut-off that lets much noise through to the accelerations.
+    treatment = preprocessing_of(robot, log, Processing(cutoff=40.0, band=20.0))
+    one, other = halves(model, log, treatment)
+    inertia = [k for k, kind in enumerate(model.kinds) if kind == "base"]
+    found = instrumental(one, other, mutual=True)
+    standard = (found.values - truth(model)) / found.deviations
+    assert (np.abs(standard) < 4.0).all()
+    biased = weighted(observations_of(model, log, treatment))
+    off = np.abs((biased.values - truth(model)) / biased.deviations)[inertia]
+    assert np.abs(standard[inertia]).max() < 0.5 * off.max()
 
 
 # Refusals
@@ -470,6 +648,30 @@ def experiment(joint_noise, seed=0, derivatives="periodic"):
         equations=observations_of(model, log, treatment),
         truth=truth(model),
     )
+
+
+@pytest.mark.parametrize("name", ["quadrupteron", "tripteron", "delta"])
+def test_intervals_and_regions_of_logs_hold_the_truth(name):
+    # The whole table: benchmarks/identification/regions.py.
+    robot = CATALOG[name]
+    model = identification_model(robot)
+    values, count = truth(model), 12
+    motion = {"rate": 500.0, "harmonics": 6, "period": 2.5, "duration": 10.0, "seed": 2}
+    plain = log_of(robot, **motion)
+    size = 0.01 * np.sqrt((plain.forces**2).mean(axis=0))
+    single, distances = [], []
+    for seed in range(count):
+        rng = np.random.default_rng(seed)
+        noise = lfilter([0.8], [1.0, -0.6], rng.normal(size=plain.forces.shape), axis=0)
+        positions = plain.joints + 1e-6 * rng.normal(size=plain.joints.shape)
+        log = replace(plain, joints=positions, forces=plain.forces + size * noise)
+        estimate = weighted(observations_of(model, log, preprocessing_of(robot, log)))
+        low, high = estimate.intervals()
+        single.append(((low <= values) & (values <= high)).mean())
+        distances.append(estimate.distance(values) ** 2)
+    assert np.mean(single) > 0.9  # values hang together: 12 repetitions say little of single ones
+    # Chi-square of p degrees: the mean of 12 is within 0.25 p in 99 cases of 100, and more.
+    assert np.mean(distances) / len(values) == pytest.approx(1.0, abs=0.25)
 
 
 def test_errors_of_columns_grow_with_the_noise():

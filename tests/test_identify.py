@@ -205,7 +205,9 @@ def test_a_periodic_log_is_divided_at_its_periods():
     assert found.verdict.grade == "trustworthy"
 
 
-@pytest.mark.parametrize("estimator", ["ordinary", "weighted", "huber", "total", "likelihood"])
+@pytest.mark.parametrize(
+    "estimator", ["ordinary", "weighted", "huber", "total", "instrumental", "likelihood"]
+)
 def test_every_estimator_serves(estimator):
     found = identify(CATALOG["tripteron"], noisy(CATALOG["tripteron"]), estimator=estimator)
     errors = found.estimate.values - truth(found.model)

@@ -30,8 +30,10 @@ from pteron.identification import (
     Observations,
     Preprocessing,
     column_errors,
+    halves,
     huber,
     identification_model,
+    instrumental,
     maximum_likelihood,
     observations_of,
     ordinary,
@@ -103,6 +105,7 @@ NOISE = (
     (1e-6, FORCE_NOISE),
     (1e-5, 0.01),
     (1e-5, 0.05),
+    (5e-5, 0.01),
     (1e-4, 0.01),
     (5e-4, 0.01),
 )
@@ -122,6 +125,9 @@ ESTIMATORS: dict[str, Estimator] = {
     "huber": lambda model, log, treatment, equations: huber(equations),
     "total": lambda model, log, treatment, equations: total(
         equations, column_errors(model, log, treatment)
+    ),
+    "instrumental": lambda model, log, treatment, equations: instrumental(
+        *halves(model, log, treatment), mutual=True
     ),
     "likelihood": lambda model, log, treatment, equations: maximum_likelihood(
         model, log, treatment
@@ -196,6 +202,8 @@ class Score:
     """Errors in the stated standard deviations."""
     relative: Array
     """Errors relative to what each parameter is usually made of."""
+    regions: Array
+    """Whether the joint region at 95 % of all values holds the truth."""
     held_out: Array
     """Largest held-out error over the noise floor, of the first repetitions."""
     held_out_all: Array
@@ -218,7 +226,7 @@ def score(
     bench: Bench, noise: tuple[float, float], names: list[str], repetitions: int
 ) -> dict[str, Score]:
     """Identify with other noise again and again."""
-    errors: dict[str, list[tuple[Array, Array]]] = {name: [] for name in names}
+    errors: dict[str, list[tuple[Array, Array, bool]]] = {name: [] for name in names}
     held: dict[str, list[tuple[float, float, float]]] = {name: [] for name in names}
     for seed in range(repetitions):
         log = bench.log(noise, seed)
@@ -227,7 +235,8 @@ def score(
         for name in names:
             found = ESTIMATORS[name](bench.model, log, treatment, equations)
             off = found.values - bench.truth
-            errors[name].append((off / found.deviations, off / bench.usual))
+            inside = found.p_value(bench.truth) >= 0.05
+            errors[name].append((off / found.deviations, off / bench.usual, inside))
             if seed < 5:
                 other = bench.log(noise, 1000 + seed, held_out=True)
                 judged = predict(
@@ -246,8 +255,7 @@ def score(
                 )
     return {
         name: Score(
-            np.array([pair[0] for pair in errors[name]]),
-            np.array([pair[1] for pair in errors[name]]),
+            *(np.array(part) for part in zip(*errors[name], strict=True)),
             *np.array(held[name]).T,
         )
         for name in names
@@ -263,10 +271,11 @@ def realistic(benches: dict[str, Bench]) -> Iterator[str]:
     yield ""
     yield (
         "| machine | parameters | 95 % intervals that hold the truth | least and most of a "
-        "parameter | largest error, first repetition (std) | beyond 3 std | error (%) | "
+        "parameter | 95 % regions of all that hold it | "
+        "largest error, first repetition (std) | beyond 3 std | error (%) | "
         "held-out error / noise | left out, next to reversals | with these |"
     )
-    yield "| --- " + "| ---: " * 9 + "|"
+    yield "| --- " + "| ---: " * 10 + "|"
     for name, bench in benches.items():
         noise = bench.drives.encoder, FORCE_NOISE
         found = score(bench, noise, ["weighted"], REPETITIONS)["weighted"]
@@ -274,6 +283,7 @@ def realistic(benches: dict[str, Bench]) -> Iterator[str]:
         yield (
             f"| {name} | {len(bench.truth)} | {100 * found.coverage:.1f} % | "
             f"{100 * each.min():.0f} to {100 * each.max():.0f} % | "
+            f"{100 * found.regions.mean():.0f} % | "
             f"{np.abs(found.standard[0]).max():.2f} | "
             f"{100 * (np.abs(found.standard) > 3.0).mean():.2f} % | {found.error:.2f} | "
             f"{found.held_out.max():.3f} | {100 * found.left_out.max():.0f} % | "
@@ -286,7 +296,7 @@ def swept(benches: dict[str, Bench]) -> tuple[list[str], dict[str, list[Score]]]
     name, bench = next(iter(benches.items()))
     lines = [
         f"{name}, {SWEPT} repetitions. Each cell: error of the parameters (% of what they are made "
-        "of) / intervals that hold the truth / held-out error over the noise.",
+        "of) / intervals that hold the truth / regions that do / held-out error over the noise.",
         "",
         "| encoder (um) | force noise | " + " | ".join(ESTIMATORS) + " |",
         "| ---: | ---: | " + " | ".join("---:" for _ in ESTIMATORS) + " |",
@@ -297,7 +307,10 @@ def swept(benches: dict[str, Bench]) -> tuple[list[str], dict[str, list[Score]]]
         cells = []
         for estimator, one in found.items():
             scores[estimator].append(one)
-            cells.append(f"{one.error:.3g} / {100 * one.coverage:.0f} % / {one.held_out.max():.2f}")
+            cells.append(
+                f"{one.error:.3g} / {100 * one.coverage:.0f} % / {100 * one.regions.mean():.0f} % "
+                f"/ {one.held_out.max():.2f}"
+            )
         lines.append(f"| {1e6 * noise[0]:g} | {100 * noise[1]:g} % | " + " | ".join(cells) + " |")
         print(lines[-1], file=sys.stderr, flush=True)
     return lines, scores

@@ -27,7 +27,7 @@ _COLORS = {"trustworthy": "green", "usable with care": "yellow", "not trustworth
 _TERMS = ("coulomb", "viscous", "offset")
 
 
-Estimator = Literal["weighted", "ordinary", "huber", "total", "likelihood"]
+Estimator = Literal["weighted", "ordinary", "huber", "total", "instrumental", "likelihood"]
 Passive = Literal["none", "shared", "each"]
 Derivatives = Literal["periodic", "central", "spline"]
 """The library's own, which are slow to import."""

@@ -2,7 +2,8 @@
 
 `identify` does all of it. Its parts can be used by themselves: `logs` reads, `signals` turns
 samples into states, `observations_of` stacks the regressor, `estimators` solve, `consistency` finds
-real bodies, `excitation` makes the motions worth recording.
+real bodies, `excitation` makes the motions worth recording. `estimate` takes a regressor of any
+robot.
 """
 
 from pteron.identification.consistency import Bounds, Consistency, consistent_model
@@ -11,11 +12,15 @@ from pteron.identification.errors import LogError
 from pteron.identification.estimators import (
     Essential,
     Estimate,
+    Reduced,
     column_errors,
     essential_parameters,
+    halves,
     huber,
+    instrumental,
     maximum_likelihood,
     ordinary,
+    reduced,
     total,
     weighted,
 )
@@ -34,6 +39,7 @@ from pteron.identification.model import Model, Terms, identification_model
 from pteron.identification.observation import Observations, observations_of, stacked
 from pteron.identification.payload import Payload, identify_payload
 from pteron.identification.prediction import Prediction
+from pteron.identification.regressor import Fit, estimate
 from pteron.identification.result import Identification
 from pteron.identification.signals import Preprocessing, Processing, States, preprocessing_of
 from pteron.identification.verdict import Verdict
@@ -46,6 +52,7 @@ __all__ = [
     "Essential",
     "Estimate",
     "Excitation",
+    "Fit",
     "FourierMotion",
     "Identification",
     "Limits",
@@ -57,6 +64,7 @@ __all__ = [
     "Prediction",
     "Preprocessing",
     "Processing",
+    "Reduced",
     "States",
     "Suspicion",
     "Terms",
@@ -65,11 +73,14 @@ __all__ = [
     "column_errors",
     "consistent_model",
     "essential_parameters",
+    "estimate",
+    "halves",
     "huber",
     "identification_model",
     "identify",
     "identify_drive_gains",
     "identify_payload",
+    "instrumental",
     "maximum_likelihood",
     "observations_of",
     "open_log",
@@ -78,6 +89,7 @@ __all__ = [
     "preprocessing_of",
     "random_excitation",
     "read_log",
+    "reduced",
     "stacked",
     "total",
     "weighted",

@@ -13,18 +13,20 @@ from pteron.identification.estimators import (
     ESTIMATORS,
     Estimate,
     column_errors,
+    halves,
+    instrumental,
     maximum_likelihood,
     total,
 )
 from pteron.identification.logs import Log
 from pteron.identification.logs.sizes import check_forces as check_strength
 from pteron.identification.model import Model
-from pteron.identification.observation import Observations, observations_of
+from pteron.identification.observation import Observations, observations_of, stacked
 from pteron.identification.recordings import Recording, same
 from pteron.identification.signals import Preprocessing, Processing, preprocessing_of
 from pteron.manipulator import Manipulator
 
-METHODS = (*ESTIMATORS, "likelihood")
+METHODS = (*ESTIMATORS, "instrumental", "likelihood")
 """Names of the estimators that `identify` knows."""
 
 _EXPLAINED = 0.2
@@ -133,17 +135,22 @@ def estimated(
     """Return what an estimator makes of the observations, or of their recording."""
     if not isinstance(estimator, str):
         return estimator(observations)
-    if estimator not in ("likelihood", "total"):
+    if estimator in ESTIMATORS and estimator != "total":
         return ESTIMATORS[estimator](observations)
-    if len(fit) > 1 or not isinstance(fit[0].log, Log):
+    logs = [one.head() for one in fit if isinstance(one.log, Log)]
+    if len(logs) < len(fit) or (len(logs) > 1 and estimator != "instrumental"):
+        how_many = "logs" if estimator == "instrumental" else "one log"
         raise DataError(
-            f"estimator: {estimator} takes one log of at most some million rows; choose weighted, "
-            "or give one log"
+            f"estimator: {estimator} takes {how_many} of at most some million rows; choose "
+            "weighted, or give such"
         )
-    log, how = fit[0].head(), preprocessing[0]
+    if estimator == "instrumental":
+        pairs = [halves(model, log, how) for log, how in zip(logs, preprocessing, strict=True)]
+        first, second = (stacked(half) for half in zip(*pairs, strict=True))
+        return instrumental(first, second, mutual=True)
     if estimator == "likelihood":
-        return maximum_likelihood(model, log, how)
-    return total(observations, column_errors(model, log, how))
+        return maximum_likelihood(model, logs[0], preprocessing[0])
+    return total(observations, column_errors(model, logs[0], preprocessing[0]))
 
 
 def check_columns(model: Model, one: Recording, preprocessing: Preprocessing) -> None:

@@ -81,8 +81,9 @@ def identify(
     shared : bool or groups of legs
         Whether legs share one parameter set; see `pteron.base_parameters`.
     estimator : str or callable
-        One of `METHODS`: ordinary, weighted (the default), huber, total, likelihood; or what takes
-        observations and returns an estimate, such as `functools.partial(huber, threshold=2.0)`.
+        One of `METHODS`: ordinary, weighted (the default), huber, total, instrumental, likelihood;
+        or what takes observations and returns an estimate, such as
+        `functools.partial(huber, threshold=2.0)`.
     processing : Processing, optional
         How positions are differentiated and filtered; by default the data decide.
     cad : Manipulator, "robot" or None

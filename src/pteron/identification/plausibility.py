@@ -20,6 +20,7 @@ from pteron.reduction import BaseParameters, base_regressor
 
 _PROBES = 50
 
+_NO_FORCES = 1e4
 _MOST_UNSEEN = 0.5
 """Share of the base parameters that a motion may leave unseen."""
 
@@ -113,11 +114,13 @@ def unseen(model: Model, deviations: Array) -> tuple[tuple[str, ...], bool]:
     """Return the base parameters that a log cannot show, and whether they are too many.
 
     Their standard deviation, among the (p,) of all values, is larger than what they are made of.
+    One that is 10 000 times larger is too many: its actuator's forces are no forces of the machine.
     """
     base = model.base
-    hidden = deviations[: base.rank] > usual_sizes(base, parameters(model.robot))
+    share = deviations[: base.rank] / usual_sizes(base, parameters(model.robot))
+    hidden = share > 1.0
     names = tuple(name for name, flag in zip(base.names, hidden, strict=True) if flag)
-    return names, bool(hidden.mean() > _MOST_UNSEEN)
+    return names, bool(hidden.mean() > _MOST_UNSEEN or share.max() > _NO_FORCES)
 
 
 def usual_sizes(base: BaseParameters, drawn: Array) -> Array:

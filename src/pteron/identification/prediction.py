@@ -32,7 +32,7 @@ _RARE, _FEW = 1e-3, 0.05
 """Shares of the samples up to which what stands out may be chance, and from which it is no
 exception."""
 
-_FRICTION = ("coulomb", "viscous", "stribeck", "offset")
+FRICTION = ("coulomb", "viscous", "stribeck", "offset")
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ def predict(
     """
     n = len(model.robot.legs)
     plain = values.copy()
-    plain[[k for k, kind in enumerate(model.kinds) if kind in _FRICTION]] = 0.0
+    plain[[k for k, kind in enumerate(model.kinds) if kind in FRICTION]] = 0.0
     counts, total = np.zeros(n), 0
     sums = np.zeros((7, n))
     shown: list[Array] = []

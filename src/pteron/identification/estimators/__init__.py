@@ -4,9 +4,11 @@ from collections.abc import Callable
 
 from pteron.identification.estimators.essential import Essential, essential_parameters
 from pteron.identification.estimators.estimate import Estimate, Whiteness, whiteness
+from pteron.identification.estimators.instrumental import halves, instrumental
 from pteron.identification.estimators.least_squares import huber, ordinary, weighted
 from pteron.identification.estimators.likelihood import maximum_likelihood
 from pteron.identification.estimators.qr import QrFactor, qr_factor
+from pteron.identification.estimators.reduction import Reduced, reduced
 from pteron.identification.estimators.total import column_errors, total
 from pteron.identification.observation import Observations
 
@@ -15,13 +17,17 @@ __all__ = [
     "Essential",
     "Estimate",
     "QrFactor",
+    "Reduced",
     "Whiteness",
     "column_errors",
     "essential_parameters",
+    "halves",
     "huber",
+    "instrumental",
     "maximum_likelihood",
     "ordinary",
     "qr_factor",
+    "reduced",
     "total",
     "weighted",
     "whiteness",

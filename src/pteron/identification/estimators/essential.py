@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2  # type: ignore[import-untyped]
+from scipy.stats import f  # type: ignore[import-untyped]
 
 from pteron.identification.estimators.estimate import Estimate
 from pteron.identification.observation import Observations
@@ -50,8 +50,8 @@ def essential_parameters(
 
     Wald's test, backwards: of all values, the one whose loss costs least goes first, as long as the
     hypothesis that *all* that are gone are zero is not rejected: b^T C^-1 b of those, with C their
-    covariance, against chi-square with as many degrees of freedom. Testing them together keeps two
-    values that only show as a pair.
+    covariance, against Fisher's F, since the noise is known from a limited number of equations.
+    Testing them together keeps two values that only show as a pair.
 
     Parameters
     ----------
@@ -69,15 +69,16 @@ def essential_parameters(
     A value that was dropped need not be zero, only too small for these data; what it did is then
     done by those it is correlated with. For statements about single values use the full estimate.
     """
-    values, covariance = estimate.values, estimate.covariance
+    values = estimate.values
     gone: list[int] = []
     p_value = 1.0
     left = list(range(len(values)))
     while len(left) > 1:
         # Cost of dropping each of those left, beside those already gone.
-        statistics = [_wald(values, covariance, [*gone, k]) for k in left]
+        statistics = [estimate.wald(values[[*gone, k]], [*gone, k]) for k in left]
         least = int(np.argmin(statistics))
-        chance = float(chi2.sf(statistics[least], len(gone) + 1))
+        count = len(gone) + 1
+        chance = float(f.sf(statistics[least] / count, count, estimate.degrees))
         if chance < level:
             break
         p_value = chance
@@ -86,11 +87,3 @@ def essential_parameters(
         return Essential(estimate.names, (), estimate, 1.0, level)
     refit = estimator(observations.columns(left))
     return Essential(refit.names, tuple(estimate.names[k] for k in gone), refit, p_value, level)
-
-
-def _wald(values: np.ndarray, covariance: np.ndarray, chosen: list[int]) -> float:
-    b = values[chosen]
-    scale = np.maximum(np.sqrt(np.diag(covariance)[chosen]), np.finfo(float).tiny)
-    c = covariance[np.ix_(chosen, chosen)] / np.outer(scale, scale)
-    u = b / scale
-    return float(u @ np.linalg.solve(c, u))

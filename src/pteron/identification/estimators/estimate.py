@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from statistics import NormalDist
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.stats import chi2  # type: ignore[import-untyped]
+from numpy.typing import ArrayLike, NDArray
+from scipy.stats import chi2, f  # type: ignore[import-untyped]
 
+from pteron.identification.estimators.covariance import noise_of
 from pteron.identification.estimators.qr import QrFactor
 from pteron.identification.observation import Observations
 from pteron.identification.signals.fourier import row_blocks
 from pteron.kernels import Array
 
 _LAGS = 20
-_MOST_LAGS = 100
-"""Rows, of a parallel filter's, beyond which noise has forgotten itself in any case."""
-
 _LEVEL = 0.01
 """Chance at which white residuals would be called coloured."""
 
@@ -89,8 +88,13 @@ class Estimate:
 
     @property
     def correlated(self) -> bool:
-        """Whether residuals are not white; the covariance allows for it anyway (Newey, West)."""
+        """Whether residuals are not white; the covariance allows for it anyway."""
         return not self.whiteness.white
+
+    @property
+    def degrees(self) -> int:
+        """Equations more than values."""
+        return self.rows - len(self.values)
 
     @property
     def deviations(self) -> Array:
@@ -113,6 +117,28 @@ class Estimate:
         """Return the lower and upper ends (p,) of the values' intervals at a level."""
         reach = NormalDist().inv_cdf(0.5 + level / 2.0) * self.deviations
         return self.values - reach, self.values + reach
+
+    def distance(self, truth: ArrayLike) -> float:
+        """Return how far values (p,) are from the estimate, in standard deviations of all.
+
+        The square root of (values - truth)^T covariance^-1 (values - truth).
+        """
+        return float(np.sqrt(self.wald(self.values - np.asarray(truth, dtype=float))))
+
+    def p_value(self, truth: ArrayLike) -> float:
+        """Return the chance of an estimate farther away, were these the true values (p,).
+
+        The joint region at 95 % is where it is at least 0.05.
+        """
+        p = len(self.values)
+        return float(f.sf(self.distance(truth) ** 2 / p, p, self.degrees))
+
+    def wald(self, shift: Array, chosen: Sequence[int] | None = None) -> float:
+        """Return the square of a shift of values, all or some, in terms of their covariance."""
+        rows = range(len(self.values)) if chosen is None else chosen
+        size = np.maximum(self.deviations[list(rows)], np.finfo(float).tiny)
+        scaled = shift / size
+        return float(scaled @ np.linalg.solve(self.correlation[np.ix_(rows, rows)], scaled))
 
     def value(self, name: str) -> float:
         """Return one value by name."""
@@ -157,36 +183,37 @@ def estimate_of(
     observations: Observations,
     factor: QrFactor,
     values: Array,
-    covariance: Array,
     *,
     weights: Array,
     iterations: int = 1,
     converged: bool = True,
-    scores: Array | None = None,
+    pull: Array | None = None,
     inverse: Array | None = None,
+    instruments: Array | None = None,
+    beside: Array | float = 0.0,
 ) -> Estimate:
     """Return the estimate that an estimator found.
 
-    `covariance` is that for white residuals, and `factor` that of the rows times `weights`, (R, n)
-    or (n,). `scores` (R, n) are weighted residuals that stand for the plain ones in a covariance
-    that allows for their correlation, and `inverse` (p, p) is the weighted normal equations' own.
+    The values are B Z^T V F, `factor` is that of the rows times `weights` (R, n) or (n,), whose
+    squares are V, and the covariance B (Z^T V cov(F) V Z + `beside`) B, (p, p). By default B is
+    (W^T V W)^-1, another one is `inverse`, and Z is W, another one is `instruments` (R, n, p).
+    `pull` (R, n) stands for the weighted residuals where these count in another way.
     """
     rest = residuals_of(observations, values)
     share = factor.degrees / factor.rows
     noise = np.sqrt((rest**2).sum(axis=0) / np.maximum(observations.used, 1) / share)
-    # Whatever the test says: in a short log it does not see all correlation that matters.
-    weighted = weights**2 * rest if scores is None else scores
-    rows = np.einsum("rnp,rn->rp", observations.matrix, weighted, optimize=True)
     bread = factor.inverse() if inverse is None else inverse
-    allowed = long_run_covariance(rows, bread, share)
-    # Correlation that happens to help is not counted on.
-    worse = np.sqrt(np.maximum(np.diag(allowed) / np.diag(covariance), 1.0))
+    rows = observations.matrix if instruments is None else instruments
+    pulled = weights * rest if pull is None else pull
+    found = noise_of(rows, pulled, observations.gain > 0.0, weights)
+    middle = found.sum_covariance(rows, weights)
+    covariance = bread @ (middle + beside) @ bread.T
     return Estimate(
         method,
         observations.names,
         observations.units,
         values,
-        covariance * np.outer(worse, worse),
+        0.5 * (covariance + covariance.T),
         noise,
         whiteness(rest, observations.gain > 0.0),
         factor.condition,
@@ -215,18 +242,3 @@ def whiteness(residuals: Array, used: NDArray[np.bool_] | None = None) -> Whiten
     statistic = count * (count + 2.0) * (found**2 / np.maximum(pairs, 1)).sum(axis=0)
     degrees = np.maximum((pairs > 0).sum(axis=0), 1)
     return Whiteness(found[0], np.asarray(chi2.sf(statistic, degrees)))
-
-
-def long_run_covariance(scores: Array, inverse: Array, degrees: float) -> Array:
-    """Return the covariance (p, p) of values whose residuals are correlated in time.
-
-    It is the sandwich of Newey and West, with Bartlett's weights, of `scores` (R, p), W^T times the
-    weighted residuals of each row; `degrees` is the share of equations not spent on the values.
-    """
-    rows = len(scores)
-    lags = min(int(np.ceil(1.3 * np.sqrt(rows))), _MOST_LAGS)
-    middle = scores.T @ scores
-    for lag in range(1, min(lags, rows - 1) + 1):
-        shifted = scores[lag:].T @ scores[:-lag]
-        middle += (1.0 - lag / (lags + 1.0)) * (shifted + shifted.T)
-    return np.asarray(inverse @ middle @ inverse / degrees)

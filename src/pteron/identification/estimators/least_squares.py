@@ -36,11 +36,8 @@ def ordinary(observations: Observations) -> Estimate:
     """
     factor = qr_factor(observations)
     factor.check_seen()
-    covariance = factor.rest / factor.degrees * factor.inverse()
     weights = np.ones(observations.actuators)
-    return estimate_of(
-        "ordinary", observations, factor, factor.values(), covariance, weights=weights
-    )
+    return estimate_of("ordinary", observations, factor, factor.values(), weights=weights)
 
 
 def weighted(observations: Observations, *, iterations: int = 20) -> Estimate:
@@ -72,14 +69,11 @@ def weighted(observations: Observations, *, iterations: int = 20) -> Estimate:
         converged = bool(np.abs(noise / before - 1.0).max() < _SETTLED_NOISE)
         if converged:
             break
-    # The residuals of the weighted equations have unit variance but for rounding of the above.
-    covariance = factor.rest / factor.degrees * factor.inverse()
     return estimate_of(
         "weighted",
         observations,
         factor,
         values,
-        covariance,
         weights=1.0 / before,
         iterations=iteration,
         converged=converged,
@@ -133,17 +127,15 @@ def huber(
     used = observations.gain > 0.0
     slope = float((np.abs(standard)[used] < threshold).mean())
     spent = 1.0 + len(values) / observations.rows * (1.0 - slope) / slope
-    variance = spent**2 * float((pull**2).sum()) / plain.degrees / slope**2
     return estimate_of(
         "huber",
         observations,
         plain,
         values,
-        variance * plain.inverse(),
         weights=1.0 / scale,
         iterations=iteration,
         converged=converged,
-        scores=spent * pull / scale / slope,
+        pull=spent * pull / slope,
     )
 
 

@@ -117,17 +117,21 @@ def maximum_likelihood(
         converged = bool((np.abs(step) <= _SETTLED * np.sqrt(np.diag(inverse))).all())
         if converged:
             break
+    # The values' own part of the forces: what the motion could do as well is taken out of it.
+    moved = solved[:, :-1]
+    own = (w - s @ moved).reshape(observations.matrix.shape) * noise[:, None]
     observations = _sampled(model, log, curve, preprocessing)
     return estimate_of(
         _NAME,
         observations,
         qr_factor(observations, 1.0 / noise),
         values,
-        inverse,
         weights=1.0 / noise,
         iterations=iteration,
         converged=converged,
         inverse=inverse,
+        instruments=own,
+        beside=moved.T @ (information @ moved),
     )
 
 

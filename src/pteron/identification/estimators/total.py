@@ -119,22 +119,19 @@ def total(
             converged = bool(abs(forces / before - 1.0) < _SETTLED)
         if converged:
             break
-    # First-order perturbation: noise of variance s^2 in all entries, and its own bias taken out.
-    least = float(sizes[-1] ** 2)
-    effective = least / factor.degrees * (forces**2 + through)
+    # The normal equations without the bias of the columns' noise, least^2 times its variance.
     normal = (factor.scale[:, None] * factor.factor.T) @ (factor.factor * factor.scale)
-    normal = normal - least * np.diag(errors**2)
+    normal = normal - float(sizes[-1] ** 2) * np.diag(errors**2)
     lengths = np.outer(factor.scale, factor.scale)
-    covariance = effective * np.linalg.inv(normal / lengths) / lengths
     return estimate_of(
         "total",
         observations,
         factor,
         values,
-        covariance,
         weights=1.0 / noise,
         iterations=iteration,
         converged=converged,
+        inverse=np.linalg.inv(normal / lengths) / lengths,
     )
 
 

@@ -37,6 +37,10 @@ _HIGHEST = 0.2
 _MARGIN = 20.0
 """Factor on the motion's own bandwidth beyond which what shows is noise of another colour."""
 
+_REPEATED = 1.3
+"""Factor on the cut-off of least error: what the filter takes of a motion is the same whenever the
+machine moves so, and shifts the values; what it leaves of the noise averages out."""
+
 _POSITION_POWER = 0.9999
 _CANDIDATES = 40
 
@@ -126,15 +130,18 @@ def smoothed(signal: Array, rate: float, cutoff: float | None) -> Array:
     return np.asarray(sosfiltfilt(sections, signal, axis=0, padlen=padding))
 
 
-def cutoff_of(signal: Array, rate: float, *, harmless: float = 0.0) -> float | None:
+def cutoff_of(
+    signal: Array, rate: float, *, harmless: float = 0.0, tolerable: float = 0.0
+) -> float | None:
     """Return the cut-off for positions (T, k), Hz, or None where they need no filter.
 
     It makes the mean square error of the filtered accelerations least, each over its signal's
     noise, as far as the measured positions tell: by Stein's estimate, from their spectrum and
     `position_noise`. So the filter passes what is more motion than noise. It passes more, since it
     then mixes less, as long as the accelerations' noise, which is all below the cut-off, is less
-    than that of white noise of a `harmless` size, relative to them, which is everywhere. The
-    cut-off is at most twenty times the frequency below which nearly all the motion is, as noise
+    than that of white noise of a `harmless` size, relative to them, which is everywhere; and up to
+    1.3 times the frequency of least error as long as it is less than that of a `tolerable` size.
+    The cut-off is at most twenty times the frequency below which nearly all the motion is, as noise
     need not be white.
 
     References
@@ -161,7 +168,9 @@ def cutoff_of(signal: Array, rate: float, *, harmless: float = 0.0) -> float | N
     motion = (fourth * gains[:, [best]] ** 2 * power).mean(axis=0) - noise**2 * passed[best]
     share = np.outer(passed, noise**2 / np.maximum(motion, np.finfo(float).tiny)).max(axis=1)
     below = 2.0 * candidates / rate
-    return float(candidates[max(best, int((share <= harmless**2 * below).sum()) - 1)])
+    near = candidates <= _REPEATED * candidates[best]
+    allowed = (share <= harmless**2 * below) | (near & (share <= tolerable**2 * below))
+    return float(candidates[max(best, int(np.flatnonzero(allowed).max(initial=0)))])
 
 
 def _least_risk(relative: Array, gains: Array, weights: Array) -> int:

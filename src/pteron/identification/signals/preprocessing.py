@@ -44,6 +44,9 @@ _POWER = 0.999
 _HARMLESS = 0.2
 """Noise of the accelerations, relative to that of the forces, that adds next to nothing to it."""
 
+_TOLERABLE = 0.5
+"""Likewise, up to which a cut-off above that of least error is worth it."""
+
 _REPEATS = 0.02
 """What a series may leave of a motion, as a share of its span, where it is said to repeat."""
 
@@ -229,7 +232,9 @@ def preprocessing_of(
     # A median, which single wild forces do not change.
     size = np.median(np.abs(forces - np.median(forces, axis=0)), axis=0)
     relative = float((noise / np.maximum(size, np.finfo(float).tiny)).min())
-    cutoff = wanted.cutoff or cutoff_of(joints, rate, harmless=_HARMLESS * relative)
+    cutoff = wanted.cutoff or cutoff_of(
+        joints, rate, harmless=_HARMLESS * relative, tolerable=_TOLERABLE * relative
+    )
 
     # How positions are differentiated
     period = wanted.period or log.description.period

@@ -1,0 +1,172 @@
+"""Instrumental variables: values without the bias that noise in the regressor makes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from scipy.interpolate import make_interp_spline  # type: ignore[import-untyped]
+
+from pteron.errors import DataError
+from pteron.identification.estimators.estimate import Estimate, estimate_of
+from pteron.identification.estimators.least_squares import actuator_noise
+from pteron.identification.estimators.qr import qr_factor
+from pteron.identification.logs import Log
+from pteron.identification.model import Model
+from pteron.identification.observation import Observations, observations_of
+from pteron.identification.signals import Preprocessing
+from pteron.kernels import Array
+
+_NAME = "instrumental"
+
+_SETTLED = 1e-3
+"""Change of a value, in standard deviations, and of the noise, relative, that does not matter."""
+
+_DEGREE = 5
+"""Of the spline through every other sample."""
+
+Instruments = Observations | Callable[[Array], Observations]
+"""Observations of states without the noise of those to be solved; or what makes them of values."""
+
+
+def instrumental(
+    observations: Observations,
+    instruments: Instruments,
+    *,
+    mutual: bool = False,
+    iterations: int = 20,
+) -> Estimate:
+    """Return the values (Z^T V W)^-1 Z^T V F, with instruments Z and V each actuator's weight.
+
+    Noise in positions is noise in W, which pulls least squares towards zero however long the log
+    is. Instruments are the regressor at states that are near the true ones, and whose noise has
+    nothing to do with that in W: then it averages out. Three kinds are usual.
+
+    - The states of a simulated model, with the machine's controller: give a function from values to
+      observations. It is called again with what was found until that settles (IDIM-IV).
+    - The motion that was commanded.
+    - Another measurement of the same motion, such as `halves` of the samples make.
+
+    Parameters
+    ----------
+    observations : Observations
+        What is solved.
+    instruments : Observations or callable
+        Of the same rows; their forces play no part unless they are `mutual`.
+    mutual : bool
+        Whether each is the instrument of the other, as of two measurements that are as good: then
+        the noise of both is averaged.
+    iterations : int
+        How many times the noise, and simulated instruments, are found anew at most.
+
+    Raises
+    ------
+    DataError
+        If instruments are of another shape, or the observations do not determine the values.
+
+    References
+    ----------
+    A. Janot, P.-O. Vandanjon, M. Gautier, "A generic instrumental variable approach for industrial
+    robot identification", IEEE Transactions on Control Systems Technology 22(1), 2014.
+    """
+    factor = qr_factor(observations)
+    factor.check_seen()
+    values = factor.values()
+    noise = actuator_noise(observations, values)
+    converged = False
+    for iteration in range(1, iterations + 1):
+        if callable(instruments) or iteration == 1:
+            found = instruments(values) if callable(instruments) else instruments
+            both, z, apart = _together(observations, found, mutual=mutual)
+            qr_factor(replace(both, matrix=z)).check_seen()
+        inverse, moment = _normal_equations(both, z, apart, noise)
+        earlier, values = values, inverse @ moment
+        factor = qr_factor(both, 1.0 / noise)
+        before, noise = noise, actuator_noise(both, values)
+        size = np.sqrt(np.maximum(np.diag(factor.inverse()), np.finfo(float).tiny))
+        settled = np.abs(noise / before - 1.0).max() < _SETTLED
+        converged = bool(settled and (np.abs(values - earlier) <= _SETTLED * size).all())
+        if converged:
+            break
+    return estimate_of(
+        _NAME,
+        both,
+        factor,
+        values,
+        weights=1.0 / before,
+        iterations=iteration,
+        converged=converged,
+        inverse=inverse,
+        instruments=z,
+    )
+
+
+def halves(
+    model: Model, log: Log, preprocessing: Preprocessing
+) -> tuple[Observations, Observations]:
+    """Return the observations of a log by every other sample of the positions, and by the others.
+
+    A spline through one half of the samples gives the positions at all instants. Encoders' noise is
+    not the same in two samples, as long as a joint passes a step or more between them, so that
+    the halves are mutual instruments of each other, and no controller needs to be known.
+    """
+    first, second = (
+        observations_of(model, _every_other(log, start), preprocessing) for start in (0, 1)
+    )
+    return first, second
+
+
+def _together(
+    observations: Observations, instruments: Observations, *, mutual: bool
+) -> tuple[Observations, Array, Array | None]:
+    """Return observations and instruments where there are both, and what they err by if mutual.
+
+    With M and D mean and half the difference of two regressors, (W1^T W2 + W2^T W1) / 2 is
+    M^T M - D^T D.
+    """
+    if instruments.matrix.shape != observations.matrix.shape:
+        raise DataError(
+            f"instruments: shape {instruments.matrix.shape} given, that of the observations, "
+            f"{observations.matrix.shape}, expected; preprocess both logs alike"
+        )
+    used = (observations.gain > 0.0) & (instruments.gain > 0.0)
+    matrix, forces = observations.matrix, observations.forces
+    z, apart = instruments.matrix * used[..., None], None
+    if mutual:
+        apart = 0.5 * (matrix * used[..., None] - z)
+        matrix, forces = 0.5 * (matrix + z), 0.5 * (forces + instruments.forces)
+    both = replace(
+        observations,
+        matrix=used[..., None] * matrix,
+        forces=used * forces,
+        gain=used * observations.gain,
+    )
+    return both, both.matrix if mutual else z, apart
+
+
+def _normal_equations(
+    observations: Observations, instruments: Array, apart: Array | None, noise: Array
+) -> tuple[Array, Array]:
+    """Return (Z^T V W)^-1, or (M^T V M - D^T V D)^-1, (p, p), and Z^T V F (p,)."""
+    p = instruments.shape[-1]
+    z, w = ((a / noise[:, None]).reshape(-1, p) for a in (instruments, observations.matrix))
+    size = np.linalg.norm(w, axis=0)
+    normal = (z / size).T @ (w / size)
+    if apart is not None:
+        d = (apart / noise[:, None]).reshape(-1, p) / size
+        normal -= d.T @ d
+    inverse = np.linalg.inv(normal) / np.outer(size, size)
+    return inverse, z.T @ (observations.forces / noise).ravel()
+
+
+def _every_other(log: Log, start: int) -> Log:
+    """Return a log with the positions that every other sample from `start` on has."""
+    joints = log.joints.copy()
+    for rows in log.segments:
+        time, kept = log.time[rows], slice(start, None, 2)
+        if len(time) // 2 <= _DEGREE:
+            continue  # too short for the filters, too
+        spline = make_interp_spline(time[kept], log.joints[rows][kept], k=_DEGREE)
+        joints[rows] = spline(time)
+    return replace(log, joints=joints)

@@ -1,0 +1,107 @@
+"""Base parameters of a regressor that is only known as numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import qr, solve_triangular  # type: ignore[import-untyped]
+
+from pteron.errors import DataError
+from pteron.identification.estimators.qr import qr_factor
+from pteron.identification.observation import Observations
+from pteron.kernels import Array
+
+TOLERANCE = 1e-8
+"""What columns of length one have of their own, relative to the first, that is rounding."""
+
+_ROUNDING = 1e-12
+"""Length of a column, relative to the longest, that is."""
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """Which columns of a regressor are independent, and what the others join.
+
+    Attributes
+    ----------
+    kept, dependent : tuple of int
+        The columns.
+    names, dependent_names : tuple of str
+        What they are called.
+    shares : array, shape (kept, dependent)
+        Dependent column j is the kept ones times shares[:, j]: the value of kept column k is its
+        own plus shares[k, j] of each dependent one.
+    gap : float
+        What the weakest kept column has of its own, over what the strongest dependent one has. At
+        less than 1000 or so the rank is a matter of the tolerance.
+    """
+
+    kept: tuple[int, ...]
+    dependent: tuple[int, ...]
+    names: tuple[str, ...]
+    dependent_names: tuple[str, ...]
+    shares: Array
+    gap: float
+
+    @property
+    def expressions(self) -> tuple[str, ...]:
+        """What each value is, such as "I1 + 0.25 m2"."""
+        found = []
+        for name, row in zip(self.names, self.shares, strict=True):
+            text = name
+            for other, share in zip(self.dependent_names, row.tolist(), strict=True):
+                if share:
+                    size = "" if abs(abs(share) - 1.0) < TOLERANCE else f"{abs(share):.6g} "
+                    text += f" {'-' if share < 0.0 else '+'} {size}{other}"
+            found.append(text)
+        return tuple(found)
+
+    def values(self, parameters: Array) -> Array:
+        """Return the values (kept,) that parameters of all columns have."""
+        own, joined = parameters[list(self.kept)], parameters[list(self.dependent)]
+        return np.asarray(own + self.shares @ joined)
+
+
+def reduced(observations: Observations, *, tolerance: float = TOLERANCE) -> Reduced:
+    """Return the independent columns of observations, by a QR factor with pivots.
+
+    The columns, scaled to length one, are taken in the order of what they have of their own; those
+    with less than `tolerance`, relative to the first, depend on the others. This is numerical, and
+    concerns the states in the observations: a motion that does not show a parameter makes its
+    column dependent too. For machines of Pteron's own, `base_parameters` decides exactly.
+
+    Raises
+    ------
+    DataError
+        If no column is left.
+
+    References
+    ----------
+    M. Gautier, "Numerical calculation of the base inertial parameters of robots", Journal of
+    Robotic Systems 8(4), 1991.
+    """
+    found = qr_factor(observations)
+    # Columns that vanish but for rounding would be independent once they are scaled.
+    acts = found.scale > _ROUNDING * found.scale.max()
+    _, factor, order = qr(found.factor * acts, mode="economic", pivoting=True)
+    sizes = np.abs(np.diag(factor))
+    rank = int((sizes > tolerance * sizes[0]).sum())
+    if not rank:
+        raise DataError(f"{observations.source}: every column of the regressor is zero")
+    shares = solve_triangular(factor[:rank, :rank], factor[:rank, rank:])
+    shares = np.where(np.abs(shares) > 1e2 * tolerance, shares, 0.0)
+    scale = np.where(acts, found.scale, 0.0)
+    shares = shares * scale[order[rank:]] / scale[order[:rank], None]
+    # In the order in which they were given
+    first, rest = np.argsort(order[:rank]), np.argsort(order[rank:])
+    kept, dependent = order[:rank][first].tolist(), order[rank:][rest].tolist()
+    below = sizes[rank] if rank < len(sizes) else 0.0
+    return Reduced(
+        tuple(kept),
+        tuple(dependent),
+        tuple(observations.names[k] for k in kept),
+        tuple(observations.names[k] for k in dependent),
+        shares[np.ix_(first, rest)],
+        float(sizes[rank - 1] / below) if below else float("inf"),
+    )

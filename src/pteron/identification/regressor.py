@@ -1,0 +1,258 @@
+"""Identification with a regressor of the user's own: any machine whose forces are W values."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pteron.errors import DataError, ModelError
+from pteron.identification.errors import LogError
+from pteron.identification.estimators import (
+    ESTIMATORS,
+    Essential,
+    Estimate,
+    essential_parameters,
+    instrumental,
+    weighted,
+)
+from pteron.identification.estimators.reduction import Reduced, reduced
+from pteron.identification.given import finite, given
+from pteron.identification.observation import Observations
+from pteron.identification.prediction import FRICTION, Prediction
+from pteron.identification.signals.filters import white_noise
+from pteron.identification.verdict import Verdict, verdict_of
+from pteron.kernels import Array
+
+_FITTED = 0.7
+"""Share of the samples that is fitted where none are held out."""
+
+_LEAST_ROWS = 9
+"""Samples from which the noise of forces can be told without a model."""
+
+_ESTIMATORS = (*ESTIMATORS, "instrumental")
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What samples of forces and a regressor say.
+
+    Attributes
+    ----------
+    estimate : Estimate
+        The values.
+    essential : Essential
+        Those that the data can show, and the fit of these alone.
+    held_out : Prediction
+        How well the values predict the forces that were held out.
+    verdict : Verdict
+        Whether they can be trusted, from these forces alone.
+    reduced : Reduced or None
+        Which columns are independent, where that was asked for.
+    """
+
+    estimate: Estimate
+    essential: Essential
+    held_out: Prediction
+    verdict: Verdict
+    reduced: Reduced | None = None
+
+
+def estimate(
+    regressor: ArrayLike,
+    forces: ArrayLike,
+    *,
+    names: Sequence[str] | None = None,
+    units: Sequence[str] | None = None,
+    kinds: Sequence[str] | None = None,
+    time: ArrayLike | None = None,
+    used: ArrayLike | None = None,
+    estimator: str | Callable[[Observations], Estimate] = "weighted",
+    held_out: tuple[ArrayLike, ...] | None = None,
+    instruments: ArrayLike | Callable[[Array], ArrayLike] | None = None,
+    reduce: bool = False,
+) -> Fit:
+    """Estimate the values of a model whose forces are `regressor` @ values, and judge them.
+
+    Parameters
+    ----------
+    regressor : array, shape (R, n, p) or (R n, p)
+        W at R samples of n actuators, in the order of time; stacked sample by sample if it has two
+        axes. Filter it and the forces alike before.
+    forces : array, shape (R, n), or (R,) of a single actuator
+        F, N or N m.
+    names : sequence of str, optional
+        What the p values are called; "beta1" ... by default.
+    units : sequence of str, optional
+        Their units; none by default.
+    kinds : sequence of str, optional
+        What they are: "coulomb", "viscous" and "offset" are friction, "base" is the rest. The
+        verdict then says whether friction is what a model misses.
+    time : array, shape (R,), optional
+        s; one second a sample by default.
+    used : array of bool, shape (R, n), optional
+        Which equations count; leave out what the model is not meant for, such as joints at rest.
+    estimator : str or callable
+        ordinary, weighted, huber, total, instrumental; or what takes observations and returns an
+        estimate.
+    held_out : tuple of arrays, optional
+        Regressor and forces of another motion, and which equations count there; by default the last
+        30 % of the samples.
+    instruments : array or callable, optional
+        For "instrumental": the regressor at states whose noise has nothing to do with that of the
+        ones given, such as a simulation's; or what returns it for values (of the columns kept).
+    reduce : bool
+        Whether columns that depend on others are left out and named, numerically: see `reduced`.
+
+    Raises
+    ------
+    DataError
+        If shapes do not fit one another, numbers are missing, or the samples do not determine the
+        values; the message says what was expected.
+    ModelError
+        If the estimator is not known.
+
+    Examples
+    --------
+    A pendulum's torque, I q'' + m g l sin(q), with I = 0.2 kg m^2 and m l = 0.5 kg m:
+
+    >>> import numpy as np
+    >>> from pteron.identification import estimate
+    >>> t = np.linspace(0.0, 10.0, 1000)
+    >>> q, ddq = np.sin(t) + 0.3 * np.sin(3.0 * t), -np.sin(t) - 2.7 * np.sin(3.0 * t)
+    >>> W = np.column_stack([ddq, 9.81 * np.sin(q)])
+    >>> noise = 0.01 * np.random.default_rng(0).normal(size=t.shape)
+    >>> fit = estimate(W, W @ [0.2, 0.5] + noise, names=["I", "ml"], units=["kg m^2", "kg m"])
+    >>> fit.estimate.values.round(3).tolist(), fit.verdict.grade
+    ([0.2, 0.5], 'trustworthy')
+    """
+    if isinstance(estimator, str) and estimator not in _ESTIMATORS:
+        raise ModelError(f"estimator: {estimator!r} is not one of {', '.join(_ESTIMATORS)}")
+    if (estimator == "instrumental") != (instruments is not None):
+        raise ModelError('instruments: belong to estimator "instrumental"; give both or neither')
+    whole = given(regressor, forces, names=names, units=units, kinds=kinds, time=time, used=used)
+    z: Observations | Callable[[Array], Observations] | None = None
+    if callable(instruments):
+        asked = instruments
+        z = lambda values: _like(whole, asked(values))  # noqa: E731 (narrows the type)
+    elif instruments is not None:
+        z = _like(whole, instruments)
+    if held_out is None:
+        rows = round(_FITTED * len(whole.time))
+        if rows in (0, len(whole.time)):
+            raise DataError(f"forces: {len(whole.time)} samples given, more are needed")
+        fit, check = _part(whole, slice(rows)), _part(whole, slice(rows, None))
+    else:
+        fit = whole
+        other, measured, *counting = held_out
+        check = given(
+            other,
+            measured,
+            names=whole.names,
+            units=whole.units,
+            kinds=kinds,
+            used=counting[0] if counting else None,
+            place="held_out",
+        )
+        if check.actuators != whole.actuators:
+            raise DataError(
+                f"held_out: forces of {check.actuators} actuators given, {whole.actuators} expected"
+            )
+    found = reduced(fit) if reduce else None
+    if found is not None:
+        fit, check = fit.columns(found.kept), check.columns(found.kept)
+    try:
+        answer = _estimated(estimator, fit, z, found)
+    except LogError as error:
+        if error.reason == "too little motion" and not reduce:
+            error.args = (f"{error}; or give reduce=True, which leaves out dependent columns",)
+        raise
+    again = ESTIMATORS.get(estimator, weighted) if isinstance(estimator, str) else estimator
+    prediction = _prediction(check, answer, repeats=held_out is None)
+    return Fit(
+        answer,
+        essential_parameters(fit, answer, again),
+        prediction,
+        verdict_of([prediction], repeats=held_out is None),
+        found,
+    )
+
+
+def _part(observations: Observations, rows: slice) -> Observations:
+    parts: dict[str, Any] = {
+        name: getattr(observations, name)[rows]
+        for name in ("matrix", "forces", "time", "gain", "payload")
+    }
+    return replace(observations, **parts)
+
+
+def _like(whole: Observations, instruments: ArrayLike) -> Observations:
+    """Return instruments as observations of the same samples."""
+    numbers = finite(instruments, "instruments")
+    if numbers.size != whole.matrix.size:
+        raise DataError(
+            f"instruments: shape {numbers.shape} given, that of the regressor, "
+            f"{whole.matrix.shape}, expected"
+        )
+    return replace(whole, matrix=numbers.reshape(whole.matrix.shape))
+
+
+def _estimated(
+    estimator: str | Callable[[Observations], Estimate],
+    fit: Observations,
+    instruments: Observations | Callable[[Array], Observations] | None,
+    found: Reduced | None,
+) -> Estimate:
+    if instruments is None:
+        return (ESTIMATORS[estimator] if isinstance(estimator, str) else estimator)(fit)
+
+    def alike(one: Observations) -> Observations:
+        part = _part(one, slice(len(fit.time)))
+        return part if found is None else part.columns(found.kept)
+
+    if callable(instruments):
+        simulated = instruments
+        return instrumental(fit, lambda values: alike(simulated(values)))
+    return instrumental(fit, alike(instruments))
+
+
+def _prediction(check: Observations, estimate: Estimate, *, repeats: bool) -> Prediction:
+    """Return how well the values predict forces that were not fitted."""
+    predicted = check.matrix @ estimate.values
+    friction = [k for k, kind in enumerate(check.kinds) if kind in FRICTION]
+    plain = estimate.values.copy()
+    plain[friction] = 0.0
+    without = check.matrix @ plain if check.kinds else np.full(predicted.shape, np.nan)
+    # Equations that do not count are zero on both sides.
+    used, counts = check.gain > 0.0, np.maximum(check.used, 1)
+    error, bare = (
+        np.sqrt(((check.forces - one) ** 2).sum(axis=0) / counts) for one in (predicted, without)
+    )
+    mean = check.forces.sum(axis=0) / counts
+    size = np.sqrt((used * (check.forces - mean) ** 2).sum(axis=0) / counts)
+    noise = estimate.noise
+    if len(check.forces) >= _LEAST_ROWS and used.all():
+        # Either is too large: where samples are few, or where the model misses something.
+        noise = np.minimum(noise, white_noise(check.forces))
+    return Prediction(
+        source="the last samples" if repeats else "the samples held out",
+        samples=len(check.forces),
+        left_out=1.0 - used.mean(axis=0),
+        size=np.maximum(size, np.finfo(float).tiny),
+        error=error,
+        error_without_friction=bare,
+        error_of_all=error,
+        # Which of filtered samples stand out nobody knows.
+        robust_error=error,
+        outliers=np.zeros_like(error),
+        noise=noise,
+        time=check.time,
+        measured=check.forces,
+        predicted=predicted,
+        without_friction=without,
+        speed=np.full(predicted.shape, np.nan),
+        used=used,
+    )
