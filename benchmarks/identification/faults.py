@@ -37,6 +37,9 @@ _RATE = 1000.0
 _NOISE = 0.01
 """Of each force's root mean square."""
 
+_SIZE = 0.9
+"""Of the cycle, over the largest: a machine 1 mm off must come along."""
+
 _TWENTY_BITS = 2.0 * np.pi / 2**20
 
 
@@ -285,12 +288,12 @@ def judged(name: str, fault: str, seed: int) -> Said:
     _, rates, seconds = commanded(case)
     pose = case.motion.at(case.time).pose.mean(axis=0)
     extent = Extent(pose, np.abs(rates).max(axis=0), np.abs(seconds).max(axis=0))
-    cycle = Cycle.within(case.motion.robot, extent)
+    cycle = Cycle.within(case.motion.robot, extent, size=_SIZE)
     assert cycle is not None
     assert found.machine is not None
     s = cycle.states
     joints = s.joints, s.joint_rates, s.joint_accelerations
-    true = States.of_joints(case.robot, joints, s.time, tuple(s.pose[0]))
+    true = States.of_joints(case.robot, joints, s.time, home_pose(case.robot))
     forces = pteron.drive_forces(case.robot, true.pose, true.velocity, true.acceleration)
     told = pteron.drive_forces(found.machine, s.pose, s.velocity, s.acceleration)
     named: tuple[str, ...] = tuple(one.fault for one in found.trial.suspicions if one.matters)

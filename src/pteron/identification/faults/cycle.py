@@ -53,10 +53,10 @@ class Cycle:
     moves: NDArray[np.bool_]
 
     @classmethod
-    def within(cls, robot: Manipulator, extent: Extent) -> Cycle | None:
+    def within(cls, robot: Manipulator, extent: Extent, *, size: float = 1.0) -> Cycle | None:
         """Return the cycle about a motion's mean pose, or home, as fast as the motion itself.
 
-        None where the machine has no room for one.
+        `size` is over the largest size that fits. None where the machine has no room for one.
         """
         for around in (extent.pose, np.array(home(robot))):
             try:
@@ -71,7 +71,7 @@ class Cycle:
             motion = pick_and_place(
                 robot,
                 around,
-                scale=slow.scale,
+                scale=size * slow.scale,
                 direction=slow.across,
                 duration=duration,
                 samples=_SAMPLES,
