@@ -160,7 +160,9 @@ def _of_trial(trial: Trial) -> _Opinion:
     found = _Opinion("trustworthy", [one.message for one in trial.suspicions], [])
     if any(one.matters for one in trial.suspicions):
         found.grade = "usable with care"
-        found.reasons.append("Stated errors of the values do not allow for it.")
+        found.reasons.append("The stated errors of the values do not allow for that.")
+    if trial.tried and not trial.suspicions:
+        found.reasons.append(f"No fault shows in the residuals; tried: {', '.join(trial.tried)}.")
     if np.isnan(trial.off).any():
         return found
     worst = int(np.argmax(trial.off))
