@@ -35,7 +35,7 @@ from pteron.identification.prediction import predict
 from pteron.identification.recordings import Recording, divided, recording
 from pteron.identification.result import Identification
 from pteron.identification.signals import Preprocessing, Processing
-from pteron.identification.verdict import verdict_of
+from pteron.identification.verdict import judged, verdict_of
 from pteron.kernels import Array
 from pteron.legs import Drive
 from pteron.manipulator import Manipulator
@@ -146,7 +146,7 @@ def identify(
     # Judge by what was held out, which betrays columns that are not what they are called
     modes = [None] * len(check) if others else [how.start for how in preprocessing]
     held = [
-        predict(
+        judged(
             model,
             estimate.values,
             one,

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 
 from pteron.identification.faults import Trial
-from pteron.identification.prediction import Prediction
+from pteron.identification.model import Model
+from pteron.identification.prediction import Prediction, predict
+from pteron.identification.recordings import Recording
+from pteron.identification.signals import Preprocessing
+from pteron.kernels import Array
 
 Grade = Literal["trustworthy", "usable with care", "not trustworthy"]
 
@@ -25,6 +29,9 @@ LARGE = 15.0
 
 CYCLE = 3.0
 """Percent of its forces by which a pick-and-place cycle may be expected to be off."""
+
+_LOWER = (0.7, 0.5)
+"""Cut-offs that are tried too, over that of the whole recording."""
 
 _ORDER: tuple[Grade, ...] = ("trustworthy", "usable with care", "not trustworthy")
 
@@ -99,6 +106,31 @@ def verdict_of(
         )
     grade = max((one.grade for one in opinions), key=_ORDER.index)
     return Verdict(grade, tuple(reasons), tuple(dict.fromkeys(steps)))
+
+
+def judged(
+    model: Model,
+    values: Array,
+    recording: Recording,
+    preprocessing: Preprocessing,
+    progress: Callable[[int], None] | None = None,
+) -> Prediction:
+    """Return how well a model with values (p,) predicts a recording that was not fitted.
+
+    Where that is not trusted, lower cut-offs of the positions' filter are tried: it was chosen for
+    the whole recording, and samples at rest, which do not count, have less noise than others. No
+    value is fitted to this, and a wrong model stays wrong at every cut-off.
+    """
+    found = predict(model, values, recording, preprocessing, progress)
+    if preprocessing.cutoff is None or preprocessing.derivatives == "periodic":
+        return found
+    for share in _LOWER:
+        if _of_prediction(found).grade == "trustworthy":
+            break
+        lower = replace(preprocessing, cutoff=share * preprocessing.cutoff)
+        other = predict(model, values, recording, lower, progress)
+        found = min(found, other, key=lambda one: float(one.robust_nrms.max()))
+    return found
 
 
 def _graded(percent: float, small: float) -> Grade:
