@@ -386,26 +386,50 @@ def test_a_trace_of_codesys_2_is_read(tmp_path):
     assert "cells separated by blanks, 3 header lines" in message(log)
 
 
-def test_variables_below_one_another_are_refused(tmp_path):
-    """As traces of CODESYS 3 are saved (github.com/ajwang-kajwang/sdplc reads them so)."""
+def below_one_another(sheet):
+    """Return the times, names and values of a sheet as variables one below another."""
+    names = sheet.names("t", "PLC_PRG.theta{}", "PLC_PRG.torque{}")[1:]
+    columns = zip(*[[*q, *f] for q, f in zip(sheet.joints, sheet.forces, strict=True)], strict=True)
+    return sheet.milliseconds, list(zip(names, columns, strict=True))
+
+
+def test_a_trace_of_codesys_3_is_read(tmp_path):
+    """A block for each variable (github.com/ajwang-kajwang/sdplc reads them so)."""
     sheet = Sheet("delta")
+    times, variables = below_one_another(sheet)
     lines = []
-    for i, name in enumerate(sheet.names("t", "theta{}", "torque{}")[1:]):
-        lines.append([f"{i}.Variable", f" PLC_PRG.{name}"])
-        lines += [["", f" {t}.0", " 0.5"] for t in sheet.milliseconds]
-    with pytest.raises(DataError, match=r"variables stand one below another.*one row a sample"):
+    for i, (name, values) in enumerate(variables):
+        lines.append([f"{i}.Variable", f" {name}"])
+        lines += [["", f" {t}.0", f" {v}"] for t, v in zip(times, values, strict=True)]
+    path = written(tmp_path, lines, ";")
+    log = refused_then_read(path, sheet, "the median step is 2 s")
+    sheet.check(log)
+    assert "variables one below another" in message(log)
+    del lines[5]
+    with pytest.raises(DataError, match=r"the times of PLC_PRG.theta2 are not those of .*theta1"):
         read_log(written(tmp_path, lines, ";"), sheet.robot)
 
 
-def test_a_log_of_wincc_with_a_row_for_each_value_is_refused(tmp_path):
-    """As the help of WinCC shows the structure of a CSV file with tags."""
-    names = [f'"{n}"' for n in ("VarName", "TimeString", "VarValue", "Validity", "Time_ms")]
+def test_a_log_of_wincc_is_read(tmp_path):
+    """A row for each value, times in days, as the help of WinCC shows a CSV file with tags."""
+    sheet = Sheet("delta")
+    times, variables = below_one_another(sheet)
+    header = ["VarName", "TimeString", "VarValue", "Validity", "Time_ms"]
+    days = [35886460322 + t / 86.4 for t in times]
     rows = [
-        [f'"Var_{i % 2}"', f'"01.04.98 11:02:{i:02d}"', "66,00", "1", "35886460322,81"]
-        for i in range(ROWS)
+        [name, "01.04.98 11:02:52", values[k].replace(".", ","), "1", f"{days[k]:.6f}"]
+        for k in range(ROWS)
+        for name, values in variables
     ]
-    with pytest.raises(DataError, match=r"has a row for each value.*one row a sample"):
-        read_log(written(tmp_path, [names, *rows], ";"), CATALOG["delta"])
+    rows = [[cell.replace(".", ",") if i == 4 else cell for i, cell in enumerate(r)] for r in rows]
+    cells = [[f'"{cell}"' for cell in row] for row in [header, *rows, ["$RT_OFF$", *4 * ["0"]]]]
+    log = read_log(written(tmp_path, cells, ";"), sheet.robot)
+    np.testing.assert_array_equal(log.joints, np.array(sheet.joints, dtype=float))
+    np.testing.assert_array_equal(log.forces, np.array(sheet.forces, dtype=float))
+    np.testing.assert_allclose(log.time, np.array(times) / 1e3, atol=1e-6)
+    short = [row[:4] for row in cells]
+    with pytest.raises(DataError, match="a row for each value, but no column Time_ms"):
+        read_log(written(tmp_path, short, ";"), sheet.robot)
 
 
 @each_machine

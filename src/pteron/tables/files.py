@@ -16,6 +16,7 @@ from pteron.errors import DataError, OutputError, shown
 from pteron.tables.csv_file import CsvFile
 from pteron.tables.dialect import PLAIN, Dialect
 from pteron.tables.parquet_file import ParquetFile
+from pteron.tables.stacked import side_by_side
 from pteron.tables.table import Table, listed, typed
 
 STANDARD_INPUT = "-"
@@ -56,7 +57,13 @@ def open_table(
                 f"{source}: is no regular file, and a {noun} is read twice; save it as a file"
             )
         if file.suffix.lower() == ".csv":
-            return CsvFile(file, source, dialect)
+            encoding = None if dialect is None else dialect.encoding
+            made = None if dialect is None else side_by_side(file, encoding, source)
+            if made is None:
+                return CsvFile(file, source, dialect)
+            table = CsvFile(made, source)
+            table.found = ("variables one below another",)
+            return table
         return ParquetFile(file, source)
 
 

@@ -32,8 +32,6 @@ _UNIT = re.compile(
 
 _KEYS = {"SymbolName", "SymbolComment", "SampleTime[ms]", "Data-Type", "Unit", "NetID"}
 """First cells of lines above the data in an export of TwinCAT Scope; that of the names is Name."""
-_VARIABLE = re.compile(r"\d+\.Variable")
-"""First cell of a line above the samples of one variable, in a trace of CODESYS."""
 _TICKS = 10**15
 """Milliseconds since its start that no export lasts: such times are ticks of 100 ns."""
 
@@ -181,11 +179,6 @@ def _names(
 ) -> tuple[tuple[str, ...], tuple[str, ...], bool]:
     """Return names and units of the columns, and whether the units have a line of their own."""
     width = rows.width
-    if any(_VARIABLE.fullmatch(one.cells[0]) for one in above):
-        raise DataError(
-            f"{source}: its variables stand one below another, each with its own times; put them "
-            "beside each other, one row a sample"
-        )
     # Rows may end in a separator that the names have not.
     fitting = [one for one in above if len(one.cells) in (width, width - 1)]
     fitting = [one for one in fitting if 2 * sum(map(bool, one.cells)) > width] or fitting[-1:]

@@ -10,8 +10,6 @@ from pteron.tables import declaration, listed
 
 _LONGEST = 60
 """A name longer than this is in no example."""
-_ROW_A_VALUE = {"VarName", "VarValue"}
-"""Columns of a log of WinCC, which has a row for each value."""
 
 
 def incomplete(
@@ -33,11 +31,6 @@ def incomplete(
     `families` are columns that are called alike, by number; `names` are all of the file's, `taken`
     those that have a meaning already, `needed` the documented ones.
     """
-    if set(names) >= _ROW_A_VALUE:
-        return DataError(
-            f"{source}: has a row for each value ({listed(names)}); put the variables beside each "
-            "other, one row a sample"
-        )
     example = _example(legs, table, stem, [name for name in names if name not in taken])
     others = next((one for one in families if numbers[0] in one), None)
     if others is None:
