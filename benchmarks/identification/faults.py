@@ -3,7 +3,7 @@
 A machine 20 % off its drawing moves along random Fourier series; its joints have friction, encoders
 round and 1 % of each force is noise. One fault is put in, the log is identified with another motion
 held out, and the model file's forces are compared with the machine's on a cycle as fast as the
-motion. Printed, and written to FAULTS.md beside this file: grades, what was named, and that error.
+motion. Printed, and written to docs/faults.md: grades, what was named, and that error.
 
     python benchmarks/identification/faults.py [--seeds 5] [--jobs 2] [MACHINE ...]
 """
@@ -349,7 +349,8 @@ def main() -> None:
     print(text)
     if asked.machines == list(MACHINES):
         atomic.write_text(
-            Path(__file__).with_name("FAULTS.md"), _HEAD.format(asked.seeds) + text + "\n"
+            Path(__file__).parents[2] / "docs" / "faults.md",
+            _HEAD.format(asked.seeds) + text + "\n",
         )
 
 
