@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from scipy.stats import chi2  # type: ignore[import-untyped]
@@ -25,17 +26,22 @@ _SEEN = 1e-3
 _AS_WELL = 0.7
 """Share of the clearest fault's statistic with which one of fewer sizes is taken in its place."""
 
+_CLEAR = 3.0
+"""Standard deviations of a mixture's size from which it is more than noise."""
+
 _ENOUGH = 2
 """Equations for each value, from which residuals tell of more values."""
 
 _BESIDE = 0.1
 """Share of the first fault's statistic that another one has at least."""
 
-_LENGTH = 0.05
-"""Error of the geometry, over the legs' size, beyond which it is another fault, told badly."""
+_LENGTH = 0.01
+"""Usual error of a length, over the legs' size: larger ones are another fault, told badly."""
+
+_MOSTLY = 0.5
 
 _TIMES = 3.0
-"""Friction that falls with speed, over the dry friction that is left, likewise."""
+"""Friction that falls with speed, over the dry friction that is left, beyond which it is none."""
 
 _MOST = 3
 """Faults that are named at most."""
@@ -43,13 +49,19 @@ _MOST = 3
 
 @dataclass(frozen=True)
 class Named:
-    """A family that was taken in: its sizes, the fit with it, and the families in before it."""
+    """A family that was taken in, the fit with it, and the families in before it.
+
+    `mix` is of its columns what is seen, and `sizes` are what they are multiplied by; a share
+    `likely` of what they explain is explained by sizes as usual errors have.
+    """
 
     family: Family
+    mix: Array
     sizes: Array
     deviations: Array
     chance: float
     fit: Estimate
+    likely: float = 1.0
     others: tuple[tuple[Family, Array], ...] = ()
 
 
@@ -57,7 +69,6 @@ def searched(suspects: Suspects, observations: Observations) -> tuple[Estimate, 
     """Return the fit of the model without faults, and the faults that the observations show."""
     p = len(suspects.model.names)
     named: list[Named] = []
-    taken: list[int] = []
     first = 0.0
     plain = weighted(observations.columns(range(p)))
     while len(named) < _MOST:
@@ -65,77 +76,101 @@ def searched(suspects: Suspects, observations: Observations) -> tuple[Estimate, 
         for k, family in enumerate(suspects.families):
             if family.name in (one.family.name for one in named):
                 continue
-            one, wald = _taken_in(suspects, observations, [*taken, k])
+            one, wald = _taken_in(suspects, observations, named, k)
             if one is not None and one.chance < _CHANCE and _is_possible(one, suspects):
-                clear.append((wald, k, one))
-        best = max((wald for wald, _, _ in clear), default=0.0)
+                clear.append((wald, one))
+        best = max((wald for wald, _ in clear), default=0.0)
         first = first or best
         # What is left beside a clear fault may be its own shape, which no column has exactly.
         if not best > _BESIDE * first:
             break
         # Of those that explain as much, the one of fewest sizes.
-        _, k, one = min(
+        _, one = min(
             (item for item in clear if item[0] >= _AS_WELL * best),
-            key=lambda item: (len(item[2].sizes), -item[0]),
+            key=lambda item: (len(item[1].sizes), -item[0]),
         )
-        taken.append(k)
         named.append(one)
     return plain, named
 
 
 def _taken_in(
-    suspects: Suspects, observations: Observations, families: Sequence[int]
+    suspects: Suspects, observations: Observations, before: Sequence[Named], k: int
 ) -> tuple[Named | None, float]:
-    """Return the last of the families as the fit with all of them sees it, and Wald's statistic."""
+    """Return a family, by its place, as it is seen beside those before it; and Wald's statistic.
+
+    Mixtures of its columns that are at right angles to the model's and to each other are tried
+    together. Those whose sizes are clear are then kept, and fitted alone: the others are noise.
+    """
     p = len(suspects.model.names)
     flat = observations.matrix.reshape(-1, observations.matrix.shape[-1])
-    known = np.linalg.qr(_scaled(flat[:, :p])[0])[0]
-    mixes, parts = [], [observations.matrix[..., :p]]
-    for k in families:
-        places = suspects.places[k]
-        columns, lengths = _scaled(flat[:, places])
-        new = columns - known @ (known.T @ columns)
-        _, sizes, ways = np.linalg.svd(new, full_matrices=False)
-        seen = ways[sizes > _SEEN].T
-        mixes.append(seen / lengths[:, None])
-        parts.append(observations.matrix[..., places] @ mixes[-1])
-        known = np.hstack([known, np.linalg.qr(new @ seen)[0]])
-    q = mixes[-1].shape[1]
+    known = _scaled(flat[:, :p])[0]
+    taken = [suspects.families.index(one.family) for one in before]
+    mixes = [one.mix for one in before]
+    made = [flat[:, suspects.places[j]] @ mix for j, mix in zip(taken, mixes, strict=True)]
+    known = np.linalg.qr(np.hstack([known, *(_scaled(part)[0] for part in made)]))[0]
+    columns, lengths = _scaled(flat[:, suspects.places[k]])
+    _, seen, ways = np.linalg.svd(columns - known @ (known.T @ columns), full_matrices=False)
+    mix = ways[seen > _SEEN].T / lengths[:, None]
+    q = mix.shape[1]
     if q == 0 or observations.rows < _ENOUGH * (p + q):
         return None, 0.0
-    matrix = np.concatenate(parts, axis=-1)
-    names = tuple(map(str, range(matrix.shape[-1])))
-    fit = weighted(replace(observations, matrix=matrix, names=names, units=names, kinds=()))
-    size, covariance = fit.values[-q:], fit.covariance[-q:, -q:]
+
+    def fitted(mix: Array) -> tuple[Estimate, Array, Array]:
+        """Return the fit with these mixtures, their sizes, and the sizes' covariance."""
+        places = [suspects.places[j] for j in (*taken, k)]
+        parts = [
+            observations.matrix[..., place] @ one
+            for place, one in zip(places, (*mixes, mix), strict=True)
+        ]
+        matrix = np.concatenate([observations.matrix[..., :p], *parts], axis=-1)
+        names = tuple(map(str, range(matrix.shape[-1])))
+        fit = weighted(replace(observations, matrix=matrix, names=names, units=names, kinds=()))
+        last = slice(matrix.shape[-1] - mix.shape[1], None)
+        return fit, fit.values[last], fit.covariance[last, last]
+
+    fit, size, covariance = fitted(mix)
     unit = np.sqrt(np.diag(covariance))
     standard = size / unit
     wald = float(standard @ np.linalg.solve(covariance / np.outer(unit, unit), standard))
-    ends = np.cumsum([p, *(mix.shape[1] for mix in mixes)])
-    found = [mix @ fit.values[a:b] for mix, a, b in zip(mixes, ends[:-1], ends[1:], strict=True)]
-    before = [suspects.families[k] for k in families[:-1]]
-    mix = mixes[-1]
-    return Named(
-        suspects.families[families[-1]],
-        found[-1],
-        np.sqrt(np.einsum("ij,jk,ik->i", mix, covariance, mix)),
-        float(chi2.sf(wald, q)),
-        fit,
-        tuple(zip(before, found[:-1], strict=True)),
-    ), wald
+    chance = float(chi2.sf(wald, q))
+    clear = np.abs(standard) > _CLEAR
+    if chance < _CHANCE and clear.any() and not clear.all():
+        mix = mix[:, clear]
+        fit, size, covariance = fitted(mix)
+    ends = np.cumsum([p, *(one.shape[1] for one in mixes)])
+    others = [
+        (one.family, one.mix @ fit.values[start:stop])
+        for one, (start, stop) in zip(before, pairwise(ends), strict=True)
+    ]
+    deviations = np.sqrt(np.einsum("ij,jk,ik->i", mix, covariance, mix))
+    family = suspects.families[k]
+    usual = _likely(size, covariance, mix, suspects) if family.unit == "m" else 1.0
+    return Named(family, mix, mix @ size, deviations, chance, fit, usual, tuple(others)), wald
+
+
+def _likely(size: Array, covariance: Array, mix: Array, suspects: Suspects) -> float:
+    """Return what share of Wald's statistic lengths explain that are off by usual errors alone."""
+    spread = _LENGTH * float(np.mean([leg.size for leg in suspects.robot.legs]))
+    back = spread * np.linalg.pinv(mix)
+    both = back @ back.T + covariance
+    # The most likely sizes leave C (C0 + C)^-1 of what was found.
+    left = np.linalg.solve(both, size)
+    unit = np.sqrt(np.diag(covariance))
+    standard = size / unit
+    whole = float(standard @ np.linalg.solve(covariance / np.outer(unit, unit), standard))
+    return 1.0 - float(left @ covariance @ left) / whole
 
 
 def _is_possible(one: Named, suspects: Suspects) -> bool:
     """Say whether sizes can be those of the fault: friction brakes, errors of lengths are small."""
     family = one.family
     largest = family.largest
-    if family.unit == "m":
-        largest = _LENGTH * float(np.mean([leg.size for leg in suspects.robot.legs]))
-    elif family.speed is not None:
+    if family.speed is not None:
         dry = suspects.model.per_joint("coulomb", np.abs(suspects.values))
         largest = np.inf if dry is None else _TIMES * float(dry.max())
-    if family.positive and not (one.sizes / one.deviations).sum() > 0.0:
+    if family.positive and not (one.sizes / np.maximum(one.deviations, 1e-300)).sum() > 0.0:
         return False
-    return bool(np.abs(one.sizes).max() < largest)
+    return one.likely > _MOSTLY and bool(np.abs(one.sizes).max() < largest)
 
 
 def _scaled(columns: Array) -> tuple[Array, Array]:
