@@ -11,8 +11,10 @@ from scipy.interpolate import make_interp_spline
 
 import pteron
 from pteron.identification import Processing, Terms, identification_model, identify
+from pteron.identification.faults import trial
 from pteron.identification.faults.moved import Moved, lengths_of
 from pteron.identification.faults.suspects import Suspects, families_of
+from pteron.identification.recordings import recording
 from pteron.identification.signals import States
 from pteron.legs import Drive, Stribeck
 from pteron.workspace import home_pose
@@ -244,3 +246,12 @@ def test_every_family_names_its_columns():
     suspects = Suspects(model, values, np.ones(4), 0.0, 1.0, families_of(robot))
     assert len(suspects.names) == len(suspects.units) == len(suspects.kinds)
     assert suspects.places[-1][-1] == len(suspects.names) - 1
+
+
+def test_a_log_too_short_for_the_trial_is_not_refused():
+    robot, log, _ = clean("delta")
+    result = found(robot, noisy(log))
+    (how,) = result.preprocessing
+    slow = replace(how, derivatives="central", cutoff=0.5)  # its edges leave nothing
+    shown = trial(result.model, result.estimate, recording(log.part(0, 1000)), slow)
+    assert (shown.tried, shown.suspicions) == ((), ())

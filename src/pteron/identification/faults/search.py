@@ -39,6 +39,7 @@ _LENGTH = 0.01
 """Usual error of a length, over the legs' size: larger ones are another fault, told badly."""
 
 _MOSTLY = 0.5
+"""Share of what lengths explain that errors of the usual size explain too, at least."""
 
 _TIMES = 3.0
 """Friction that falls with speed, over the dry friction that is left, beyond which it is none."""
@@ -129,11 +130,9 @@ def _taken_in(
         return fit, fit.values[last], fit.covariance[last, last]
 
     fit, size, covariance = fitted(mix)
-    unit = np.sqrt(np.diag(covariance))
-    standard = size / unit
-    wald = float(standard @ np.linalg.solve(covariance / np.outer(unit, unit), standard))
+    wald = _wald(size, covariance)
     chance = float(chi2.sf(wald, q))
-    clear = np.abs(standard) > _CLEAR
+    clear = np.abs(size) > _CLEAR * np.sqrt(np.diag(covariance))
     if chance < _CHANCE and clear.any() and not clear.all():
         mix = mix[:, clear]
         fit, size, covariance = fitted(mix)
@@ -155,10 +154,14 @@ def _likely(size: Array, covariance: Array, mix: Array, suspects: Suspects) -> f
     both = back @ back.T + covariance
     # The most likely sizes leave C (C0 + C)^-1 of what was found.
     left = np.linalg.solve(both, size)
+    return 1.0 - float(left @ covariance @ left) / _wald(size, covariance)
+
+
+def _wald(size: Array, covariance: Array) -> float:
+    """Return Wald's statistic of sizes (q,) that may all be zero."""
     unit = np.sqrt(np.diag(covariance))
     standard = size / unit
-    whole = float(standard @ np.linalg.solve(covariance / np.outer(unit, unit), standard))
-    return 1.0 - float(left @ covariance @ left) / whole
+    return float(standard @ np.linalg.solve(covariance / np.outer(unit, unit), standard))
 
 
 def _is_possible(one: Named, suspects: Suspects) -> bool:

@@ -103,15 +103,15 @@ def trial(
     preprocessing : Preprocessing
         How it was preprocessed.
     """
+    nothing = np.full(len(model.robot.legs), np.nan)
     log, how = _looked_at(model, recording, preprocessing)
-    states = [block.states for block in samples(model.robot, log, how)]
-    suspects = _suspects(model, estimate, log, how, states)
 
     # Which faults the residuals show
-    nothing = np.full(len(model.robot.legs), np.nan)
-    if np.abs(estimate.residuals).max() < _EXACT * np.abs(log.forces).max():
-        suspects = replace(suspects, families=())
     try:
+        states = [block.states for block in samples(model.robot, log, how)]
+        suspects = _suspects(model, estimate, log, how, states)
+        if np.abs(estimate.residuals).max() < _EXACT * np.abs(log.forces).max():
+            suspects = replace(suspects, families=())
         plain, named = searched(suspects, observations_of(suspects, log, how))
     except LogError:  # what is looked at is too little by itself
         return Trial((), (), nothing, nothing)
