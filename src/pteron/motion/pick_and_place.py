@@ -13,34 +13,12 @@ from pteron.kernels import Array
 from pteron.kinematics.evaluate import checked
 from pteron.manipulator import Manipulator
 from pteron.motion.cycle import Cycle, moves
+from pteron.motion.motion import Motion
 from pteron.motion.scaling import LEAST_RESERVE, TURN, scaled_to_reach
 from pteron.shapes import PoseLike
 
 PEAK_ACCELERATION = 10.0
 """Of the tool's centre point, where no duration is given, m/s^2."""
-
-
-@dataclass(frozen=True)
-class Motion:
-    """A motion of the platform, sampled in time; the derivatives are exact.
-
-    Attributes
-    ----------
-    time : array, shape (T,)
-        s, ascending from 0.
-    pose, velocity, acceleration : array, shape (T, m)
-        m, rad and s.
-    """
-
-    time: Array
-    pose: Array
-    velocity: Array
-    acceleration: Array
-
-    @property
-    def duration(self) -> float:
-        """Time from the first sample to the last, s."""
-        return float(self.time[-1] - self.time[0])
 
 
 @dataclass(frozen=True)
