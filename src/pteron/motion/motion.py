@@ -1,0 +1,103 @@
+"""A motion of the platform as samples in time, and what it is between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pteron.errors import DataError
+from pteron.kernels import Array
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A motion of the platform, sampled in time.
+
+    Attributes
+    ----------
+    time : array, shape (T,)
+        s, ascending.
+    pose, velocity, acceleration : array, shape (T, m)
+        m, rad and s.
+    """
+
+    time: Array
+    pose: Array
+    velocity: Array
+    acceleration: Array
+
+    @property
+    def duration(self) -> float:
+        """Time from the first sample to the last, s."""
+        return float(self.time[-1] - self.time[0])
+
+    def at(self, time: ArrayLike) -> tuple[Array, Array, Array]:
+        """Return pose, velocity and acceleration at any times.
+
+        Between two samples the pose is the polynomial of the fifth degree that has their poses,
+        velocities and accelerations; before the first and after the last the platform rests there.
+
+        Parameters
+        ----------
+        time : array, shape (...)
+            s.
+
+        Returns
+        -------
+        pose, velocity, acceleration : array, shape (..., m)
+            m, rad and s.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from pteron.motion import Motion
+        >>> time = np.linspace(0.0, 1.0, 11)
+        >>> wave = np.sin(time), np.cos(time), -np.sin(time)
+        >>> motion = Motion(time, *(part[:, None] for part in wave))
+        >>> float(abs(motion.at(0.55)[0][0] - np.sin(0.55))) < 1e-9
+        True
+        """
+        asked = np.asarray(time, dtype=float)
+        within = np.clip(asked, self.time[0], self.time[-1])
+        k = np.clip(np.searchsorted(self.time, within, side="right") - 1, 0, len(self.time) - 2)
+        span = (self.time[k + 1] - self.time[k])[..., None]
+        u = (within - self.time[k])[..., None] / span
+        p, v, a = self.pose[k], span * self.velocity[k], 0.5 * span**2 * self.acceleration[k]
+        # What is left for the terms of third to fifth degree, at the next sample.
+        dp = self.pose[k + 1] - p - v - a
+        dv = span * self.velocity[k + 1] - v - 2.0 * a
+        da = 0.5 * span**2 * self.acceleration[k + 1] - a
+        c = 10.0 * dp - 4.0 * dv + da
+        d = -15.0 * dp + 7.0 * dv - 2.0 * da
+        e = 6.0 * dp - 3.0 * dv + da
+        pose = p + u * (v + u * (a + u * (c + u * (d + u * e))))
+        velocity = (v + u * (2.0 * a + u * (3.0 * c + u * (4.0 * d + u * 5.0 * e)))) / span
+        acceleration = (2.0 * a + u * (6.0 * c + u * (12.0 * d + u * 20.0 * e))) / span**2
+        moving = (asked == within)[..., None]
+        return pose, np.where(moving, velocity, 0.0), np.where(moving, acceleration, 0.0)
+
+    def repeated(self, count: int) -> Motion:
+        """Return the motion done several times, one after the other; it must end where it begins.
+
+        Raises
+        ------
+        DataError
+            If the motion does not end at the pose, and with the velocity, of its beginning.
+        """
+        if count < 1:
+            raise DataError(f"count: {count} given, 1 or more expected")
+        ends = [np.abs(part[-1] - part[0]).max() for part in (self.pose, self.velocity)]
+        if max(ends) > 1e-9:
+            raise DataError(
+                f"the motion ends {ends[0]:.3g} m or rad from where it begins, and its velocity "
+                f"differs by {ends[1]:.3g}: it cannot be repeated"
+            )
+        starts = self.duration * np.arange(count)
+        time = np.add.outer(starts, self.time[:-1] - self.time[0]).ravel()
+        parts = (
+            np.concatenate([np.tile(part[:-1], (count, 1)), part[-1:]])
+            for part in (self.pose, self.velocity, self.acceleration)
+        )
+        return Motion(np.append(time, count * self.duration), *parts)
