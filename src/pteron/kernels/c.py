@@ -37,6 +37,7 @@ from pteron.kernels.code import (
     rendered,
     single_precision,
 )
+from pteron.kernels.exponential import straight
 from pteron.kernels.graph import Graph, graph_of
 from pteron.kernels.kernel import SHARE, Array, ArrayKernel, Port
 
@@ -92,8 +93,20 @@ def module_source(
 
     The arrays of the caller are read as they lie in memory.
     """
+    values = module_values(name, graph, inputs, outputs, c_language(dtype))
+    return module_of("module.c.j2", values, dtype, block)
+
+
+def module_of(template: str, values: Mapping[str, Any], dtype: str, block: int = 32) -> str:
+    """Return the C of a template of a module, of what `module_values` returns."""
+    real = "float" if dtype == "float32" else "double"
+    return rendered("pteron.kernels", template, real=real, block=block, **values)
+
+
+def c_language(dtype: str) -> Language:
+    """Return how modules in C are written."""
     printed = single_precision(C) if dtype == "float32" else C
-    language = Language(
+    return Language(
         printed
         | {
             "sin": "sincos_({0}).sine",
@@ -110,9 +123,6 @@ def module_source(
         stored="out[{0}][k] = {1};",
         returned="{0}[{1}] = {2};",
     )
-    values = module_values(name, graph, inputs, outputs, language)
-    real = "float" if dtype == "float32" else "double"
-    return rendered("pteron.kernels", "module.c.j2", real=real, block=block, **values)
 
 
 class Code:
@@ -135,7 +145,7 @@ class Code:
     def source(self) -> str:
         """The C code."""
         function, outputs = self._program
-        graph = graph_of(function, self.ports)
+        graph = graph_of(straight(function), self.ports)
         return module_source(self.name, graph, self.ports, outputs, self.dtype)
 
     @property

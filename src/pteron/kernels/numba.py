@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 from pteron.errors import ModelError
 from pteron.kernels.cache import digest, entry, find
 from pteron.kernels.code import PYTHON, Language, module_values, rendered
+from pteron.kernels.exponential import straight
 from pteron.kernels.graph import Graph, graph_of
 from pteron.kernels.kernel import Array, ArrayKernel, Port
 
@@ -36,7 +37,7 @@ class Jitted(ArrayKernel):
     @cached_property
     def source(self) -> str:
         """The Python code."""
-        graph = graph_of(self.function, self.ports)
+        graph = graph_of(straight(self.function), self.ports)
         return _source(self.name, graph, self.ports, self.outputs)
 
     @property

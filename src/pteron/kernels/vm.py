@@ -8,6 +8,7 @@ from functools import cached_property, lru_cache
 import casadi as ca
 
 from pteron.bodies.motion import Expression
+from pteron.kernels.exponential import straight
 from pteron.kernels.graph import Node, expression, function_like, graph_of
 from pteron.kernels.kernel import Array, ArrayKernel
 from pteron.kernels.sincos import LIMIT, near
@@ -27,7 +28,7 @@ class VirtualMachine(ArrayKernel):
 
     @cached_property
     def _lowered(self) -> ca.Function:
-        return _lowered(self.function)
+        return _lowered(straight(self.function))
 
     def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
         shared = tuple(i for i, port in enumerate(self.ports) if port.shared)
