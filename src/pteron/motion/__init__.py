@@ -3,6 +3,7 @@
 from pteron.motion.joint_points import Guide, JointPoints, Part, joint_guides, joint_points
 from pteron.motion.motion import Motion
 from pteron.motion.overloads import overloads
+from pteron.motion.payload import with_payload
 from pteron.motion.pick_and_place import PickAndPlace, pick_and_place
 from pteron.motion.scaling import scaled_to_reach
 
@@ -17,4 +18,5 @@ __all__ = [
     "overloads",
     "pick_and_place",
     "scaled_to_reach",
+    "with_payload",
 ]

@@ -1,0 +1,67 @@
+"""A machine that carries a payload."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from pteron.bodies.inertia import PlanarInertia
+from pteron.errors import DataError, ModelError
+from pteron.manipulator import Manipulator
+
+
+def with_payload(robot: Manipulator, mass: float) -> Manipulator:
+    """Return the machine with a point mass at the tool's centre point.
+
+    It is the same machine whose platform is heavier: m + m_L, m gamma + m_L s and I + m_L |s|^2,
+    s being `platform.tool` across the platform's axis.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    mass : float
+        Of the payload m_L, kg; 0 or more.
+
+    Returns
+    -------
+    Manipulator
+
+    Raises
+    ------
+    DataError
+        If the mass is not a finite number of 0 or more.
+    ModelError
+        If the platform slides, as that of an I4, and its tool is off the axis: what turns with such
+        a tool has a first moment that the model of the platform has not.
+
+    Examples
+    --------
+    >>> import numpy as np, pteron
+    >>> from pteron.motion import with_payload
+    >>> robot = pteron.load("quadrupteron")
+    >>> with_payload(robot, 0.5).platform.inertia.mass
+    1.3
+    """
+    try:
+        carried = float(mass)
+    except (TypeError, ValueError):
+        carried = math.nan
+    if not (math.isfinite(carried) and carried >= 0.0):
+        raise DataError(f"payload: {mass!r} given, a mass of 0 kg or more expected")
+    platform = robot.platform
+    x, y, _ = platform.tool
+    if platform.slides and carried > 0.0 and (x, y) != (0.0, 0.0):
+        raise ModelError(
+            f"platform.tool is {math.hypot(x, y):g} m off the axis of a platform that slides, "
+            "where a payload cannot be modelled; give the tool [0, 0, z]",
+            subject=robot.name,
+        )
+    own = platform.inertia
+    hx, hy = own.first_moment
+    heavier = PlanarInertia(
+        own.mass + carried,
+        (hx + carried * x, hy + carried * y),
+        own.inertia + carried * (x * x + y * y),
+    )
+    return replace(robot, platform=replace(platform, inertia=heavier))
