@@ -1,7 +1,7 @@
 """Where a machine can work: its reserves, its home pose, its reach and its joints' ranges."""
 
+from pteron.kinematics.limits import LimitedJoint, limited_joints
 from pteron.workspace.home import home_pose
-from pteron.workspace.limits import LimitedJoint, limited_joints
 from pteron.workspace.reach import BEYOND_LIMITS, REACHABLE, ReachSlice, reach_slice
 from pteron.workspace.reserve import JointRanges, Reserve, joint_ranges, reserve
 from pteron.workspace.volume import ReachVolume, bounding_box, reach_volume

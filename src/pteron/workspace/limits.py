@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-
-import casadi as ca
 import numpy as np
 from scipy.optimize import minimize  # type: ignore[import-untyped]
 
-from pteron.equations.kinematics import passive_joints
-from pteron.equations.machine import Machine
 from pteron.errors import ModelError
 from pteron.kernels import Array, numeric
+from pteron.kinematics.limits import limited_joints
 from pteron.kinematics.sampling import search_ball
-from pteron.legs.leg import Passive
 from pteron.manipulator import Manipulator
 from pteron.manipulator.manipulator import told_legs
 from pteron.workspace.reserve import room_to_limits
@@ -84,56 +78,3 @@ def beyond_limits(robot: Manipulator, poses: Array) -> ModelError:
         f"{', '.join(told)}; widen limits or move the guide points",
         subject=robot.name,
     )
-
-
-@dataclass(frozen=True)
-class LimitedJoint:
-    """A joint that has limits, and where it is in a pose.
-
-    Attributes
-    ----------
-    leg : int
-        Its leg, from 1; 0 for the platform's angle.
-    noun : str
-        What it is: "slider", "elbow", ...
-    actuated : bool
-        Whether a drive moves it.
-    unit : str
-        Of the numbers, "m" or "rad".
-    value, least, most : float
-        Where it is, and its limits.
-    only_most : bool
-        Whether it is never below zero, as the angle in a cone, and only its greatest value a limit.
-    """
-
-    leg: int
-    noun: str
-    actuated: bool
-    unit: str
-    value: float
-    least: float
-    most: float
-    only_most: bool = False
-
-    def told_limits(self, told: Callable[..., str]) -> str:
-        """Return its limits as words; `told` turns a value and the unit into text."""
-        most = told(self.most, self.unit)
-        return f"at most {most}" if self.only_most else f"{told(self.least, self.unit)} to {most}"
-
-
-def limited_joints(robot: Manipulator, pose: Array) -> tuple[LimitedJoint, ...]:
-    """Return all joints that have limits, actuated and passive, at a pose (m,) in reach."""
-    joints = numeric(robot, "joint_coordinates")(pose)[0]
-    angle, *legs = passive_joints(Machine.of(robot), ca.SX(ca.DM(pose)))
-    found = [_limited(0, joint) for joint in angle]
-    for i, (leg, q, passive) in enumerate(zip(robot.legs, joints, legs, strict=True), start=1):
-        if leg.limits is not None:
-            own = leg.joint
-            found.append(LimitedJoint(i, own.noun, True, own.unit, float(q), *leg.limits))
-        found += [_limited(i, joint) for joint in passive]
-    return tuple(found)
-
-
-def _limited(leg: int, at: Passive) -> LimitedJoint:
-    limits = at.least, at.most, at.only_most
-    return LimitedJoint(leg, at.noun, False, at.unit, float(at.value), *limits)

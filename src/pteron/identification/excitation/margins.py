@@ -22,9 +22,9 @@ from pteron.identification.excitation.movement import Movement, State
 from pteron.identification.signals.states import home
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import unchecked
+from pteron.kinematics.limits import limited_joints
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator
-from pteron.workspace.limits import limited_joints
 from pteron.workspace.reserve import clearances
 
 _REFINED = 33
