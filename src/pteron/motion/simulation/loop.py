@@ -1,0 +1,192 @@
+"""From sample to sample: forces are asked for, limited and delayed, and the plant goes on."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from pteron.dynamics import drive_accelerations
+from pteron.kernels import Array, numeric
+from pteron.manipulator import Manipulator
+from pteron.motion.motion import Motion
+from pteron.motion.simulation.plant import Plant
+from pteron.motion.simulation.result import Simulation
+from pteron.motion.simulation.sensors import Encoders
+from pteron.motion.simulation.stops import (
+    first_beyond_limits,
+    first_singular,
+    told_limit,
+    told_pose,
+    told_singular,
+    why_not_further,
+)
+
+_WHOLE = 1e-9
+"""Share of a sample that is none."""
+
+
+class Law(Protocol):
+    """What a controller does for one machine; `pteron.motion.controllers` has some."""
+
+    def memory(self, pose: Array, velocity: Array) -> Array:
+        """Return what it knows at the start, (K,)."""
+
+    def __call__(
+        self,
+        pose: Array,
+        velocity: Array,
+        acceleration: Array,
+        joints: Array,
+        joint_rates: Array,
+        memory: Array,
+    ) -> tuple[Array, Array]:
+        """Return forces (n,) and what it knows next, of the reference and the measured joints."""
+
+
+class Source(Protocol):
+    """Where forces come from, sample by sample."""
+
+    memory: Array
+
+    def forces(self, k: int, joints: Array, rates: Array) -> Array:
+        """Return what is asked of the drives, (n,), at sample k."""
+
+
+class Given:
+    """Forces that depend on time alone."""
+
+    def __init__(self, of_time: Callable[[float], Array], time: Array) -> None:
+        self._of_time, self._time = of_time, time
+        self.memory = np.empty(0)
+
+    def forces(self, k: int, joints: Array, rates: Array) -> Array:
+        """Return them."""
+        return self._of_time(float(self._time[k]))
+
+
+class Controlled:
+    """Forces of a controller that sees the joints."""
+
+    def __init__(
+        self, law: Law, encoders: Encoders, reference: Motion, pose: Array, velocity: Array
+    ) -> None:
+        self._law, self._encoders, self._reference = law, encoders, reference
+        self.memory = law.memory(pose, velocity)
+
+    def forces(self, k: int, joints: Array, rates: Array) -> Array:
+        """Return what its law asks for."""
+        at = self._reference
+        found, self.memory = self._law(
+            at.pose[k],
+            at.velocity[k],
+            at.acceleration[k],
+            *self._encoders.read(joints, rates),
+            self.memory,
+        )
+        return found
+
+
+@dataclass(frozen=True)
+class Loads:
+    """What the platform carries, and what else acts on it, at each sample."""
+
+    masses: Array
+    machines: Mapping[float, Manipulator]
+    """The machine with each of the masses."""
+    wrench: Callable[[float], Array]
+
+
+def run(
+    robot: Manipulator,
+    plant: Plant,
+    source: Source,
+    reference: Motion,
+    loads: Loads,
+    delay: float,
+    *,
+    limits: bool,
+) -> Simulation:
+    """Simulate; `limits` says whether joints' limits and singularities of type II end it."""
+    time = reference.time
+    joints_of, rates_of = numeric(robot, "joint_coordinates"), numeric(robot, "joint_rates")
+    most = _most(robot)
+    # A command acts `whole` samples and a part of one after it was asked for; before there are any,
+    # the first one holds the machine.
+    period = float(time[1] - time[0])
+    whole = int(delay / period + _WHOLE)
+    late = max(delay - whole * period, 0.0)
+    late = late if late > _WHOLE * period else 0.0
+    commands: deque[Array] = deque(maxlen=whole + 2)
+    rows: list[tuple[Array, ...]] = []
+    why = None
+    for k, now in enumerate(time):
+        joints = joints_of(plant.pose)[0]
+        rates = rates_of(plant.pose, plant.velocity)[0]
+        asked = source.forces(k, joints, rates)
+        commands.append(np.clip(asked, -most, most))
+        while len(commands) < whole + 2:
+            commands.append(commands[0])
+        before, after = commands[0], commands[1]
+        forces = before if late else after
+        rows.append((plant.pose, plant.velocity, joints, rates, forces, asked, source.memory))
+        if not np.isfinite(asked).all():
+            why = f"no forces are asked for at the joints {told_pose(joints)}: the law has none"
+            break
+        if k + 1 < len(time):
+            loaded = loads.machines[float(loads.masses[k])]
+            span, wrench = float(time[k + 1] - now), loads.wrench(float(now))
+            if not (
+                plant.go(loaded, late, before, wrench)
+                and plant.go(loaded, span - late, after, wrench)
+            ):
+                why = why_not_further(robot, plant.pose, plant.velocity)
+                break
+    columns = [np.array(column) for column in zip(*rows, strict=True)]
+    end = len(rows)
+    if limits:
+        ends = {
+            first_beyond_limits(robot, columns[0], columns[2]): told_limit,
+            first_singular(robot, columns[0]): told_singular,
+        }
+        first = min((k for k in ends if k is not None), default=None)
+        if first is not None:
+            end, why = first + 1, ends[first](robot, columns[0][first])
+    stopped = None if why is None else f"at {min(plant.time, time[end - 1]):.4g} s: {why}"
+    pose, velocity, joints, rates, forces, asked, memory = (part[:end] for part in columns)
+    acceleration = np.empty_like(pose)
+    wrenches = np.array([loads.wrench(float(t)) for t in time[:end]])
+    for mass, loaded in loads.machines.items():
+        at = loads.masses[:end] == mass
+        acceleration[at] = drive_accelerations(
+            loaded, pose[at], velocity[at], forces[at], wrenches[at], on_failure="nan"
+        )
+    return Simulation(
+        robot,
+        time[:end],
+        pose,
+        velocity,
+        acceleration,
+        joints,
+        rates,
+        forces,
+        asked,
+        Motion(*(part[:end] for part in (time, *_parts(reference)))),
+        loads.masses[:end],
+        memory,
+        plant.step,
+        stopped,
+    )
+
+
+def _parts(motion: Motion) -> tuple[Array, Array, Array]:
+    return motion.pose, motion.velocity, motion.acceleration
+
+
+def _most(robot: Manipulator) -> Array:
+    """Return what each drive can give, (n,)."""
+    limits = (leg.drive.max_force if leg.drive else None for leg in robot.legs)
+    return np.array([np.inf if limit is None else limit for limit in limits])

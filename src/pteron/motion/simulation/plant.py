@@ -1,0 +1,165 @@
+"""The machine that is simulated: its state goes on under the forces of its drives."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.integrate import DOP853  # type: ignore[import-untyped]
+
+from pteron.dynamics import mass_matrix
+from pteron.equations.drives import Drives, drive_numbers
+from pteron.errors import DataError, PteronError
+from pteron.kernels import Array, numeric
+from pteron.kernels.steps import steps
+from pteron.kinematics import jacobian
+from pteron.manipulator import Manipulator
+from pteron.shapes import PoseLike
+
+Method = Literal["rk4", "dop853"]
+
+_STABLE = 2.0
+"""Runge and Kutta's method of fourth order is stable up to a decay of 2.78 within a step."""
+
+_SHORTEST = 1e-8
+"""s; what asks for shorter steps is a mistake in the file."""
+
+
+def advance(
+    robot: Manipulator,
+    pose: PoseLike,
+    velocity: PoseLike,
+    forces: ArrayLike,
+    step: float,
+    count: int,
+    wrench: PoseLike | None = None,
+) -> tuple[Array, Array, Any]:
+    """Return where machines are after some steps of Runge and Kutta's method of fourth order.
+
+    The equations are those of `drive_accelerations`: friction and the motors' inertia count. Where
+    there is a C compiler the steps are one loop of machine code, which is compiled when it is first
+    asked for; the machines of a batch share the width of a vector.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    pose, velocity : array, shape (..., m)
+        The platform's state; m, rad and s.
+    forces : array, shape (..., n)
+        Of the drives, N at a slider, N m at a crank; they stay as they are.
+    step : float
+        Length of a step, s; see `longest_step`.
+    count : int
+        How many.
+    wrench : array, shape (..., m), optional
+        What acts on the platform at P all the while: a force in N and, where it turns, a moment
+        about k in N m.
+
+    Returns
+    -------
+    pose, velocity : array, shape (..., m)
+        At the end; of a machine that cannot go on, where it came to.
+    status : array of bool, shape (...)
+        Whether all steps were made: not where a leg is out of reach or singular (type I).
+
+    Examples
+    --------
+    >>> import numpy as np, pteron
+    >>> from pteron.motion import advance
+    >>> robot = pteron.load("tripteron")
+    >>> pose, velocity, status = advance(robot, np.zeros(3), np.zeros(3), np.zeros(3), 1e-4, 100)
+    >>> bool(status), bool(np.allclose(velocity, [0.0, 0.0, -0.0981], atol=0.1))
+    (True, True)
+    """
+    span = np.array([step, count], dtype=float)
+    given = [pose, velocity, forces, *([] if wrench is None else [wrench])]
+    found = steps(robot, wrench=wrench is not None)(*given, span)
+    return found[0], found[1], found[2] == count
+
+
+def longest_step(robot: Manipulator, poses: PoseLike) -> float:
+    """Return the longest step that friction allows, s: infinite for a machine without friction.
+
+    Next to rest a drive's dry friction is like a damper of coulomb / rest_speed, which makes a rate
+    decay fast; the steps must follow that. The poses, (..., m), are where it may come to rest.
+    """
+    own = Drives(*drive_numbers(robot).reshape(len(Drives._fields), -1))
+    damping = own.viscous + (own.coulomb + own.stribeck) / own.rest_speed
+    if not damping.any():
+        return float("inf")
+    rows = jacobian(robot, poses)
+    mass = mass_matrix(robot, poses) + rows.mT @ (own.inertia[:, None] * rows)
+    decay = np.linalg.eigvals(np.linalg.solve(mass, rows.mT @ (damping[:, None] * rows)))
+    return _STABLE / float(np.abs(decay).max())
+
+
+_LEAST = 1e-9
+"""Share of a span in which a method of adaptive steps that makes such short ones goes nowhere."""
+
+
+class Plant:
+    """A machine's state, which goes on from sample to sample, until it cannot."""
+
+    def __init__(
+        self, pose: Array, velocity: Array, method: Method, step: float, tolerance: float
+    ) -> None:
+        self.pose, self.velocity, self.time = pose, velocity, 0.0
+        self.step = step if method == "rk4" else float("nan")
+        self._tolerance = tolerance
+        self._go = self._fixed if method == "rk4" else self._adaptive
+
+    def go(self, robot: Manipulator, span: float, forces: Array, wrench: Array) -> bool:
+        """Go on by a span, as the machine is now; return whether it was made whole."""
+        return span <= 0.0 or self._go(robot, span, forces, wrench)
+
+    def _fixed(self, robot: Manipulator, span: float, forces: Array, wrench: Array) -> bool:
+        count = int(np.ceil(span / self.step - 1e-9))
+        how = np.array([span / count, count])
+        moved = steps(robot, wrench=True)(self.pose, self.velocity, forces, wrench, how)
+        self.pose, self.velocity, done = moved
+        self.time += float(done) * span / count
+        return bool(done == count)
+
+    def _adaptive(self, robot: Manipulator, span: float, forces: Array, wrench: Array) -> bool:
+        accelerations = numeric(robot, "drive_accelerations", wrench=True)
+        m = len(self.pose)
+
+        def rates(_: float, state: Array) -> Array:
+            velocity = state[m:]
+            found, status = accelerations(state[:m], velocity, forces, wrench)
+            return np.concatenate([velocity, found if status else np.full(m, np.nan)])
+
+        state = np.concatenate([self.pose, self.velocity])
+        if not np.isfinite(rates(0.0, state)).all():
+            return False
+        solver = DOP853(
+            rates,
+            self.time,
+            state,
+            self.time + span,
+            first_step=span,  # its own choice goes on forever where the machine cannot be
+            rtol=self._tolerance,
+            atol=1e-3 * self._tolerance,
+        )
+        while solver.status == "running":
+            solver.step()
+            if solver.step_size < _LEAST * span:
+                break
+        self.time, self.pose, self.velocity = float(solver.t), solver.y[:m], solver.y[m:]
+        return bool(solver.status == "finished")
+
+
+def allowed_step(robot: Manipulator, poses: Array, step: float) -> float:
+    """Return the given step, or the longest that friction allows, or refuse a drive's numbers."""
+    try:
+        longest = longest_step(robot, poses)
+    except PteronError:
+        return step  # the first sample says what is wrong with the pose
+    if longest < _SHORTEST:
+        raise DataError(
+            f"drives: their friction at rest asks for steps below {_SHORTEST:g} s; make rest_speed "
+            "larger, or coulomb smaller",
+        )
+    return min(step, longest)

@@ -1,0 +1,103 @@
+"""What a simulation was: its samples, and why it ended."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pteron.kernels import Array
+from pteron.manipulator import Manipulator
+from pteron.motion.motion import Motion
+
+if TYPE_CHECKING:
+    import polars as pl
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """A machine's motion under the forces of its drives, at each sample of the controller.
+
+    Attributes
+    ----------
+    robot : Manipulator
+        The machine that moved.
+    time : array, shape (T,)
+        s, from 0.
+    pose, velocity, acceleration : array, shape (T, m)
+        Of the platform; m, rad and s. The acceleration is the one right after the sample.
+    joints, joint_rates : array, shape (T, n)
+        m and m/s; rad and rad/s at cranks.
+    forces : array, shape (T, n)
+        What the drives give from this sample on, limits and delay included; N, N m at cranks.
+    asked : array, shape (T, n)
+        What the controller asked for at this sample.
+    reference : Motion
+        What the machine was to do, at the same times; where nothing was asked for, it rests.
+    payload : array, shape (T,)
+        What it carried, kg.
+    memory : array, shape (T, K)
+        What the controller knew: of an adaptive one, its estimates.
+    step : float
+        Length of the integration's steps, s; NaN where they have no fixed length.
+    stopped : str or None
+        Why the simulation ended before its time.
+    """
+
+    robot: Manipulator
+    time: Array
+    pose: Array
+    velocity: Array
+    acceleration: Array
+    joints: Array
+    joint_rates: Array
+    forces: Array
+    asked: Array
+    reference: Motion
+    payload: Array
+    memory: Array
+    step: float
+    stopped: str | None
+
+    @property
+    def error(self) -> Array:
+        """Pose less reference, (T, m), m and rad."""
+        return self.pose - self.reference.pose
+
+    @property
+    def motion(self) -> Motion:
+        """What the platform did."""
+        return Motion(self.time, self.pose, self.velocity, self.acceleration)
+
+    @property
+    def saturated(self) -> Array:
+        """Share of the samples, (n,), in which a drive could not give what was asked for."""
+        limits = [leg.drive.max_force if leg.drive else None for leg in self.robot.legs]
+        most = np.array([np.inf if limit is None else limit for limit in limits])
+        share: Array = (np.abs(self.asked) > most).mean(axis=0)
+        return share
+
+    def table(self) -> pl.DataFrame:
+        """Return the samples as a table.
+
+        Its columns are t; x y z phi, dx dy dz dphi, ddx ddy ddz ddphi and xref yref zref phiref,
+        those that the machine has; its joints (rho1, theta2) and their rates (drho1, dtheta2);
+        forces (force1, torque2); and payload.
+        """
+        import polars as pl
+
+        names, joints = self.robot.coordinates, self.robot.joint_names
+        blocks = (
+            (names, self.pose),
+            ([f"d{name}" for name in names], self.velocity),
+            ([f"dd{name}" for name in names], self.acceleration),
+            ([f"{name}ref" for name in names], self.reference.pose),
+            (joints, self.joints),
+            ([f"d{name}" for name in joints], self.joint_rates),
+            (self.robot.force_names, self.forces),
+        )
+        columns = {"t": self.time}
+        for titles, values in blocks:
+            columns |= dict(zip(titles, values.T, strict=True))
+        return pl.DataFrame(columns | {"payload": self.payload})

@@ -1,0 +1,64 @@
+"""What a controller is told of its joints: encoders, and the rates that are made of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pteron.errors import DataError
+from pteron.kernels import Array
+from pteron.shapes import PerJoint
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """The encoders of the actuated joints.
+
+    Parameters
+    ----------
+    encoder : float or array, shape (n,)
+        Step of the encoders at the joints, m or rad: a coordinate is rounded to its multiples, and
+        rates are differences of two of them, so that they lag half a sample. 0: coordinates and
+        rates are exact.
+    cutoff : float, optional
+        Of a filter of first order on the rates, Hz; without effect on exact ones.
+    """
+
+    encoder: float | tuple[float, ...] = 0.0
+    cutoff: float | None = None
+
+    def __post_init__(self) -> None:
+        steps = np.asarray(self.encoder, dtype=float)
+        if not (np.isfinite(steps).all() and (steps >= 0.0).all()):
+            raise DataError(f"encoder: {self.encoder} given, steps of 0 or more expected")
+        if self.cutoff is not None and not (np.isfinite(self.cutoff) and self.cutoff > 0.0):
+            raise DataError(f"cutoff: {self.cutoff} given, a frequency above 0 Hz expected")
+
+
+class Encoders:
+    """The encoders at work: what they told last is what rates are made of."""
+
+    def __init__(self, sensors: Sensors, period: float, joints: PerJoint, rates: PerJoint) -> None:
+        self._steps = np.broadcast_to(np.asarray(sensors.encoder, dtype=float), joints.shape)
+        self._period = period
+        self._share = 1.0
+        if sensors.cutoff is not None:
+            self._share = -float(np.expm1(-2.0 * np.pi * sensors.cutoff * period))
+        self._last = self._rounded(joints - period * rates)
+        self._rates = np.array(rates)
+
+    def read(self, joints: PerJoint, rates: PerJoint) -> tuple[Array, Array]:
+        """Return coordinates and rates (n,) as the controller is told them, of the true ones."""
+        if not self._steps.any():
+            return joints, rates
+        told = self._rounded(joints)
+        self._rates = self._rates + self._share * ((told - self._last) / self._period - self._rates)
+        self._last = told
+        return told, np.where(self._steps > 0.0, self._rates, rates)
+
+    def _rounded(self, joints: ArrayLike) -> Array:
+        steps = np.where(self._steps > 0.0, self._steps, 1.0)
+        rounded: Array = np.where(self._steps > 0.0, steps * np.round(joints / steps), joints)
+        return rounded

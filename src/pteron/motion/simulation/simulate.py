@@ -1,0 +1,216 @@
+"""A machine under a controller, or under given forces, from sample to sample."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Protocol, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pteron.errors import DataError
+from pteron.kernels import Array, as_array
+from pteron.kinematics import inverse_kinematics, joint_rates
+from pteron.kinematics.evaluate import checked
+from pteron.manipulator import Manipulator
+from pteron.motion.motion import Motion
+from pteron.motion.payload import with_payload
+from pteron.motion.simulation.loop import Controlled, Given, Law, Loads, Source, run
+from pteron.motion.simulation.plant import Method, Plant, allowed_step
+from pteron.motion.simulation.result import Simulation
+from pteron.motion.simulation.sensors import Encoders, Sensors
+from pteron.shapes import PoseLike
+
+STEP = 1e-4
+"""Length of the integration's steps, s, where none is given and friction allows it."""
+
+PERIOD = 1e-3
+"""Between two samples where no controller says it, s."""
+
+_POSES = 64
+"""Poses of a motion at which the step that friction allows is asked for."""
+
+_STATE = ("start, pose", "start, velocity")
+
+
+class Controls(Protocol):
+    """A controller: how often it acts, and its law for the machine that it believes in."""
+
+    @property
+    def period(self) -> float:
+        """Time between two samples, s."""
+
+    def law(self, model: Manipulator) -> Law:
+        """Return what it does for a machine."""
+
+
+def simulate(
+    robot: Manipulator,
+    motion: Motion | None = None,
+    controller: Controls | None = None,
+    *,
+    start: tuple[PoseLike, PoseLike] | None = None,
+    duration: float | None = None,
+    forces: ArrayLike | Callable[[float], ArrayLike] | None = None,
+    model: Manipulator | None = None,
+    payload: float | Sequence[tuple[float, float]] = 0.0,
+    wrench: ArrayLike | Callable[[float], ArrayLike] | None = None,
+    sensors: Sensors | None = None,
+    delay: float = 0.0,
+    limits: bool = True,
+    period: float = PERIOD,
+    step: float = STEP,
+    method: Method = "rk4",
+    tolerance: float = 1e-10,
+) -> Simulation:
+    """Simulate a machine with its drives under a controller, or under given forces, or free.
+
+    The rigid bodies, the drives' friction (smooth at rest, by `rest_speed`) and the motors' inertia
+    move by `drive_accelerations`; no drive gives more than its `max_force`. At each sample the
+    controller sees the reference and the measured joints; what it asks for is held until the next,
+    as a digital drive does. The simulation ends, and says why, where a leg comes to the edge of its
+    reach; and under a controller, unless told otherwise, where a joint comes to its limits or the
+    platform to a singularity of type II.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    motion : Motion, optional
+        What it is to follow; without it a controller holds the pose at the start.
+    controller : Controller, optional
+        Of `pteron.motion.controllers`, or anything like them.
+    start : (pose, velocity), optional
+        Where the platform begins, (m,) each; by default on the motion.
+    duration : float, optional
+        s; by default the motion's.
+    forces : array, shape (n,), or callable of the time (s), optional
+        Of the drives, where there is no controller; none by default. N, N m at cranks.
+    model : Manipulator, optional
+        What the controller takes the machine for; by default what it is, with a payload that does
+        not change.
+    payload : float or sequence of (time, mass)
+        What the tool carries, kg; of a sequence each mass from its time (s) on, zero before.
+    wrench : array, shape (m,), or callable of the time (s), optional
+        What else acts on the platform at P; held from sample to sample. N and N m.
+    sensors : Sensors, optional
+        The encoders; by default coordinates and rates are exact.
+    delay : float
+        From a sample to what the drives give for it, s.
+    limits : bool
+        Whether joints' limits and singularities of type II end a simulation with a controller.
+    period : float
+        Between two samples where there is no controller, s.
+    step : float
+        Length of the integration's steps, s; shorter where friction at rest needs it.
+    method : {"rk4", "dop853"}
+        Fixed steps of Runge and Kutta's method of fourth order, compiled; or SciPy's method of
+        Dormand and Prince of eighth order, of which `tolerance` bounds the error of each step.
+    tolerance : float
+        For "dop853", relative to the state; absolutely a thousandth of it.
+
+    Returns
+    -------
+    Simulation
+
+    Raises
+    ------
+    DataError
+        If a number is not sensible, or what is given does not go together.
+    UnreachablePose, SingularPose
+        If the start is out of reach or singular.
+
+    Examples
+    --------
+    >>> import numpy as np, pteron
+    >>> from pteron.motion import simulate
+    >>> robot = pteron.load("tripteron")
+    >>> falling = simulate(robot, start=(np.zeros(3), np.zeros(3)), duration=0.1)
+    >>> falling.stopped is None, bool(falling.velocity[-1, 2] < -0.9)
+    (True, True)
+    """
+    if controller is not None and forces is not None:
+        raise DataError("controller and forces given; give one of them")
+    if motion is not None and controller is None:
+        raise DataError("motion given, but no controller that follows it")
+    period = period if controller is None else controller.period
+    _check(period=period, step=step, tolerance=tolerance)
+    if not (np.isfinite(delay) and delay >= 0.0):
+        raise DataError(f"delay: {delay} given, 0 s or more expected")
+    if method not in get_args(Method):
+        raise DataError(f'method: {method!r} given, "rk4" or "dop853" expected')
+
+    reference = _reference(robot, motion, start, duration, period)
+    pose, velocity = reference.pose[0], reference.velocity[0]
+    if start is not None:
+        pose, velocity = (
+            checked(robot, part, name) for part, name in zip(start, _STATE, strict=True)
+        )
+    joints, rates = inverse_kinematics(robot, pose), joint_rates(robot, pose, velocity).actuated
+    masses = _masses(payload, reference.time)
+    loaded = {mass: with_payload(robot, mass) for mass in dict.fromkeys(masses.tolist())}
+
+    if controller is None:
+        source: Source = Given(_of_time(forces, robot.freedom, "forces"), reference.time)
+    else:
+        believed = model or (loaded[masses[0]] if len(loaded) == 1 else robot)
+        encoders = Encoders(sensors or Sensors(), period, joints, rates)
+        source = Controlled(controller.law(believed), encoders, reference, pose, velocity)
+    about = np.vstack([pose, reference.pose[:: max(1, len(reference.time) // _POSES)]])
+    plant = Plant(pose, velocity, method, allowed_step(robot, about, step), tolerance)
+    loads = Loads(masses, loaded, _of_time(wrench, robot.freedom, "wrench"))
+    return run(
+        robot, plant, source, reference, loads, delay, limits=limits and controller is not None
+    )
+
+
+def _check(**positive: float) -> None:
+    for name, value in positive.items():
+        if not (np.isfinite(value) and value > 0.0):
+            raise DataError(f"{name}: {value} given, a number above 0 expected")
+
+
+def _reference(
+    robot: Manipulator,
+    motion: Motion | None,
+    start: tuple[PoseLike, PoseLike] | None,
+    duration: float | None,
+    period: float,
+) -> Motion:
+    """Return what the machine is to do, at the samples: the motion, or rest where it starts."""
+    if duration is None:
+        if motion is None:
+            raise DataError("duration: not given, nor a motion that has one; give it in s")
+        duration = motion.duration
+    _check(duration=duration)
+    if duration < period:
+        raise DataError(f"duration: {duration:g} s given, at least a sample of {period:g} s")
+    time: Array = period * np.arange(round(duration / period) + 1.0)
+    if motion is not None:
+        return Motion(time, *motion.at(motion.time[0] + time))
+    if start is None:
+        raise DataError("start: not given, nor a motion to start on; give a pose and a velocity")
+    rest = np.zeros((len(time), robot.freedom))
+    return Motion(time, rest + checked(robot, start[0], _STATE[0]), rest, rest)
+
+
+def _masses(payload: float | Sequence[tuple[float, float]], time: Array) -> Array:
+    """Return what is carried at each sample, kg."""
+    if np.ndim(payload) == 0:
+        return np.full(len(time), payload, dtype=float)
+    given = np.asarray(payload, dtype=float)
+    if given.ndim != 2 or given.shape[1:] != (2,) or (np.diff(given[:, 0]) < 0.0).any():
+        raise DataError("payload: a mass, or pairs of time and mass in the order of time, expected")
+    k = np.searchsorted(given[:, 0], time + 1e-9, side="right")
+    masses: Array = np.append(0.0, given[:, 1])[k]
+    return masses
+
+
+def _of_time(
+    given: ArrayLike | Callable[[float], ArrayLike] | None, size: int, name: str
+) -> Callable[[float], Array]:
+    """Return what gives (size,) numbers at a time: what was given, or zeros."""
+    if callable(given):
+        return lambda now: as_array(given(now), f"{name}({now:g})", (size,))
+    held = np.zeros(size) if given is None else as_array(given, name, (size,))
+    return lambda _: held

@@ -1,0 +1,74 @@
+"""Why a simulation ends before its time, in a sentence."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pteron.kernels import Array, numeric
+from pteron.kernels.functions import TYPE_II
+from pteron.kinematics.limits import limited_joints
+from pteron.kinematics.singularities import best_type_ii
+from pteron.manipulator import Manipulator
+from pteron.shapes import PerJoint
+
+_FAST = 1e3
+"""Speeds, m/s or rad/s, that no machine has: the numbers diverge."""
+
+_ROUNDING = 1e-9
+"""m or rad beyond a limit that are none."""
+
+
+def why_not_further(robot: Manipulator, pose: Array, velocity: Array) -> str:
+    """Return why the equations end at a state, (m,) each."""
+    if not np.abs(velocity).max() < _FAST:
+        return (
+            "the motion diverges: the controller is unstable, or the forces are far too large; "
+            "lower the gains, or the delay"
+        )
+    type_i = numeric(robot, "reach")(pose)[1]
+    i = int(np.nanargmin(type_i))
+    return (
+        f"leg {i + 1} comes to the edge of its reach, where {robot.legs[i].singular_text} (type I; "
+        f"measure {type_i[i]:.1e}), at pose {told_pose(pose)}"
+    )
+
+
+def first_beyond_limits(robot: Manipulator, poses: Array, joints: PerJoint) -> int | None:
+    """Return the first of some poses (T, m) at which a joint is beyond its limits, or None."""
+    beyond = np.zeros(len(poses), dtype=bool)
+    for leg, q in zip(robot.legs, joints.T, strict=True):
+        if leg.limits is not None:
+            low, high = leg.limits
+            beyond |= (q < low - _ROUNDING) | (q > high + _ROUNDING)
+    beyond |= (numeric(robot, "passive_room")(poses)[1] < -_ROUNDING).any(axis=-1)
+    return int(beyond.argmax()) if beyond.any() else None
+
+
+def told_limit(robot: Manipulator, pose: Array) -> str:
+    """Return which joint is beyond its limits in a pose (m,)."""
+    at = max(
+        limited_joints(robot, pose),
+        key=lambda joint: max(joint.least - joint.value, joint.value - joint.most),
+    )
+    where = f"leg {at.leg}: " if at.leg else ""
+    limits = at.told_limits(lambda value, _: f"{value:g}")
+    return f"{where}the {at.noun} comes to its limit, {at.value:.5g} {at.unit} of {limits}"
+
+
+def first_singular(robot: Manipulator, poses: Array) -> int | None:
+    """Return the first of some poses (T, m) at or beyond a singularity of type II, or None."""
+    measure = numeric(robot, "type_ii")(poses)[0]
+    beyond = ~(measure * np.sign(measure[0]) > TYPE_II * best_type_ii(robot))
+    return int(beyond.argmax()) if beyond.any() else None
+
+
+def told_singular(_: Manipulator, pose: Array) -> str:
+    """Return what is said of a singularity of type II."""
+    return (
+        f"singular (type II) at pose {told_pose(pose)}: the actuators no longer hold the platform"
+    )
+
+
+def told_pose(pose: Array) -> str:
+    """Return a pose as people read it."""
+    return f"[{', '.join(f'{value:.4g}' for value in pose)}]"
