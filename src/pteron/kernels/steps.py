@@ -55,7 +55,11 @@ class Steps(ArrayKernel):
         fixed = {port.name: FIXED[port.name](robot) for port in built.inputs if port.shared}
         super().__init__("steps", built.function, self._code.ports, self._code.outputs, fixed)
         self._rates = VirtualMachine(built.name, built.function, built.inputs, built.outputs, fixed)
-        self.is_compiled = os.environ.get(VARIABLE) != "vm" and compiler() is not None
+
+    @property
+    def is_compiled(self) -> bool:
+        """Whether C makes the steps."""
+        return os.environ.get(VARIABLE) != "vm" and compiler() is not None
 
     @property
     def source(self) -> str:

@@ -1,0 +1,300 @@
+"""Simulation: energies, two integrators, limits, delays, loads, and why one ends."""
+
+from dataclasses import replace
+
+import mechanisms
+import numpy as np
+import pytest
+
+import pteron
+from pteron.kernels import numeric
+from pteron.kernels.steps import Steps
+from pteron.motion import Motion, Sensors, advance, longest_step, pick_and_place, simulate
+from pteron.motion.simulation.sensors import Encoders
+from pteron.workspace import home_pose
+
+FREE = ["quadrupteron", "delta", "par4", "five-bar", "quadrupteron-oblique"]
+
+DRIVE = pteron.Drive(coulomb=3.0, viscous=10.0, offset=0.5, rotor_inertia=0.1, rest_speed=0.01)
+
+
+def driven(robot, drive=DRIVE):
+    return replace(robot, legs=tuple(replace(leg, drive=drive) for leg in robot.legs))
+
+
+def energy(robot, pose, velocity):
+    return pteron.kinetic_energy(robot, pose, velocity) + pteron.potential_energy(robot, pose)
+
+
+@pytest.mark.parametrize("name", FREE)
+def test_free_motion_keeps_its_energy(name, monkeypatch):
+    """For 2 s, or until a leg's margin is below 5 % of its longest reach; 100 random states."""
+    monkeypatch.delenv("PTERON_KERNELS")
+    robot = pteron.load(name)
+    pose = pteron.random_poses(robot, 100, seed=1)
+    velocity = 0.5 * np.random.default_rng(1).normal(size=pose.shape)
+    least = 0.05 * np.array([leg.size for leg in robot.legs])
+    begun, kinetic = energy(robot, pose, velocity), pteron.kinetic_energy(robot, pose, velocity)
+    worst = np.zeros(100)
+    going = (numeric(robot, "reach")(pose)[0] > least).all(axis=-1)
+    for k in range(2000):
+        ahead, fast, served = advance(robot, pose, velocity, np.zeros_like(pose), 1e-4, 10)
+        going &= served & (numeric(robot, "reach")(ahead)[0] > least).all(axis=-1)
+        pose[going], velocity[going] = ahead[going], fast[going]
+        if k % 10 == 0 or not going.any():
+            kinetic = np.fmax(kinetic, pteron.kinetic_energy(robot, pose, velocity))
+            worst = np.fmax(worst, np.abs(energy(robot, pose, velocity) - begun))
+        if not going.any():
+            break
+    assert (worst <= 1e-9 * kinetic).all()
+    assert worst.max() > 0.0
+
+
+@pytest.mark.parametrize("name", ["quadrupteron", "delta", "3-prr"])
+def test_the_steps_of_c_and_of_the_virtual_machine_are_the_same_bits(name, monkeypatch):
+    robot = driven(pteron.load(name))
+    rng = np.random.default_rng(0)
+    pose = pteron.random_poses(robot, 40, seed=2)
+    velocity, forces, wrench = rng.normal(size=(3, *pose.shape))
+    virtual = Steps(robot, wrench=True)
+    given = pose, velocity, forces, wrench, np.array([1e-4, 7.0])
+    slow = virtual(*given)
+    assert not virtual.is_compiled
+    monkeypatch.delenv("PTERON_KERNELS")
+    compiled = Steps(robot, wrench=True)
+    assert compiled.is_compiled
+    for one, other in zip(compiled(*given), slow, strict=True):
+        np.testing.assert_array_equal(one, other)
+    for k in range(3):  # a machine by itself moves as it does among others
+        alone = compiled(pose[k], velocity[k], forces[k], wrench[k], np.array([1e-4, 7.0]))
+        for one, many in zip(alone, compiled(*given), strict=True):
+            np.testing.assert_array_equal(one, many[k])
+
+
+@pytest.mark.parametrize("name", ["quadrupteron", "delta", "five-bar", "mixed", "elbows"])
+def test_both_integrators_agree(name):
+    if name == "mixed":
+        robot = pteron.load("tests/data/mixed.toml")
+    elif name == "elbows":
+        robot = mechanisms.with_elbows(pteron.load("quadrupteron"), "-+-+")
+    else:
+        robot = pteron.load(name)
+    robot, home = driven(robot), home_pose(robot)
+    rest = np.zeros(robot.freedom)
+    holding = pteron.drive_forces(robot, home, rest, rest, smooth=True)
+
+    def forces(time):
+        return holding + 2.0 * np.sin(40.0 * time)
+
+    given = {"start": (home, rest), "forces": forces, "duration": 0.05, "payload": 0.3}
+    fixed = simulate(robot, **given)
+    adaptive = simulate(robot, method="dop853", tolerance=1e-12, **given)
+    assert fixed.stopped is adaptive.stopped is None
+    assert np.abs(fixed.pose - home).max() > 1e-5
+    np.testing.assert_allclose(fixed.pose, adaptive.pose, rtol=0.0, atol=1e-11)
+    np.testing.assert_allclose(fixed.velocity, adaptive.velocity, rtol=0.0, atol=1e-9)
+    # The forces that give the accelerations that it had are those of the drives.
+    loaded = pteron.motion.with_payload(robot, 0.3)
+    state = fixed.pose, fixed.velocity, fixed.acceleration
+    needed = pteron.drive_forces(loaded, *state, smooth=True)
+    np.testing.assert_allclose(needed, fixed.forces, rtol=0.0, atol=1e-8)
+
+
+def test_friction_shortens_the_steps_that_it_would_make_unstable():
+    stiff = replace(DRIVE, rest_speed=1e-5, rotor_inertia=0.0)
+    robot = driven(pteron.load("delta"), stiff)
+    home, rest = home_pose(robot), np.zeros(3)
+    assert longest_step(pteron.load("delta"), home) == np.inf
+    assert longest_step(robot, home) < 1e-5
+    held = simulate(robot, start=(home, rest), duration=0.01)
+    assert held.step < 1e-5
+    assert np.abs(held.velocity).max() < 1.0  # at 0.1 ms it would diverge
+    with pytest.raises(pteron.DataError, match="make rest_speed larger"):
+        simulate(driven(robot, replace(stiff, rest_speed=1e-12)), start=(home, rest), duration=0.1)
+
+
+class Held:
+    """A controller that asks for the same forces, whatever it sees, and remembers what it saw."""
+
+    def __init__(self, forces, period=1e-3):
+        self.forces, self.period, self.seen = forces, period, []
+
+    def law(self, model):
+        self.model = model
+        return self
+
+    def memory(self, pose, velocity):
+        return np.zeros(1)
+
+    def __call__(self, pose, velocity, acceleration, joints, joint_rates, memory):
+        self.seen.append((joints, joint_rates))
+        return self.forces(memory[0]), memory + 1.0
+
+
+def test_forces_are_limited_delayed_and_held():
+    limited = replace(DRIVE, max_force=4.0)
+    robot = driven(pteron.load("tripteron"), limited)
+    home, rest = home_pose(robot), np.zeros(3)
+    ramp = Held(lambda count: np.full(3, count))
+    found = simulate(robot, None, ramp, start=(home, rest), duration=0.01, delay=0.0025)
+    np.testing.assert_array_equal(found.asked[:, 0], np.arange(11.0))
+    # A force acts 2.5 ms after it was asked for: right after a sample, that of three before.
+    np.testing.assert_array_equal(found.forces[:, 0], np.clip(np.arange(11.0) - 3.0, 0.0, 4.0))
+    np.testing.assert_allclose(found.saturated, 6.0 / 11.0)
+    # What half a sample late does is between what none and a whole one do: masses hardly change.
+    robot = pteron.load("tripteron")
+    given = {"start": (home, rest), "duration": 0.005}
+    early, half, late = (
+        simulate(robot, None, ramp, delay=delay, **given).velocity[-1]
+        for delay in (0.0, 5e-4, 1e-3)
+    )
+    np.testing.assert_allclose(half, 0.5 * (early + late), rtol=1e-3)
+    assert np.abs(early - late).min() > 1e-4
+
+
+def test_what_a_controller_is_told():
+    robot = driven(pteron.load("delta"))
+    home, rest = home_pose(robot), np.zeros(3)
+    holding = pteron.drive_forces(robot, home, rest, rest, smooth=True)
+    held = Held(lambda _: holding + 1.0)
+    found = simulate(robot, None, held, start=(home, rest), duration=0.02)
+    joints, rates = (np.array(part) for part in zip(*held.seen, strict=True))
+    np.testing.assert_array_equal(joints, found.joints)
+    np.testing.assert_array_equal(rates, found.joint_rates)
+    held.seen.clear()
+    step = 1e-5
+    found = simulate(
+        robot, None, held, start=(home, rest), duration=0.02, sensors=Sensors(encoder=step)
+    )
+    joints, rates = (np.array(part) for part in zip(*held.seen, strict=True))
+    np.testing.assert_allclose(joints / step, np.round(joints / step), atol=1e-6)
+    assert 0.0 < np.abs(joints - found.joints).max() <= 0.5 * step * (1.0 + 1e-9)
+    np.testing.assert_allclose(rates[1:], np.diff(joints, axis=0) / 1e-3, atol=1e-9)
+
+
+def test_a_filter_of_rates_settles_where_they_are():
+    encoders = Encoders(Sensors((1e-6, 0.0), cutoff=50.0), 1e-3, np.zeros(2), np.zeros(2))
+    told = [encoders.read(np.array([0.1, 0.1]) * k * 1e-3, np.full(2, 0.1))[1] for k in range(200)]
+    assert told[1][0] < 0.1 * 0.5
+    np.testing.assert_allclose(told[-1], 0.1, rtol=1e-9)
+    assert told[0][1] == 0.1  # a joint without an encoder is known exactly
+
+
+def test_loads_change_on_the_way():
+    robot = driven(pteron.load("par4"))
+    home, rest = home_pose(robot), np.zeros(4)
+    holding = pteron.drive_forces(robot, home, rest, rest, smooth=True)
+    given = {"start": (home, rest), "forces": holding, "duration": 0.02}
+    found = simulate(robot, payload=[(0.01, 0.5)], **given)
+    assert np.abs(found.acceleration[:10]).max() < 1e-9
+    assert found.acceleration[10, 2] < -0.1
+    np.testing.assert_array_equal(found.payload, [0.0] * 10 + [0.5] * 11)
+    # The weight of what it carries, as a wrench, keeps its place.
+    weight = np.append(-0.5 * np.array(robot.gravity), 0.0)
+    held = simulate(robot, payload=[(0.01, 0.5)], wrench=lambda t: weight * (t > 0.0095), **given)
+    assert np.abs(held.pose - home).max() < 1e-12
+
+
+def test_a_simulation_says_why_it_ends():
+    robot = pteron.load("quadrupteron")
+    home, rest = home_pose(robot), np.zeros(4)
+    for method in ("rk4", "dop853"):
+        falling = simulate(robot, start=(home, rest), duration=2.0, method=method)
+        assert "comes to the edge of its reach" in falling.stopped
+        assert falling.stopped.startswith("at 0.2")
+        assert 0.2 < falling.time[-1] < 0.3
+        assert np.isfinite(falling.pose).all()
+    holding = pteron.drive_forces(robot, home, rest, rest)
+    pushed = Held(lambda _: holding + 5.0)
+    low = pteron.inverse_kinematics(robot, home) - 0.01
+    narrow = replace(
+        robot,
+        legs=tuple(
+            replace(leg, limits=(q, q + 0.03)) for leg, q in zip(robot.legs, low, strict=True)
+        ),
+    )
+    ended = simulate(narrow, None, pushed, start=(home, rest), duration=2.0)
+    assert "the slider comes to its limit" in ended.stopped
+    on = simulate(narrow, None, pushed, start=(home, rest), duration=2.0, limits=False)
+    assert on.time[-1] > ended.time[-1]
+    lost = simulate(robot, None, Held(lambda _: np.full(4, np.nan)), start=(home, rest), duration=1)
+    assert "no forces are asked for" in lost.stopped
+    assert len(lost.time) == 1
+    wild = simulate(
+        robot, None, Held(lambda k: 1e9 * (-1) ** k * np.ones(4)), start=(home, rest), duration=1
+    )
+    assert "at 0" in wild.stopped
+
+
+def test_a_singularity_of_type_ii_ends_control_but_not_free_motion():
+    robot = pteron.load("five-bar")
+    home, measure = home_pose(robot), numeric(robot, "type_ii")
+    poses = pteron.random_poses(robot, 4000, seed=0)
+    beyond = poses[measure(poses)[0] * measure(home)[0] < 0.0][0]
+    start = home, (beyond - home) / 0.05
+    crossing = simulate(robot, start=start, duration=0.05)
+    ended = simulate(robot, None, Held(lambda _: np.zeros(2)), start=start, duration=0.05)
+    assert "type II" in ended.stopped
+    assert len(crossing.time) > len(ended.time)
+
+
+def test_a_table_of_it():
+    robot = driven(pteron.load("five-bar"))
+    found = simulate(robot, start=(home_pose(robot), np.zeros(2)), duration=0.005)
+    table = found.table()
+    assert table.columns == [
+        *("t", "x", "y", "dx", "dy", "ddx", "ddy", "xref", "yref"),
+        *("theta1", "theta2", "dtheta1", "dtheta2", "torque1", "torque2", "payload"),
+    ]
+    assert len(table) == 6
+    np.testing.assert_array_equal(table["x"].to_numpy(), found.pose[:, 0])
+    np.testing.assert_array_equal(found.error, found.pose - found.pose[0])
+
+
+def test_mistakes_are_told_in_a_line():
+    robot = pteron.load("tripteron")
+    rest = np.zeros(3)
+    start = (rest, rest)
+    motion = pick_and_place(robot, rest, samples=11)
+    told = {
+        "duration: not given": {"start": start},
+        "start: not given": {"duration": 1.0},
+        "motion given, but no controller": {"motion": motion},
+        "give one of them": {"controller": Held(lambda _: rest), "forces": rest, "start": start},
+        "step: -1.0 given, a number above 0": {"start": start, "duration": 1.0, "step": -1.0},
+        "delay: -1 given": {"start": start, "duration": 1.0, "delay": -1},
+        '"rk4" or "dop853"': {"start": start, "duration": 1.0, "method": "euler"},
+        "payload: -1.0 given": {"start": start, "duration": 1.0, "payload": -1.0},
+        "in the order of time": {"start": start, "duration": 1.0, "payload": [(1, 2), (0, 1)]},
+        r"wrench: shape \(2,\) given": {"start": start, "duration": 1.0, "wrench": [1.0, 2.0]},
+        "at least a sample": {"start": start, "duration": 1e-5},
+    }
+    for message, given in told.items():
+        with pytest.raises(pteron.DataError, match=message):
+            simulate(robot, **given)
+    with pytest.raises(pteron.UnreachablePose):
+        simulate(robot, start=([5.0, 0.0, 0.0], rest), duration=1.0)
+    with pytest.raises(pteron.DataError, match="encoder: -1"):
+        Sensors(encoder=-1.0)
+
+
+def test_a_motion_between_its_samples():
+    time = np.linspace(0.0, 1.0, 201)
+    parts = (np.sin(3 * time), 3 * np.cos(3 * time), -9 * np.sin(3 * time))
+    motion = Motion(time + 2.0, *(part[:, None] for part in parts))
+    asked = np.linspace(0.0, 1.0, 977)
+    exact = (np.sin(3 * asked), 3 * np.cos(3 * asked), -9 * np.sin(3 * asked))
+    for part, expected, most in zip(
+        motion.at(asked + 2.0), exact, (1e-14, 1e-12, 1e-8), strict=True
+    ):
+        np.testing.assert_allclose(part[:, 0], expected, rtol=0.0, atol=most)
+    pose, velocity, acceleration = motion.at([1.0, 9.0])
+    np.testing.assert_array_equal(pose[:, 0], motion.pose[[0, -1], 0])
+    assert not velocity.any()
+    assert not acceleration.any()
+    cycle = pick_and_place(pteron.load("tripteron"), [0.0, 0.0, 0.0], duration=1.0, samples=101)
+    twice = cycle.repeated(2)
+    assert twice.duration == 2.0
+    np.testing.assert_allclose(twice.at(1.25)[0], cycle.at(0.25)[0], atol=1e-12)
+    with pytest.raises(pteron.DataError, match="cannot be repeated"):
+        motion.repeated(2)
