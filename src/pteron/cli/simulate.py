@@ -1,0 +1,264 @@
+"""`pteron simulate`: a machine with its drives follows a cycle under a controller."""
+
+from __future__ import annotations
+
+import json as json_text
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from typer import Exit
+
+from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
+from pteron.cli.cycles import CYCLE, STANDARD, cycle_of
+from pteron.cli.screen import is_terminal, note, plain, show, show_json, spinner, table, write
+from pteron.errors import DataError
+
+if TYPE_CHECKING:
+    from pteron.controllers import Controller
+    from pteron.manipulator import Manipulator
+    from pteron.motion import Motion, Simulation
+
+_ENDED = 1
+"""Exit code where the machine did not come to the end."""
+
+_TABLES = (".csv", ".parquet")
+
+Name = Literal["computed-torque", "feed-forward", "pd", "adaptive", "adaptive-drives"]
+
+_UNITS = {"m": (1e6, "um"), "rad": (1e6, "urad")}
+
+
+def simulate(
+    robot: Robot,
+    cycle: Annotated[str, CYCLE] = STANDARD,
+    controller: Annotated[
+        Name,
+        option("controller", "What makes the machine follow the cycle; see docs/controllers.md."),
+    ] = "computed-torque",
+    payload: Annotated[float, option("payload", "At the tool's centre point, kg.")] = 0.0,
+    cycles: Annotated[int, option("cycles", "How many, one after the other.")] = 1,
+    duration: Annotated[
+        float | None,
+        option("duration", "Of a standard cycle, s.", show_default="10 m/s^2 at the tool"),
+    ] = None,
+    rate: Annotated[float, option("rate", "Samples of the controller a second.")] = 1000.0,
+    bandwidth: Annotated[
+        float | None,
+        option("bandwidth", "Of the controller, rad/s.", show_default="a tenth of the rate"),
+    ] = None,
+    model: Annotated[
+        str | None,
+        option(
+            "model",
+            "What the controller takes the machine for; by default what it is, payload and all.",
+            "ROBOT",
+            show_default=False,
+        ),
+    ] = None,
+    encoder: Annotated[
+        float, option("encoder", "Step of the encoders at the joints, m or rad; 0 is exact.")
+    ] = 0.0,
+    delay: Annotated[float, option("delay", "From a sample to the drives' force, s.")] = 0.0,
+    step: Annotated[float, option("step", "Of the integration, s.")] = 1e-4,
+    method: Annotated[
+        Literal["rk4", "dop853"], option("method", "Fixed steps, compiled, or SciPy's DOP853.")
+    ] = "rk4",
+    anyway: Annotated[
+        bool, option("anyway", "Simulate a cycle that is more than the drives can do, too.")
+    ] = False,
+    out: Annotated[
+        str | None,
+        option(
+            "out", "Write a table and pictures to a folder, or the table to a file.", "DIR|FILE"
+        ),
+    ] = None,
+    elbows: Elbows = None,
+    json: Json = False,
+) -> None:
+    """Simulate a machine with its drives under a controller.
+
+    The rigid bodies with the payload, the drives' friction and rotors move under what the
+    controller asks for, held from sample to sample; no drive gives more than its max_force. A
+    cycle that is more than the drives can do is refused, with the leg and by how much.
+
+    The table has a row for each sample: t, the pose x y z phi, its rates and accelerations, what
+    it was to be (xref ...), the joints and their rates, forces, and what the machine carries. A
+    folder gets simulation.csv, simulation.json, tracking.svg and forces.svg. The exit code is 1 if
+    the machine does not come to the end; why is said.
+    """
+    machine = load_robot(robot, elbows)
+    from pteron.motion import Sensors, with_payload
+    from pteron.motion import simulate as simulated
+
+    if cycles < 1:
+        raise DataError(f"--cycles: {cycles} given, 1 or more expected")
+    if not 0.0 < rate < float("inf"):
+        raise DataError(f"--rate: {rate:g} given, samples a second above 0 expected")
+    as_table = out is not None and Path(out).suffix.lower() in _TABLES
+    _check_output(out, as_table=as_table)
+    acts = _controller(controller, 1.0 / rate, bandwidth)
+    loaded = with_payload(machine, payload)
+    with spinner(f"Simulating {machine.name}"):
+        motion = cycle_of(machine, cycle, duration)
+        motion = motion if cycles == 1 else motion.repeated(cycles)
+        overloads = _overloads(loaded, motion)
+        if overloads and not anyway:
+            raise DataError(
+                f"{'; '.join(overloads)}: give a smaller payload or a longer --duration, or see "
+                "what happens with --anyway"
+            )
+        found = simulated(
+            machine,
+            motion,
+            acts,
+            model=None if model is None else load_robot(model, None),
+            payload=payload,
+            sensors=Sensors(encoder=encoder),
+            delay=delay,
+            step=step,
+            method=method,
+        )
+    for text in overloads:
+        note(f"Warning: {text}")
+    if found.stopped:
+        note(f"Stopped {found.stopped}")
+    data = _data(found, controller, cycle, payload)
+    if out is not None:
+        files = _write(out, found, data, as_table=as_table)
+        data["files"] = [str(file) for file in files]
+    if json:
+        show_json(data)
+    elif is_terminal():
+        _show(found, data)
+        show(*(f"Written: {plain(file)}" for file in data.get("files", ())))
+    elif out is None:
+        write(found.table().write_csv())
+    else:
+        note(f"Wrote {', '.join(data['files'])}")
+    if found.stopped:
+        raise Exit(_ENDED)
+
+
+def _controller(name: Name, period: float, bandwidth: float | None) -> Controller:
+    from pteron.controllers import Adaptive, ComputedTorque, FeedForwardPD, PDGravity
+
+    made: dict[str, Any] = {
+        "computed-torque": ComputedTorque,
+        "feed-forward": FeedForwardPD,
+        "pd": PDGravity,
+        "adaptive": Adaptive,
+        "adaptive-drives": lambda **given: Adaptive(friction=True, **given),
+    }
+    found: Controller = made[name](period=period, bandwidth=bandwidth)
+    return found
+
+
+def _check_output(out: str | None, *, as_table: bool) -> None:
+    """Refuse, before the work begins, where nothing can be written."""
+    if out is not None and as_table:
+        from pteron.tables import check_output
+
+        check_output(out)
+    elif out is not None:
+        from pteron.report.write import checked_folder
+
+        checked_folder(out)
+
+
+def _overloads(loaded: Manipulator, motion: Motion) -> tuple[str, ...]:
+    """Return which drives the motion asks too much of."""
+    from pteron.dynamics import drive_forces
+    from pteron.kinematics import joint_rates
+    from pteron.motion import overloads
+
+    state = motion.pose, motion.velocity, motion.acceleration
+    rates = joint_rates(loaded, *state[:2]).actuated
+    return overloads(loaded, drive_forces(loaded, *state, smooth=True), rates)
+
+
+def _data(found: Simulation, controller: str, cycle: str, payload: float) -> dict[str, Any]:
+    """Return the figures of a simulation, SI units."""
+    import numpy as np
+
+    robot, error = found.robot, found.error
+    power = found.forces * found.joint_rates
+    return {
+        "robot": robot.name,
+        "cycle": cycle,
+        "controller": controller,
+        "payload": payload,
+        "duration": float(found.time[-1]),
+        "samples": len(found.time),
+        "step": None if np.isnan(found.step) else found.step,
+        "stopped": found.stopped,
+        "tracking": [
+            {
+                "coordinate": name,
+                "largest": float(np.abs(error[:, i]).max()),
+                "rms": float(np.sqrt(np.mean(error[:, i] ** 2))),
+            }
+            for i, name in enumerate(robot.coordinates)
+        ],
+        "drives": [
+            {
+                "leg": i + 1,
+                "peak_force": float(np.abs(found.forces[:, i]).max()),
+                "rms_force": float(np.sqrt(np.mean(found.forces[:, i] ** 2))),
+                "peak_speed": float(np.abs(found.joint_rates[:, i]).max()),
+                "peak_power": float(np.abs(power[:, i]).max()),
+                "at_its_limit": float(found.saturated[i]),
+            }
+            for i in range(robot.freedom)
+        ],
+    }
+
+
+def _write(out: str, found: Simulation, data: dict[str, Any], *, as_table: bool) -> list[Path]:
+    if as_table:
+        from pteron.tables import write_table
+
+        return [write_table(found.table(), out)]
+    from pteron.atomic import plain as plain_data
+    from pteron.atomic import write_texts
+    from pteron.plots import forces_figure, svg_file, tracking_figure
+
+    unit = "N m" if found.robot.legs[0].joint.force_unit == "N m" else "N"
+    forces = forces_figure(found.time, found.forces, ylabel=f"drive force ({unit})")
+    tracking = tracking_figure(found.time, found.error, found.robot.coordinates)
+    texts = {
+        "simulation.csv": found.table().write_csv(),
+        "simulation.json": json_text.dumps(plain_data(data), indent=1, allow_nan=False) + "\n",
+        "tracking.svg": svg_file(tracking),
+        "forces.svg": svg_file(forces),
+    }
+    return write_texts(out, texts)
+
+
+def _show(found: Simulation, data: dict[str, Any]) -> None:
+    """Print for a person: how well it follows, and what its drives do."""
+    robot = found.robot
+    carried = f" with {data['payload']:g} kg" if data["payload"] else ""
+    steps = "DOP853" if data["step"] is None else f"steps of {data['step'] * 1e3:.3g} ms"
+    errors = table("error", "largest", "RMS", numbers=("largest", "RMS"))
+    for row in data["tracking"]:
+        factor, unit = _UNITS["rad" if row["coordinate"] == "phi" else "m"]
+        cells = (f"{factor * row[key]:.3g} {unit}" for key in ("largest", "rms"))
+        errors.add_row(row["coordinate"], *cells)
+    names = ("peak force", "RMS force", "peak speed", "peak power", "at its limit")
+    drives = table("leg", *names, numbers=("leg", *names))
+    for leg, row in zip(robot.legs, data["drives"], strict=True):
+        force, speed = leg.joint.force_unit, f"{leg.joint.unit}/s"
+        drives.add_row(
+            str(row["leg"]),
+            f"{row['peak_force']:.4g} {force}",
+            f"{row['rms_force']:.4g} {force}",
+            f"{row['peak_speed']:.4g} {speed}",
+            f"{row['peak_power']:.4g} W",
+            f"{row['at_its_limit']:.1%}" if leg.drive and leg.drive.max_force else "-",
+        )
+    show(
+        f"[bold]{plain(robot.name)}[/bold]{carried}, cycle {plain(data['cycle'])}, "
+        f"{plain(data['controller'])}: {data['duration']:.4g} s in {steps}",
+        errors,
+        drives,
+    )
