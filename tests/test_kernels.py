@@ -15,12 +15,14 @@ from mechanisms import CATALOG, MECHANISMS, NEAREST, states
 
 import pteron
 from pteron import atomic
+from pteron.controllers import CONTROLLERS
 from pteron.equations.drives import drive_numbers
 from pteron.equations.machine import numbers
 from pteron.errors import DataError, ModelError, OutputError
 from pteron.kernels import (
     FUNCTIONS,
     LOADED,
+    SELECTED,
     NoSquareRoot,
     PrimeField,
     RationalField,
@@ -59,7 +61,7 @@ def test_unknown_functions_and_options_out_of_place_are_refused_with_the_choices
 @lru_cache
 def kernel_of(robot, what, wrench=False):
     """Return the kernel of any function; that of the base regressor needs base parameters."""
-    base = pteron.base_parameters(robot) if what == "base_regressor" else None
+    base = pteron.base_parameters(robot) if what in SELECTED else None
     return pteron.compile(robot, what, base=base, wrench=wrench, grade="parametric")
 
 
@@ -77,7 +79,13 @@ def values_for(robot, kernel, lead=()):
         "joint_rates": velocity,
         "joint_accelerations": acceleration,
     }
-    return [known[port.name].reshape(*lead, robot.freedom) for port in kernel.inputs]
+    if kernel.name in CONTROLLERS:
+        law = CONTROLLERS[kernel.name].law(robot)
+        known |= {"memory": law.memory(pose, velocity), "gains": law.gains}
+    return [
+        known[port.name].reshape(*(() if port.shared else lead), *port.shape)
+        for port in kernel.inputs
+    ]
 
 
 PUBLIC = {
@@ -112,11 +120,15 @@ def test_every_function_compiles_and_gives_what_the_public_one_gives(name, what)
         assert kernel.operations == count_operations(kernel.function) == walked(kernel.function)
         assert what in kernel.source
         inputs = {port.name for port in kernel.inputs}
-        sizes = {"parameters": len(pteron.parameters(robot)), "drives": len(drive_numbers(robot))}
-        assert {port.name for port in kernel.ports} - sizes.keys() == inputs
+        fixed = {"parameters": len(pteron.parameters(robot)), "drives": len(drive_numbers(robot))}
+        assert {port.name for port in kernel.ports} - fixed.keys() == inputs
+        sizes = dict(fixed)
+        if what in CONTROLLERS:
+            law = CONTROLLERS[what].law(robot)
+            sizes |= {"gains": law.gains.size, "memory": law.memory(*[values[0][0, 0]] * 2).size}
         for port in kernel.ports:
             assert port.shape == (sizes.get(port.name, robot.freedom),)
-            assert port.shared == (port.name in sizes)
+            assert port.shared == (port.name in (*fixed, "gains"))
             assert port.name in kernel.source
 
 

@@ -18,8 +18,9 @@ import pytest
 from mechanisms import CATALOG, MECHANISMS, NEAREST, random_machine, relative_error, states
 
 import pteron
+from pteron.controllers import CONTROLLERS
 from pteron.errors import DataError, ModelError, OutputError
-from pteron.kernels import FUNCTIONS, TARGETS, NoSquareRoot, Port, numeric, program
+from pteron.kernels import FUNCTIONS, SELECTED, TARGETS, NoSquareRoot, Port, numeric, program
 from pteron.kernels.c import Code, compiler
 from pteron.kernels.choice import Adaptive, Tier
 
@@ -42,7 +43,7 @@ needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 
 @lru_cache
 def compiled(robot, what, target, **options):
-    base = pteron.base_parameters(robot) if what == "base_regressor" else None
+    base = pteron.base_parameters(robot) if what in SELECTED else None
     return pteron.compile(robot, what, target, base=base, **options)
 
 
@@ -67,6 +68,9 @@ def values_of(robot, what, count=131):
         "joint_rates": velocity,
         "joint_accelerations": acceleration,
     }
+    if what in CONTROLLERS:
+        law = CONTROLLERS[what].law(robot)
+        known |= {"memory": law.memory(pose, velocity), "gains": law.gains}
     return tuple(known[port.name] for port in compiled(robot, what, "vm").inputs)
 
 
@@ -114,13 +118,18 @@ def assert_agrees(robot, what, target, **options):
     expected = vm(*values)
     assert other.operations == vm.operations
     assert_same_bits(other(*values), expected)
+    ports = vm.inputs
+
+    def at(rows):
+        return [v if p.shared else v[rows].copy() for v, p in zip(values, ports, strict=True)]
+
     for row in (0, 3, 11, 12):
-        single = [value[row].copy() for value in values]
+        single = at(row)
         assert_same_bits(other(*single), tuple(part[row] for part in as_tuple(expected)))
         lists = [value.tolist() for value in single]
         assert_same_bits(other(*lists), tuple(part[row] for part in as_tuple(expected)))
     for count in (0, 1, 15, 16, 31, 32, 33, 64, 65):
-        part = [value[:count] for value in values]
+        part = at(slice(count))
         assert_same_bits(other(*part), tuple(whole[:count] for whole in as_tuple(expected)))
     return expected
 

@@ -9,9 +9,13 @@ from pteron.cli.screen import note, plain, show, show_json, spinner
 from pteron.errors import DataError
 
 _FUNCTIONS = (
+    "adaptive",
+    "adaptive_drives",
     "bias_forces",
     "closure_poses",
     "closure_rows",
+    "computed_torque",
+    "computed_torque_base",
     "coriolis_matrix",
     "direct_kinematics",
     "direct_step",
@@ -21,6 +25,8 @@ _FUNCTIONS = (
     "drive_forces_base",
     "feed_forward",
     "feed_forward_base",
+    "feed_forward_pd",
+    "feed_forward_pd_base",
     "forward_dynamics",
     "gravity_forces",
     "inverse_dynamics",
@@ -43,6 +49,8 @@ _FUNCTIONS = (
     "paper_terms",
     "passive_friction",
     "passive_room",
+    "pd_gravity",
+    "pd_gravity_base",
     "platform_motion",
     "platform_points",
     "potential_energy",

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
@@ -16,7 +16,7 @@ from typing import Literal, get_args
 from pteron.atomic import write_texts
 from pteron.errors import ModelError
 from pteron.export.descriptions import banner
-from pteron.export.functions import Exported, chosen
+from pteron.export.functions import Asked, Exported, chosen
 from pteron.export.outputs import Output
 from pteron.kernels import Array
 from pteron.kernels.code import (
@@ -38,7 +38,7 @@ _WIDTH = 97
 
 def export_c(
     robot: Manipulator,
-    functions: str | Sequence[str] | None = None,
+    functions: Asked | None = None,
     folder: str | Path = ".",
     *,
     real: Real = "double",
@@ -60,13 +60,14 @@ def export_c(
     ----------
     robot : Manipulator
         The machine; its name becomes the prefix of the functions and the files.
-    functions : sequence of str
+    functions : sequence of str or of controllers
         Names of what `compile` accepts, and `"inverse_dynamics_base"`, `"feed_forward_base"` or
         `"joint_feed_forward_base"`, from base parameters as `base_parameters` and `pteron
         identify` list them. By default inverse and direct kinematics, Jacobian, inverse dynamics
         from the inertial parameters and from base parameters, forward dynamics and the regressor;
         of a machine with drives `"feed_forward"` and `"joint_feed_forward"` too. Where direct
-        kinematics have no closed form, `"direct_step"` comes in their place.
+        kinematics have no closed form, `"direct_step"` comes in their place. A controller stands
+        for its law, with a table of its gains; a law's name has those that it has by default.
     folder : path
         Where; made if it is missing.
     real : {"double", "float"}

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 
+from pteron.equations.control import MEMORY
 from pteron.export.outputs import NAMES, Output, told_meaning
 from pteron.kernels import Port
 from pteron.manipulator import Manipulator
@@ -30,6 +31,16 @@ SUMMARIES = {
     "drive_accelerations": "Acceleration of the platform under what the drives give, friction and "
     "the motors' inertia included.",
     "regressor": "Regressor: actuator forces = regressor parameters.",
+    "pd_gravity": "PD control with gravity compensation at the measured pose: what the drives are "
+    "to give until the next sample.",
+    "feed_forward_pd": "Feed-forward of the wanted motion, plus PD control: what the drives are to "
+    "give until the next sample.",
+    "computed_torque": "Computed torque: what the drives are to give until the next sample so that "
+    "the joints' errors go as the gains say.",
+    "adaptive": "Slotine and Li's adaptive control in base parameters: what the drives are to give "
+    "until the next sample, and what is learnt at this one.",
+    "adaptive_drives": "Slotine and Li's adaptive control in base parameters and in those of the "
+    "drives: what the drives are to give until the next sample, and what is learnt at this one.",
 }
 """What functions return; of others, what the library's function of that name returns."""
 
@@ -47,6 +58,11 @@ DRIVES = (
     "The machine's drives, at the joints: motors' inertia, dry and viscous friction, a constant "
     "force, what dry friction has more at rest, the speeds by which it is gone, and within which "
     "dry friction changes its sign; SI units."
+)
+
+GAINS = (
+    "Gains of the law of the same name. With another period, or to tune them, take those of a "
+    "controller of the library."
 )
 
 BASE_PARAMETERS = (
@@ -102,6 +118,26 @@ def meaning(robot: Manipulator, port: Port, output: Output) -> str:
     }
     name = port.name.removesuffix("_out")
     return told_meaning(robot, output) if name == NAMES[output] != "forces" else texts.get(name, "")
+
+
+def law_meanings(what: str, texts: Mapping[str, str]) -> dict[str, str]:
+    """Return what the inputs and outputs of a law of control mean, from what they are elsewhere."""
+    remembered = ", ".join(MEMORY_TEXTS[name] for name in MEMORY[what])
+    wanted = ("pose", "velocity", "acceleration")
+    return {
+        **{name: f"wanted now: {texts[name]}" for name in wanted},
+        **{name: f"measured now: {texts[name]}" for name in ("joints", "joint_rates")},
+        "memory": f"next_memory of the last sample: {remembered}; keep it where a status is not 0",
+        "next_memory": "what is to be the memory at the next sample",
+        "gains": f"see the table {what}_gains",
+    }
+
+
+MEMORY_TEXTS = {
+    "measured": "the pose of the joints (at first one that is near it)",
+    "acceleration": "the acceleration wanted last (at first 0)",
+    "learnt": "what is learnt (at first 0)",
+}
 
 
 def _by_leg(units: Sequence[str]) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pteron.controllers import CONTROLLERS, Controller
 from pteron.equations.drives import drive_names, drive_numbers
 from pteron.equations.machine import Machine, closure_of
 from pteron.errors import ModelError
@@ -15,16 +16,29 @@ from pteron.export.descriptions import (
     BASE_PARAMETERS,
     BRANCHES,
     DRIVES,
+    GAINS,
     MODES,
     PARAMETERS,
     SUMMARIES,
+    law_meanings,
     meaning,
 )
 from pteron.export.identified import Identified, base_program, read_identified
 from pteron.export.labels import node_names
 from pteron.export.outputs import DRIVEN, Output, factors, in_units
 from pteron.kernels import FUNCTIONS as COMPILED
-from pteron.kernels import LOADED, REDUCIBLE, Array, Graph, Port, Program, graph_of, program
+from pteron.kernels import (
+    LOADED,
+    REDUCIBLE,
+    SELECTED,
+    Array,
+    Graph,
+    Port,
+    Program,
+    columns_of,
+    graph_of,
+    program,
+)
 from pteron.kernels import specialised as with_values
 from pteron.kernels.functions import TABLE
 from pteron.kernels.graph import CONSTANT
@@ -45,6 +59,9 @@ what `FEED` names too of a machine with drives."""
 
 FEED = ("feed_forward", "joint_feed_forward")
 """What a controller adds to its feedback, from the platform's motion or from the joints'."""
+
+Asked = str | Controller | Sequence[str | Controller]
+"""A choice of functions, by name, and of controllers, whose laws they are."""
 
 _BASE = "_base"
 """What ends the name of a function of base parameters."""
@@ -101,9 +118,14 @@ def has_drives(robot: Manipulator) -> bool:
     return any(leg.drive is not None for leg in robot.legs)
 
 
+def listed(functions: Asked) -> list[str | Controller]:
+    """Return a choice of functions as a list."""
+    return [functions] if isinstance(functions, str | Controller) else list(functions)
+
+
 def chosen(
     robot: Manipulator,
-    functions: str | Sequence[str] | None,
+    functions: Asked | None,
     *,
     usual: Sequence[str] = FUNCTIONS,
     specialised: bool,
@@ -134,7 +156,9 @@ def chosen(
             functions += [name + _BASE for name in FEED]
         elif has_drives(robot):
             functions += FEED
-    names = [functions] if isinstance(functions, str) else list(dict.fromkeys(functions))
+    asked = listed(functions)
+    given = {one.what: one for one in asked if isinstance(one, Controller)}
+    names: list[str] = list(dict.fromkeys(getattr(one, "what", one) for one in asked))
     allowed = sorted({*COMPILED, *(name + _BASE for name in REDUCIBLE)} - {"base_regressor"})
     valid = f"choose from {', '.join(allowed)}"
     for name in names:
@@ -148,7 +172,12 @@ def chosen(
             f'output: "{output}" is what drives are told, but none of {", ".join(DRIVEN)} is '
             "written; name one of them"
         )
-    return tuple(_exported(robot, name, identified, specialised, wrench, output) for name in names)
+    controllers = CONTROLLERS | given
+    options = identified, specialised, wrench, output
+    return tuple(
+        _exported(robot, name, *options, controllers.get(name.removesuffix(_BASE)))
+        for name in names
+    )
 
 
 def _exported(
@@ -158,6 +187,7 @@ def _exported(
     specialised: bool,
     wrench: bool,
     output: Output,
+    controller: Controller | None,
 ) -> Exported:
     what = name.removesuffix(_BASE)
     loaded = wrench and what in LOADED
@@ -165,8 +195,11 @@ def _exported(
     if base:
         given = base_program(what, base, wrench=loaded, folded=specialised)
     else:
-        given = program(robot, what, wrench=loaded)
-    if identified and "parameters" in {port.name for port in given.inputs}:
+        learnt = controller.base(robot) if controller else None
+        columns = None if learnt is None else columns_of(learnt)
+        given = program(robot, what, columns, wrench=loaded)
+    bodies = "parameters" in {port.name for port in given.inputs} or name in SELECTED
+    if identified and bodies:
         other = f"ask for {what + _BASE}" if what in REDUCIBLE else "leave it out"
         raise ModelError(
             f"functions: {name!r} takes every body's parameters, which identified base parameters "
@@ -175,13 +208,13 @@ def _exported(
     if what in DRIVEN:
         given = in_units(given, robot, output)
     shared = [port.name for port in given.inputs if port.shared]
-    tables = tuple(_table(robot, port, base) for port in shared)
-    fixed = {table.name: table.values for table in tables}
+    tables = tuple(_table(robot, port, base, controller) for port in shared)
+    fixed = {name: table.values for name, table in zip(shared, tables, strict=True)}
     if specialised:
         given, tables = with_values(given, fixed), ()
     graph = graph_of(given.function, given.inputs)
     machine = Machine.of(robot)
-    states = _states(robot, given.inputs, fixed)
+    states = _states(robot, given.inputs, fixed, controller)
     # Argument names must differ from those of the results.
     taken = {port.name for port in given.inputs}
     outputs = tuple(
@@ -196,7 +229,9 @@ def _exported(
     elif "pose" in taken and not any(node.operation == "sqrt" for node in graph.nodes):
         summary += " It does not ask whether the legs reach."
     meanings = {port.name: meaning(robot, port, output) for port in (*given.inputs, *outputs)}
-    if {"pose", "joints"} <= taken:
+    if controller:
+        meanings |= law_meanings(controller.what, meanings)
+    elif {"pose", "joints"} <= taken:
         meanings["pose"] = f"near that of the joints, such as the last: {meanings['pose']}"
     return Exported(
         name,
@@ -211,8 +246,14 @@ def _exported(
     )
 
 
-def _table(robot: Manipulator, name: str, base: Identified | None) -> Table:
+def _table(
+    robot: Manipulator, name: str, base: Identified | None, controller: Controller | None
+) -> Table:
     """Return the machine's own numbers for a shared input."""
+    if name == "gains":
+        assert controller is not None
+        law = controller.law(robot)
+        return Table(f"{controller.what}_gains", GAINS, law.gain_names, law.gains)
     if name == "drives":
         return Table(name, DRIVES, drive_names(robot), drive_numbers(robot))
     if base is not None:
@@ -222,15 +263,22 @@ def _table(robot: Manipulator, name: str, base: Identified | None) -> Table:
 
 
 def _states(
-    robot: Manipulator, ports: Sequence[Port], fixed: dict[str, Array]
+    robot: Manipulator,
+    ports: Sequence[Port],
+    fixed: dict[str, Array],
+    controller: Controller | None,
 ) -> list[list[Array]]:
     """Return inputs at three random poses in reach, and far out of it."""
     rng = np.random.default_rng(1)
     states = []
+    law = controller.law(robot) if controller else None
     # Where the joints are given a pose is but next to theirs.
     apart = 1e-3 if "joints" in {port.name for port in ports} else 0.0
     for pose in random_poses(robot, 3, seed=rng):
         known = {"pose": pose + apart, "joints": inverse_kinematics(robot, pose), **fixed}
+        if law:
+            start = law.memory(pose, np.zeros_like(pose))
+            known["memory"] = start + 1e-3 * rng.normal(size=start.shape)
         states.append(
             [np.array(known.get(port.name, rng.normal(size=port.shape))) for port in ports]
         )

@@ -7,6 +7,7 @@ from typing import Literal, get_args
 
 import casadi as ca
 
+from pteron.equations.laws import LAWS
 from pteron.errors import ModelError
 from pteron.kernels import Program
 from pteron.legs import Drive
@@ -14,7 +15,7 @@ from pteron.manipulator import Manipulator
 
 Output = Literal["force", "torque", "percent"]
 
-DRIVEN = ("drive_forces", "feed_forward", "joint_feed_forward")
+DRIVEN = ("drive_forces", "feed_forward", "joint_feed_forward", *LAWS)
 """The functions whose forces are those of the drives."""
 
 NAMES = {"force": "forces", "torque": "motor_torques", "percent": "percent_of_rated"}

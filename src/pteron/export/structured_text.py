@@ -14,7 +14,7 @@ from pteron.atomic import write_texts
 from pteron.equations.machine import closure_of
 from pteron.export.c import prefix_of
 from pteron.export.descriptions import banner
-from pteron.export.functions import Exported, chosen
+from pteron.export.functions import Asked, Exported, chosen, listed
 from pteron.export.guards import INPUT_POWER, Names, Statements, element, power
 from pteron.export.outputs import Output
 from pteron.kernels import Graph, Port
@@ -35,7 +35,7 @@ _STATUSES = (("Usable", 3), ("Reachable", 1), ("Regular", 2))
 
 def export_st(
     robot: Manipulator,
-    functions: str | Sequence[str] | None = None,
+    functions: Asked | None = None,
     folder: str | Path = ".",
     *,
     specialised: bool = True,
@@ -95,7 +95,7 @@ def export_st(
     """
     # A block is valid or not as a whole; but of two assembly modes one alone may be in reach.
     direct = "closure_poses" if closure_of(robot).closed_form else "direct_step"
-    names = [functions] if isinstance(functions, str) else functions
+    names = None if functions is None else listed(functions)
     if names is not None:
         names = [direct if name == "direct_kinematics" else name for name in names]
     exported = chosen(

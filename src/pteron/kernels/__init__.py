@@ -11,6 +11,7 @@ from pteron.kernels.kernel import Array, Kernel, Port, as_array, count_operation
 from pteron.kernels.programs import (
     LOADED,
     REDUCIBLE,
+    SELECTED,
     Columns,
     Program,
     bare,
@@ -32,6 +33,7 @@ __all__ = [
     "LOADED",
     "OTHER_LAYOUT",
     "REDUCIBLE",
+    "SELECTED",
     "Selects",
     "needs_of",
     "TARGETS",

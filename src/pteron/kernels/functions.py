@@ -10,8 +10,9 @@ from typing import Any, Literal
 import casadi as ca
 
 from pteron.bodies.motion import Expression
-from pteron.equations import closing, drives, kinematics, lagrangian, regressor
+from pteron.equations import closing, control, drives, kinematics, lagrangian, regressor
 from pteron.equations.friction import passive_friction
+from pteron.equations.laws import LAWS
 from pteron.equations.machine import Machine
 from pteron.equations.virtual_work import generalized_forces, inverse_dynamics
 
@@ -217,10 +218,35 @@ def _paper_terms(m: Machine, v: Symbols) -> Outputs:
     }
 
 
+def _controlled(m: Machine, v: Symbols, *, what: str) -> Outputs:
+    """Return what a law of control answers to a sample; an adaptive one takes no parameters."""
+    selection = v.get("selection", ca.SX(len(m.parameters), 0))
+    estimates = control.estimated(what, m.freedom, selection.shape[1])
+    gains, memory = (
+        control.split(v[name], control.lengths(parts[what], m.freedom, estimates))
+        for name, parts in (("gains", control.GAINS), ("memory", control.MEMORY))
+    )
+    sample = control.Sample(
+        m,
+        control.Wanted(v["pose"], v["velocity"], v["acceleration"]),
+        v["joints"],
+        v["joint_rates"],
+        gains,
+        memory,
+        drives.Drives.of(v["drives"]),
+        v.get("parameters", ca.SX.nan(len(m.parameters))),
+        selection,
+        TYPE_II,
+    )
+    forces, kept = LAWS[what](sample)
+    return {"forces": forces, "next_memory": ca.vertcat(*(kept[name] for name in memory))}
+
+
 _POSE, _RATE = ("pose",), ("pose", "velocity")
 _MOTION = ("pose", "velocity", "acceleration")
 _BENT: tuple[Need, ...] = ("reach", "type I")
 _HELD: tuple[Need, ...] = ("reach", "type I", "type II")
+_SAMPLE = (*_MOTION, "joints", "joint_rates", "memory", "gains")
 
 TABLE: dict[str, Entry] = {
     "inverse_kinematics": Entry(_POSE, _position, ("reach",)),
@@ -270,6 +296,14 @@ TABLE: dict[str, Entry] = {
     "drive_accelerations": Entry(
         (*_RATE, "forces", "parameters", "drives"), _drive_accelerations, _BENT
     ),
+    **{
+        what: Entry(
+            (*_SAMPLE, *([] if "learnt" in control.MEMORY[what] else ["parameters"]), "drives"),
+            partial(_controlled, what=what),
+            _HELD,
+        )
+        for what in LAWS
+    },
     "mass_matrix": Entry(
         (*_POSE, "parameters"),
         lambda m, v: {"mass": lagrangian.mass_matrix(m, v["pose"], v["parameters"])},

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.bodies.motion import Expression
-from pteron.equations import kinematics
+from pteron.equations import control, kinematics
 from pteron.equations.drives import Drives
 from pteron.equations.machine import Machine
 from pteron.errors import ModelError
@@ -25,7 +25,10 @@ _HUGE = 1e75
 
 _TINY = 1e-300
 
-REDUCIBLE = ("inverse_dynamics", "drive_forces", "feed_forward", "joint_feed_forward")
+REDUCIBLE = (
+    *("inverse_dynamics", "drive_forces", "feed_forward", "joint_feed_forward"),
+    *("pd_gravity", "feed_forward_pd", "computed_torque"),
+)
 """Forces, which may be asked for from base parameters."""
 
 LOADED = (
@@ -34,7 +37,10 @@ LOADED = (
 )
 """What may take a wrench on the platform as well."""
 
-_SHARED = ("geometry", "parameters", "base_parameters", "drives")
+SELECTED = ("base_regressor", "adaptive", "adaptive_drives")
+"""What takes a choice of base parameters, but not their values."""
+
+_SHARED = ("geometry", "gains", "parameters", "base_parameters", "drives")
 """Inputs of which one value serves a whole batch."""
 
 Columns = tuple[tuple[int, ...], ...]
@@ -74,10 +80,10 @@ def program(
     """
     if what not in TABLE:
         raise ModelError(f"what: {what!r} cannot be compiled; choose from {', '.join(FUNCTIONS)}")
-    if what == "base_regressor" and columns is None:
-        raise ModelError('base: missing; "base_regressor" needs base=base_parameters(robot)')
-    if what not in (*REDUCIBLE, "base_regressor") and columns is not None:
-        useful = ", ".join((*REDUCIBLE, "base_regressor"))
+    if what in SELECTED and columns is None:
+        raise ModelError(f'base: missing; "{what}" needs base=base_parameters(robot)')
+    if what not in (*REDUCIBLE, *SELECTED) and columns is not None:
+        useful = ", ".join((*REDUCIBLE, *SELECTED))
         raise ModelError(f"base: {what!r} has no use for it; it goes with {useful}")
     if what not in LOADED and wrench:
         raise ModelError(f"wrench: {what!r} has no use for it; it goes with {', '.join(LOADED)}")
@@ -140,7 +146,7 @@ def _built(
     for k, members in enumerate(columns):
         for j in members:
             selection[j, k] = 1
-    if what == "base_regressor":
+    if what in SELECTED:
         constants: Symbols = {"selection": selection}
         return _program(machine, what, constants=constants, guarded=guarded, plain=plain)
     base = ca.SX.sym("base_parameters", len(columns))
@@ -189,9 +195,11 @@ def _program(
     entry = TABLE[what]
     asked = [name for name in entry.inputs if name not in (constants or {})]
     asked += ["wrench"] if wrench else []
+    selected = (constants or {}).get("selection", ca.SX.eye(0)).shape[1]
     sizes = {
         "parameters": len(machine.parameters),
         "drives": len(Drives._fields) * machine.freedom,
+        **control.input_sizes(what, machine.freedom, selected),
     }
     given = {name: ca.SX.sym(name, sizes.get(name, machine.freedom)) for name in asked}
     given |= extra or {}

@@ -1,5 +1,12 @@
 """Motions of the platform and of the machine: trajectories, simulation, the drives' limits."""
 
+from pteron.controllers import (
+    Adaptive,
+    ComputedTorque,
+    Controller,
+    FeedForwardPD,
+    PDGravity,
+)
 from pteron.motion.joint_points import Guide, JointPoints, Part, joint_guides, joint_points
 from pteron.motion.motion import Motion
 from pteron.motion.overloads import overloads
@@ -15,6 +22,11 @@ from pteron.motion.simulation import (
 )
 
 __all__ = [
+    "Adaptive",
+    "ComputedTorque",
+    "Controller",
+    "FeedForwardPD",
+    "PDGravity",
     "Guide",
     "JointPoints",
     "Motion",

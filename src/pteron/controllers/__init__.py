@@ -1,0 +1,29 @@
+"""Controllers: laws that turn what is wanted and what is measured into forces of the drives."""
+
+from pteron.controllers.adaptive import Adaptive
+from pteron.controllers.computed_torque import ComputedTorque
+from pteron.controllers.controller import Controller
+from pteron.controllers.feed_forward_pd import FeedForwardPD
+from pteron.controllers.joint_masses import joint_masses
+from pteron.controllers.law import Law
+from pteron.controllers.pd_gravity import PDGravity
+
+CONTROLLERS: dict[str, Controller] = {
+    usual.what: usual
+    for usual in (
+        *(PDGravity(), FeedForwardPD(), ComputedTorque()),
+        *(Adaptive(), Adaptive(friction=True)),
+    )
+}
+"""Controllers as they are by default, by the names of their laws."""
+
+__all__ = [
+    "CONTROLLERS",
+    "Adaptive",
+    "ComputedTorque",
+    "Controller",
+    "FeedForwardPD",
+    "Law",
+    "PDGravity",
+    "joint_masses",
+]

@@ -1,0 +1,49 @@
+"""Computed torque: the forces that give the joints the accelerations which errors call for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from pteron.controllers.feedback import Feedback
+
+
+@dataclass(frozen=True)
+class ComputedTorque(Feedback):
+    """F = what the drives need for q'' = q''_d + K_p e + K_d e', in the measured state.
+
+    With the true model errors obey e'' + K_d e' + K_p e = 0, at every joint by itself. The pose is
+    that of the measured joints, by Newton's method from the last one; the model is taken in the
+    middle of the period for which the forces are held. Friction is that of the wanted rates.
+
+    Parameters
+    ----------
+    period : float
+        Time between two samples, for which forces are held, s.
+    bandwidth : float or one for each joint, optional
+        How quickly an error goes, rad/s; by default 0.1 / period.
+    damping : float or one for each joint
+        1 is the least without overshoot.
+    proportional, derivative : float or one for each joint, optional
+        The gains themselves, 1/s^2 and 1/s.
+
+    Raises
+    ------
+    DataError
+        If a number is not above zero, or one of the gains is given alone.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.controllers import ComputedTorque
+    >>> law = ComputedTorque(period=1e-3, bandwidth=100.0).law(pteron.load("five-bar"))
+    >>> law.gains.round(1)
+    array([9055.9, 9055.9,  185.8,  185.8,    0. ])
+    """
+
+    @property
+    def what(self) -> str:
+        """The name of its law."""
+        return "computed_torque"
+
+    of_accelerations: ClassVar[bool] = True

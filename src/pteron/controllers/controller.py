@@ -1,0 +1,89 @@
+"""What a controller is: its gains and its period, and from them a law for a machine."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
+
+from pteron.controllers.gain_numbers import PerJoint, above_zero, period_of
+from pteron.controllers.law import Law
+from pteron.kernels import Array
+from pteron.manipulator import Manipulator
+from pteron.reduction import BaseParameters
+
+SHARE = 0.1
+"""The usual bandwidth, times the period: a controller ten times as slow as its samples allows for
+a delay of one of them, and for legs that are heavier together than each by itself."""
+
+
+@dataclass(frozen=True)
+class Controller(ABC):
+    """A controller: a frozen dataclass of gains; `law` makes what runs of it.
+
+    Parameters
+    ----------
+    period : float
+        Time between two samples, for which forces are held, s.
+    bandwidth : float or one for each joint, optional
+        How quickly an error goes, rad/s; by default 0.1 / period.
+    """
+
+    period: float = 1e-3
+    bandwidth: PerJoint | None = None
+
+    @property
+    @abstractmethod
+    def what(self) -> str:
+        """The name of its law, among `pteron.kernels.FUNCTIONS`."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "period", period_of(self.period))
+        for name in self.positive:
+            object.__setattr__(self, name, above_zero(name, getattr(self, name)))
+
+    positive: ClassVar[tuple[str, ...]] = ("bandwidth",)
+    """The fields that are numbers above 0, one or one for each joint, or None."""
+
+    def base(self, model: Manipulator) -> BaseParameters | None:
+        """Return the base parameters that it estimates of a machine; None where it does not."""
+        return None
+
+    @abstractmethod
+    def gains(self, model: Manipulator) -> Array:
+        """Return its gains for a machine, as its law takes them.
+
+        Parameters
+        ----------
+        model : Manipulator
+            The machine as the controller knows it.
+
+        Returns
+        -------
+        array, shape (G,)
+            SI units; `pteron.equations.control.GAINS` has their order.
+
+        Raises
+        ------
+        DataError
+            If there are not as many numbers as joints.
+        """
+
+    def law(self, model: Manipulator) -> Law:
+        """Return its law for a machine.
+
+        Parameters
+        ----------
+        model : Manipulator
+            The machine as the controller knows it; what it controls may be another one.
+
+        Returns
+        -------
+        Law
+
+        Raises
+        ------
+        DataError
+            If there are not as many gains as joints.
+        """
+        return Law(self.what, model, self.gains(model), self.base(model))

@@ -1,0 +1,62 @@
+"""The numbers of a controller, checked: above zero, one for all joints or one for each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pteron.errors import DataError, shown
+from pteron.kernels import Array
+from pteron.manipulator import Manipulator
+
+PerJoint = float | Sequence[float]
+"""One number for all joints, or one for each."""
+
+_SLOWEST = 0.1
+"""A longer period, s, is taken for a rate."""
+
+
+def above_zero(name: str, value: PerJoint | None) -> float | tuple[float, ...] | None:
+    """Return a number or some, or refuse one that is not above zero."""
+    if value is None:
+        return None
+    if np.ndim(value) == 0:
+        return _number(f"{name}: {{}} given, a number above 0 expected", value)
+    return tuple(
+        _number(f"{name}: {{}} given for joint {i}, a number above 0 expected", one)
+        for i, one in enumerate(np.asarray(value).tolist(), start=1)
+    )
+
+
+def _number(message: str, value: object) -> float:
+    """Return a finite number above zero."""
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        number = np.nan
+    if isinstance(value, str | bool) or not (np.isfinite(number) and number > 0.0):
+        raise DataError(message.format(shown(value)))
+    return number
+
+
+def period_of(value: float) -> float:
+    """Return a period in s, or refuse what is none."""
+    period = _number("period: {} given, seconds between two samples expected, such as 0.001", value)
+    if period > _SLOWEST:
+        raise DataError(
+            f"period: {period:g} s given, at most {_SLOWEST:g} s expected; is it a rate in Hz? "
+            f"then give {1 / period:g}"
+        )
+    return period
+
+
+def per_joint(model: Manipulator, name: str, value: PerJoint) -> Array:
+    """Return a number for each joint (n,)."""
+    found = np.asarray(value, dtype=float)
+    if found.ndim and found.shape != (model.freedom,):
+        raise DataError(
+            f"{name}: {found.size} numbers given, but {model.name} has {model.freedom} joints "
+            f"({', '.join(model.joint_names)}); give one for each, or one for all"
+        )
+    return np.broadcast_to(found, model.freedom)

@@ -1,0 +1,71 @@
+"""How heavy a machine is at each of its joints, by which forces of feedback are scaled."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from functools import lru_cache
+
+import numpy as np
+
+from pteron.dynamics import mass_matrix
+from pteron.errors import ModelError
+from pteron.kernels import Array
+from pteron.kinematics import jacobian, random_poses
+from pteron.legs import Drive
+from pteron.manipulator import Manipulator
+
+_POSES = 100
+_LEAST = (0.1, 0.01)
+"""Least measures of type I and type II of these poses; less where there are none."""
+
+_SHARE = 0.1
+"""The share of them at which a joint is lighter."""
+
+
+@lru_cache(maxsize=64)
+def joint_masses(robot: Manipulator) -> Array:
+    """Return what a joint's force accelerates while the other joints are free, at light poses.
+
+    It is 1 / (J M^-1 J^T)_ii with the motors' inertia in M. Of n joints whose stiffness is w^2
+    times it, the squares of the natural frequencies have the mean w^2, so that none is above
+    sqrt(n) w. As it depends on the pose, it is what nine of ten random poses exceed.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine, its motors included.
+
+    Returns
+    -------
+    array, shape (n,)
+        kg at a slider, kg m^2 at a crank.
+
+    Raises
+    ------
+    ModelError
+        If the legs have next to no common reach.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.controllers import joint_masses
+    >>> joint_masses(pteron.load("five-bar")).round(5)
+    array([0.00042, 0.00042])
+    """
+    poses = light_poses(robot)
+    rows = jacobian(robot, poses)
+    rotors = np.diag([(leg.drive or Drive()).inertia for leg in robot.legs])
+    across = np.swapaxes(rows, -1, -2)
+    masses = mass_matrix(robot, poses) + across @ rotors @ rows
+    mobility = np.einsum("kij,kji->ki", rows, np.linalg.solve(masses, across))
+    found: Array = np.quantile(1.0 / mobility, _SHARE, axis=0)
+    found.setflags(write=False)
+    return found
+
+
+def light_poses(robot: Manipulator) -> Array:
+    """Return random poses, away from singularities where there are such."""
+    for least in _LEAST:
+        with suppress(ModelError):
+            return random_poses(robot, _POSES, type_i=least, type_ii=least)
+    return random_poses(robot, _POSES, type_i=0.0, type_ii=0.0)

@@ -1,0 +1,166 @@
+"""A law of control for one machine, as something to be called at every sample."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from pteron.equations.control import ADAPTED, GAINS, MEMORY, Layout, estimated, lengths
+from pteron.equations.drives import drive_names
+from pteron.errors import DataError
+from pteron.kernels import Array, as_array, numeric
+from pteron.kernels.choice import Adaptive
+from pteron.manipulator import Manipulator
+from pteron.reduction import BaseParameters
+from pteron.shapes import JointsLike, PerJoint, PoseLike
+
+
+@dataclass(frozen=True)
+class Law:
+    """A law of control with the gains and the model of one machine; it has no state of its own.
+
+    Attributes
+    ----------
+    what : str
+        Its name, among `pteron.kernels.FUNCTIONS`.
+    model : Manipulator
+        The machine as the controller knows it.
+    gains : array, shape (G,)
+        SI units.
+    base : BaseParameters, optional
+        What an adaptive law estimates.
+
+    Examples
+    --------
+    >>> import numpy as np, pteron
+    >>> from pteron.controllers import ComputedTorque
+    >>> robot, rest = pteron.load("tripteron"), np.zeros(3)
+    >>> law = ComputedTorque().law(robot)
+    >>> joints = pteron.inverse_kinematics(robot, rest)
+    >>> forces, memory = law(rest, rest, rest, joints, rest, law.memory(rest, rest))
+    >>> np.allclose(forces, pteron.inverse_dynamics(robot, rest, rest, rest))
+    True
+    """
+
+    what: str
+    model: Manipulator
+    gains: Array = field(repr=False)
+    base: BaseParameters | None = field(default=None, repr=False)
+
+    def memory(self, pose: PoseLike, velocity: PoseLike) -> Array:
+        """Return the memory with which to begin in a state of the machine.
+
+        Parameters
+        ----------
+        pose, velocity : array, shape (..., m)
+            m, rad and s. The pose may be some millimetres from that of the joints, as the last one
+            of a motion is; the wanted acceleration counts as zero before the first sample.
+
+        Returns
+        -------
+        array, shape (..., K)
+        """
+        robot = self.model
+        place = as_array(pose, "pose", (robot.freedom,))
+        place = np.broadcast_arrays(place, as_array(velocity, "velocity", (robot.freedom,)))[0]
+        zeros = [
+            np.zeros((*place.shape[:-1], size)) if name != "measured" else place
+            for name, size in self._sizes(MEMORY).items()
+        ]
+        return np.concatenate(zeros, axis=-1)
+
+    def __call__(
+        self,
+        pose: PoseLike,
+        velocity: PoseLike,
+        acceleration: PoseLike,
+        joints: JointsLike,
+        joint_rates: JointsLike,
+        memory: Array,
+    ) -> tuple[PerJoint, Array]:
+        """Return the forces until the next sample, and the memory for it.
+
+        Parameters
+        ----------
+        pose, velocity, acceleration : array, shape (..., m)
+            The platform's motion that is wanted at this sample; m, rad and s. Leading axes
+            broadcast.
+        joints, joint_rates : array, shape (..., n)
+            What is measured: m and m/s at a slider, rad and rad/s at a crank, as
+            `inverse_kinematics` gives them.
+        memory : array, shape (..., K)
+            What the last sample, or `memory`, returned.
+
+        Returns
+        -------
+        forces : array, shape (..., n)
+            Of the drives, N at a slider, N m at a crank. NaN where a leg does not reach the wanted
+            pose, or Newton's method finds no pose for the joints.
+        memory : array, shape (..., K)
+        """
+        wanted = pose, velocity, acceleration
+        forces, kept, _ = self._kernel(*wanted, joints, joint_rates, memory, self.gains)
+        return forces, kept
+
+    @cached_property
+    def _kernel(self) -> Adaptive:
+        return numeric(self.model, self.what, base=self.base)
+
+    def estimates(self, memory: Array) -> Array:
+        """Return what an adaptive law estimates: base parameters, then drives where it does.
+
+        Parameters
+        ----------
+        memory : array, shape (..., K)
+            What the law returned.
+
+        Returns
+        -------
+        array, shape (..., E)
+            In the order of `base.names`, SI units; then motors' inertia, dry friction, viscous
+            friction and offset, each for all joints.
+
+        Raises
+        ------
+        DataError
+            If the law estimates nothing.
+        """
+        if self.base is None:
+            raise DataError(f"{self.what}: it estimates nothing; use Adaptive")
+        gains = self._parts(GAINS, self.gains)
+        learnt = self._parts(MEMORY, memory)["learnt"]
+        count = learnt.shape[-1]
+        matrix = gains["learning"].reshape(count, count).T  # CasADi has columns
+        return np.asarray(gains["start"] + learnt @ matrix.T)
+
+    @property
+    def gain_names(self) -> tuple[str, ...]:
+        """What the gains are: "proportional_1" for joint 1, and so on."""
+        joints = range(1, self.model.freedom + 1)
+        estimates: tuple[str, ...] = () if self.base is None else self.base.names
+        if self.what == "adaptive_drives":
+            estimates += drive_names(self.model)[: len(ADAPTED) * self.model.freedom]
+        found: list[str] = []
+        for name, per in GAINS[self.what].items():
+            if per == "joint":
+                found += [f"{name}_{i}" for i in joints]
+            elif per == "parameter":
+                found += [f"{name}: {one}" for one in estimates]
+            elif per == "pair":
+                count = range(1, len(estimates) + 1)
+                found += [f"{name}: {one}, {k}" for k in count for one in estimates]
+            else:
+                found.append(name)
+        return tuple(found)
+
+    def _sizes(self, layout: Layout) -> dict[str, int]:
+        freedom = self.model.freedom
+        inertial = 0 if self.base is None else self.base.selection.shape[1]
+        return lengths(layout[self.what], freedom, estimated(self.what, freedom, inertial))
+
+    def _parts(self, layout: Layout, vector: Array) -> dict[str, Array]:
+        sizes = self._sizes(layout)
+        bounds = np.cumsum(list(sizes.values()))[:-1]
+        return dict(zip(sizes, np.split(vector, bounds, axis=-1), strict=True))

@@ -1,0 +1,152 @@
+"""What a motion shows of the parameters, and by how much they may be off: scales of adaptation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Protocol
+
+import numpy as np
+
+from pteron.bodies.parameters import body_places
+from pteron.controllers.joint_masses import joint_masses, light_poses
+from pteron.dynamics import drive_forces
+from pteron.equations.control import ADAPTED
+from pteron.equations.drives import drive_numbers
+from pteron.kernels import Array, numeric
+from pteron.kinematics import joint_accelerations, joint_rates
+from pteron.manipulator import Manipulator, parameter_data, parameters
+from pteron.reduction import BaseParameters, base_parameters, base_regressor
+
+_TYPICAL = 0.5, 5.0
+"""Speed and acceleration of a platform point in a typical motion, m/s and m/s^2."""
+
+_TURNS = 10
+"""Directions at each of its poses."""
+
+_HARDLY = 1e-3
+"""The share of the best seen combination below which another counts as not seen."""
+
+_NEAR = 0.1
+"""Share by which velocities and accelerations are disturbed: what errors call for counts too."""
+
+_SAMPLES = 400
+"""Of a motion, at least."""
+
+_DRIVES = 0.1
+"""The share of a joint's typical force, and of its mass, that a drive may take in any case."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What a motion of a machine shows of its base parameters and of its drives."""
+
+    robot: Manipulator
+    base: BaseParameters
+    motion: tuple[Array, Array, Array]
+
+    @cached_property
+    def columns(self) -> Array:
+        """(B, n, K): forces at the joints per unit of every estimate."""
+        n = self.robot.freedom
+        rates = joint_rates(self.robot, *self.motion[:2]).actuated
+        seconds = joint_accelerations(self.robot, *self.motion).actuated
+        drives = [seconds, np.sign(rates), rates, np.ones_like(rates)]
+        blocks = [np.eye(n) * part[:, None, :] for part in drives]
+        return np.concatenate([base_regressor(self.robot, self.base, *self.motion), *blocks], -1)
+
+    @cached_property
+    def scales(self) -> Array:
+        """(K,): the size of what makes up every estimate, in its own unit.
+
+        First moments count as the mass times the body's radius of gyration, also where they are
+        zero; drives as a tenth of what their joint takes at least.
+        """
+        values, sizes = parameters(self.robot), np.abs(parameters(self.robot))
+        for places in body_places(parameter_data(self.robot)).values():
+            if "I" in places:
+                sizes[[places[k] for k in ("mgx", "mgy") if k in places]] = np.sqrt(
+                    values[places["m"]] * values[places["I"]]
+                )
+        forces = drive_forces(self.robot, *self.motion)
+        force = _DRIVES * np.sqrt((forces**2).mean(axis=0))
+        rates = joint_rates(self.robot, *self.motion[:2]).actuated
+        speed = np.sqrt((rates**2).mean(axis=0))
+        least = _DRIVES * joint_masses(self.robot), force, force / speed, force
+        own = np.abs(drive_numbers(self.robot)[: len(ADAPTED) * self.robot.freedom])
+        drives = np.maximum(own, np.concatenate(least))
+        return np.concatenate([np.abs(self.base.grouping) @ sizes, drives])
+
+    def learning(self, damping: Array, count: int, rate: float, most: float) -> tuple[Array, float]:
+        """Return L (count, count), with which the first estimates learn at one rate, rad/s.
+
+        An estimate's error x acts as Y x, the joints of damping K (n,) answer with K^-1 Y x, and
+        Gamma Y^T of that changes it. So Gamma = L L^T is `rate` times the inverse of the mean of
+        Y^T K^-1 Y; less where something would be learnt faster than at `most` somewhere in the
+        motion. The second result is the size of eta where the estimates are off by their
+        `scales`, theta - theta_0 = L eta, on average over signs.
+        """
+        scales = self.scales[:count]
+        shown = self.columns[..., :count] * (scales / np.sqrt(damping)[:, None])
+        mean = np.einsum("bik,bil->kl", shown, shown) / len(shown)
+        seen, ways = np.linalg.eigh(mean)
+        seen = seen + _HARDLY * seen[-1]
+        part = shown @ (ways / np.sqrt(seen))
+        fastest = float(np.linalg.eigvalsh(part @ np.swapaxes(part, -1, -2)).max())
+        rate = min(rate, most / fastest)
+        matrix = scales[:, None] * ways * np.sqrt(rate / seen)
+        return matrix, float(np.sqrt(seen.sum() / rate))
+
+
+class Moves(Protocol):
+    """A motion, such as `pteron.motion.Motion`: samples (T, m) in m, rad and s."""
+
+    @property
+    def pose(self) -> Array:
+        """Poses."""
+
+    @property
+    def velocity(self) -> Array:
+        """Their rates."""
+
+    @property
+    def acceleration(self) -> Array:
+        """Their accelerations."""
+
+
+def shown(robot: Manipulator, motion: Moves | None) -> Shown:
+    """Return what a motion shows of a machine, or the typical one."""
+    if motion is None:
+        return typical(robot)
+    thinned = slice(None, None, max(len(motion.pose) // _SAMPLES, 1))
+    rng, unit = np.random.default_rng(0), _units(robot)
+    parts = []
+    for part, share in ((motion.pose, 0.0), (motion.velocity, _NEAR), (motion.acceleration, _NEAR)):
+        size = np.sqrt(((part[thinned] / unit) ** 2).sum(axis=-1).mean())
+        parts.append(part[thinned] + share * size * unit * rng.normal(size=part[thinned].shape))
+    return Shown(robot, typical(robot).base, (parts[0], parts[1], parts[2]))
+
+
+@lru_cache(maxsize=32)
+def typical(robot: Manipulator) -> Shown:
+    """Return what a typical motion shows of a machine, the same for the same machine.
+
+    It is random: the poses among many in which the legs are bent best, at 0.5 m/s and 5 m/s^2.
+    """
+    poses, rng, unit = light_poses(robot), np.random.default_rng(0), _units(robot)
+    bent = numeric(robot, "reach")(poses)[1].min(axis=-1)
+    poses = poses[np.argsort(-bent)[: len(poses) // 3]].repeat(_TURNS, axis=0)
+    velocity, acceleration = (
+        size * unit * way / np.linalg.norm(way, axis=-1, keepdims=True)
+        for size, way in zip(_TYPICAL, rng.normal(size=(2, *poses.shape)), strict=True)
+    )
+    return Shown(robot, base_parameters(robot), (poses, velocity, acceleration))
+
+
+def _units(robot: Manipulator) -> Array:
+    """Return how much of each of the pose's coordinates (m,) moves a platform point by 1 m."""
+    lever = max(float(np.linalg.norm(leg.platform_point)) for leg in robot.legs)
+    unit = np.ones(robot.freedom)
+    if robot.platform.turns and lever > 0.0:
+        unit[-1] = 1.0 / lever
+    return unit

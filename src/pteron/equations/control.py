@@ -1,0 +1,197 @@
+"""One sample of a controller: what is wanted, what is measured, and what it has to remember.
+
+The wanted motion is the platform's, the measured one the joints'. Errors are those of the joints,
+e = q_d - q. A law of control has no state of its own: what it must know at the next sample goes out
+as its memory, and comes in again. The laws themselves are in `laws`.
+
+A controller holds its forces for a period while the machine moves on, so that forces which suit the
+state at the sample come half a period late on average. Hence the model is taken in the middle of
+the period: the wanted motion is carried there by its Taylor series, with the change of the wanted
+acceleration since the last sample for the third derivative, and the measured joints by what the
+wanted ones do meanwhile. The errors are those at the sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, NamedTuple
+
+import casadi as ca
+
+from pteron.bodies.motion import Expression
+from pteron.equations.closing import direct_step
+from pteron.equations.drives import Drives, joint_motion
+from pteron.equations.machine import Machine, State
+
+Per = Literal["joint", "coordinate", "parameter", "pair", "law"]
+"""What a part of a vector has one number for: each joint, each of the pose's coordinates, each
+parameter that is estimated, each pair of these, or the law as a whole."""
+
+Layout = Mapping[str, Mapping[str, Per]]
+"""The parts of a vector, in order, for each law by name."""
+
+_FEEDBACK: dict[str, Per] = {"proportional": "joint", "derivative": "joint"}
+
+_LEARNING: dict[str, Per] = {
+    "slope": "joint",
+    "derivative": "joint",
+    "period": "law",
+    "start": "parameter",
+    "learning": "pair",
+    "room": "law",
+}
+
+GAINS: Layout = {
+    "pd_gravity": _FEEDBACK,
+    "feed_forward_pd": {**_FEEDBACK, "period": "law"},
+    "computed_torque": {**_FEEDBACK, "period": "law"},
+    "adaptive": _LEARNING,
+    "adaptive_drives": _LEARNING,
+}
+"""The parts of each law's gains, in order."""
+
+_LEARNT: dict[str, Per] = {
+    "measured": "coordinate",
+    "acceleration": "coordinate",
+    "learnt": "parameter",
+}
+
+MEMORY: Layout = {
+    "pd_gravity": {"measured": "coordinate"},
+    "feed_forward_pd": {"acceleration": "coordinate"},
+    "computed_torque": {"measured": "coordinate", "acceleration": "coordinate"},
+    "adaptive": _LEARNT,
+    "adaptive_drives": _LEARNT,
+}
+"""The parts of each law's memory, in order: the pose measured last, the acceleration wanted last,
+and what is learnt beyond the estimates at the start, as `estimates` has it."""
+
+ADAPTED = ("inertia", "coulomb", "viscous", "offset")
+"""What `adaptive_drives` estimates of the drives, after the inertial or base parameters, each for
+all joints: the first of `Drives`, in which forces are linear."""
+
+
+def lengths(parts: Mapping[str, Per], freedom: int, estimates: int) -> dict[str, int]:
+    """Return how many numbers each part of gains or memory has."""
+    sizes = {
+        "joint": freedom,
+        "coordinate": freedom,
+        "parameter": estimates,
+        "pair": estimates**2,
+        "law": 1,
+    }
+    return {name: sizes[per] for name, per in parts.items()}
+
+
+def estimated(what: str, freedom: int, inertial: int) -> int:
+    """Return how many estimates a law has, of so many inertial or base parameters."""
+    return inertial + (len(ADAPTED) * freedom if what == "adaptive_drives" else 0)
+
+
+def input_sizes(what: str, freedom: int, inertial: int) -> dict[str, int]:
+    """Return how many numbers a law's gains and its memory have; nothing for what is no law."""
+    estimates = estimated(what, freedom, inertial)
+    return {
+        name: sum(lengths(parts[what], freedom, estimates).values())
+        for name, parts in (("gains", GAINS), ("memory", MEMORY))
+        if what in parts
+    }
+
+
+def split(vector: Expression, sizes: Mapping[str, int]) -> dict[str, Expression]:
+    """Return the parts of a vector by name."""
+    bounds = [0]
+    for size in sizes.values():
+        bounds.append(bounds[-1] + size)
+    return dict(zip(sizes, ca.vertsplit(vector, bounds), strict=True))
+
+
+def estimates(gains: Mapping[str, Expression], learnt: Expression) -> Expression:
+    """Return theta = theta_0 + L eta (K, 1): what is estimated, from what is learnt, eta."""
+    count = learnt.shape[0]
+    return gains["start"] + ca.mtimes(ca.reshape(gains["learning"], count, count), learnt)
+
+
+class Wanted(NamedTuple):
+    """What the platform is to do at the sample: pose, velocity and acceleration, (m, 1) each."""
+
+    pose: Expression
+    velocity: Expression
+    acceleration: Expression
+
+    def middle(self, period: Expression, last: Expression) -> Wanted:
+        """Return what it is to do half a period later; `last` is the last sample's acceleration."""
+        t, third = period / 2, (self.acceleration - last) / period
+        return Wanted(
+            self.pose + t * (self.velocity + t / 2 * (self.acceleration + t / 3 * third)),
+            self.velocity + t * (self.acceleration + t / 2 * third),
+            self.acceleration + t * third,
+        )
+
+
+@dataclass(frozen=True)
+class Sample:
+    """What a law is given."""
+
+    machine: Machine
+    wanted: Wanted
+    joints: Expression
+    """Measured, (n, 1)."""
+    rates: Expression
+    gains: Mapping[str, Expression]
+    memory: Mapping[str, Expression]
+    drives: Drives
+    parameters: Expression
+    """(N, 1), where the law takes them as they are."""
+    selection: Expression
+    """(N, K): inertial parameters = selection @ the estimates of them."""
+    least: float
+    """The type-II measure below which a measured pose does not count."""
+
+    @cached_property
+    def now(self) -> State:
+        """The wanted motion at the sample."""
+        return self.machine.state(*self.wanted)
+
+    @cached_property
+    def middle(self) -> State:
+        """The wanted motion in the middle of the period."""
+        ahead = self.wanted.middle(self.gains["period"], self.memory["acceleration"])
+        return self.machine.state(*ahead)
+
+    @cached_property
+    def error(self) -> Expression:
+        """By how much the joints are behind, e (n, 1)."""
+        return coordinates(self.now) - self.joints
+
+    @cached_property
+    def error_rate(self) -> Expression:
+        """Its rate, e' (n, 1)."""
+        return joint_motion(self.now)[0] - self.rates
+
+    @property
+    def feedback(self) -> Expression:
+        """K_p e + K_d e'."""
+        return self.gains["proportional"] * self.error + self.gains["derivative"] * self.error_rate
+
+    @cached_property
+    def middle_rates(self) -> Expression:
+        """The measured joints' rates in the middle of the period."""
+        return joint_motion(self.middle)[0] - self.error_rate
+
+    def found(self, joints: Expression) -> Expression:
+        """Return the pose of measured joints, by Newton's method from the last one."""
+        return direct_step(self.machine, joints, self.memory["measured"], self.least)[0]
+
+    @cached_property
+    def middle_pose(self) -> Expression:
+        """The measured pose in the middle of the period."""
+        moved = coordinates(self.middle) - coordinates(self.now)
+        return self.found(self.joints + moved)
+
+
+def coordinates(state: State) -> Expression:
+    """Return the coordinates (n, 1) of the actuated joints."""
+    return ca.vertcat(*(leg.coordinate for leg in state.legs))

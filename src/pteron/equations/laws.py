@@ -1,0 +1,105 @@
+"""Laws of control: the forces of the drives at one sample, and what is remembered of it.
+
+What they are given and what e, e' and the middle of the period are: `control`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import casadi as ca
+
+from pteron.bodies.motion import Expression
+from pteron.equations.control import ADAPTED, Sample, estimates
+from pteron.equations.drives import Drives, drive_forces, joint_motion
+from pteron.equations.kinematics import platform_rates
+from pteron.equations.mixed import mixed_forces
+from pteron.equations.virtual_work import inverse_dynamics
+
+Answer = tuple[Expression, dict[str, Expression]]
+"""Forces (n, 1), and the parts of the memory."""
+
+
+def pd_gravity(s: Sample) -> Answer:
+    """Return F = K_p e + K_d e' + J^-T g + f_0: gravity and offsets at the measured pose."""
+    found = s.found(s.joints)
+    held = inverse_dynamics(s.machine, s.machine.state(found), s.parameters)
+    return s.feedback + held + s.drives.offset, {"measured": found}
+
+
+def feed_forward_pd(s: Sample) -> Answer:
+    """Return F = K_p e + K_d e' + what the drives need for the wanted motion."""
+    needed = inverse_dynamics(s.machine, s.middle, s.parameters)
+    needed += drive_forces(s.drives, *joint_motion(s.middle), smooth=True)
+    return s.feedback + needed, {"acceleration": s.wanted.acceleration}
+
+
+def computed_torque(s: Sample) -> Answer:
+    """Return what the drives need for q'' = q''_d + K_p e + K_d e' in the measured state.
+
+    Friction is that of the wanted rates: where a joint rests, measured ones have no steady sign.
+    """
+    found, (wanted, growth) = s.middle_pose, joint_motion(s.middle)
+    push = growth + s.feedback
+    motion = platform_rates(s.machine, found, s.middle_rates, push)
+    needed = inverse_dynamics(s.machine, s.machine.state(found, *motion), s.parameters)
+    needed += drive_forces(s.drives, wanted, push, smooth=True)
+    return needed, {"measured": found, "acceleration": s.wanted.acceleration}
+
+
+def adaptive(s: Sample) -> Answer:
+    """Return the forces, and what is learnt at this sample: Slotine and Li's law.
+
+    With the reference q'_r = q'_d + slope e, and z = q'_r - q' = e' + slope e,
+
+        F = Y theta + K_d z,    theta' = Gamma Y^T z,    Gamma = L L^T,
+
+    where Y theta are the forces of M x''_r + C(x, x') x'_r + g and of the drives at q'_r, q''_r. Y
+    is never formed: Y theta is linear in theta, so that Y^T z is the derivative of z^T Y theta.
+
+    What is kept is eta of theta = theta_0 + L eta: eta' = L^T Y^T z, one step of Euler's method a
+    sample, after which eta is brought back to |eta| <= room. In these coordinates that is no
+    farther from the true values, wherever they are within.
+
+    J.-J. E. Slotine, W. Li, "On the adaptive control of robot manipulators", The International
+    Journal of Robotics Research 6 (1987) 49-59; their s is -z.
+    """
+    return _adapted(s, estimates(s.gains, s.memory["learnt"]), s.drives)
+
+
+def adaptive_drives(s: Sample) -> Answer:
+    """Return what `adaptive` does, with motors' inertia, friction and offsets among the estimates.
+
+    Dry friction and viscous friction grow with the rate: taken at q'_r they take energy from z.
+    """
+    estimate = estimates(s.gains, s.memory["learnt"])
+    drive = estimate[s.selection.shape[1] :]
+    own = Drives(*ca.vertsplit(drive, s.machine.freedom), *s.drives[len(ADAPTED) :])
+    return _adapted(s, estimate, own)
+
+
+def _adapted(s: Sample, estimate: Expression, drives: Drives) -> Answer:
+    slope, found, learnt = s.gains["slope"], s.middle_pose, s.memory["learnt"]
+    z = s.error_rate + slope * s.error
+    rates, growth = joint_motion(s.middle)
+    aim, push = rates + slope * s.error, growth + slope * s.error_rate
+    parameters = ca.mtimes(s.selection, estimate[: s.selection.shape[1]])
+    needed = mixed_forces(s.machine, found, s.middle_rates, aim, push, parameters)
+    needed += drive_forces(drives, aim, push, smooth=True)
+    moved = learnt + s.gains["period"] * ca.jtimes(needed, learnt, z, True)
+    room = s.gains["room"]
+    return needed + s.gains["derivative"] * z, {
+        "measured": found,
+        "acceleration": s.wanted.acceleration,
+        "learnt": moved * (room / ca.fmax(ca.norm_2(moved), room)),
+    }
+
+
+LAWS: dict[str, Callable[[Sample], Answer]] = {
+    "pd_gravity": pd_gravity,
+    "feed_forward_pd": feed_forward_pd,
+    "computed_torque": computed_torque,
+    "adaptive": adaptive,
+    "adaptive_drives": adaptive_drives,
+}
+"""The laws by name."""

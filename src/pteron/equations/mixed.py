@@ -1,0 +1,42 @@
+"""Forces in which one velocity meets another: M a + C(x, v) w + g, by polarisation.
+
+C v is quadratic in v, and with Christoffel's symbols C(x, v) w is symmetric in v and w. So it is
+C(u) u of their mean less that of half their difference, and needs no equation of its own. The same
+holds for what the joints' accelerations are at x'' = 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import casadi as ca
+
+from pteron.bodies.motion import Expression
+from pteron.equations.drives import joint_motion
+from pteron.equations.machine import Machine
+from pteron.equations.virtual_work import inverse_dynamics
+
+
+def mixed_forces(
+    machine: Machine,
+    pose: Expression,
+    rates: Expression,
+    aim: Expression,
+    push: Expression,
+    parameters: Expression,
+) -> Expression:
+    """Return F (n, K) with J^T F = M a + C(x, v) w + g, for the columns of parameters (N, K).
+
+    J v = `rates`, J w = `aim`, and a is such that the joints' acceleration J a + J'(x, v) w is
+    `push`; these are (n, 1) each. With `aim` the rates themselves it is the inverse dynamics.
+    """
+    at_rest = machine.state(pose)
+    both = machine.closure.rates(ca.horzcat(rates, aim), at_rest.platform, at_rest.legs)
+    mean, half = 0.5 * (both[:, 0] + both[:, 1]), 0.5 * (both[:, 0] - both[:, 1])
+    drifts = (joint_motion(machine.state(pose, velocity))[1] for velocity in (mean, half))
+    drift = next(drifts) - next(drifts)
+    acceleration = machine.closure.rates(push - drift, at_rest.platform, at_rest.legs)
+    weightless = replace(machine, gravity=ca.SX.zeros(3))
+    return inverse_dynamics(
+        machine, machine.state(pose, mean, acceleration), parameters
+    ) - inverse_dynamics(weightless, machine.state(pose, half), parameters)
