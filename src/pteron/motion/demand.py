@@ -154,7 +154,9 @@ class Peak(NamedTuple):
         """Return the peak and its limit as words."""
         who = f"leg {self.leg}" if self.leg else "the tool"
         verb = _WORDS[self.name.removeprefix("tool_")][0]
-        return f"{who} {verb} {self.size:.4g} {self.unit} of {self.limit:.4g} {self.unit}"
+        return (
+            f"{who} {verb} {self.size:.4g} {self.unit}, its limit is {self.limit:.4g} {self.unit}"
+        )
 
 
 def peaks(

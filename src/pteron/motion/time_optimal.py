@@ -4,9 +4,9 @@ Along a path x(s) speeds are linear in s', and accelerations and the drives' for
 a u + b x + c <= 1 with u = s'' and x = s'^2, for each limit at each s. TOPP-RA (Pham and Pham,
 2018, IEEE Transactions on Robotics 34(3)) finds the largest x everywhere by small linear programs.
 
-Viscous friction goes with s', whose root is concave in x: against the motion a tangent of the root
-bounds it from above, where it helps to brake a chord from below. Both are exact at the speed that
-they are taken at, so that a second pass with the speeds of the first leaves little between them.
+Viscous friction goes with s', which is the root of x: where it is against the drive a tangent of
+the root bounds it from above, where it helps to brake a chord from rest to a largest speed bounds
+it from below. Both are close at the speeds that they are taken for: those of the pass before.
 Dry friction has the sign of the joint's motion: in full against it, without what it has more at
 rest where it helps.
 """
@@ -33,8 +33,18 @@ from pteron.motion.time_law import STEP, Course, kept_motion, polynomial, stretc
 _GRID = 400
 """Intervals of a stretch."""
 
+_EVEN = 0.3
+"""Share of the grid's spacing that is even."""
+
 _PASSES = 4
-"""How often a stretch is solved: with viscous friction and excesses of the time before."""
+"""How often a stretch is solved, each time with less room where the time before exceeds a limit."""
+
+_AHEAD = (math.inf, 4.0, 2.0, 1.4, 1.2, 1.1, 1.05)
+"""With viscous friction it is solved before, each time no faster than so many times the s'^2 of the
+time before: the chord is then the closer."""
+
+_FASTEST = 1e6
+"""The greatest s'^2, over its mean in the quintic's time."""
 
 _SIDES = 16
 """Sides of the polygon, inscribed in a circle, within which the tool's acceleration stays."""
@@ -50,6 +60,10 @@ _LITTLE = 1e-4
 
 _LOOK = 2001
 """Points of a stretch at which its limits are held against it."""
+
+_NOTHING = 1e-6
+"""Share of a limit, for s'' or s'^2 of 1, that the solver takes for neither nothing nor something;
+what it is to nothing is held against the limit afterwards."""
 
 _SLOWEST = 1e-4
 """Share of the largest s'^2 below which no tangent of its root is taken."""
@@ -157,19 +171,24 @@ def _fastest(
 ) -> _Stretch:
     """Return how a stretch is gone fastest; times are counted in `unit`, s, and s in its length."""
     begin, end = path.rests[j : j + 2]
-    # Denser towards the rests, where the motion stays long.
-    grid = 0.5 - 0.5 * np.cos(np.pi * np.arange(_GRID + 1) / _GRID)
+    # Denser towards the rests, where the motion stays long; much denser, and TOPP-RA loses digits.
+    even = np.linspace(0.0, 1.0, _GRID + 1)
+    grid = _EVEN * even + (1.0 - _EVEN) * (0.5 - 0.5 * np.cos(np.pi * even))
 
     def asked_at(share: Array) -> Demand:
         pose, first, second = path.at(begin + (end - begin) * share)
         return demand(robot, pose, (end - begin) * first, (end - begin) ** 2 * second)
 
     rows = _rows(asked_at(grid), limits, unit)
-    squares = _solved(toppra, rows, grid, None)
+    squares = _solved(toppra, rows, grid, None, math.inf)
+    if rows.v.any():
+        for ahead in _AHEAD:
+            squares = _solved(toppra, rows, grid, squares, ahead)
     found: list[_Stretch] = []
     room, most = np.ones_like(rows.c), rows.most
     for k in range(_PASSES):
-        squares = _solved(toppra, rows._replace(c=rows.c + 1.0 - room, most=most), grid, squares)
+        tighter = rows._replace(c=rows.c + 1.0 - room, most=most)
+        squares = _solved(toppra, tighter, grid, squares, _AHEAD[-1])
         profile = _Profile.of(grid, squares)
         spread = min(_SPREAD * step / unit, _SHARE * profile.duration)
         progress = profile.spread(spread)
@@ -268,23 +287,29 @@ def _rows(asked: Demand, limits: MotionLimits, unit: float) -> _Rows:
     return _Rows(found[0], found[1], found[2], found[3], (rates * unit) ** 2)
 
 
-def _solved(toppra: Any, rows: _Rows, grid: Array, before: Array | None) -> Array:
-    """Return x = s'^2 on the grid, by TOPP-RA, given that of the pass before."""
-    most = np.minimum(rows.most, 1e6)
-    b, c = rows.b.copy(), rows.c.copy()
+def _solved(toppra: Any, rows: _Rows, grid: Array, before: Array | None, ahead: float) -> Array:
+    """Return x = s'^2 on the grid, by TOPP-RA, given that of the pass before.
+
+    With viscous friction it is no more than `ahead` times as large, where the chord ends.
+    """
+    most = np.minimum(rows.most, _FASTEST)
+    a, b, c = rows.a.copy(), rows.b.copy(), rows.c.copy()
     if before is not None and rows.v.any():
         at = np.maximum(before, _SLOWEST * before.max())[:, None]
+        most = np.minimum(most, ahead * at[:, 0])
         # sqrt(x) <= sqrt(at) / 2 + x / (2 sqrt(at)), and for x <= top: sqrt(x) >= x / sqrt(top).
         against = rows.v > 0.0
         top = most[:, None]
         b += np.where(against, rows.v / (2.0 * np.sqrt(at)), rows.v / np.sqrt(top))
         c += np.where(against, rows.v * np.sqrt(at) / 2.0, 0.0)
+    for part in (a, b):
+        part[np.abs(part) < _NOTHING] = 0.0
     limit = toppra.constraint.LinearConstraint()
     limit.identical = True
     count = rows.a.shape[1]
     bounds = np.stack([np.zeros_like(most), most], axis=-1)
     parameters = toppra.constraint.linear_constraint.canlinear_colloc_to_interpolate(
-        rows.a, b, c, np.eye(count), np.ones(count), bounds, None, grid, identical=True
+        a, b, c, np.eye(count), np.ones(count), bounds, None, grid, identical=True
     )
     *lines, x_bounds, u_bounds = parameters
     limit.compute_constraint_params = lambda *_: (*lines, u_bounds, x_bounds)
