@@ -43,6 +43,9 @@ _AHEAD = (math.inf, 4.0, 2.0, 1.4, 1.2, 1.1, 1.05)
 """With viscous friction it is solved before, each time no faster than so many times the s'^2 of the
 time before: the chord is then the closer."""
 
+_SLOWER = (1.0, 0.5, 0.25, 0.1)
+"""Speeds over the quintic's from which on it is: one so slow that less friction helps to brake."""
+
 _FASTEST = 1e6
 """The greatest s'^2, over its mean in the quintic's time."""
 
@@ -180,10 +183,7 @@ def _fastest(
         return demand(robot, pose, (end - begin) * first, (end - begin) ** 2 * second)
 
     rows = _rows(asked_at(grid), limits, unit)
-    squares = _solved(toppra, rows, grid, None, math.inf)
-    if rows.v.any():
-        for ahead in _AHEAD:
-            squares = _solved(toppra, rows, grid, squares, ahead)
+    squares = _first(toppra, rows, grid)
     found: list[_Stretch] = []
     room, most = np.ones_like(rows.c), rows.most
     for k in range(_PASSES):
@@ -209,6 +209,25 @@ def _fastest(
         room = np.minimum(room, room - 1.05 * np.maximum(_most_of(near, used - 1.0), 0.0))
         most = most / np.maximum(_most_of(near, fast[:, None])[:, 0], 1.0)
     return min(found, key=lambda one: one.duration * one.slower)
+
+
+def _first(toppra: Any, rows: _Rows, grid: Array) -> Array:
+    """Return x = s'^2 on the grid that viscous friction allows, from that of the quintic on."""
+    share, rate, _ = polynomial("quintic")(np.linspace(0.0, 1.0, _LOOK))
+    quintic = np.interp(grid, share, rate) ** 2
+    if not rows.v.any():
+        return _solved(toppra, rows, grid, quintic, math.inf)
+    for slower in _SLOWER:
+        squares = slower**2 * quintic
+        try:
+            for ahead in _AHEAD:
+                squares = _solved(toppra, rows, grid, squares, ahead)
+        except ModelError:
+            if slower == _SLOWER[-1]:
+                raise
+        else:
+            break
+    return squares
 
 
 def _near(times: Array, nodes: Array, span: float) -> Array:
@@ -287,14 +306,14 @@ def _rows(asked: Demand, limits: MotionLimits, unit: float) -> _Rows:
     return _Rows(found[0], found[1], found[2], found[3], (rates * unit) ** 2)
 
 
-def _solved(toppra: Any, rows: _Rows, grid: Array, before: Array | None, ahead: float) -> Array:
+def _solved(toppra: Any, rows: _Rows, grid: Array, before: Array, ahead: float) -> Array:
     """Return x = s'^2 on the grid, by TOPP-RA, given that of the pass before.
 
     With viscous friction it is no more than `ahead` times as large, where the chord ends.
     """
     most = np.minimum(rows.most, _FASTEST)
     a, b, c = rows.a.copy(), rows.b.copy(), rows.c.copy()
-    if before is not None and rows.v.any():
+    if rows.v.any():
         at = np.maximum(before, _SLOWEST * before.max())[:, None]
         most = np.minimum(most, ahead * at[:, 0])
         # sqrt(x) <= sqrt(at) / 2 + x / (2 sqrt(at)), and for x <= top: sqrt(x) >= x / sqrt(top).
