@@ -1,19 +1,47 @@
 """Trajectories: smooth, through their poses, within every limit, and refused where impossible."""
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
+import polars as pl
 import pytest
-from differences import along
+from differences import along as derivative
 from mechanisms import CATALOG, MECHANISMS, random_machine, states
 
 import pteron
-from pteron.motion import with_payload
+from pteron.motion import (
+    FourierSeries,
+    Motion,
+    along,
+    check_motion,
+    cycle_path,
+    fourier_motion,
+    jerk_limited,
+    limits_of,
+    line_path,
+    peaks,
+    pick_and_place,
+    point_to_point,
+    replay,
+    shortest,
+    there_and_back,
+    time_optimal,
+    with_payload,
+)
+from pteron.motion.time_law import polynomial
+from pteron.tables import Table
+from pteron.workspace import home_pose
 
 MACHINES = {
     **MECHANISMS,
     **{name: CATALOG[name] for name in ("linear-delta", "par4", "five-bar", "3-rrr", "3-prr")},
+    "delta-4": CATALOG["delta-4"],
     "sliding": random_machine(0, "PRSSI"),
+    "off axis": replace(
+        CATALOG["quadrupteron"],
+        platform=replace(CATALOG["quadrupteron"].platform, tool=(0.03, -0.02, 0.01)),
+    ),
 }
 TOOLS = (
     "quadrupteron",
@@ -45,9 +73,10 @@ def test_a_payload_is_the_weight_and_the_inertia_of_a_point_at_the_tool(name):
         return p + robot.platform.tool @ axes
 
     step = 1e-3
-    v = along(lambda t: np.array([tool(k) for k in t]), step)
-    a = along(
-        lambda t: np.array([along(lambda u, k=k: [tool(k + w) for w in u], step) for k in t]), step
+    v = derivative(lambda t: np.array([tool(k) for k in t]), step)
+    a = derivative(
+        lambda t: np.array([derivative(lambda u, k=k: [tool(k + w) for w in u], step) for k in t]),
+        step,
     )
     taken = 1.7 * ((a - robot.gravity) * v).sum(axis=-1)
     np.testing.assert_allclose(given, taken, rtol=1e-6, atol=1e-6 * np.abs(taken).max())
@@ -64,3 +93,396 @@ def test_a_payload_that_is_none_or_impossible():
     askew = replace(slides, platform=replace(slides.platform, tool=(0.1, 0.0, 0.0)))
     with pytest.raises(pteron.ModelError, match=r"0\.1 m off the axis"):
         with_payload(askew, 1.0)
+
+
+DRIVE = pteron.Drive(
+    coulomb=1.5, viscous=6.0, offset=0.4, rotor_inertia=0.02, ratio=5.0, max_speed=2.0
+)
+STRIBECK = replace(DRIVE, stribeck=pteron.Stribeck(0.7, 0.02))
+
+
+def driven(robot, drive=DRIVE, **more):
+    """Return the machine with these drives."""
+    return replace(robot, legs=[replace(leg, drive=replace(drive, **more)) for leg in robot.legs])
+
+
+# The searches for home poses would take most of the time.
+HOMES = {
+    "3-prr": (0.0, 0.0, -0.087),
+    "3-rrr": (0.0, 0.0, 0.0),
+    "delta": (0.0, 0.0, -1.0),
+    "delta-4": (0.0, 0.0, -1.0, 0.0),
+    "delta-omnid": (0.0, 0.0, 0.36),
+    "five-bar": (0.0, 0.138),
+    "h4": (0.0, 0.129, -0.345, 0.0),
+    "linear-delta": (0.0, 0.0, 0.1),
+    "orthoglide": (-0.04, -0.04, -0.04),
+    "par4": (0.0, 0.0, -0.45, 0.0),
+    "quadrupteron": (0.0, 0.0, 0.0, 0.0),
+    "quadrupteron-oblique": (0.01, 0.03, -0.06, 0.0),
+    "tripteron": (-0.01, -0.01, -0.01),
+    "tripteron-colinear": (0.0, 0.0, 0.1),
+    "tripteron-oblique": (-0.02, -0.09, -0.05),
+    "tripteron-router": (0.01, 0.01, 0.01),
+}
+
+
+@lru_cache
+def home(name):
+    return np.array(HOMES[name]) if name in HOMES else home_pose(MACHINES[name])
+
+
+@lru_cache
+def around(name, count=4):
+    """Return poses (count, m) about a machine's home pose, within its reach."""
+    robot = MACHINES[name]
+    size = np.array([0.25 if c == "phi" else 0.02 for c in robot.coordinates])
+    steps = np.random.default_rng(5).uniform(-1.0, 1.0, (count, robot.freedom))
+    return home(name) + size * steps
+
+
+def sides(robot, motion, finer=10):
+    """Return joints' speeds, accelerations and the drives' forces at so many times the samples."""
+    fine = motion.at(np.linspace(0.0, motion.duration, finer * (len(motion.time) - 1) + 1))
+    return (
+        pteron.joint_rates(robot, *fine[:2]).actuated,
+        pteron.joint_accelerations(robot, *fine).actuated,
+        pteron.drive_forces(robot, *fine),
+    )
+
+
+def used(robot, motion, limits):
+    """Return the largest share of a limit that a motion takes, between its samples too."""
+    sizes = (np.abs(part).max(axis=0) for part in sides(robot, motion))
+    kept = limits.speed, limits.acceleration, limits.force
+    return max(float((size / limit).max()) for size, limit in zip(sizes, kept, strict=True))
+
+
+PATHS = ("quadrupteron", "3-rrr", "random PRR 0", "sliding", "par4")
+
+
+@lru_cache
+def paths(name):
+    """Return a cornered path with its way back, and that of a pick-and-place cycle."""
+    robot = MACHINES[name]
+    lines = there_and_back(line_path(robot, around(name), 0.005))
+    return lines, cycle_path(pick_and_place(robot, home(name)))
+
+
+@pytest.mark.parametrize("law", ["quintic", "seventh"])
+def test_a_polynomial_rests_at_both_ends(law):
+    progress = polynomial(law)
+    tau = np.linspace(0.01, 0.99, 50)
+    for order in range(2):
+        found = derivative(lambda t, k=order: np.array([progress(tau + u)[k] for u in t]), 1e-4)
+        np.testing.assert_allclose(found, progress(tau)[order + 1], atol=1e-9)
+    np.testing.assert_allclose(
+        progress(np.array([-1.0, 0.0, 1.0, 2.0])), [[0, 0, 1, 1], [0] * 4, [0] * 4], atol=1e-12
+    )
+    begin = derivative(lambda t: np.array([progress(0.1 * np.abs(u))[2] for u in t]), 1e-3)
+    assert law == "quintic" or abs(float(begin)) < 1e-12
+
+
+@pytest.mark.parametrize("name", PATHS)
+def test_a_path_is_smooth_in_what_it_has_gone(name):
+    for path in paths(name):
+        step = 1e-4 * path.length
+        s = np.random.default_rng(1).uniform(4.0 * step, path.length - 4.0 * step, 300)
+        apart = np.abs(s[:, None] - path.rests).min(axis=1) > 5.0 * step
+        s = s[apart]
+        for order in range(2):
+            found = derivative(
+                lambda t, k=order, s=s, path=path: np.array([path.at(s + u)[k] for u in t]), step
+            )
+            exact = path.at(s)[order + 1]
+            errors = np.abs(found - exact).max(axis=1) / np.abs(exact).max()
+            # The third derivative jumps at a few places: differences reach across them.
+            assert np.quantile(errors, 0.9) < 1e-7
+            assert errors.max() < 2e-3
+        ends = path.at(np.array(path.rests))[0]
+        np.testing.assert_allclose(ends[0], ends[-1], atol=1e-12)
+
+
+def test_a_path_goes_straight_between_its_corners_and_rounds_them():
+    robot = MACHINES["off axis"]
+    poses = home("quadrupteron") + np.array(
+        [[0, 0, 0, 0], [0.04, 0, 0, 0.3], [0.04, 0.04, 0, 0.3], [0.04, 0.04, 0.04, 0.3]]
+    )
+
+    def tool(pose):
+        p, axes = robot.platform.at(pose)
+        return p + robot.platform.tool @ axes
+
+    stops = line_path(robot, poses)
+    np.testing.assert_allclose(stops.at(np.array(stops.rests))[0], poses, atol=1e-12)
+    s = np.linspace(*stops.rests[:2], 50)
+    a, b = tool(poses[0]), tool(poses[1])
+    np.testing.assert_allclose(np.cross(tool(stops.at(s)[0]) - a, b - a), 0.0, atol=1e-14)
+    rounded = line_path(robot, poses, 0.01)
+    assert rounded.rests == (0.0, rounded.length)
+    fine = tool(rounded.at(np.linspace(0.0, rounded.length, 20001))[0])
+    # A right angle without a turn on either side is passed at 0.265 times the cut.
+    missed = np.linalg.norm(fine - tool(poses[2]), axis=-1).min()
+    assert missed == pytest.approx(0.01 * 6.0 / 32.0 * np.sqrt(2.0), rel=1e-4)
+    # All corners' cuts end in the middle of a line at most, and a way back is a rest.
+    assert line_path(robot, poses, 1.0).rests == (0.0, pytest.approx(rounded.length, abs=1e-12))
+    assert len(line_path(robot, poses[[0, 1, 0, 2]], 0.01).rests) == 3
+
+
+@pytest.mark.parametrize("name", ["quadrupteron", "par4"])
+def test_a_cycles_path_is_that_of_the_cycle(name):
+    robot = MACHINES[name]
+    cycle = pick_and_place(robot, home(name), samples=101)
+    path = cycle_path(cycle)
+    fine = path.at(np.linspace(0.0, path.length / 2.0, 20001))[0]
+    for pose in cycle.pose[:51]:
+        k = int(np.linalg.norm(fine - pose, axis=-1).argmin())
+        a, b = fine[max(k - 1, 0)], fine[min(k + 1, 20000)]
+        way = (b - a) / np.linalg.norm(b - a)
+        off = pose - a - (pose - a) @ way * way
+        assert np.linalg.norm(off) < 1e-6
+
+
+@pytest.mark.parametrize("name", ["quadrupteron-oblique +--+", "delta", "3-rrr", "random PRR 0"])
+@pytest.mark.parametrize("drive", [DRIVE, STRIBECK], ids=["viscous", "stribeck"])
+def test_a_motion_takes_the_shortest_time_within_the_limits(name, drive):
+    robot = driven(MACHINES[name], drive)
+    path = line_path(robot, around(name), 0.01)
+    free = along(robot, path, duration=1.0, limits=limits_of(replace(robot), speed=np.inf))
+    _, accelerations, forces = sides(robot, free)
+    for limits in (
+        limits_of(robot, acceleration=3.0 * np.abs(accelerations).max(), speed=100.0),
+        limits_of(robot, force=1.5 * np.abs(forces).max(axis=0) + 1.0, speed=100.0),
+        limits_of(robot, speed=np.abs(sides(robot, free)[0]).max(axis=0)),
+    ):
+        found = along(robot, path, limits=limits)
+        assert used(robot, found, limits) <= 1.0 + 1e-8
+        # Samples are whole steps: a step less is too short.
+        faster = Motion(
+            found.time * 0.99, found.pose, found.velocity / 0.99, found.acceleration / 0.99**2
+        )
+        # Dry friction counts in full, at rest and moving.
+        assert used(robot, faster, limits) > (1.0 if drive is DRIVE else 0.97)
+        with pytest.raises(pteron.DataError, match=r"too short: leg .* its limit is .* shortest"):
+            along(robot, path, limits=limits, duration=0.9 * found.duration)
+
+
+def test_peaks_are_those_of_the_motion():
+    robot = driven(MACHINES["random 3T1R 0"])
+    motion = along(
+        robot, line_path(robot, around("random 3T1R 0"), 0.01), duration=0.5, law="seventh"
+    )
+    found = peaks(robot, motion.pose, motion.velocity, motion.acceleration, limits_of(robot))
+    sizes = [np.abs(part).max(axis=0) for part in sides(robot, motion, finer=1)]
+    np.testing.assert_allclose(
+        [peak.size for peak in found if peak.leg], np.concatenate(sizes), rtol=1e-10
+    )
+    assert [peak.limit for peak in found[:4]] == [2.0] * 4
+    tool = np.linalg.norm(motion.velocity[:, :3], axis=-1).max()
+    assert found[-2].size == pytest.approx(tool, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", CATALOG)
+def test_the_fastest_motion_keeps_every_limit_and_is_never_slower(name):
+    robot = driven(CATALOG[name]) if sum(map(ord, name)) % 2 else CATALOG[name]
+    cycle = pick_and_place(robot, home(name))
+    rates, _, forces = (np.abs(part).max(axis=0) for part in sides(robot, cycle, finer=1))
+    limits = limits_of(robot, force=1.3 * forces + 1.0, speed=1.3 * rates + 0.1)
+    path = cycle_path(cycle)
+    fastest = time_optimal(robot, path, limits)
+    assert used(robot, fastest, limits) <= 1.0 + 1e-8
+    assert fastest.duration < along(robot, path, limits=limits).duration
+    assert fastest.duration < shortest(robot, cycle.cycle.at, limits).duration
+    assert fastest.duration < 1.08 * fastest.bound
+    np.testing.assert_allclose(fastest.pose[[0, -1]], cycle.pose[[0, -1]], atol=1e-9)
+    for part in (fastest.velocity, fastest.acceleration):
+        np.testing.assert_allclose(part[[0, -1]], 0.0, atol=1e-6)
+
+
+def axis_move(**drive):
+    """Return a Tripteron that moves along its first slider alone, and the mass that this moves."""
+    robot = MACHINES["tripteron, no gravity"]
+    robot = driven(robot, pteron.Drive(**drive)) if drive else robot
+    path = line_path(robot, [[-0.05, 0.0, 0.0], [0.1, 0.0, 0.0]])
+    return robot, path, pteron.mass_matrix(robot, [0.0, 0.0, 0.0])[0, 0]
+
+
+def test_the_fastest_motion_of_one_slider_is_the_textbook_s():
+    robot, path, _ = axis_move()
+    bang = time_optimal(robot, path, limits_of(robot, acceleration=20.0), step=1e-4)
+    assert bang.bound == pytest.approx(2.0 * np.sqrt(0.15 / 20.0), rel=1e-6)
+    cruise = time_optimal(robot, path, limits_of(robot, acceleration=20.0, speed=1.0), step=1e-4)
+    assert cruise.bound == pytest.approx(0.15 / 1.0 + 1.0 / 20.0, rel=1e-3)
+    assert bang.duration < 1.02 * bang.bound
+    tool = time_optimal(robot, path, limits_of(robot, tool_acceleration=20.0), step=1e-4)
+    assert tool.bound == pytest.approx(bang.bound, rel=1e-6)
+
+
+def test_viscous_friction_is_bounded_tightly():
+    # M v' = F - f - c v, then M v' = -F - f - c v: the switch is where the ways meet.
+    robot, path, _ = axis_move(viscous=60.0, coulomb=4.0, rotor_inertia=0.1)
+    limits = limits_of(robot, force=[60.0, 1e6, 1e6])
+    fastest = time_optimal(robot, path, limits, step=1e-4)
+    assert used(robot, fastest, limits) <= 1.0 + 1e-8
+    poses = np.linspace([-0.05, 0.0, 0.0], [0.1, 0.0, 0.0], 20001)
+    zero = np.zeros_like(poses)
+    push = np.broadcast_to([1.0, 0.0, 0.0], poses.shape)
+    mass = pteron.inverse_dynamics(robot, poses, zero, push)[:, 0] + 0.1
+    square = pteron.inverse_dynamics(robot, poses, push, zero)[:, 0]
+    h = 0.15 / 20000
+    ahead, back = np.zeros(20001), np.zeros(20001)
+    for k in range(20000):
+        gain = (60.0 - 4.0 - 60.0 * np.sqrt(ahead[k]) - square[k] * ahead[k]) / mass[k]
+        ahead[k + 1] = ahead[k] + 2.0 * h * gain
+        j = 20000 - k
+        loss = (60.0 + 4.0 + 60.0 * np.sqrt(back[j]) + square[j] * back[j]) / mass[j]
+        back[j - 1] = back[j] + 2.0 * h * loss
+    rate = np.sqrt(np.minimum(ahead, back))
+    exact = (2.0 * h / (rate[1:] + rate[:-1])).sum()
+    # Where friction helps to brake it is a chord below the root: a little is given away.
+    assert 0.999 < fastest.bound / exact < 1.006
+
+
+def test_joints_with_limited_jerk_take_the_textbooks_time():
+    robot = MACHINES["tripteron"]
+    ends = [-0.05, 0.0, 0.0], [0.1, 0.0, 0.0]
+    limits = limits_of(robot, speed=0.5, acceleration=5.0)
+    found = jerk_limited(robot, *ends, 100.0, limits)
+    assert found.duration == pytest.approx(0.15 / 0.5 + 0.5 / 5.0 + 5.0 / 100.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("name", ["quadrupteron", "delta", "3-rrr", "delta-4", "random PRR 0"])
+def test_joints_with_limited_jerk_keep_their_limits(name):
+    robot = driven(MACHINES[name], max_force=150.0)
+    ends = around(name)[[0, 2]]
+    limits = limits_of(robot, speed=1.0, acceleration=20.0)
+    found = jerk_limited(robot, *ends, 500.0, limits)
+    assert used(robot, found, limits) <= 1.0 + 1e-8
+    np.testing.assert_allclose(found.pose[[0, -1]], ends, atol=1e-9)
+    accelerations = sides(robot, found, finer=1)[1]
+    jerks = np.diff(accelerations, axis=0) / np.diff(found.time)[:, None]
+    assert np.abs(jerks).max() <= 500.0 * (1.0 + 1e-6)
+    for part in (found.velocity, found.acceleration):
+        np.testing.assert_allclose(part[[0, -1]], 0.0, atol=1e-9)
+
+
+def test_a_fourier_series_has_its_own_derivatives_and_repeats():
+    rng = np.random.default_rng(2)
+    series = FourierSeries((0.0, 0.0, 0.0), *(0.01 * rng.normal(size=(2, 3, 3))), 1.5)
+    motion = fourier_motion(MACHINES["tripteron"], series)
+    time = rng.uniform(0.0, 1.5, 50)
+    for order in range(2):
+        found = derivative(lambda t, k=order: np.array([series.at(time + u)[k] for u in t]), 1e-3)
+        np.testing.assert_allclose(found, series.at(time)[order + 1], rtol=1e-9, atol=1e-9)
+    assert motion.repeated(2).duration == 3.0
+    with pytest.raises(pteron.DataError, match=r"shapes .* expected"):
+        FourierSeries((0.0,), ((1.0, 2.0),), ((1.0,),), 1.0)
+    with pytest.raises(pteron.DataError, match="period"):
+        FourierSeries((0.0,), ((1.0,),), ((1.0,),), 0.0)
+
+
+def test_a_table_is_replayed_by_poses_or_by_joints():
+    robot = MACHINES["3-rrr"]
+    poses = around("3-rrr")
+    motion = along(robot, line_path(robot, poses, 0.01), duration=0.8, law="seventh")
+    joints = pteron.inverse_kinematics(robot, motion.pose)
+    columns = {"t": motion.time}
+    pose = columns | dict(zip(robot.coordinates, motion.pose.T, strict=True))
+    crank = columns | dict(zip(robot.joint_names, joints.T, strict=True))
+    whole = pose | {
+        f"{order}{c}": values
+        for order, part in (("d", motion.velocity), ("dd", motion.acceleration))
+        for c, values in zip(robot.coordinates, part.T, strict=True)
+    }
+    for cells, digits in ((whole, 1e-15), (pose, 1e-4), (crank, 1e-4)):
+        found = replay(robot, Table("a table", pl.DataFrame(cells)), start=poses[0])
+        np.testing.assert_allclose(found.pose, motion.pose, atol=1e-9)
+        np.testing.assert_allclose(found.velocity, motion.velocity, atol=digits)
+        scale = np.abs(motion.acceleration).max()
+        np.testing.assert_allclose(
+            found.acceleration, motion.acceleration, atol=digits * scale * 10
+        )
+    with pytest.raises(pteron.DataError, match="start: the table holds joint coordinates"):
+        replay(robot, Table("a table", pl.DataFrame(crank)))
+    back = pl.DataFrame(pose)[[0, 2, 1, 3]]
+    with pytest.raises(pteron.DataError, match=r"row 3, column t: 0\.001 s after 0\.002 s"):
+        replay(robot, Table("a table", back))
+
+
+def test_a_way_that_fails_is_refused_where_it_first_does():
+    quadrupteron, five = MACHINES["quadrupteron"], MACHINES["five-bar"]
+    with pytest.raises(
+        pteron.UnreachablePose, match=r"0\.09\d* m along its 0\.4 m.*of leg 2"
+    ) as error:
+        point_to_point(quadrupteron, [0.0] * 4, [0.4, 0.0, 0.0, 0.0], duration=1.0)
+    assert error.value.leg == 2
+    assert error.value.shortfall > 0.1
+    with pytest.raises(
+        pteron.SingularPose, match=r"0, 1\.5708\]: comes to a singularity .*type II"
+    ):
+        point_to_point(quadrupteron, [0.0] * 4, [0.0, 0.0, 0.0, 2.0], duration=1.0)
+    # The limits of the cranks come later on this way than the singularity.
+    with pytest.raises(pteron.SingularPose, match=r"0\.0535\d* m along"):
+        point_to_point(five, [0.0, 0.138], [0.0, -0.1], duration=1.0)
+    with pytest.raises(
+        pteron.UnreachablePose, match=r"leg 2: its crank passes its limits, -0\.258"
+    ):
+        point_to_point(five, [0.0, 0.138], [0.12, 0.0], duration=1.0)
+    h4 = CATALOG["h4"]
+    turned = home("h4") + np.array([0.0, 0.0, 0.0, 1.5])
+    with pytest.raises(pteron.UnreachablePose, match=r"\]: phi comes to 1\.5 rad, its limits are"):
+        point_to_point(h4, home("h4"), turned, duration=1.0)
+    with pytest.raises(pteron.UnreachablePose, match=r"out of the reach.*is it in millimetres"):
+        point_to_point(five, [0.0, 138.0], [0.0, 100.0], duration=1.0)
+
+
+def test_a_way_is_followed_between_its_samples():
+    # Three samples far apart: between two of them the platform turns by a half and back.
+    robot = MACHINES["quadrupteron"]
+    time = np.array([0.0, 1.0, 2.0])
+    rest = np.zeros((3, 4))
+    gone = rest.copy()
+    gone[1, 3] = 12.0
+    with pytest.raises(pteron.SingularPose, match=r"the motion, at 0\.\d+ s"):
+        check_motion(robot, Motion(time, rest, gone, rest))
+    gone[1] = [1.2, 0.0, 0.0, 0.0]
+    with pytest.raises(pteron.UnreachablePose, match=r"the motion, at \d\.\d+ s.* reach of leg 4"):
+        check_motion(robot, Motion(time, rest, gone, rest))
+
+
+def test_drives_that_cannot_hold_the_machine_are_told():
+    robot = driven(MACHINES["delta"], max_force=20.0)
+    ends = [0.0, 0.0, -0.9], [0.0, 0.2, -0.9]
+    with pytest.raises(
+        pteron.ModelError, match=r"leg \d: its drive gives 20 N m, but .* alone take"
+    ):
+        point_to_point(with_payload(robot, 5.0), *ends)
+    with pytest.raises(pteron.ModelError, match="alone take"):
+        time_optimal(with_payload(robot, 5.0), line_path(robot, ends))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        (lambda r, a, b: point_to_point(r, a, b), "neither a duration nor a limit"),
+        (lambda r, a, b: point_to_point(r, a, b, duration=0.0), "duration: 0.0 given"),
+        (lambda r, a, b: point_to_point(r, a, b, duration=1.0, law="cubic"), "law: 'cubic'"),
+        (lambda r, a, b: point_to_point(r, a, b, duration=1.0, step=-1), "step: -1 given"),
+        (lambda r, a, b: point_to_point(r, a, b, duration=1e9), "10000000 are served"),
+        (lambda r, a, b: point_to_point(r, a, a, duration=1.0), "2 is the same as 1"),
+        (lambda r, a, b: line_path(r, [a]), r"shape \(1, 3\) given"),
+        (lambda r, a, b: line_path(r, [a, b], -0.1), "corner: -0.1 given"),
+        (lambda r, a, b: limits_of(r, speed=[1.0, 2.0]), "2 numbers given, one expected or 3"),
+        (lambda r, a, b: limits_of(r, force=-1.0), "force: -1.0 given"),
+        (lambda r, a, b: limits_of(r, tool_speed="fast"), "tool_speed: 'fast' given"),
+        (lambda r, a, b: time_optimal(r, line_path(r, [a, b])), "nothing limits the acceleration"),
+        (lambda r, a, b: jerk_limited(r, a, b, 10.0), "jerk and acceleration of every joint"),
+        (
+            lambda r, a, b: jerk_limited(r, a, a, 10.0, limits_of(r, acceleration=1.0)),
+            "at start's already",
+        ),
+    ],
+)
+def test_what_makes_no_motion_is_refused(wrong, told):
+    with pytest.raises(pteron.DataError, match=told):
+        wrong(MACHINES["tripteron"], [0.0, 0.0, 0.0], [0.05, 0.0, 0.0])

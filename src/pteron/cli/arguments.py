@@ -40,7 +40,10 @@ Elbows = Annotated[
     str | None, option("elbows", "The working mode, one sign a leg, such as ++-+.", "SIGNS")
 ]
 
-VECTORS = ("--pose", "--velocity", "--acceleration", "--wrench")
+MOTION = ("--pose", "--velocity", "--acceleration", "--wrench")
+"""The parts of a state that is typed."""
+
+VECTORS = (*MOTION, "--from", "--to", "--around", "--speed", "--force", "--jerk")
 """The options that take as many numbers as follow them."""
 
 
@@ -136,6 +139,14 @@ def parsed_numbers(words: Sequence[str], names: Sequence[str], what: str) -> lis
             f"{what}: {len(values)} {noun} given, {len(names)} expected: {' '.join(names)}"
         )
     return values
+
+
+def parsed_list(text: str | None, what: str) -> list[float] | None:
+    """Return the numbers in an option's text, as many as there are; None where it is left out."""
+    if text is None:
+        return None
+    words = text.replace(",", " ").split()
+    return parsed_numbers([text], [f"number {k + 1}" for k in range(max(1, len(words)))], what)
 
 
 def load_robot(name_or_path: str, elbows: str | None = None) -> Manipulator:

@@ -15,6 +15,7 @@ from typer.core import TyperGroup
 
 from pteron.cli.arguments import Command, NumbersCommand, without_types
 from pteron.cli.base import base, table1
+from pteron.cli.cycle import cycle
 from pteron.cli.excite import excite
 from pteron.cli.export import export
 from pteron.cli.identify import identify
@@ -171,6 +172,14 @@ _add(
     "pteron export my-robot.toml --c controller --float --function inverse_kinematics",
     "pteron export quadrupteron --st plc",
     "pteron export robot.toml --base result/identification.json --c controller",
+)
+_add(
+    cycle,
+    "pteron cycle quadrupteron",
+    "pteron cycle my-robot.toml --optimal --force 60 --payload 0.5 --out cycle.csv",
+    "pteron cycle tripteron --to 0.1 0 0.05 --back --acceleration 10 --out line.csv",
+    "pteron cycle delta --via poses.csv --corner 0.02 --duration 2 --out path.csv",
+    cls=NumbersCommand,
 )
 _add(
     excite,

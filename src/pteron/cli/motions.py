@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from typer import Argument
 
 from pteron.cli.arguments import (
-    VECTORS,
+    MOTION,
     Elbows,
     Failure,
     Json,
@@ -219,7 +219,7 @@ def _typed_row(typed: list[str | None], motion: list[str], loads: tuple[str, ...
     names: list[str] = []
     values: list[float] = []
     parts = (motion[:m], motion[m : 2 * m], motion[2 * m :], loads)
-    for name, given, own in zip(VECTORS, typed, parts, strict=True):
+    for name, given, own in zip(MOTION, typed, parts, strict=True):
         if given is None and name == "--wrench":
             continue
         names += own

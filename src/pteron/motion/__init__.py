@@ -1,17 +1,18 @@
-"""Motions of the platform and of the machine: trajectories, simulation, the drives' limits."""
+"""Motions of the platform, what they ask of the drives, and simulation of the machine."""
 
-from pteron.controllers import (
-    Adaptive,
-    ComputedTorque,
-    Controller,
-    FeedForwardPD,
-    PDGravity,
-)
+from pteron.motion.checks import check_motion, check_path
+from pteron.motion.demand import Peak, peaks
+from pteron.motion.fourier import FourierSeries, fourier_motion
+from pteron.motion.jerk_limited import jerk_limited
 from pteron.motion.joint_points import Guide, JointPoints, Part, joint_guides, joint_points
+from pteron.motion.limits import MotionLimits, limits_of
 from pteron.motion.motion import Motion
 from pteron.motion.overloads import overloads
+from pteron.motion.path import LinePath, Path, line_path, there_and_back
 from pteron.motion.payload import with_payload
-from pteron.motion.pick_and_place import PickAndPlace, pick_and_place
+from pteron.motion.pick_and_place import PickAndPlace, cycle_path, pick_and_place
+from pteron.motion.point_to_point import point_to_point
+from pteron.motion.replay import replay
 from pteron.motion.scaling import scaled_to_reach
 from pteron.motion.simulation import (
     Sensors,
@@ -20,27 +21,44 @@ from pteron.motion.simulation import (
     longest_step,
     simulate,
 )
+from pteron.motion.time_law import along, shortest
+from pteron.motion.time_optimal import TimeOptimal, time_optimal
 
 __all__ = [
-    "Adaptive",
-    "ComputedTorque",
-    "Controller",
-    "FeedForwardPD",
-    "PDGravity",
+    "FourierSeries",
     "Guide",
     "JointPoints",
+    "LinePath",
     "Motion",
+    "MotionLimits",
     "Part",
+    "Path",
+    "Peak",
     "PickAndPlace",
     "Sensors",
     "Simulation",
+    "TimeOptimal",
     "advance",
+    "along",
+    "check_motion",
+    "check_path",
+    "cycle_path",
+    "fourier_motion",
+    "jerk_limited",
     "joint_guides",
     "joint_points",
+    "limits_of",
+    "line_path",
     "longest_step",
     "overloads",
+    "peaks",
     "pick_and_place",
+    "point_to_point",
+    "replay",
     "scaled_to_reach",
+    "shortest",
     "simulate",
+    "there_and_back",
+    "time_optimal",
     "with_payload",
 ]

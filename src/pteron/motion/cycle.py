@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
+from pteron.motion.tool import pose_motion, turning_arm
 from pteron.platforms import Platform
 
 LIFT = 0.025
@@ -114,24 +115,14 @@ class Cycle:
             return place, velocity, acceleration
         turned, rate, growth = (self.scale * self.turn * s[:, None] for s in _shares(tau)[0])
         angle = self.around[-1:] + turned
-        # P leads to the tool by an arm, of which a part turns with the platform.
-        (middle, _), (arm, lever) = self._arm(self.around[-1:]), self._arm(angle)
-        return (
-            np.hstack([place + middle - arm, angle]),
-            np.hstack([velocity - rate * lever, rate]),
-            np.hstack([acceleration - growth * lever + rate**2 * arm, growth]),
+        # The middle is told as a pose of P, the path as that of the tool.
+        middle, _ = turning_arm(self.platform, self.around[-1:])
+        return pose_motion(
+            self.platform,
+            np.hstack([place + middle, angle]),
+            np.hstack([velocity, rate]),
+            np.hstack([acceleration, growth]),
         )
-
-    def _arm(self, angle: Array) -> tuple[Array, Array]:
-        """Return what of the way from P to the tool turns, at angles (..., 1), and d/d angle."""
-        platform = self.platform
-        x, y = (platform.directions @ axis for axis in platform.frame[:2])
-        a, b = (
-            platform.tool[0] * x + platform.tool[1] * y,
-            platform.tool[0] * y - platform.tool[1] * x,
-        )
-        cos, sin = np.cos(angle), np.sin(angle)
-        return cos * a + sin * b, cos * b - sin * a
 
 
 _Shares = tuple[Array, Array, Array]

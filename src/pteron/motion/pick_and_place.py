@@ -14,6 +14,7 @@ from pteron.kinematics.evaluate import checked
 from pteron.manipulator import Manipulator
 from pteron.motion.cycle import Cycle, moves
 from pteron.motion.motion import Motion
+from pteron.motion.path import BackPath, CyclePath
 from pteron.motion.scaling import LEAST_RESERVE, TURN, scaled_to_reach
 from pteron.shapes import PoseLike
 
@@ -33,12 +34,15 @@ class PickAndPlace(Motion):
         Unit vectors of the moves, in the base frame.
     turn : float
         By how much the platform turns on its way across, rad, the scale included.
+    cycle : Cycle
+        The cycle over one unit of time.
     """
 
     scale: float
     across: Array
     up: Array
     turn: float
+    cycle: Cycle
 
 
 def pick_and_place(
@@ -132,7 +136,32 @@ def pick_and_place(
         across,
         up,
         scale * angle,
+        cycle,
     )
+
+
+def cycle_path(found: PickAndPlace) -> BackPath:
+    """Return the way of a pick-and-place cycle, out and back, without its time.
+
+    Parameters
+    ----------
+    found : PickAndPlace
+        The cycle.
+
+    Returns
+    -------
+    Path
+        It rests at both ends; `time_optimal` goes it fastest.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.motion import cycle_path, pick_and_place
+    >>> path = cycle_path(pick_and_place(pteron.load("tripteron"), [0.0, 0.0, 0.0]))
+    >>> len(path.rests)
+    3
+    """
+    return BackPath(CyclePath(found.cycle))
 
 
 def _peak_acceleration(cycle: Cycle) -> float:

@@ -16,6 +16,7 @@ from pteron.kernels import Array, as_array
 from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator
 from pteron.motion import Motion
+from pteron.motion.fourier import fourier_basis
 
 Space = Literal["platform", "joints"]
 """Whose coordinates the series are of: the platform's pose, or the joints'."""
@@ -154,7 +155,7 @@ class FourierMotion:
         """
         robot = self.robot
         q, first, second = (
-            rows @ self.coefficients for rows in basis(phase, self.harmonics, self.period)
+            rows @ self.coefficients for rows in fourier_basis(phase, self.harmonics, self.period)
         )
         rate, gain = np.reshape(rate, (-1, 1)), np.reshape(gain, (-1, 1))
         dq, ddq = first * rate, second * rate**2 + first * gain
@@ -171,18 +172,6 @@ class FourierMotion:
     def uniform_times(self, count: int) -> Array:
         """Return so many times (count,) evenly over one period, without its end."""
         return np.asarray(np.arange(count) * (self.period / count), dtype=np.float64)
-
-
-def basis(times: Array, harmonics: int, period: float) -> tuple[Array, Array, Array]:
-    """Return what takes coefficients (2 H + 1, n) to q, q' and q'' (T, n): (T, 2 H + 1) each."""
-    w = 2.0 * np.pi / period * np.arange(1, harmonics + 1)
-    cosines, sines = np.cos(np.outer(times, w)), np.sin(np.outer(times, w))
-    one, zero = np.ones((len(times), 1)), np.zeros((len(times), 1))
-    return (
-        np.hstack([one, cosines, sines]),
-        np.hstack([zero, -w * sines, w * cosines]),
-        np.hstack([zero, -w * w * cosines, -w * w * sines]),
-    )
 
 
 def _times(time: ArrayLike) -> Array:

@@ -11,13 +11,14 @@ import numpy as np
 
 from pteron.bodies.motion import Expression
 from pteron.identification.excitation.draws import sizes
-from pteron.identification.excitation.fourier import Space, basis
+from pteron.identification.excitation.fourier import Space
 from pteron.identification.excitation.limits import Limits, drive_load, joint_sizes, per_joint
 from pteron.identification.signals.states import home, home_mode
 from pteron.kernels import Array, Columns, program
 from pteron.kinematics.evaluate import unchecked
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator, parameters
+from pteron.motion.fourier import fourier_basis
 
 Criterion = Literal["condition", "logdet"]
 """What is made small: the scaled condition number, or the volume of the confidence ellipsoid."""
@@ -114,7 +115,7 @@ def _options(seconds: float) -> dict[str, Any]:
 
 def _along(setting: Setting, coefficients: Expression, times: Array) -> list[Expression]:
     """Return q, q' and q'' at times (T,), (n, T) each."""
-    rows = basis(times, setting.harmonics, setting.period)
+    rows = fourier_basis(times, setting.harmonics, setting.period)
     return [ca.mtimes(ca.DM(row), coefficients).T for row in rows]
 
 

@@ -1,0 +1,119 @@
+"""Simulation: how much faster than real time, alone, in a batch, and beside MuJoCo.
+
+The machines have drives with dry and viscous friction and rotors. Steps are Runge and Kutta's of
+fourth order, 0.1 ms long. MuJoCo simulates the exported MJCF, the same bodies with all legs closed
+by equality constraints, with the same method and step; it is called from C once for all steps of a
+round, as Pteron's steps are, and the two take turns. The controlled simulation is `simulate` with
+computed torque at 1 kHz, called from Python at each sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from importlib.util import find_spec
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from measuring import Contestant, contest, quick
+
+import pteron
+from pteron.controllers import ComputedTorque
+from pteron.kernels.steps import steps
+from pteron.motion import pick_and_place, simulate
+from pteron.workspace import home_pose
+
+STEP = 1e-4
+"""s."""
+
+DRIVE = pteron.Drive(coulomb=3.0, viscous=10.0, rotor_inertia=0.1, rest_speed=0.01)
+BATCH = 10_000
+GOALS = {"quadrupteron": (80.0, 20.0)}
+"""Times real time, and times MuJoCo's speed, that are asked for."""
+
+
+def main() -> None:
+    """Print a row a machine."""
+    names = ("alone", "ns a step", "in a batch", "ns a step", "MuJoCo", "ratio", "controlled")
+    print(f"{'times real time':<14}{''.join(f'{name:>12}' for name in names)}")
+    for name in ("quadrupteron", "delta", "par4", "five-bar"):
+        robot = pteron.load(name)
+        robot = replace(robot, legs=tuple(replace(leg, drive=DRIVE) for leg in robot.legs))
+        home, rest = home_pose(robot), np.zeros(robot.freedom)
+        holding = pteron.drive_forces(robot, home, rest, rest, smooth=True)
+        count, many = (100, 1) if quick() else (2000, 20)
+        batch = 100 if quick() else BATCH
+        spread = home + 1e-3 * np.random.default_rng(0).normal(size=(batch, robot.freedom))
+        made = steps(robot)
+        contestants = [
+            _contestant("alone", lambda: made(home, rest, holding, [STEP, count]), count),
+            _contestant(
+                "batch",
+                lambda: made(spread, np.zeros_like(spread), holding + 0.0 * spread, [STEP, many]),
+                many * batch,
+            ),
+        ]
+        if find_spec("mujoco") is not None:
+            contestants.append(_contestant("mujoco", _mujoco(robot, holding, count // 20), count // 20))
+        times = contest(contestants, 3 if quick() else 15)
+        alone, together = (float(np.median(times[key])) for key in ("alone", "batch"))
+        peer, ratio = "-", "-"
+        if "mujoco" in times:
+            slower = float(np.median(times["mujoco"] / times["alone"]))
+            peer, ratio = f"{STEP / float(np.median(times['mujoco'])):.2f}", f"{slower:.0f}"
+        cells = [
+            *(f"{STEP / alone:.0f}", f"{1e9 * alone:.0f}"),
+            *(f"{STEP / together:.0f}", f"{1e9 * together:.0f}", peer, ratio),
+            f"{_controlled(robot):.1f}",
+        ]
+        print(f"{name:<14}{''.join(f'{cell:>12}' for cell in cells)}")
+        if name in GOALS and not quick():
+            fast, faster = GOALS[name]
+            if STEP / alone < fast or ("mujoco" in times and slower < faster):
+                raise SystemExit(f"{name}: {fast:g} times real time and {faster:g} times MuJoCo's")
+
+
+def _contestant(name: str, run: Callable[[], Any], count: int) -> Contestant:
+    def seconds() -> float:
+        begin = perf_counter()
+        run()
+        return (perf_counter() - begin) / count
+
+    return Contestant(name, seconds, 0.0)
+
+
+def _mujoco(robot: pteron.Manipulator, holding: Any, count: int) -> Callable[[], Any]:
+    """Return what makes steps of MuJoCo's closed-loop model from its keyframe."""
+    import mujoco
+
+    from pteron.export import mjcf, tree
+
+    model = mujoco.MjModel.from_xml_string(mjcf(tree(robot)))
+    model.opt.timestep = STEP
+    model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
+    data = mujoco.MjData(model)
+
+    def run() -> None:
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+        data.ctrl[:] = holding
+        mujoco.mj_step(model, data, count)
+
+    return run
+
+
+def _controlled(robot: pteron.Manipulator) -> float:
+    """Return how many times faster than real time a controlled cycle is."""
+    motion = pick_and_place(robot, home_pose(robot), least=0.1)
+    controller = ComputedTorque(period=1e-3)
+    best = 0.0
+    for _ in range(1 if quick() else 5):
+        begin = perf_counter()
+        found = simulate(robot, motion, controller)
+        assert found.stopped is None
+        best = max(best, motion.duration / (perf_counter() - begin))
+    return best
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,389 @@
+"""`pteron cycle`: a motion of the machine as a table, and what it asks of the drives."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pteron.cli.arguments import (
+    Elbows,
+    Json,
+    Robot,
+    load_robot,
+    option,
+    parsed_list,
+    parsed_numbers,
+)
+from pteron.cli.motion_table import motion_frame, peaks_table
+from pteron.cli.screen import note, plain, show, show_json, spinner
+from pteron.errors import DataError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from pteron.manipulator import Manipulator
+    from pteron.motion import Motion, MotionLimits
+
+Kind = Literal["adept", "line", "joints", "replay"]
+
+_ROUNDING = 1e-6
+
+_DENSE = 10
+"""How much finer than its samples a motion's peaks are sought."""
+
+
+def _poses(name: str, text: str) -> Any:
+    return option(name, text, "POSE", show_default=False, rich_help_panel="Way")
+
+
+def _limit(name: str, text: str, **more: Any) -> Any:
+    return option(name, text, "NUMBERS", rich_help_panel="Limits", **more)
+
+
+def _of_drives(name: str, text: str, default: str) -> Any:
+    return _limit(name, text, show_default=default)
+
+
+def cycle(
+    robot: Robot,
+    kind: Annotated[
+        Kind | None,
+        option(
+            "kind",
+            "The pick-and-place cycle, straight lines, the joints' own way, or a table's motion.",
+            show_default="adept, or what --to, --via or --table says",
+            rich_help_panel="Way",
+        ),
+    ] = None,
+    from_: Annotated[
+        str | None, _poses("from", "Where it begins; the home pose if left out.")
+    ] = None,
+    to: Annotated[str | None, _poses("to", "Where it ends.")] = None,
+    via: Annotated[
+        str | None,
+        option("via", "Poses to pass, a .csv or .parquet file.", "FILE", rich_help_panel="Way"),
+    ] = None,
+    corner: Annotated[
+        float,
+        option(
+            "corner",
+            "Metres before a pose at which its corner is rounded; 0 stops there.",
+            rich_help_panel="Way",
+        ),
+    ] = 0.0,
+    back: Annotated[bool, option("back", "And the same way back.", rich_help_panel="Way")] = False,
+    around: Annotated[
+        str | None, _poses("around", "The middle of adept; the home pose if left out.")
+    ] = None,
+    scale: Annotated[
+        float | None,
+        option(
+            "scale",
+            "Of adept, 25 x 305 mm at 1.",
+            show_default="the largest that fits",
+            rich_help_panel="Way",
+        ),
+    ] = None,
+    file: Annotated[
+        str | None,
+        option(
+            "table", "A motion to replay: t and poses, or joints.", "FILE", rich_help_panel="Way"
+        ),
+    ] = None,
+    duration: Annotated[
+        float | None,
+        option(
+            "duration",
+            "Of all of it, s.",
+            show_default="the shortest within the limits",
+            rich_help_panel="Time",
+        ),
+    ] = None,
+    optimal: Annotated[
+        bool, option("optimal", "As fast as the limits allow.", rich_help_panel="Time")
+    ] = False,
+    law: Annotated[
+        Literal["quintic", "seventh"],
+        option("law", "Of a line, by the polynomial's degree.", rich_help_panel="Time"),
+    ] = "quintic",
+    rate: Annotated[float, option("rate", "Samples a second.", rich_help_panel="Time")] = 1000.0,
+    speed: Annotated[
+        str | None, _of_drives("speed", "Of the joints, m/s or rad/s.", "the drives'")
+    ] = None,
+    acceleration: Annotated[
+        str | None, _limit("acceleration", "Of the joints, the same per s.", show_default=False)
+    ] = None,
+    force: Annotated[
+        str | None, _of_drives("force", "Of the drives, N or N m.", "the drives'")
+    ] = None,
+    jerk: Annotated[
+        str | None, _limit("jerk", "Of joints, with --kind joints.", show_default=False)
+    ] = None,
+    tool_speed: Annotated[
+        float | None, option("tool-speed", "Of the tool, m/s.", rich_help_panel="Limits")
+    ] = None,
+    tool_acceleration: Annotated[
+        float | None, option("tool-acceleration", "Of the tool, m/s^2.", rich_help_panel="Limits")
+    ] = None,
+    payload: Annotated[float, option("payload", "A mass at the tool's centre point, kg.")] = 0.0,
+    out: Annotated[
+        str | None, option("out", "Write its samples to a .csv or .parquet file.", "FILE")
+    ] = None,
+    elbows: Elbows = None,
+    json: Json = False,
+) -> None:
+    """Make a motion, within the limits, and see what it asks of the drives.
+
+    The standard pick-and-place cycle, 25 mm up, 305 mm across, 25 mm down and back; straight lines
+    to a pose or through a table's poses; the joints' way to a pose with limited jerk; or a motion
+    from a table. Without --duration it takes the shortest time within the limits: those given, and
+    those of the machine's drives. With --optimal it is as fast as they allow at every place.
+
+    The file's columns are t x y z phi dx ... ddx ... of the pose, rho1 ... drho1 ... ddrho1 ... of
+    the joints (theta1 of cranks), and force1 ... (torque1) of the drives: pteron forces --table
+    reads it. --speed, --acceleration, --force and --jerk take one number, or one for each joint.
+    """
+    from pteron.motion import limits_of, with_payload
+
+    machine = with_payload(load_robot(robot, elbows), payload)
+    if not 0.0 < rate < float("inf"):
+        raise DataError(f"--rate: {rate} given, samples a second above 0 expected")
+    if out is not None:
+        from pteron.tables import check_output
+
+        check_output(out)
+    limits = limits_of(
+        machine,
+        speed=parsed_list(speed, "--speed"),
+        acceleration=parsed_list(acceleration, "--acceleration"),
+        force=parsed_list(force, "--force"),
+        tool_speed=tool_speed,
+        tool_acceleration=tool_acceleration,
+    )
+    way = kind or ("replay" if file else "line" if to or via else "adept")
+    _expect_fitting(
+        way,
+        {
+            "to": (to, ("line", "joints")),
+            "via": (via, ("line",)),
+            "from": (from_, ("line", "joints", "replay")),
+            "corner": (corner, ("line",)),
+            "back": (back, ("line",)),
+            "around": (around, ("adept",)),
+            "scale": (scale, ("adept",)),
+            "table": (file, ("replay",)),
+            "optimal": (optimal, ("line", "adept")),
+            "duration": (duration, ("line", "adept")),
+            "jerk": (jerk, ("joints",)),
+        },
+    )
+    if optimal and duration is not None:
+        raise DataError("--duration and --optimal given; give one of them")
+    with spinner(f"A motion of {machine.name}"):
+        step = 1.0 / rate
+        if way == "replay":
+            motion = _replayed(machine, file, from_)
+        elif way == "joints":
+            motion = _jerk_limited(machine, from_, to, parsed_list(jerk, "--jerk"), limits, step)
+        elif way == "line":
+            motion = _line(
+                machine, from_, to, via, corner, back, limits, duration, optimal, law, step
+            )
+        else:
+            motion = _adept(machine, around, scale, limits, duration, optimal, step)
+    _deliver(machine, way, motion, limits, payload, out=out, as_json=json)
+
+
+def _expect_fitting(way: str, given: dict[str, tuple[Any, tuple[str, ...]]]) -> None:
+    """Refuse options that a kind of motion has no use for."""
+    for name, (value, kinds) in given.items():
+        if value not in (None, False, 0.0) and way not in kinds:
+            raise DataError(
+                f"--{name}: has no use in a motion of kind {way}; leave it out, or give --kind "
+                f"{' or '.join(kinds)}"
+            )
+
+
+def _pose(machine: Manipulator, text: str | None, name: str) -> NDArray[Any]:
+    import numpy as np
+
+    from pteron.workspace import home_pose
+
+    if text is None:
+        return home_pose(machine)
+    values = np.array(parsed_numbers([text], machine.coordinates, name))
+    _doubt(machine, machine.coordinates, values, name)
+    return values
+
+
+def _doubt(machine: Manipulator, columns: Sequence[str], values: NDArray[Any], source: str) -> None:
+    from pteron.workspace.doubts import value_doubts
+
+    for text in value_doubts(machine, columns, values):
+        note(f"Note: {source}: {text}")
+
+
+def _adept(
+    machine: Manipulator,
+    around: str | None,
+    scale: float | None,
+    limits: MotionLimits,
+    duration: float | None,
+    optimal: bool,
+    step: float,
+) -> Motion:
+    from dataclasses import replace
+
+    from pteron.motion import check_path, cycle_path, pick_and_place, time_optimal
+    from pteron.motion.pick_and_place import PEAK_ACCELERATION
+    from pteron.motion.time_law import in_time
+
+    middle = _pose(machine, around, "--around")
+    found = pick_and_place(machine, middle, scale=scale)
+    path = cycle_path(found)
+    if optimal:
+        return time_optimal(machine, path, limits, step=step)
+    check_path(machine, path)
+    if duration is None and not limits.any:
+        note(
+            "Note: no limits given, and the machine's drives have none: the tool's acceleration is "
+            f"{PEAK_ACCELERATION:g} m/s^2 at most"
+        )
+        limits = replace(limits, tool_acceleration=PEAK_ACCELERATION)
+    return in_time(machine, found.cycle.at, duration, limits, step)
+
+
+def _line(
+    machine: Manipulator,
+    from_: str | None,
+    to: str | None,
+    via: str | None,
+    corner: float,
+    back: bool,
+    limits: MotionLimits,
+    duration: float | None,
+    optimal: bool,
+    law: Literal["quintic", "seventh"],
+    step: float,
+) -> Motion:
+    import numpy as np
+
+    from pteron.motion import along, line_path, there_and_back, time_optimal
+
+    if to is None and via is None:
+        raise DataError(f"no way given; give --to with {' '.join(machine.coordinates)}, or --via")
+    poses = [] if via is not None and from_ is None else [_pose(machine, from_, "--from")]
+    if via is not None:
+        from pteron.tables import read_table
+
+        passed = read_table(via).numbers(machine.coordinates)
+        _doubt(machine, machine.coordinates, passed, via)
+        poses += list(passed)
+    if to is not None:
+        poses.append(_pose(machine, to, "--to"))
+    path: Any = line_path(machine, np.array(poses), corner)
+    if back:
+        path = there_and_back(path)
+    if optimal:
+        return time_optimal(machine, path, limits, step=step)
+    return along(machine, path, duration=duration, limits=limits, law=law, step=step)
+
+
+def _jerk_limited(
+    machine: Manipulator,
+    from_: str | None,
+    to: str | None,
+    jerk: Sequence[float] | None,
+    limits: MotionLimits,
+    step: float,
+) -> Motion:
+    from pteron.motion import jerk_limited
+
+    if to is None:
+        raise DataError(f"no way given; give --to with {' '.join(machine.coordinates)}")
+    if jerk is None:
+        raise DataError("--jerk is missing; give it, and --acceleration, for the joints")
+    ends = _pose(machine, from_, "--from"), _pose(machine, to, "--to")
+    return jerk_limited(machine, *ends, jerk, limits, step=step)
+
+
+def _replayed(machine: Manipulator, file: str | None, from_: str | None) -> Motion:
+    import numpy as np
+
+    from pteron.motion import replay
+    from pteron.tables import read_table
+
+    if file is None:
+        raise DataError("no motion given; give --table FILE")
+    rows = read_table(file)
+    names = [n for n in (*machine.coordinates, *machine.joint_names) if n in rows.columns]
+    _doubt(machine, names, rows.numbers(names), file)
+    motion = replay(machine, rows, start=_pose(machine, from_, "--from"))
+    if float(np.median(np.diff(motion.time))) >= 0.5:
+        note(f"Note: {file}: t in steps of {motion.time[1]:g}: are these ms? s are expected")
+    return motion
+
+
+def _deliver(
+    machine: Manipulator,
+    way: str,
+    motion: Motion,
+    limits: MotionLimits,
+    payload: float,
+    *,
+    out: str | None,
+    as_json: bool,
+) -> None:
+    import numpy as np
+
+    from pteron.motion import peaks
+
+    fine = motion.at(
+        np.linspace(float(motion.time[0]), float(motion.time[-1]), _DENSE * len(motion.time) - 9)
+    )
+    found = peaks(machine, *fine, limits)
+    for peak in found:
+        if peak.share > 1.0 + _ROUNDING:  # of a motion that came in a table
+            note(f"Note: {peak.told()}")
+    if out is not None:
+        from pteron.tables import write_table
+
+        write_table(motion_frame(machine, motion), out)
+    bound = getattr(motion, "polynomial", None)
+    if as_json:
+        show_json(
+            {
+                "robot": machine.name,
+                "kind": way,
+                "payload": payload,
+                "duration": motion.duration,
+                "samples": len(motion.time),
+                "start": motion.pose[0].tolist(),
+                "end": motion.pose[-1].tolist(),
+                "quintic_duration": bound,
+                "scale": getattr(motion, "scale", None),
+                "peaks": [
+                    {
+                        "quantity": peak.name,
+                        "leg": peak.leg or None,
+                        "size": peak.size,
+                        "unit": peak.unit,
+                        "limit": peak.limit if np.isfinite(peak.limit) else None,
+                        "share": peak.share,
+                    }
+                    for peak in found
+                ],
+                "file": out,
+            }
+        )
+        return
+    show(_told(motion, bound), peaks_table(found), *([f"Written: {plain(out)}"] if out else []))
+    if out is None:
+        note("Note: no file is written; to have the motion, add --out FILE.csv")
+
+
+def _told(motion: Motion, bound: float | None) -> str:
+    text = f"{motion.duration:.4g} s, {len(motion.time)} samples"
+    if bound is not None:
+        text += f"; a polynomial in time along the same path takes {bound:.4g} s"
+    return text

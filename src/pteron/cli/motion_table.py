@@ -1,0 +1,70 @@
+"""A motion as a table of its samples, and what it asks of joints and drives as one for a person."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from rich.table import Table
+
+from pteron.cli.screen import table
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from pteron.manipulator import Manipulator
+    from pteron.motion import Motion, Peak
+
+_QUANTITIES = {
+    "speed": "speed",
+    "acceleration": "acceleration",
+    "force": "force",
+    "tool_speed": "tool speed",
+    "tool_acceleration": "tool acceleration",
+}
+
+_BINDS = 0.98
+"""Share of a limit from which on it is said to bind."""
+
+
+def peaks_table(found: Sequence[Peak]) -> Table:
+    """Return a table of the largest sizes in a motion, beside their limits."""
+    made = table(
+        "largest", "leg", "size", "limit", "share", numbers=("leg", "size", "limit", "share")
+    )
+    for peak in found:
+        limited = math.isfinite(peak.limit)
+        mark = " (binds)" if peak.share >= _BINDS else ""
+        made.add_row(
+            f"{_QUANTITIES[peak.name]} ({peak.unit}){mark}",
+            str(peak.leg) if peak.leg else "",
+            f"{peak.size:.4g}",
+            f"{peak.limit:.4g}" if limited else "-",
+            f"{peak.share:.0%}" if limited else "-",
+        )
+    return made
+
+
+def motion_frame(machine: Manipulator, motion: Motion) -> pl.DataFrame:
+    """Return a motion's samples: t, pose and joints with two derivatives each, drives' forces."""
+    import numpy as np
+    import polars as pl
+
+    from pteron.dynamics import drive_forces
+    from pteron.kinematics import inverse_kinematics, joint_accelerations, joint_rates
+
+    path = motion.pose, motion.velocity, motion.acceleration
+    columns = {"t": motion.time}
+    joints = (
+        inverse_kinematics(machine, path[0]),
+        joint_rates(machine, *path[:2]).actuated,
+        joint_accelerations(machine, *path).actuated,
+    )
+    for names, parts in ((machine.coordinates, path), (machine.joint_names, joints)):
+        for order, part in zip(("", "d", "dd"), parts, strict=True):
+            for name, values in zip(names, part.T, strict=True):
+                columns[f"{order}{name}"] = np.asarray(values + 0.0)
+    forces = drive_forces(machine, *path)
+    columns.update(zip(machine.force_names, forces.T, strict=True))
+    return pl.DataFrame(columns)

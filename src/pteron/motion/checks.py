@@ -1,0 +1,309 @@
+"""Whether a machine can go a way at all: its reach, its joints' limits, and singularities between.
+
+The way is a continuous one: its measures are followed between samples too, so that it does not jump
+over a place where it fails.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from pteron.equations.kinematics import passive_joints
+from pteron.equations.machine import Machine, closure_of
+from pteron.errors import DataError, PteronError, SingularPose, UnreachablePose
+from pteron.kernels import Array, numeric
+from pteron.kernels.functions import TYPE_I, TYPE_II
+from pteron.kinematics.singularities import is_singular_everywhere, singular_everywhere
+from pteron.manipulator import Manipulator
+from pteron.motion.demand import told_pose
+from pteron.motion.motion import Motion
+from pteron.motion.path import Path, poses_of
+
+_SAMPLES = 1001
+"""Poses of a path that are looked at before its measures are followed between them."""
+
+_VALLEYS = 3
+"""How many of a measure's lowest places are looked into more closely."""
+
+_FINER = 33
+_ZOOMS = 4
+"""Each time the place of a least value is known 16 times as well."""
+
+_HALVINGS = 50
+
+_ROUNDING = 1e-9
+"""m, or rad, by which a joint may be beyond its limit: a pose on it is within."""
+
+_MILLIMETRES = 20.0
+"""A way that misses a leg's reach by so many times its size was perhaps given in millimetres."""
+
+
+def check_path(robot: Manipulator, path: Path) -> None:
+    """Refuse a path that the machine cannot go.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    path : Path
+        Such as `line_path` makes.
+
+    Raises
+    ------
+    UnreachablePose
+        If it leaves a leg's reach, or the limits of an actuated or a passive joint; the message
+        says where, by how much, and which leg.
+    SingularPose
+        If it comes to a singularity of type I, or crosses one of type II.
+    """
+    s, _ = poses_of(path, _SAMPLES)
+    check_way(robot, lambda at: path.at(at)[0], s, lambda at: f"the path, {path.place(at)}")
+
+
+def check_motion(robot: Manipulator, motion: Motion) -> None:
+    """Refuse a motion that the machine cannot do, as `check_path` does; it says at what time.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    motion : Motion
+        Any motion of its platform.
+
+    Raises
+    ------
+    DataError
+        If the motion has another number of coordinates than the machine.
+    UnreachablePose, SingularPose
+        As `check_path`.
+    """
+    if motion.pose.shape[-1] != robot.freedom:
+        raise DataError(
+            f"motion: poses of {motion.pose.shape[-1]} numbers given, {robot.freedom} expected: "
+            f"{' '.join(robot.coordinates)}"
+        )
+    even = np.linspace(float(motion.time[0]), float(motion.time[-1]), _SAMPLES)
+    marks = np.unique(np.concatenate([motion.time, even]))
+    check_way(robot, lambda at: motion.at(at)[0], marks, lambda at: f"the motion, at {at:.4g} s")
+
+
+def check_way(
+    robot: Manipulator,
+    poses: Callable[[Array], Array],
+    marks: Array,
+    place: Callable[[float], str],
+) -> None:
+    """Refuse a way of poses (K, m) at a parameter (K,), by where it first fails.
+
+    `marks` are where it is looked at first, and `place` says in words where a parameter is.
+    """
+    if is_singular_everywhere(robot):
+        raise singular_everywhere(robot)
+    way = _Way(robot, poses, place)
+    # Beyond the reach nothing else is measured.
+    failures = [_failed_reach(way, marks)]
+    if failures[0] is not None:
+        within = marks < failures[0].at
+        marks = np.append(marks[within], failures[0].at)
+    if len(marks) > 1:
+        failures += [_failed_limit(way, marks), _failed_passive(way, marks)]
+        failures.append(_failed_type_ii(way, marks))
+    found = [failure for failure in failures if failure is not None]
+    if found:
+        raise min(found, key=lambda failure: failure.at).error
+
+
+class _Way(NamedTuple):
+    """The way of a machine: poses (K, m) at a parameter (K,), and words for where that is."""
+
+    robot: Manipulator
+    poses: Callable[[Array], Array]
+    place: Callable[[float], str]
+
+    def pose(self, at: float) -> Array:
+        """Return the pose (m,) there."""
+        found: Array = self.poses(np.array([at]))[0]
+        return found
+
+    def told(self, at: float) -> str:
+        """Return where that is, and the pose."""
+        return f"{self.place(at)}, pose {told_pose(self.pose(at))}"
+
+
+class _Failure(NamedTuple):
+    """Where a way fails, and what is said of it."""
+
+    at: float
+    error: PteronError
+
+
+def _failed_reach(way: _Way, marks: Array) -> _Failure | None:
+    robot = way.robot
+
+    def squares(at: Array) -> Array:
+        found: Array = np.nan_to_num(numeric(robot, "squared_type_i")(way.poses(at))[0], nan=-1.0)
+        return found
+
+    found = _first_below(squares, marks, TYPE_I**2)
+    if found is None:
+        return None
+    at, i, square = found
+    fine = np.linspace(marks[0], marks[-1], _SAMPLES)
+    missed = -float(np.nanmin(numeric(robot, "reach")(way.poses(fine))[0][:, i]))
+    leg = robot.legs[i]
+    error: PteronError
+    if missed <= _ROUNDING:
+        error = SingularPose(
+            f"{way.told(at)}: singular for leg {i + 1}: {leg.singular_text} (type I); take another "
+            "path",
+            kind="I",
+            measure=float(np.sqrt(max(square, 0.0))),
+            index=(),
+            leg=i + 1,
+        )
+        return _Failure(at, error)
+    millimetres = missed > _MILLIMETRES * leg.size
+    verb = "is out of the reach" if at == marks[0] else "leaves the reach"
+    error = UnreachablePose(
+        f"{way.told(at)}: {verb} of leg {i + 1}, which misses the way by up to {missed:.3g} m: "
+        f"{leg.reach_text}; "
+        f"{'is it in millimetres? lengths are in metres' if millimetres else 'take another path'}",
+        leg=i + 1,
+        shortfall=missed,
+        index=(),
+        millimetres=millimetres,
+    )
+    return _Failure(at, error)
+
+
+def _failed_limit(way: _Way, marks: Array) -> _Failure | None:
+    robot = way.robot
+    low, high = np.array([leg.limits or (-np.inf, np.inf) for leg in robot.legs]).T
+
+    def room(at: Array) -> Array:
+        q = numeric(robot, "joint_coordinates")(way.poses(at))[0]
+        return np.asarray(np.minimum(q - low, high - q))
+
+    found = _first_below(room, marks, -_ROUNDING)
+    if found is None:
+        return None
+    at, i, _ = found
+    leg = robot.legs[i]
+    beyond = -float(_least(room, marks, -_ROUNDING)[1][i])
+    return _beyond(
+        way,
+        at,
+        i + 1,
+        f"leg {i + 1}: its {leg.joint.noun} passes its limits, {low[i]:g} to {high[i]:g} "
+        f"{leg.joint.unit}, by up to {beyond:.3g} {leg.joint.unit}",
+        beyond * leg.lever,
+    )
+
+
+def _failed_passive(way: _Way, marks: Array) -> _Failure | None:
+    robot = way.robot
+
+    def room(at: Array) -> Array:
+        return np.asarray(numeric(robot, "passive_room")(way.poses(at))[1])
+
+    found = _first_below(room, marks, -_ROUNDING)
+    if found is None:
+        return None
+    at, i, _ = found
+    places, least = _least(room, marks, -_ROUNDING)
+    shared, *legs = passive_joints(Machine.of(robot), ca.SX(ca.DM(way.pose(float(places[i])))))
+    for joint in (*shared, *legs[i]):
+        value = float(joint.value)
+        if joint.least <= value <= joint.most:
+            continue
+        limits = f"at most {joint.most:g}" if joint.only_most else ""
+        limits = limits or f"{joint.least:g} to {joint.most:g}"
+        whose = "" if joint in shared else f"leg {i + 1}: its "
+        told = f"{whose}{joint.noun} comes to {value:.4g} {joint.unit}, its limits are {limits}"
+        return _beyond(way, at, 0 if joint in shared else i + 1, told, -float(least[i]))
+    return _beyond(way, at, i + 1, f"leg {i + 1} passes a passive joint's limits", -float(least[i]))
+
+
+def _beyond(way: _Way, at: float, leg: int, told: str, metres: float) -> _Failure:
+    error = UnreachablePose(
+        f"{way.told(at)}: {told}; take another path",
+        leg=leg,
+        shortfall=metres,
+        index=(),
+    )
+    return _Failure(at, error)
+
+
+def _failed_type_ii(way: _Way, marks: Array) -> _Failure | None:
+    robot = way.robot
+    if closure_of(robot).vanishes() is False and not robot.platform.turns:
+        return None
+
+    def measure(at: Array) -> Array:
+        return np.asarray(numeric(robot, "type_ii")(way.poses(at))[0])
+
+    # Its sign is that of the beginning, as far as the actuators hold the platform.
+    side = 1.0 if float(measure(marks[:1])[0]) > 0.0 else -1.0
+    found = _first_below(lambda at: side * measure(at)[:, None], marks, TYPE_II)
+    if found is None:
+        return None
+    at = found[0]
+    error = SingularPose(
+        f"{way.told(at)}: comes to a singularity (type II), where the actuators no longer hold the "
+        "platform; take another path, or go round it",
+        kind="II",
+        measure=float(np.abs(measure(np.array([at])))[0]),
+        index=(),
+    )
+    return _Failure(at, error)
+
+
+def _least(measure: Callable[[Array], Array], marks: Array, enough: float) -> tuple[Array, Array]:
+    """Return where each column of a measure (K, c) is least along a way, and how much: (c,) each.
+
+    Its lowest valleys among the marks are looked into, finer and finer, if it may go below
+    `enough` there: between two marks it changes by no more than twice what it does elsewhere.
+    """
+    values = measure(marks)
+    places, least = marks[values.argmin(axis=0)], values.min(axis=0)
+    for j in range(values.shape[1]):
+        column = values[:, j]
+        if not np.isfinite(column).all() or least[j] - enough > 2.0 * np.abs(np.diff(column)).max():
+            continue
+        padded = np.concatenate([[np.inf], column, [np.inf]])
+        valleys = np.flatnonzero((column <= padded[:-2]) & (column <= padded[2:]))
+        for k in valleys[np.argsort(column[valleys])][:_VALLEYS]:
+            low, high = marks[max(k - 1, 0)], marks[min(k + 1, len(marks) - 1)]
+            for _ in range(_ZOOMS):
+                fine = np.linspace(low, high, _FINER)
+                found = measure(fine)[:, j]
+                best = int(found.argmin())
+                low, high = fine[max(best - 1, 0)], fine[min(best + 1, _FINER - 1)]
+            if found[best] < least[j]:
+                places[j], least[j] = fine[best], found[best]
+    return places, least
+
+
+def _first_below(
+    measure: Callable[[Array], Array], marks: Array, least: float
+) -> tuple[float, int, float] | None:
+    """Return where a measure (K, c) first goes below a value, of which column, and its value."""
+    places, lowest = _least(measure, marks, least)
+    columns = np.flatnonzero(lowest < least)
+    if not len(columns):
+        return None
+    all_marks = np.sort(np.concatenate([marks, places[columns]]))
+    below = measure(all_marks) < least
+    k = int(below.any(axis=1).argmax())
+    i = int(below[k].argmax())
+    low, high = all_marks[max(k - 1, 0)], all_marks[k]
+    if k:
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            inside = float(measure(np.array([middle]))[0, i]) >= least
+            low, high = (middle, high) if inside else (low, middle)
+    return float(high), i, float(measure(np.array([high]))[0, i])

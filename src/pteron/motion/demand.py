@@ -1,0 +1,201 @@
+"""What a curve of poses asks of joints and drives, whatever time it takes, and how fast it may be.
+
+Along a curve x(p) the drives' forces are c + a p'' + b p'^2, and what friction needs: dry friction
+by the sign of the joint's motion, viscous friction by its speed.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pteron.equations.drives import Drives, drive_numbers
+from pteron.errors import ModelError
+from pteron.kernels import Array
+from pteron.kinematics.evaluate import unchecked
+from pteron.manipulator import Manipulator
+from pteron.motion.limits import MotionLimits
+from pteron.motion.tool import tool_motion
+
+_WORDS = {
+    "speed": ("moves at up to", "{unit}/s"),
+    "acceleration": ("accelerates by up to", "{unit}/s^2"),
+    "force": ("takes up to", "{force_unit}"),
+}
+
+
+class Demand(NamedTuple):
+    """What K poses on a curve ask for, (K, n) each but for the tool's."""
+
+    first: Array
+    """dq/dp and d2q/dp2 of the joints."""
+    second: Array
+    still: Array
+    """c: forces at rest, the offset included."""
+    growth: Array
+    """a, of p''; the motors' inertia included."""
+    square: Array
+    """b, of p'^2."""
+    dry: Array
+    """(2, n): dry friction at least and, with what is more at rest, at most."""
+    viscous: Array
+    """(n,)"""
+    tool: tuple[Array, Array]
+    """Derivatives of the tool's place (K, k) by p."""
+
+    def drive_forces(self, rate: Array, gain: Array) -> Array:
+        """Return forces (2, K, n) at p' (K,) and p'' (K,): with least and with most dry friction.
+
+        What the drives give is between the two.
+        """
+        moving = np.sign(self.first * rate[:, None])
+        rigid = self.still + self.growth * gain[:, None] + self.square * rate[:, None] ** 2
+        return np.asarray(
+            rigid + self.viscous * self.first * rate[:, None] + self.dry[:, None] * moving
+        )
+
+
+def demand(robot: Manipulator, pose: Array, first: Array, second: Array) -> Demand:
+    """Return what poses (K, m) on a curve, with these derivatives by p, ask for."""
+    rest = np.zeros_like(pose)
+    weight = unchecked(robot, "inverse_dynamics", pose, rest, rest)
+    rates = unchecked(robot, "joint_rates", pose, first)[0]
+    bends = unchecked(robot, "joint_accelerations", pose, first, second)[0]
+    drives = Drives(*np.split(drive_numbers(robot), len(Drives._fields)))
+    pushed = unchecked(robot, "inverse_dynamics", pose, rest, first)
+    swept = unchecked(robot, "inverse_dynamics", pose, first, second)
+    count = len(robot.platform.lengths)
+    _, speed, bend = tool_motion(robot.platform, pose, first, second)
+    return Demand(
+        rates,
+        bends,
+        weight + drives.offset,
+        pushed - weight + drives.inertia * rates,
+        swept - weight + drives.inertia * bends,
+        np.array([drives.coulomb, drives.coulomb + drives.stribeck]),
+        np.asarray(drives.viscous),
+        (speed[:, :count], bend[:, :count]),
+    )
+
+
+def most_rate(robot: Manipulator, asked: Demand, limits: MotionLimits, poses: Array) -> float:
+    """Return the largest constant p' at which a curve keeps the limits; inf without limits.
+
+    Raises
+    ------
+    ModelError
+        If the drives cannot even hold the machine, or creep, at one of the poses (K, m).
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rates = [
+            limits.speed / np.abs(asked.first),
+            np.sqrt(limits.acceleration / np.abs(asked.second)),
+            limits.tool_speed / np.linalg.norm(asked.tool[0], axis=-1),
+            np.sqrt(limits.tool_acceleration / np.linalg.norm(asked.tool[1], axis=-1)),
+        ]
+        least = min(float(np.nanmin(rate, initial=np.inf)) for rate in rates)
+    for dry in asked.dry:
+        still = asked.still + dry * np.sign(asked.first)
+        _expect_strength(robot, still, limits, poses)
+        for side in (1.0, -1.0):
+            # The smallest root of b u^2 + v u = room.
+            room = limits.force - side * still
+            b, v = side * asked.square, side * asked.viscous * asked.first
+            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+                below = v + np.sqrt(v**2 + 4.0 * b * room)
+                root = np.where(below > 0.0, 2.0 * room / below, np.inf)
+            root = np.where(np.isfinite(room), root, np.inf)
+            least = min(least, float(np.nanmin(root, initial=np.inf)))
+    return least
+
+
+def _expect_strength(robot: Manipulator, still: Array, limits: MotionLimits, poses: Array) -> None:
+    """Refuse a curve on which a drive is too weak to move as slowly as one likes."""
+    over = np.abs(still) - limits.force
+    if not (over >= 0.0).any():
+        return
+    k, i = np.unravel_index(int(np.nanargmax(over)), over.shape)
+    joint = robot.legs[i].joint
+    raise ModelError(
+        f"leg {i + 1}: its drive gives {limits.force[i]:.4g} {joint.force_unit}, but the machine's "
+        f"weight and dry friction alone take {abs(still[k, i]):.4g} {joint.force_unit} at pose "
+        f"{told_pose(poses[k])}: no motion is slow enough; take another path, a lighter load or a "
+        "stronger drive",
+        subject=robot.name,
+    )
+
+
+def told_pose(pose: Array) -> str:
+    """Return a pose as messages show it."""
+    return f"[{', '.join(f'{value:.5g}' for value in pose + 0.0)}]"
+
+
+class Peak(NamedTuple):
+    """The largest size of a quantity in a motion, beside its limit."""
+
+    name: str
+    """ "speed", "acceleration" or "force" of a joint; "tool_speed" or "tool_acceleration"."""
+    leg: int
+    """From 1; 0 for the tool."""
+    size: float
+    unit: str
+    limit: float
+    """Infinite where there is none."""
+    at: int
+    """The sample."""
+
+    @property
+    def share(self) -> float:
+        """The size over the limit; 0 without one."""
+        return self.size / self.limit
+
+    def told(self) -> str:
+        """Return the peak and its limit as words."""
+        who = f"leg {self.leg}" if self.leg else "the tool"
+        verb = _WORDS[self.name.removeprefix("tool_")][0]
+        return (
+            f"{who} {verb} {self.size:.4g} {self.unit}, its limit is {self.limit:.4g} {self.unit}"
+        )
+
+
+def peaks(
+    robot: Manipulator, pose: Array, velocity: Array, acceleration: Array, limits: MotionLimits
+) -> tuple[Peak, ...]:
+    """Return the largest sizes in a motion (T, m), one for each leg and quantity, then the tool's.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    pose, velocity, acceleration : array, shape (T, m)
+        The motion; m, rad and s.
+    limits : MotionLimits
+        What stands beside them.
+
+    Returns
+    -------
+    tuple of Peak
+    """
+    asked = demand(robot, pose, velocity, acceleration)
+    ones = np.ones(len(pose))
+    force = np.abs(asked.drive_forces(ones, 0.0 * ones)).max(axis=0)
+    found = []
+    for name, sizes in (
+        ("speed", np.abs(asked.first)),
+        ("acceleration", np.abs(asked.second)),
+        ("force", force),
+    ):
+        for i, leg in enumerate(robot.legs):
+            unit = _WORDS[name][1].format(unit=leg.joint.unit, force_unit=leg.joint.force_unit)
+            at = int(np.argmax(sizes[:, i]))
+            size = float(sizes[at, i])
+            found.append(Peak(name, i + 1, size, unit, float(getattr(limits, name)[i]), at))
+    for name, part, unit in (
+        ("tool_speed", asked.tool[0], "m/s"),
+        ("tool_acceleration", asked.tool[1], "m/s^2"),
+    ):
+        sizes = np.linalg.norm(part, axis=-1)
+        at = int(np.argmax(sizes))
+        found.append(Peak(name, 0, float(sizes[at]), unit, float(getattr(limits, name)), at))
+    return tuple(found)

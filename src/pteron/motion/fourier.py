@@ -1,0 +1,124 @@
+"""Periodic motions of the platform as finite Fourier series."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pteron.errors import DataError
+from pteron.kernels import Array
+from pteron.manipulator import Manipulator
+from pteron.motion.checks import check_motion
+from pteron.motion.motion import Motion
+from pteron.motion.time_law import STEP, sampled
+from pteron.motion.tool import Curve
+
+
+@dataclass(frozen=True)
+class FourierSeries:
+    """x(t) = center + sum over h of a_h cos(h w t) + b_h sin(h w t), with w = 2 pi / period.
+
+    Attributes
+    ----------
+    center : tuple of float
+        The pose in the middle (m,), m and rad.
+    cosines, sines : tuple of tuple of float
+        Coefficients a_h and b_h, (H, m) each, of the harmonics 1 to H; m and rad.
+    period : float
+        s.
+
+    Raises
+    ------
+    DataError
+        If the period is not above 0 or the shapes do not fit.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from pteron.motion import FourierSeries
+    >>> swing = FourierSeries((0.0, 0.0), ((0.05, 0.0),), ((0.0, 0.05),), 2.0)
+    >>> swing.at(np.array([0.0, 0.5]))[0].round(12)
+    array([[0.05, 0.  ],
+           [0.  , 0.05]])
+    """
+
+    center: tuple[float, ...]
+    cosines: tuple[tuple[float, ...], ...]
+    sines: tuple[tuple[float, ...], ...]
+    period: float
+
+    def __post_init__(self) -> None:
+        shapes = [np.shape(part) for part in (self.center, self.cosines, self.sines)]
+        m = len(self.center)
+        if shapes[1] != shapes[2] or len(shapes[1]) != 2 or shapes[1][1] != m:
+            raise DataError(
+                f"center, cosines, sines: shapes {shapes} given, (m,), (H, m) and (H, m) expected"
+            )
+        if not (np.isfinite(self.period) and self.period > 0.0):
+            raise DataError(f"period: {self.period} s given, a number above 0 expected")
+        object.__setattr__(self, "center", tuple(float(value) for value in self.center))
+        for name in ("cosines", "sines"):
+            rows = np.asarray(getattr(self, name), dtype=float).tolist()
+            object.__setattr__(self, name, tuple(tuple(row) for row in rows))
+
+    def at(self, time: ArrayLike) -> Curve:
+        """Return pose, velocity and acceleration, (T, m) each, at times (T,), s."""
+        coefficients = np.vstack([self.center, self.cosines, self.sines])
+        times = np.asarray(time, dtype=float)
+        pose, velocity, acceleration = (
+            rows @ coefficients for rows in fourier_basis(times, len(self.cosines), self.period)
+        )
+        return pose, velocity, acceleration
+
+
+def fourier_basis(times: Array, harmonics: int, period: float) -> tuple[Array, Array, Array]:
+    """Return what takes coefficients (2 H + 1, m) to x, x' and x'' (T, m): (T, 2 H + 1) each.
+
+    The coefficients are those of 1, then of the cosines, then of the sines.
+    """
+    w = 2.0 * np.pi / period * np.arange(1, harmonics + 1)
+    cosines, sines = np.cos(np.outer(times, w)), np.sin(np.outer(times, w))
+    one, zero = np.ones((len(times), 1)), np.zeros((len(times), 1))
+    return (
+        np.hstack([one, cosines, sines]),
+        np.hstack([zero, -w * sines, w * cosines]),
+        np.hstack([zero, -w * w * cosines, -w * w * sines]),
+    )
+
+
+def fourier_motion(robot: Manipulator, series: FourierSeries, step: float = STEP) -> Motion:
+    """Return one period of a Fourier series as a motion; it is already moving when it begins.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    series : FourierSeries
+        Of as many coordinates as the machine's poses have.
+    step : float
+        Time between samples, s.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    DataError
+        If the series has another number of coordinates.
+    UnreachablePose, SingularPose
+        If the machine cannot do it; see `check_motion`.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.motion import FourierSeries, fourier_motion
+    >>> swing = FourierSeries((0.0, 0.0, 0.0), ((0.05, 0.0, 0.0),), ((0.0, 0.05, 0.0),), 2.0)
+    >>> fourier_motion(pteron.load("tripteron"), swing).repeated(3).duration
+    6.0
+    """
+    motion = sampled(series.at, series.period, step)
+    check_motion(robot, motion)
+    return motion

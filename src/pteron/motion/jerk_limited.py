@@ -1,0 +1,183 @@
+"""Motion of the joints from pose to pose with limited jerk, by Ruckig.
+
+Each joint has limits of speed, acceleration and jerk, and all of them start and arrive together
+(Berscheid and Kroeger, 2021, Robotics: Science and Systems). The platform follows.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pteron.errors import DataError, PteronError, UnreachablePose
+from pteron.kernels import Array
+from pteron.kinematics import follow, inverse_kinematics
+from pteron.kinematics.evaluate import checked, unchecked
+from pteron.manipulator import Manipulator
+from pteron.motion.checks import check_motion
+from pteron.motion.limits import MotionLimits, PerJointLimit, limits_of, per_joint
+from pteron.motion.motion import Motion
+from pteron.motion.time_law import STEP, Timed, kept_motion, sampled
+from pteron.motion.tool import Curve
+from pteron.shapes import PoseLike
+
+_NEAR = 1e-6
+"""m or rad by which the platform may miss the pose that its joints have gone to."""
+
+_FAST = 1e6
+"""m/s or rad/s of a joint that has no limit."""
+
+
+def jerk_limited(
+    robot: Manipulator,
+    start: PoseLike,
+    end: PoseLike,
+    jerk: PerJointLimit,
+    limits: MotionLimits | None = None,
+    *,
+    step: float = STEP,
+) -> Motion:
+    """Return the motion of the joints from rest in one pose to rest in another, with limited jerk.
+
+    The joints start and arrive together; where forces of the drives are limited too, or the tool,
+    the motion is slowed as a whole. The tool's way is what follows, and not a line.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    start, end : array, shape (m,)
+        m and rad.
+    jerk : float or sequence of n floats
+        Most change of the joints' accelerations, m/s^3 or rad/s^3.
+    limits : MotionLimits, optional
+        What joints, drives and tool can do; every joint needs an acceleration. By default what the
+        machine's drives say.
+    step : float
+        Time between samples, s.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    DataError
+        If a joint's acceleration has no limit, or the poses are the same.
+    UnreachablePose
+        If the joints leave their limits on their way, or do not lead to the other pose.
+    SingularPose
+        If the way comes to a singularity.
+    PteronError
+        If ruckig is missing.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.motion import jerk_limited, limits_of
+    >>> robot = pteron.load("delta")
+    >>> limits = limits_of(robot, speed=5.0, acceleration=100.0)
+    >>> motion = jerk_limited(robot, [0.0, 0.0, -0.9], [0.2, 0.1, -0.8], 5000.0, limits)
+    >>> motion.pose[-1].round(6)
+    array([ 0.2,  0.1, -0.8])
+    """
+    ends = [checked(robot, start, "start"), checked(robot, end, "end")]
+    kept = limits_of(robot) if limits is None else limits
+    jerks = per_joint(robot, "jerk", jerk, [None] * robot.freedom)
+    if not np.isfinite([*kept.acceleration, *jerks]).all():
+        raise DataError(
+            "a motion with limited jerk needs jerk and acceleration of every joint; give both"
+        )
+    first, last = (
+        _joints(robot, name, pose) for name, pose in zip(("start", "end"), ends, strict=True)
+    )
+    # The shorter way round, where the limits of a crank leave one.
+    for i, leg in enumerate(robot.legs):
+        if leg.joint.unit == "rad" and leg.limits is None and not leg.follows_angle:
+            last[i] = first[i] + (last[i] - first[i] + np.pi) % (2.0 * np.pi) - np.pi
+    if np.abs(last - first).max() <= _NEAR:
+        raise DataError("end: the joints are at start's already; give another pose")
+    planned = _planned(first, last, kept, jerks)
+
+    def curve(tau: Array) -> Curve:
+        joints, rates, gains = (
+            np.array(part)
+            for part in zip(*map(planned.at_time, tau * planned.duration), strict=True)
+        )
+        poses = follow(robot, joints, ends[0], on_failure="nan")
+        lost = np.isnan(poses).any(axis=-1)
+        if lost.any():
+            k = int(lost.argmax())
+            raise UnreachablePose(
+                f"the motion, at {tau[k] * planned.duration:.4g} s: the platform does not follow "
+                f"to the joint coordinates {[round(float(q), 6) for q in joints[k]]}: its "
+                "assembly mode ends before; go there by way of another pose",
+                leg=0,
+                shortfall=float("nan"),
+                index=(),
+            )
+        velocity, acceleration = unchecked(robot, "platform_motion", poses, rates, gains)
+        return poses, planned.duration * velocity, planned.duration**2 * acceleration
+
+    course = Timed(curve, planned.duration)
+    rough = sampled(course.at, course.duration, min(step, course.duration / 100.0))
+    check_motion(robot, rough)
+    _expect_modes(robot, rough, planned, ends[1])
+    return kept_motion(robot, course, kept, step)
+
+
+def _joints(robot: Manipulator, name: str, pose: Array) -> Array:
+    try:
+        return inverse_kinematics(robot, pose)
+    except UnreachablePose as error:
+        told = f"{name} {error}"
+        raise UnreachablePose(
+            told, leg=error.leg, shortfall=error.shortfall, index=(), millimetres=error.millimetres
+        ) from None
+
+
+def _expect_modes(robot: Manipulator, motion: Motion, planned: Any, end: Array) -> None:
+    """Refuse a motion that leaves the machine's working mode, or ends in another pose."""
+    off = motion.pose[-1] - end
+    if robot.platform.turns and not any(leg.follows_angle for leg in robot.legs):
+        off[-1] = (off[-1] + np.pi) % (2.0 * np.pi) - np.pi
+    joints = np.array([planned.at_time(t)[0] for t in motion.time])
+    turns = np.where([leg.joint.unit == "rad" for leg in robot.legs], 2.0 * np.pi, np.inf)
+    away = joints - inverse_kinematics(robot, motion.pose)
+    away -= np.where(np.isinf(turns), 0.0, np.round(away / turns) * 2.0 * np.pi)
+    if max(np.abs(off).max(), np.abs(away).max()) > _NEAR:
+        raise UnreachablePose(
+            "end: the joints' way leads to another assembly or working mode there; go by way of "
+            "another pose",
+            leg=0,
+            shortfall=float("nan"),
+            index=(),
+        )
+
+
+def _planned(first: Array, last: Array, limits: MotionLimits, jerks: Array) -> Any:
+    """Return Ruckig's trajectory between joint coordinates (n,)."""
+    ruckig = _ruckig()
+    count = len(first)
+    asked = ruckig.InputParameter(count)
+    asked.current_position, asked.target_position = first.tolist(), last.tolist()
+    asked.max_velocity = np.minimum(limits.speed, _FAST).tolist()
+    asked.max_acceleration, asked.max_jerk = limits.acceleration.tolist(), jerks.tolist()
+    planned = ruckig.Trajectory(count)
+    result = ruckig.Ruckig(count).calculate(asked, planned)
+    if result not in (ruckig.Result.Working, ruckig.Result.Finished):
+        raise DataError(f"limits: Ruckig finds no motion within them ({result}); give others")
+    return planned
+
+
+def _ruckig() -> Any:
+    """Return the library, or say which extra has it."""
+    try:
+        import ruckig
+    except ImportError:
+        raise PteronError(
+            "motion with limited jerk needs ruckig, which is not installed; "
+            "pip install 'pteron[motion]'"
+        ) from None
+    return ruckig

@@ -1,0 +1,127 @@
+"""What a motion must keep: limits of the joints, of the drives, and of the tool."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pteron.errors import DataError, shown
+from pteron.kernels import Array
+from pteron.legs import Drive
+from pteron.manipulator import Manipulator
+
+PerJointLimit = float | Sequence[float] | None
+"""One number for every joint, or one for each; None for the drives' own, or none."""
+
+
+@dataclass(frozen=True, eq=False)
+class MotionLimits:
+    """Largest sizes of what moves; infinite where there is no limit. Made by `limits_of`.
+
+    Attributes
+    ----------
+    speed, acceleration : array, shape (n,)
+        Of the joints, m/s and m/s^2 or rad/s and rad/s^2.
+    force : array, shape (n,)
+        Of the drives, N or N m: their friction and their motors' inertia take a part of it.
+    tool_speed, tool_acceleration : float
+        Of the tool's centre point, m/s and m/s^2.
+    """
+
+    speed: Array
+    acceleration: Array
+    force: Array
+    tool_speed: float = math.inf
+    tool_acceleration: float = math.inf
+
+    @property
+    def bounds_acceleration(self) -> bool:
+        """Whether anything keeps accelerations finite."""
+        finite = np.isfinite([*self.acceleration, *self.force, self.tool_acceleration])
+        return bool(finite.any())
+
+    @property
+    def any(self) -> bool:
+        """Whether there is a limit at all."""
+        return self.bounds_acceleration or bool(np.isfinite([*self.speed, self.tool_speed]).any())
+
+
+def limits_of(
+    robot: Manipulator,
+    *,
+    speed: PerJointLimit = None,
+    acceleration: PerJointLimit = None,
+    force: PerJointLimit = None,
+    tool_speed: float | None = None,
+    tool_acceleration: float | None = None,
+) -> MotionLimits:
+    """Return the limits given and, of speed and force, else those of the machine's drives.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine; its drives' `max_speed` and `max_force` count where nothing else is given.
+    speed, acceleration, force : float or sequence of n floats, optional
+        Of each joint: m/s, m/s^2 and N, or rad/s, rad/s^2 and N m.
+    tool_speed, tool_acceleration : float, optional
+        Of the tool's centre point, m/s and m/s^2.
+
+    Returns
+    -------
+    MotionLimits
+
+    Raises
+    ------
+    DataError
+        If a number is not above 0, or there are neither one nor n of them.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.motion import limits_of
+    >>> limits_of(pteron.load("tripteron"), speed=0.5, force=[40.0, 40.0, 60.0]).force
+    array([40., 40., 60.])
+    """
+    drives = [leg.drive or Drive() for leg in robot.legs]
+    return MotionLimits(
+        per_joint(robot, "speed", speed, [drive.max_speed for drive in drives]),
+        per_joint(robot, "acceleration", acceleration, [None] * len(drives)),
+        per_joint(robot, "force", force, [drive.max_force for drive in drives]),
+        *(
+            math.inf if value is None else _positive(name, value)
+            for name, value in (
+                ("tool_speed", tool_speed),
+                ("tool_acceleration", tool_acceleration),
+            )
+        ),
+    )
+
+
+def per_joint(
+    robot: Manipulator, name: str, given: PerJointLimit, own: Sequence[float | None]
+) -> Array:
+    """Return a limit of each joint (n,), by default its own, infinite where it has none."""
+    if given is None:
+        return np.array([math.inf if value is None else value for value in own])
+    several = list(given) if isinstance(given, Sequence | np.ndarray) else [given]
+    values = [_positive(name, value) for value in several]
+    if len(values) not in (1, robot.freedom):
+        raise DataError(
+            f"{name}: {len(values)} numbers given, one expected or {robot.freedom}, one for each "
+            f"joint of {robot.name}"
+        )
+    return np.broadcast_to(np.array(values), (robot.freedom,)).copy()
+
+
+def _positive(name: str, value: object) -> float:
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        number = math.nan
+    if not number > 0.0:
+        given = value if isinstance(value, float) else shown(value)
+        raise DataError(f"{name}: {given} given, a number above 0 expected")
+    return number

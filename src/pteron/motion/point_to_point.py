@@ -1,0 +1,59 @@
+"""From one pose straight to another, at rest in both."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pteron.kinematics.evaluate import checked
+from pteron.manipulator import Manipulator
+from pteron.motion.limits import MotionLimits
+from pteron.motion.motion import Motion
+from pteron.motion.path import line_path
+from pteron.motion.time_law import STEP, Law, along
+from pteron.shapes import PoseLike
+
+
+def point_to_point(
+    robot: Manipulator,
+    start: PoseLike,
+    end: PoseLike,
+    *,
+    duration: float | None = None,
+    limits: MotionLimits | None = None,
+    law: Law = "quintic",
+    step: float = STEP,
+) -> Motion:
+    """Return the motion from rest in one pose straight to rest in another.
+
+    The tool's centre point goes along a line, and the platform turns evenly with it.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    start, end : array, shape (m,)
+        m and rad.
+    duration, limits, law, step
+        As of `along`: a duration, or the shortest that keeps the limits.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    UnreachablePose, SingularPose, DataError, ModelError
+        As `along`.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.motion import point_to_point
+    >>> robot = pteron.load("delta")
+    >>> motion = point_to_point(robot, [0.0, 0.0, -0.9], [0.1, 0.0, -0.8], duration=0.5)
+    >>> motion.at(0.25)[0]
+    array([ 0.05,  0.  , -0.85])
+    """
+    ends = np.stack([checked(robot, start, "start"), checked(robot, end, "end")])
+    path = line_path(robot, ends)
+    return along(robot, path, duration=duration, limits=limits, law=law, step=step)

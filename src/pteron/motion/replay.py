@@ -1,0 +1,122 @@
+"""A motion from a table: of poses, or of joint coordinates that the platform follows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path as File
+
+import numpy as np
+from scipy.interpolate import make_interp_spline  # type: ignore[import-untyped]
+
+from pteron.errors import DataError
+from pteron.kernels import Array
+from pteron.kinematics import follow
+from pteron.kinematics.evaluate import checked, unchecked
+from pteron.manipulator import Manipulator
+from pteron.motion.checks import check_motion
+from pteron.motion.motion import Motion
+from pteron.shapes import PoseLike
+from pteron.tables import Table, read_table
+
+TIME = "t"
+"""The column of the time, s."""
+
+_DEGREE = 5
+
+
+def replay(
+    robot: Manipulator, table: str | File | Table, *, start: PoseLike | None = None
+) -> Motion:
+    """Return the motion that a table holds.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    table : path or Table
+        CSV or Parquet. Its columns are t (s) and the pose's, such as x y z phi, or t and the
+        joints', such as rho1 theta2. With the poses' velocities and accelerations (dx ... ddx ...)
+        these count; else they are those of the interpolating spline of the fifth degree, for which
+        samples must be smooth.
+    start : array, shape (m,), optional
+        A pose in the assembly mode of the joints, from which a straight way leads to the table's
+        first row; needed where there are joints only.
+
+    Returns
+    -------
+    Motion
+        With the table's own times, which begin at 0.
+
+    Raises
+    ------
+    DataError
+        If a column is missing, a cell is no number, or times do not ascend.
+    UnreachablePose, SingularPose
+        If the machine cannot do it; see `check_motion`.
+
+    Examples
+    --------
+    >>> import numpy as np, polars as pl, pteron
+    >>> from pteron.motion import replay
+    >>> from pteron.tables import Table
+    >>> t = np.linspace(0.0, 1.0, 101)
+    >>> wave = pl.DataFrame({"t": t, "x": 0.1 * np.sin(t), "y": 0.0 * t, "z": 0.0 * t})
+    >>> float(replay(pteron.load("tripteron"), Table("wave", wave)).velocity[0, 0].round(9))
+    0.1
+    """
+    rows = table if isinstance(table, Table) else read_table(table)
+    poses, joints = robot.coordinates, robot.joint_names
+    whole = [f"{order}{name}" for order in ("", "d", "dd") for name in poses]
+    has = set(rows.columns)
+    m = robot.freedom
+    if has.issuperset(whole):
+        time, values = _read(rows, whole)
+        motion = Motion(time, values[:, :m], values[:, m : 2 * m], values[:, 2 * m :])
+    elif has.issuperset(joints) and not has.issuperset(poses):
+        time, values = _read(rows, joints)
+        motion = _followed(robot, time, values, start)
+    else:
+        time, values = _read(rows, poses)
+        motion = Motion(time, *_spline(time, values))
+    check_motion(robot, motion)
+    return motion
+
+
+def _read(rows: Table, columns: Sequence[str]) -> tuple[Array, Array]:
+    """Return times (T,), from 0, and columns (T, K)."""
+    values = rows.numbers([TIME, *columns])
+    time = values[:, 0]
+    if len(time) < 2:
+        raise DataError(f"{rows.source}: one row given, at least two expected")
+    back = np.flatnonzero(np.diff(time) <= 0.0)
+    if len(back):
+        k = int(back[0]) + 1
+        raise DataError(
+            f"{rows.place(k)}, column {TIME}: {time[k]:g} s after {time[k - 1]:g} s; times must "
+            "ascend"
+        )
+    return time - time[0], values[:, 1:]
+
+
+def _spline(time: Array, values: Array) -> tuple[Array, Array, Array]:
+    """Return values (T, K) and two derivatives, of the spline through them."""
+    degree = min(_DEGREE, len(time) - 1)
+    spline = make_interp_spline(time, values, k=degree)
+    orders = (
+        np.asarray(spline.derivative(k)(time)) if k <= degree else 0.0 * values for k in (1, 2)
+    )
+    return (values, *orders)  # type: ignore[return-value]
+
+
+def _followed(robot: Manipulator, time: Array, joints: Array, start: PoseLike | None) -> Motion:
+    """Return the platform's motion as its joints move so, (T, n)."""
+    if start is None:
+        raise DataError(
+            "start: the table holds joint coordinates, which may have several poses; give one of "
+            "their assembly mode"
+        )
+    cranks = [leg.joint.unit == "rad" and not leg.follows_angle for leg in robot.legs]
+    joints = np.where(cranks, np.unwrap(joints, axis=0), joints)
+    _, rates, gains = _spline(time, joints)
+    poses = follow(robot, joints, checked(robot, start, "start"))
+    return Motion(time, poses, *unchecked(robot, "platform_motion", poses, rates, gains))

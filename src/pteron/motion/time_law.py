@@ -1,0 +1,383 @@
+"""How a path is gone in time: polynomials from rest to rest, and the shortest that serve."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal, Protocol, get_args
+
+import numpy as np
+
+from pteron.errors import DataError
+from pteron.kernels import Array
+from pteron.manipulator import Manipulator
+from pteron.motion.checks import check_path
+from pteron.motion.demand import demand, most_rate, peaks
+from pteron.motion.limits import MotionLimits, limits_of
+from pteron.motion.motion import Motion
+from pteron.motion.path import Path
+from pteron.motion.tool import Curve
+
+Law = Literal["quintic", "seventh"]
+"""The polynomial of a motion from rest to rest, by its degree."""
+
+STEP = 1e-3
+"""Time between the samples of a motion, s."""
+
+_MOST = 10_000_000
+"""Samples that a motion may have."""
+
+_LOOK = 2001
+"""Samples of a motion at which the shortest time for it is decided."""
+
+KEPT = 1.0 + 1e-9
+"""Share of a limit that counts as kept, for rounding."""
+
+_FINER = 10
+"""How much finer than its samples a motion is checked."""
+
+
+class Progress(Protocol):
+    """How far a motion from rest to rest has come, over one unit of time."""
+
+    def __call__(self, tau: Array, /) -> tuple[Array, Array, Array]:
+        """Return a share of the way in [0, 1] and two derivatives, (T,) each, at tau (T,)."""
+
+
+def polynomial(law: Law) -> Progress:
+    """Return the polynomial from 0 to 1 whose derivatives vanish at both ends.
+
+    Of the fifth degree, 10 t^3 - 15 t^4 + 6 t^5, two of them; of the seventh, 35 t^4 - 84 t^5 +
+    70 t^6 - 20 t^7, three: the jerk begins and ends at zero too.
+
+    Raises
+    ------
+    DataError
+        If there is no such law.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from pteron.motion.time_law import polynomial
+    >>> [float(v[0]) for v in polynomial("seventh")(np.array([0.5]))]
+    [0.5, 2.1875, 0.0]
+    """
+    if law not in get_args(Law):
+        raise DataError(f"law: {law!r} is not one of {', '.join(get_args(Law))}")
+    factors = {
+        "quintic": [0.0, 0.0, 0.0, 10.0, -15.0, 6.0],
+        "seventh": [0.0, 0.0, 0.0, 0.0, 35.0, -84.0, 70.0, -20.0],
+    }
+    s = np.polynomial.Polynomial(factors[law])
+    ds, dds = s.deriv(1), s.deriv(2)
+
+    def progress(tau: Array) -> tuple[Array, Array, Array]:
+        t = np.clip(tau, 0.0, 1.0)
+        return s(t), ds(t), dds(t)
+
+    return progress
+
+
+@dataclass(frozen=True)
+class Course:
+    """A path gone in time, from rest to rest to rest.
+
+    Attributes
+    ----------
+    path : Path
+        The way.
+    durations : tuple of float
+        Of each stretch between two rests, s.
+    laws : tuple of Progress
+        How each of them is gone.
+    """
+
+    path: Path
+    durations: tuple[float, ...]
+    laws: tuple[Progress, ...]
+
+    @property
+    def duration(self) -> float:
+        """Of all stretches, s."""
+        return float(sum(self.durations))
+
+    def slowed(self, factor: float) -> Course:
+        """Return the course with all its times longer by a factor."""
+        return Course(self.path, tuple(factor * d for d in self.durations), self.laws)
+
+    def at(self, time: Array) -> Curve:
+        """Return poses, velocities and accelerations, (T, m) each, at times (T,), s."""
+        starts = np.concatenate([[0.0], np.cumsum(self.durations)])
+        k = np.clip(np.searchsorted(starts, time, side="right") - 1, 0, len(self.laws) - 1)
+        s, rate, gain = (np.zeros(len(time)) for _ in range(3))
+        for j, law in enumerate(self.laws):
+            own = k == j
+            begin, end = self.path.rests[j : j + 2]
+            share, first, second = law((time[own] - starts[j]) / self.durations[j])
+            s[own] = begin + (end - begin) * share
+            rate[own] = (end - begin) * first / self.durations[j]
+            gain[own] = (end - begin) * second / self.durations[j] ** 2
+        pose, by_s, bend = self.path.at(s)
+        rate, gain = rate[:, None], gain[:, None]
+        return pose, by_s * rate, bend * rate**2 + by_s * gain
+
+
+@dataclass(frozen=True)
+class Timed:
+    """A curve of poses over one unit of time, gone in so many seconds.
+
+    Attributes
+    ----------
+    curve : callable
+        From tau (T,) in [0, 1] to poses (T, m) and two derivatives by tau.
+    duration : float
+        s.
+    """
+
+    curve: Callable[[Array], Curve]
+    duration: float
+
+    def slowed(self, factor: float) -> Timed:
+        """Return the same with all its times longer by a factor."""
+        return Timed(self.curve, factor * self.duration)
+
+    def at(self, time: Array) -> Curve:
+        """Return poses, velocities and accelerations, (T, m) each, at times (T,), s."""
+        pose, first, second = self.curve(time / self.duration)
+        return pose, first / self.duration, second / self.duration**2
+
+
+class InTime(Protocol):
+    """What moves, and can be slowed: a `Course`, or a curve that is `Timed`."""
+
+    @property
+    def duration(self) -> float:
+        """How long it takes, s."""
+
+    def at(self, time: Array, /) -> Curve:
+        """Return poses, velocities and accelerations, (T, m) each, at times (T,), s."""
+
+    def slowed(self, factor: float, /) -> InTime:
+        """Return the same with all its times longer by a factor."""
+
+
+def shortest(
+    robot: Manipulator,
+    curve: Callable[[Array], Curve],
+    limits: MotionLimits,
+    step: float = STEP,
+) -> Motion:
+    """Return a curve of poses, gone as it is, in the shortest time that keeps the limits.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    curve : callable
+        From tau (T,) in [0, 1] to poses (T, m) and two derivatives by tau.
+    limits : MotionLimits
+        At least one.
+    step : float
+        Time between samples, s.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    DataError
+        If there is no limit.
+    ModelError
+        If the drives cannot hold the machine somewhere on the way.
+    """
+    pose, first, second = curve(np.linspace(0.0, 1.0, _LOOK))
+    rate = most_rate(robot, demand(robot, pose, first, second), limits, pose)
+    if not np.isfinite(rate):
+        raise _unlimited()
+    return kept_motion(robot, Timed(curve, 1.0 / rate), limits, step)
+
+
+def in_time(
+    robot: Manipulator,
+    curve: Callable[[Array], Curve],
+    duration: float | None,
+    limits: MotionLimits,
+    step: float = STEP,
+) -> Motion:
+    """Return a curve of poses, gone as it is, in a duration, s, or the shortest.
+
+    Raises
+    ------
+    DataError
+        If the duration is too short for the limits, or neither it nor a limit is given.
+    ModelError
+        If the drives cannot hold the machine somewhere on the way.
+    """
+    if duration is None:
+        return shortest(robot, curve, limits, step)
+    course = Timed(curve, _expect_time("duration", duration))
+    fine = course.at(np.linspace(0.0, duration, _LOOK))
+    rate = most_rate(robot, demand(robot, *fine), limits, fine[0])
+    if rate * KEPT < 1.0:
+        raise too_short(robot, course, limits, duration / rate)
+    return sampled(course.at, duration, step)
+
+
+def _unlimited() -> DataError:
+    return DataError(
+        "neither a duration nor a limit that the motion meets is given, and the machine's drives "
+        "have none; give a duration, or limits such as speed and acceleration of the joints"
+    )
+
+
+def along(
+    robot: Manipulator,
+    path: Path,
+    *,
+    duration: float | None = None,
+    limits: MotionLimits | None = None,
+    law: Law = "quintic",
+    step: float = STEP,
+) -> Motion:
+    """Return the motion along a path that is one polynomial in time between two rests.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    path : Path
+        Such as `line_path` makes.
+    duration : float, optional
+        Of the whole, s, shared among the stretches between rests as their shortest ones are; by
+        default the shortest that keeps the limits, each stretch its own.
+    limits : MotionLimits, optional
+        What joints, drives and tool can do; by default what the machine's drives say.
+    law : {"quintic", "seventh"}
+        The polynomial's degree; see `polynomial`.
+    step : float
+        Time between samples, s; at most that.
+
+    Returns
+    -------
+    Motion
+        It keeps the limits between its samples too.
+
+    Raises
+    ------
+    UnreachablePose, SingularPose
+        If the machine cannot go the path; see `check_path`.
+    DataError
+        If the duration is too short for the limits, or neither it nor a limit is given.
+    ModelError
+        If the drives cannot hold the machine somewhere on the path.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.motion import along, limits_of, line_path
+    >>> robot = pteron.load("tripteron")
+    >>> path = line_path(robot, [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]])
+    >>> along(robot, path, limits=limits_of(robot, acceleration=5.0)).duration
+    0.34
+    """
+    check_path(robot, path)
+    kept = limits_of(robot) if limits is None else limits
+    laws = (polynomial(law),) * (len(path.rests) - 1)
+    sizes = np.diff(path.rests)
+    # Where nothing limits a motion the stretches have the same peak acceleration.
+    shares: Sequence[float] = [float(np.sqrt(size)) for size in sizes]
+    if kept.any:
+        shares = stretch_times(robot, path, laws[0], kept)
+    elif duration is None:
+        raise _unlimited()
+    course = Course(path, tuple(shares), laws)
+    if duration is None:
+        return kept_motion(robot, course, kept, step)
+    _expect_time("duration", duration)
+    if kept.any and duration < course.duration / KEPT:
+        raise too_short(robot, course.slowed(duration / course.duration), kept, course.duration)
+    return sampled(course.slowed(duration / course.duration).at, duration, step)
+
+
+def stretch_times(
+    robot: Manipulator, path: Path, law: Progress, limits: MotionLimits
+) -> list[float]:
+    """Return the shortest durations, s, of the stretches between rests that keep the limits."""
+    found = []
+    tau = np.linspace(0.0, 1.0, _LOOK)
+    share, rate, gain = law(tau)
+    for begin, end in zip(path.rests[:-1], path.rests[1:], strict=True):
+        size = end - begin
+        pose, by_s, bend = path.at(begin + size * share)
+        first = by_s * size * rate[:, None]
+        second = bend * (size * rate[:, None]) ** 2 + by_s * size * gain[:, None]
+        most = most_rate(robot, demand(robot, pose, first, second), limits, pose)
+        if not np.isfinite(most):
+            raise _unlimited()
+        found.append(1.0 / most)
+    return found
+
+
+def too_short(robot: Manipulator, course: InTime, limits: MotionLimits, least: float) -> DataError:
+    """Return what is said of a duration in which limits are passed: which joint's, by how much."""
+    time = np.linspace(0.0, course.duration, _LOOK)
+    worst = max(peaks(robot, *course.at(time), limits), key=lambda peak: peak.share)
+    return DataError(
+        f"duration: {course.duration:.4g} s given, too short: {worst.told()}; the shortest that "
+        f"keeps every limit is {least:.4g} s"
+    )
+
+
+def kept_motion(robot: Manipulator, course: InTime, limits: MotionLimits, step: float) -> Motion:
+    """Return a course as a motion that keeps the limits at ten times its samples too.
+
+    Its duration is a multiple of the step; the course is slowed by what it exceeds a limit.
+    """
+    for _ in range(20):
+        count = max(1, int(np.ceil(course.duration / _expect_time("step", step) - 1e-9)))
+        course = course.slowed(count * step / course.duration)
+        motion = sampled(course.at, course.duration, step)
+        fine = motion.at(np.linspace(0.0, motion.duration, _FINER * count + 1))
+        rate = most_rate(robot, demand(robot, *fine), limits, fine[0])
+        if rate * KEPT >= 1.0:
+            return motion
+        course = course.slowed(1.0 / rate)
+    raise DataError(
+        f"step: {step:g} s is too long for a motion of {course.duration:.3g} s; give a shorter one"
+    )
+
+
+def sampled(states: Callable[[Array], Curve], duration: float, step: float = STEP) -> Motion:
+    """Return a motion's samples from its beginning to its end, evenly and at most a step apart.
+
+    Parameters
+    ----------
+    states : callable
+        From times (T,), s, to pose, velocity and acceleration, (T, m) each.
+    duration, step : float
+        s.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    DataError
+        If a time is not above 0, or the samples are too many.
+    """
+    count = _expect_time("duration", duration) / _expect_time("step", step)
+    if count > _MOST:
+        raise DataError(
+            f"step: {step:g} s gives {count:.0f} samples in {duration:g} s; at most {_MOST} are "
+            "served"
+        )
+    time = np.linspace(0.0, duration, max(1, int(np.ceil(count - 1e-9))) + 1)
+    return Motion(time, *states(time))
+
+
+def _expect_time(name: str, value: float) -> float:
+    if not (np.isfinite(value) and value > 0.0):
+        raise DataError(f"{name}: {value} given, a time above 0 s expected")
+    return value

@@ -1,0 +1,418 @@
+"""The fastest motion along a path under limits of joints, drives and tool, by TOPP-RA.
+
+Along a path x(s) speeds are linear in s', and accelerations and the drives' forces in s'' and s'^2:
+a u + b x + c <= 1 with u = s'' and x = s'^2, for each limit at each s. TOPP-RA (Pham and Pham,
+2018, IEEE Transactions on Robotics 34(3)) finds the largest x everywhere by small linear programs.
+
+Viscous friction goes with s', which is the root of x: where it is against the drive a tangent of
+the root bounds it from above, where it helps to brake a chord from rest to a largest speed bounds
+it from below. Both are close at the speeds that they are taken for: those of the pass before.
+Dry friction has the sign of the joint's motion: in full against it, without what it has more at
+rest where it helps.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pteron.errors import DataError, ModelError, PteronError
+from pteron.kernels import Array
+from pteron.manipulator import Manipulator
+from pteron.motion.checks import check_path
+from pteron.motion.demand import Demand, demand
+from pteron.motion.limits import MotionLimits, limits_of
+from pteron.motion.motion import Motion
+from pteron.motion.path import Path
+from pteron.motion.time_law import STEP, Course, kept_motion, polynomial, stretch_times
+
+_GRID = 400
+"""Intervals of a stretch."""
+
+_EVEN = 0.3
+"""Share of the grid's spacing that is even."""
+
+_PASSES = 4
+"""How often a stretch is solved, each time with less room where the time before exceeds a limit."""
+
+_AHEAD = (math.inf, 4.0, 2.0, 1.4, 1.2, 1.1, 1.05)
+"""With viscous friction it is solved before, each time no faster than so many times the s'^2 of the
+time before: the chord is then the closer."""
+
+_SLOWER = (1.0, 0.5, 0.25, 0.1)
+"""Speeds over the quintic's from which on it is: one so slow that less friction helps to brake."""
+
+_FASTEST = 1e6
+"""The greatest s'^2, over its mean in the quintic's time."""
+
+_SIDES = 16
+"""Sides of the polygon, inscribed in a circle, within which the tool's acceleration stays."""
+
+_SPREAD = 4.0
+"""Samples over which, before and after, a jump of the acceleration is spread."""
+
+_SHARE = 0.02
+"""The same, as the share of a stretch's time that it is at most."""
+
+_LITTLE = 1e-4
+"""By what a motion may exceed its limits, to be slowed as a whole."""
+
+_LOOK = 2001
+"""Points of a stretch at which its limits are held against it."""
+
+_NOTHING = 1e-6
+"""Share of a limit, for s'' or s'^2 of 1, that the solver takes for neither nothing nor something;
+what it is to nothing is held against the limit afterwards."""
+
+_SLOWEST = 1e-4
+"""Share of the largest s'^2 below which no tangent of its root is taken."""
+
+
+@dataclass(frozen=True)
+class TimeOptimal(Motion):
+    """A motion along a path in next to the shortest time.
+
+    Attributes
+    ----------
+    bound : float
+        What TOPP-RA finds where the acceleration may jump, s. The motion takes longer by what its
+        jumps are spread over, and by what keeps the limits between samples.
+    polynomial : float
+        What the quintic along the same path takes, within the same limits, s.
+    """
+
+    bound: float
+    polynomial: float
+
+
+def time_optimal(
+    robot: Manipulator,
+    path: Path,
+    limits: MotionLimits | None = None,
+    *,
+    step: float = STEP,
+) -> TimeOptimal:
+    """Return the fastest motion along a path that keeps the limits.
+
+    It rests where the path does. The acceleration is continuous: its jumps are spread over a few
+    samples. The limits are kept at ten times as many samples too.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine; what its drives need for themselves counts as their force.
+    path : Path
+        Such as `line_path` makes.
+    limits : MotionLimits, optional
+        What joints, drives and tool can do; by default what the machine's drives say.
+    step : float
+        Time between samples, s.
+
+    Returns
+    -------
+    TimeOptimal
+
+    Raises
+    ------
+    UnreachablePose, SingularPose
+        If the machine cannot go the path; see `check_path`.
+    DataError
+        If nothing limits the acceleration.
+    ModelError
+        If the drives cannot hold the machine somewhere on the path, or toppra is missing.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.motion import along, limits_of, line_path, time_optimal
+    >>> robot = pteron.load("tripteron")
+    >>> path = line_path(robot, [[0.0, 0.0, 0.0], [0.1, 0.05, 0.0], [0.1, 0.0, 0.1]], 0.02)
+    >>> limits = limits_of(robot, force=60.0, speed=1.0)
+    >>> time_optimal(robot, path, limits).duration < along(robot, path, limits=limits).duration
+    True
+    """
+    kept = limits_of(robot) if limits is None else limits
+    if not kept.bounds_acceleration:
+        raise DataError(
+            "nothing limits the acceleration: neither a limit given nor the drives' max_force; "
+            "give force or acceleration"
+        )
+    toppra = _toppra()
+    check_path(robot, path)
+    slow = stretch_times(robot, path, polynomial("quintic"), kept)
+    found = [_fastest(robot, path, j, kept, slow[j], step, toppra) for j in range(len(slow))]
+    course = Course(
+        path, tuple(stretch.duration for stretch in found), tuple(s.progress for s in found)
+    )
+    motion = kept_motion(robot, course, kept, step)
+    parts = motion.time, motion.pose, motion.velocity, motion.acceleration
+    return TimeOptimal(*parts, sum(stretch.bound for stretch in found), sum(slow))
+
+
+class _Stretch(NamedTuple):
+    """How a stretch between two rests is gone, its duration, and TOPP-RA's, s."""
+
+    progress: Callable[[Array], tuple[Array, Array, Array]]
+    duration: float
+    bound: float
+    slower: float
+    """By what its limits, where it exceeds them, slow it."""
+
+
+def _fastest(
+    robot: Manipulator,
+    path: Path,
+    j: int,
+    limits: MotionLimits,
+    unit: float,
+    step: float,
+    toppra: Any,
+) -> _Stretch:
+    """Return how a stretch is gone fastest; times are counted in `unit`, s, and s in its length."""
+    begin, end = path.rests[j : j + 2]
+    # Denser towards the rests, where the motion stays long; much denser, and TOPP-RA loses digits.
+    even = np.linspace(0.0, 1.0, _GRID + 1)
+    grid = _EVEN * even + (1.0 - _EVEN) * (0.5 - 0.5 * np.cos(np.pi * even))
+
+    def asked_at(share: Array) -> Demand:
+        pose, first, second = path.at(begin + (end - begin) * share)
+        return demand(robot, pose, (end - begin) * first, (end - begin) ** 2 * second)
+
+    rows = _rows(asked_at(grid), limits, unit)
+    squares = _first(toppra, rows, grid)
+    found: list[_Stretch] = []
+    room, most = np.ones_like(rows.c), rows.most
+    for k in range(_PASSES):
+        tighter = rows._replace(c=rows.c + 1.0 - room, most=most)
+        squares = _solved(toppra, tighter, grid, squares, _AHEAD[-1])
+        profile = _Profile.of(grid, squares)
+        spread = min(_SPREAD * step / unit, _SHARE * profile.duration)
+        progress = profile.spread(spread)
+        # What the spreading exceeds is taken from the limits there.
+        tau = np.linspace(0.0, 1.0, _LOOK)
+        share, rate, gain = progress(tau)
+        whole = profile.duration + 2.0 * spread
+        x, u = (rate / whole) ** 2, gain / whole**2
+        there = _rows(asked_at(share), limits, unit)
+        used = there.used(u, x)
+        fast = x / there.most
+        slower = max(1.0, float(used.max(initial=0.0)) ** 0.5, float(fast.max()) ** 0.5)
+        bound = profile.duration if k == 0 else found[0].bound / unit
+        found.append(_Stretch(progress, whole * unit, bound * unit, slower))
+        if slower < 1.0 + _LITTLE:
+            break
+        near = _near(tau * whole - spread, profile.time, 2.0 * spread)
+        room = np.minimum(room, room - 1.05 * np.maximum(_most_of(near, used - 1.0), 0.0))
+        most = most / np.maximum(_most_of(near, fast[:, None])[:, 0], 1.0)
+    return min(found, key=lambda one: one.duration * one.slower)
+
+
+def _first(toppra: Any, rows: _Rows, grid: Array) -> Array:
+    """Return x = s'^2 on the grid that viscous friction allows, from that of the quintic on."""
+    share, rate, _ = polynomial("quintic")(np.linspace(0.0, 1.0, _LOOK))
+    quintic = np.interp(grid, share, rate) ** 2
+    if not rows.v.any():
+        return _solved(toppra, rows, grid, quintic, math.inf)
+    for slower in _SLOWER:
+        squares = slower**2 * quintic
+        try:
+            for ahead in _AHEAD:
+                squares = _solved(toppra, rows, grid, squares, ahead)
+        except ModelError:
+            if slower == _SLOWER[-1]:
+                raise
+        else:
+            break
+    return squares
+
+
+def _near(times: Array, nodes: Array, span: float) -> Array:
+    """Return the first and the last, exclusive, of the times (T,) near each node, (2, K)."""
+    first = np.searchsorted(times, nodes - span)
+    last = np.searchsorted(times, nodes + span)
+    # Between distant nodes all times count.
+    first[1:] = np.minimum(first[1:], np.searchsorted(times, nodes[:-1]))
+    last[:-1] = np.maximum(last[:-1], np.searchsorted(times, nodes[1:]))
+    return np.array([np.minimum(first, len(times) - 1), np.maximum(last, first + 1)])
+
+
+def _most_of(near: Array, values: Array) -> Array:
+    """Return the largest values (T, R) near each node, (K, R)."""
+    return np.array([values[a:b].max(axis=0) for a, b in near.T])
+
+
+class _Rows(NamedTuple):
+    """Limits as a u + b x + c + v sqrt(x) <= 1, (K, R) each, and x <= `most` (K,)."""
+
+    a: Array
+    b: Array
+    c: Array
+    v: Array
+    most: Array
+
+    def used(self, u: Array, x: Array) -> Array:
+        """Return the share of each limit that s'' and s'^2, (K,) each, take, (K, R)."""
+        u, x = u[:, None], x[:, None]
+        return np.asarray(self.a * u + self.b * x + self.c + self.v * np.sqrt(x))
+
+
+def _rows(asked: Demand, limits: MotionLimits, unit: float) -> _Rows:
+    """Return what a stretch asks at points of it, its limits taken as 1, times in `unit`."""
+    count = len(asked.first)
+    none = np.zeros((count, 0))
+    a, b, c, v = [none], [none], [none], [none]
+
+    def add(linear: Array, square: Array, constant: Array, root: Array, limit: Array) -> None:
+        has = np.isfinite(limit)
+        for part, values in zip(
+            (a, b, c, v),
+            (linear / unit**2, square / unit**2, constant, root / unit),
+            strict=True,
+        ):
+            part.append((np.broadcast_to(values, linear.shape) / limit)[:, has])
+
+    zero = np.zeros_like(asked.first)
+    moving = np.sign(asked.first)
+    for side in (1.0, -1.0):
+        against = side * moving > 0.0
+        dry = np.where(against, asked.dry[1], asked.dry[0]) * side * moving
+        add(side * asked.first, side * asked.second, zero, zero, limits.acceleration)
+        still = side * asked.still + dry
+        root = side * asked.viscous * asked.first
+        add(side * asked.growth, side * asked.square, still, root, limits.force)
+    speed, bend = asked.tool
+    if math.isfinite(limits.tool_acceleration):
+        # Both lie in a plane: speed along its x, and what is left of the bend along its y.
+        size = np.linalg.norm(speed, axis=-1)
+        way = np.divide(speed, size[:, None], out=np.zeros_like(speed), where=size[:, None] > 0.0)
+        ahead = np.sum(bend * way, axis=-1)
+        aside = np.linalg.norm(bend - ahead[:, None] * way, axis=-1)
+        angles = 2.0 * np.pi * (np.arange(_SIDES) + 0.5) / _SIDES
+        cos, sin = np.cos(angles), np.sin(angles)
+        most = np.full(_SIDES, limits.tool_acceleration * np.cos(np.pi / _SIDES))
+        linear = size[:, None] * cos
+        square = ahead[:, None] * cos + aside[:, None] * sin
+        add(linear, square, np.zeros_like(linear), np.zeros_like(linear), most)
+    with np.errstate(divide="ignore"):
+        rates = np.minimum(
+            (limits.speed / np.abs(asked.first)).min(axis=-1),
+            limits.tool_speed / np.linalg.norm(speed, axis=-1),
+        )
+    found = [np.hstack(part) for part in (a, b, c, v)]
+    return _Rows(found[0], found[1], found[2], found[3], (rates * unit) ** 2)
+
+
+def _solved(toppra: Any, rows: _Rows, grid: Array, before: Array, ahead: float) -> Array:
+    """Return x = s'^2 on the grid, by TOPP-RA, given that of the pass before.
+
+    With viscous friction it is no more than `ahead` times as large, where the chord ends.
+    """
+    most = np.minimum(rows.most, _FASTEST)
+    a, b, c = rows.a.copy(), rows.b.copy(), rows.c.copy()
+    if rows.v.any():
+        at = np.maximum(before, _SLOWEST * before.max())[:, None]
+        most = np.minimum(most, ahead * at[:, 0])
+        # sqrt(x) <= sqrt(at) / 2 + x / (2 sqrt(at)), and for x <= top: sqrt(x) >= x / sqrt(top).
+        against = rows.v > 0.0
+        top = most[:, None]
+        b += np.where(against, rows.v / (2.0 * np.sqrt(at)), rows.v / np.sqrt(top))
+        c += np.where(against, rows.v * np.sqrt(at) / 2.0, 0.0)
+    for part in (a, b):
+        part[np.abs(part) < _NOTHING] = 0.0
+    limit = toppra.constraint.LinearConstraint()
+    limit.identical = True
+    count = rows.a.shape[1]
+    bounds = np.stack([np.zeros_like(most), most], axis=-1)
+    parameters = toppra.constraint.linear_constraint.canlinear_colloc_to_interpolate(
+        a, b, c, np.eye(count), np.ones(count), bounds, None, grid, identical=True
+    )
+    *lines, x_bounds, u_bounds = parameters
+    limit.compute_constraint_params = lambda *_: (*lines, u_bounds, x_bounds)
+    line = toppra.SplineInterpolator([0.0, 1.0], [[0.0], [1.0]])
+    solver = toppra.algorithm.TOPPRA([limit], line, gridpoints=grid, solver_wrapper="seidel")
+    _, rates, _ = solver.compute_parameterization(0.0, 0.0)
+    if rates is None or not np.isfinite(rates).all():
+        raise ModelError("TOPP-RA finds no motion along the path; give other limits")
+    return np.asarray(rates, dtype=float) ** 2
+
+
+class _Profile(NamedTuple):
+    """s(t) of constant accelerations between nodes: what TOPP-RA finds, and its integrals."""
+
+    time: Array
+    s: Array
+    rate: Array
+    gain: Array
+    area: Array
+    """The integral of s, and that of it."""
+    volume: Array
+
+    @classmethod
+    def of(cls, grid: Array, squares: Array) -> _Profile:
+        """Take x = s'^2 on a grid; before and after s rests."""
+        rate = np.sqrt(np.maximum(squares, 0.0))
+        gain = 0.5 * np.diff(squares) / np.diff(grid)
+        spans = 2.0 * np.diff(grid) / (rate[1:] + rate[:-1])
+        s, v, u, d = grid[:-1], rate[:-1], gain, spans
+        areas = d * (s + d * (v / 2.0 + d * u / 6.0))
+        area = np.concatenate([[0.0], np.cumsum(areas)])
+        volumes = d * (area[:-1] + d * (s / 2.0 + d * (v / 6.0 + d * u / 24.0)))
+        return cls(
+            np.concatenate([[0.0], np.cumsum(spans)]),
+            grid,
+            rate,
+            np.append(gain, 0.0),
+            area,
+            np.concatenate([[0.0], np.cumsum(volumes)]),
+        )
+
+    @property
+    def duration(self) -> float:
+        """From rest to rest, in units."""
+        return float(self.time[-1])
+
+    def integrals(self, t: Array) -> tuple[Array, Array, Array]:
+        """Return s, its integral and that of it, (T,) each, at times (T,)."""
+        within = np.maximum(t, 0.0)
+        k = np.clip(np.searchsorted(self.time, within, side="right") - 1, 0, len(self.time) - 1)
+        d = within - self.time[k]
+        s, v, u, area = self.s[k], self.rate[k], self.gain[k], self.area[k]
+        return (
+            s + d * (v + d * u / 2.0),
+            area + d * (s + d * (v / 2.0 + d * u / 6.0)),
+            self.volume[k] + d * (area + d * (s / 2.0 + d * (v / 6.0 + d * u / 24.0))),
+        )
+
+    def spread(self, h: float) -> Callable[[Array], tuple[Array, Array, Array]]:
+        """Return s averaged over h before and after, by a triangle's weights, from rest to rest.
+
+        Its acceleration is continuous, and so is the jerk: both are second differences of what is.
+        """
+        whole = self.duration + 2.0 * h
+
+        def progress(tau: Array) -> tuple[Array, Array, Array]:
+            t = whole * tau - h
+            later, now, earlier = (self.integrals(t + shift) for shift in (h, 0.0, -h))
+            gain, rate, s = (
+                (a - 2.0 * b + c) / h**2 for a, b, c in zip(later, now, earlier, strict=True)
+            )
+            return s, rate * whole, gain * whole**2
+
+        return progress
+
+
+def _toppra() -> Any:
+    """Return the library, or say which extra has it."""
+    try:
+        import toppra
+        import toppra.algorithm
+        import toppra.constraint
+    except ImportError:
+        raise PteronError(
+            "time-optimal motion needs toppra, which is not installed; pip install 'pteron[motion]'"
+        ) from None
+    return toppra

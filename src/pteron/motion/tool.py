@@ -1,0 +1,48 @@
+"""The tool's centre point: its motion from the platform's, and the platform's from its."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pteron.kernels import Array
+from pteron.platforms import Platform
+
+Curve = tuple[Array, Array, Array]
+"""Poses (..., m), and their first and second derivatives by a parameter."""
+
+
+def tool_motion(platform: Platform, pose: Array, first: Array, second: Array) -> Curve:
+    """Return where the tool is, along the pose's lengths, with phi, and two derivatives.
+
+    The way from P to the tool along the platform's axis, which is constant, is left out.
+    """
+    return _moved(platform, (pose, first, second), 1.0)
+
+
+def pose_motion(platform: Platform, place: Array, first: Array, second: Array) -> Curve:
+    """Return the poses whose tool moves so: the inverse of `tool_motion`."""
+    return _moved(platform, (place, first, second), -1.0)
+
+
+def _moved(platform: Platform, curve: Curve, side: float) -> Curve:
+    if not platform.turns or not any(platform.tool[:2]):
+        return curve
+    place, velocity, acceleration = (part.copy() for part in curve)
+    rate, growth = velocity[..., -1:], acceleration[..., -1:]
+    # P leads to the tool by an arm, of which a part turns with the platform.
+    arm, lever = turning_arm(platform, place[..., -1:])
+    place[..., :-1] += side * arm
+    velocity[..., :-1] += side * rate * lever
+    acceleration[..., :-1] += side * (growth * lever - rate**2 * arm)
+    return place, velocity, acceleration
+
+
+def turning_arm(platform: Platform, angle: Array) -> tuple[Array, Array]:
+    """Return what of the way from P to the tool turns, at angles (..., 1), and d/d angle."""
+    x, y = (platform.directions @ axis for axis in platform.frame[:2])
+    a, b = (
+        platform.tool[0] * x + platform.tool[1] * y,
+        platform.tool[0] * y - platform.tool[1] * x,
+    )
+    cos, sin = np.cos(angle), np.sin(angle)
+    return cos * a + sin * b, cos * b - sin * a
