@@ -253,7 +253,7 @@ def test_without_a_rotor_only_speed_bounds_the_ratio():
     assert fit.inertia_ratio == np.inf
 
 
-def test_motors_are_chosen_by_what_they_have_to_spare():
+def test_the_smallest_motor_that_serves_comes_first():
     found = sized("delta-4")
     motors = [
         Motor("weak", 1e-6, 1e-4, 2e-4, 600.0),
@@ -266,17 +266,33 @@ def test_motors_are_chosen_by_what_they_have_to_spare():
     for leg in range(1, 5):
         own = [fit for fit in fits if fit.leg == leg]
         serving = [fit for fit in own if fit.fits]
-        assert {fit.motor.name for fit in serving} >= {"400 W", "100 W"}
+        assert [fit.motor.name for fit in own[:2]] == ["100 W", "400 W"]
         assert own[: len(serving)] == serving
-        margins = [fit.margin for fit in serving]
-        assert margins == sorted(margins, reverse=True)
         for fit in own:
             rms, peak = torques(found, leg, fit.ratio, fit.motor.rotor_inertia)
             assert fit.rated_margin == pytest.approx(fit.motor.rated_torque / rms)
             assert fit.peak_margin == pytest.approx(fit.motor.peak_torque / peak)
             assert fit.fits == (fit.margin >= 1.0 - 1e-9)
+            assert fit.scarcest in ("rated torque", "peak torque", "speed")
             if fit.fits:
                 assert fit.ratio in fit.span
+    weak = next(fit for fit in fits if fit.motor.name == "weak")
+    assert not weak.fits
+    assert (weak.scarcest, weak.margin) == ("rated torque", weak.rated_margin)
+
+
+def test_a_margin_is_kept_at_every_ratio_that_serves():
+    found = sized("mixed")
+    motor = Motor("400 W", 2.6e-5, 1.27, 3.8, 600.0)
+    for plain, careful in zip(
+        choose(found, [motor]), choose(found, [motor], margin=1.5), strict=True
+    ):
+        assert careful.fits
+        assert plain.span.least < careful.span.least
+        assert careful.span.greatest < plain.span.greatest
+        assert careful.margin >= 1.5 * (1.0 - 1e-9)
+    with pytest.raises(pteron.DataError, match=r"margin: 0\.5 given"):
+        choose(found, [motor], margin=0.5)
 
 
 def test_what_is_more_than_the_drives_can_do_is_told_by_leg_and_amount():

@@ -16,6 +16,9 @@ from pteron.kernels import Array
 from pteron.motion.sizing import Sizing
 from pteron.shapes import PerJoint
 
+_STILL = 1e-9
+"""Share of the fastest joint's acceleration below which a joint stands still, but for rounding."""
+
 
 class Span(NamedTuple):
     """Ratios from the least to the greatest, rad/m or rad/rad; none where least > greatest."""
@@ -96,7 +99,8 @@ def best_ratio(sizing: Sizing, leg: int, rotor_inertia: float) -> float:
     295.1
     """
     force, _, acceleration = squares(sizing, leg)
-    if rotor_inertia == 0.0 or acceleration == 0.0:
+    all_joints = sizing.mean(sizing.accelerations**2)
+    if rotor_inertia == 0.0 or acceleration <= _STILL**2 * float(all_joints.max()):
         return math.inf
     return math.sqrt(math.sqrt(force / acceleration) / rotor_inertia)
 

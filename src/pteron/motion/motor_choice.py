@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pteron.errors import DataError
 from pteron.motion.gearing import Span, best_ratio, peak_span, rated_span, speed_span, torques
 from pteron.motion.motors import Motor
 from pteron.motion.sizing import Sizing
@@ -24,7 +25,8 @@ class Fit:
     motor : Motor
         The motor.
     span : Span
-        The ratios at which it keeps its rated torque, its peak torque and its speed.
+        The ratios at which it keeps its rated torque, its peak torque and its speed, each with the
+        margin asked for.
     ratio : float
         The one among them at which its root mean square torque is least, rad/m or rad/rad; where
         there is none, that of the ratios that its speed allows.
@@ -51,16 +53,32 @@ class Fit:
     @property
     def margin(self) -> float:
         """The least of the three margins."""
-        return min(self.rated_margin, self.peak_margin, self.speed_margin)
+        return min(self._margins.values())
+
+    @property
+    def scarcest(self) -> str:
+        """What the least margin is of: "rated torque", "peak torque" or "speed"."""
+        margins = self._margins
+        return min(margins, key=lambda name: margins[name])
+
+    @property
+    def _margins(self) -> dict[str, float]:
+        return {
+            "rated torque": self.rated_margin,
+            "peak torque": self.peak_margin,
+            "speed": self.speed_margin,
+        }
 
 
-def choose(sizing: Sizing, motors: Sequence[Motor]) -> tuple[Fit, ...]:
-    """Return how each motor suits each joint, the best first: what fits, by what it has to spare.
+def choose(sizing: Sizing, motors: Sequence[Motor], *, margin: float = 1.0) -> tuple[Fit, ...]:
+    """Return how each motor suits each joint: first what serves, the smallest motor before others.
 
-    A motor serves at a ratio if its root mean square torque over the cycle, the rest included, is
-    no more than its rated torque, its greatest torque no more than its peak torque, and its
-    greatest speed no more than its own. All ratios that serve are found, in closed form; what the
-    transmission loses is the joint's friction in the machine's file.
+    A motor serves at a ratio if, times the margin, its root mean square torque over the cycle, the
+    rest included, is no more than its rated torque, its greatest torque no more than its peak
+    torque, and its greatest speed no more than its own. All ratios that serve are found, in closed
+    form; what the transmission loses is the joint's friction in the machine's file. Of two motors
+    the smaller has less rated torque times speed; those that do not serve follow, by how near they
+    come.
 
     Parameters
     ----------
@@ -68,11 +86,18 @@ def choose(sizing: Sizing, motors: Sequence[Motor]) -> tuple[Fit, ...]:
         What the cycle asks of the joints; the motors of the machine's own file play no part.
     motors : sequence of Motor
         Those to choose from; `read_motors` reads them from a file.
+    margin : float
+        What a motor must be able to do, over what the cycle asks; 1 or more.
 
     Returns
     -------
     tuple of Fit
         One for each joint and motor, joint by joint.
+
+    Raises
+    ------
+    DataError
+        If the margin is not a number of 1 or more.
 
     Examples
     --------
@@ -84,18 +109,26 @@ def choose(sizing: Sizing, motors: Sequence[Motor]) -> tuple[Fit, ...]:
     >>> fit.fits, round(fit.ratio), round(fit.rated_margin, 1)
     (True, 295, 2.1)
     """
+    if not 1.0 <= margin < math.inf:
+        raise DataError(f"margin: {margin} given, a number of 1 or more expected")
     found = []
     for leg in range(1, sizing.robot.freedom + 1):
-        fits = [_fit(sizing, leg, motor) for motor in motors]
-        found += sorted(fits, key=lambda fit: (not fit.fits, -fit.margin))
+        fits = [_fit(sizing, leg, motor, margin) for motor in motors]
+        found += sorted(fits, key=_place)
     return tuple(found)
 
 
-def _fit(sizing: Sizing, leg: int, motor: Motor) -> Fit:
+def _place(fit: Fit) -> tuple[bool, float]:
+    """Return what fits are sorted by."""
+    size = fit.motor.rated_torque * fit.motor.max_speed
+    return not fit.fits, size if fit.fits else -fit.margin
+
+
+def _fit(sizing: Sizing, leg: int, motor: Motor, margin: float) -> Fit:
     rotor = motor.rotor_inertia
-    fast = speed_span(sizing, leg, motor.max_speed)
-    span = fast.within(rated_span(sizing, leg, rotor, motor.rated_torque))
-    span = span.within(peak_span(sizing, leg, rotor, motor.peak_torque))
+    fast = speed_span(sizing, leg, motor.max_speed / margin)
+    span = fast.within(rated_span(sizing, leg, rotor, motor.rated_torque / margin))
+    span = span.within(peak_span(sizing, leg, rotor, motor.peak_torque / margin))
     least, greatest = span if span else fast
     ratio = min(max(best_ratio(sizing, leg, rotor), least), greatest)
     if not math.isfinite(ratio):  # the joint only holds: any ratio from the least on serves

@@ -204,7 +204,7 @@ class Sizing:
             "rotor_inertia": np.where(self.rotor_inertia > 0.0, self.rotor_inertia, np.nan),
             "inertia_ratio": self.inertia_ratios,
             "ratio": [np.nan if drive.ratio is None else drive.ratio for drive in self.drives],
-            "best_ratio": best_ratios(self),
+            "best_ratio": np.where(np.isfinite(best := best_ratios(self)), best, np.nan),
             "peak_motor_torque": np.where(turning, peak, np.nan),
             "rms_motor_torque": np.where(turning, rms, np.nan),
         }
