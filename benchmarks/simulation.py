@@ -55,7 +55,9 @@ def main() -> None:
             ),
         ]
         if find_spec("mujoco") is not None:
-            contestants.append(_contestant("mujoco", _mujoco(robot, holding, count // 20), count // 20))
+            contestants.append(
+                _contestant("mujoco", _mujoco(robot, holding, count // 20), count // 20)
+            )
         times = contest(contestants, 3 if quick() else 15)
         alone, together = (float(np.median(times[key])) for key in ("alone", "batch"))
         peer, ratio = "-", "-"

@@ -17,12 +17,16 @@ import pteron
 from pteron.motion import joint_guides, joint_points
 from pteron.plots import (
     LEG_COLORS,
+    Ability,
+    force_speed_figure,
     forces_figure,
     measure_figure,
+    power_figure,
     reach_figure,
     regularity_figure,
     robot_figure,
     svg,
+    svg_file,
 )
 from pteron.plots.canvas import PAPER
 from pteron.plots.space import upright
@@ -67,6 +71,23 @@ def regularity():
     return regularity_figure(angles, np.cos(angles), singular, home=0.1, used=(-0.4, 0.4))
 
 
+def drives(units=("N", "N", "N m")):
+    t = np.linspace(0.0, 2.0 * np.pi, 50)
+    speeds, forces = np.sin(np.outer(t, [1, 2, 3])), 20.0 * np.cos(np.outer(t, [1, 2, 3]))
+    return force_speed_figure(
+        speeds,
+        forces,
+        units=[("m/s" if unit == "N" else "rad/s", unit) for unit in units],
+        abilities=[Ability(1.2, 30.0, 15.0), Ability(None, 500.0, None), Ability(None, None, None)],
+        rms=(np.full(3, 0.7), np.full(3, 14.0)),
+    )
+
+
+def powers():
+    t = np.linspace(0.0, 1.0, 50)
+    return power_figure(t, np.sin(np.outer(t, [1, 2, 3])))
+
+
 PICTURES = {
     "machine": (machine, "quadrupteron turned"),
     "plane": (machine, "3-rrr"),
@@ -74,6 +95,8 @@ PICTURES = {
     "measure": (measure, "delta"),
     "forces": (forces, "tripteron"),
     "regularity": (regularity,),
+    "drives": (drives,),
+    "powers": (powers,),
 }
 
 
@@ -274,3 +297,26 @@ def test_a_map_keeps_its_aspect():
         assert axes.get_aspect() == 1.0
         assert axes.get_xlabel() == f"{plane[0]} (mm)"
         assert axes.get_ylabel() == f"{plane[1]} (mm)"
+
+
+def test_legs_of_other_units_have_axes_of_their_own_and_far_limits_are_left_out():
+    upper, lower = drives().axes
+    assert upper.get_ylabel() == "force (N)"
+    assert lower.get_ylabel() == "torque (N m)"
+    # 500 N would make what is used, 20 N, small; 30 N is in sight.
+    assert 30.0 < upper.get_ylim()[1] < 60.0
+    boxed = [line.get_ydata() for line in upper.lines if line.get_color() == LEG_COLORS[0]]
+    assert {30.0, -30.0, 15.0, -15.0} <= {float(y[0]) for y in boxed if len(set(y)) == 1}
+
+
+def test_the_power_of_all_is_the_sum():
+    total, *legs = powers().axes[0].lines[1:]
+    np.testing.assert_allclose(total.get_ydata(), sum(leg.get_ydata() for leg in legs))
+
+
+def test_a_picture_in_a_file_of_its_own_is_whole():
+    text = svg_file(powers())
+    root = ElementTree.fromstring(text)
+    assert root.tag == "{http://www.w3.org/2000/svg}svg"
+    assert svg_file(powers()) == text
+    assert "<metadata" not in text

@@ -152,7 +152,7 @@ def test_the_page_is_whole_and_needs_nothing_else(name):
     assert wanted <= set(found.ids)
     assert found.counts["canvas"] == 1
     measures = {"quadrupteron": 1, "delta": 2, "mixed": 2, "shaft": 2, "planar": 3}.get(name, 0)
-    assert found.counts["svg"] == (3 if name == "planar" else 5) + measures
+    assert found.counts["svg"] == (5 if name == "planar" else 7) + measures
     assert found.counts["h1"] == 1
 
 
@@ -253,12 +253,16 @@ def test_the_numbers_are_the_librarys(name):
     assert cycle["with_drives"] == (np.abs(forces - rigid).max() > 1.0) == (name == "driven")
     assert [text[:5] for text in cycle["overloads"]] == (["leg 3"] if name == "driven" else [])
     assert data["drives"][1] == (asdict(robot.legs[1].drive) if name == "driven" else None)
-    np.testing.assert_allclose(np.abs(forces).max(axis=0), cycle["peak_forces"])
-    # Over one period, by the trapezoidal rule.
+    # The report looks between the samples too.
+    np.testing.assert_allclose(np.abs(forces).max(axis=0), cycle["peak_forces"], rtol=1e-3)
     mean = np.trapezoid(forces**2, cycle["time"], axis=0) / cycle["duration"]
-    np.testing.assert_allclose(np.sqrt(mean), cycle["rms_forces"])
+    np.testing.assert_allclose(np.sqrt(mean), cycle["rms_forces"], rtol=1e-3)
+    power = forces * (pteron.jacobian(robot, state[0]) @ state[1][..., None])[..., 0]
+    for i, row in enumerate(data["motors"]):
+        assert row["peak_power"] == pytest.approx(power[:, i].max(), rel=1e-3)
+        assert row["peak_force"] == cycle["peak_forces"][i]
     speeds = (pteron.jacobian(robot, state[0]) @ state[1][..., None])[..., 0]
-    np.testing.assert_allclose(np.abs(speeds).max(axis=0), cycle["peak_speeds"], atol=1e-12)
+    np.testing.assert_allclose(np.abs(speeds).max(axis=0), cycle["peak_speeds"], 1e-3, 1e-12)
     joints = pteron.inverse_kinematics(robot, state[0])
     np.testing.assert_array_equal(cycle["joints"]["least"], joints.min(axis=0))
     np.testing.assert_array_equal(cycle["joints"]["greatest"], joints.max(axis=0))
@@ -285,7 +289,8 @@ def test_the_numbers_are_the_librarys(name):
 @EVERY
 def test_the_page_shows_the_numbers(name):
     found, text = report(name), read(name).text
-    for value in (*found.peak_forces, *found.rms_forces, *found.peak_speeds):
+    loads = found.sizing
+    for value in (*loads.peak_forces, *loads.rms_forces, *loads.peak_speeds, *loads.peak_power):
         assert significant(float(value)) in text
     joints = {leg.joint.noun: leg.joint.force_unit for leg in found.robot.legs}
     for noun in ("slider", "crank", "shaft"):
@@ -298,7 +303,8 @@ def test_the_page_shows_the_numbers(name):
     for words in ("Drives, at the joints", "4.626 4.626", "Drive forces,"):
         assert (words in text) == (name == "driven"), words
     assert ("friction is left out" in text) == (name != "driven")
-    assert all(line in text for line in found.overloads)
+    assert all(line in text for line in loads.overloads)
+    assert ("best ratio" in text) == (name == "driven")
     assert significant(found.jacobian.condition, 4) in text
     for i, value in enumerate(found.base.values(), start=1):
         assert significant(float(value), 4) in text

@@ -24,6 +24,7 @@ from pteron.cli.machines import catalog, check, new
 from pteron.cli.motions import direct, forces, inverse
 from pteron.cli.report import report
 from pteron.cli.screen import complain, note
+from pteron.cli.size import size
 from pteron.errors import PteronError
 
 _USER_ERROR = 2
@@ -160,6 +161,12 @@ _add(
     "pteron forces quadrupteron --pose 0.01 0.02 -0.03 0.1 --velocity 0 0 0.5 0",
     "pteron forces quadrupteron --table motion.csv --out forces.csv",
     cls=NumbersCommand,
+)
+_add(
+    size,
+    "pteron size delta --payload 1.0",
+    "pteron size robot.toml --motors motors.csv --dwell 0.2 --out sizing",
+    "pteron size quadrupteron --cycle motion.csv --out sizing.csv",
 )
 _add(
     base,

@@ -87,6 +87,11 @@ class Drive:
         """The motor's inertia at the joint, ratio^2 rotor_inertia, kg or kg m^2."""
         return self.gear**2 * self.rotor_inertia
 
+    @property
+    def rated_force(self) -> float | None:
+        """What the motor's rated torque gives at the joint, N or N m."""
+        return None if self.rated_torque is None else abs(self.gear) * self.rated_torque
+
 
 def _check(
     part: Any,

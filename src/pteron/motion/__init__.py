@@ -2,11 +2,15 @@
 
 from pteron.motion.checks import check_motion, check_path
 from pteron.motion.demand import Peak, peaks
+from pteron.motion.drive_sizing import size
 from pteron.motion.fourier import FourierSeries, fourier_motion
+from pteron.motion.gearing import Span, best_ratio, best_ratios
 from pteron.motion.jerk_limited import jerk_limited
 from pteron.motion.joint_points import Guide, JointPoints, Part, joint_guides, joint_points
 from pteron.motion.limits import MotionLimits, limits_of
 from pteron.motion.motion import Motion
+from pteron.motion.motor_choice import Fit, choose
+from pteron.motion.motors import Motor, read_motors
 from pteron.motion.overloads import overloads
 from pteron.motion.path import LinePath, Path, line_path, there_and_back
 from pteron.motion.payload import with_payload
@@ -21,27 +25,35 @@ from pteron.motion.simulation import (
     longest_step,
     simulate,
 )
+from pteron.motion.sizing import Sizing
 from pteron.motion.time_law import along, shortest
 from pteron.motion.time_optimal import TimeOptimal, time_optimal
 
 __all__ = [
+    "Fit",
     "FourierSeries",
     "Guide",
     "JointPoints",
     "LinePath",
     "Motion",
     "MotionLimits",
+    "Motor",
     "Part",
     "Path",
     "Peak",
     "PickAndPlace",
     "Sensors",
     "Simulation",
+    "Sizing",
+    "Span",
     "TimeOptimal",
     "advance",
     "along",
+    "best_ratio",
+    "best_ratios",
     "check_motion",
     "check_path",
+    "choose",
     "cycle_path",
     "fourier_motion",
     "jerk_limited",
@@ -54,10 +66,12 @@ __all__ = [
     "peaks",
     "pick_and_place",
     "point_to_point",
+    "read_motors",
     "replay",
     "scaled_to_reach",
     "shortest",
     "simulate",
+    "size",
     "there_and_back",
     "time_optimal",
     "with_payload",

@@ -3,7 +3,7 @@
 Physics is asked elsewhere; nothing here touches pyplot's global state.
 """
 
-from pteron.plots.canvas import LEG_COLORS, svg
+from pteron.plots.canvas import LEG_COLORS, svg, svg_file
 from pteron.plots.certainty import (
     autocorrelation_figure,
     certainty_figure,
@@ -16,25 +16,30 @@ from pteron.plots.comparison import (
     residual_speed_figure,
     residual_time_figure,
 )
+from pteron.plots.drives import Ability, force_speed_figure, power_figure
 from pteron.plots.forces import forces_figure, regularity_figure
 from pteron.plots.reach import measure_figure, reach_figure
 from pteron.plots.robot import grid_step, robot_figure
 
 __all__ = [
+    "Ability",
     "LEG_COLORS",
     "autocorrelation_figure",
     "certainty_figure",
     "comparison_figure",
     "correlation_figure",
     "errors_figure",
+    "force_speed_figure",
     "forces_figure",
     "grid_step",
     "histogram_figure",
     "measure_figure",
+    "power_figure",
     "reach_figure",
     "regularity_figure",
     "residual_speed_figure",
     "residual_time_figure",
     "robot_figure",
     "svg",
+    "svg_file",
 ]

@@ -139,10 +139,7 @@ def svg(figure: Figure, *, name: str, title: str) -> Markup:
     digits, is put before every identifier, which must be unique in a page; the title says what the
     picture shows to those who cannot see it.
     """
-    buffer = StringIO()
-    with mpl.rc_context({"svg.hashsalt": "pteron", "svg.fonttype": "none"}):
-        figure.savefig(buffer, format="svg", metadata=_NO_METADATA)
-    text = buffer.getvalue()
+    text = _drawn(figure)
     text = text[text.index("<svg") :].rstrip()
     text = re.sub(r"\s*<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
     text = re.sub(r"<!--.*?-->\s*", "", text, flags=re.DOTALL)
@@ -164,3 +161,15 @@ def svg(figure: Figure, *, name: str, title: str) -> Markup:
         f"<title>{escape(title)}</title>"
     )
     return Markup(head + text[text.index(">") + 1 :])
+
+
+def svg_file(figure: Figure) -> str:
+    """Return a figure as the text of an SVG file that stands alone, on white, without a date."""
+    return _drawn(figure, facecolor="white")
+
+
+def _drawn(figure: Figure, **look: Any) -> str:
+    buffer = StringIO()
+    with mpl.rc_context({"svg.hashsalt": "pteron", "svg.fonttype": "none"}):
+        figure.savefig(buffer, format="svg", metadata=_NO_METADATA, **look)
+    return buffer.getvalue()

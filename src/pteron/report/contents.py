@@ -7,20 +7,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pteron.dynamics import drive_forces
 from pteron.equations.machine import closure_of
 from pteron.kernels import Array, numeric
-from pteron.kinematics import jacobian, joint_rates, singular_orientations
+from pteron.kinematics import jacobian, singular_orientations
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator
 from pteron.motion import (
     Guide,
     JointPoints,
     PickAndPlace,
+    Sizing,
     joint_guides,
     joint_points,
-    overloads,
     pick_and_place,
+    size,
 )
 from pteron.plots import grid_step
 from pteron.reduction import BaseParameters, base_parameters
@@ -112,9 +112,8 @@ class Measures:
 class Report:
     """All that a page says about a machine; the cycle has T samples.
 
-    The cycle keeps the reserve `least`; its forces and joint speeds (T, n) are in N and m/s, or
-    N m and rad/s. The forces are what the drives must give, friction and the motors' inertia
-    included where the file tells of them (`driven`); `overloads` says which drives are exceeded.
+    The cycle keeps the reserve `least`; `sizing` is what it asks of the drives: forces, in N or
+    N m, include friction and the motors' inertia where the file tells of them (`driven`).
     The slices go through the home pose and are all of one width. Of `orientations` and `measures`
     there is what the type-II measure depends on; neither where J is constant. The squares of the
     machine's pictures have sides of `grid`, m. `passive` has the passive joints that have limits,
@@ -131,9 +130,7 @@ class Report:
     home_points: JointPoints
     guides: tuple[Guide, ...]
     grid: float
-    forces: Array
-    joint_speeds: Array
-    overloads: tuple[str, ...]
+    sizing: Sizing
     joints: JointRanges
     passive: tuple[LimitedJoint, ...]
     slices: tuple[ReachSlice, ...]
@@ -155,19 +152,20 @@ class Report:
         return any(bool((cut.status == BEYOND_LIMITS).any()) for cut in self.slices)
 
     @property
-    def peak_forces(self) -> Array:
-        """Largest size of each leg's force over the cycle, N or N m."""
-        return np.asarray(np.abs(self.forces).max(axis=0))
+    def forces(self) -> Array:
+        """Each drive's force (T, n) at the cycle's samples, N or N m."""
+        return self.sizing.forces[::2]
 
     @property
-    def rms_forces(self) -> Array:
-        """Root mean square of each leg's force over the cycle, N or N m."""
-        return np.asarray(np.sqrt((self.forces[:-1] ** 2).mean(axis=0)))
+    def limited_drives(self) -> bool:
+        """Whether the file tells what a drive can do."""
+        drives = self.sizing.drives
+        return any(drive.max_force or drive.max_speed or drive.rated_force for drive in drives)
 
     @property
-    def peak_speeds(self) -> Array:
-        """Largest speed of each joint over the cycle, m/s or rad/s."""
-        return np.asarray(np.abs(self.joint_speeds).max(axis=0))
+    def geared(self) -> bool:
+        """Whether the file tells of a motor's inertia."""
+        return any(drive.rotor_inertia > 0.0 for drive in self.sizing.drives)
 
 
 def contents(robot: Manipulator) -> Report:
@@ -180,8 +178,6 @@ def contents(robot: Manipulator) -> Report:
     volume = reach_volume(robot, home)
     base = base_parameters(robot)
     home_points, guides = joint_points(robot, home), joint_guides(robot, cycle.pose)
-    forces = drive_forces(robot, cycle.pose, cycle.velocity, cycle.acceleration, smooth=True)
-    speeds = joint_rates(robot, cycle.pose, cycle.velocity).actuated
     # Squares of one width, so that the pictures share a scale.
     half = (0.5 + _RIM) * float((volume.box[1] - volume.box[0]).max())
     return Report(
@@ -195,9 +191,7 @@ def contents(robot: Manipulator) -> Report:
         home_points=home_points,
         guides=guides,
         grid=grid_step(home_points, guides),
-        forces=forces,
-        joint_speeds=speeds,
-        overloads=overloads(robot, forces, speeds),
+        sizing=size(robot, cycle),
         joints=joint_ranges(robot, cycle.pose),
         passive=tuple(joint for joint in limited_joints(robot, home) if not joint.actuated),
         slices=tuple(

@@ -30,6 +30,7 @@ from pteron.plots.robot import APART, base_outline
 from pteron.reduction import BaseParameters
 from pteron.reduction.expressions import html_symbol
 from pteron.report.contents import Report
+from pteron.report.drives import force_speed, power
 from pteron.report.joints import coordinate, force, nouns, readable, speed
 from pteron.report.typeset import compact, fixed, resource, template, triple
 
@@ -82,6 +83,9 @@ def page(report: Report) -> str:
         paired=any(leg.bar for leg in robot.legs),
         modes=prod(len(leg.branches) for leg in robot.legs),
         figures=_figures(report),
+        sizing=report.sizing,
+        motors=report.sizing.table().to_dicts(),
+        total=report.sizing.power.sum(axis=1),
         units=[report.base.parameters[k].unit for k in report.base.kept],
         values=report.base.values(),
         sums=[Markup(line) for line in report.base.expressions("html")],
@@ -232,6 +236,10 @@ def _figures(report: Report) -> dict[str, Any]:
     made: dict[str, Any] = {
         "robot": svg(machine, name="robot", title=f"{robot.name} in its home pose"),
         "forces": svg(forces, name="forces", title="Actuator forces over the pick-and-place cycle"),
+        "force_speed": svg(
+            force_speed(report.sizing), name="speeds", title="Force over speed of every drive"
+        ),
+        "power": svg(power(report.sizing), name="power", title="Power of every drive over time"),
         "reach": [
             svg(
                 reach_figure(cut, path=path),

@@ -113,10 +113,10 @@ def numbers(report: Report) -> dict[str, Any]:
             "acceleration": cycle.acceleration.tolist(),
             "forces": report.forces.tolist(),
             "with_drives": report.driven,
-            "overloads": list(report.overloads),
-            "peak_forces": report.peak_forces.tolist(),
-            "rms_forces": report.rms_forces.tolist(),
-            "peak_speeds": report.peak_speeds.tolist(),
+            "overloads": list(report.sizing.overloads),
+            "peak_forces": report.sizing.peak_forces.tolist(),
+            "rms_forces": report.sizing.rms_forces.tolist(),
+            "peak_speeds": report.sizing.peak_speeds.tolist(),
             "joints": {
                 "least": ranges.least.tolist(),
                 "greatest": ranges.greatest.tolist(),
@@ -124,6 +124,7 @@ def numbers(report: Report) -> dict[str, Any]:
                 "within": ranges.within.tolist(),
             },
         },
+        "motors": report.sizing.table().to_dicts(),
         "base_parameters": {
             "rank": report.base.rank,
             "of": len(report.base.columns),

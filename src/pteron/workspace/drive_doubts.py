@@ -9,7 +9,7 @@ import numpy as np
 from pteron.dynamics import drive_forces, mass_matrix
 from pteron.kernels import Array
 from pteron.kinematics import jacobian
-from pteron.legs import Drive, LegKind
+from pteron.legs import LegKind
 from pteron.manipulator import Manipulator
 
 _SLOW = 5.0
@@ -41,7 +41,7 @@ def drive_doubts(leg: LegKind) -> Iterator[str]:
             f"{left_out}: belts have some tens, screws hundreds"
         )
     dry = drive.coulomb + (drive.stribeck.force if drive.stribeck else 0.0)
-    rated, most = rated_force(drive), drive.max_force
+    rated, most = drive.rated_force, drive.max_force
     if most is not None and dry > most:
         yield (
             f"drive: dry friction of {dry:g} {unit} is more than max_force, {most:g} {unit}: it "
@@ -71,11 +71,6 @@ def drive_doubts(leg: LegKind) -> Iterator[str]:
         )
 
 
-def rated_force(drive: Drive) -> float | None:
-    """Return what the motor's rated torque gives at the joint, N or N m."""
-    return None if drive.rated_torque is None else abs(drive.gear) * drive.rated_torque
-
-
 def load_doubts(robot: Manipulator, pose: Array) -> tuple[str, ...]:
     """Return what is unlikely in the drives for the load that they have in a pose (m,), at rest."""
     rest = np.zeros(robot.freedom)
@@ -87,7 +82,7 @@ def load_doubts(robot: Manipulator, pose: Array) -> tuple[str, ...]:
         if (drive := leg.drive) is None:
             continue
         unit, inertia = leg.joint.force_unit, "kg" if leg.joint.unit == "m" else "kg m^2"
-        rated = rated_force(drive)
+        rated = drive.rated_force
         for name, limit in (("max_force", drive.max_force), ("rated_torque's force", rated)):
             if limit is not None and holding[i] > limit:
                 found.append(

@@ -1,0 +1,32 @@
+"""Gymnasium environments: a machine with its drives, to reach poses or to follow a motion.
+
+`import pteron.environments` registers `pteron/Reach-v0`. Needs the extra `gymnasium`.
+"""
+
+try:
+    import gymnasium
+except ImportError:
+    raise ImportError(
+        "pteron.environments needs Gymnasium, which is not installed; "
+        'pip install "pteron[gymnasium]"'
+    ) from None
+
+from pteron.environments.batch import PteronVectorEnv
+from pteron.environments.single import PteronEnv
+from pteron.environments.world import World
+
+REACH = "pteron/Reach-v0"
+"""What the environment is called: ``gymnasium.make(REACH, robot="delta")``."""
+
+EPISODE = 300
+"""Steps after which an episode is truncated."""
+
+if REACH not in gymnasium.registry:
+    gymnasium.register(
+        REACH,
+        entry_point="pteron.environments.single:PteronEnv",
+        vector_entry_point="pteron.environments.batch:PteronVectorEnv",
+        max_episode_steps=EPISODE,
+    )
+
+__all__ = ["EPISODE", "REACH", "PteronEnv", "PteronVectorEnv", "World"]

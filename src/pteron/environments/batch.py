@@ -1,0 +1,179 @@
+"""Many machines as one Gymnasium vector environment: they share each step's machine code."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from pteron.environments.making import world_of
+from pteron.environments.picture import Picture
+from pteron.environments.single import Numbers, checked_mode, spaces
+from pteron.environments.state import Bools, State
+from pteron.errors import DataError
+from pteron.manipulator import Manipulator
+from pteron.motion import Motion
+
+
+class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
+    """Many environments like `PteronEnv`, whose machines go on in one call.
+
+    Each has its own random numbers: environment i of seed s is the single environment of seed
+    s + i, step for step. An environment that has ended starts anew with the next step, whose action
+    is not used (Gymnasium's next-step autoreset).
+
+    Parameters
+    ----------
+    robot, motion, period, spread, tolerance, render_mode
+        As `PteronEnv` has them.
+    num_envs : int
+        How many.
+    max_episode_steps : int, optional
+        Steps after which an episode is truncated.
+
+    Raises
+    ------
+    DataError, ModelError
+        As `PteronEnv`, or if there is no environment.
+
+    Examples
+    --------
+    >>> import gymnasium, pteron.environments
+    >>> envs = gymnasium.make_vec("pteron/Reach-v0", num_envs=8, robot="five-bar")
+    >>> observations, infos = envs.reset(seed=1)
+    >>> envs.step(envs.action_space.sample())[0].shape
+    (8, 8)
+    """
+
+    metadata = {  # noqa: RUF012
+        "render_modes": ["rgb_array"],
+        "render_fps": 100,
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
+
+    def __init__(
+        self,
+        robot: Manipulator | str = "quadrupteron",
+        num_envs: int = 1,
+        *,
+        motion: Motion | None = None,
+        period: float = 0.01,
+        spread: float | None = None,
+        tolerance: float = 0.005,
+        max_episode_steps: int | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        for name, value in {"num_envs": num_envs, "max_episode_steps": max_episode_steps}.items():
+            if value is not None and value < 1:
+                raise DataError(f"{name}: {value} given, 1 or more expected")
+        self.world = world_of(
+            robot, motion=motion, period=period, spread=spread, tolerance=tolerance
+        )
+        self.num_envs = num_envs
+        pair = spaces(self.world.bounds, len(self.world.forces))
+        self.single_observation_space, self.single_action_space = pair
+        self.observation_space, self.action_space = (batch_space(one, num_envs) for one in pair)
+        self.render_mode = checked_mode(render_mode)
+        self.metadata = {**self.metadata, "render_fps": round(1.0 / period)}
+        self._most = max_episode_steps
+        self._generators: list[np.random.Generator | None] = [None] * num_envs
+        self._state: State | None = None
+        self._done = np.zeros(num_envs, dtype=bool)
+        self._steps = np.zeros(num_envs, dtype=np.int64)
+        self._picture = Picture(self.world)
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[Numbers, dict[str, Any]]:
+        """Start all episodes; `options` are those of `PteronEnv.reset`, the same for all.
+
+        An option "reset_mask", an array of bool, chooses which environments start anew.
+        """
+        options = dict(options or {})
+        chosen = self._mask(options.pop("reset_mask", None))
+        seeds = self._seeds(seed)
+        for i in np.flatnonzero(chosen).tolist():
+            if seeds[i] is not None or self._generators[i] is None:
+                self._generators[i] = seeding.np_random(seeds[i])[0]
+        self._start(chosen, options)
+        assert self._state is not None
+        return self.world.observed(self._state), self._infos(
+            self.world.distance(self._state), chosen
+        )
+
+    def _mask(self, mask: Any) -> Bools:
+        if mask is None:
+            return np.ones(self.num_envs, dtype=bool)
+        chosen = np.asarray(mask)
+        if chosen.shape != (self.num_envs,) or chosen.dtype != bool or not chosen.any():
+            raise DataError(
+                f"options: reset_mask must be {self.num_envs} truth values, at least one True"
+            )
+        if self._state is None and not chosen.all():
+            raise DataError("options: reset_mask before the first reset; reset all first")
+        return chosen
+
+    def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
+        if seed is None:
+            return [None] * self.num_envs
+        if isinstance(seed, int | np.integer):
+            return [int(seed) + i for i in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            raise DataError(f"seed: {len(seed)} seeds given, {self.num_envs} expected")
+        return list(seed)
+
+    def _start(self, chosen: Bools, options: dict[str, Any] | None) -> None:
+        """Start the episodes of chosen environments."""
+        generators = [self._generators[i] for i in np.flatnonzero(chosen).tolist()]
+        new = self.world.started([rng for rng in generators if rng is not None], options)
+        self._state = new if self._state is None else self._state.put(chosen, new)
+        self._done = self._done & ~chosen
+        self._steps = np.where(chosen, 0, self._steps)
+
+    def step(self, actions: Numbers) -> tuple[Numbers, Numbers, Numbers, Numbers, dict[str, Any]]:
+        """Let all machines go on for a period, but for those that start anew."""
+        if self._state is None:
+            raise DataError("step before reset; call reset first")
+        starting = self._done
+        before = self._state
+        self._state, distance, reward, ended = self.world.after(before, actions)
+        self._steps = self._steps + 1
+        if starting.any():
+            self._start(starting, None)
+            distance = np.where(starting, self.world.distance(self._state), distance)
+        reward = np.where(starting, 0.0, reward)
+        ended = ended & ~starting
+        late = np.zeros_like(ended) if self._most is None else (self._steps >= self._most)
+        late = late & ~starting
+        self._done = ended | late
+        infos = self._infos(distance, np.ones_like(ended))
+        if ended.any():
+            told = np.full(self.num_envs, None, dtype=object)
+            for i in np.flatnonzero(ended).tolist():
+                told[i] = self.world.why(self._state.pose[i], self._state.velocity[i])
+            infos |= {"stopped": told, "_stopped": ended.copy()}
+        return self.world.observed(self._state), reward, ended, late, infos
+
+    def _infos(self, distance: NDArray[Any], known: Bools) -> dict[str, Any]:
+        return {
+            "distance": np.where(known, distance, 0.0),
+            "_distance": known.copy(),
+            "is_success": (distance < self.world.tolerance) & known,
+            "_is_success": known.copy(),
+        }
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """Return a picture of every machine, if they are asked for."""
+        if self.render_mode is None:
+            return None
+        if self._state is None:
+            raise DataError("render before reset; call reset first")
+        return tuple(self._picture.of(self._state.row(i)) for i in range(self.num_envs))

@@ -1,0 +1,94 @@
+"""The world of a machine, made from what a user says."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from pteron.dynamics import drive_forces, mass_matrix
+from pteron.environments.world import ENDS, LEVER, World
+from pteron.errors import DataError
+from pteron.kernels import Array
+from pteron.kinematics import jacobian
+from pteron.legs import Drive
+from pteron.manipulator import Manipulator, load
+from pteron.motion import Motion, longest_step
+from pteron.workspace import home_pose, reserve
+
+_STEP = 5e-4
+"""s; Runge and Kutta's method is then exact to some micrometres."""
+
+_LIVELY = 20.0
+"""m/s^2 that drives without `max_force` can give along every coordinate at once."""
+
+_LEAST = 0.2
+"""Reserve that starts and targets have."""
+
+_SPREAD = 0.25
+"""Share of the longest leg within which starts and targets are from home."""
+
+
+def world_of(
+    robot: Manipulator | str,
+    *,
+    motion: Motion | None = None,
+    period: float = 0.01,
+    spread: float | None = None,
+    tolerance: float = 0.005,
+) -> World:
+    """Return the world of a machine, after checks.
+
+    Raises
+    ------
+    DataError
+        If a number is not above 0, or the motion cannot be followed.
+    ModelError
+        If there is no such machine, or it reaches no pose.
+    """
+    machine = load(robot) if isinstance(robot, str) else robot
+    sizes = {"period": period, "tolerance": tolerance, "spread": spread}
+    for name, value in sizes.items():
+        if value is not None and not (np.isfinite(value) and value > 0.0):
+            raise DataError(f"{name}: {value} given, a number above 0 expected")
+    if spread is None:
+        spread = _SPREAD * max(leg.size for leg in machine.legs)
+    home = _home(machine)
+    least = min(_LEAST, float(reserve(machine, home).smallest) / 2.0)
+    step = min(_STEP, longest_step(machine, home[None]) / 2.0, period)
+    count = int(np.ceil(period / step - 1e-9))
+    given = (home, _forces(machine, home), period, period / count, count)
+    world = World(machine, *given, spread, tolerance, least, motion)
+    if motion is not None:
+        motion.repeated(2)
+        low = world.reserve_of(motion.pose) <= ENDS
+        if low.any():
+            at = float(motion.time[int(low.argmax())])
+            raise DataError(
+                f"motion: at {at:.4g} s it is out of reach, next to a singularity, or beyond the "
+                "joints' limits; no episode could follow it"
+            )
+    return world
+
+
+@lru_cache(maxsize=16)
+def _home(robot: Manipulator) -> Array:
+    """Return the home pose, whose search takes a second, for every environment of a machine."""
+    home = home_pose(robot)
+    home.setflags(write=False)
+    return home
+
+
+def _forces(robot: Manipulator, home: Array) -> Array:
+    """Return what an action of 1 gives, (n,)."""
+    rest = np.zeros(robot.freedom)
+    rows = jacobian(robot, home)
+    rotors = np.diag([leg.drive.inertia if leg.drive else 0.0 for leg in robot.legs])
+    mass = mass_matrix(robot, home) + rows.T @ rotors @ rows
+    turning = np.array([name == "phi" for name in robot.coordinates])
+    lively = np.linalg.solve(rows.T, mass * np.where(turning, _LIVELY / LEVER, _LIVELY))
+    enough = 2.0 * np.abs(drive_forces(robot, home, rest, rest)) + np.abs(lively).sum(axis=1)
+    limits = [(leg.drive or Drive()).max_force for leg in robot.legs]
+    return np.array(
+        [own if most is None else most for most, own in zip(limits, enough, strict=True)]
+    )

@@ -1,0 +1,59 @@
+"""Pictures of an environment's machine as arrays of colours."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from pteron.environments.state import State
+from pteron.environments.world import World
+from pteron.kernels import Array
+from pteron.motion import Guide, joint_guides, joint_points
+from pteron.plots import robot_figure
+
+_POSES = 32
+
+
+class Picture:
+    """Draws one machine: its guides are the same in every picture."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+
+    @cached_property
+    def _guides(self) -> tuple[Guide, ...]:
+        generators = [np.random.default_rng(seed) for seed in range(_POSES)]
+        return joint_guides(self._world.robot, self._world.started(generators, None).pose)
+
+    def of(self, state: State) -> NDArray[np.uint8]:
+        """Return a machine's state (m,), with a line from its tool to the target.
+
+        All pictures have the size of the one in which the machine is at home.
+        """
+        figure = self._drawn(state.pose, self._world.target(state)[0])
+        figure.set_size_inches(self._size)
+        canvas: Any = FigureCanvasAgg(figure)
+        canvas.draw()
+        return np.asarray(canvas.buffer_rgba())[..., :3].copy()
+
+    @cached_property
+    def _size(self) -> tuple[float, float]:
+        width, height = self._drawn(self._world.home, self._world.home).get_size_inches()
+        return float(width), float(height)
+
+    def _drawn(self, pose: Array, target: Array) -> Figure:
+        robot = self._world.robot
+        points, gravity = joint_points(robot, pose), np.array(robot.gravity)
+        figure = robot_figure(
+            points,
+            self._guides,
+            gravity=gravity if gravity.any() else None,
+            path=np.array([points.tool, joint_points(robot, target).tool]),
+        )
+        figure.patch.set(facecolor="white", alpha=1.0)
+        return figure

@@ -1,0 +1,139 @@
+"""One machine as a Gymnasium environment."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.environments.making import world_of
+from pteron.environments.picture import Picture
+from pteron.environments.state import State
+from pteron.errors import DataError
+from pteron.kernels import Array
+from pteron.manipulator import Manipulator
+from pteron.motion import Motion
+
+Numbers = NDArray[Any]
+"""Of observations and actions: float32."""
+
+
+class PteronEnv(gymnasium.Env[Numbers, Numbers]):
+    """A machine whose drives' forces are the actions, to reach a pose or to follow a motion.
+
+    The action, (n,) in [-1, 1], is each drive's share of its greatest force, kept for a period. The
+    observation, (4 m,), is the platform's pose and velocity and the target's, m, rad and s. An
+    episode starts at rest in a random pose, or on the motion at a random time. It ends
+    (`terminated`) where the machine leaves its reach, its joints' limits or the neighbourhood of
+    its singularities, with the reason in ``info["stopped"]``; reaching the target does not end it.
+    ``info["distance"]`` is in m, a radian counting as 0.1 m; ``info["is_success"]`` says whether it
+    is within the tolerance.
+
+    The reward of a step is 1 - tanh(2 distance / spread) - 0.01 mean(action^2), and -1 where the
+    episode ends.
+
+    Parameters
+    ----------
+    robot : str or Manipulator
+        A machine of the catalog, a TOML file, or a machine. What an action of 1 gives is each
+        drive's max_force, or enough to move briskly.
+    motion : Motion, optional
+        What is to be followed, again and again; by default a random pose is to be reached.
+    period : float
+        Time of an action, s.
+    spread : float, optional
+        Half the side of the box about the home pose in which starts and targets are, m; by default
+        a quarter of the longest leg's links.
+    tolerance : float
+        Distance that is a success, m.
+    render_mode : {None, "rgb_array"}
+        Whether `render` draws the machine.
+
+    Raises
+    ------
+    DataError
+        If a number is not above 0, the motion cannot be followed, or a mode is unknown.
+    ModelError
+        If there is no such machine, or it reaches no pose.
+
+    Examples
+    --------
+    >>> import gymnasium, pteron.environments
+    >>> env = gymnasium.make("pteron/Reach-v0", robot="five-bar")
+    >>> observation, info = env.reset(seed=1)
+    >>> env.action_space.shape, observation.shape, round(info["distance"], 3)
+    ((2,), (8,), 0.042)
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 100}  # noqa: RUF012
+
+    def __init__(
+        self,
+        robot: Manipulator | str = "quadrupteron",
+        *,
+        motion: Motion | None = None,
+        period: float = 0.01,
+        spread: float | None = None,
+        tolerance: float = 0.005,
+        render_mode: str | None = None,
+    ) -> None:
+        self.world = world_of(
+            robot, motion=motion, period=period, spread=spread, tolerance=tolerance
+        )
+        self.observation_space, self.action_space = spaces(
+            self.world.bounds, len(self.world.forces)
+        )
+        self.render_mode = checked_mode(render_mode)
+        self.metadata = {**self.metadata, "render_fps": round(1.0 / period)}
+        self._state: State | None = None
+        self._picture = Picture(self.world)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Numbers, dict[str, Any]]:
+        """Start an episode; `options` may have a "pose" to start in at rest, and a "target"."""
+        super().reset(seed=seed)
+        self._state = self.world.started([self.np_random], options).row(0)
+        return self.world.observed(self._state), self._info(self.world.distance(self._state))
+
+    def step(self, action: Numbers) -> tuple[Numbers, float, bool, bool, dict[str, Any]]:
+        """Let the machine go on for a period under the drives' forces."""
+        if self._state is None:
+            raise DataError("step before reset; call reset first")
+        self._state, distance, reward, ended = self.world.after(self._state, action)
+        info = self._info(distance)
+        if ended:
+            info["stopped"] = self.world.why(self._state.pose, self._state.velocity)
+        return self.world.observed(self._state), float(reward), bool(ended), False, info
+
+    def _info(self, distance: Any) -> dict[str, Any]:
+        return {
+            "distance": float(distance),
+            "is_success": bool(distance < self.world.tolerance),
+        }
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Return a picture of the machine, (height, width, 3), if it is asked for."""
+        if self.render_mode is None:
+            return None
+        if self._state is None:
+            raise DataError("render before reset; call reset first")
+        return self._picture.of(self._state)
+
+
+def spaces(bounds: Array, count: int) -> tuple[gymnasium.Space[Any], gymnasium.Space[Any]]:
+    """Return the spaces of observations within bounds and of actions of so many drives."""
+    most = bounds.astype(np.float32)
+    return (
+        gymnasium.spaces.Box(-most, most, dtype=np.float32),
+        gymnasium.spaces.Box(-1.0, 1.0, (count,), dtype=np.float32),
+    )
+
+
+def checked_mode(mode: str | None) -> str | None:
+    """Return a render mode after a check."""
+    if mode not in (None, "rgb_array"):
+        raise DataError(f'render_mode: {mode!r} given, None or "rgb_array" expected')
+    return mode

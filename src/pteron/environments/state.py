@@ -1,0 +1,34 @@
+"""The state of machines in an environment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.kernels import Array
+
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class State:
+    """The state of machines: pose, velocity and target (..., m), clock (...) in s."""
+
+    pose: Array
+    velocity: Array
+    target: Array
+    clock: Array
+
+    def put(self, chosen: Bools, others: State) -> State:
+        """Return these states with others in the place of those that are chosen, (B,)."""
+        found = self.pose.copy(), self.velocity.copy(), self.target.copy(), self.clock.copy()
+        new = others.pose, others.velocity, others.target, others.clock
+        for into, values in zip(found, new, strict=True):
+            into[chosen] = values
+        return State(*found)
+
+    def row(self, i: int) -> State:
+        """Return the state of one machine."""
+        return State(self.pose[i], self.velocity[i], self.target[i], self.clock[i])

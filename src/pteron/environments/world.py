@@ -1,0 +1,201 @@
+"""What an environment does, for any number of machines at once: states, forces, reward, ends."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from math import hypot
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.environments.state import Bools, State
+from pteron.errors import DataError
+from pteron.kernels import Array, numeric
+from pteron.manipulator import Manipulator
+from pteron.motion import Motion, advance
+from pteron.workspace import reserve
+
+LEVER = 0.1
+"""Metres that count as much as a radian in distances."""
+
+SPEED, TURN = 10.0, 100.0
+"""m/s and rad/s that the platform never has: faster, and the episode ends."""
+
+EFFORT = 0.01
+"""What the mean square of the action takes from the reward."""
+
+ENDS = 0.02
+"""Reserve below which an episode ends."""
+
+_ANGLE = np.pi / 4.0
+_DRAWS = 16
+
+
+@dataclass(frozen=True)
+class World:
+    """A machine under a sampled controller that sets the forces of its drives.
+
+    Attributes
+    ----------
+    robot : Manipulator
+        The machine.
+    home : array, shape (m,)
+        The pose about which starts and targets are drawn, m and rad.
+    forces : array, shape (n,)
+        What an action of 1 gives: each drive's max_force, or, where the file has none, enough to
+        hold the platform twice and to accelerate it along every coordinate at 20 m/s^2.
+    period : float
+        Time of an action, s.
+    step : float
+        Of the integration, s.
+    count : int
+        Steps of an action.
+    spread : float
+        Half the side of the box about home, m, in which starts and targets are.
+    tolerance : float
+        Distance to the target that is a success, m.
+    least : float
+        Reserve, see `pteron.workspace.Reserve`, of starts and targets.
+    motion : Motion or None
+        What is to be followed, again and again; None where a pose is to be reached.
+    """
+
+    robot: Manipulator
+    home: Array
+    forces: Array
+    period: float
+    step: float
+    count: int
+    spread: float
+    tolerance: float
+    least: float
+    motion: Motion | None
+
+    @cached_property
+    def bounds(self) -> Array:
+        """The greatest size of each number of an observation, (4 m,)."""
+        robot = self.robot
+        size = max(
+            hypot(*leg.guide_point) + leg.size + hypot(*leg.platform_point) for leg in robot.legs
+        )
+        turning = self._turning
+        pose, rate = np.where(turning, 2.0 * np.pi, size), np.where(turning, TURN, SPEED)
+        return np.concatenate([pose, rate, pose, rate])
+
+    def observed(self, state: State) -> NDArray[np.float32]:
+        """Return observations (..., 4 m): pose, velocity, the target's pose and velocity."""
+        parts = [state.pose, state.velocity, *self.target(state)]
+        bounds = self.bounds
+        return np.clip(np.concatenate(parts, axis=-1), -bounds, bounds).astype(np.float32)
+
+    def target(self, state: State) -> tuple[Array, Array]:
+        """Return pose and velocity of the targets (..., m)."""
+        if self.motion is None:
+            return state.target, np.zeros_like(state.target)
+        time = self.motion.time[0] + np.mod(state.clock, self.motion.duration)
+        return self.motion.at(time)[:2]
+
+    def distance(self, state: State) -> Array:
+        """Return how far machines are from their targets (...), m."""
+        away = (self.target(state)[0] - state.pose) * np.where(self._turning, LEVER, 1.0)
+        return np.asarray(np.sqrt((away**2).sum(axis=-1)))
+
+    @cached_property
+    def _turning(self) -> Bools:
+        return np.array([name == "phi" for name in self.robot.coordinates])
+
+    def started(
+        self, generators: Sequence[np.random.Generator], options: Mapping[str, Any] | None
+    ) -> State:
+        """Return the states at the start of episodes, (B, m), one for each generator.
+
+        Raises
+        ------
+        DataError
+            If an option is unknown, or a pose is none that the machine may have.
+        """
+        given = {key: self._pose(key, value) for key, value in (options or {}).items()}
+        poses, targets = self._drawn(generators), self._drawn(generators)
+        velocity, clock = np.zeros_like(poses), np.zeros(len(poses))
+        if self.motion is not None:
+            clock = np.array([rng.uniform(0.0, self.motion.duration) for rng in generators])
+            if "pose" not in given:
+                poses, velocity, _ = self.motion.at(self.motion.time[0] + clock)
+        return State(
+            np.broadcast_to(given.get("pose", poses), poses.shape),
+            velocity,
+            np.broadcast_to(given.get("target", targets), poses.shape),
+            clock,
+        )
+
+    def _drawn(self, generators: Sequence[np.random.Generator]) -> Array:
+        """Return a random pose of each generator with reserve enough, or home where it has none."""
+        half = np.where(self._turning, _ANGLE, self.spread)
+        shape = (_DRAWS, self.robot.freedom)
+        drawn = np.stack([rng.uniform(-1.0, 1.0, shape) for rng in generators])
+        poses = self.home + half * drawn
+        good: Any = self.reserve_of(poses) >= self.least
+        first = poses[np.arange(len(poses)), good.argmax(axis=-1)]
+        return np.where(good.any(axis=-1)[:, None], first, self.home)
+
+    def reserve_of(self, poses: Array) -> Array:
+        """Return the reserve of poses, negative beyond a singularity of type II."""
+        across = numeric(self.robot, "type_ii")(poses)[0] * self._side < 0.0
+        smallest = reserve(self.robot, poses).smallest
+        return np.where(across, -np.abs(smallest), smallest)
+
+    @cached_property
+    def _side(self) -> float:
+        return float(numeric(self.robot, "type_ii")(self.home)[0])
+
+    def _pose(self, key: str, value: Any) -> Array:
+        """Return a pose of the options after a check."""
+        if key not in ("pose", "target"):
+            raise DataError(f"options: {key!r} is unknown; the valid ones are pose, target")
+        if key == "target" and self.motion is not None:
+            raise DataError("options: a target given, but the target follows the motion")
+        pose = np.asarray(value, dtype=float)
+        if pose.shape != (self.robot.freedom,) or not np.isfinite(pose).all():
+            names = " ".join(self.robot.coordinates)
+            raise DataError(f"options: {key} is {value!r}, {names} expected, m and rad")
+        if self.reserve_of(pose[None])[0] <= ENDS:
+            raise DataError(
+                f"options: {key} {pose.tolist()} is out of reach, singular, or beyond the joints' "
+                f"limits; choose one near home, {self.home.round(4).tolist()}"
+            )
+        return pose
+
+    def after(self, state: State, action: Array) -> tuple[State, Array, Array, Bools]:
+        """Return states after an action (..., n), the distances, the rewards, and what has ended.
+
+        reward = 1 - tanh(2 distance / spread) - 0.01 mean(action^2), at most 1; -1 where the
+        episode ends.
+        """
+        action = np.clip(np.asarray(action, dtype=float), -1.0, 1.0)
+        pose, velocity, going = advance(
+            self.robot, state.pose, state.velocity, action * self.forces, self.step, self.count
+        )
+        new = State(pose, velocity, state.target, state.clock + self.period)
+        distance = self.distance(new)
+        reward = 1.0 - np.tanh(2.0 * distance / self.spread)
+        reward = reward - EFFORT * (action**2).mean(axis=-1)
+        rates = self.bounds[self.robot.freedom : 2 * self.robot.freedom]
+        ended = ~np.asarray(going, dtype=bool) | (self.reserve_of(pose) < ENDS)
+        ended = ended | (np.abs(velocity) > rates).any(axis=-1)
+        return new, distance, np.where(ended, -1.0, reward), ended
+
+    def why(self, pose: Array, velocity: Array) -> str:
+        """Return why the episode of a machine ended, in its last state (m,)."""
+        rates = self.bounds[self.robot.freedom : 2 * self.robot.freedom]
+        if (np.abs(velocity) > rates).any():
+            return f"faster than {SPEED:g} m/s or {TURN:g} rad/s"
+        found = reserve(self.robot, pose)
+        leg = int(found.type_i.argmin()) + 1
+        if self.reserve_of(pose[None])[0] < 0.0 <= found.smallest or found.type_ii < ENDS:
+            return "next to a singularity of type II: the actuators hardly hold the platform"
+        if found.clearances.min() < ENDS <= found.type_i.min():
+            return f"leg {int(found.clearances.argmin()) + 1} is at its joint's limit"
+        return f"leg {leg} is at the end of its reach"

@@ -1,0 +1,178 @@
+"""The ratio between a motor and its joint: which is best, and which a motor's limits allow.
+
+A motor of rotor inertia J behind a ratio i, motor angle over the joint's coordinate, has the torque
+T = f / i + J i q''. What the joint needs without the motor, f, does not depend on the ratio, for
+friction is the joint's. So every answer here is in closed form.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from pteron.kernels import Array
+from pteron.motion.sizing import Sizing
+from pteron.shapes import PerJoint
+
+_STILL = 1e-9
+"""Share of the fastest joint's acceleration below which a joint stands still, but for rounding."""
+
+
+class Span(NamedTuple):
+    """Ratios from the least to the greatest, rad/m or rad/rad; none where least > greatest."""
+
+    least: float
+    greatest: float
+
+    def __bool__(self) -> bool:
+        """Say whether there is any."""
+        return self.least <= self.greatest
+
+    def __contains__(self, ratio: object) -> bool:
+        """Say whether a ratio is one of them."""
+        return isinstance(ratio, float) and self.least <= ratio <= self.greatest
+
+    def within(self, other: Span) -> Span:
+        """Return those that are in both."""
+        return Span(max(self.least, other.least), min(self.greatest, other.greatest))
+
+
+NONE = Span(math.inf, 0.0)
+
+
+def torques(sizing: Sizing, leg: int, ratio: float, rotor_inertia: float) -> tuple[float, float]:
+    """Return the torque that a motor would have over the cycle: root mean square and peak.
+
+    Parameters
+    ----------
+    sizing : Sizing
+        What the cycle asks of the joints.
+    leg : int
+        From 1.
+    ratio : float
+        rad/m or rad/rad, above 0.
+    rotor_inertia : float
+        J, kg m^2.
+
+    Returns
+    -------
+    rms, peak : float
+        N m.
+    """
+    force, mixed, acceleration = squares(sizing, leg)
+    square = force / ratio**2 + 2.0 * rotor_inertia * mixed
+    square += (rotor_inertia * ratio) ** 2 * acceleration
+    loads, accelerations = _samples(sizing, leg)
+    peak = np.abs(loads / ratio + rotor_inertia * ratio * accelerations).max()
+    return math.sqrt(max(square, 0.0)), float(peak)
+
+
+def best_ratio(sizing: Sizing, leg: int, rotor_inertia: float) -> float:
+    """Return the ratio at which a motor's root mean square torque over the cycle is least.
+
+    T^2 = <f^2> / i^2 + 2 J <f q''> + J^2 i^2 <q''^2> is least at i^2 = rms(f) / (J rms(q'')): the
+    load and the rotor then take equal parts of the torque.
+
+    Parameters
+    ----------
+    sizing : Sizing
+        What the cycle asks of the joints.
+    leg : int
+        From 1.
+    rotor_inertia : float
+        J, kg m^2.
+
+    Returns
+    -------
+    float
+        rad/m or rad/rad; infinite where the joint does not accelerate, or J is 0.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.motion import best_ratio, pick_and_place, size
+    >>> robot = pteron.load("tripteron")
+    >>> found = size(robot, pick_and_place(robot, [0.0, 0.0, 0.0], scale=0.5, duration=0.5))
+    >>> round(best_ratio(found, 1, 3e-5), 1)
+    295.1
+    """
+    force, _, acceleration = squares(sizing, leg)
+    all_joints = sizing.mean(sizing.accelerations**2)
+    if rotor_inertia == 0.0 or acceleration <= _STILL**2 * float(all_joints.max()):
+        return math.inf
+    return math.sqrt(math.sqrt(force / acceleration) / rotor_inertia)
+
+
+def best_ratios(sizing: Sizing) -> PerJoint:
+    """Return the best ratio of each drive's own motor, rad/m or rad/rad; NaN where it has no rotor.
+
+    Parameters
+    ----------
+    sizing : Sizing
+        What the cycle asks of the joints.
+
+    Returns
+    -------
+    array, shape (n,)
+    """
+    return np.array(
+        [
+            best_ratio(sizing, i, drive.rotor_inertia) if drive.rotor_inertia else np.nan
+            for i, drive in enumerate(sizing.drives, start=1)
+        ]
+    )
+
+
+def speed_span(sizing: Sizing, leg: int, max_speed: float) -> Span:
+    """Return the ratios at which a motor is no faster than `max_speed`, rad/s."""
+    fastest = float(sizing.peak_speeds[leg - 1])
+    return Span(0.0, max_speed / fastest if fastest else math.inf)
+
+
+def rated_span(sizing: Sizing, leg: int, rotor_inertia: float, rated_torque: float) -> Span:
+    """Return the ratios at which the root mean square torque is no more than the rated, N m."""
+    force, mixed, acceleration = squares(sizing, leg)
+    # C u^2 - B u + A <= 0 with u = i^2.
+    a, b, c = force, rated_torque**2 - 2.0 * rotor_inertia * mixed, rotor_inertia**2 * acceleration
+    inside = b * b - 4.0 * a * c
+    if b < 0.0 or inside < 0.0 or (b == 0.0 and a > 0.0):
+        return NONE
+    root = b + math.sqrt(inside)
+    return Span(
+        math.sqrt(2.0 * a / root) if a else 0.0,
+        math.sqrt(root / (2.0 * c)) if c else math.inf,
+    )
+
+
+def peak_span(sizing: Sizing, leg: int, rotor_inertia: float, peak_torque: float) -> Span:
+    """Return the ratios at which the torque is never more than a motor's greatest, N m.
+
+    At each sample |f / i + J i q''| <= T holds between the roots of two parabolas, an interval.
+    """
+    loads, accelerations = _samples(sizing, leg)
+    own = rotor_inertia * accelerations
+    inside = peak_torque**2 - 4.0 * loads * own
+    if (inside < 0.0).any():
+        return NONE
+    root = peak_torque + np.sqrt(inside)
+    least = 2.0 * np.abs(loads) / root
+    moving = np.abs(own) > 0.0
+    greatest = root[moving] / (2.0 * np.abs(own[moving]))
+    return Span(float(least.max()), float(greatest.min(initial=math.inf)))
+
+
+def squares(sizing: Sizing, leg: int) -> tuple[float, float, float]:
+    """Return the means over the cycle of f^2, f q'' and q''^2 of a leg, from 1."""
+    i = leg - 1
+    f, a, held = sizing.loads[:, i], sizing.accelerations[:, i], sizing.holding[i]
+    means = sizing.mean(np.stack([f * f, f * a, a * a], axis=-1), [held**2, 0.0, 0.0])
+    return float(means[0]), float(means[1]), float(means[2])
+
+
+def _samples(sizing: Sizing, leg: int) -> tuple[Array, Array]:
+    """Return f and q'' of a leg, the rest among them if there is one."""
+    i = leg - 1
+    f, a = sizing.loads[:, i], sizing.accelerations[:, i]
+    return (np.append(f, sizing.holding[i]), np.append(a, 0.0)) if sizing.dwell else (f, a)

@@ -1,0 +1,151 @@
+"""Which motors of a list can drive which joint, at what ratio, and with what to spare."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pteron.errors import DataError
+from pteron.motion.gearing import Span, best_ratio, peak_span, rated_span, speed_span, torques
+from pteron.motion.motors import Motor
+from pteron.motion.sizing import Sizing
+
+
+@dataclass(frozen=True)
+class Fit:
+    """How a motor suits a joint over a cycle.
+
+    Attributes
+    ----------
+    leg : int
+        From 1.
+    motor : Motor
+        The motor.
+    span : Span
+        The ratios at which it keeps its rated torque, its peak torque and its speed, each with the
+        margin asked for.
+    ratio : float
+        The one among them at which its root mean square torque is least, rad/m or rad/rad; where
+        there is none, that of the ratios that its speed allows.
+    rated_margin, peak_margin, speed_margin : float
+        At that ratio, what the motor can do over what the cycle asks; from 1 on it is enough.
+    inertia_ratio : float
+        At that ratio, the greatest inertia of the load over the rotor's, both at the joint.
+    """
+
+    leg: int
+    motor: Motor
+    span: Span
+    ratio: float
+    rated_margin: float
+    peak_margin: float
+    speed_margin: float
+    inertia_ratio: float
+
+    @property
+    def fits(self) -> bool:
+        """Whether there is a ratio at which it serves."""
+        return bool(self.span)
+
+    @property
+    def margin(self) -> float:
+        """The least of the three margins."""
+        return min(self._margins.values())
+
+    @property
+    def scarcest(self) -> str:
+        """What the least margin is of: "rated torque", "peak torque" or "speed"."""
+        margins = self._margins
+        return min(margins, key=lambda name: margins[name])
+
+    @property
+    def _margins(self) -> dict[str, float]:
+        return {
+            "rated torque": self.rated_margin,
+            "peak torque": self.peak_margin,
+            "speed": self.speed_margin,
+        }
+
+
+def choose(sizing: Sizing, motors: Sequence[Motor], *, margin: float = 1.0) -> tuple[Fit, ...]:
+    """Return how each motor suits each joint: first what serves, the smallest motor before others.
+
+    A motor serves at a ratio if, times the margin, its root mean square torque over the cycle, the
+    rest included, is no more than its rated torque, its greatest torque no more than its peak
+    torque, and its greatest speed no more than its own. All ratios that serve are found, in closed
+    form; what the transmission loses is the joint's friction in the machine's file. Of two motors
+    the smaller has less rated torque times speed; those that do not serve follow, by how near they
+    come.
+
+    Parameters
+    ----------
+    sizing : Sizing
+        What the cycle asks of the joints; the motors of the machine's own file play no part.
+    motors : sequence of Motor
+        Those to choose from; `read_motors` reads them from a file.
+    margin : float
+        What a motor must be able to do, over what the cycle asks; 1 or more.
+
+    Returns
+    -------
+    tuple of Fit
+        One for each joint and motor, joint by joint.
+
+    Raises
+    ------
+    DataError
+        If the margin is not a number of 1 or more.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.motion import Motor, choose, pick_and_place, size
+    >>> robot = pteron.load("tripteron")
+    >>> found = size(robot, pick_and_place(robot, [0.0, 0.0, 0.0], scale=0.5, duration=0.5))
+    >>> fit = choose(found, [Motor("200 W", 3e-5, 0.64, 1.9, 600.0)])[0]
+    >>> fit.fits, round(fit.ratio), round(fit.rated_margin, 1)
+    (True, 295, 2.1)
+    """
+    if not 1.0 <= margin < math.inf:
+        raise DataError(f"margin: {margin} given, a number of 1 or more expected")
+    found = []
+    for leg in range(1, sizing.robot.freedom + 1):
+        fits = [_fit(sizing, leg, motor, margin) for motor in motors]
+        found += sorted(fits, key=_place)
+    return tuple(found)
+
+
+def _place(fit: Fit) -> tuple[bool, float]:
+    """Return what fits are sorted by."""
+    size = fit.motor.rated_torque * fit.motor.max_speed
+    return not fit.fits, size if fit.fits else -fit.margin
+
+
+def _fit(sizing: Sizing, leg: int, motor: Motor, margin: float) -> Fit:
+    rotor = motor.rotor_inertia
+    fast = speed_span(sizing, leg, motor.max_speed / margin)
+    span = fast.within(rated_span(sizing, leg, rotor, motor.rated_torque / margin))
+    span = span.within(peak_span(sizing, leg, rotor, motor.peak_torque / margin))
+    least, greatest = span if span else fast
+    ratio = min(max(best_ratio(sizing, leg, rotor), least), greatest)
+    if not math.isfinite(ratio):  # the joint only holds: any ratio from the least on serves
+        ratio = least or 1.0
+    rms, peak = torques(sizing, leg, ratio, rotor)
+    moved = float(sizing.load_inertia[1, leg - 1])
+    return Fit(
+        leg,
+        motor,
+        span,
+        ratio,
+        _over(motor.rated_torque, rms),
+        _over(motor.peak_torque, peak),
+        _over(motor.max_speed, ratio * float(sizing.peak_speeds[leg - 1])),
+        _over(moved, ratio**2 * rotor),
+    )
+
+
+def _over(can: float, asked: float) -> float:
+    return can / asked if asked > 0.0 else np.inf

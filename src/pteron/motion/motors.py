@@ -1,0 +1,159 @@
+"""Motors as their data sheets have them, read from a file that lists them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+from pydantic import BaseModel, ConfigDict
+
+from pteron.errors import DataError
+from pteron.tables import read_table
+from pteron.toml import read_toml, told, validated
+
+_FASTEST = 3000.0
+"""rad/s above which a motor's speed is doubted: 29 000 revolutions per minute."""
+
+_SLUGGISH = 30.0
+"""Rated torque over rotor inertia, rad/s^2, below which they are doubted: servo motors have
+hundreds to tens of thousands."""
+
+_NUMBERS = ("rotor_inertia", "rated_torque", "peak_torque", "max_speed")
+
+
+@dataclass(frozen=True)
+class Motor:
+    """A motor that turns; everything is at its own shaft.
+
+    Parameters
+    ----------
+    name : str
+        What it is called.
+    rotor_inertia : float
+        Of its rotor, with what turns with it before the gear, kg m^2.
+    rated_torque : float
+        What it gives all the time, N m.
+    peak_torque : float
+        What it gives for a moment, N m.
+    max_speed : float
+        rad/s.
+
+    Raises
+    ------
+    DataError
+        If a number is not above 0 (an inertia may be 0), or peak_torque is below rated_torque.
+    """
+
+    name: str
+    rotor_inertia: float
+    rated_torque: float
+    peak_torque: float
+    max_speed: float
+
+    def __post_init__(self) -> None:
+        faults = []
+        for key in _NUMBERS:
+            value, least = getattr(self, key), key == "rotor_inertia"
+            if not (math.isfinite(value) and (value > 0.0 or (least and value == 0.0))):
+                wanted = "0 or more" if least else "a number above 0"
+                faults.append(f"{key}: {value:g} given, {wanted} expected")
+        if not faults and self.peak_torque < self.rated_torque:
+            faults.append(
+                f"peak_torque: {self.peak_torque:g} N m given, at least rated_torque expected, "
+                f"{self.rated_torque:g} N m"
+            )
+        if faults:
+            raise DataError(told(faults), subject=f"motor {self.name}")
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What is possible but unlikely in it, most often a wrong unit, one line each."""
+        found = []
+        if self.max_speed > _FASTEST:
+            found.append(
+                f"motor {self.name}: max_speed of {self.max_speed:g} rad/s: is it in revolutions "
+                "per minute?"
+            )
+        if self.rated_torque < _SLUGGISH * self.rotor_inertia:
+            found.append(
+                f"motor {self.name}: rotor_inertia of {self.rotor_inertia:g} kg m^2 with a rated "
+                f"torque of {self.rated_torque:g} N m: is it in kg cm^2?"
+            )
+        return tuple(found)
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+
+class _MotorTable(_Strict):
+    name: str
+    rotor_inertia: float
+    rated_torque: float
+    peak_torque: float
+    max_speed: float
+
+
+class _MotorsFile(_Strict):
+    motors: list[_MotorTable]
+
+
+def read_motors(path: str | Path) -> tuple[Motor, ...]:
+    """Return the motors that a file lists.
+
+    Parameters
+    ----------
+    path : str or path
+        A CSV or Parquet file with the columns name, rotor_inertia, rated_torque, peak_torque and
+        max_speed, a row a motor; or a TOML file with a table `[[motors]]` of these keys for each.
+        kg m^2, N m and rad/s.
+
+    Returns
+    -------
+    tuple of Motor
+
+    Raises
+    ------
+    DataError
+        If there is no such file, a column or key is missing, a number is not what it must be, or
+        two motors have one name.
+    """
+    rows = _from_toml(path) if Path(path).suffix.lower() == ".toml" else _from_table(path)
+    found, names = [], set()
+    for place, row in rows:
+        try:
+            motor = Motor(**row)
+        except DataError as error:
+            raise DataError(f"{place}: {error}") from None
+        if motor.name in names:
+            raise DataError(f"{place}: motor {motor.name} is listed twice; give each its own name")
+        names.add(motor.name)
+        found.append(motor)
+    if not found:
+        raise DataError(f"{path}: lists no motor")
+    return tuple(found)
+
+
+_Rows = list[tuple[str, dict[str, Any]]]
+
+
+def _from_toml(path: str | Path) -> _Rows:
+    document = read_toml(path, DataError, "no such file")
+    listed = validated(_MotorsFile, document, str(path), DataError)
+    return [(str(path), motor.model_dump()) for motor in listed.motors]
+
+
+def _from_table(path: str | Path) -> _Rows:
+    table = read_table(path)
+    numbers = table.numbers(_NUMBERS)
+    if "name" in table.columns:
+        names = table.frame["name"].cast(pl.String).fill_null("").str.strip_chars().to_list()
+    else:
+        names = [f"{i}" for i in range(1, len(table) + 1)]
+    return [
+        (table.place(i), {"name": name or f"{i + 1}", **dict(zip(_NUMBERS, row, strict=True))})
+        for i, (name, row) in enumerate(zip(names, numbers.tolist(), strict=True))
+    ]

@@ -1,0 +1,220 @@
+"""What the drives do over a cycle: forces, speeds, power, energy, and inertia."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pteron.kernels import Array
+from pteron.legs import Drive
+from pteron.manipulator import Manipulator
+from pteron.motion.overloads import overloads
+from pteron.shapes import PerJoint
+
+if TYPE_CHECKING:
+    import polars as pl
+
+
+@dataclass(frozen=True)
+class Sizing:
+    """What the drives of a machine do over one cycle: a motion, and perhaps a rest after it.
+
+    Everything is at the joints, per leg: N and m/s of a slider, N m and rad/s of a crank, but for
+    what is said to be at the motor. Forces are those of the drives: rigid bodies, friction, offset
+    and the motors' inertia.
+
+    Attributes
+    ----------
+    robot : Manipulator
+        The machine, with its payload if it carries one.
+    time : array, shape (K,)
+        The motion's samples and the middles between them, s.
+    forces : array, shape (K, n)
+        What the drives give, N or N m.
+    loads : array, shape (K, n)
+        The same without the motors' inertia: what does not depend on the ratio.
+    speeds, accelerations : array, shape (K, n)
+        Of the joints, m/s and m/s^2, or rad/s and rad/s^2.
+    dwell : float
+        How long the platform rests after the motion, s.
+    holding : array, shape (n,)
+        Forces at that rest, where friction helps neither way.
+    load_inertia : array, shape (2, n)
+        Least and greatest inertia of the rigid bodies at each joint, the other joints being held:
+        the diagonal of J^-T M J^-1; kg or kg m^2.
+    """
+
+    robot: Manipulator
+    time: Array = field(repr=False)
+    forces: Array = field(repr=False)
+    loads: Array = field(repr=False)
+    speeds: Array = field(repr=False)
+    accelerations: Array = field(repr=False)
+    dwell: float
+    holding: Array
+    load_inertia: Array
+
+    @property
+    def duration(self) -> float:
+        """The cycle's time, the rest included, s."""
+        return float(self.time[-1] - self.time[0]) + self.dwell
+
+    def integral(self, values: Array) -> Array:
+        """Return the integral over the motion, by Simpson's rule, of values (K, ...) at `time`."""
+        spans = (self.time[2::2] - self.time[:-2:2]) / 6.0
+        ends = values[:-2:2] + 4.0 * values[1::2] + values[2::2]
+        return np.asarray(np.tensordot(spans, ends, axes=1))
+
+    def mean(self, values: Array, resting: ArrayLike = 0.0) -> Array:
+        """Return the mean over the cycle of values (K, ...), which are `resting` at the rest."""
+        whole = self.integral(values) + self.dwell * np.asarray(resting)
+        return np.asarray(whole / self.duration)
+
+    @cached_property
+    def peak_forces(self) -> PerJoint:
+        """Largest size of each force, N or N m."""
+        return np.asarray(np.maximum(np.abs(self.forces).max(axis=0), self._held))
+
+    @cached_property
+    def rms_forces(self) -> PerJoint:
+        """Root mean square of each force over the cycle, N or N m: what heats a motor."""
+        return np.asarray(np.sqrt(self.mean(self.forces**2, self.holding**2)))
+
+    @cached_property
+    def peak_speeds(self) -> PerJoint:
+        """Largest speed of each joint, m/s or rad/s."""
+        return np.asarray(np.abs(self.speeds).max(axis=0))
+
+    @cached_property
+    def rms_speeds(self) -> PerJoint:
+        """Root mean square of each speed over the cycle, m/s or rad/s."""
+        return np.asarray(np.sqrt(self.mean(self.speeds**2)))
+
+    @property
+    def _held(self) -> PerJoint:
+        return np.asarray(np.abs(self.holding) * (self.dwell > 0.0))
+
+    @cached_property
+    def power(self) -> Array:
+        """Mechanical power of each drive (K, n), W: negative where it brakes."""
+        return np.asarray(self.forces * self.speeds)
+
+    @property
+    def peak_power(self) -> PerJoint:
+        """Largest power that each drive gives, W."""
+        return np.asarray(self.power.max(axis=0, initial=0.0))
+
+    @property
+    def peak_braking(self) -> PerJoint:
+        """Largest power that each drive takes back, W, as a positive number."""
+        return np.asarray((-self.power).max(axis=0, initial=0.0))
+
+    @cached_property
+    def given_energy(self) -> PerJoint:
+        """What each drive gives over the cycle while it drives, J."""
+        return self.integral(np.maximum(self.power, 0.0))
+
+    @cached_property
+    def braked_energy(self) -> PerJoint:
+        """What each drive takes back over the cycle while it brakes, J, as a positive number."""
+        return self.integral(np.maximum(-self.power, 0.0))
+
+    @property
+    def energy(self) -> PerJoint:
+        """What each drive gives over the cycle, less what it takes back, J."""
+        return np.asarray(self.given_energy - self.braked_energy)
+
+    @property
+    def mean_power(self) -> PerJoint:
+        """Mean of what each drive gives while it drives, over the whole cycle, W."""
+        return self.given_energy / self.duration
+
+    @property
+    def mean_braking(self) -> PerJoint:
+        """Mean of what each drive takes back while it brakes, over the whole cycle, W."""
+        return self.braked_energy / self.duration
+
+    @property
+    def drives(self) -> tuple[Drive, ...]:
+        """The drives; one that says nothing where the file has none."""
+        return tuple(leg.drive or Drive() for leg in self.robot.legs)
+
+    @property
+    def rotor_inertia(self) -> PerJoint:
+        """Each motor's inertia at the joint, ratio^2 rotor_inertia, kg or kg m^2."""
+        return np.array([drive.inertia for drive in self.drives])
+
+    @property
+    def inertia_ratios(self) -> PerJoint:
+        """The greatest load's inertia over the motor's, at the joint; NaN where it has no rotor."""
+        rotors = self.rotor_inertia
+        return np.where(
+            rotors > 0.0, self.load_inertia[1] / np.where(rotors > 0.0, rotors, 1.0), np.nan
+        )
+
+    @property
+    def motor_torques(self) -> tuple[PerJoint, PerJoint]:
+        """Root mean square and peak at each motor, N m; of one without a ratio as at the joint."""
+        gears = np.array([abs(drive.gear) for drive in self.drives])
+        return self.rms_forces / gears, self.peak_forces / gears
+
+    @cached_property
+    def overloads(self) -> tuple[str, ...]:
+        """What is more than the drives can do, a line each: which leg, what, and by how much."""
+        found = list(overloads(self.robot, [self.peak_forces], self.speeds))
+        legs = zip(self.robot.legs, self.drives, self.rms_forces, strict=True)
+        for i, (leg, drive, rms) in enumerate(legs, start=1):
+            rated, unit = drive.rated_force, leg.joint.force_unit
+            if rated is not None and rms > rated:
+                found.append(
+                    f"leg {i}: the cycle takes {rms:.4g} {unit} root mean square, but the motor "
+                    f"gives {rated:.4g} {unit} all the time (rated_torque and ratio)"
+                )
+        return tuple(found)
+
+    def table(self) -> pl.DataFrame:
+        """Return a table, one row a leg: SI units, at the joint but for motor_torque.
+
+        What a drive has not is empty.
+        """
+        import polars as pl
+
+        from pteron.motion.gearing import best_ratios
+
+        joints = [leg.joint for leg in self.robot.legs]
+        turning = np.array([drive.ratio is not None for drive in self.drives])
+        rms, peak = self.motor_torques
+        numbers = {
+            "peak_force": self.peak_forces,
+            "rms_force": self.rms_forces,
+            "peak_speed": self.peak_speeds,
+            "rms_speed": self.rms_speeds,
+            "peak_power": self.peak_power,
+            "mean_power": self.mean_power,
+            "peak_braking": self.peak_braking,
+            "mean_braking": self.mean_braking,
+            "given_energy": self.given_energy,
+            "braked_energy": self.braked_energy,
+            "least_load_inertia": self.load_inertia[0],
+            "greatest_load_inertia": self.load_inertia[1],
+            "rotor_inertia": np.where(self.rotor_inertia > 0.0, self.rotor_inertia, np.nan),
+            "inertia_ratio": self.inertia_ratios,
+            "ratio": [np.nan if drive.ratio is None else drive.ratio for drive in self.drives],
+            "best_ratio": np.where(np.isfinite(best := best_ratios(self)), best, np.nan),
+            "peak_motor_torque": np.where(turning, peak, np.nan),
+            "rms_motor_torque": np.where(turning, rms, np.nan),
+        }
+        columns = [pl.Series(k, np.asarray(v), nan_to_null=True) for k, v in numbers.items()]
+        return pl.DataFrame(
+            [
+                pl.Series("leg", range(1, self.robot.freedom + 1)),
+                pl.Series("joint", [joint.noun for joint in joints]),
+                pl.Series("force_unit", [joint.force_unit for joint in joints]),
+                pl.Series("speed_unit", [f"{joint.unit}/s" for joint in joints]),
+                *columns,
+            ]
+        )

@@ -1,0 +1,120 @@
+"""What drives do: force against speed within what they can do, and power over time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from pteron.kernels import Array
+from pteron.plots.canvas import (
+    INK,
+    LEG_COLORS,
+    MUTED,
+    PAPER,
+    blank,
+    leg_style,
+    legend,
+    plain_axes,
+    remark,
+    spot,
+)
+
+_ROOM = 1.15
+"""The axes' half width over what is drawn."""
+
+_FAR = 3.0
+"""A limit that many times what is used is left out of the picture, which it would make small."""
+
+
+class Ability(NamedTuple):
+    """What a drive can do, each None where that is not known; N and m/s, or N m and rad/s."""
+
+    speed: float | None
+    force: float | None
+    rated: float | None
+    """The force that it gives all the time."""
+
+
+def force_speed_figure(
+    speeds: Array,
+    forces: Array,
+    *,
+    units: Sequence[tuple[str, str]],
+    abilities: Sequence[Ability],
+    rms: tuple[Array, Array],
+) -> Figure:
+    """Return each drive's force over its speed, within what it can do.
+
+    A drive brakes in the quadrants where force and speed have different signs.
+
+    Parameters
+    ----------
+    speeds, forces : array, shape (K, n)
+        Over the cycle.
+    units : sequence of (str, str)
+        Of each leg's speed and force; legs of other units get axes of their own.
+    abilities : sequence of Ability
+        Drawn dashed in the leg's colour, the rated force dotted; in grey where all have the same.
+    rms : (array, array), shape (n,)
+        Root mean squares of speed and force, drawn as a dot.
+    """
+    groups = list(dict.fromkeys(units))
+    figure = blank(5.4, 3.4 * len(groups))
+    for k, (rate, unit) in enumerate(groups):
+        word = "torque" if unit == "N m" else "force"
+        axes = plain_axes(figure, f"speed ({rate})", f"{word} ({unit})")
+        axes.set_subplotspec(figure.add_gridspec(len(groups), 1)[k])
+        axes.axhline(0.0, color=MUTED, linewidth=0.8)
+        axes.axvline(0.0, color=MUTED, linewidth=0.8)
+        own = [i for i, one in enumerate(units) if one == (rate, unit)]
+        sizes = []
+        for values, key in ((speeds, "speed"), (forces, "force")):
+            used = float(np.abs(values[:, own]).max()) or 1.0
+            near = [getattr(abilities[i], key) or 0.0 for i in own]
+            near += [abilities[i].rated or 0.0 for i in own] if key == "force" else []
+            sizes.append(_ROOM * max(used, *(one for one in near if one <= _FAR * used), 0.0))
+        axes.set(xlim=(-sizes[0], sizes[0]), ylim=(-sizes[1], sizes[1]))
+        shared = len({abilities[i] for i in own}) == 1
+        for i in own[: 1 if shared else None]:
+            _box(axes, abilities[i], sizes, MUTED if shared else LEG_COLORS[i])
+        for i in own:
+            axes.plot(speeds[:, i], forces[:, i], label=f"leg {i + 1}", **leg_style(i, 1.6))
+            spot(axes, rms[0][i], rms[1][i], LEG_COLORS[i], PAPER, 6.5, zorder=5)
+        if k == 0:
+            for x, y in ((-1.0, 1.0), (1.0, -1.0)):
+                remark(axes, "brakes", 0.8 * x * sizes[0], 0.78 * y * sizes[1], MUTED)
+    legend(figure, min(len(units), 4))
+    return figure
+
+
+def _box(axes: Axes, ability: Ability, sizes: Sequence[float], color: str) -> None:
+    """Draw what a drive can do, as far as the axes show it."""
+    x = min(ability.speed or sizes[0], sizes[0])
+    y = min(ability.force or sizes[1], sizes[1])
+    look: dict[str, Any] = {"color": color, "linewidth": 1.0, "linestyle": (0, (4, 2))}
+    if ability.force is not None:
+        for side in (-ability.force, ability.force):
+            axes.plot([-x, x], [side, side], **look)
+    if ability.speed is not None:
+        for side in (-ability.speed, ability.speed):
+            axes.plot([side, side], [-y, y], **look)
+    if ability.rated is not None:
+        for side in (-ability.rated, ability.rated):
+            axes.plot([-x, x], [side, side], color=color, linewidth=1.0, linestyle=(0, (1, 1.6)))
+
+
+def power_figure(time: Array, power: Array) -> Figure:
+    """Return the power (K, n) of all drives over time (K,), s, and their sum; W."""
+    figure = blank(5.4, 3.3)
+    axes = plain_axes(figure, "time (s)", "power (W)")
+    axes.axhline(0.0, color=MUTED, linewidth=0.8)
+    axes.plot(time, power.sum(axis=1), label="all", color=INK, linewidth=2.0)
+    for i, one in enumerate(power.T):
+        axes.plot(time, one, label=f"leg {i + 1}", **leg_style(i, 1.4))
+    axes.set_xlim(float(time[0]), float(time[-1]))
+    legend(figure, power.shape[1] + 1)
+    return figure

@@ -1,0 +1,27 @@
+"""Pictures of what the drives of a machine do over a cycle."""
+
+from __future__ import annotations
+
+from matplotlib.figure import Figure
+
+from pteron.motion import Sizing
+from pteron.plots import Ability, force_speed_figure, power_figure
+
+
+def force_speed(found: Sizing) -> Figure:
+    """Return force over speed of each drive, within what the machine's file says that it can do."""
+    joints = [leg.joint for leg in found.robot.legs]
+    return force_speed_figure(
+        found.speeds,
+        found.forces,
+        units=[(f"{joint.unit}/s", joint.force_unit) for joint in joints],
+        abilities=[
+            Ability(drive.max_speed, drive.max_force, drive.rated_force) for drive in found.drives
+        ],
+        rms=(found.rms_speeds, found.rms_forces),
+    )
+
+
+def power(found: Sizing) -> Figure:
+    """Return the power of each drive over time, and their sum."""
+    return power_figure(found.time, found.power)

@@ -1,0 +1,165 @@
+"""`pteron size` as a person and as a program meet it."""
+
+import json
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+from test_cli import done, refused, run
+
+import pteron
+from pteron.motion import pick_and_place, size, with_payload
+from pteron.workspace import home_pose
+
+MOTORS = (
+    "name,rotor_inertia,rated_torque,peak_torque,max_speed\n"
+    "100 W,4e-6,0.32,0.95,600\n400 W,2.6e-5,1.27,3.8,600\n"
+)
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def driven() -> str:
+    robot = pteron.load("five-bar")
+    drive = pteron.Drive(
+        *(0.1, 0.01, 0.0, 3e-5, 20.0), rated_torque=0.64, max_force=30.0, max_speed=40.0
+    )
+    legs = tuple(replace(leg, drive=drive) for leg in robot.legs)
+    pteron.save(replace(robot, legs=legs), "driven.toml")
+    return "driven.toml"
+
+
+def cycle_table(robot: pteron.Manipulator, **columns: float) -> pl.DataFrame:
+    """Return a cycle as a table; `columns` are factors of some."""
+    cycle = pick_and_place(robot, home_pose(robot), scale=0.2, samples=51)
+    names = [f"{rate}{name}" for rate in ("", "d", "dd") for name in robot.coordinates]
+    values = np.hstack([cycle.pose, cycle.velocity, cycle.acceleration])
+    found = {"t": cycle.time} | dict(zip(names, values.T, strict=True))
+    return pl.DataFrame({name: columns.get(name, 1.0) * value for name, value in found.items()})
+
+
+def test_a_pipe_gets_a_row_a_leg_and_json_all_numbers(driven: str):
+    rows = pl.read_csv(StringIO(done(f"size {driven}")))
+    data = json.loads(done(f"size {driven} --json"))
+    assert rows.to_dicts() == [pytest.approx(row) for row in data["drives"]]
+    assert rows["leg"].to_list() == [1, 2]
+    assert data["overloads"] == data["motors"] == []
+    assert data["all"]["energy"] == pytest.approx(
+        (rows["given_energy"] - rows["braked_energy"]).sum()
+    )
+    assert data["all"]["peak_power"] <= rows["peak_power"].sum()
+
+
+def test_payload_dwell_and_duration_count(driven: str):
+    asked = "--payload 0.4 --dwell 0.2 --duration 0.5"
+    data = json.loads(done(f"size {driven} {asked} --json"))
+    robot = pteron.load(driven)
+    cycle = pick_and_place(robot, home_pose(robot), duration=0.5, samples=481)
+    found = size(with_payload(robot, 0.4), cycle, dwell=0.2)
+    assert data["duration"] == pytest.approx(0.7)
+    assert [row["rms_force"] for row in data["drives"]] == pytest.approx(found.rms_forces, 1e-3)
+
+
+def test_what_the_drives_cannot_do_is_told_and_ends_with_1(driven: str):
+    result = run(f"size {driven} --payload 50 --duration 0.3")
+    assert result.exit_code == 1
+    assert "Warning: leg 1: the motion takes up to " in result.stderr
+    assert "but its drive gives 30 N m (max_force)" in result.stderr
+    assert "root mean square, but the motor gives 12.8 N m all the time" in result.stderr
+    assert len(pl.read_csv(StringIO(result.stdout))) == 2
+
+
+def test_motors_of_a_list_are_fitted_to_each_joint(driven: str):
+    Path("motors.csv").write_text(MOTORS, encoding="utf-8")
+    rows = pl.read_csv(StringIO(done(f"size {driven} --motors motors.csv")))
+    assert rows["motor"].to_list() == ["100 W", "400 W"] * 2
+    assert rows["serves"].all()
+    assert (
+        (rows["least_ratio"] <= rows["ratio"]) & (rows["ratio"] <= rows["greatest_ratio"])
+    ).all()
+    result = run(f"size {driven} --motors motors.csv --payload 500 --duration 0.2")
+    assert result.exit_code == 1
+    assert "leg 1: no motor of the list serves; 400 W comes nearest, with " in result.stderr
+    assert "is it in grams?" in result.stderr
+
+
+def test_a_folder_gets_tables_numbers_and_pictures(driven: str):
+    Path("motors.csv").write_text(MOTORS, encoding="utf-8")
+    result = run(f"size {driven} --motors motors.csv --out made/sizing")
+    assert result.exit_code == 0
+    names = {path.name for path in Path("made/sizing").iterdir()}
+    assert names == {
+        *("sizing.csv", "sizing.json", "motors.csv", "power.svg", "force-speed.svg"),
+    }
+    assert all(name in result.stderr for name in names)
+    data = json.loads(Path("made/sizing/sizing.json").read_text(encoding="utf-8"))
+    assert data["drives"] == pl.read_csv("made/sizing/sizing.csv").to_dicts()
+    assert len(data["motors"]) == len(pl.read_csv("made/sizing/motors.csv")) == 4
+
+
+def test_one_table_may_be_written(driven: str):
+    assert run(f"size {driven} --out sizing.parquet").exit_code == 0
+    assert pl.read_parquet("sizing.parquet")["leg"].to_list() == [1, 2]
+
+
+def test_a_person_sees_tables_within_80_columns(driven: str, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("pteron.cli.size.is_terminal", lambda: True)
+    Path("motors.csv").write_text(MOTORS, encoding="utf-8")
+    text = run(f"size {driven} --motors motors.csv --payload 0.2", COLUMNS="80").stdout
+    assert max(map(len, text.splitlines())) <= 80
+    for words in ("with 0.2 kg", "RMS force", "takes back (J)", "best ratio", "J a cycle", "400 W"):
+        assert words in text
+    assert "…" not in text
+
+
+def test_a_motion_of_a_table_is_sized_as_it_is():
+    robot = pteron.load("delta")
+    cycle_table(robot).write_csv("motion.csv")
+    rows = pl.read_csv(StringIO(done("size delta --cycle motion.csv")))
+    cycle = pick_and_place(robot, home_pose(robot), scale=0.2, samples=51)
+    assert rows["rms_force"].to_list() == pytest.approx(size(robot, cycle).rms_forces, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("size delta --payload -1", ["payload: -1.0 given", "0 kg or more"]),
+        ("size delta --dwell -1", ["dwell: -1.0 given"]),
+        ("size delta --duration 0", ["duration: 0.0 given", "above 0"]),
+        ("size delta --margin 0.5 --motors motors.csv", ["margin: 0.5 given", "1 or more"]),
+        ("size delta --motors nothing.csv", ["nothing.csv: no such file"]),
+        ("size delta --cycle adpt", ["adpt"]),
+        ("size delta --cycle motion.csv --duration 1", ["--duration is for --cycle adept"]),
+        ("size delta --out nowhere/there.csv", ["no folder nowhere"]),
+        ("size delta --out motors.csv/there", ["motors.csv", "is a file"]),
+        ("size no-such-robot", ["no-such-robot"]),
+    ],
+)
+def test_a_mistake_is_one_line(line: str, words: list[str]):
+    Path("motors.csv").write_text(MOTORS, encoding="utf-8")
+    refused(line, *words)
+
+
+@pytest.mark.parametrize(
+    ("factors", "words"),
+    [
+        ({"x": 1e3, "y": 1e3, "z": 1e3}, ["motion.csv: row 1", "are these mm?"]),
+        ({"t": -1.0}, ["motion.csv: row 2", "time does not go on"]),
+        ({"z": np.nan}, ["motion.csv: row 1", "column z"]),
+    ],
+)
+def test_a_table_that_is_no_motion_is_one_line(factors: dict[str, float], words: list[str]):
+    cycle_table(pteron.load("delta"), **factors).write_csv("motion.csv")
+    refused("size delta --cycle motion.csv", *words)
+
+
+def test_a_time_in_milliseconds_is_doubted():
+    cycle_table(pteron.load("delta"), t=1e3).write_csv("motion.csv")
+    assert "is t in s, are they per s?" in run("size delta --cycle motion.csv").stderr
