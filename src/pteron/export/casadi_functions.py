@@ -216,9 +216,9 @@ def _ends(robot: Manipulator) -> tuple[list[float], list[float]]:
     ModelError
         If the machine has no pose to start from.
     """
-    start = start_pose(robot)
+    start, others = start_pose(robot), good_poses(robot)[:50]
     for share in (0.2, 0.1, 0.05, 0.02, 0.01):
-        for pose in good_poses(robot, 0.01, 0.001)[:50]:
+        for pose in others:
             way = start + share * np.linspace(0.0, 1.0, 20)[:, None] * (pose - start)
             if keeps_limits(robot, way).all():
                 return start.tolist(), [float(f"{v:.4g}") for v in way[-1]]

@@ -11,10 +11,11 @@ from pteron.kinematics import inverse_kinematics, random_poses
 from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator
 
-_LEAST = ((0.3, 0.15), (0.1, 0.05), (0.03, 0.01), (0.01, 0.001))
-"""Type-I and type-II measures that are asked for, one after the other."""
+_TYPE_I, _TYPE_II = 0.01, 0.001
+"""Measures below which no pose is good; a type-II measure of a half is as good as a type-I of 1."""
 
-_DIGITS = 3
+_SHARE = 0.5
+"""The share of the best pose's measure that a good pose has."""
 
 
 def start_pose(robot: Manipulator) -> Array:
@@ -25,29 +26,32 @@ def start_pose(robot: Manipulator) -> Array:
     ModelError
         If the machine has no such pose.
     """
-    for type_i, type_ii in _LEAST:
-        poses = good_poses(robot, type_i, type_ii)
-        if len(poses) == 0:
-            continue
-        apart = np.linalg.norm(poses - np.median(poses, axis=0), axis=1)
-        middle: Array = poses[apart.argmin()]
-        rounded = np.array([float(f"{v:.{_DIGITS}g}") for v in middle])
-        for pose in (np.zeros(robot.freedom), rounded):
-            bent = (unchecked(robot, "squared_type_i", pose) >= type_i**2).all()
-            held = abs(unchecked(robot, "type_ii", pose)) >= type_ii
-            if bent and held and keeps_limits(robot, pose):
-                return pose
-        return middle
-    raise ModelError(f"{robot.name}: no pose was found within the joints' limits to start from")
+    poses = good_poses(robot)
+    if len(poses) == 0:
+        raise ModelError(f"{robot.name}: no pose was found within the joints' limits to start from")
+    measures = _measures(robot, poses)
+    enough = _SHARE * measures.max()
+    poses = poses[measures >= enough]
+    apart = np.linalg.norm(poses - np.median(poses, axis=0), axis=1)
+    middle: Array = poses[apart.argmin()]
+    rounded = np.array([float(f"{v:.3g}") for v in middle])
+    for pose in (np.zeros(robot.freedom), rounded):
+        if keeps_limits(robot, pose) and _measures(robot, pose) >= 0.9 * enough:
+            return pose
+    return middle
 
 
-def good_poses(robot: Manipulator, type_i: float, type_ii: float) -> Array:
-    """Return random poses (k, m) with at least these measures, within the joints' limits."""
-    try:
-        poses = random_poses(robot, 500, seed=1, type_i=type_i, type_ii=type_ii)
-    except ModelError:
-        return np.empty((0, robot.freedom))
+def good_poses(robot: Manipulator) -> Array:
+    """Return random poses (k, m) away from singularities, within the joints' limits."""
+    poses = random_poses(robot, 500, seed=1, type_i=_TYPE_I, type_ii=_TYPE_II)
     return poses[keeps_limits(robot, poses)]
+
+
+def _measures(robot: Manipulator, poses: Array) -> Array:
+    """Return how far poses (..., m) are from singular: the worst type-I or twice the type-II."""
+    bent = np.sqrt(unchecked(robot, "squared_type_i", poses).min(axis=-1))
+    held = 2.0 * np.abs(unchecked(robot, "type_ii", poses))
+    return np.asarray(np.minimum(bent, held))
 
 
 def keeps_limits(robot: Manipulator, poses: Array) -> NDArray[np.bool_]:
