@@ -257,6 +257,20 @@ def test_an_fmu_refuses_what_it_cannot_start_from(values, words):
     assert words in said[0]
 
 
+def test_casadi_takes_the_fmu_too():
+    robot = ROBOTS["par4"]
+    model = ca.DaeBuilder("par4", str(fmpy.extract(fmu_of("par4"))), {})
+    function = model.create("f", ["x", "u"], ["ode", "y"])
+    n, start = robot.freedom, started(fmu_of("par4"))
+    states = np.array([start[name] for name in model.x()]) + np.repeat([0.0, 0.3], n)
+    inputs = np.array([start[name] for name in model.u()]) + 0.1 * np.arange(2 * n)
+    rates = np.array(function(ca.DM(states), ca.DM(inputs))[0]).ravel()
+    forward = pteron.drive_accelerations(
+        robot, states[:n], states[n:], inputs[:n], wrench=inputs[n:]
+    )
+    np.testing.assert_allclose(rates, [*states[n:], *forward], 1e-12)
+
+
 def test_an_fmu_goes_back_to_a_kept_state_and_to_its_start():
     path = fmu_of("delta")
     description = fmpy.read_model_description(path)

@@ -96,12 +96,14 @@ class Layout:
     def attributes(self) -> Iterator[dict[str, object]]:
         """The attributes of every variable in modelDescription.xml, in order."""
         for block in self.blocks:
+            hidden = {"causality": "local"} if block.rate_of else {}
             for k, variable in enumerate(block.variables):
                 found = {
                     "name": variable.name,
                     "valueReference": block.first + k,
                     "description": variable.description,
                     **_XML[block.kind],
+                    **hidden,
                     "unit": variable.unit,
                     "min": variable.least,
                     "derivative": self[block.rate_of][k] if block.rate_of else None,
@@ -110,17 +112,35 @@ class Layout:
                 yield {name: value for name, value in found.items() if value is not None}
 
     @property
-    def outputs(self) -> Iterator[tuple[int, tuple[int, ...]]]:
-        """The outputs, each with the variables that it depends on."""
+    def known(self) -> dict[int, tuple[int, ...]]:
+        """For each variable that is computed, or is a state, the variables that it depends on."""
         state = self["pose"] + self["velocity"]
-        for own in state:
-            yield own, (own,)
-        for own in self["acceleration"]:
-            yield own, state + self["forces"] + self["wrench"]
-        for own in self["joints"] + self["reserves"]:
-            yield own, self["pose"]
-        for own in self["joint_rates"]:
-            yield own, state
+        forced = state + self["forces"] + self["wrench"]
+        return {
+            **{own: (own,) for own in state},
+            **dict(zip(self["pose_rates"], ((own,) for own in self["velocity"]), strict=True)),
+            **dict.fromkeys(self["acceleration"] + self["velocity_rates"], forced),
+            **dict.fromkeys(self["joints"] + self["reserves"], self["pose"]),
+            **dict.fromkeys(self["joint_rates"], state),
+        }
+
+    @property
+    def outputs(self) -> tuple[int, ...]:
+        """The value references of the outputs."""
+        names = ("pose", "velocity", "acceleration", "joints", "joint_rates", "reserves")
+        return sum((self[name] for name in names), ())
+
+    @property
+    def derivatives(self) -> tuple[int, ...]:
+        """The value references of the rates of the states."""
+        return self["pose_rates"] + self["velocity_rates"]
+
+    @property
+    def computed(self) -> tuple[int, ...]:
+        """The value references of what is computed from the start values."""
+        states = self["pose"] + self["velocity"]
+        found = {*self.outputs, *self.derivatives} - {*states}
+        return tuple(sorted(found))
 
 
 def layout(robot: Manipulator, pose: Array, forces: Array) -> Layout:
@@ -152,9 +172,9 @@ def _parts(robot: Manipulator, pose: Array, forces: Array) -> Iterator[_Part]:
     states = of_pose("pose", "", "Platform pose,", [float(v) for v in pose])
     yield "pose", "STATE", "offsetof(Values, state)", states
     states = of_pose("velocity", "/s", "Rate of the pose's", rest)
-    yield "velocity", "STATE", "offsetof(Values, state) + M * sizeof(double)", states, "pose"
+    yield "velocity", "STATE", "offsetof(Values, state) + M * sizeof(double)", states
     results = of_pose("acceleration", "/s2", "Acceleration of the pose's", None)
-    yield "acceleration", "RESULT", "ACCELERATION", results, "velocity"
+    yield "acceleration", "RESULT", "ACCELERATION", results
     results = [Variable(f"{j.coordinate}{i}", j.unit, f"Leg {i}: the {j.noun}") for i, j in legs]
     yield "joints", "RESULT", "JOINTS", results
     results = [
@@ -179,6 +199,13 @@ def _parts(robot: Manipulator, pose: Array, forces: Array) -> Iterator[_Part]:
         for name, unit in zip(coordinates, moments, strict=True)
     ]
     yield "wrench", "INPUT", "offsetof(Values, wrench)", inputs
+    # Each state's rate is a variable of its own: some tools do not take an output in its place.
+    for name, per, place in (("pose", "/s", "VELOCITY"), ("velocity", "/s2", "ACCELERATION")):
+        rates = [
+            Variable(f"der({name}.{c})", unit + per, f"Rate of {name}.{c}")
+            for c, unit in zip(coordinates, lengths, strict=True)
+        ]
+        yield f"{name}_rates", "RESULT", place, rates, name
     yield from _payload(robot)
     yield "drives", "START", "offsetof(Values, drives)", list(_drives(robot))
 
