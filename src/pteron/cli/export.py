@@ -1,12 +1,18 @@
-"""`pteron export`: code for a controller."""
+"""`pteron export`: code for a controller, and models for other engines and tools."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
 from pteron.cli.screen import note, plain, show, show_json, spinner
 from pteron.errors import DataError
+
+if TYPE_CHECKING:
+    from pteron.manipulator import Manipulator
 
 _FUNCTIONS = (
     "adaptive",
@@ -66,11 +72,32 @@ _TRUSTED = "trustworthy"
 Output = Literal["force", "torque", "percent"]
 """The library's own, which is slow to import."""
 
+_TARGETS = ("c", "st", "mjcf", "sdf", "urdf", "pinocchio", "casadi", "fmu", "klipper", "linuxcnc")
+"""The options that say what to write; each but the first two is `pteron.export.export_NAME`."""
+
 
 def export(
     robot: Robot,
     c: Annotated[str | None, option("c", "Write C99 to this folder.", "DIR")] = None,
     st: Annotated[str | None, option("st", "Write Structured Text to this folder.", "DIR")] = None,
+    mjcf: Annotated[str | None, option("mjcf", "Write MuJoCo's MJCF.", "DIR")] = None,
+    sdf: Annotated[str | None, option("sdf", "Write SDF, for Gazebo.", "DIR")] = None,
+    urdf: Annotated[
+        str | None, option("urdf", "Write URDF of the tree, and its closures.", "DIR")
+    ] = None,
+    pinocchio: Annotated[
+        str | None, option("pinocchio", "Write a module that makes Pinocchio's model.", "DIR")
+    ] = None,
+    casadi: Annotated[
+        str | None, option("casadi", "Write CasADi functions, for acados and the like.", "DIR")
+    ] = None,
+    fmu: Annotated[str | None, option("fmu", "Write an FMU of FMI 3.0.", "DIR")] = None,
+    klipper: Annotated[
+        str | None, option("klipper", "Write the kinematics of a Klipper configuration.", "DIR")
+    ] = None,
+    linuxcnc: Annotated[
+        str | None, option("linuxcnc", "Write kinematics for LinuxCNC.", "DIR")
+    ] = None,
     function: Annotated[
         list[str] | None,
         option("function", f"What to write; again for more: {', '.join(_FUNCTIONS)}.", "NAME"),
@@ -103,17 +130,27 @@ def export(
     elbows: Elbows = None,
     json: Json = False,
 ) -> None:
-    """Write code for a controller: C99, or Structured Text for a PLC.
+    """Write code for a controller, or the machine as another engine or tool wants it.
 
-    Kinematics, Jacobian, dynamics and regressor, in functions that return a status, without
-    allocation or state; with a test program and a CMakeLists.txt. Function blocks for a PLC are
-    inverse kinematics and inverse dynamics unless others are named. A machine with drives has
-    `feed_forward` as well: what the drives must give, with friction, and `joint_feed_forward`, the
-    same from the motion of the joints. With --base they take what `pteron identify` found, as it
-    lists it, and are called `feed_forward_base` and `joint_feed_forward_base`.
+    With --c or --st: kinematics, Jacobian, dynamics and regressor, in functions that return a
+    status, without allocation or state; with a test program and a CMakeLists.txt. Function blocks
+    for a PLC are inverse kinematics and inverse dynamics unless others are named. A machine with
+    drives has `feed_forward` as well: what the drives must give, with friction, and
+    `joint_feed_forward`, the same from the motion of the joints. With --base they take what `pteron
+    identify` found, as it lists it, and are called `feed_forward_base` and
+    `joint_feed_forward_base`. The others write one thing each, and take no options but --elbows.
     """
-    if c is None and st is None:
-        raise DataError("--c, --st: neither given; say what to write, such as --c controller")
+    folders = (c, st, mjcf, sdf, urdf, pinocchio, casadi, fmu, klipper, linuxcnc)
+    asked = {name: folder for name, folder in zip(_TARGETS, folders, strict=True) if folder}
+    options = {
+        "function": function,
+        "float": single,
+        "specialised": specialised,
+        "wrench": wrench,
+        "output": output != "force",
+        "base": base,
+    }
+    _check(asked, [name for name, given in options.items() if given])
     machine = load_robot(robot, elbows)
     files = []
     with spinner(f"Writing code for {machine.name}"):
@@ -135,9 +172,36 @@ def export(
             )
         if st is not None:
             files += export_st(machine, function, st, wrench=wrench, output=output, base=base)
+        for name, folder in asked.items():
+            if name not in ("c", "st"):
+                files += _exporter(name)(machine, folder)
     if grade != _TRUSTED:
         note(f"Warning: {base}: the verdict on these values is: {grade}")
     if json:
         show_json({"robot": machine.name, "files": [str(path) for path in files]})
         return
     show(*(f"Written: {plain(str(path))}" for path in files))
+
+
+def _check(asked: dict[str, str], options: list[str]) -> None:
+    """Refuse what is not one thing to write, and options that do not go with it."""
+    if not asked:
+        names = ", ".join(f"--{name}" for name in _TARGETS)
+        raise DataError(f"{names}: none given; say what to write, such as --c controller")
+    others = [name for name in asked if name not in ("c", "st")]
+    if others and len(asked) > 1:
+        names = ", ".join(f"--{name}" for name in asked)
+        raise DataError(f"{names}: give one at a time; only --c and --st go together")
+    if others and options:
+        names = ", ".join(f"--{name}" for name in options)
+        raise DataError(f"{names}: goes with --c and --st, not with --{others[0]}; leave it out")
+    if "float" in options and "c" not in asked:
+        raise DataError("--float: goes with --c; Structured Text has LREAL alone")
+
+
+def _exporter(name: str) -> Callable[[Manipulator, str], list[Path]]:
+    """Return `pteron.export.export_NAME`."""
+    found: Callable[[Manipulator, str], list[Path]] = getattr(
+        import_module("pteron.export"), f"export_{name}"
+    )
+    return found

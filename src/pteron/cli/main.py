@@ -178,6 +178,8 @@ _add(
     "pteron export quadrupteron --c controller",
     "pteron export my-robot.toml --c controller --float --function inverse_kinematics",
     "pteron export quadrupteron --st plc",
+    "pteron export quadrupteron --fmu models",
+    "pteron export linear-delta --klipper printer",
     "pteron export robot.toml --base result/identification.json --c controller",
 )
 _add(

@@ -61,14 +61,18 @@ def drive_names(robot: Manipulator) -> tuple[str, ...]:
     return tuple(f"{name}_{i}" for name in Drives._fields for i in legs)
 
 
+def dry_friction(drives: Drives, rates: Expression) -> Expression:
+    """Return the size (n, 1) of dry friction: Coulomb's, and what Stribeck's law adds at rest."""
+    return drives.coulomb + drives.stribeck * ca.exp(-((rates / drives.stribeck_speed) ** 2))
+
+
 def friction(drives: Drives, rates: Expression, *, smooth: bool) -> Expression:
     """Return what friction and offset take (n, 1); `smooth` where a joint rests, else by sign."""
-    dry = drives.coulomb + drives.stribeck * ca.exp(-((rates / drives.stribeck_speed) ** 2))
     side = _ahead(rates) - _ahead(-rates)
     if smooth:  # tanh(q'/rest_speed), by an exponential that controllers have and none overflows
         small = ca.exp(-2 * ca.fabs(rates) / drives.rest_speed)
         side = side * (1 - small) / (1 + small)
-    return dry * side + drives.viscous * rates + drives.offset
+    return dry_friction(drives, rates) * side + drives.viscous * rates + drives.offset
 
 
 def _ahead(rates: Expression) -> Expression:

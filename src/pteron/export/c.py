@@ -112,6 +112,13 @@ def export_c(
     exported = chosen(
         robot, functions, specialised=specialised, wrench=wrench, output=output, base=base
     )
+    return write_texts(folder, c_texts(robot, exported, real))
+
+
+def c_texts(
+    robot: Manipulator, exported: Sequence[Exported], real: Real = "double"
+) -> dict[str, str]:
+    """Return the files of `export_c` by their names: header, source, test, CMakeLists.txt."""
     prefix, single = prefix_of(robot), real == "float"
     values = {
         "banner": banner(robot, "C99"),
@@ -119,7 +126,7 @@ def export_c(
         "upper": prefix.upper(),
         "real": real,
         "f": "f" if single else "",
-        "printer": _Printer(prefix, real),
+        "printer": Printer(prefix, real),
         "tables": {table.name: table for item in exported for table in item.tables}.values(),
         "functions": exported,
         "largest": 3.4028234e38 if single else 1.7976931348623157e308,
@@ -131,8 +138,7 @@ def export_c(
         f"test_{prefix}.c": "test.c.j2",
         "CMakeLists.txt": "CMakeLists.txt.j2",
     }
-    texts = {file: rendered("pteron.export", name, **values) for file, name in files.items()}
-    return write_texts(folder, texts)
+    return {file: rendered("pteron.export", name, **values) for file, name in files.items()}
 
 
 def prefix_of(robot: Manipulator) -> str:
@@ -142,7 +148,9 @@ def prefix_of(robot: Manipulator) -> str:
 
 
 @dataclass(frozen=True)
-class _Printer:
+class Printer:
+    """How numbers, comments and functions are written."""
+
     prefix: str
     real: Real
 

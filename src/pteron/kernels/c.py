@@ -53,12 +53,18 @@ _FLAGS = (
 _LIBRARY = "pteron_kernel" + EXTENSION_SUFFIXES[0]
 
 
-def compiler() -> tuple[str, ...] | None:
-    """Return the C compiler's command, if there is one and Python's headers are there too.
+def c_compiler() -> tuple[str, ...] | None:
+    """Return the C compiler's command, if there is one.
 
     The environment variable CC names another than `cc` and `gcc`, with options: `CC="gcc -m64"`.
     """
     return _command(os.environ.get("CC", ""), os.environ.get("PATH", ""))
+
+
+def compiler() -> tuple[str, ...] | None:
+    """Return the C compiler's command, if there is one and Python's headers are there too."""
+    headers = Path(sysconfig.get_path("include"), "Python.h").exists()
+    return c_compiler() if headers else None
 
 
 @lru_cache(maxsize=4)
@@ -68,8 +74,7 @@ def _command(given: str, path: str) -> tuple[str, ...] | None:
     except ValueError:
         return None
     found = shutil.which(words[0], path=path)
-    headers = Path(sysconfig.get_path("include"), "Python.h").exists()
-    return (found, *words[1:]) if found and headers else None
+    return (found, *words[1:]) if found else None
 
 
 @lru_cache(maxsize=4)

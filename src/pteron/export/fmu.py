@@ -1,0 +1,208 @@
+"""An FMU of FMI 3.0: a machine with its drives, for model exchange and co-simulation.
+
+The exported C is inside, with `fmu.c` around it, and compiled for the platform that writes it. That
+is done here and not by CasADi's DaeBuilder, which (3.8) writes model exchange alone, and which
+cannot end a simulation where a leg does not reach.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import platform
+import subprocess
+import sys
+import tempfile
+import zipfile
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pteron.atomic import make_folder, write_files
+from pteron.dynamics import drive_forces
+from pteron.errors import DataError, ModelError
+from pteron.export.c import Printer, c_texts, prefix_of
+from pteron.export.descriptions import banner
+from pteron.export.fmu_variables import layout
+from pteron.export.functions import chosen
+from pteron.export.start_pose import start_pose
+from pteron.kernels import Array
+from pteron.kernels.c import c_compiler
+from pteron.kernels.code import rendered
+from pteron.kinematics import inverse_kinematics
+from pteron.manipulator import Manipulator, expect_manipulator
+
+_FUNCTIONS = ("drive_accelerations", "joint_coordinates", "jacobian", "squared_type_i")
+
+LEAST = 0.01
+"""The type-I measure of a leg at which a simulation ends."""
+
+_FLAGS = ("-std=c99", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off")
+
+_CALL = {
+    "pose": "state",
+    "velocity": "state + M",
+    "forces": "values->forces",
+    "wrench": "values->wrench",
+    "parameters": "values->parameters",
+    "drives": "values->drives",
+}
+"""What of the C code's values each input of `drive_accelerations` is."""
+
+_DATES = (1980, 1, 1, 0, 0, 0)
+"""Of the files inside, so that the same machine gives the same bytes."""
+
+
+def export_fmu(
+    robot: Manipulator, folder: str | Path = ".", *, pose: ArrayLike | None = None
+) -> list[Path]:
+    """Write a machine with its drives as an FMU of FMI 3.0, its sources inside.
+
+    Inputs are the drives' forces and a wrench on the platform at P; states are the pose and its
+    rate; outputs are these, the acceleration, the joint coordinates and their rates. Friction, with
+    tanh(q'/rest_speed), and the motors' inertia are in it. Parameters are a payload and the numbers
+    of the drives. It starts at rest, and its forces hold it there unless others are given. Where a
+    leg's type-I measure falls below 0.01 the simulation ends, with a message.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine; its name becomes the file's.
+    folder : path
+        Where; made if it is missing.
+    pose : array_like, shape (m,), optional
+        To start from, m and rad; by default zero where that is a good pose, else one in the middle
+        of the reach. The user of the FMU may set another.
+
+    Returns
+    -------
+    list of Path
+        NAME.fmu.
+
+    Raises
+    ------
+    ModelError
+        If there is no C compiler, or it fails.
+    DataError
+        If `pose` has another shape.
+    UnreachablePose, SingularPose
+        If `pose` cannot be started from.
+    OutputError
+        If the folder cannot be written.
+    """
+    expect_manipulator(robot)
+    prefix = prefix_of(robot)
+    start = start_pose(robot) if pose is None else _expected(robot, pose)
+    rest = np.zeros(robot.freedom)
+    forces = drive_forces(robot, start, rest, rest)
+    exported = chosen(robot, _FUNCTIONS, specialised=False, wrench=True, output="force", base=None)
+    tables = {table.name: table.values for item in exported for table in item.tables}
+    call = [_CALL[port.name] for port in exported[0].inputs]
+    texts = {name: text for name, text in c_texts(robot, exported).items() if prefix in name}
+    del texts[f"test_{prefix}.c"]
+    values = {
+        "banner": banner(robot, "FMU of FMI 3.0"),
+        "name": quoteattr(robot.name),
+        "description": quoteattr(" ".join(banner(robot, "FMU")[:1])),
+        "tool": quoteattr(f"Pteron {version('pteron')}"),
+        "quoted": lambda value: quoteattr(str(value)),
+        "prefix": prefix,
+        "upper": prefix.upper(),
+        "printer": Printer(prefix, "double"),
+        "number": Printer(prefix, "double").number,
+        "freedom": robot.freedom,
+        "inertial": tables["parameters"],
+        "drives": tables["drives"],
+        "least_square": LEAST**2,
+        "layout": layout(robot, start, forces),
+        "start": np.concatenate([start, rest]),
+        "forces": np.asarray(forces),
+        "acceleration_call": ", ".join([*call, "found + M"]),
+    }
+    # The token says which modelDescription.xml goes with which binary: a digest of all of it.
+    parts = {
+        name: rendered("pteron.export", f"{name}.j2", token="", **values)
+        for name in ("fmu.c", "modelDescription.xml")
+    }
+    digest = hashlib.sha256("".join([*texts.values(), *parts.values()]).encode()).hexdigest()
+    for name in parts:
+        parts[name] = rendered("pteron.export", f"{name}.j2", token=digest[:32], **values)
+    sources = texts | {"fmu.c": parts["fmu.c"]}
+    binary, place = _compiled(prefix, sources)
+    build = rendered("pteron.export", "buildDescription.xml.j2", prefix=prefix)
+    members = {
+        "modelDescription.xml": parts["modelDescription.xml"].encode(),
+        "sources/buildDescription.xml": build.encode(),
+        **{f"sources/{name}": text.encode() for name, text in sources.items()},
+        place: binary,
+    }
+    return write_files({make_folder(folder) / f"{prefix}.fmu": _zipped(members)})
+
+
+def _expected(robot: Manipulator, pose: ArrayLike) -> Array:
+    """Return the pose to start from, after a check that the machine can be there."""
+    given = np.asarray(pose, dtype=float)
+    if given.shape != (robot.freedom,):
+        names = ", ".join(robot.platform.coordinates)
+        raise DataError(f"pose: shape {given.shape} given, ({robot.freedom},) expected: {names}")
+    inverse_kinematics(robot, given)
+    return given
+
+
+def _compiled(prefix: str, sources: Mapping[str, str]) -> tuple[bytes, str]:
+    """Return the shared library and its place in the FMU.
+
+    Raises
+    ------
+    ModelError
+        If there is no compiler, or it fails.
+    """
+    command = c_compiler()
+    if command is None:
+        raise ModelError(
+            "fmu: an FMU needs a C compiler, which is not here; install gcc or clang, or set the "
+            "environment variable CC to one"
+        )
+    place, suffix = _platform()
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
+        for name, text in sources.items():
+            (folder / name).write_text(text, encoding="utf-8")
+        library = folder / f"{prefix}{suffix}"
+        files = [name for name in sources if name.endswith(".c")]
+        done = _run([*command, *_FLAGS, *files, "-o", library.name, "-lm"], folder)
+        if done.returncode != 0:
+            lines = done.stderr.strip().splitlines() or [f"exit code {done.returncode}"]
+            raise ModelError(
+                f"fmu: its code could not be compiled with {' '.join(command)}: {lines[0]}; set "
+                "the environment variable CC to another compiler"
+            )
+        return library.read_bytes(), f"binaries/{place}/{library.name}"
+
+
+def _run(command: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+
+
+def _platform() -> tuple[str, str]:
+    """Return the folder that FMI 3.0 gives to binaries of this machine, and their suffix."""
+    machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(
+        platform.machine().lower(), platform.machine().lower()
+    )
+    if sys.platform == "win32":
+        return f"{machine}-windows", ".dll"
+    return (
+        (f"{machine}-darwin", ".dylib") if sys.platform == "darwin" else (f"{machine}-linux", ".so")
+    )
+
+
+def _zipped(members: Mapping[str, bytes]) -> bytes:
+    held = io.BytesIO()
+    with zipfile.ZipFile(held, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in members.items():
+            archive.writestr(zipfile.ZipInfo(name, _DATES), data, zipfile.ZIP_DEFLATED)
+    return held.getvalue()

@@ -1,0 +1,254 @@
+"""The variables of a machine's FMU: names, units, causality, start values, dependencies."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from pteron.equations.drives import Drives, drive_numbers
+from pteron.kernels import Array
+from pteron.manipulator import Manipulator
+
+_UNITS = {
+    "m": {"m": 1},
+    "m/s": {"m": 1, "s": -1},
+    "m/s2": {"m": 1, "s": -2},
+    "rad": {"rad": 1},
+    "rad/s": {"rad": 1, "s": -1},
+    "rad/s2": {"rad": 1, "s": -2},
+    "s": {"s": 1},
+    "kg": {"kg": 1},
+    "kg.m2": {"kg": 1, "m": 2},
+    "N": {"kg": 1, "m": 1, "s": -2},
+    "N.m": {"kg": 1, "m": 2, "s": -2},
+    "N.s/m": {"kg": 1, "s": -1},
+    "N.m.s/rad": {"kg": 1, "m": 2, "s": -1, "rad": -1},
+    "1": {},
+}
+"""The units of the variables by the powers of SI's base units, as FMI wants them."""
+
+Kind = Literal["TIME", "STATE", "START", "INPUT", "RESULT"]
+"""How the C code treats a block: START is set before the simulation begins, and never after."""
+
+_XML: dict[Kind, dict[str, str]] = {
+    "TIME": {"causality": "independent", "variability": "continuous"},
+    "STATE": {"causality": "output", "variability": "continuous", "initial": "exact"},
+    "START": {"causality": "parameter", "variability": "fixed", "initial": "exact"},
+    "INPUT": {"causality": "input", "variability": "continuous"},
+    "RESULT": {"causality": "output", "variability": "continuous", "initial": "calculated"},
+}
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One variable of modelDescription.xml."""
+
+    name: str
+    unit: str
+    description: str
+    start: float | None = None
+    least: float | None = None
+
+
+@dataclass(frozen=True)
+class Block:
+    """Variables whose numbers stand behind each other in the C code."""
+
+    name: str
+    first: int
+    """The value reference of the first of them."""
+    kind: Kind
+    place: str
+    """Where they are in the C code: a byte offset, or which result it is."""
+    variables: tuple[Variable, ...]
+    rate_of: str = ""
+    """The block whose rates these are."""
+
+    @property
+    def references(self) -> tuple[int, ...]:
+        """The value references."""
+        return tuple(range(self.first, self.first + len(self.variables)))
+
+
+@dataclass(frozen=True)
+class Layout:
+    """All variables of an FMU."""
+
+    blocks: tuple[Block, ...]
+
+    def __getitem__(self, name: str) -> tuple[int, ...]:
+        """Return the value references of a block."""
+        return next(block.references for block in self.blocks if block.name == name)
+
+    @property
+    def count(self) -> int:
+        """How many variables there are."""
+        return sum(len(block.variables) for block in self.blocks)
+
+    @property
+    def units(self) -> dict[str, dict[str, int]]:
+        """The units that occur, and what they are made of."""
+        used = [variable.unit for block in self.blocks for variable in block.variables]
+        return {unit: _UNITS[unit] for unit in dict.fromkeys(used)}
+
+    @property
+    def attributes(self) -> Iterator[dict[str, object]]:
+        """The attributes of every variable in modelDescription.xml, in order."""
+        for block in self.blocks:
+            hidden = {"causality": "local"} if block.rate_of else {}
+            for k, variable in enumerate(block.variables):
+                found = {
+                    "name": variable.name,
+                    "valueReference": block.first + k,
+                    "description": variable.description,
+                    **_XML[block.kind],
+                    **hidden,
+                    "unit": variable.unit,
+                    "min": variable.least,
+                    "derivative": self[block.rate_of][k] if block.rate_of else None,
+                    "start": variable.start,
+                }
+                yield {name: value for name, value in found.items() if value is not None}
+
+    @property
+    def known(self) -> dict[int, tuple[int, ...]]:
+        """For each variable that is computed, or is a state, the variables that it depends on."""
+        state = self["pose"] + self["velocity"]
+        forced = state + self["forces"] + self["wrench"]
+        return {
+            **{own: (own,) for own in state},
+            **dict(zip(self["pose_rates"], ((own,) for own in self["velocity"]), strict=True)),
+            **dict.fromkeys(self["acceleration"] + self["velocity_rates"], forced),
+            **dict.fromkeys(self["joints"] + self["reserves"], self["pose"]),
+            **dict.fromkeys(self["joint_rates"], state),
+        }
+
+    @property
+    def outputs(self) -> tuple[int, ...]:
+        """The value references of the outputs."""
+        names = ("pose", "velocity", "acceleration", "joints", "joint_rates", "reserves")
+        return sum((self[name] for name in names), ())
+
+    @property
+    def derivatives(self) -> tuple[int, ...]:
+        """The value references of the rates of the states."""
+        return self["pose_rates"] + self["velocity_rates"]
+
+    @property
+    def computed(self) -> tuple[int, ...]:
+        """The value references of what is computed from the start values."""
+        states = self["pose"] + self["velocity"]
+        found = {*self.outputs, *self.derivatives} - {*states}
+        return tuple(sorted(found))
+
+
+def layout(robot: Manipulator, pose: Array, forces: Array) -> Layout:
+    """Return the variables of a machine that starts at rest at a pose, held by forces."""
+    blocks: list[Block] = []
+    for name, kind, place, variables, *rate_of in _parts(robot, pose, forces):
+        first = sum(len(block.variables) for block in blocks)
+        blocks.append(Block(name, first, kind, place, tuple(variables), *rate_of))
+    return Layout(tuple(blocks))
+
+
+_Part = tuple[str, Kind, str, list[Variable]] | tuple[str, Kind, str, list[Variable], str]
+
+
+def _parts(robot: Manipulator, pose: Array, forces: Array) -> Iterator[_Part]:
+    coordinates = robot.platform.coordinates
+    lengths = ["rad" if name == "phi" else "m" for name in coordinates]
+    moments = ["N.m" if name == "phi" else "N" for name in coordinates]
+    legs = list(enumerate((leg.joint for leg in robot.legs), start=1))
+
+    def of_pose(word: str, per: str, told: str, start: list[float] | None) -> list[Variable]:
+        return [
+            Variable(f"{word}.{name}", unit + per, f"{told} {name}", start[k] if start else None)
+            for k, (name, unit) in enumerate(zip(coordinates, lengths, strict=True))
+        ]
+
+    rest = [0.0] * len(coordinates)
+    yield "time", "TIME", "offsetof(Values, time)", [Variable("time", "s", "Time")]
+    states = of_pose("pose", "", "Platform pose,", [float(v) for v in pose])
+    yield "pose", "STATE", "offsetof(Values, state)", states
+    states = of_pose("velocity", "/s", "Rate of the pose's", rest)
+    yield "velocity", "STATE", "offsetof(Values, state) + M * sizeof(double)", states
+    results = of_pose("acceleration", "/s2", "Acceleration of the pose's", None)
+    yield "acceleration", "RESULT", "ACCELERATION", results
+    results = [Variable(f"{j.coordinate}{i}", j.unit, f"Leg {i}: the {j.noun}") for i, j in legs]
+    yield "joints", "RESULT", "JOINTS", results
+    results = [
+        Variable(f"{j.coordinate}{i}_rate", f"{j.unit}/s", f"Leg {i}: the {j.noun}'s rate")
+        for i, j in legs
+    ]
+    yield "joint_rates", "RESULT", "JOINT_RATES", results
+    results = [
+        Variable(f"reach_reserve{i}", "1", f"Leg {i}: the simulation ends where this is 0")
+        for i, _ in legs
+    ]
+    yield "reserves", "RESULT", "RESERVES", results
+    inputs = [
+        Variable(
+            f"{j.force}{i}", j.force_unit.replace(" ", "."), f"Leg {i}: the drive's {j.force}", f
+        )
+        for (i, j), f in zip(legs, (float(v) for v in forces), strict=True)
+    ]
+    yield "forces", "INPUT", "offsetof(Values, forces)", inputs
+    inputs = [
+        Variable(f"wrench.{name}", unit, f"What acts on the platform at P along {name}", 0.0)
+        for name, unit in zip(coordinates, moments, strict=True)
+    ]
+    yield "wrench", "INPUT", "offsetof(Values, wrench)", inputs
+    # Each state's rate is a variable of its own: some tools do not take an output in its place.
+    for name, per, place in (("pose", "/s", "VELOCITY"), ("velocity", "/s2", "ACCELERATION")):
+        rates = [
+            Variable(f"der({name}.{c})", unit + per, f"Rate of {name}.{c}")
+            for c, unit in zip(coordinates, lengths, strict=True)
+        ]
+        yield f"{name}_rates", "RESULT", place, rates, name
+    yield from _payload(robot)
+    yield "drives", "START", "offsetof(Values, drives)", list(_drives(robot))
+
+
+def _payload(robot: Manipulator) -> Iterator[_Part]:
+    """Yield the payload's parameters: its mass, and what matters where the platform turns."""
+    told = [Variable("payload.mass", "kg", "A body that the platform carries", 0.0, 0.0)]
+    yield "payload.mass", "START", "offsetof(Values, payload)", told
+    if robot.platform.turns and not robot.platform.slides:
+        told = [
+            Variable(f"payload.{x}", "m", f"Its centre of mass in the platform frame, {x}", 0.0)
+            for x in "xy"
+        ]
+        yield "payload.centre", "START", "offsetof(Values, payload) + sizeof(double)", told
+    if robot.platform.turns:
+        axis = "Its inertia about the axis through its own centre"
+        told = [Variable("payload.inertia", "kg.m2", axis, 0.0, 0.0)]
+        yield "payload.inertia", "START", "offsetof(Values, payload) + 3 * sizeof(double)", told
+
+
+def _drives(robot: Manipulator) -> Iterator[Variable]:
+    """Yield the numbers of the drives, in the order of the table that the C code has."""
+    texts = {
+        "inertia": "the motor's inertia at the joint",
+        "coulomb": "dry friction",
+        "viscous": "viscous friction",
+        "offset": "a constant force",
+        "stribeck": "what dry friction has more at rest",
+        "stribeck_speed": "the speed by which that is gone",
+        "rest_speed": "half the width of the speeds where dry friction changes its sign",
+    }
+    values = iter(drive_numbers(robot))
+    for name in Drives._fields:
+        for i, leg in enumerate(robot.legs, start=1):
+            turns = leg.joint.unit == "rad"
+            units = {
+                "inertia": "kg.m2" if turns else "kg",
+                "viscous": "N.m.s/rad" if turns else "N.s/m",
+                "stribeck_speed": f"{leg.joint.unit}/s",
+                "rest_speed": f"{leg.joint.unit}/s",
+            }
+            unit = units.get(name, leg.joint.force_unit.replace(" ", "."))
+            least = None if name == "offset" else 0.0
+            yield Variable(
+                f"drive{i}.{name}", unit, f"Leg {i}: {texts[name]}", float(next(values)), least
+            )

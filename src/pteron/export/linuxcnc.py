@@ -1,0 +1,191 @@
+"""LinuxCNC's kinematics of a machine: a component around the exported C, with INI and HAL lines.
+
+The component has the three functions that LinuxCNC 2.8 and 2.9 ask of a kinematics module, and
+converts their millimetres and degrees. A machine whose joints are linear in x, y and z may use
+LinuxCNC's own matrixkins instead, for which the numbers are written too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pteron.atomic import write_texts
+from pteron.equations.machine import Machine, closure_of
+from pteron.export.c import c_texts, prefix_of
+from pteron.export.descriptions import banner
+from pteron.export.functions import chosen
+from pteron.export.start_pose import start_pose
+from pteron.kernels import Array
+from pteron.kernels.code import rendered
+from pteron.kinematics import inverse_kinematics, jacobian
+from pteron.kinematics.evaluate import unchecked
+from pteron.manipulator import Manipulator, expect_manipulator
+
+_MILLIMETRES = 1000.0
+_DEGREES = 180.0 / math.pi
+
+
+@dataclass(frozen=True)
+class _Axis:
+    """A coordinate of the pose and the axis of LinuxCNC that it is."""
+
+    letter: str
+    field: str
+    """Of EmcPose."""
+    name: str
+    scale: float
+    """LinuxCNC's units, mm or degrees, per m or rad; negative where it counts the other way."""
+
+
+@dataclass(frozen=True)
+class _Joint:
+    name: str
+    angular: bool
+    scale: float
+    home: float
+    least: float | None
+    most: float | None
+    speed: float | None
+    """The last four in mm or degrees, the speed per second; None where the file has none."""
+
+
+def export_linuxcnc(robot: Manipulator, folder: str | Path = ".") -> list[Path]:
+    """Write a machine's kinematics for LinuxCNC, with lines for its INI and HAL files.
+
+    The component is built by `halcompile --install NAMEkins.comp` and gives LinuxCNC 2.8 and 2.9
+    `kinematicsForward`, `kinematicsInverse` and `kinematicsType`. Axes X, Y and Z are the position
+    of P, in mm; for planar machines X and Y are the pose's two lengths; phi, in degrees, is A, B or
+    C where the platform turns about x, y or z, else C. Joints are in mm or degrees. Of the poses
+    that joints allow, forward kinematics return the one nearest to the last.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine; its name becomes the files' prefix.
+    folder : path
+        Where; made if it is missing.
+
+    Returns
+    -------
+    list of Path
+        NAMEkins.comp, NAME.ini, NAME.hal, and for machines linear in x, y and z
+        NAME_matrixkins.hal.
+
+    Raises
+    ------
+    ModelError
+        If the machine has no pose to home at.
+    OutputError
+        If the folder cannot be written.
+
+    Examples
+    --------
+    >>> import pteron, tempfile
+    >>> from pteron.export import export_linuxcnc
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     files = export_linuxcnc(pteron.load("quadrupteron"), folder)
+    >>> [path.name for path in files]
+    ['quadrupteronkins.comp', 'quadrupteron.ini', 'quadrupteron.hal']
+    """
+    expect_manipulator(robot)
+    prefix = prefix_of(robot)
+    closed = closure_of(robot).closed_form
+    names = ("inverse_kinematics", "direct_kinematics" if closed else "direct_step")
+    exported = chosen(robot, names, specialised=True, wrench=False, output="force", base=None)
+    texts = c_texts(robot, exported)
+    home = start_pose(robot)
+    axes, joints = _axes(robot), tuple(_joints(robot, home))
+    values = {
+        "banner": [line for line in banner(robot, "LinuxCNC") if "SI units" not in line],
+        "prefix": prefix,
+        "upper": prefix.upper(),
+        "name": f"{prefix}kins",
+        # One file, since halcompile takes one.
+        "code": texts[f"{prefix}.h"] + texts[f"{prefix}.c"].partition("#include <math.h>\n")[2],
+        "axes": axes,
+        "joints": joints,
+        "freedom": robot.freedom,
+        "modes": exported[1].outputs[0].shape[0] if closed else 0,
+        "lengths": len(robot.platform.lengths),
+        "free": _turns_freely(robot),
+        "home": dict(zip((axis.letter for axis in axes), home, strict=True)),
+        "places": [
+            next(
+                (
+                    f"{axis.scale * value:.6f}"
+                    for axis, value in zip(axes, home, strict=True)
+                    if axis.letter == letter
+                ),
+                "0",
+            )
+            for letter in "XYZABC"
+        ],
+        "planar": robot.platform.planar,
+        "tool": [_MILLIMETRES * v for v in robot.platform.tool],
+        "number": repr,
+    }
+    files = {
+        f"{prefix}kins.comp": rendered("pteron.export", "kins.comp.j2", **values),
+        f"{prefix}.ini": rendered("pteron.export", "linuxcnc.ini.j2", **values),
+        f"{prefix}.hal": rendered("pteron.export", "linuxcnc.hal.j2", **values),
+    }
+    if _linear(robot):
+        rows = np.asarray(jacobian(robot, np.zeros(3)))
+        offsets = _MILLIMETRES * np.asarray(unchecked(robot, "joint_coordinates", np.zeros(3)))
+        files[f"{prefix}_matrixkins.hal"] = rendered(
+            "pteron.export", "matrixkins.hal.j2", rows=rows.tolist(), offsets=offsets, **values
+        )
+    return write_texts(folder, files)
+
+
+def _linear(robot: Manipulator) -> bool:
+    """Return whether the joints are linear in x, y and z, which are all of the pose."""
+    legs = Machine.of(robot).legs
+    return robot.platform.coordinates == ("x", "y", "z") and all(
+        leg.row_is_constant for leg in legs
+    )
+
+
+def _turns_freely(robot: Manipulator) -> bool:
+    """Return whether a whole turn of the platform leaves the joints as they were."""
+    held = any(leg.follows_angle for leg in robot.legs)
+    return robot.platform.turns and not robot.platform.slides and not held
+
+
+def _axes(robot: Manipulator) -> tuple[_Axis, ...]:
+    """Return the axes of LinuxCNC that the pose's coordinates are."""
+    letters = iter("XYZ")
+    found = []
+    for name in robot.platform.coordinates:
+        if name != "phi":
+            letter = next(letters)
+            found.append(_Axis(letter, f"tran.{letter.lower()}", name, _MILLIMETRES))
+            continue
+        axis = np.array(robot.platform.axis)
+        place = int(np.abs(axis).argmax())
+        aligned = np.abs(axis[place]) > 1.0 - 1e-12 and not robot.platform.planar
+        letter = "ABC"[place] if aligned else "C"
+        sign = float(np.sign(axis[place])) if aligned else 1.0
+        found.append(_Axis(letter, letter.lower(), name, sign * _DEGREES))
+    return tuple(found)
+
+
+def _joints(robot: Manipulator, home: Array) -> Iterator[_Joint]:
+    coordinates = inverse_kinematics(robot, home)
+    for i, (leg, at) in enumerate(zip(robot.legs, coordinates, strict=True), start=1):
+        angular = leg.joint.unit == "rad"
+        scale = _DEGREES if angular else _MILLIMETRES
+        least, most = leg.limits or (None, None)
+        speed = leg.drive.max_speed if leg.drive else None
+        yield _Joint(
+            f"{leg.joint.coordinate}{i}",
+            angular,
+            scale,
+            scale * float(at),
+            *(None if v is None else scale * v for v in (least, most, speed)),
+        )

@@ -1,0 +1,68 @@
+"""A pose that a written model can start from: well in reach, within the joints' limits."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.errors import ModelError
+from pteron.kernels import Array
+from pteron.kinematics import inverse_kinematics, random_poses
+from pteron.kinematics.evaluate import unchecked
+from pteron.manipulator import Manipulator
+
+_TYPE_I, _TYPE_II = 0.01, 0.001
+"""Measures below which no pose is good; a type-II measure of a half is as good as a type-I of 1."""
+
+_SHARE = 0.5
+"""The share of the best pose's measure that a good pose has."""
+
+
+def start_pose(robot: Manipulator) -> Array:
+    """Return a pose (m,) to start from: zero if it is a good one, else amid the good ones.
+
+    Raises
+    ------
+    ModelError
+        If the machine has no such pose.
+    """
+    poses = good_poses(robot)
+    if len(poses) == 0:
+        raise ModelError(f"{robot.name}: no pose was found within the joints' limits to start from")
+    measures = _measures(robot, poses)
+    enough = _SHARE * measures.max()
+    poses = poses[measures >= enough]
+    apart = np.linalg.norm(poses - np.median(poses, axis=0), axis=1)
+    middle: Array = poses[apart.argmin()]
+    rounded = np.array([float(f"{v:.3g}") for v in middle])
+    for pose in (np.zeros(robot.freedom), rounded):
+        if keeps_limits(robot, pose) and _measures(robot, pose) >= 0.9 * enough:
+            return pose
+    return middle
+
+
+def good_poses(robot: Manipulator) -> Array:
+    """Return random poses (k, m) away from singularities, within the joints' limits."""
+    poses = random_poses(robot, 500, seed=1, type_i=_TYPE_I, type_ii=_TYPE_II)
+    return poses[keeps_limits(robot, poses)]
+
+
+def _measures(robot: Manipulator, poses: Array) -> Array:
+    """Return how far poses (..., m) are from singular: the worst type-I or twice the type-II."""
+    bent = np.sqrt(unchecked(robot, "squared_type_i", poses).min(axis=-1))
+    held = 2.0 * np.abs(unchecked(robot, "type_ii", poses))
+    return np.asarray(np.minimum(bent, held))
+
+
+def keeps_limits(robot: Manipulator, poses: Array) -> NDArray[np.bool_]:
+    """Return whether poses (..., m) are in reach with every joint within its limits."""
+    joints = inverse_kinematics(robot, poses, on_failure="nan")
+    least, most = joint_limits(robot)
+    return np.asarray((np.isfinite(joints) & ~((joints < least) | (joints > most))).all(axis=-1))
+
+
+def joint_limits(robot: Manipulator) -> tuple[Array, Array]:
+    """Return the joints' limits (n,) each, m or rad; NaN where there are none."""
+    limits = [leg.limits or (np.nan, np.nan) for leg in robot.legs]
+    least, most = np.array(limits).T
+    return least, most

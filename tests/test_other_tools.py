@@ -1,0 +1,712 @@
+"""Models for other tools, run by those tools or by what they say that they compute."""
+
+import configparser
+import ctypes
+import re
+import subprocess
+import sys
+import zipfile
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from tempfile import mkdtemp
+
+import casadi as ca
+import fmpy
+import numpy as np
+import pytest
+from fmpy.validation import validate_fmu
+from mechanisms import CATALOG, MECHANISMS, random_machine, states, with_elbows
+from scipy.integrate import solve_ivp
+from typer.testing import CliRunner
+
+import pteron
+from pteron.cli.main import app
+from pteron.errors import DataError, ModelError, OutputError, UnreachablePose
+from pteron.export import (
+    casadi_functions,
+    export_casadi,
+    export_fmu,
+    export_klipper,
+    export_linuxcnc,
+)
+
+
+def driven(robot, **more):
+    """Return a machine whose drives differ from leg to leg, with friction of every kind."""
+    legs = [
+        replace(
+            leg,
+            drive=pteron.Drive(
+                *(0.3 + 0.1 * i, 0.4 - 0.05 * i, 0.05 * i, 1e-5, 40.0 - 90.0 * (i % 2)),
+                rest_speed=0.02,
+                stribeck=pteron.Stribeck(0.1, 0.05),
+                **more,
+            ),
+        )
+        for i, leg in enumerate(robot.legs)
+    ]
+    return replace(robot, legs=tuple(legs))
+
+
+ROBOTS = {
+    "quadrupteron": driven(CATALOG["quadrupteron"]),
+    "oblique": replace(with_elbows(MECHANISMS["quadrupteron-oblique"], "+--+"), name="oblique"),
+    "delta": CATALOG["delta"],
+    "par4": driven(CATALOG["par4"]),
+    "five-bar": driven(CATALOG["five-bar"]),
+    "3-rrr": CATALOG["3-rrr"],
+    "mixed": driven(random_machine(3, "PRSU")),
+    "sliding": random_machine(5, "RRRRI"),
+}
+
+
+# CasADi
+
+
+@pytest.mark.parametrize("name", ["quadrupteron", "delta", "par4", "3-rrr", "mixed"])
+def test_casadi_functions_are_the_librarys(name):
+    robot = ROBOTS[name]
+    functions = casadi_functions(robot)
+    rng = np.random.default_rng(2)
+    for pose, velocity, acceleration in zip(*states(robot, 3), strict=True):
+        wrench = rng.normal(size=robot.freedom)
+        motion = pose, velocity, acceleration
+        forces = pteron.inverse_dynamics(robot, *motion, wrench=wrench)
+        joints = pteron.inverse_kinematics(robot, pose)
+        given = {
+            "inverse_kinematics": (pose,),
+            "jacobian": (pose,),
+            "mass_matrix": (pose,),
+            "bias_forces": (pose, velocity),
+            "inverse_dynamics": (*motion, wrench),
+            "forward_dynamics": (pose, velocity, forces, wrench),
+            "drive_accelerations": (pose, velocity, forces, wrench),
+        }
+        for function, values in given.items():
+            *state, last = values
+            loaded = last is wrench
+            own = getattr(pteron, function)
+            expected = own(robot, *state, wrench=last) if loaded else own(robot, *values)
+            found = np.array(functions[function](*values)).reshape(expected.shape)
+            np.testing.assert_allclose(found, expected, 1e-9, 1e-9 * np.abs(expected).max())
+        needed = functions["drive_forces"](*motion, wrench)
+        back = functions["drive_accelerations"](pose, velocity, needed, wrench)
+        np.testing.assert_allclose(np.array(back).ravel(), acceleration, 1e-9, 1e-9)
+        rates = functions["state_rates"](np.concatenate([pose, velocity]), needed, wrench)
+        expected = np.concatenate([velocity, acceleration])
+        np.testing.assert_allclose(np.array(rates).ravel(), expected, 1e-9, 1e-9)
+        if "direct_kinematics" in functions:
+            poses = np.array(functions["direct_kinematics"](joints))
+            assert np.nanmin(np.abs(poses - pose).max(axis=1)) < 1e-9
+        else:
+            found, _ = functions["direct_step"](joints, pose + 1e-3)
+            np.testing.assert_allclose(np.array(found).ravel(), pose, 0.0, 1e-9)
+
+
+@pytest.mark.parametrize("name", ["quadrupteron", "mixed"])
+@pytest.mark.parametrize("speed", [0.0, 1.0])
+def test_casadi_differentiates_friction_also_at_rest(name, speed):
+    robot = ROBOTS[name]
+    pose, velocity = (value[0] for value in states(robot, 1)[:2])
+    zero = ca.DM.zeros(robot.freedom)
+    pose, velocity = ca.DM(pose), ca.DM(speed * velocity)
+    function = casadi_functions(robot)["drive_forces"]
+    jacobian = function.jacobian()
+    parts = jacobian(pose, velocity, zero, zero, zero)
+    found = np.array(parts[jacobian.name_out().index("jac_forces_velocity")])
+    steps = ca.horzsplit(1e-6 * ca.DM.eye(robot.freedom))
+    ends = [[function(pose, velocity + h, zero, zero) for h in (step, -step)] for step in steps]
+    expected = np.array(ca.horzcat(*((more - less) / 2e-6 for more, less in ends)))
+    np.testing.assert_allclose(found, expected, 0.0, 1e-5 * np.abs(found).max())
+
+
+@pytest.mark.parametrize("name", ["quadrupteron", "3-rrr"])
+def test_the_casadi_example_finds_a_motion(tmp_path, name):
+    files = export_casadi(ROBOTS[name], tmp_path)
+    done = subprocess.run(
+        [sys.executable, files[-1].name], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "largest forces: [" in done.stdout
+
+
+# FMU
+
+
+@cache
+def fmu_of(name):
+    """Return the path of a machine's FMU."""
+    (path,) = export_fmu(ROBOTS[name], mkdtemp())
+    return str(path)
+
+
+def started(path):
+    """Return the start values of an FMU's variables by name."""
+    description = fmpy.read_model_description(path)
+    return {v.name: float(v.start) for v in description.modelVariables if v.start is not None}
+
+
+def simulated(path, kind, stop, **values):
+    """Return what fmpy simulates, and what the FMU says."""
+    said = []
+    result = fmpy.simulate_fmu(
+        path,
+        fmi_type=kind,
+        stop_time=stop,
+        output_interval=stop / 8,
+        relative_tolerance=1e-10,
+        start_values=values,
+        logger=lambda *message: said.append(message[-1].decode()),
+    )
+    return result, said
+
+
+KINDS = ["CoSimulation", "ModelExchange"]
+
+
+@pytest.mark.parametrize("name", ["quadrupteron", "oblique", "delta", "par4", "five-bar", "mixed"])
+def test_fmpy_simulates_an_fmu_as_scipy_the_librarys_equations(name):
+    """With forces, a wrench, and a payload, which here is another platform."""
+    robot, path = ROBOTS[name], fmu_of(name)
+    assert validate_fmu(path) == []
+    n, starts = robot.freedom, started(path)
+    pose = np.array([starts[f"pose.{c}"] for c in robot.platform.coordinates])
+    inputs = [f"{leg.joint.force}{i}" for i, leg in enumerate(robot.legs, start=1)]
+    held = np.array([starts[k] for k in inputs])
+    rest = np.zeros(n)
+    np.testing.assert_allclose(held, pteron.drive_forces(robot, pose, rest, rest), 1e-12)
+    push = 0.02 * np.abs(held).max() * np.array([1.0, -0.5, 0.7, 0.3])[:n] + 0.2
+    wrench = 0.1 * push[::-1]
+    load = {"payload.mass": 0.3}
+    values = pteron.parameters(robot).copy()
+    values[-4] += 0.3
+    if robot.platform.turns:
+        load |= {"payload.x": 0.02, "payload.y": -0.01, "payload.inertia": 1e-3}
+        values[-3:] += [0.3 * 0.02, -0.3 * 0.01, 1e-3 + 0.3 * (0.02**2 + 0.01**2)]
+    loaded = pteron.with_parameters(robot, values)
+
+    def rates(_, state):
+        forward = pteron.drive_accelerations(
+            loaded, state[:n], state[n:], held + push, wrench=wrench
+        )
+        return np.concatenate([state[n:], forward])
+
+    stop = 0.04
+    expected = solve_ivp(
+        rates, (0.0, stop), [*pose, *rest], method="DOP853", rtol=1e-11, atol=1e-13
+    ).y[:, -1]
+    assert np.abs(expected[:n] - pose).max() > 1e-5
+    coordinates = robot.platform.coordinates
+    for kind in KINDS:
+        result, said = simulated(
+            path,
+            kind,
+            stop,
+            **dict(zip(inputs, held + push, strict=True)),
+            **{f"wrench.{c}": w for c, w in zip(coordinates, wrench, strict=True)},
+            **load,
+        )
+        assert said == []
+        last = result[-1]
+        found = [last[f"pose.{c}"] for c in coordinates]
+        found += [last[f"velocity.{c}"] for c in coordinates]
+        np.testing.assert_allclose(found, expected, 0.0, 1e-7)
+        motion = pteron.jacobian(robot, expected[:n]) @ expected[n:]
+        for i, leg in enumerate(robot.legs):
+            own = f"{leg.joint.coordinate}{i + 1}"
+            joints = pteron.inverse_kinematics(robot, expected[:n])
+            assert last[own] == pytest.approx(joints[i], abs=1e-6)
+            assert last[f"{own}_rate"] == pytest.approx(motion[i], abs=1e-6)
+        forward = rates(0.0, expected)[n:]
+        given = [last[f"acceleration.{c}"] for c in coordinates]
+        np.testing.assert_allclose(given, forward, 0.0, 1e-4 * np.abs(forward).max())
+
+
+@pytest.mark.parametrize("name", ["quadrupteron", "five-bar"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_fmu_ends_where_a_leg_does_not_reach(name, kind):
+    path, robot = fmu_of(name), ROBOTS[name]
+    first = f"{robot.legs[0].joint.force}1"
+    result, said = simulated(path, kind, 4.0, **{first: started(path)[first] - 8.0})
+    assert result["time"][-1] < 4.0
+    (text,) = said
+    time, leg = re.match(r"([\d.]+) s: leg (\d) is at the edge of its reach", text).groups()
+    assert result["time"][-1] - 0.5 <= float(time) <= result["time"][-1] + 0.5
+    if kind == "CoSimulation":  # fmpy keeps no sample of the end of model exchange
+        assert abs(result[f"reach_reserve{leg}"][-1]) < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"pose.x": 300.0}, "does not reach the platform at the pose to start from"),
+        ({"payload.mass": -1.0}, "must be 0 or more; -1 was given"),
+        ({"force1": np.nan}, "a number is expected"),
+        ({"drive1.rest_speed": 0.0}, "no finite acceleration"),
+    ],
+)
+def test_an_fmu_refuses_what_it_cannot_start_from(values, words):
+    said = []
+    with pytest.raises(fmpy.fmi1.FMICallException):
+        fmpy.simulate_fmu(
+            fmu_of("quadrupteron"),
+            start_values=values,
+            logger=lambda *message: said.append(message[-1].decode()),
+        )
+    assert words in said[0]
+
+
+def test_casadi_takes_the_fmu_too():
+    robot = ROBOTS["par4"]
+    model = ca.DaeBuilder("par4", str(fmpy.extract(fmu_of("par4"))), {})
+    function = model.create("f", ["x", "u"], ["ode", "y"])
+    n, start = robot.freedom, started(fmu_of("par4"))
+    states = np.array([start[name] for name in model.x()]) + np.repeat([0.0, 0.3], n)
+    inputs = np.array([start[name] for name in model.u()]) + 0.1 * np.arange(2 * n)
+    rates = np.array(function(ca.DM(states), ca.DM(inputs))[0]).ravel()
+    forward = pteron.drive_accelerations(
+        robot, states[:n], states[n:], inputs[:n], wrench=inputs[n:]
+    )
+    np.testing.assert_allclose(rates, [*states[n:], *forward], 1e-12)
+
+
+def test_an_fmu_goes_back_to_a_kept_state_and_to_its_start():
+    path = fmu_of("delta")
+    description = fmpy.read_model_description(path)
+    folder = fmpy.extract(path)
+    unit = fmpy.instantiate_fmu(folder, description, "CoSimulation")
+    references = [v.valueReference for v in description.modelVariables if "pose" in v.name]
+    force = [v.valueReference for v in description.modelVariables if v.name == "torque1"]
+
+    def run(time):
+        unit.doStep(currentCommunicationPoint=time, communicationStepSize=0.01)
+        return unit.getFloat64(references)
+
+    def begin():
+        unit.enterInitializationMode()
+        unit.exitInitializationMode()
+        unit.setFloat64(force, [10.0])
+
+    begin()
+    first = run(0.0)
+    kept = unit.getFMUState()
+    second = run(0.01)
+    assert first != second
+    unit.setFMUState(kept)
+    assert run(0.01) == second
+    unit.freeFMUState(kept)
+    unit.reset()
+    begin()
+    assert run(0.0) == first
+    with pytest.raises(fmpy.fmi1.FMICallException):
+        unit.doStep(currentCommunicationPoint=0.5, communicationStepSize=0.01)
+    unit.freeInstance()
+
+
+def test_an_fmu_has_its_sources_and_is_refused_clearly(tmp_path, monkeypatch):
+    with zipfile.ZipFile(fmu_of("delta")) as archive:
+        names = set(archive.namelist())
+    assert {"sources/delta.c", "sources/fmu.c", "sources/buildDescription.xml"} < names
+    with pytest.raises(DataError, match=r"pose: shape \(2,\) given, \(3,\) expected: x, y, z"):
+        export_fmu(CATALOG["delta"], tmp_path, pose=[0.0, 0.0])
+    with pytest.raises(UnreachablePose):
+        export_fmu(CATALOG["delta"], tmp_path, pose=[0.0, 0.0, -820.0])
+    (tmp_path / "file").touch()
+    with pytest.raises(OutputError, match="it is a file"):
+        export_fmu(CATALOG["five-bar"], tmp_path / "file")
+    monkeypatch.setenv("CC", "no-such-compiler")
+    with pytest.raises(ModelError, match="an FMU needs a C compiler, which is not here"):
+        export_fmu(CATALOG["five-bar"], tmp_path)
+    monkeypatch.setenv("CC", "false")
+    with pytest.raises(ModelError, match=r"could not be compiled with .*false: exit code 1"):
+        export_fmu(CATALOG["five-bar"], tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+# Klipper
+
+
+def settings(robot, folder):
+    """Return the configuration as Klipper reads it, and its text."""
+    (path,) = export_klipper(robot, folder)
+    parser = configparser.RawConfigParser(
+        strict=False, inline_comment_prefixes=(";", "#"), delimiters=(":", "=")
+    )
+    parser.read_string(path.read_text())
+    return parser, path.read_text()
+
+
+def coefficients(text):
+    """Read `carriages` as klippy/kinematics/kinematic_stepper.py does: float*name, +name, -name."""
+    found = np.zeros(3)
+    for term in re.findall(r"[+-]?[^+-]+", text):
+        *factor, axis = term.split("*")
+        if not factor:
+            sign, axis = (-1.0, axis[1:]) if axis[0] == "-" else (1.0, axis.lstrip("+"))
+        assert axis in ("x", "y", "z")
+        assert found["xyz".index(axis)] == 0.0
+        found["xyz".index(axis)] = float(factor[0]) if factor else sign
+    return found
+
+
+def klipper_steppers(config):
+    """Return functions from x, y, z in mm to the steppers' positions, by Klipper's formulas."""
+    printer = config["printer"]
+    kind = printer["kinematics"]
+    if kind == "generic_cartesian":  # klippy/chelper/kin_generic.c
+        assert {f"carriage {axis}" for axis in "xyz"} <= set(config.sections())
+        rows = [coefficients(config[s]["carriages"]) for s in config if s.startswith("stepper ")]
+        assert abs(np.linalg.det(np.array(rows).T @ np.array(rows))) > 1e-5
+        return [lambda p, row=row: p @ row for row in rows]
+    towers = [config[f"stepper_{name}"] for name in "abc"]
+    if kind == "delta":  # klippy/kinematics/delta.py, klippy/chelper/kin_delta.c
+        radius = float(printer["delta_radius"])
+
+        def carriage(p, tower):
+            arm, angle = float(tower["arm_length"]), np.radians(float(tower["angle"]))
+            assert arm > radius
+            away = p[:, :2] - radius * np.array([np.cos(angle), np.sin(angle)])
+            return np.sqrt(arm**2 - (away**2).sum(axis=1)) + p[:, 2]
+
+        return [lambda p, tower=tower: carriage(p, tower) for tower in towers]
+    assert kind == "rotary_delta"  # klippy/chelper/kin_rotary_delta.c
+
+    def arm(p, tower):
+        angle = np.radians(float(tower["angle"]))
+        cos, sin = np.cos(angle), np.sin(angle)
+        upper, lower = (float(tower[f"{k}_arm_length"]) for k in ("upper", "lower"))
+        aside = p[:, 1] * cos - p[:, 0] * sin
+        dx = p[:, 0] * cos + p[:, 1] * sin - float(printer["shoulder_radius"])
+        dy = p[:, 2] - float(printer["shoulder_height"])
+        # elbow_y = first - slope elbow_x, from the difference of the two circles
+        first = (dx**2 + dy**2 + upper**2 - (lower**2 - aside**2)) / (2.0 * dy)
+        slope = dx / dy
+        scale = slope**2 + 1.0
+        x = first * slope + np.sqrt(scale * upper**2 - first**2)
+        return np.arctan2(first * scale - slope * x, x)
+
+    return [lambda p, tower=tower: arm(p, tower) for tower in towers]
+
+
+def lowered(robot, count=50):
+    """Return poses of a Delta whose platform is below."""
+    poses = pteron.random_poses(robot, 20 * count, seed=3, type_i=0.1, type_ii=0.0)
+    lowest = min(leg.guide_point[2] for leg in robot.legs)
+    return poses[poses[:, 2] < lowest - 0.01][:count]
+
+
+def mirrored(robot):
+    """Return a linear Delta whose sliders count downwards."""
+    legs = [
+        replace(leg, slider_direction=(0.0, 0.0, -1.0), elbow=-leg.elbow, limits=(-0.48, -0.13))
+        for leg in robot.legs
+    ]
+    return driven(replace(robot, legs=tuple(legs)))
+
+
+def reversed_cranks(robot):
+    """Return a rotary Delta whose second crank counts downwards, from another zero."""
+    first, leg, last = robot.legs
+    r, d = np.array(leg.guide_point), np.array(leg.direction)
+    turned = replace(
+        leg,
+        direction=tuple(-d),
+        zero_direction=tuple(-np.array([0.0, 0.0, 1.0])),
+        elbow=-leg.elbow,
+        limits=(-2.0, 0.5),
+        platform_point=tuple(1.1 * np.array(leg.platform_point)),
+        guide_point=tuple(r + 0.1 * np.array(leg.platform_point)),
+    )
+    return driven(replace(robot, legs=(first, turned, last)))
+
+
+KLIPPER = {
+    "tripteron": CATALOG["tripteron"],
+    "tripteron-router": driven(CATALOG["tripteron-router"]),
+    "tripteron-oblique": CATALOG["tripteron-oblique"],
+    "tripteron-colinear": CATALOG["tripteron-colinear"],
+    "on a wall": MECHANISMS["tripteron on a wall"],
+    "random": MECHANISMS["random 3T 0"],
+    "linear-delta": CATALOG["linear-delta"],
+    "mirrored": mirrored(CATALOG["linear-delta"]),
+    "delta": CATALOG["delta"],
+    "cranks": reversed_cranks(CATALOG["delta"]),
+}
+
+
+@pytest.mark.parametrize("name", KLIPPER)
+def test_klipper_puts_the_joints_where_the_library_does(tmp_path, name):
+    robot = KLIPPER[name]
+    config, text = settings(robot, tmp_path)
+    rotary = config["printer"]["kinematics"] == "rotary_delta"
+    shift = 0.0
+    if rotary:
+        shift = float(re.search(r"the bed, is the pose's z = (\S+) mm", text)[1])
+    poses = lowered(robot) if rotary else states(robot, 50)[0]
+    assert len(poses) > 10
+    joints = pteron.inverse_kinematics(robot, poses)
+    told = re.findall(r"Its position is (-?)(\w+) in (mm|rad) ([+-]) (\S+) (?:mm|rad)", text)
+    unit = 1.0 if rotary else 1000.0
+    for i, (stepper, (sign, joint, _, side, offset)) in enumerate(
+        zip(klipper_steppers(config), told, strict=True)
+    ):
+        assert joint == f"{robot.legs[i].joint.coordinate}{i + 1}"
+        found = stepper(1000.0 * poses - [0.0, 0.0, shift])
+        expected = unit * joints[:, i] * (-1.0 if sign else 1.0)
+        apart = found - expected
+        if rotary:  # whole turns left out
+            apart = (apart - apart[0] + np.pi) % (2.0 * np.pi) - np.pi + apart[0]
+        np.testing.assert_allclose(apart, apart[0], 0.0, 1e-9 * unit)
+        assert apart[0] == pytest.approx(float(side + offset), abs=1e-7 * unit)
+
+
+@pytest.mark.parametrize("name", ["linear-delta", "mirrored", "delta"])
+def test_klippers_end_stops_are_the_joints_upper_limits(tmp_path, name):
+    """position_endstop is z on the axis, with all carriages or arms where they end."""
+    robot = KLIPPER[name]
+    config, text = settings(robot, tmp_path)
+    told = re.findall(r"Its position is (-?)(\w+) in (mm|rad) ([+-]) (\S+) (?:mm|rad)", text)
+    for leg, letter, stepper, (sign, _, unit, side, offset) in zip(
+        robot.legs, "abc", klipper_steppers(config), told, strict=True
+    ):
+        end = float(config[f"stepper_{letter}"]["position_endstop"])
+        limit = -leg.limits[0] if sign else leg.limits[1]
+        scale = 1000.0 if unit == "mm" else 1.0
+        (found,) = stepper(np.array([[0.0, 0.0, end]]))
+        assert found == pytest.approx(scale * limit + float(side + offset), abs=1e-6 * scale)
+
+
+def test_klippers_box_keeps_the_joints_limits(tmp_path):
+    for name, fills in (("tripteron-router", True), ("tripteron-oblique", False)):
+        robot = replace(
+            CATALOG[name],
+            legs=tuple(replace(leg, limits=(-0.05, 0.11)) for leg in CATALOG[name].legs),
+        )
+        config, text = settings(robot, tmp_path)
+        assert ("its end stop is that axis' own" in text) == fills
+        ends = [
+            [float(config[f"carriage {a}"][f"position_{k}"]) for a in "xyz"] for k in ("min", "max")
+        ]
+        corners = np.array(np.meshgrid(*np.transpose(ends))).reshape(3, -1).T / 1000.0
+        joints = corners @ pteron.jacobian(robot, np.zeros(3)).T
+        joints += np.array(pteron.inverse_kinematics(robot, np.zeros(3)))
+        assert joints.min() == pytest.approx(-0.05, abs=1e-6)
+        assert joints.max() == pytest.approx(0.11, abs=1e-6)
+
+
+def test_klipper_is_told_of_the_drives(tmp_path):
+    config, _ = settings(KLIPPER["tripteron-router"], tmp_path)
+    assert float(config["stepper rho1"]["rotation_distance"]) == pytest.approx(2000 * np.pi / 40.0)
+    config, _ = settings(KLIPPER["cranks"], tmp_path)
+    assert [config[f"stepper_{k}"]["gear_ratio"] for k in "abc"] == ["40:1", "50:1", "40:1"]
+
+
+def with_leg(robot, **changes):
+    """Return a machine whose second leg is changed."""
+    legs = list(robot.legs)
+    legs[1] = replace(legs[1], **changes)
+    return replace(robot, legs=tuple(legs))
+
+
+LINEAR, DELTA = CATALOG["linear-delta"], CATALOG["delta"]
+
+
+@pytest.mark.parametrize(
+    ("robot", "words"),
+    [
+        (CATALOG["quadrupteron"], "this machine's pose is x, y, z, phi; use --linuxcnc"),
+        (CATALOG["five-bar"], "this machine's pose is x, y; use --linuxcnc"),
+        (CATALOG["orthoglide"], "leg 1: its guide is not vertical"),
+        (CATALOG["delta-omnid"], "turn a model over whose platform is above"),
+        (MECHANISMS["random PRR 0"], "neither all linear in the pose"),
+        (with_leg(LINEAR, guide_point=(0.105, -0.0599, 0.0)), r"leg 2: is [\d.]+ mm from the z"),
+        (with_leg(LINEAR, lower_length=0.09), "rod of 90 mm is shorter than the radius, 99.8 mm"),
+        (with_elbows(LINEAR, "+++"), "leg 1: its slider is below the platform"),
+        (with_elbows(DELTA, "+-+"), "leg 2: its elbow is inside"),
+        (with_leg(DELTA, platform_point=(-0.0625, 0.1, 0.0)), "leg 2: its crank's plane passes"),
+        (
+            with_leg(DELTA, platform_point=(-0.0625, 0.10825317547305482, 0.02)),
+            "leg 2: has its shoulder at z = -20 mm, leg 1 0 mm",
+        ),
+        (
+            pteron.turned(DELTA, [[1, 0, 0], [0, 0, -1], [0, 1, 0]]),
+            "crank's axis is not horizontal",
+        ),
+    ],
+)
+def test_klipper_is_not_given_a_machine_that_it_cannot_move(tmp_path, robot, words):
+    with pytest.raises(ModelError, match=words) as refusal:
+        export_klipper(robot, tmp_path)
+    assert "\n" not in str(refusal.value)
+    assert not list(tmp_path.iterdir())
+
+
+# LinuxCNC
+
+
+STUBS = {
+    "rtapi_math.h": "#include <math.h>\n",
+    "kinematics.h": """
+        typedef struct { double x, y, z; } PmCartesian;
+        typedef struct EmcPose { PmCartesian tran; double a, b, c, u, v, w; } EmcPose;
+        typedef enum {
+            KINEMATICS_IDENTITY = 1, KINEMATICS_FORWARD_ONLY, KINEMATICS_INVERSE_ONLY,
+            KINEMATICS_BOTH
+        } KINEMATICS_TYPE;
+        typedef unsigned long int KINEMATICS_FORWARD_FLAGS;
+        typedef unsigned long int KINEMATICS_INVERSE_FLAGS;
+        extern int kinematicsForward(const double *, struct EmcPose *,
+            const KINEMATICS_FORWARD_FLAGS *, KINEMATICS_INVERSE_FLAGS *);
+        extern int kinematicsInverse(const struct EmcPose *, double *,
+            const KINEMATICS_INVERSE_FLAGS *, KINEMATICS_FORWARD_FLAGS *);
+        extern KINEMATICS_TYPE kinematicsType(void);
+        #define EXPORT_SYMBOL(x) extern int symbol_##x
+        #define KINS_NOT_SWITCHABLE
+    """,
+}
+"""What the component needs of LinuxCNC 2.9: of kinematics.h, emcpos.h, posemath.h, rtapi_math.h."""
+
+
+class EmcPose(ctypes.Structure):
+    _fields_ = [(name, ctypes.c_double) for name in ("x", "y", "z", *"abcuvw")]
+
+
+def kinematics(robot, folder):
+    """Return LinuxCNC's forward and inverse kinematics of a machine, and its files by suffix."""
+    files = {path.name.partition(".")[2]: path for path in export_linuxcnc(robot, folder)[:3]}
+    source = files["comp"].read_text()
+    assert source.isascii()
+    head, _, code = source.partition("\n;;\n")
+    assert re.search(rf"^component {files['comp'].stem} ", head, re.MULTILINE)
+    (folder / "kins.c").write_text(code)
+    for name, text in STUBS.items():
+        (folder / name).write_text(text)
+    flags = ["-std=gnu99", "-O0", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Werror"]
+    subprocess.run(
+        ["gcc", *flags, "-shared", "-fPIC", "-I.", "kins.c", "-o", "kins.so", "-lm"],
+        cwd=folder,
+        check=True,
+    )
+    return ctypes.CDLL(str(folder / "kins.so")), files
+
+
+LINUXCNC = ROBOTS | {
+    "tripteron-oblique": CATALOG["tripteron-oblique"],
+    "upside": pteron.turned(CATALOG["quadrupteron"], np.diag([1.0, -1.0, -1.0])),
+    "sideways": pteron.turned(CATALOG["quadrupteron"], [[0, 0, 1], [1, 0, 0], [0, 1, 0]]),
+    "h4": CATALOG["h4"],
+}
+ANGLE = {"upside": ("c", -1.0), "sideways": ("a", 1.0)}
+
+
+@pytest.mark.parametrize("name", LINUXCNC)
+def test_linuxcnc_goes_to_the_joints_and_back(tmp_path, name):
+    robot = LINUXCNC[name]
+    library, _ = kinematics(robot, tmp_path)
+    assert library.kinematicsType() == 4
+    n, degrees = robot.freedom, 180.0 / np.pi
+    units = [degrees if leg.joint.unit == "rad" else 1000.0 for leg in robot.legs]
+    letter, sign = ANGLE.get(name, ("c", 1.0))
+    lengths = len(robot.platform.lengths)
+    joints = (ctypes.c_double * 16)(*[77.0] * 16)
+    poses = states(robot, 20)[0].copy()
+    if robot.platform.turns and not robot.platform.slides and name != "mixed":
+        poses[::2, -1] += 4.0 * np.pi  # a whole turn more is kept
+    for pose in poses:
+        given = dict(zip("xyz", 1000.0 * pose[:lengths], strict=False))
+        if robot.platform.turns:
+            given[letter] = sign * degrees * pose[-1]
+        world = EmcPose(**given, w=5.0)
+        assert library.kinematicsInverse(ctypes.byref(world), joints, None, None) == 0
+        expected = units * pteron.inverse_kinematics(robot, pose)
+        np.testing.assert_allclose(joints[:n], expected, 1e-12, 1e-9)
+        assert list(joints[n:]) == [77.0] * (16 - n)
+        near = EmcPose(**{key: value + 0.3 for key, value in given.items()}, w=5.0)
+        assert library.kinematicsForward(joints, ctypes.byref(near), None, None) == 0
+        for key, _ in EmcPose._fields_:
+            assert getattr(near, key) == pytest.approx(given.get(key, 0.0), abs=1e-6, rel=1e-9)
+    far = EmcPose(x=1e6)
+    before = list(joints)
+    assert library.kinematicsInverse(ctypes.byref(far), joints, None, None) == -1
+    assert list(joints) == before
+    nowhere = (ctypes.c_double * 16)(*[1e6 * (k + 1) for k in range(16)])
+    assert library.kinematicsForward(nowhere, ctypes.byref(near), None, None) in (0, -1)
+
+
+def test_linuxcncs_files_tell_home_and_limits(tmp_path):
+    robot = driven(CATALOG["delta"], max_speed=2.0)
+    library, files = kinematics(robot, tmp_path)
+    parser = configparser.RawConfigParser()
+    parser.read_string(files["ini"].read_text())
+    assert parser["KINS"]["JOINTS"] == "3"
+    assert parser["TRAJ"]["COORDINATES"] == "XYZ"
+    world = EmcPose(*map(float, parser["TRAJ"]["HOME"].split()))
+    joints = (ctypes.c_double * 16)()
+    assert library.kinematicsInverse(ctypes.byref(world), joints, None, None) == 0
+    for k, leg in enumerate(robot.legs):
+        joint = parser[f"JOINT_{k}"]
+        assert joint["TYPE"] == "ANGULAR"
+        assert float(joint["HOME"]) == pytest.approx(joints[k], abs=1e-4)
+        assert float(joint["MIN_LIMIT"]) == pytest.approx(np.degrees(leg.limits[0]), abs=1e-6)
+        assert float(joint["MAX_VELOCITY"]) == pytest.approx(np.degrees(2.0), abs=1e-6)
+    assert files["hal"].read_text().count("motor-pos-fb") == 4
+
+
+@pytest.mark.parametrize("name", ["tripteron-oblique", "random 3T 0"])
+def test_matrixkins_moves_the_joints_as_the_library_does(tmp_path, name):
+    robot = MECHANISMS[name]
+    *_, path = export_linuxcnc(robot, tmp_path)
+    text = path.read_text()
+    values = dict(re.findall(r"setp matrixkins\.C_(\w\w) (\S+)", text))
+    rows = np.array([[float(values[i + j]) for j in "xyz"] for i in "xyz"])
+    told = re.findall(r"= rho\d ([+-]) (\S+) mm", text)
+    offsets = [float(side + size) for side, size in told]
+    poses = states(robot, 20)[0]
+    joints = 1000.0 * pteron.inverse_kinematics(robot, poses) + offsets
+    np.testing.assert_allclose(1000.0 * poses @ rows.T, joints, 0.0, 1e-6)
+
+
+# The command line
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("", "none given; say what to write, such as --c controller"),
+        ("--fmu a --casadi b", "--casadi, --fmu: give one at a time"),
+        ("--fmu a --c b", "--c, --fmu: give one at a time"),
+        ("--klipper a --float --wrench", "--float, --wrench: goes with --c and --st, not with"),
+        ("--linuxcnc a --base b.json", "--base: goes with --c and --st, not with --linuxcnc"),
+        ("--st a --float", "--float: goes with --c"),
+        ("--klipper a", "Klipper moves x, y and z alone"),
+    ],
+)
+def test_what_cannot_be_written_is_refused_in_one_line(tmp_path, monkeypatch, line, words):
+    monkeypatch.chdir(tmp_path)
+    result = CliRunner(env={"COLUMNS": "300"}).invoke(
+        app, ["export", "quadrupteron", *line.split()]
+    )
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert result.stderr.startswith("Error: ")
+    assert result.stderr.count("\n") == 1
+    assert words in result.stderr
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("target", "names"),
+    [
+        ("casadi", ["example_tripteron.py", "load_tripteron.py", "tripteron_jacobian.casadi"]),
+        ("fmu", ["tripteron.fmu"]),
+        ("klipper", ["tripteron.cfg"]),
+        ("linuxcnc", ["tripteron.ini", "tripteronkins.comp"]),
+    ],
+)
+def test_the_command_writes_what_is_asked_for(tmp_path, target, names):
+    line = ["export", "tripteron", "--elbows", "+-+", f"--{target}", str(tmp_path / "made")]
+    result = CliRunner(env={"COLUMNS": "300"}).invoke(app, line)
+    assert (result.exit_code, result.stderr) == (0, "")
+    files = [Path(text) for text in re.findall(r"Written: (\S+)", result.stdout)]
+    assert set(names) <= {path.name for path in files}
+    assert all(path.stat().st_size > 0 for path in files)
