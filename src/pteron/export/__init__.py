@@ -1,7 +1,17 @@
-"""Code for a controller: C99 and IEC 61131-3 Structured Text."""
+"""The machine for others: code for a controller, in C99 and Structured Text; files for engines."""
 
 from pteron.export.c import Real, export_c
+from pteron.export.engines import export_mjcf, export_pinocchio, pinocchio_model, tree
 from pteron.export.functions import FUNCTIONS
 from pteron.export.structured_text import export_st
 
-__all__ = ["FUNCTIONS", "Real", "export_c", "export_st"]
+__all__ = [
+    "FUNCTIONS",
+    "Real",
+    "export_c",
+    "export_mjcf",
+    "export_pinocchio",
+    "export_st",
+    "pinocchio_model",
+    "tree",
+]

@@ -7,7 +7,7 @@ engine's file may place its bodies there, or take their joints back to zero by `
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -201,6 +201,35 @@ def place(tree: Tree, coordinates: Mapping[str, float]) -> list[Array]:
             moved = moved @ displacement(joint, coordinates[joint.name] - joint.home)
         found.append(moved)
     return found
+
+
+def at_zero(tree: Tree) -> tuple[TreeBody, ...]:
+    """Return the bodies where all joint coordinates are zero: each chain for itself, loops open."""
+    found: list[TreeBody] = []
+    moved: list[Array] = []
+    for body in tree.bodies:
+        motion = np.eye(4) if body.parent == BASE else moved[body.parent]
+        joints = []
+        for joint in body.joints:
+            axis, point = motion[:3, :3] @ joint.axis, moved_point(motion, joint.point)
+            joints.append(replace(joint, axis=axis, point=point, home=0.0))
+            motion = motion @ displacement(joint, -joint.home)
+        moved.append(motion)
+        shapes = [
+            replace(shape, ends=np.array([moved_point(motion, end) for end in shape.ends]))
+            for shape in body.shapes
+        ]
+        found.append(
+            replace(
+                body,
+                joints=tuple(joints),
+                origin=moved_point(motion, body.origin),
+                axes=motion[:3, :3] @ body.axes,
+                center=moved_point(motion, body.center),
+                shapes=tuple(shapes),
+            )
+        )
+    return tuple(found)
 
 
 def displacement(joint: TreeJoint, by: float) -> Array:

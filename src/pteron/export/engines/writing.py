@@ -12,8 +12,8 @@ from pteron.export.engines.parts import BASE, Tree, TreeBody
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 
-_ROUNDING = 1e-15
-"""What is smaller is zero but for rounding; m, rad, or a part of a unit vector."""
+_DIGITS = 15
+"""After the point; what is beyond is rounding. m, rad, or parts of a unit vector."""
 
 COLORS = (
     "0.13 0.47 0.71 1",
@@ -29,9 +29,8 @@ BASE_COLOR = "0.45 0.46 0.48 1"
 
 
 def number(value: float) -> str:
-    """Return a number in the shortest form that reads back as the same."""
-    value = float(value)
-    return repr(0.0 if abs(value) < _ROUNDING else value).removesuffix(".0")
+    """Return a coordinate in the shortest form that reads back as the same, to 1e-15."""
+    return repr(round(float(value), _DIGITS) + 0.0).removesuffix(".0")
 
 
 def small(value: float) -> str:
@@ -42,6 +41,11 @@ def small(value: float) -> str:
 def row(values: Sequence[float] | Array) -> str:
     """Return numbers with spaces between them."""
     return " ".join(map(number, np.ravel(values)))
+
+
+def look(values: Sequence[float] | Array | float) -> str:
+    """Return numbers that nothing but a picture depends on."""
+    return " ".join(f"{round(float(value), 6) + 0.0:g}" for value in np.ravel(values))
 
 
 def frame(body: TreeBody) -> Array:
