@@ -1,7 +1,14 @@
 """The machine for others: code for a controller, in C99 and Structured Text; files for engines."""
 
 from pteron.export.c import Real, export_c
-from pteron.export.engines import export_mjcf, export_pinocchio, pinocchio_model, tree
+from pteron.export.engines import (
+    export_mjcf,
+    export_pinocchio,
+    export_sdf,
+    export_urdf,
+    pinocchio_model,
+    tree,
+)
 from pteron.export.functions import FUNCTIONS
 from pteron.export.structured_text import export_st
 
@@ -11,7 +18,9 @@ __all__ = [
     "export_c",
     "export_mjcf",
     "export_pinocchio",
+    "export_sdf",
     "export_st",
+    "export_urdf",
     "pinocchio_model",
     "tree",
 ]

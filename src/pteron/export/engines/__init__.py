@@ -4,7 +4,9 @@ from pteron.export.engines.coordinates import coordinates
 from pteron.export.engines.mjcf import export_mjcf, mjcf
 from pteron.export.engines.parts import Closing, Motor, Tree, TreeBody, TreeJoint
 from pteron.export.engines.pinocchio import export_pinocchio, pinocchio_model
+from pteron.export.engines.sdf import export_sdf
 from pteron.export.engines.tree import tree
+from pteron.export.engines.urdf import export_urdf
 
 __all__ = [
     "Closing",
@@ -15,6 +17,8 @@ __all__ = [
     "coordinates",
     "export_mjcf",
     "export_pinocchio",
+    "export_sdf",
+    "export_urdf",
     "mjcf",
     "pinocchio_model",
     "tree",

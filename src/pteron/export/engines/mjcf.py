@@ -21,6 +21,7 @@ from pteron.export.engines.writing import (
     identifier,
     inverse,
     look,
+    material,
     number,
     parent_frame,
     row,
@@ -128,7 +129,7 @@ def mjcf(opened: Tree, *, step: float = STEP) -> str:
         moments=lambda body: " ".join(map(small, body.moments)),
         placed=lambda body: _placed(opened, body),
         joint_of=lambda body, joint: _joint(opened, body, joint),
-        material=lambda body: _material(body),
+        material=material,
         **_scene(opened),
     )
 
@@ -240,10 +241,6 @@ def _sites(opened: Tree) -> list[list[tuple[str, Array]]]:
     p, axes = opened.robot.platform.at(opened.home)
     found[0].append(("tool", p + np.array(opened.robot.platform.tool) @ axes))
     return found
-
-
-def _material(body: TreeBody) -> str:
-    return f"leg{(body.color - 1) % len(COLORS) + 1}" if body.color else "platform"
 
 
 def _scene(opened: Tree) -> dict[str, Any]:

@@ -79,6 +79,11 @@ def identifier(robot: Manipulator) -> str:
     return name or "robot"
 
 
+def material(body: TreeBody) -> str:
+    """Return what a body's looks are of."""
+    return f"leg{body.color}" if body.color else "platform"
+
+
 def head(opened: Tree, language: str) -> list[str]:
     """Return the lines that begin every file: what it is, and what was completed."""
     robot = opened.robot
