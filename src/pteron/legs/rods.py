@@ -101,8 +101,8 @@ def universal_joints(
 
     With n' = omega x n and omega = alpha' d + beta' e, e = d x n / |d x n|: alpha' = n'.(d x n) /
     |d x n|^2 and beta' = - n'.d / |d x n|. `direction` is n, n' and n''; `swing` (3, 4) is
-    dn/d(c, phi); `before` is a joint about d that turns the tip's side, such as a crank's; `body` is the
-    letter of the rod.
+    dn/d(c, phi); `before` is a joint about d that turns the tip's side, such as a crank's. `body`
+    is the rod's letter.
     """
     c, (n, dn, ddn) = point.position, direction
     across, turning = ca.cross(d, n), ca.cross(d, dn)

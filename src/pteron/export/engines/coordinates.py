@@ -60,8 +60,8 @@ def coordinates(opened: Tree, poses: PoseLike) -> Array:
             elif joint.name not in values:  # of a part that slides with a hinge of the platform
                 arm = home_axes @ (joint.point - home_p)
                 values[joint.name] = (p + np.einsum("kij,i->kj", axes, arm)) @ joint.axis
-    found = np.stack([values[joint.name] for joint in opened.joints], axis=-1)
-    return np.asarray(found.reshape(*given.shape[:-1], -1))
+    columns = np.stack([values[joint.name] for joint in opened.joints], axis=-1)
+    return np.asarray(columns.reshape(*given.shape[:-1], -1))
 
 
 def _leg(home: LegStance, away: LegStance) -> list[Array]:
@@ -69,7 +69,9 @@ def _leg(home: LegStance, away: LegStance) -> list[Array]:
     count = len(away.end)
     turn, shift = np.broadcast_to(np.eye(3), (count, 3, 3)), np.zeros((count, 3))
     found: list[Array] = []
-    for k, (slides, axis, point) in enumerate(zip(home.slides, home.axes, home.points, strict=True)):
+    for k, (slides, axis, point) in enumerate(
+        zip(home.slides, home.axes, home.points, strict=True)
+    ):
         now = turn @ axis
         if slides:
             after, where = _next_point(home, k), _next_point(away, k)
@@ -96,8 +98,7 @@ def _next_point(leg: LegStance, k: int) -> Array:
 
 
 def _pointer(home: LegStance, away: LegStance, k: int) -> tuple[Array, Array]:
-    """Return a vector that a joint turns, at the home pose and away from it, first in what it tells.
-    """
+    """Return a vector that a joint turns, at the home pose and away from it."""
     axis, letter = home.axes[k], home.carries[k]
     pairs = []
     if letter in home.along:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from functools import lru_cache
 
 import numpy as np
 
@@ -28,7 +29,7 @@ def chosen_home(robot: Manipulator, home: PoseLike | None) -> Array:
         If the pose given is none, or out of reach.
     """
     if home is None:
-        return middle_pose(robot)
+        return np.array(_middle(robot))
     pose = np.asarray(home, dtype=float)
     if pose.shape != (robot.freedom,):
         raise DataError(
@@ -39,7 +40,8 @@ def chosen_home(robot: Manipulator, home: PoseLike | None) -> Array:
     return pose
 
 
-def middle_pose(robot: Manipulator) -> Array:
+@lru_cache(maxsize=64)
+def _middle(robot: Manipulator) -> tuple[float, ...]:
     """Return the pose with all joints in the middle of their ranges, zero where they have none.
 
     Where no such pose is away from singularities it is the best of random ones, within the joints'
@@ -52,7 +54,7 @@ def middle_pose(robot: Manipulator) -> Array:
         found = found[np.isfinite(found).all(axis=-1)]
     worth = _worth(robot, found)
     if len(found) and worth.max() >= _GOOD:
-        return np.round(found[worth.argmax()], 12) + 0.0
+        return tuple((np.round(found[worth.argmax()], 12) + 0.0).tolist())
     for count, least in _SEARCHES:
         with suppress(ModelError):
             found = random_poses(robot, count, type_i=least, type_ii=least)
@@ -66,7 +68,7 @@ def middle_pose(robot: Manipulator) -> Array:
     given = np.array([leg.limits is not None for leg in robot.legs])
     beyond = (joints < ranges[:, 0]) | (joints > ranges[:, 1])
     worth = _worth(robot, found) - (beyond & given).any(axis=-1)
-    return np.asarray(np.round(found[worth.argmax()], 6) + 0.0)
+    return tuple((np.round(found[worth.argmax()], 6) + 0.0).tolist())
 
 
 def _worth(robot: Manipulator, poses: Array) -> Array:

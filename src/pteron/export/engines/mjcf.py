@@ -90,7 +90,7 @@ def mjcf(opened: Tree, *, step: float = STEP) -> str:
     opened = dressed(opened)
     bodies, robot = opened.bodies, opened.robot
     children: list[list[int]] = [[] for _ in bodies]
-    roots = []
+    roots: list[int] = []
     for k, body in enumerate(bodies):
         (roots if body.parent == BASE else children[body.parent]).append(k)
     offset = any(motor.drive.offset for motor in opened.motors)
@@ -139,7 +139,9 @@ def _notes(opened: Tree) -> list[str]:
     found = []
     shafts = [motor.name for motor in opened.motors if motor.joint == "phi"]
     if shafts:
-        found.append(f"The shaft's actuator, {shafts[0]}, turns phi; its gear is the shaft's ratio.")
+        found.append(
+            f"The shaft's actuator, {shafts[0]}, turns phi; its gear is the shaft's ratio."
+        )
     if any(motor.drive.stribeck for motor in opened.motors):
         found.append("What dry friction has more at rest (stribeck) is left out.")
     if any(motor.drive.max_speed for motor in opened.motors):
@@ -157,7 +159,7 @@ def _notes(opened: Tree) -> list[str]:
 
 def _placed(opened: Tree, body: TreeBody) -> str:
     """Return where a body is in the frame of the one before."""
-    from scipy.spatial.transform import Rotation
+    from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
 
     there = inverse(parent_frame(opened, body)) @ frame(body)
     x, y, z, w = Rotation.from_matrix(there[:3, :3]).as_quat(canonical=True)

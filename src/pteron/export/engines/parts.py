@@ -233,7 +233,7 @@ def at_zero(tree: Tree) -> tuple[TreeBody, ...]:
 
 
 def displacement(joint: TreeJoint, by: float) -> Array:
-    """Return the motion (4, 4) of what a joint carries that moves by m or rad from the home pose."""
+    """Return the motion (4, 4) of what a joint carries that moves by m or rad."""
     moved = np.eye(4)
     if joint.slides:
         moved[:3, 3] = by * joint.axis

@@ -128,9 +128,7 @@ def pinocchio_source(opened: Tree) -> str:
         )
     here = {body.name: body for body in opened.bodies}
     bodies = _without_gears(at_zero(opened))
-    armature = {
-        motor.joint: motor.ratio**2 * motor.drive.inertia for motor in opened.motors
-    }
+    armature = {motor.joint: motor.ratio**2 * motor.drive.inertia for motor in opened.motors}
     limits = _limits(opened)
     homes = {joint.name: joint.home for joint in opened.joints}
     notes = []

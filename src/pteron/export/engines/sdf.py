@@ -28,7 +28,7 @@ from pteron.kernels.code import rendered
 from pteron.manipulator import Manipulator
 from pteron.shapes import PoseLike
 
-_SHARE = 1e-9
+_SHARE = 1e-10
 """Of a body's mass and moments, what a link between its joints has."""
 
 

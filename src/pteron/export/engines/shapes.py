@@ -1,4 +1,4 @@
-"""What the machine looks like: bars, boxes, guides and axles, in the base frame at the home pose."""
+"""What the machine looks like at its home pose: bars, boxes, guides and axles."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ def dressed(opened: Tree) -> Tree:
         base += [(i + 1, shape) for shape in _stand(bodies[0], opened.size)]
     _platform(opened, looks, thick)
     pairs = zip(opened.bodies, looks, strict=True)
-    bodies = tuple(replace(body, shapes=tuple(shapes)) for body, shapes in pairs)
-    return replace(opened, bodies=bodies, base=tuple(base))
+    shown = tuple(replace(body, shapes=tuple(shapes)) for body, shapes in pairs)
+    return replace(opened, bodies=shown, base=tuple(base))
 
 
 def _leg(
@@ -99,7 +99,8 @@ def _platform(opened: Tree, looks: list[list[Shape]], thick: float) -> None:
         if body.color == 0 and body.parent != BASE and not body.joints[0].slides:
             # What turns about P: a block, so that it is seen to turn.
             half = 2.4 * thick * body.axes[:, 0]
-            looks[k].append(Shape("box", body.origin + [-half, half] - 2.2 * thick * axis, thick))
+            middle = body.origin - 2.2 * thick * axis
+            looks[k].append(Shape("box", np.array([middle - half, middle + half]), thick))
         elif body.color == 0 and not looks[k]:
             looks[k].append(_arm(p, body.origin, thick))
 

@@ -58,8 +58,10 @@ def tree(robot: Manipulator, home: PoseLike | None = None) -> Tree:
     >>> import pteron
     >>> from pteron.export import tree
     >>> opened = tree(pteron.load("delta"))
-    >>> [body.name for body in opened.bodies][:3], [joint.name for joint in opened.joints][:6]
-    (['platform', 'leg1_crank', 'leg1_rod'], ['x', 'y', 'z', 'theta1', 'leg1_joint1', 'leg1_joint2'])
+    >>> [body.name for body in opened.bodies][:3]
+    ['platform', 'leg1_crank', 'leg1_rod']
+    >>> [joint.name for joint in opened.joints][:6]
+    ['x', 'y', 'z', 'theta1', 'leg1_joint1', 'leg1_joint2']
     """
     expect_manipulator(robot)
     pose = chosen_home(robot, home)
@@ -109,16 +111,12 @@ def _leg(
         parent = count + len(bodies) - 1 if bodies else BASE
         title = f"leg{number}_{leg.names[letter].replace(' ', '_')}"
         body = _body(leg, stance, letter, waiting[-1], size)
-        bodies.append(
-            replace(body, name=title, parent=parent, joints=tuple(waiting), color=number)
-        )
+        bodies.append(replace(body, name=title, parent=parent, joints=tuple(waiting), color=number))
         waiting = []
     return bodies
 
 
-def _body(
-    leg: LegKind, stance: LegStance, letter: str, joint: TreeJoint, size: float
-) -> TreeBody:
+def _body(leg: LegKind, stance: LegStance, letter: str, joint: TreeJoint, size: float) -> TreeBody:
     """Return a body that a joint carries; its name, its parent and its joints come later."""
     mass, (x, y), moment = about_center(leg.bodies[letter])
     reference = stance.references[letter]

@@ -105,7 +105,7 @@ def urdf(opened: Tree) -> str:
 
 
 def _links(opened: Tree, bodies: Sequence[TreeBody], body: TreeBody) -> list[dict[str, Any]]:
-    """Return a body's links with their joints: those between joints at one place have no inertia."""
+    """Return a body's links with their joints; those between joints at one place have no mass."""
     parent, before = "base", np.eye(4)
     if body.parent != BASE:
         parent, before = bodies[body.parent].name, frame(bodies[body.parent])
