@@ -53,7 +53,8 @@ def _turning(robot: Manipulator, pose: Array) -> Pieces:
     platform = robot.platform
     p, axes = platform.at(pose)
     # What of a leg's fixed offset is along the axis turns with the platform as well as not.
-    hung = [bool(np.abs(cross(leg.fixed_offset, platform.axis)).max() > _COINCIDENT) for leg in robot.legs]
+    across = [cross(leg.fixed_offset, platform.axis) for leg in robot.legs]
+    hung = [bool(np.abs(offset).max() > _COINCIDENT) for offset in across]
     points = [np.array(leg.platform_point) for leg in robot.legs]
     hinges = _distinct([point for point, hangs in zip(points, hung, strict=True) if hangs])
     masses, shares, rest = _shared(platform, hinges, len(platform.geared))
