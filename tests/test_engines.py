@@ -239,6 +239,17 @@ def test_every_file_is_named_after_the_machine(tmp_path):
     compile(paths[-1].read_text(), "module", "exec")
 
 
+def test_what_a_file_cannot_hold_is_said_in_it():
+    drive = pteron.Drive(3.0, offset=1.0, rotor_inertia=1e-5, max_speed=2.0)
+    robot = CATALOG["quadrupteron"]
+    legs = (replace(leg, drive=drive, elbow_limits=(0.1, 3.0)) for leg in robot.legs)
+    opened = tree(replace(robot, legs=tuple(legs)))
+    told = "the limits of passive joints (elbow)."
+    assert f"Left out: the drives' greatest speeds, {told}" in mjcf(opened)
+    assert f"Left out: the motors' inertia, friction's constant part, {told}" in trees.urdf(opened)
+    assert "Left out" not in mjcf(tree(CATALOG["delta"]))
+
+
 def test_names_in_sdf_are_unique():
     text = trees.sdf(tree(CATALOG["delta-4"]))
     model = ElementTree.fromstring(text).find("world/model")
@@ -248,8 +259,14 @@ def test_names_in_sdf_are_unique():
 
 def test_wrong_homes_are_refused(tmp_path):
     robot = CATALOG["delta"]
-    with pytest.raises(pteron.DataError, match=r"home: shape \(4,\) given, \(3,\) expected"):
+    with pytest.raises(pteron.DataError, match=r"home: shape \(4,\) given, \(\.\.\., 3\) expected"):
         export_mjcf(robot, tmp_path, home=[0.0, 0.0, -0.9, 0.0])
+    with pytest.raises(pteron.DataError, match=r"home: shape \(2, 3\) given, one pose"):
+        export_mjcf(robot, tmp_path, home=np.zeros((2, 3)))
+    with pytest.raises(pteron.DataError, match="home: not an array of real numbers"):
+        export_sdf(robot, tmp_path, home=["middle"] * 3)
+    with pytest.raises(pteron.DataError, match="nan given, a finite number expected"):
+        export_sdf(robot, tmp_path, home=[0.0, 0.0, np.nan])
     with pytest.raises(pteron.UnreachablePose, match="leg 1"):
         export_urdf(robot, tmp_path, home=[0.0, 0.0, -900.0])
     with pytest.raises(pteron.ModelError, match="robot: 'delta' given"):

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from pteron.errors import DataError, ModelError, SingularPose
-from pteron.kernels import Array, numeric
+from pteron.kernels import Array, as_array, numeric
 from pteron.kinematics import direct_kinematics, inverse_kinematics, random_poses
 from pteron.manipulator import Manipulator
 from pteron.shapes import PoseLike
@@ -30,14 +30,11 @@ def chosen_home(robot: Manipulator, home: PoseLike | None) -> Array:
     """
     if home is None:
         return np.array(_middle(robot))
-    pose = np.asarray(home, dtype=float)
-    if pose.shape != (robot.freedom,):
-        raise DataError(
-            f"home: shape {pose.shape} given, ({robot.freedom},) expected: "
-            f"{', '.join(robot.coordinates)}"
-        )
+    pose = as_array(home, "home", (robot.freedom,))
+    if pose.ndim > 1:
+        raise DataError(f"home: shape {pose.shape} given, one pose ({robot.freedom},) expected")
     inverse_kinematics(robot, pose)
-    return pose
+    return np.array(pose)
 
 
 @lru_cache(maxsize=64)

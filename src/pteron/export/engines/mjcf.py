@@ -20,6 +20,7 @@ from pteron.export.engines.writing import (
     head,
     identifier,
     inverse,
+    left_out,
     look,
     material,
     number,
@@ -135,26 +136,11 @@ def mjcf(opened: Tree, *, step: float = STEP) -> str:
 
 
 def _notes(opened: Tree) -> list[str]:
-    """Return what the file cannot hold of this machine."""
-    found = []
-    shafts = [motor.name for motor in opened.motors if motor.joint == "phi"]
-    if shafts:
-        found.append(
-            f"The shaft's actuator, {shafts[0]}, turns phi; its gear is the shaft's ratio."
-        )
-    if any(motor.drive.stribeck for motor in opened.motors):
-        found.append("What dry friction has more at rest (stribeck) is left out.")
-    if any(motor.drive.max_speed for motor in opened.motors):
-        found.append("The drives' greatest speeds are left out.")
-    passive = [
-        key
-        for leg in opened.robot.legs
-        for key in ("elbow_limits", "tip_cone", "platform_cone", "travel")
-        if getattr(leg, key, None) is not None
-    ]
-    if passive:
-        found.append(f"Limits of passive joints are left out: {', '.join(sorted(set(passive)))}.")
-    return found
+    """Return what the file cannot hold of this machine, and how its shaft is driven."""
+    kept = ("inertia", "viscous", "coulomb", "offset", "max_force")
+    shafts = [motor.name for motor in opened.motors if motor.name != motor.joint]
+    said = [f"{name} turns phi; its actuator's gear is the shaft's ratio." for name in shafts]
+    return [*said, *left_out(opened, kept)]
 
 
 def _placed(opened: Tree, body: TreeBody) -> str:
@@ -180,36 +166,19 @@ def _joint(opened: Tree, body: TreeBody, joint: TreeJoint) -> str:
         parts.append(f'pos="{row(place)}"')
     if number(joint.home) != "0":
         parts.append(f'ref="{number(joint.home)}"')
-    limits = joint.limits
     for motor in opened.motors:
         if motor.joint != joint.name:
             continue
         drive, ratio = motor.drive, motor.ratio
-        if motor.name != joint.name:
-            limits = _narrower(limits, _leg_limits(opened, motor.name), ratio)
         values = {
             "armature": ratio**2 * drive.inertia,
             "damping": ratio**2 * drive.viscous,
             "frictionloss": abs(ratio) * drive.coulomb,
         }
         parts += [f'{name}="{number(value)}"' for name, value in values.items() if value]
-    if limits is not None:
-        parts.append(f'range="{row(limits)}"')
+    if joint.limits is not None:
+        parts.append(f'range="{row(joint.limits)}"')
     return " ".join(parts)
-
-
-def _leg_limits(opened: Tree, name: str) -> tuple[float, float] | None:
-    return opened.robot.legs[opened.robot.joint_names.index(name)].limits
-
-
-def _narrower(
-    own: tuple[float, float] | None, shaft: tuple[float, float] | None, ratio: float
-) -> tuple[float, float] | None:
-    """Return the limits of phi that the platform and its shaft leave."""
-    if shaft is None:
-        return own
-    low, high = sorted(limit / ratio for limit in shaft)
-    return (low, high) if own is None else (max(low, own[0]), min(high, own[1]))
 
 
 def _motor(opened: Tree, k: int) -> str:

@@ -22,6 +22,7 @@ from pteron.export.engines.writing import (
     head,
     identifier,
     inverse,
+    left_out,
     number,
     small,
     within,
@@ -131,7 +132,7 @@ def pinocchio_source(opened: Tree) -> str:
     armature = {motor.joint: motor.ratio**2 * motor.drive.inertia for motor in opened.motors}
     limits = _limits(opened)
     homes = {joint.name: joint.home for joint in opened.joints}
-    notes = []
+    notes = left_out(opened, ("inertia",))
     if coupled:
         notes.append(
             "What gears turn is in the platform's inertia: the square of its ratio times its own."

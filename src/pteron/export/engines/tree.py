@@ -77,11 +77,23 @@ def tree(robot: Manipulator, home: PoseLike | None = None) -> Tree:
         drive, ratio = leg.drive or Drive(), 1.0
         if leg.follows_angle:
             ratio = shaft_ratio(robot, i)
+            bodies[0] = _with_shaft(bodies[0], leg.limits, ratio)
         motors.append(Motor(names[i], "phi" if leg.follows_angle else names[i], ratio, drive))
     # The legs' closings first: what the platform's parts add comes after.
     count = len(robot.legs)
     closings = closings[-count:] + closings[:-count]
     return Tree(robot, pose, tuple(bodies), tuple(closings), tuple(motors), (), size)
+
+
+def _with_shaft(platform: TreeBody, limits: tuple[float, float] | None, ratio: float) -> TreeBody:
+    """Return the platform with the limits that its shaft leaves its last joint, which is phi."""
+    *rest, phi = platform.joints
+    if limits is None:
+        return platform
+    low, high = sorted(limit / ratio for limit in limits)
+    least, most = phi.limits or (low, high)
+    phi = replace(phi, limits=(max(low, least), min(high, most)))
+    return replace(platform, joints=(*rest, phi))
 
 
 def _size(stances: list[LegStance], p: Array) -> float:
@@ -121,22 +133,22 @@ def _body(leg: LegKind, stance: LegStance, letter: str, joint: TreeJoint, size: 
     mass, (x, y), moment = about_center(leg.bodies[letter])
     reference = stance.references[letter]
     if letter not in stance.along:
-        axes = frame_along(joint.axis)
+        axes = _frame_along(joint.axis)
         moments, center = cube_moments(mass, 0.05 * size), reference
     else:
         along = stance.along[letter]
         if letter in stance.across:
-            axes = frame_along(along, stance.across[letter])
+            axes = _frame_along(along, stance.across[letter])
             moments = plane_moments(mass, moment, size)
         else:
             # A rod's y is the axis of the joint that carries it, where that is across the rod.
-            axes = frame_along(along, np.cross(along, joint.axis))
+            axes = _frame_along(along, np.cross(along, joint.axis))
             moments = rod_moments(mass, moment, size)
         center = reference + axes @ [x, y, 0.0]
     return TreeBody("", BASE, (), joint.point, axes, mass, center, moments, 0)
 
 
-def frame_along(x: Array, z: Array | None = None) -> Array:
+def _frame_along(x: Array, z: Array | None = None) -> Array:
     """Return axes as columns (3, 3): x along a vector, and z near another one."""
     x = x / np.linalg.norm(x)
     across = None if z is None else z - (z @ x) * x

@@ -6,8 +6,11 @@ import re
 from collections.abc import Sequence
 from importlib.metadata import version
 
+import casadi as ca
 import numpy as np
 
+from pteron.equations.kinematics import passive_joints
+from pteron.equations.machine import Machine
 from pteron.export.engines.parts import BASE, Tree, TreeBody
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
@@ -84,6 +87,28 @@ def identifier(robot: Manipulator) -> str:
 def material(body: TreeBody) -> str:
     """Return what a body's looks are of."""
     return f"leg{body.color}" if body.color else "platform"
+
+
+def left_out(opened: Tree, kept: Sequence[str]) -> list[str]:
+    """Return what of a machine's drives and passive joints a file has not; `kept` it has."""
+    drives = {
+        "inertia": "the motors' inertia",
+        "viscous": "viscous friction",
+        "coulomb": "dry friction",
+        "offset": "friction's constant part",
+        "stribeck": "what dry friction has more at rest",
+        "max_force": "the drives' greatest forces",
+        "max_speed": "the drives' greatest speeds",
+    }
+    found = [
+        what
+        for key, what in drives.items()
+        if key not in kept and any(getattr(motor.drive, key) for motor in opened.motors)
+    ]
+    _, *legs = passive_joints(Machine.of(opened.robot), ca.DM(opened.home))
+    nouns = sorted({joint.noun for joints in legs for joint in joints})
+    found += [f"the limits of passive joints ({', '.join(nouns)})"] if nouns else []
+    return [f"Left out: {', '.join(found)}."] if found else []
 
 
 def head(opened: Tree, language: str) -> list[str]:
