@@ -28,6 +28,7 @@ _SCRIPTS = {
     "Memory traffic": "memory_traffic.py",
     "The paper's 41 %": "paper_claim.py",
     "Excitation": "excitation.py",
+    "The same free motion in MuJoCo": "mujoco_convergence.py",
     "Limits of excitation": "excitation_limits.py",
     "From a log to a running machine": "identification/chain.py",
 }

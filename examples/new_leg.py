@@ -110,7 +110,7 @@ class SliderRodEquations(LegEquations):
         slides = ca.mtimes(self.e, row / divisor)
         swing = (ca.horzcat(ca.SX.eye(3), ca.SX(3, 1)) - slides) / self.ll  # d n / d (c, phi)
         dn, ddn = db / self.ll, (ddc - acceleration * self.e) / self.ll
-        slider = Joint("P", self.e, self.r, row / divisor, rate, acceleration)
+        slider = Joint("P", self.e, self.r, row / divisor, rate, acceleration, "p")
         chain = (slider, *universal_joints(self.d, tip, point, swing, (n, dn, ddn), angle))
         slides = BodyMotion(tip, slides, acceleration * self.e)
         bodies = {"p": slides, "l": rod_body(point, n, ddn, swing)}

@@ -93,9 +93,11 @@ def test_forces(case):
 @pytest.mark.parametrize("engine", ENGINES)
 def test_forces_of_an_engine(case, engine):
     robot, motion, wrench, _ = case
-    if robot.platform.slides:
-        pytest.skip("the trees have no platform that slides")
-    forces, jacobian, gap = trees.projected(robot, ENGINES[engine](robot), *motion)
+    if robot.platform.slides and engine == "pinocchio":
+        pytest.skip("the halves of a platform that slides are coupled joints")
+    # Wherever the file's home pose is: here at the first of the poses.
+    model = ENGINES[engine](robot, motion[0][0], spin=False)
+    forces, jacobian, gap = trees.projected(robot, model, *motion)
     assert gap < 1e-13, "the engine's loops must close, in metres"
     assert error(pteron.jacobian(robot, motion[0]), jacobian) < 1e-12
     expected = loaded(forces, jacobian, wrench)

@@ -72,7 +72,7 @@ Leg = PRRR
 """The kind of leg that a file means where it does not say `type`."""
 
 if TYPE_CHECKING:
-    from pteron import identification, motion, plots, report, workspace
+    from pteron import export, identification, motion, plots, report, workspace
     from pteron.export import export_c, export_st
     from pteron.reduction import (
         BaseParameters,
@@ -91,7 +91,7 @@ _LATER = {
     "export_c": "pteron.export",
     "export_st": "pteron.export",
 }
-_LATER_MODULES = ("identification", "motion", "plots", "report", "workspace")
+_LATER_MODULES = ("export", "identification", "motion", "plots", "report", "workspace")
 """What would slow the start of those who do not use it (SymPy, SciPy, matplotlib)."""
 
 
@@ -144,6 +144,7 @@ __all__ = [
     "direct_kinematics",
     "drive_accelerations",
     "drive_forces",
+    "export",
     "export_c",
     "export_st",
     "follow",

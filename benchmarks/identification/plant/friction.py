@@ -56,7 +56,8 @@ class Guides:
         )
         self.rows = rows
         self.held = data.eq_active[-n:]
-        self.places = model.eq_data[-n:, 0]
+        self.places = model.eq_data[-n:, 0]  # from where the model opens
+        self.homes = model.qpos0[first::3]
         self.sense = np.where(self.rates < 0.0, -1.0, 1.0)
         self.holding = np.zeros(n)
 
@@ -87,5 +88,5 @@ class Guides:
             self.held[loose] = 0
         if stopped.any():
             self.sense[stopped] = 0.0
-            self.places[stopped] = self.joints[stopped]
+            self.places[stopped] = (self.joints - self.homes)[stopped]
             self.held[stopped] = 1

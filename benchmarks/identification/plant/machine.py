@@ -29,11 +29,12 @@ from plant.model import (
     Array,
     first_joint,
     joint_damping,
-    leg_coordinates,
     loop_rows,
     mujoco_model,
+    opened,
 )
 from plant.reference import Reference
+from pteron.export import Tree, coordinates
 
 __all__ = ["Recording", "simulate"]
 
@@ -131,7 +132,8 @@ def simulate(
     every = round(1.0 / (rate * _STEP))
     if abs(every * rate * _STEP - 1.0) > 1e-9:
         raise ValueError(f"rate: {rate:g} Hz given, but 5000 Hz over a whole number expected")
-    model = mujoco_model(robot, _STEP)
+    machine = opened(robot)
+    model = mujoco_model(machine, _STEP)
     data = mujoco.MjData(model)
     start = -round(settle * rate) / rate
     # Every other instant of the controller's table is a stage in the middle of a step.
@@ -147,8 +149,8 @@ def simulate(
         bandwidth,
         feed_forward,
     )
-    _place(robot, data, reference, start)
-    plant = _Plant(robot, friction, controller, model, data)
+    _place(machine, data, reference, start)
+    plant = _Plant(machine, friction, controller, model, data)
     before, samples = round(settle * rate), round(duration * rate)
     rows = []
     previous = mujoco.get_mjcb_control()
@@ -175,7 +177,7 @@ class _Plant:
 
     def __init__(
         self,
-        robot: pteron.Manipulator,
+        machine: Tree,
         friction: Friction,
         controller: Controller,
         model: Any,
@@ -185,9 +187,9 @@ class _Plant:
 
         self.step, self.forward = mujoco.mj_step, mujoco.mj_forward
         self.model, self.data, self.controller = model, data, controller
-        m, first = robot.freedom, first_joint(robot)
-        self.guides = Guides(friction, model, data, first, loop_rows(robot))
-        self.damping = friction.joints * joint_damping(robot) if friction.joints else None
+        m, first = machine.robot.freedom, first_joint(machine)
+        self.guides = Guides(friction, model, data, first, loop_rows(machine))
+        self.damping = friction.joints * joint_damping(machine) if friction.joints else None
         # Views: MuJoCo's arrays stay where they are.
         self.poses, self.joints, self.rates = (
             data.qpos[:m],
@@ -196,7 +198,9 @@ class _Plant:
         )
         self.accelerations, self.applied = data.qacc[first::3], data.qfrc_applied[first::3]
         self.forces = np.zeros(m)
-        self.sites = [[data.site(f"{a} {i}").id for i in range(m)] for a in ("leg", "platform")]
+        self.sites = [
+            [data.site(f"leg{i}_{side}").id for i in range(1, m + 1)] for side in ("end", "seat")
+        ]
 
     def load(self, _model: Any, _data: Any) -> None:
         """Apply the actuators' forces and friction; MuJoCo calls it at every stage."""
@@ -226,19 +230,10 @@ class _Plant:
         return joints, rates, accelerations, forces, poses, gap
 
 
-def _place(robot: pteron.Manipulator, data: Any, reference: Reference, start: float) -> None:
+def _place(machine: Tree, data: Any, reference: Reference, start: float) -> None:
     """Put the mechanism on the reference, with its rates."""
     moments = start + _MOMENT * np.array([-1.0, 0.0, 1.0])
-    poses = platform_state(robot, *reference(moments)).pose
-    platform = robot.platform
-    parts = [poses]
-    for gear in platform.geared:
-        parts.append((gear.ratio - 1.0) * poses[:, -1:])
-    for bar in platform.bars:
-        x, y, _ = np.array(platform.frame) * np.array(bar.hinge)[:, None]
-        cosine, sine = np.cos(poses[:, -1:]), np.sin(poses[:, -1:])
-        turned = cosine * (x + y) + sine * np.cross(platform.axis, x + y)
-        parts.append(poses[:, :3] + turned - (x + y))
-    before, now, after = np.hstack([*parts, leg_coordinates(robot, poses)])
+    poses = platform_state(machine.robot, *reference(moments)).pose
+    before, now, after = coordinates(machine, poses)
     data.qpos[:], data.time = now, start
     data.qvel[:] = (np.remainder(after - before + np.pi, 2.0 * np.pi) - np.pi) / (2.0 * _MOMENT)

@@ -1,7 +1,18 @@
-"""Code for a controller, C99 and IEC 61131-3 Structured Text, and models for other tools."""
+"""The machine for others: code for a controller, files for engines, models for other tools."""
 
 from pteron.export.c import Real, export_c
 from pteron.export.casadi_functions import casadi_functions, export_casadi
+from pteron.export.engines import (
+    Tree,
+    coordinates,
+    export_mjcf,
+    export_pinocchio,
+    export_sdf,
+    export_urdf,
+    mjcf,
+    pinocchio_model,
+    tree,
+)
 from pteron.export.fmu import export_fmu
 from pteron.export.functions import FUNCTIONS
 from pteron.export.klipper import export_klipper
@@ -11,11 +22,20 @@ from pteron.export.structured_text import export_st
 __all__ = [
     "FUNCTIONS",
     "Real",
+    "Tree",
     "casadi_functions",
+    "coordinates",
     "export_c",
     "export_casadi",
     "export_fmu",
     "export_klipper",
     "export_linuxcnc",
+    "export_mjcf",
+    "export_pinocchio",
+    "export_sdf",
     "export_st",
+    "export_urdf",
+    "mjcf",
+    "pinocchio_model",
+    "tree",
 ]

@@ -236,7 +236,7 @@ class CrankEquations(LegEquations):
         ddx, ddy = at.acceleration * y - square * x, -at.acceleration * x - square * y
         rest = ca.SX(3, 1)
         crank = BodyMotion(self.r, ca.SX(3, 4), rest, self.d, row, x, y, ddx, ddy)
-        joint = Joint("R", self.d, self.r, row, at.rate, at.acceleration)
+        joint = Joint("R", self.d, self.r, row, at.rate, at.acceleration, "u")
         last, joints, turning = self.last_link(point, angle, at, joint)
         return LegMotion(
             coordinate,

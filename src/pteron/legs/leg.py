@@ -53,6 +53,9 @@ class Joint(NamedTuple):
     """(1, 4): d rate / d (c', phi')."""
     rate: Expression
     acceleration: Expression
+    body: str = ""
+    """The letter of the body that it carries; none where the next joint follows at once, and at
+    the platform, where the leg's loop is cut."""
 
 
 class LegMotion(NamedTuple):

@@ -174,7 +174,10 @@ class PRREquations(SlideEquations):
         turning = Turning(row, rate, ca.dot(across, pull))
         body = lower_link_body(point, self.d, self.plane, at.b / self.ll, turning)
         tip = self.r + at.q * self.e
-        joints = [Joint("R", self.d, tip, *turning), *last_joints(self.d, point, turning, angle)]
+        joints = [
+            Joint("R", self.d, tip, *turning, "l"),
+            *last_joints(self.d, point, turning, angle),
+        ]
         return body, joints, (turning.rate, turning.acceleration)
 
     def locus(self, q: Expression) -> Circle:

@@ -283,9 +283,9 @@ class PRRREquations(LegEquations):
         }
         links = ca.mtimes(self.plane, at.l_u), ca.mtimes(self.plane, at.l_l)
         chain = (
-            Joint("P", self.e, self.r, row, rate, sliding),
-            Joint("R", self.d, r1, *at.upper),
-            Joint("R", self.d, r1 + links[0], *at.lower.less(at.upper)),
+            Joint("P", self.e, self.r, row, rate, sliding, "p"),
+            Joint("R", self.d, r1, *at.upper, "u"),
+            Joint("R", self.d, r1 + links[0], *at.lower.less(at.upper), "l"),
             *last_joints(self.d, point, at.lower, angle),
         )
         angles = tuple((link.rate, link.acceleration) for link in (at.upper, at.lower))

@@ -93,6 +93,7 @@ def universal_joints(
     direction: tuple[Expression, Expression, Expression],
     angle: AngleMotion | None,
     before: Joint | None = None,
+    body: str = "l",
 ) -> list[Joint]:
     """Return the universal joints at a rod's ends, tip and c: about d, and about d x n across it.
 
@@ -100,7 +101,8 @@ def universal_joints(
 
     With n' = omega x n and omega = alpha' d + beta' e, e = d x n / |d x n|: alpha' = n'.(d x n) /
     |d x n|^2 and beta' = - n'.d / |d x n|. `direction` is n, n' and n''; `swing` (3, 4) is
-    dn/d(c, phi); `before` is a joint about d that turns the tip's side, such as a crank's.
+    dn/d(c, phi); `before` is a joint about d that turns the tip's side, such as a crank's. `body`
+    is the rod's letter.
     """
     c, (n, dn, ddn) = point.position, direction
     across, turning = ca.cross(d, n), ca.cross(d, dn)
@@ -115,7 +117,7 @@ def universal_joints(
     about_e = (-ca.mtimes(d.T, swing) / size, beta, -ca.dot(ddn, d) / size - beta * growth)
     knee = about_d
     if before is not None:
-        knee = tuple(a - b for a, b in zip(about_d, before[3:], strict=True))
+        knee = tuple(a - b for a, b in zip(about_d, before[3:6], strict=True))
     axis = across / size
     hinge = []
     if angle is not None:
@@ -123,7 +125,7 @@ def universal_joints(
         hinge = [Joint("R", angle.axis, angle.axis_point(point), *turn)]
     return [
         Joint("R", d, tip, *knee),
-        Joint("R", axis, tip, *about_e),
+        Joint("R", axis, tip, *about_e, body),
         Joint("R", axis, c, *(-a for a in about_e)),
         Joint("R", d, c, *(-a for a in about_d)),
         *hinge,

@@ -139,7 +139,7 @@ class RRREquations(CrankEquations):
         upper = Turning(crank.row, crank.rate, crank.acceleration)
         body = lower_link_body(point, self.d, self.plane, at.b / self.ll, lower)
         elbow = self.r + ca.mtimes(self.plane, at.l_u)
-        knee = Joint("R", self.d, elbow, *lower.less(upper))
+        knee = Joint("R", self.d, elbow, *lower.less(upper), "l")
         joints = [knee, *last_joints(self.d, point, lower, angle)]
         return body, joints, (lower.rate, lower.acceleration)
 

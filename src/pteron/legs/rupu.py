@@ -249,8 +249,8 @@ class RUPUEquations(LegEquations):
         # The shaft turns at its base; what turns the platform has its axis at the platform's end.
         joint = Joint("R", self.d, angle.axis_point(point), row, *turned)
         swung = (n, dn, ddn)
-        *hinges, last = universal_joints(self.hinge, self.r, point, swing, swung, angle)
-        telescope = Joint("P", n, self.r, along, rate, growth)
+        *hinges, last = universal_joints(self.hinge, self.r, point, swing, swung, angle, body="u")
+        telescope = Joint("P", n, self.r, along, rate, growth, "l")
         gear = (last.row - row, last.rate - joint.rate, last.acceleration - joint.acceleration)
         chain = (joint, *hinges[:2], telescope, *hinges[2:], Joint("R", self.d, last.point, *gear))
         return LegMotion(

@@ -179,7 +179,7 @@ class SlideEquations(LegEquations):
         b = self.in_space(at.b)
         full = ca.horzcat(b.T, 0)
         row = full / at.divisor
-        slider = Joint("P", self.e, self.r, row, at.rate, at.acceleration)
+        slider = Joint("P", self.e, self.r, row, at.rate, at.acceleration, "p")
         tip = self.r + at.q * self.e
         body = BodyMotion(tip, ca.mtimes(self.e, row), at.acceleration * self.e)
         link, joints, turning = self.link(point, angle, at, slider)

@@ -1,0 +1,131 @@
+"""The legs in numbers, as they stand in a pose: their joints, their bodies and their ends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from pteron.equations.machine import Machine, State
+from pteron.errors import ModelError
+from pteron.kernels import Array
+from pteron.legs.leg import LegMotion
+from pteron.manipulator import Manipulator
+
+
+@dataclass(frozen=True)
+class LegStance:
+    """A leg in a pose, or in K poses: then each vector is (K, 3).
+
+    Attributes
+    ----------
+    slides, carries : tuple
+        Of each joint that is before the cut: whether it slides, and the body it carries, by letter.
+    axes, points : tuple of array, shape (3,)
+        Of these joints.
+    references : dict of array, shape (3,)
+        Where the reference point of each body is.
+    along, across : dict of array, shape (3,)
+        Each body's x, and its z if it turns in a plane.
+    end : array, shape (3,)
+        The platform point.
+    coordinate : float
+        The actuated joint's.
+    first : int
+        The number in the leg's chain of the first joint here: 1 where the actuated joint follows
+        the platform's angle and carries nothing of the leg.
+    """
+
+    slides: tuple[bool, ...]
+    carries: tuple[str, ...]
+    axes: tuple[Array, ...]
+    points: tuple[Array, ...]
+    references: dict[str, Array]
+    along: dict[str, Array]
+    across: dict[str, Array]
+    end: Array
+    coordinate: Any
+    first: int
+
+
+def leg_stances(robot: Manipulator, poses: Array) -> list[LegStance]:
+    """Return the legs at a pose (m,), or at poses (K, m)."""
+    function, names = _function(robot)
+    values = dict(zip(names, function.call([ca.DM(poses.T)]), strict=True))
+    batch = poses.shape[:-1]
+
+    def vector(*name: Any) -> Array:
+        found = np.asarray(values[name]).T
+        return found.reshape(*batch, -1)
+
+    found = []
+    for i, (leg, motion) in enumerate(zip(robot.legs, _states(robot)[1].legs, strict=True)):
+        before = _joints_before_the_cut(robot, i, motion)
+        first = int(leg.follows_angle)
+        numbers = range(first, first + len(before))
+        turning = [b for b, body in motion.bodies.items() if body.x is not None]
+        found.append(
+            LegStance(
+                tuple(joint.kind == "P" for joint in before),
+                tuple(joint.body for joint in before),
+                tuple(vector(i, "axis", k) for k in numbers),
+                tuple(vector(i, "point", k) for k in numbers),
+                {letter: vector(i, "reference", letter) for letter in motion.bodies},
+                {letter: vector(i, "x", letter) for letter in turning},
+                {b: vector(i, "z", b) for b in turning if motion.bodies[b].y is not None},
+                vector(i, "end"),
+                vector(i, "coordinate")[..., 0],
+                first,
+            )
+        )
+    return found
+
+
+def shaft_ratio(robot: Manipulator, i: int) -> float:
+    """Return the actuated joint's angle per radian of phi, of a leg that follows the angle."""
+    motion = _states(robot)[1].legs[i]
+    return float(ca.evalf(motion.row[3] / motion.divisor))
+
+
+def _joints_before_the_cut(robot: Manipulator, i: int, motion: LegMotion) -> list[Any]:
+    """Return a leg's joints up to that of its last body."""
+    leg = robot.legs[i]
+    chain = motion.chain[int(leg.follows_angle) :]
+    carried = [joint.body for joint in chain if joint.body]
+    if sorted(carried) != sorted(motion.bodies):
+        raise ModelError(
+            f"leg {i + 1}: {leg.type}: its chain's joints carry {carried}, but its bodies are "
+            f"{list(motion.bodies)}; let each body's joint name it (Joint.body)",
+            subject=robot.name,
+        )
+    last = max((k for k, joint in enumerate(chain) if joint.body), default=-1)
+    return list(chain[: last + 1])
+
+
+@lru_cache(maxsize=64)
+def _states(robot: Manipulator) -> tuple[Any, State]:
+    pose = ca.SX.sym("pose", robot.freedom)
+    return pose, Machine.of(robot).state(pose)
+
+
+@lru_cache(maxsize=64)
+def _function(robot: Manipulator) -> tuple[Any, list[tuple[Any, ...]]]:
+    """Return the function from the pose to what a stance holds, and what its outputs are."""
+    pose, state = _states(robot)
+    parts: dict[tuple[Any, ...], Any] = {}
+    for i, (motion, point) in enumerate(zip(state.legs, state.platform.points, strict=True)):
+        for k, joint in enumerate(motion.chain):
+            parts[i, "axis", k], parts[i, "point", k] = joint.axis, joint.point
+        for letter, body in motion.bodies.items():
+            parts[i, "reference", letter] = body.position
+            if body.x is not None:
+                parts[i, "x", letter] = body.x
+            if body.y is not None:
+                parts[i, "z", letter] = body.axes
+        parts[i, "end"], parts[i, "coordinate"] = point.position, motion.coordinate
+    # What does not depend on the pose is made to: so that every output has a column for each pose.
+    still = 0 * pose[0]
+    return ca.Function("stances", [pose], [part + still for part in parts.values()]), list(parts)

@@ -1,0 +1,125 @@
+"""From poses of the platform to the coordinates of all joints of the tree."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pteron.export.engines.chains import LegStance, leg_stances
+from pteron.export.engines.parts import Tree
+from pteron.kernels import Array
+from pteron.kinematics import inverse_kinematics
+from pteron.shapes import PoseLike
+
+_LONG = 1e-3
+"""Share of its own length that a vector must have across an axis, to tell an angle about it."""
+
+
+def coordinates(opened: Tree, poses: PoseLike) -> Array:
+    """Return the coordinates of the tree's joints with all loops closed.
+
+    Passive joints of legs are found one after the other from the home pose on: a joint that turns
+    from what comes next in its leg, a joint that slides from where the next one is.
+
+    Parameters
+    ----------
+    opened : Tree
+        The opened mechanism.
+    poses : array, shape (..., m)
+        m and rad.
+
+    Returns
+    -------
+    array, shape (..., K)
+        In the order of `opened.joints`, m and rad; passive angles are between -pi and pi.
+
+    Raises
+    ------
+    UnreachablePose
+        If a leg does not reach a pose.
+    """
+    robot = opened.robot
+    given = np.asarray(poses, dtype=float)
+    flat = given.reshape(-1, robot.freedom)
+    joints = inverse_kinematics(robot, flat)
+    values = {name: flat[:, k] for k, name in enumerate(robot.coordinates)}
+    for i, (home, away) in enumerate(
+        zip(leg_stances(robot, opened.home), leg_stances(robot, flat), strict=True)
+    ):
+        found = _leg(home, away)
+        if home.first == 0:
+            found[0] = joints[:, i]
+        names = [robot.joint_names[i], *(f"leg{i + 1}_joint{k}" for k in range(1, 20))]
+        values |= dict(zip(names[home.first :], found, strict=False))
+    p, axes = robot.platform.at(flat)
+    home_p, home_axes = robot.platform.at(opened.home)
+    for body in opened.bodies:
+        for joint in body.joints:
+            if joint.follows is not None:
+                name, ratio = joint.follows
+                values[joint.name] = ratio * values[name]
+            elif joint.name not in values:  # of a part that slides with a hinge of the platform
+                arm = home_axes @ (joint.point - home_p)
+                values[joint.name] = (p + np.einsum("kij,i->kj", axes, arm)) @ joint.axis
+    columns = np.stack([values[joint.name] for joint in opened.joints], axis=-1)
+    return np.asarray(columns.reshape(*given.shape[:-1], -1))
+
+
+def _leg(home: LegStance, away: LegStance) -> list[Array]:
+    """Return how far each joint of a leg has moved from the home pose, (K,) each."""
+    count = len(away.end)
+    turn, shift = np.broadcast_to(np.eye(3), (count, 3, 3)), np.zeros((count, 3))
+    found: list[Array] = []
+    for k, (slides, axis, point) in enumerate(
+        zip(home.slides, home.axes, home.points, strict=True)
+    ):
+        now = turn @ axis
+        if slides:
+            after, where = _next_point(home, k), _next_point(away, k)
+            by = np.einsum("ki,ki->k", now, where - turn @ after - shift)
+            shift = shift + by[:, None] * now
+        else:
+            before, here = _pointer(home, away, k)
+            before = turn @ before
+            across = np.cross(now, before)
+            by = np.arctan2(
+                np.einsum("ki,ki->k", across, here),
+                np.einsum("ki,ki->k", np.cross(across, now), here),
+            )
+            center = turn @ point + shift
+            turned = _rotations(now, by)
+            turn = turned @ turn
+            shift = center + np.einsum("kij,kj->ki", turned, shift - center)
+        found.append(by)
+    return found
+
+
+def _next_point(leg: LegStance, k: int) -> Array:
+    return leg.points[k + 1] if k + 1 < len(leg.points) else leg.end
+
+
+def _pointer(home: LegStance, away: LegStance, k: int) -> tuple[Array, Array]:
+    """Return a vector that a joint turns, at the home pose and away from it."""
+    axis, letter = home.axes[k], home.carries[k]
+    pairs = []
+    if letter in home.along:
+        pairs.append((home.along[letter], away.along[letter]))
+    if k + 1 < len(home.axes):
+        pairs.append((home.axes[k + 1], away.axes[k + 1]))
+    pairs += [
+        (_next_point(leg, j) - leg.points[k], _next_point(other, j) - other.points[k])
+        for leg, other in [(home, away)]
+        for j in range(k, len(home.points))
+    ]
+    for before, here in pairs:
+        if np.linalg.norm(np.cross(axis, before)) > _LONG * np.linalg.norm(before) > 0.0:
+            return before, here
+    return pairs[0]  # nothing tells: what it carries lies on its axis
+
+
+def _rotations(axes: Array, angles: Array) -> Array:
+    """Return rotations (K, 3, 3) about axes (K, 3)."""
+    zero = np.zeros(len(axes))
+    x, y, z = axes.T
+    cross = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
+    sine, cosine = np.sin(angles)[:, None, None], np.cos(angles)[:, None, None]
+    return np.asarray(np.eye(3) + sine * cross + (1.0 - cosine) * cross @ cross)

@@ -1,0 +1,83 @@
+"""The pose in which an exported machine stands: its joints in the middle of their ranges."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from functools import lru_cache
+
+import numpy as np
+
+from pteron.errors import DataError, ModelError, SingularPose
+from pteron.kernels import Array, as_array, numeric
+from pteron.kinematics import direct_kinematics, inverse_kinematics, random_poses
+from pteron.manipulator import Manipulator
+from pteron.shapes import PoseLike
+
+_GOOD = 0.1
+"""The least measure from singularities with which the middle of the joints' ranges will do."""
+
+_SEARCHES = ((200, 0.3), (200, 0.02), (200, 0.0))
+"""How many random poses, and their least measures."""
+
+
+def chosen_home(robot: Manipulator, home: PoseLike | None) -> Array:
+    """Return the pose given, checked, or one chosen by the joints' ranges.
+
+    Raises
+    ------
+    DataError, UnreachablePose
+        If the pose given is none, or out of reach.
+    """
+    if home is None:
+        return np.array(_middle(robot))
+    pose = as_array(home, "home", (robot.freedom,))
+    if pose.ndim > 1:
+        raise DataError(f"home: shape {pose.shape} given, one pose ({robot.freedom},) expected")
+    inverse_kinematics(robot, pose)
+    return np.array(pose)
+
+
+@lru_cache(maxsize=64)
+def _middle(robot: Manipulator) -> tuple[float, ...]:
+    """Return the pose with all joints in the middle of their ranges, zero where they have none.
+
+    Where no such pose is away from singularities it is the best of random ones, within the joints'
+    limits if any are.
+    """
+    ranges = np.array([leg.limits or (0.0, 0.0) for leg in robot.legs])
+    found = np.empty((0, robot.freedom))
+    with suppress(SingularPose):
+        found = direct_kinematics(robot, ranges.mean(axis=1)).reshape(-1, robot.freedom)
+        found = found[np.isfinite(found).all(axis=-1)]
+    worth = _worth(robot, found)
+    if len(found) and worth.max() >= _GOOD:
+        return tuple((np.round(found[worth.argmax()], 12) + 0.0).tolist())
+    for count, least in _SEARCHES:
+        with suppress(ModelError):
+            found = random_poses(robot, count, type_i=least, type_ii=least)
+            break
+    else:
+        raise ModelError(
+            "no pose found in which all legs reach the platform; give one as home",
+            subject=robot.name,
+        )
+    joints = inverse_kinematics(robot, found)
+    given = np.array([leg.limits is not None for leg in robot.legs])
+    beyond = (joints < ranges[:, 0]) | (joints > ranges[:, 1])
+    worth = _worth(robot, found) - (beyond & given).any(axis=-1)
+    return tuple((np.round(found[worth.argmax()], 6) + 0.0).tolist())
+
+
+def _worth(robot: Manipulator, poses: Array) -> Array:
+    """Return the least measure (K,) of singularities of poses (K, m), below 0 beyond limits."""
+    if not len(poses):
+        return np.empty(0)
+    bent = numeric(robot, "reach")(poses)[1].min(axis=-1)
+    held = np.abs(numeric(robot, "type_ii")(poses)[0])
+    if not held.max() > 0.0:  # singular everywhere
+        held = bent
+    room = numeric(robot, "passive_room")(poses)[0].min(axis=-1)
+    worth = np.minimum(bent, held)
+    if robot.platform.turns:  # a machine seldom works the wrong way round
+        worth = np.minimum(worth, 1.0 - np.abs(poses[:, -1]) / np.pi)
+    return np.asarray(np.nan_to_num(np.where(room < 0.0, room, worth), nan=-1.0))

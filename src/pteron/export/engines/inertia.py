@@ -1,0 +1,79 @@
+"""Inertia that the model does not determine, completed to real bodies.
+
+A body that moves in a plane acts by its mass, its centre of mass in the plane and one moment of
+inertia; a slider by its mass alone; a rod without a spin. Engines want bodies in space. What is
+added here acts on no motion that the mechanism can make:
+
+- a link's or the platform's other two moments about its centre are 0.6 and 0.7 of the one that
+  acts, and its centre lies in the plane of its reference point;
+- a rod's moment about itself is 1e-10 of the one across it: the universal joint that carries it
+  in the tree spins it, and the model's rod has no inertia of spin;
+- a slider's mass is a cube's at its joint;
+- what the platform carries without a mass of its own, a hinged bar or a geared part, takes a share
+  of the platform's mass, and the platform's own first moment and inertia lose what that share has.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pteron.bodies.inertia import Inertia
+from pteron.kernels import Array
+
+_ACROSS = (0.6, 0.7, 1.0)
+"""A plane body's moments about its x, y and z, over that about z."""
+
+_SPIN = 1e-10
+"""A rod's moment about itself, over that across it."""
+
+_LEAST = 1e-10
+"""The least moment about the centre, over mass times the square of what is given as its distance:
+a body whose whole mass is at its centre is none to an engine."""
+
+_TINY = 2e-15
+"""kg m^2; engines refuse less."""
+
+
+def about_center(inertia: Inertia) -> tuple[float, Array, float]:
+    """Return a body's mass, its centre of mass (2,) in its own axes and the moment about that."""
+    values = dict(zip(inertia.kinds, inertia.values, strict=True))
+    mass = values["m"]
+    center = np.array([values.get(kind, 0.0) for kind in ("mgx", "mgy")]) / mass
+    return mass, center, values.get("I", 0.0) - mass * float(center @ center)
+
+
+def plane_moments(mass: float, moment: float, lever: float) -> Array:
+    """Return the moments (3,) of a body that turns about its z; `lever` is its size, m."""
+    return np.array(_ACROSS) * max(moment, _LEAST * mass * lever**2, _TINY / min(_ACROSS))
+
+
+def rod_moments(mass: float, moment: float, lever: float) -> Array:
+    """Return the moments (3,) of a rod along its x."""
+    across = max(moment, _LEAST * mass * lever**2, _TINY)
+    return np.array([max(_SPIN * across, _TINY), across, across])
+
+
+def cube_moments(mass: float, side: float) -> Array:
+    """Return the moments (3,) of a cube."""
+    return np.full(3, max(mass * side**2 / 6.0, _TINY))
+
+
+def shared_masses(
+    mass: float, moment: Array, inertia: float, places: Array
+) -> tuple[Array, float, Array, float]:
+    """Return masses (K,) taken from a plane body for parts at places (K, 2), and what is left.
+
+    The parts' masses and what is left, mass (kg), first moment (2,) (kg m) and moment of inertia
+    (kg m^2), are together the body that was given.
+    """
+    share = 0.05
+    own = inertia - float(moment @ moment) / mass
+    squares = (places**2).sum(axis=1)
+    for _ in range(40):
+        taken = np.full(len(places), share * mass)
+        left = mass - float(taken.sum())
+        rest, turning = moment - taken @ places, inertia - float(taken @ squares)
+        if left > 0.5 * mass and turning - float(rest @ rest) / left >= 0.5 * own:
+            break
+        share *= 0.5
+    return taken, left, rest, turning

@@ -1,0 +1,59 @@
+"""Shapes as URDF and SDF have them: in a link's frame, turned by roll, pitch and yaw."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pteron.export.engines.parts import Shape, TreeBody
+from pteron.export.engines.writing import look, row
+from pteron.kernels import Array
+
+_SAME = 1e-6
+
+
+class Look(NamedTuple):
+    """A shape: "sphere", "cylinder" along its own z, or "box"; all texts."""
+
+    kind: str
+    place: str
+    turn: str
+    radius: str
+    length: str
+    side: str
+
+
+def look_of(shape: Shape, body: TreeBody | None) -> Look:
+    """Return a shape in a body's frame, or in the base frame."""
+    ends = shape.ends if body is None else (shape.ends - body.origin) @ body.axes
+    along, middle = ends[1] - ends[0], ends.mean(axis=0)
+    length = float(np.linalg.norm(along))
+    kind = {"box": "box"}.get(shape.kind, "cylinder")
+    turn = np.eye(3)
+    if length < _SAME:
+        kind = "sphere"
+    else:
+        z = along / length
+        x = np.cross(z, np.eye(3)[np.argmin(np.abs(z))])
+        x /= np.linalg.norm(x)
+        turn = np.column_stack([x, np.cross(z, x), z])
+    sizes = look(shape.radius), look(length), look(2.0 * shape.radius)
+    return Look(kind, look(middle), look(roll_pitch_yaw(turn)), *sizes)
+
+
+def roll_pitch_yaw(turn: Array) -> Array:
+    """Return the angles (3,) of a rotation about fixed x, then y, then z, rad.
+
+    Where pitch is half a turn's half, yaw is what rounding makes it, and roll goes with it.
+    """
+    yaw = np.arctan2(turn[1, 0], turn[0, 0])
+    s, c = np.sin(yaw), np.cos(yaw)
+    pitch = np.arctan2(-turn[2, 0], c * turn[0, 0] + s * turn[1, 0])
+    roll = np.arctan2(s * turn[0, 2] - c * turn[1, 2], c * turn[1, 1] - s * turn[0, 1])
+    return np.array([roll, pitch, yaw])
+
+
+def placed(motion: Array) -> tuple[str, str]:
+    """Return a frame's place and its turn by roll, pitch and yaw, as texts."""
+    return row(motion[:3, 3]), row(roll_pitch_yaw(motion[:3, :3]))

@@ -1,0 +1,245 @@
+"""MJCF, for MuJoCo: the whole closed machine, with its drives."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pteron.atomic import write_texts
+from pteron.dynamics import inverse_dynamics
+from pteron.export.engines.parts import BASE, Shape, Tree, TreeBody, TreeJoint
+from pteron.export.engines.shapes import dressed
+from pteron.export.engines.tree import tree
+from pteron.export.engines.writing import (
+    BASE_COLOR,
+    COLORS,
+    PLATFORM_COLOR,
+    frame,
+    head,
+    identifier,
+    inverse,
+    left_out,
+    look,
+    material,
+    number,
+    parent_frame,
+    row,
+    small,
+    within,
+)
+from pteron.kernels import Array
+from pteron.kernels.code import rendered
+from pteron.manipulator import Manipulator
+from pteron.shapes import PoseLike
+
+STEP = 2e-4
+"""The file's step of integration, s."""
+
+STIFFNESS = 0.2
+"""The rate at which the loops' constraints pull gaps back, times the step."""
+
+_SAME = 1e-6
+
+
+def export_mjcf(
+    robot: Manipulator, folder: str | Path = ".", *, home: PoseLike | None = None
+) -> list[Path]:
+    """Write a machine for MuJoCo: bodies, looks, closed loops, drives, and a keyframe.
+
+    All loops are closed by `connect` constraints, and gears by constraints of joints. The actuated
+    joints have the names and the coordinates of the machine's logs; a drive's inertia, viscous and
+    dry friction are the joint's armature, damping and frictionloss, its greatest force the
+    actuator's control range.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    folder : path
+        Where the file goes; it is made if it is missing.
+    home : array, shape (m,), optional
+        The pose in which the machine opens, m and rad; where it is left out that with all joints in
+        the middle of their ranges, or the best of random ones.
+
+    Returns
+    -------
+    list of Path
+        The one file written, named after the machine.
+
+    Raises
+    ------
+    DataError, UnreachablePose
+        If `home` is no pose, or out of reach.
+    OutputError
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> import pteron, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     files = pteron.export.export_mjcf(pteron.load("delta"), folder)
+    >>> [path.name for path in files]
+    ['delta.xml']
+    """
+    return write_texts(folder, {f"{identifier(robot)}.xml": mjcf(tree(robot, home))})
+
+
+def mjcf(opened: Tree, *, step: float = STEP) -> str:
+    """Return a machine as MJCF, for an integration by this step, s."""
+    opened = dressed(opened)
+    bodies, robot = opened.bodies, opened.robot
+    children: list[list[int]] = [[] for _ in bodies]
+    roots: list[int] = []
+    for k, body in enumerate(bodies):
+        (roots if body.parent == BASE else children[body.parent]).append(k)
+    offset = any(motor.drive.offset for motor in opened.motors)
+    return rendered(
+        "pteron.export",
+        "robot.mjcf.j2",
+        head=head(opened, "MJCF"),
+        notes=_notes(opened),
+        name=identifier(robot),
+        step=step,
+        rate=STIFFNESS / step,
+        gravity=robot.gravity,
+        offset=offset,
+        size=opened.size,
+        colors=COLORS,
+        platform_color=PLATFORM_COLOR,
+        base_color=BASE_COLOR,
+        base=opened.base,
+        bodies=bodies,
+        children=children,
+        roots=roots,
+        sites=_sites(opened),
+        closings=opened.closings,
+        coupled=[joint for joint in opened.joints if joint.follows is not None],
+        motors=[_motor(opened, k) for k in range(len(opened.motors))],
+        names=[motor.name for motor in opened.motors],
+        home=[joint.home for joint in opened.joints],
+        hold=_hold(opened),
+        number=number,
+        look=look,
+        row=row,
+        small=small,
+        local=lambda body, points: points if body is None else within(body, points),
+        same=lambda shape: np.ptp(shape.ends, axis=0).max() < _SAME,
+        half=lambda shape: float(np.linalg.norm(shape.ends[1] - shape.ends[0])) / 2.0,
+        moments=lambda body: " ".join(map(small, body.moments)),
+        placed=lambda body: _placed(opened, body),
+        joint_of=lambda body, joint: _joint(opened, body, joint),
+        material=material,
+        **_scene(opened),
+    )
+
+
+def _notes(opened: Tree) -> list[str]:
+    """Return what the file cannot hold of this machine, and how its shaft is driven."""
+    kept = ("inertia", "viscous", "coulomb", "offset", "max_force")
+    shafts = [motor.name for motor in opened.motors if motor.name != motor.joint]
+    said = [f"{name} turns phi; its actuator's gear is the shaft's ratio." for name in shafts]
+    return [*said, *left_out(opened, kept)]
+
+
+def _placed(opened: Tree, body: TreeBody) -> str:
+    """Return where a body is in the frame of the one before."""
+    from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
+
+    there = inverse(parent_frame(opened, body)) @ frame(body)
+    x, y, z, w = Rotation.from_matrix(there[:3, :3]).as_quat(canonical=True)
+    text = f'pos="{row(there[:3, 3])}"'
+    turned = row([w, x, y, z])
+    return text if turned == "1 0 0 0" else f'{text} quat="{turned}"'
+
+
+def _joint(opened: Tree, body: TreeBody, joint: TreeJoint) -> str:
+    """Return a joint's attributes; its `ref` makes the file's pose the home pose."""
+    parts = [
+        f'name="{joint.name}"',
+        f'type="{"slide" if joint.slides else "hinge"}"',
+        f'axis="{row(joint.axis @ body.axes)}"',
+    ]
+    place = within(body, joint.point)
+    if not joint.slides and row(place) != "0 0 0":
+        parts.append(f'pos="{row(place)}"')
+    if number(joint.home) != "0":
+        parts.append(f'ref="{number(joint.home)}"')
+    for motor in opened.motors:
+        if motor.joint != joint.name:
+            continue
+        drive, ratio = motor.drive, motor.ratio
+        values = {
+            "armature": ratio**2 * drive.inertia,
+            "damping": ratio**2 * drive.viscous,
+            "frictionloss": abs(ratio) * drive.coulomb,
+        }
+        parts += [f'{name}="{number(value)}"' for name, value in values.items() if value]
+    if joint.limits is not None:
+        parts.append(f'range="{row(joint.limits)}"')
+    return " ".join(parts)
+
+
+def _motor(opened: Tree, k: int) -> str:
+    """Return an actuator, whose control is the force at the actuated joint."""
+    motor = opened.motors[k]
+    parts = [f'name="{motor.name}" joint="{motor.joint}" gear="{number(motor.ratio)}"']
+    most = motor.drive.max_force
+    if most is not None:
+        parts.append(f'ctrlrange="{number(-most)} {number(most)}"')
+    if motor.drive.offset:
+        bias = f'gainprm="1" biastype="affine" biasprm="{number(-motor.drive.offset)} 0 0"'
+        return f"<general {parts[0]} {bias}{' ' + parts[1] if most is not None else ''}/>"
+    return f"<motor {' '.join(parts)}/>"
+
+
+def _hold(opened: Tree) -> Array:
+    """Return the controls that hold the machine at its home pose, as far as its drives can."""
+    rest = np.zeros(opened.robot.freedom)
+    forces = inverse_dynamics(opened.robot, opened.home, rest, rest, on_failure="nan")
+    forces = forces + [motor.drive.offset for motor in opened.motors]
+    most = np.array([motor.drive.max_force or np.inf for motor in opened.motors])
+    return np.asarray(np.clip(np.nan_to_num(forces), -most, most))
+
+
+def _sites(opened: Tree) -> list[list[tuple[str, Array]]]:
+    """Return each body's sites: the two sides of every closing, and the tool's centre point."""
+    found: list[list[tuple[str, Array]]] = [[] for _ in opened.bodies]
+    for closing in opened.closings:
+        found[closing.one].append((f"{closing.name}_end", closing.point))
+        found[closing.other].append((f"{closing.name}_seat", closing.point))
+    p, axes = opened.robot.platform.at(opened.home)
+    found[0].append(("tool", p + np.array(opened.robot.platform.tool) @ axes))
+    return found
+
+
+def _scene(opened: Tree) -> dict[str, Any]:
+    """Return where floor, light and camera are."""
+    shapes: list[Shape] = [shape for body in opened.bodies for shape in body.shapes]
+    points = np.vstack([shape.ends for shape in [*shapes, *(shape for _, shape in opened.base)]])
+    gravity = np.array(opened.robot.gravity)
+    weight = float(np.linalg.norm(gravity))
+    up = -gravity / weight if weight else np.array([0.0, 0.0, 1.0])
+    low, high = points.min(axis=0), points.max(axis=0)
+    center, extent = (low + high) / 2.0, float(np.linalg.norm(high - low))
+    floor = center + (float((points @ up).min()) - center @ up - 0.08 * opened.size) * up
+    if opened.robot.platform.planar and abs(opened.robot.platform.frame[2] @ up) < 0.5:
+        toward = np.array(opened.robot.platform.frame[2])
+    else:
+        side = np.cross(up, np.eye(3)[np.argmin(np.abs(up))])
+        side /= np.linalg.norm(side)
+        toward = 0.75 * side + 0.55 * np.cross(up, side) + 0.45 * up
+    toward /= np.linalg.norm(toward)
+    right = np.cross(up, toward)
+    right /= np.linalg.norm(right)
+    return {
+        "up": up,
+        "center": center,
+        "extent": extent,
+        "floor": floor,
+        "camera": center + 1.2 * extent * toward,
+        "view": np.array([right, np.cross(toward, right)]),
+        "light": center + 2.0 * extent * up,
+        "shine": -(up + 0.4 * right + 0.3 * toward),
+    }

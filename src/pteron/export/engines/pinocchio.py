@@ -1,0 +1,240 @@
+"""Pinocchio: the opened mechanism as a model, and the constraints that close its loops.
+
+Joints that are coupled to others are no part of Pinocchio's constrained dynamics. What a gear turns
+with the platform is therefore in the platform's inertia: the square of its ratio times its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pteron.atomic import write_texts
+from pteron.errors import ModelError
+from pteron.export.engines.parts import BASE, Tree, TreeBody, at_zero
+from pteron.export.engines.tree import tree
+from pteron.export.engines.writing import (
+    frame,
+    head,
+    identifier,
+    inverse,
+    left_out,
+    number,
+    small,
+    within,
+)
+from pteron.kernels import Array
+from pteron.kernels.code import rendered
+from pteron.manipulator import Manipulator
+from pteron.shapes import PoseLike
+
+
+def export_pinocchio(
+    robot: Manipulator, folder: str | Path = ".", *, home: PoseLike | None = None
+) -> list[Path]:
+    """Write a Python file whose `build()` returns a Pinocchio model with its loops' constraints.
+
+    The file needs Pinocchio and NumPy only. What `build` returns has the model, its constraints and
+    their data, the matrix of the motors, and the coordinates at the home pose. Joints have the
+    names and coordinates of the machine's logs; a point of each leg is held to the platform in
+    three directions.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine; its platform must not slide (`slides`), whose halves need coupled joints.
+    folder : path
+        Where the file goes; it is made if it is missing.
+    home : array, shape (m,), optional
+        The pose at which passive joints are zero, m and rad; see `export_mjcf`.
+
+    Returns
+    -------
+    list of Path
+        The one file written, named after the machine: a module of Python.
+
+    Raises
+    ------
+    ModelError
+        If the machine's platform slides.
+    DataError, UnreachablePose
+        If `home` is no pose, or out of reach.
+    OutputError
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> import pteron, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     files = pteron.export.export_pinocchio(pteron.load("five-bar"), folder)
+    >>> [path.name for path in files]
+    ['five_bar_pinocchio.py']
+    """
+    name = identifier(robot).replace("-", "_")
+    name = f"robot_{name}" if name[0].isdigit() else name
+    return write_texts(folder, {f"{name}_pinocchio.py": pinocchio_source(tree(robot, home))})
+
+
+def pinocchio_model(robot: Manipulator, *, home: PoseLike | None = None) -> Any:
+    """Return what `build()` of the exported file returns: a Pinocchio model with its constraints.
+
+    Parameters
+    ----------
+    robot, home
+        See `export_pinocchio`.
+
+    Returns
+    -------
+    ClosedModel
+        A named tuple: model, constraints, constraint_datas, motors (n, nv), home (nq,).
+
+    Raises
+    ------
+    ModelError
+        If Pinocchio is not installed, or the machine's platform slides.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> closed = pteron.export.pinocchio_model(pteron.load("delta"))
+    >>> closed.model.nv, len(closed.constraints), closed.motors.shape
+    (12, 3, (3, 12))
+    """
+    try:
+        import pinocchio  # type: ignore[import-not-found,unused-ignore]  # noqa: F401
+    except ImportError:
+        raise ModelError(
+            'Pinocchio is not installed; pip install "pteron[oracles]", or pip install pin'
+        ) from None
+    source = pinocchio_source(tree(robot, home))
+    # What is returned in this process is what the written file returns: one code for both.
+    module: dict[str, Any] = {"__name__": f"{identifier(robot)}_pinocchio"}
+    exec(compile(source, f"<{robot.name} for Pinocchio>", "exec"), module)
+    return module["build"]()
+
+
+def pinocchio_source(opened: Tree) -> str:
+    """Return the text of the Python file."""
+    robot = opened.robot
+    coupled = [body for body in opened.bodies if body.joints[0].follows is not None]
+    if any(body.joints[0].slides for body in coupled):
+        raise ModelError(
+            "the halves of its platform slide by phi, which takes coupled joints, and Pinocchio's "
+            "constrained dynamics have none; export it as MJCF, SDF or URDF",
+            subject=robot.name,
+        )
+    here = {body.name: body for body in opened.bodies}
+    bodies = _without_gears(at_zero(opened))
+    armature = {motor.joint: motor.ratio**2 * motor.drive.inertia for motor in opened.motors}
+    limits = _limits(opened)
+    homes = {joint.name: joint.home for joint in opened.joints}
+    notes = left_out(opened, ("inertia",))
+    if coupled:
+        notes.append(
+            "What gears turn is in the platform's inertia: the square of its ratio times its own."
+        )
+    return rendered(
+        "pteron.export",
+        "robot.pinocchio.j2",
+        head=head(opened, "Python for Pinocchio"),
+        notes=notes,
+        title=identifier(robot),
+        name=identifier(robot),
+        gravity=_list(robot.gravity),
+        bodies=[
+            {
+                "name": body.name,
+                "before": None if body.parent == BASE else opened.bodies[body.parent].name,
+                "place": _list(_from_parent(opened, bodies, body)[:3]),
+                "mass": small(body.mass),
+                "center": _list(within(body, body.center)),
+                "moments": ", ".join(map(small, body.moments)),
+            }
+            for body in bodies
+        ],
+        joints=[
+            {
+                "name": joint.name,
+                "body": body.name,
+                "slides": joint.slides,
+                "axis": _list(joint.axis @ body.axes),
+                "low": limits[joint.name][0],
+                "high": limits[joint.name][1],
+                "armature": small(armature.get(joint.name, 0.0)),
+                "home": number(homes[joint.name]),
+            }
+            for body in bodies
+            for joint in body.joints
+        ],
+        closings=[
+            {
+                "name": closing.name,
+                "one": opened.bodies[closing.one].name,
+                "end": _list(within(here[opened.bodies[closing.one].name], closing.point)),
+                "other": opened.bodies[closing.other].name,
+                "seat": _list(within(here[opened.bodies[closing.other].name], closing.point)),
+            }
+            for closing in opened.closings
+        ],
+        motors=[
+            {"name": motor.name, "joint": motor.joint, "ratio": number(motor.ratio)}
+            for motor in opened.motors
+        ],
+    )
+
+
+def _without_gears(bodies: Sequence[TreeBody]) -> list[TreeBody]:
+    """Return the bodies with what gears turn in the inertia of what carries them."""
+    kept = []
+    for k, body in enumerate(bodies):
+        if body.joints[0].follows is not None:
+            continue
+        gears = [b for b in bodies if b.parent == k and b.joints[0].follows is not None]
+        for gear in gears:
+            follows = gear.joints[0].follows
+            assert follows is not None
+            body = _with_gear(body, gear, 1.0 + follows[1])
+        kept.append(body)
+    return kept
+
+
+def _with_gear(body: TreeBody, gear: TreeBody, ratio: float) -> TreeBody:
+    """Return a body that turns with a gear's part, balanced at its origin, turning `ratio` faster.
+
+    Its moment about z, which alone acts, is exact.
+    """
+    mass = body.mass + gear.mass
+    center = (body.mass * body.center + gear.mass * gear.center) / mass
+    apart = (gear.center - body.center) @ body.axes[:, :2]
+    about = body.moments[2] + ratio**2 * gear.moments[2]
+    about += body.mass * gear.mass / mass * float(apart @ apart)
+    moments = np.array([0.6, 0.7, 1.0]) * about
+    return replace(body, mass=mass, center=center, moments=moments)
+
+
+def _from_parent(opened: Tree, bodies: Sequence[TreeBody], body: TreeBody) -> Array:
+    if body.parent == BASE:
+        return frame(body)
+    before = next(b for b in bodies if b.name == opened.bodies[body.parent].name)
+    return np.asarray(inverse(frame(before)) @ frame(body))
+
+
+def _limits(opened: Tree) -> dict[str, tuple[str, str]]:
+    """Return each joint's limits as text; infinite where there are none."""
+    found = {}
+    for joint in opened.joints:
+        low, high = joint.limits or (-np.inf, np.inf)
+        found[joint.name] = _bound(low), _bound(high)
+    return found
+
+
+def _bound(value: float) -> str:
+    return number(value) if np.isfinite(value) else f"{'-' if value < 0.0 else ''}np.inf"
+
+
+def _list(values: Any) -> str:
+    return ", ".join(map(number, np.ravel(values)))

@@ -1,0 +1,220 @@
+"""The platform in pieces: what moves as one with P, parts that do not turn, gears, sliding halves.
+
+The pieces have together the platform's mass, first moment and moment of inertia, as the equations
+take them (`Platform.joined`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pteron.bodies.vectors import cross
+from pteron.export.engines.inertia import (
+    about_center,
+    cube_moments,
+    plane_moments,
+    shared_masses,
+)
+from pteron.export.engines.parts import BASE, Closing, TreeBody, TreeJoint
+from pteron.kernels import Array
+from pteron.manipulator import Manipulator
+from pteron.platforms import Platform
+
+_COINCIDENT = 1e-9
+"""m between hinges that are taken for one; m/rad where the platform slides."""
+
+_SIDE = 0.05
+"""m: the side of a cube that stands for a part that does not turn."""
+
+Pieces = tuple[list[TreeBody], list[int], list[Closing]]
+"""Bodies; which of them each leg carries; where parts of the platform close with it."""
+
+
+def platform_bodies(robot: Manipulator, pose: Array) -> Pieces:
+    """Return the platform's bodies at a pose, which of them each leg carries, and their closings.
+
+    The first bodies have the joints of the pose's coordinates, in their order.
+    """
+    platform = robot.platform
+    if platform.slides:
+        return _sliding(robot, pose)
+    if platform.turns:
+        return _turning(robot, pose)
+    mass, center, about = about_center(platform.joined)
+    body = _plane_body(platform, pose, _moves(platform, pose), mass, center, about)
+    return [body], [0] * len(robot.legs), []
+
+
+def _turning(robot: Manipulator, pose: Array) -> Pieces:
+    """Return a platform that turns, its gears, and the parts that hang on its hinges."""
+    platform = robot.platform
+    p, axes = platform.at(pose)
+    # What of a leg's fixed offset is along the axis turns with the platform as well as not.
+    across = [cross(leg.fixed_offset, platform.axis) for leg in robot.legs]
+    hung = [bool(np.abs(offset).max() > _COINCIDENT) for offset in across]
+    points = [np.array(leg.platform_point) for leg in robot.legs]
+    hinges = _distinct([point for point, hangs in zip(points, hung, strict=True) if hangs])
+    masses, shares, rest = _shared(platform, hinges, len(platform.geared))
+    joints = [*_moves(platform, pose), _turn(platform, pose)]
+    bodies = [_plane_body(platform, pose, joints, *rest)]
+    bodies += _gears(platform, pose, shares, 1.0)
+    first, closings = len(bodies), []
+    for j, (hinge, mass) in enumerate(zip(hinges, masses, strict=True), start=1):
+        at = p + hinge @ axes
+        moves = [
+            TreeJoint(f"bar{j}_{name}", True, along, at, float(along @ at))
+            for name, along in zip(platform.lengths, platform.directions, strict=True)
+        ]
+        closings.append(Closing(f"bar{j}", len(bodies), 0, at))
+        bodies.append(_still_body(platform, f"bar{j}", BASE, moves, at, mass))
+    carried = [
+        first + _which(hinges, point) if hangs else 0
+        for point, hangs in zip(points, hung, strict=True)
+    ]
+    return bodies, carried, closings
+
+
+def _sliding(robot: Manipulator, pose: Array) -> Pieces:
+    """Return a platform whose halves slide by phi: what moves with P, what turns, what slides.
+
+    The first moment of the whole per radian, h, is that of its mass m sliding by h / m; what of I
+    that leaves, h.h / m less, turns by phi.
+    """
+    platform = robot.platform
+    p, _ = platform.at(pose)
+    frame = np.array(platform.frame)
+    points = [np.array(leg.platform_point) for leg in robot.legs]
+    halves = _distinct([point for point in points if np.abs(point).max() > _COINCIDENT])
+    masses, shares, rest = _shared(platform, halves, 2 + len(platform.geared))
+    mass, center, about = rest
+    carrier = _still_body(platform, "platform", BASE, _moves(platform, pose), p, float(shares[0]))
+    turn = [_turn(platform, pose)]
+    tool = _plane_body(platform, pose, turn, float(shares[1]), np.zeros(2), about)
+    bodies = [carrier, replace(tool, name="tool", parent=0)]
+    bodies += _gears(platform, pose, shares[2:], 0.0)
+    first = len(bodies) + 1
+    slides = [("nacelle", center, mass)]
+    slides += [
+        (f"half{j}", half[:2], own)
+        for j, (half, own) in enumerate(zip(halves, masses, strict=True), start=1)
+    ]
+    for name, v, own in slides:
+        by = float(np.linalg.norm(v))
+        along = v @ frame[:2] / by if by else frame[0]
+        at = p + by * pose[-1] * along
+        follows = ("phi", by)
+        joint = TreeJoint(f"{name}_slide", True, along, at, by * float(pose[-1]), None, follows)
+        bodies.append(_still_body(platform, name, 0, [joint], at, own))
+    slide = [np.abs(point).max() > _COINCIDENT for point in points]
+    carried = [
+        first + _which(halves, point) if away else 0
+        for point, away in zip(points, slide, strict=True)
+    ]
+    return bodies, carried, []
+
+
+def _shared(
+    platform: Platform, places: Sequence[Array], others: int
+) -> tuple[list[float], Array, tuple[float, Array, float]]:
+    """Return the masses of parts at places, of so many others at P, and what the platform keeps.
+
+    A part has the mass of the bars at its place, or a share of the platform's. What the platform
+    keeps is its mass, the centre (2,) of it and the moment about that; a bar at which no part is
+    counts as a point of it.
+    """
+    own = platform.inertia
+    mass, moment, inertia = own.mass, np.array(own.first_moment), own.inertia
+    masses = [0.0] * len(places)
+    for bar in platform.bars:
+        hinge = np.array(bar.hinge)
+        near = [k for k, place in enumerate(places) if _same(place, hinge)]
+        if near:
+            masses[near[0]] += bar.mass
+        else:
+            mass, moment = mass + bar.mass, moment + bar.mass * hinge[:2]
+            inertia += bar.mass * float(hinge[:2] @ hinge[:2])
+    without = [k for k, one in enumerate(masses) if one == 0.0]
+    at = np.zeros((len(without) + others, 2))
+    for row, k in zip(at, without, strict=False):
+        row[:] = places[k][:2]
+    shares, mass, moment, inertia = shared_masses(mass, moment, inertia, at)
+    for k, share in zip(without, shares, strict=False):
+        masses[k] = float(share)
+    center = moment / mass
+    return masses, shares[len(without) :], (mass, center, inertia - mass * float(center @ center))
+
+
+def _moves(platform: Platform, pose: Array) -> list[TreeJoint]:
+    """Return the joints along which P slides."""
+    p = platform.at(pose)[0]
+    lengths = zip(platform.lengths, platform.directions, pose, strict=False)
+    return [TreeJoint(name, True, axis, p, float(at)) for name, axis, at in lengths]
+
+
+def _turn(platform: Platform, pose: Array) -> TreeJoint:
+    """Return the joint about which the platform turns."""
+    p, axis = platform.at(pose)[0], np.array(platform.axis)
+    return TreeJoint("phi", False, axis, p, float(pose[-1]), platform.limits)
+
+
+def _plane_body(
+    platform: Platform,
+    pose: Array,
+    joints: Sequence[TreeJoint],
+    mass: float,
+    center: Array,
+    about: float,
+) -> TreeBody:
+    """Return a body that turns with the platform; its centre (2,) is in the platform's frame."""
+    p, axes = platform.at(pose)
+    moments = plane_moments(mass, about, max(float(np.linalg.norm(center)), _SIDE))
+    at = p + center @ axes[:2]
+    return TreeBody("platform", BASE, tuple(joints), p, axes.T, mass, at, moments, 0)
+
+
+def _still_body(
+    platform: Platform,
+    name: str,
+    parent: int,
+    joints: Sequence[TreeJoint],
+    at: Array,
+    mass: float,
+) -> TreeBody:
+    """Return a body that does not turn, its mass where it is."""
+    axes, moments = np.array(platform.frame).T, cube_moments(mass, _SIDE)
+    return TreeBody(name, parent, tuple(joints), at, axes, mass, at, moments, 0)
+
+
+def _gears(platform: Platform, pose: Array, masses: Array, against: float) -> list[TreeBody]:
+    """Return what gears turn, on a body that itself turns by `against` times phi."""
+    p, axes = platform.at(pose)
+    found = []
+    for j, (part, mass) in enumerate(zip(platform.geared, masses, strict=True), start=1):
+        by = part.ratio - against
+        follows, home = ("phi", by), by * float(pose[-1])
+        joint = TreeJoint(f"gear{j}", False, np.array(platform.axis), p, home, None, follows)
+        moments = np.full(3, part.inertia)
+        found.append(TreeBody(f"geared{j}", 0, (joint,), p, axes.T, float(mass), p, moments, 0))
+    return found
+
+
+def _same(one: Array, other: Array) -> bool:
+    """Return whether two places of the platform are on one axis of it."""
+    return bool(np.abs(one - other)[:2].max() <= _COINCIDENT)
+
+
+def _distinct(places: Sequence[Array]) -> list[Array]:
+    """Return the places but for those that are on the axis of one before them."""
+    return [
+        place
+        for k, place in enumerate(places)
+        if not any(_same(place, before) for before in places[:k])
+    ]
+
+
+def _which(places: Sequence[Array], place: Array) -> int:
+    """Return which of the places is on the axis of another."""
+    return next(k for k, one in enumerate(places) if _same(one, place))

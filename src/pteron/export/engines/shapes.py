@@ -1,0 +1,109 @@
+"""What the machine looks like at its home pose: bars, boxes, guides and axles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pteron.export.engines.parts import BASE, Shape, Tree, TreeBody
+from pteron.kernels import Array
+
+_THICK = 0.011
+"""Radius of a link, as a share of the machine's size; the other sizes go by it."""
+
+_APART = 0.018
+"""Half the distance of parallel rods, as a share of the machine's size: files do not say it."""
+
+_SPARE = 0.25
+"""Length of a guide without limits either way, as a share of the machine's size."""
+
+_OVERLAP = 0.55
+"""Each part of a telescope has this share of the whole."""
+
+_SAME = 1e-6
+
+
+def dressed(opened: Tree) -> Tree:
+    """Return the tree with a shape for each body, and for what stands on the base."""
+    thick = _THICK * opened.size
+    looks: list[list[Shape]] = [[] for _ in opened.bodies]
+    base: list[tuple[int, Shape]] = []
+    for i, (leg, closing) in enumerate(zip(opened.robot.legs, opened.closings, strict=False)):
+        chain = [k for k, body in enumerate(opened.bodies) if body.color == i + 1]
+        bodies = [opened.bodies[k] for k in chain]
+        for k, shapes in zip(chain, _leg(bodies, closing.point, leg.bar, opened.size), strict=True):
+            looks[k] += shapes
+        base += [(i + 1, shape) for shape in _stand(bodies[0], opened.size)]
+    _platform(opened, looks, thick)
+    pairs = zip(opened.bodies, looks, strict=True)
+    shown = tuple(replace(body, shapes=tuple(shapes)) for body, shapes in pairs)
+    return replace(opened, bodies=shown, base=tuple(base))
+
+
+def _leg(
+    bodies: Sequence[TreeBody], end: Array, bar: Sequence[float] | None, size: float
+) -> list[list[Shape]]:
+    """Return the shapes of a leg's bodies; the last one is doubled where rods are parallel."""
+    thick, found = _THICK * size, []
+    origins = [*(body.origin for body in bodies), end]
+    for k, body in enumerate(bodies):
+        start, stop, radius = origins[k], origins[k + 1], thick
+        slides = body.joints[-1].slides
+        if slides and k == 0:
+            axis = 2.6 * thick * body.joints[-1].axis
+            found.append([Shape("box", np.array([start - axis, start + axis]), 1.9 * thick)])
+            continue
+        if np.linalg.norm(stop - start) < _SAME:  # the next one slides in this one
+            stop, radius = start + _OVERLAP * (end - start), 1.4 * thick
+        elif slides:
+            start = stop - _OVERLAP * (stop - start)
+        ends = np.array([start, stop])
+        if bar is None or k < len(bodies) - 1:
+            found.append([Shape("capsule", ends, radius)])
+            continue
+        side = _APART * size * np.array(bar)
+        pair = [Shape("capsule", ends + way * side, 0.6 * thick) for way in (1.0, -1.0)]
+        across = [Shape("capsule", np.array([p - side, p + side]), 0.6 * thick) for p in ends]
+        found.append(pair + across)
+    return found
+
+
+def _stand(first: TreeBody, size: float) -> list[Shape]:
+    """Return what of a leg's first joint stands on the base: a guide, or an axle."""
+    joint, thick = first.joints[0], _THICK * size
+    if joint.slides:
+        low, high = joint.limits or (joint.home - _SPARE * size, joint.home + _SPARE * size)
+        reach = np.array([[low - joint.home - 3.0 * thick], [high - joint.home + 3.0 * thick]])
+        return [Shape("cylinder", joint.point + reach * joint.axis, 0.8 * thick)]
+    half = 2.6 * thick * joint.axis
+    return [Shape("cylinder", np.array([joint.point - half, joint.point + half]), 1.8 * thick)]
+
+
+def _platform(opened: Tree, looks: list[list[Shape]], thick: float) -> None:
+    """Add the shapes of the platform's bodies: arms from their origins to where others close."""
+    platform, bodies = opened.robot.platform, opened.bodies
+    p, axes = platform.at(opened.home)
+    axis = np.array(platform.axis)
+    for closing in opened.closings:
+        for k in (closing.one, closing.other):
+            if bodies[k].color == 0:
+                looks[k].append(_arm(bodies[k].origin, closing.point, thick))
+    hub = np.array([p - 0.8 * thick * axis, p + 0.8 * thick * axis])
+    looks[0].append(Shape("cylinder", hub, 2.2 * thick))
+    tool = p + np.array(platform.tool) @ axes
+    if np.linalg.norm(tool - p) > _SAME:
+        looks[0].append(_arm(p, tool, 0.8 * thick))
+    for k, body in enumerate(bodies):
+        if body.color == 0 and body.parent != BASE and not body.joints[0].slides:
+            # What turns about P: a block, so that it is seen to turn.
+            half = 2.4 * thick * body.axes[:, 0]
+            middle = body.origin - 2.2 * thick * axis
+            looks[k].append(Shape("box", np.array([middle - half, middle + half]), thick))
+        elif body.color == 0 and not looks[k]:
+            looks[k].append(_arm(p, body.origin, thick))
+
+
+def _arm(start: Array, stop: Array, radius: float) -> Shape:
+    return Shape("capsule", np.array([start, stop]), radius)

@@ -1,0 +1,158 @@
+"""The opened mechanism: every leg and the platform as chains from the base, cut where they meet.
+
+Each leg is cut at its platform point, where its last body ends; the joints beyond are left out, as
+the platform's own chain says how it moves: it slides along the pose's lengths and turns by phi. Of
+an articulated platform each part that does not turn is a body of its own, which slides without
+turning and is closed with the platform at its hinge. Gears, and halves of a platform that slide,
+are coupled to phi.
+
+No kind of leg is asked for: all is read from `LegMotion.chain` and `LegMotion.bodies` (`legs.leg`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pteron.export.engines.chains import LegStance, leg_stances, shaft_ratio
+from pteron.export.engines.home import chosen_home
+from pteron.export.engines.inertia import about_center, cube_moments, plane_moments, rod_moments
+from pteron.export.engines.parts import BASE, Closing, Motor, Tree, TreeBody, TreeJoint
+from pteron.export.engines.platform import platform_bodies
+from pteron.kernels import Array
+from pteron.legs import Drive
+from pteron.legs.kind import LegKind
+from pteron.manipulator import Manipulator
+from pteron.manipulator.manipulator import expect_manipulator
+from pteron.shapes import PoseLike
+
+_NONE = 1e-9
+"""Sine between directions that are taken for one."""
+
+
+def tree(robot: Manipulator, home: PoseLike | None = None) -> Tree:
+    """Return a machine as chains of bodies, and the points where their loops close.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    home : array, shape (m,), optional
+        The pose in which it stands, m and rad; where it is left out that with all joints in the
+        middle of their ranges, or the best of random ones.
+
+    Returns
+    -------
+    Tree
+
+    Raises
+    ------
+    DataError, UnreachablePose
+        If `home` is no pose, or out of reach.
+    ModelError
+        If a kind of leg does not say which joint carries which body.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.export import tree
+    >>> opened = tree(pteron.load("delta"))
+    >>> [body.name for body in opened.bodies][:3]
+    ['platform', 'leg1_crank', 'leg1_rod']
+    >>> [joint.name for joint in opened.joints][:6]
+    ['x', 'y', 'z', 'theta1', 'leg1_joint1', 'leg1_joint2']
+    """
+    expect_manipulator(robot)
+    pose = chosen_home(robot, home)
+    stances = leg_stances(robot, pose)
+    size = _size(stances, pose[: len(robot.platform.lengths)] @ robot.platform.directions)
+    bodies, carriers, closings = platform_bodies(robot, pose)
+    names = robot.joint_names
+    motors = []
+    for i, (leg, stance) in enumerate(zip(robot.legs, stances, strict=True)):
+        chain = _leg(leg, i + 1, stance, names[i], len(bodies), size)
+        bodies += chain
+        closings.append(Closing(f"leg{i + 1}", len(bodies) - 1, carriers[i], stance.end))
+        drive, ratio = leg.drive or Drive(), 1.0
+        if leg.follows_angle:
+            ratio = shaft_ratio(robot, i)
+            bodies[0] = _with_shaft(bodies[0], leg.limits, ratio)
+        motors.append(Motor(names[i], "phi" if leg.follows_angle else names[i], ratio, drive))
+    # The legs' closings first: what the platform's parts add comes after.
+    count = len(robot.legs)
+    closings = closings[-count:] + closings[:-count]
+    return Tree(robot, pose, tuple(bodies), tuple(closings), tuple(motors), (), size)
+
+
+def _with_shaft(platform: TreeBody, limits: tuple[float, float] | None, ratio: float) -> TreeBody:
+    """Return the platform with the limits that its shaft leaves its last joint, which is phi."""
+    *rest, phi = platform.joints
+    if limits is None:
+        return platform
+    low, high = sorted(limit / ratio for limit in limits)
+    least, most = phi.limits or (low, high)
+    phi = replace(phi, limits=(max(low, least), min(high, most)))
+    return replace(platform, joints=(*rest, phi))
+
+
+def _size(stances: list[LegStance], p: Array) -> float:
+    """Return the longest side of the box that holds the machine, m."""
+    points = [p, *(stance.end for stance in stances)]
+    points += [point for stance in stances for point in stance.points]
+    return float(np.ptp(points, axis=0).max()) or 1.0
+
+
+def _leg(
+    leg: LegKind, number: int, stance: LegStance, actuated: str, count: int, size: float
+) -> list[TreeBody]:
+    """Return a leg's bodies, of which `count` others come before."""
+    bodies: list[TreeBody] = []
+    waiting: list[TreeJoint] = []
+    rows = zip(stance.slides, stance.carries, stance.axes, stance.points, strict=True)
+    for k, (slides, letter, axis, point) in enumerate(rows, start=stance.first):
+        if k == 0:
+            home, name, limits = float(stance.coordinate), actuated, leg.limits
+            if slides:  # the guide's point is where the slider is at zero
+                point = point + home * axis
+        else:
+            home, name, limits = 0.0, f"leg{number}_joint{k}", None
+        waiting.append(TreeJoint(name, slides, axis, point, home, limits))
+        if not letter:
+            continue
+        parent = count + len(bodies) - 1 if bodies else BASE
+        title = f"leg{number}_{leg.names[letter].replace(' ', '_')}"
+        body = _body(leg, stance, letter, waiting[-1], size)
+        bodies.append(replace(body, name=title, parent=parent, joints=tuple(waiting), color=number))
+        waiting = []
+    return bodies
+
+
+def _body(leg: LegKind, stance: LegStance, letter: str, joint: TreeJoint, size: float) -> TreeBody:
+    """Return a body that a joint carries; its name, its parent and its joints come later."""
+    mass, (x, y), moment = about_center(leg.bodies[letter])
+    reference = stance.references[letter]
+    if letter not in stance.along:
+        axes = _frame_along(joint.axis)
+        moments, center = cube_moments(mass, 0.05 * size), reference
+    else:
+        along = stance.along[letter]
+        if letter in stance.across:
+            axes = _frame_along(along, stance.across[letter])
+            moments = plane_moments(mass, moment, size)
+        else:
+            # A rod's y is the axis of the joint that carries it, where that is across the rod.
+            axes = _frame_along(along, np.cross(along, joint.axis))
+            moments = rod_moments(mass, moment, size)
+        center = reference + axes @ [x, y, 0.0]
+    return TreeBody("", BASE, (), joint.point, axes, mass, center, moments, 0)
+
+
+def _frame_along(x: Array, z: Array | None = None) -> Array:
+    """Return axes as columns (3, 3): x along a vector, and z near another one."""
+    x = x / np.linalg.norm(x)
+    across = None if z is None else z - (z @ x) * x
+    if across is None or np.linalg.norm(across) < _NONE:
+        across = np.cross(x, np.eye(3)[np.argmin(np.abs(x))])
+    across = across / np.linalg.norm(across)
+    return np.column_stack([x, np.cross(across, x), across])
