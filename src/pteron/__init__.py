@@ -140,6 +140,7 @@ __all__ = [
     "catalog",
     "cheapest_parameters",
     "compile",
+    "controllers",
     "coriolis_matrix",
     "direct_kinematics",
     "drive_accelerations",

@@ -14,6 +14,7 @@ from pteron.cli.arguments import (
     parsed_list,
     parsed_numbers,
 )
+from pteron.cli.given_cycle import replayed, standard_cycle, told_doubts
 from pteron.cli.motion_table import motion_frame, peaks_table
 from pteron.cli.screen import note, plain, show, show_json, spinner
 from pteron.errors import DataError
@@ -182,7 +183,11 @@ def cycle(
     with spinner(f"A motion of {machine.name}"):
         step = 1.0 / rate
         if way == "replay":
-            motion = _replayed(machine, file, from_)
+            if file is None:
+                raise DataError("no motion given; give --table FILE")
+            motion = replayed(
+                machine, file, None if from_ is None else _pose(machine, from_, "--from")
+            )
         elif way == "joints":
             motion = _jerk_limited(machine, from_, to, parsed_list(jerk, "--jerk"), limits, step)
         elif way == "line":
@@ -212,15 +217,8 @@ def _pose(machine: Manipulator, text: str | None, name: str) -> NDArray[Any]:
     if text is None:
         return home_pose(machine)
     values = np.array(parsed_numbers([text], machine.coordinates, name))
-    _doubt(machine, machine.coordinates, values, name)
+    told_doubts(machine, machine.coordinates, values, name)
     return values
-
-
-def _doubt(machine: Manipulator, columns: Sequence[str], values: NDArray[Any], source: str) -> None:
-    from pteron.workspace.doubts import value_doubts
-
-    for text in value_doubts(machine, columns, values):
-        note(f"Note: {source}: {text}")
 
 
 def _adept(
@@ -234,12 +232,12 @@ def _adept(
 ) -> Motion:
     from dataclasses import replace
 
-    from pteron.motion import check_path, cycle_path, pick_and_place, time_optimal
+    from pteron.motion import check_path, cycle_path, time_optimal
     from pteron.motion.pick_and_place import PEAK_ACCELERATION
     from pteron.motion.time_law import in_time
 
     middle = _pose(machine, around, "--around")
-    found = pick_and_place(machine, middle, scale=scale)
+    found = standard_cycle(machine, middle, scale)
     path = cycle_path(found)
     if optimal:
         return time_optimal(machine, path, limits, step=step)
@@ -277,7 +275,7 @@ def _line(
         from pteron.tables import read_table
 
         passed = read_table(via).numbers(machine.coordinates)
-        _doubt(machine, machine.coordinates, passed, via)
+        told_doubts(machine, machine.coordinates, passed, via)
         poses += list(passed)
     if to is not None:
         poses.append(_pose(machine, to, "--to"))
@@ -305,23 +303,6 @@ def _jerk_limited(
         raise DataError("--jerk is missing; give it, and --acceleration, for the joints")
     ends = _pose(machine, from_, "--from"), _pose(machine, to, "--to")
     return jerk_limited(machine, *ends, jerk, limits, step=step)
-
-
-def _replayed(machine: Manipulator, file: str | None, from_: str | None) -> Motion:
-    import numpy as np
-
-    from pteron.motion import replay
-    from pteron.tables import read_table
-
-    if file is None:
-        raise DataError("no motion given; give --table FILE")
-    rows = read_table(file)
-    names = [n for n in (*machine.coordinates, *machine.joint_names) if n in rows.columns]
-    _doubt(machine, names, rows.numbers(names), file)
-    motion = replay(machine, rows, start=_pose(machine, from_, "--from"))
-    if float(np.median(np.diff(motion.time))) >= 0.5:
-        note(f"Note: {file}: t in steps of {motion.time[1]:g}: are these ms? s are expected")
-    return motion
 
 
 def _deliver(

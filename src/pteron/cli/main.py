@@ -24,6 +24,7 @@ from pteron.cli.machines import catalog, check, new
 from pteron.cli.motions import direct, forces, inverse
 from pteron.cli.report import report
 from pteron.cli.screen import complain, note
+from pteron.cli.simulate import simulate
 from pteron.cli.size import size
 from pteron.errors import PteronError
 
@@ -163,6 +164,20 @@ _add(
     cls=NumbersCommand,
 )
 _add(
+    cycle,
+    "pteron cycle quadrupteron",
+    "pteron cycle my-robot.toml --optimal --force 60 --payload 0.5 --out cycle.csv",
+    "pteron cycle tripteron --to 0.1 0 0.05 --back --acceleration 10 --out line.csv",
+    "pteron cycle delta --via poses.csv --corner 0.02 --duration 2 --out path.csv",
+    cls=NumbersCommand,
+)
+_add(
+    simulate,
+    "pteron simulate delta --payload 1.0",
+    "pteron simulate robot.toml --controller adaptive --model drawing.toml --cycles 10 --out run",
+    "pteron simulate quadrupteron --cycle motion.csv --encoder 1e-6 --delay 5e-4 --out run.csv",
+)
+_add(
     size,
     "pteron size delta --payload 1.0",
     "pteron size robot.toml --motors motors.csv --dwell 0.2 --out sizing",
@@ -181,14 +196,6 @@ _add(
     "pteron export quadrupteron --fmu models",
     "pteron export linear-delta --klipper printer",
     "pteron export robot.toml --base result/identification.json --c controller",
-)
-_add(
-    cycle,
-    "pteron cycle quadrupteron",
-    "pteron cycle my-robot.toml --optimal --force 60 --payload 0.5 --out cycle.csv",
-    "pteron cycle tripteron --to 0.1 0 0.05 --back --acceleration 10 --out line.csv",
-    "pteron cycle delta --via poses.csv --corner 0.02 --duration 2 --out path.csv",
-    cls=NumbersCommand,
 )
 _add(
     excite,

@@ -10,7 +10,7 @@ import rich.table
 from typer import Exit
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
-from pteron.cli.cycles import CYCLE, STANDARD, cycle_of
+from pteron.cli.given_cycle import CYCLE, STANDARD, cycle_of
 from pteron.cli.screen import is_terminal, note, plain, show, show_json, spinner, table, write
 
 if TYPE_CHECKING:

@@ -149,16 +149,18 @@ def chosen(
     if functions is None:
         closed = closure_of(robot).closed_form
         step = {"direct_kinematics": "direct_step"}
-        functions = [name if closed else step.get(name, name) for name in usual]
+        own = [name if closed else step.get(name, name) for name in usual]
         if identified:  # which leaves the bodies unknown
-            needs = {name: TABLE[name].inputs for name in functions if name in TABLE}
-            functions = [name for name in functions if "parameters" not in needs.get(name, ())]
-            functions += [name + _BASE for name in FEED]
+            needs = {name: TABLE[name].inputs for name in own if name in TABLE}
+            own = [name for name in own if "parameters" not in needs.get(name, ())]
+            own += [name + _BASE for name in FEED]
         elif has_drives(robot):
-            functions += FEED
+            own += FEED
+        functions = own
     asked = listed(functions)
     given = {one.what: one for one in asked if isinstance(one, Controller)}
-    names: list[str] = list(dict.fromkeys(getattr(one, "what", one) for one in asked))
+    called = (one.what if isinstance(one, Controller) else one for one in asked)
+    names: list[str] = list(dict.fromkeys(called))
     allowed = sorted({*COMPILED, *(name + _BASE for name in REDUCIBLE)} - {"base_regressor"})
     valid = f"choose from {', '.join(allowed)}"
     for name in names:

@@ -20,6 +20,7 @@ from pteron.plots.drives import Ability, force_speed_figure, power_figure
 from pteron.plots.forces import forces_figure, regularity_figure
 from pteron.plots.reach import measure_figure, reach_figure
 from pteron.plots.robot import grid_step, robot_figure
+from pteron.plots.tracking import tracking_figure
 
 __all__ = [
     "Ability",
@@ -41,5 +42,6 @@ __all__ = [
     "residual_time_figure",
     "robot_figure",
     "svg",
+    "tracking_figure",
     "svg_file",
 ]
