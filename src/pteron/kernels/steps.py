@@ -9,12 +9,15 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property, lru_cache
 from typing import Any
 
+import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pteron.equations.drives import Drives
 from pteron.kernels.c import Code, c_language, compiler, module_of
 from pteron.kernels.choice import VARIABLE
 from pteron.kernels.code import module_values
@@ -42,7 +45,8 @@ class Steps(ArrayKernel):
     Parameters
     ----------
     robot : Manipulator
-        The machine; its inertial parameters and drives may be given in a call, by name.
+        The machine; its inertial parameters may be given in a call, by name, and its drives, which
+        then have no Stribeck friction where the machine's have none.
     wrench : bool
         Whether a wrench on the platform is an input too.
     """
@@ -50,7 +54,8 @@ class Steps(ArrayKernel):
     _strided = True
 
     def __init__(self, robot: Manipulator, *, wrench: bool) -> None:
-        self._code = _code(bare(robot), wrench)
+        stribeck = any(leg.drive and leg.drive.stribeck for leg in robot.legs)
+        self._code = _code(bare(robot), wrench, stribeck)
         built = self._code.built
         fixed = {port.name: FIXED[port.name](robot) for port in built.inputs if port.shared}
         super().__init__("steps", built.function, self._code.ports, self._code.outputs, fixed)
@@ -136,9 +141,22 @@ class _Code(Code):
 
 
 @lru_cache(maxsize=64)
-def _code(layout: Manipulator, wrench: bool) -> _Code:
+def _code(layout: Manipulator, wrench: bool, stribeck: bool) -> _Code:
     """Return what machines of one layout share; their numbers are left out of it."""
-    return _Code(program(layout, "drive_accelerations", wrench=wrench, guarded=True))
+    built = program(layout, "drive_accelerations", wrench=wrench, guarded=True)
+    return _Code(built if stribeck else _without_stribeck(built))
+
+
+def _without_stribeck(built: Program) -> Program:
+    """Return the program for drives that lose no friction as they move: a sixth of it, saved."""
+    symbols = built.function.sx_in()
+    k = [port.name for port in built.inputs].index("drives")
+    parts = Drives.of(symbols[k])
+    given = list(symbols)
+    given[k] = ca.vertcat(*parts._replace(stribeck=ca.SX.zeros(*parts.stribeck.shape)))
+    names = built.function.name_in(), built.function.name_out()
+    outputs = ca.cse(built.function.call(given))
+    return replace(built, function=ca.Function(built.name, symbols, outputs, *names))
 
 
 @lru_cache(maxsize=64)
