@@ -104,7 +104,7 @@ def simulate(
         overloads = _overloads(loaded, motion)
         if overloads and not anyway:
             raise DataError(
-                f"{'; '.join(overloads)}: give a smaller payload or a longer --duration, or see "
+                f"{'; '.join(overloads)}; give a smaller payload or a longer --duration, or see "
                 "what happens with --anyway"
             )
         found = simulated(
@@ -222,8 +222,8 @@ def _write(out: str, found: Simulation, data: dict[str, Any], *, as_table: bool)
     from pteron.atomic import write_texts
     from pteron.plots import forces_figure, svg_file, tracking_figure
 
-    unit = "N m" if found.robot.legs[0].joint.force_unit == "N m" else "N"
-    forces = forces_figure(found.time, found.forces, ylabel=f"drive force ({unit})")
+    units = ", ".join(dict.fromkeys(leg.joint.force_unit for leg in found.robot.legs))
+    forces = forces_figure(found.time, found.forces, ylabel=f"drive force ({units})")
     tracking = tracking_figure(found.time, found.error, found.robot.coordinates)
     texts = {
         "simulation.csv": found.table().write_csv(),

@@ -84,7 +84,7 @@ def follow(
 def _joints_of(robot: Manipulator, pose: Array, near: Array) -> Array:
     """Return the joint coordinates of a pose, with those whole turns of cranks that are nearest."""
     joints: Array = unchecked(robot, "inverse_kinematics", pose)
-    cranks = [leg.joint.unit == "rad" and not leg.follows_angle for leg in robot.legs]
+    cranks = [leg.goes_round for leg in robot.legs]
     turns = np.where(cranks, np.round((near - joints) / (2.0 * np.pi)), 0.0)
     turned: Array = joints + 2.0 * np.pi * turns
     return turned

@@ -173,6 +173,11 @@ class LegKind(ABC):
         return replace(self, **new)
 
     @property
+    def goes_round(self) -> bool:
+        """Whether a whole turn of its joint leads to the same pose again, as a crank's does."""
+        return self.joint.unit == "rad" and not self.follows_angle
+
+    @property
     @abstractmethod
     def quantities(self) -> tuple[Quantity, ...]:
         """What of its geometry the equations need, but for the platform point."""

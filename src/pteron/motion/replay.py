@@ -115,7 +115,7 @@ def _followed(robot: Manipulator, time: Array, joints: Array, start: PoseLike | 
             "start: the table holds joint coordinates, which may have several poses; give one of "
             "their assembly mode"
         )
-    cranks = [leg.joint.unit == "rad" and not leg.follows_angle for leg in robot.legs]
+    cranks = [leg.goes_round for leg in robot.legs]
     joints = np.where(cranks, np.unwrap(joints, axis=0), joints)
     _, rates, gains = _spline(time, joints)
     poses = follow(robot, joints, checked(robot, start, "start"))

@@ -202,7 +202,7 @@ def _weighed(report: Report) -> list[str]:
     legs, radius = report.robot.legs, report.jacobian.radius
     followers = [leg.joint.noun for leg in legs if leg.follows_angle]
     found = []
-    if any(leg.joint.unit == "rad" and not leg.follows_angle for leg in legs):
+    if any(leg.goes_round for leg in legs):
         found.append("a crank's angle measured as the way of its end")
     if radius is not None:
         way = f"a point {fixed(1e3 * radius)} mm from its axis (the root mean square distance"

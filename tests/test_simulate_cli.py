@@ -1,0 +1,88 @@
+"""`pteron simulate` as a person and a program use it."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import polars as pl
+import pytest
+from typer.testing import CliRunner
+
+import pteron
+from pteron.cli.main import app
+
+
+def run(*arguments, code=0):
+    found = CliRunner().invoke(app, ["simulate", *map(str, arguments)])
+    assert found.exit_code == code, found.output
+    return found
+
+
+@pytest.fixture
+def weak(tmp_path):
+    """Return the file of a Tripteron whose drives are hardly stronger than they must be."""
+    robot = pteron.load("tripteron")
+    drive = pteron.Drive(coulomb=1.0, viscous=2.0, max_force=36.0, rest_speed=0.01)
+    legs = tuple(replace(leg, drive=drive) for leg in robot.legs)
+    path = tmp_path / "weak.toml"
+    pteron.save(replace(robot, legs=legs), path)
+    return path
+
+
+def test_a_folder_has_table_numbers_and_pictures(weak, tmp_path):
+    out = tmp_path / "run"
+    data = json.loads(run(weak, "--duration", 2, "--out", out, "--json").stdout)
+    assert data["stopped"] is None
+    assert data["samples"] == 2001
+    assert max(row["largest"] for row in data["tracking"]) < 1e-6
+    assert all(row["peak_force"] < 36.0 for row in data["drives"])
+    names = {path.name for path in out.iterdir()}
+    assert names == {"simulation.csv", "simulation.json", "tracking.svg", "forces.svg"}
+    table = pl.read_csv(out / "simulation.csv")
+    assert len(table) == 2001
+    np.testing.assert_allclose(
+        np.abs(table["x"] - table["xref"]).max(), data["tracking"][0]["largest"], rtol=1e-9
+    )
+    # What was written is a cycle to be simulated again.
+    again = json.loads(run(weak, "--cycle", out / "simulation.csv", "--json").stdout)
+    assert again["duration"] == pytest.approx(2.0)
+
+
+def test_a_pipe_gets_the_table(weak):
+    text = run(weak, "--duration", 2, "--rate", 500, "--controller", "pd").stdout
+    assert text.startswith("t,x,y,z,dx,dy,dz,ddx,ddy,ddz,xref,yref,zref,rho1,rho2,rho3,drho1")
+    assert len(text.splitlines()) == 1002
+
+
+def test_a_payload_that_overloads_the_drives_is_refused(weak):
+    refused = run(weak, "--duration", 2, "--payload", 3, code=2)
+    assert "leg 3: the motion takes up to" in refused.stderr
+    assert "its drive gives 36 N (max_force)" in refused.stderr
+    assert "--anyway" in refused.stderr
+    anyway = run(weak, "--duration", 2, "--payload", 3, "--anyway", "--json", code=1)
+    assert "Warning: leg 3" in anyway.stderr
+    assert "Stopped at" in anyway.stderr
+    data = json.loads(anyway.stdout)
+    assert data["drives"][2]["at_its_limit"] > 0.5
+    assert data["drives"][2]["peak_force"] == 36.0
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        (["--cycles", "0"], "--cycles: 0 given, 1 or more"),
+        (["--rate", "-1"], "--rate: -1 given"),
+        (["--bandwidth", "-5"], "bandwidth: -5"),
+        (["--payload", "-1"], "payload: -1"),
+        (["--cycle", "no.csv"], "no.csv"),
+        (["--delay", "-1"], "delay: -1"),
+        (["--step", "0"], "step: 0"),
+        (["--encoder", "-1e-6"], "encoder: -1e-06"),
+        (["--controller", "best"], "best"),
+    ],
+)
+def test_mistakes_are_told_in_a_line(given, told, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    found = run("tripteron", *given, code=2)
+    assert told in found.stderr
+    assert len(found.stderr.strip().splitlines()) == 1
