@@ -4,7 +4,6 @@ import runpy
 import subprocess
 import sys
 from dataclasses import replace
-from itertools import pairwise
 from xml.etree import ElementTree
 
 import descriptions
@@ -338,7 +337,15 @@ def test_the_looks_join_up(case):
         for shape in body.shapes:
             assert np.isfinite(shape.ends).all()
             assert 0.0 < shape.radius < opened.size
-    for one, two in pairwise(opened.bodies):
-        if one.color and one.color == two.color:
-            near = [np.abs(shape.ends - two.origin).max(axis=-1).min() for shape in one.shapes]
-            assert min(near) < 0.7 * opened.size
+    near = 0.05 * opened.size
+
+    def touches(body, point):
+        ends = np.concatenate([shape.ends for shape in body.shapes])
+        return np.linalg.norm(ends - point, axis=-1).min() < near
+
+    for closing in opened.closings:
+        assert touches(opened.bodies[closing.one], closing.point)
+        assert touches(opened.bodies[closing.other], closing.point)
+    for body in opened.bodies:
+        telescopes = body.parent != -1 and body.joints[-1].slides
+        assert telescopes or touches(body, body.origin), body.name

@@ -13,7 +13,8 @@ file of this folder:
 Two lines bind them: `MyLeg.equations_class = MyEquations`, and `pteron.legs.KINDS[MyLeg.type] =
 MyLeg`, after which files may name the kind.
 
-That is all: Jacobian, dynamics, regressor, energies, limits, drawings, logs, exported code follow.
+That is all: Jacobian, dynamics, regressor, energies, limits, drawings, logs, exported code and
+files for other engines follow.
 `examples/new_leg.py` is a complete kind of leg. More may be overridden: `needs`, a cheaper form of
 the same forces; `named`, names in exported code; and of the data `conditions`, what must hold
 between its fields, `passive`, the passive joints that have limits, `doubts`, what is unlikely in
