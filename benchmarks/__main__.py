@@ -30,6 +30,7 @@ _SCRIPTS = {
     "Excitation": "excitation.py",
     "The same free motion in MuJoCo": "mujoco_convergence.py",
     "Limits of excitation": "excitation_limits.py",
+    "Time-optimal cycles": "time_optimal.py",
     "From a log to a running machine": "identification/chain.py",
 }
 _PACKAGES = ("pteron", "numpy", "casadi", "numba", "jax", "pin", "mujoco")

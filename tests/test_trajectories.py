@@ -1,5 +1,6 @@
 """Trajectories: smooth, through their poses, within every limit, and refused where impossible."""
 
+import json
 from dataclasses import replace
 from functools import lru_cache
 
@@ -8,8 +9,10 @@ import polars as pl
 import pytest
 from differences import along as derivative
 from mechanisms import CATALOG, MECHANISMS, random_machine, states
+from typer.testing import CliRunner
 
 import pteron
+from pteron.cli.main import app
 from pteron.motion import (
     FourierSeries,
     Motion,
@@ -486,3 +489,83 @@ def test_drives_that_cannot_hold_the_machine_are_told():
 def test_what_makes_no_motion_is_refused(wrong, told):
     with pytest.raises(pteron.DataError, match=told):
         wrong(MACHINES["tripteron"], [0.0, 0.0, 0.0], [0.05, 0.0, 0.0])
+
+
+def cycle(line):
+    """Run `pteron cycle`; return its exit code, standard output, standard error."""
+    result = CliRunner().invoke(app, ["cycle", *line.split()])
+    return result.exit_code, result.stdout, result.stderr
+
+
+def test_the_command_writes_a_cycle_that_forces_reads(tmp_path):
+    out, again = tmp_path / "cycle.csv", tmp_path / "forces.csv"
+    code, told, warned = cycle(
+        f"tripteron --around 0 0 0 --optimal --force 60 --speed 1 1 2 --json --out {out}"
+    )
+    assert (code, warned) == (0, "")
+    found = json.loads(told)
+    robot = CATALOG["tripteron"]
+    motion = replay(robot, out)
+    assert (found["samples"], found["file"]) == (len(motion.time), str(out))
+    assert found["duration"] == pytest.approx(motion.duration)
+    assert found["duration"] < found["quintic_duration"]
+    assert used(robot, motion, limits_of(robot, force=60.0, speed=[1.0, 1.0, 2.0])) <= 1.0 + 1e-8
+    binding = {(peak["quantity"], peak["leg"]) for peak in found["peaks"] if peak["share"] > 0.98}
+    assert binding
+    assert all(leg in (1, 2, 3) for _, leg in binding)
+    result = CliRunner().invoke(
+        app, ["forces", "tripteron", "--drives", "--table", str(out), "--out", str(again)]
+    )
+    assert result.exit_code == 0
+    frames = pl.read_csv(out), pl.read_csv(again)
+    for name in robot.force_names:
+        np.testing.assert_allclose(frames[0][name], frames[1][name], atol=1e-9)
+    assert frames[0].columns[:4] == ["t", "x", "y", "z"]
+    for rate, joint in (("drho1", "rho1"), ("ddrho1", "drho1")):
+        slope = np.gradient(frames[0][joint].to_numpy(), 1e-3)
+        assert np.abs(slope - frames[0][rate].to_numpy())[2:-2].max() < 0.3
+
+
+def test_the_command_goes_lines_joints_and_tables(tmp_path):
+    via, out = tmp_path / "via.csv", tmp_path / "line.csv"
+    via.write_text("x,y,z\n0,0,0\n0.05,0,0\n0.05,0.05,0\n")
+    code, told, warned = cycle(
+        f"tripteron --via {via} --corner 0.01 --back --duration 1 --out {out}"
+    )
+    assert (code, warned) == (0, "")
+    assert "1 s, 1001 samples" in told
+    ends = pl.read_csv(out)[[0, 500, -1]].select("x", "y", "z").to_numpy()
+    np.testing.assert_allclose(ends, [[0, 0, 0], [0.05, 0.05, 0], [0, 0, 0]], atol=1e-12)
+    code, told, _ = cycle(f"tripteron --table {out} --payload 1 --json")
+    assert (code, json.loads(told)["kind"]) == (0, "replay")
+    code, told, _ = cycle(
+        "tripteron --kind joints --from 0 0 0 --to -0.05 0.02 0 --jerk 200 --acceleration 5 --json"
+    )
+    assert (code, json.loads(told)["end"]) == (0, pytest.approx([-0.05, 0.02, 0.0]))
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("--to 0.05 0", "--to: 2 values given, 3 expected: x y z"),
+        ("--to 0.05 0 0", "neither a duration nor a limit"),
+        ("--to 0.05 0 0 --duration 0.01 --force 90", "its limit is 90 N; the shortest"),
+        ("--to 0.05 0 0 --force much", "--force: 'much' is not a number"),
+        ("--to 0.05 0 0 --force 50 --payload -1", "payload: -1.0 given, a mass of 0 kg or more"),
+        ("--to 0.05 0 0 --optimal --duration 1", "--duration and --optimal given"),
+        ("--to 50 0 0 --duration 1", "its slider passes its limits"),
+        ("--kind adept --to 0.05 0 0", "--to: has no use in a motion of kind adept"),
+        ("--kind line", "no way given"),
+        ("--kind joints --to 0.05 0 0", "--jerk is missing"),
+        ("--kind replay", "no motion given; give --table"),
+        ("--table nowhere.csv", "nowhere.csv: no such file"),
+        ("--rate 0", "--rate: 0.0 given"),
+        ("--out motion.txt", "motion.txt: unknown ending"),
+    ],
+)
+def test_the_command_refuses_in_one_line(line, words):
+    start = "--from 0 0 0" if "--to" in line else ""
+    code, told, error = cycle(f"tripteron {start} {line}")
+    assert (code, told) == (2, "")
+    assert words in error
+    assert error.splitlines()[-1].startswith("Error: ")

@@ -9,6 +9,7 @@ import numpy as np
 
 import pteron
 from plant.model import Array
+from pteron.motion import FourierSeries
 
 __all__ = ["Fourier", "Reference", "fourier_reference"]
 
@@ -44,15 +45,8 @@ class Fourier:
 
     def platform(self, time: Array) -> tuple[Array, Array, Array]:
         """Return pose, velocity and acceleration, (T, m) each."""
-        a, b = np.array(self.cosines), np.array(self.sines)
-        rates = 2.0 * np.pi / self.period * np.arange(1, a.shape[1] + 1)
-        angle = np.multiply.outer(time, rates)
-        cosine, sine = np.cos(angle), np.sin(angle)
-        return (
-            np.array(self.center) + cosine @ a.T + sine @ b.T,
-            cosine @ (rates * b).T - sine @ (rates * a).T,
-            -cosine @ (rates**2 * a).T - sine @ (rates**2 * b).T,
-        )
+        cosines, sines = (tuple(zip(*rows, strict=True)) for rows in (self.cosines, self.sines))
+        return FourierSeries(self.center, cosines, sines, self.period).at(time)
 
     def __call__(self, time: Array) -> tuple[Array, Array, Array]:
         """Return joint coordinates, rates and accelerations, (T, n) each."""

@@ -146,7 +146,7 @@ def parsed_list(text: str | None, what: str) -> list[float] | None:
     if text is None:
         return None
     words = text.replace(",", " ").split()
-    return parsed_numbers([text], [f"number {k + 1}" for k in range(max(1, len(words)))], what)
+    return parsed_numbers([text], ["a number"] * max(1, len(words)), what)
 
 
 def load_robot(name_or_path: str, elbows: str | None = None) -> Manipulator:

@@ -13,7 +13,7 @@ from pteron.kernels import Array
 from pteron.legs import Drive
 from pteron.manipulator import Manipulator
 
-PerJointLimit = float | Sequence[float] | None
+PerJointLimit = float | Sequence[float] | Array | None
 """One number for every joint, or one for each; None for the drives' own, or none."""
 
 
