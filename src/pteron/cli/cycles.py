@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from pteron.cli.arguments import option
 from pteron.cli.screen import note
-from pteron.errors import DataError, PteronError, SingularPose, UnreachablePose
+from pteron.errors import DataError
 
 if TYPE_CHECKING:
     from pteron.manipulator import Manipulator
@@ -23,14 +23,14 @@ CYCLE = option(
 _SAMPLES = 481
 _LEAST = 0.2
 
-_UNLIKE = 1.5
+_UNLIKE = 3.0
 """How many times as far a motion may go by its poses as by its velocities, or the inverse."""
 
 
 def cycle_of(robot: Manipulator, cycle: str, duration: float | None) -> Motion:
     """Return a cycle by its name or from a table.
 
-    A table has the columns t, the pose, its rates and accelerations, as `pteron forces` has them.
+    A table is one that `pteron.motion.replay` takes, such as `pteron cycle` writes.
     """
     if cycle == STANDARD:
         from pteron.motion import pick_and_place
@@ -46,55 +46,36 @@ def cycle_of(robot: Manipulator, cycle: str, duration: float | None) -> Motion:
 
 
 def _from_table(robot: Manipulator, file: str) -> Motion:
-    import numpy as np
-
-    from pteron.motion import Motion
+    from pteron.motion import replay
     from pteron.tables import read_table
+    from pteron.workspace import home_pose
+    from pteron.workspace.doubts import value_doubts
 
-    columns = [f"{rate}{name}" for rate in ("", "d", "dd") for name in robot.coordinates]
-    table = read_table(file)
-    values = table.numbers(["t", *columns])
-    falls = np.flatnonzero(np.diff(values[:, 0]) <= 0.0)
-    if len(values) < 2:
-        raise DataError(f"{table.source}: one row; a motion has two or more")
-    if len(falls):
-        raise DataError(
-            f"{table.place(int(falls[0]) + 1)}, column t: the time does not go on from the row "
-            "before it; put the rows in order"
-        )
-    m = robot.freedom
-    motion = Motion(values[:, 0], *(values[:, k : k + m] for k in (1, 1 + m, 1 + 2 * m)))
-    _check_poses(robot, motion, table)
-    far, meant = _lengths(motion)
-    if not _UNLIKE * far >= meant >= far / _UNLIKE:
-        note(
-            f"Warning: {table.source}: its poses go {far:.3g} m or rad, its velocities "
-            f"{meant:.3g} in the same time: is t in s, are they per s?"
-        )
+    rows = read_table(file)
+    _check_rates(robot, rows)
+    names = [n for n in (*robot.coordinates, *robot.joint_names) if n in rows.columns]
+    joints_only = not set(robot.coordinates) <= set(names)
+    motion = replay(robot, rows, start=home_pose(robot) if joints_only else None)
+    for text in value_doubts(robot, names, rows.numbers(names)):
+        note(f"Note: {rows.source}: {text}")
     return motion
 
 
-def _check_poses(robot: Manipulator, motion: Motion, table: Table) -> None:
-    """Refuse the first row whose pose the machine cannot do."""
-    from pteron.dynamics import inverse_dynamics
-    from pteron.workspace.doubts import value_doubts
-
-    state = motion.pose, motion.velocity, motion.acceleration
-    try:
-        inverse_dynamics(robot, *state)
-    except (UnreachablePose, SingularPose) as error:
-        row = error.index[0]
-        doubts = "".join(f"; {text}" for text in value_doubts(robot, robot.coordinates, state[0]))
-        try:
-            inverse_dynamics(robot, *(part[row] for part in state))
-        except PteronError as alone:
-            raise PteronError(f"{table.place(row)}, {alone}{doubts}") from None
-
-
-def _lengths(motion: Motion) -> tuple[float, float]:
-    """Return how far a motion goes by its poses, and by its velocities."""
+def _check_rates(robot: Manipulator, rows: Table) -> None:
+    """Refuse a table whose velocities, where it has them, are not those of its poses and times."""
     import numpy as np
 
-    means = np.abs(motion.velocity[1:] + motion.velocity[:-1]) / 2.0
-    steps = np.diff(motion.time)
-    return float(np.abs(np.diff(motion.pose, axis=0)).sum()), float((steps @ means).sum())
+    names = robot.coordinates
+    columns = ["t", *names, *(f"d{name}" for name in names)]
+    if len(rows) < 2 or not set(columns) <= set(rows.columns):
+        return
+    values = rows.numbers(columns)
+    poses, rates = values[:, 1 : 1 + len(names)], values[:, 1 + len(names) :]
+    means = np.abs(rates[1:] + rates[:-1]) / 2.0
+    far, meant = np.abs(np.diff(poses, axis=0)).sum(), (np.diff(values[:, 0]) @ means).sum()
+    # A time that does not ascend is told as that.
+    if meant > 0.0 and not _UNLIKE * far >= meant >= far / _UNLIKE:
+        raise DataError(
+            f"{rows.source}: its poses go {far:.3g} m or rad, its velocities {meant:.3g} in the "
+            "same time; t must be in s, and velocities per s"
+        )
