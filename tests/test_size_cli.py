@@ -150,9 +150,14 @@ def test_a_mistake_is_one_line(line: str, words: list[str]):
 @pytest.mark.parametrize(
     ("factors", "words"),
     [
-        ({"x": 1e3, "y": 1e3, "z": 1e3}, ["motion.csv: row 1", "are these mm?"]),
-        ({"t": -1.0}, ["motion.csv: row 2", "time does not go on"]),
+        (
+            {f"{d}{x}": 1e3 for d in ("", "d", "dd") for x in "xyz"},
+            ["at 0 s", "is it in millimetres?"],
+        ),
+        ({"t": -1.0}, ["motion.csv: row 2", "times must ascend"]),
         ({"z": np.nan}, ["motion.csv: row 1", "column z"]),
+        ({"t": 1e3}, ["motion.csv: its poses go", "t must be in s"]),
+        ({"x": 30.0}, ["motion.csv: its poses go"]),
     ],
 )
 def test_a_table_that_is_no_motion_is_one_line(factors: dict[str, float], words: list[str]):
@@ -160,6 +165,11 @@ def test_a_table_that_is_no_motion_is_one_line(factors: dict[str, float], words:
     refused("size delta --cycle motion.csv", *words)
 
 
-def test_a_time_in_milliseconds_is_doubted():
-    cycle_table(pteron.load("delta"), t=1e3).write_csv("motion.csv")
-    assert "is t in s, are they per s?" in run("size delta --cycle motion.csv").stderr
+def test_a_table_of_the_joints_alone_is_sized_in_the_home_poses_mode():
+    robot = pteron.load("delta")
+    cycle = pick_and_place(robot, home_pose(robot), scale=0.2, samples=301)
+    joints = pteron.inverse_kinematics(robot, cycle.pose)
+    columns = {"t": cycle.time} | dict(zip(robot.joint_names, joints.T, strict=True))
+    pl.DataFrame(columns).write_csv("motion.csv")
+    rows = pl.read_csv(StringIO(done("size delta --cycle motion.csv")))
+    assert rows["rms_force"].to_list() == pytest.approx(size(robot, cycle).rms_forces, rel=1e-2)

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from pteron.manipulator import Manipulator
     from pteron.motion import Motion, PickAndPlace
     from pteron.shapes import PoseLike
+    from pteron.tables import Table
 
 STANDARD = "adept"
 """What the pick-and-place cycle of 25, 305 and 25 mm is called."""
@@ -29,7 +30,7 @@ _LEAST = 0.2
 _SLOW = 0.5
 """s between samples that is unlikely."""
 
-_UNLIKE = 1.5
+_UNLIKE = 3.0
 """How many times as far a motion may go by its poses as by its velocities, or the inverse."""
 
 
@@ -72,17 +73,12 @@ def replayed(robot: Manipulator, file: str, start: PoseLike | None = None) -> Mo
     from pteron.workspace import home_pose
 
     rows = read_table(file)
+    _check_rates(robot, rows)
     names = [n for n in (*robot.coordinates, *robot.joint_names) if n in rows.columns]
     told_doubts(robot, names, rows.numbers(names), file)
     motion = replay(robot, rows, start=home_pose(robot) if start is None else start)
     if float(np.median(np.diff(motion.time))) >= _SLOW:
         note(f"Note: {file}: t in steps of {motion.time[1]:g}: are these ms? s are expected")
-    far, meant = _lengths(motion)
-    if not _UNLIKE * far >= meant >= far / _UNLIKE:
-        note(
-            f"Note: {file}: its poses go {far:.3g} m or rad, its velocities {meant:.3g} in the "
-            "same time: is t in s, are they per s?"
-        )
     return motion
 
 
@@ -96,10 +92,21 @@ def told_doubts(
         note(f"Note: {source}: {text}")
 
 
-def _lengths(motion: Motion) -> tuple[float, float]:
-    """Return how far a motion goes by its poses, and by its velocities."""
+def _check_rates(robot: Manipulator, rows: Table) -> None:
+    """Refuse a table whose velocities, where it has them, are not those of its poses and times."""
     import numpy as np
 
-    means = np.abs(motion.velocity[1:] + motion.velocity[:-1]) / 2.0
-    steps = np.diff(motion.time)
-    return float(np.abs(np.diff(motion.pose, axis=0)).sum()), float((steps @ means).sum())
+    names = robot.coordinates
+    columns = ["t", *names, *(f"d{name}" for name in names)]
+    if len(rows) < 2 or not set(columns) <= set(rows.columns):
+        return
+    values = rows.numbers(columns)
+    poses, rates = values[:, 1 : 1 + len(names)], values[:, 1 + len(names) :]
+    means = np.abs(rates[1:] + rates[:-1]) / 2.0
+    far, meant = np.abs(np.diff(poses, axis=0)).sum(), (np.diff(values[:, 0]) @ means).sum()
+    # A time that does not ascend is told as that.
+    if meant > 0.0 and not _UNLIKE * far >= meant >= far / _UNLIKE:
+        raise DataError(
+            f"{rows.source}: its poses go {far:.3g} m or rad, its velocities {meant:.3g} in the "
+            "same time; t must be in s, and velocities per s"
+        )

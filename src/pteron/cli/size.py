@@ -152,8 +152,8 @@ def _data(found: Sizing, fits: tuple[Fit, ...], cycle: str, payload: float) -> d
         "all": {
             "peak_power": float(total.max(initial=0.0)),
             "peak_braking": float((-total).max(initial=0.0)),
-            "energy": float(found.energy.sum()),
-            "mean_power": float(found.energy.sum()) / found.duration,
+            "energy": found.net_energy,
+            "mean_power": found.net_energy / found.duration,
         },
         "overloads": list(found.overloads),
         "motors": _fits_table(found, fits).to_dicts() if fits else [],
@@ -218,8 +218,8 @@ def _show(found: Sizing, fits: tuple[Fit, ...], cycle: str, payload: float) -> N
         _loads(found),
         _powers(found),
         *_rotors(found),
-        f"All drives: {float(found.energy.sum()):.4g} J a cycle, "
-        f"{float(found.energy.sum()) / found.duration:.4g} W in the mean, "
+        f"All drives: {found.net_energy:.4g} J a cycle, "
+        f"{found.net_energy / found.duration:.4g} W in the mean, "
         f"{total.max():.4g} W at most",
         *_choice(found, fits),
     )

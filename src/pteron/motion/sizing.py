@@ -18,6 +18,9 @@ from pteron.shapes import PerJoint
 if TYPE_CHECKING:
     import polars as pl
 
+_NONE = 1e-9
+"""Share of the energy given that is none."""
+
 
 @dataclass(frozen=True)
 class Sizing:
@@ -127,6 +130,15 @@ class Sizing:
     def energy(self) -> PerJoint:
         """What each drive gives over the cycle, less what it takes back, J."""
         return np.asarray(self.given_energy - self.braked_energy)
+
+    @property
+    def net_energy(self) -> float:
+        """What all drives together give over the cycle, less what they take back, J.
+
+        It is what friction takes, and the motion leaves; 0 where it is none but for rounding.
+        """
+        given, net = float(self.given_energy.sum()), float(self.energy.sum())
+        return net if abs(net) > _NONE * given else 0.0
 
     @property
     def mean_power(self) -> PerJoint:
