@@ -405,8 +405,8 @@ def _outside(
         down = np.arctan2(wrist[:, 2], wrist @ out)
         if (np.sin(angle - down) < 0.0).any():
             told = (
-                "its elbow is inside where the platform is below, and Klipper's is outside: set "
-                "elbow, or turn a model over whose platform is above"
+                "its elbow is inside while the platform is below, and Klipper has it outside; turn "
+                "a model over whose platform is above"
             )
             raise _differs(robot, i + 1, told, "rotary_delta")
 
@@ -453,7 +453,7 @@ _PINS: tuple[tuple[str, None], ...] = (
 
 
 def _differs(robot: Manipulator, leg: int, told: str, kind: str) -> ModelError:
-    return ModelError(f"{robot.name}: leg {leg}: {told}, so {kind} does not fit; {_INSTEAD}")
+    return ModelError(f"{robot.name}: Klipper's {kind} does not fit leg {leg}: {told}; {_INSTEAD}")
 
 
 def _common(robot: Manipulator, values: Sequence[float], told: str, kind: str) -> float:
