@@ -148,6 +148,7 @@ ALLOWED = {
     ("manipulator/files.py", "a kind of leg"): "the kind where a file names none",
     ("manipulator/manipulator.py", "an elbow"): "working modes",
     ("cli/", "an elbow"): "--elbows, the working mode; and a leg as JSON",
+    ("export/klipper/", "an elbow"): "where Klipper has it, in the message that refuses",
     ("report/", "an elbow"): "the working mode",
     ("kinematics/direct.py", "an elbow"): "the working mode that a pose is in",
     ("kinematics/evaluate.py", "an elbow"): "the kind of a singularity, in its message",

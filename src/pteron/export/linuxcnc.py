@@ -47,6 +47,8 @@ class _Joint:
     name: str
     angular: bool
     scale: float
+    middle: float | None
+    """Rad: a crank's angle is given less than half a turn from it; None of what is no crank."""
     home: float
     least: float | None
     most: float | None
@@ -182,10 +184,15 @@ def _joints(robot: Manipulator, home: Array) -> Iterator[_Joint]:
         scale = _DEGREES if angular else _MILLIMETRES
         least, most = leg.limits or (None, None)
         speed = leg.drive.max_speed if leg.drive else None
+        middle, turns = None, 0.0
+        if angular and not leg.follows_angle:  # limits may hold half a turn, where angles jump
+            middle = 0.0 if leg.limits is None else sum(leg.limits) / 2.0
+            turns = math.floor((middle - at) / (2.0 * math.pi) + 0.5)
         yield _Joint(
             f"{leg.joint.coordinate}{i}",
             angular,
             scale,
-            scale * float(at),
+            middle,
+            scale * (float(at) + 2.0 * math.pi * turns),
             *(None if v is None else scale * v for v in (least, most, speed)),
         )

@@ -1,0 +1,5 @@
+"""Klipper's configuration of a machine."""
+
+from pteron.export.klipper.export import export_klipper
+
+__all__ = ["export_klipper"]

@@ -1,0 +1,113 @@
+"""Klipper's generic_cartesian: machines whose joints are linear in the pose.
+
+The formulas are those of klippy/kinematics/generic_cartesian.py, kinematic_stepper.py and
+klippy/chelper/kin_generic.c.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import product
+
+import numpy as np
+
+from pteron.errors import ModelError
+from pteron.export.klipper.sections import INSTEAD, PINS, SPEEDS, Section, rotation_distance, signed
+from pteron.kernels import Array
+from pteron.kinematics import inverse_kinematics, jacobian
+from pteron.kinematics.evaluate import unchecked
+from pteron.manipulator import Manipulator
+
+ZERO = 5e-13
+"""A coefficient below it is left out: over a metre it is less than a picometre."""
+
+_LEAST_DETERMINANT = 1e-5
+"""Below it Klipper (generic_cartesian.py) holds that the steppers cannot move all axes."""
+
+
+def cartesian(robot: Manipulator) -> Iterator[Section]:
+    """Yield the sections of `generic_cartesian`: each stepper a sum of x, y and z.
+
+    Raises
+    ------
+    ModelError
+        If Klipper would hold the directions for dependent.
+    """
+    rows = np.asarray(jacobian(robot, np.zeros(3)))
+    offsets = 1000.0 * np.asarray(unchecked(robot, "joint_coordinates", np.zeros(3)))
+    size = float(np.linalg.det(rows.T @ rows))
+    if size < _LEAST_DETERMINANT:
+        raise ModelError(
+            f"{robot.name}: its directions are so close to a plane (det(J^T J) = {size:.1e}) that "
+            f"Klipper, which asks for 1e-5, refuses them; {INSTEAD}"
+        )
+    yield Section("printer", (("kinematics", "generic_cartesian"), *SPEEDS))
+    box, comments = _box(robot, rows, offsets)
+    straight = ((np.abs(rows) > ZERO).sum(axis=1) == 1).all()
+    homing = (
+        "Each slider moves along one axis: its end stop is that axis' own."
+        if straight
+        else "The sliders move along oblique directions, but Klipper homes x, y and z: an end stop "
+        "at a slider is none of an axis. Home with [homing_override] and SET_KINEMATIC_POSITION."
+    )
+    for axis, (least, most) in zip("xyz", box, strict=True):
+        yield Section(
+            f"carriage {axis}",
+            (
+                ("position_min", least),
+                ("position_max", most),
+                ("position_endstop", None),
+                ("endstop_pin", None),
+            ),
+            (homing, *comments) if axis == "x" else (),
+        )
+    for i, (leg, row, offset) in enumerate(zip(robot.legs, rows, offsets, strict=True), start=1):
+        joint = f"{leg.joint.coordinate}{i}"
+        yield Section(
+            f"stepper {joint}",
+            (
+                ("carriages", _sum(row)),
+                ("rotation_distance", rotation_distance(robot, i - 1)),
+                *PINS,
+            ),
+            (f"Its position is {joint} in mm {signed(-offset)} mm.",),
+        )
+
+
+def _sum(row: Array) -> str:
+    """Return a linear combination as kinematic_stepper.py reads it: no blanks, no exponents."""
+    terms: list[str] = []
+    for axis, value in zip("xyz", row, strict=True):
+        if abs(value) <= ZERO:
+            continue
+        sign = "-" if value < 0.0 else "+" if terms else ""
+        text = f"{abs(value):.15f}".rstrip("0").rstrip(".")
+        terms.append(sign + (axis if text == "1" else f"{text}*{axis}"))
+    return "".join(terms)
+
+
+def _box(
+    robot: Manipulator, rows: Array, offsets: Array
+) -> tuple[list[tuple[str | None, str | None]], tuple[str, ...]]:
+    """Return ranges of x, y and z, mm, that keep the joints' limits, and what to say of them."""
+    if any(leg.limits is None for leg in robot.legs):
+        return [(None, None)] * 3, ("The machine's file has no limits of the joints.",)
+    limits = 1000.0 * np.array([leg.limits for leg in robot.legs]) - offsets[:, None]
+    middle = np.linalg.solve(rows, limits.mean(axis=1))
+    # The largest cube about the middle; along axes that a slider has for itself, all of its way.
+    half = np.ptp(limits, axis=1) / 2.0
+    sides = np.full(3, (half / np.abs(rows).sum(axis=1)).min())
+    for row, reach in zip(rows, half, strict=True):
+        (own,) = np.nonzero(np.abs(row) > ZERO)
+        if len(own) == 1 and (np.abs(rows[:, own[0]]) > ZERO).sum() == 1:
+            sides[own[0]] = reach / abs(row[own[0]])
+    grid = middle + sides * np.array(list(product(np.linspace(-1.0, 1.0, 9), repeat=3)))
+    reached = np.isfinite(inverse_kinematics(robot, grid / 1000.0, on_failure="nan")).all(axis=1)
+    told = ["This box keeps the joints' limits; Klipper checks the box and no leg's reach."]
+    if not reached.all():
+        share = 100.0 * (1.0 - reached.mean())
+        told.append(
+            f"In {share:.0f} % of it a leg does not reach: make it smaller, by `pteron workspace`."
+        )
+    box = [(f"{m - s:.6g}", f"{m + s:.6g}") for m, s in zip(middle, sides, strict=True)]
+    return [(least, most) for least, most in box], tuple(told)

@@ -1,0 +1,94 @@
+"""What Klipper asks of a Delta: where the spheres are that its platform moves on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from pteron.equations.machine import Machine
+from pteron.export.klipper.sections import differs
+from pteron.kernels import Array
+from pteron.legs.leg import Sphere
+from pteron.manipulator import Manipulator
+
+SAME = 1e-6
+"""Metres, or a unit vector's part, that a machine may differ from what Klipper takes."""
+
+
+@dataclass(frozen=True)
+class Center:
+    """Where the centre of the sphere that P moves on is while a joint q is held.
+
+    It is at + q along, or at + along cos(q) + across sin(q); P is the platform's reference point.
+    """
+
+    leg: int
+    at: Array
+    along: Array
+    across: Array | None
+    radius: float
+
+    @property
+    def slides(self) -> bool:
+        """Whether it moves along a line."""
+        return self.across is None
+
+    @classmethod
+    def of(cls, machine: Machine, leg: int) -> Center | None:
+        """Return that of a leg, None if its platform point is not on a sphere, or P moves else."""
+        q = ca.SX.sym("q")
+        locus, offset = machine.legs[leg].locus(q), machine.platform.offsets[leg]
+        if not isinstance(locus, Sphere):
+            return None
+        function = ca.Function(
+            "center", [q], [locus.center - offset.a - offset.still, locus.radius]
+        )
+
+        def center(value: float) -> Array:
+            return np.array(function(value)[0]).ravel()
+
+        radius = float(function(0.0)[1])
+        start, step = center(0.0), center(1.0) - center(0.0)
+        if np.allclose(center(2.0), start + 2.0 * step, rtol=0.0, atol=1e-12):
+            return cls(leg, start, step, None, radius)
+        half, quarter = center(math.pi), center(0.5 * math.pi)
+        at = 0.5 * (start + half)
+        along, across = start - at, quarter - at
+        if np.allclose(
+            center(1.0), at + math.cos(1.0) * along + math.sin(1.0) * across, 0.0, 1e-12
+        ):
+            return cls(leg, at, along, across, radius)
+        return None
+
+
+def common(robot: Manipulator, values: Sequence[float], told: str, kind: str) -> float:
+    """Return the value that the legs share.
+
+    Raises
+    ------
+    ModelError
+        If they do not, by more than a micrometre.
+    """
+    for i, value in enumerate(values[1:], start=2):
+        if abs(value - values[0]) > SAME:
+            one, other = (round(1000.0 * v, 6) + 0.0 for v in (value, values[0]))
+            text = f"{told.format(one)}, leg 1 {other:.6g} mm"
+            raise differs(robot, i, text, kind)
+    return float(np.mean(values))
+
+
+def degrees(point: Array) -> float:
+    """Return the direction of a point as seen from the z axis, 0 to 360."""
+    angle = math.degrees(math.atan2(point[1], point[0])) % 360.0
+    return 0.0 if 360.0 - angle < 1e-9 else angle
+
+
+def end_stop(end: str | None, what: str) -> tuple[str, ...]:
+    """Return what is said of an end stop's position, if it is given."""
+    if end is None:
+        return ()
+    return (f"position_endstop: the {what} at its upper limit; measure it on the machine.",)

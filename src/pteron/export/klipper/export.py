@@ -1,0 +1,97 @@
+"""Klipper's configuration of a machine: generic_cartesian, delta or rotary_delta.
+
+What Klipper computes is in its klippy/kinematics/ (generic_cartesian.py with kinematic_stepper.py,
+delta.py, rotary_delta.py) and klippy/chelper/ (kin_generic.c, kin_delta.c, kin_rotary_delta.c). It
+takes machines that move x, y and z alone: those whose joints are linear in the pose, and Deltas as
+regular as its own few numbers say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from pteron.atomic import write_texts
+from pteron.equations.machine import Machine
+from pteron.errors import ModelError
+from pteron.export.c import prefix_of
+from pteron.export.descriptions import banner
+from pteron.export.klipper.cartesian import cartesian
+from pteron.export.klipper.centers import Center
+from pteron.export.klipper.delta import delta
+from pteron.export.klipper.rotary_delta import rotary
+from pteron.export.klipper.sections import INSTEAD, Section
+from pteron.kernels.code import rendered
+from pteron.manipulator import Manipulator, expect_manipulator
+
+
+def export_klipper(robot: Manipulator, folder: str | Path = ".") -> list[Path]:
+    """Write the kinematic sections of a Klipper configuration, NAME.cfg.
+
+    A machine whose joints are linear in the pose, as a Tripteron, becomes `generic_cartesian`; a
+    Delta with vertical guides `delta`; one with cranks `rotary_delta`, if its towers or shoulders
+    stand as regularly as Klipper has them. X, Y and Z are the position of P in mm, not of the tool.
+    Pins, speeds and homing are left to who builds the machine.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine; its name becomes the file's.
+    folder : path
+        Where; made if it is missing.
+
+    Returns
+    -------
+    list of Path
+        The file written.
+
+    Raises
+    ------
+    ModelError
+        If Klipper cannot move this machine: what differs, and what to use instead.
+    OutputError
+        If the folder cannot be written.
+
+    Examples
+    --------
+    >>> import pteron, tempfile
+    >>> from pteron.export import export_klipper
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     (path,) = export_klipper(pteron.load("tripteron-oblique"), folder)
+    ...     print(next(line for line in path.read_text().splitlines() if "carriages:" in line))
+    carriages: 1.063829787234042*x+0.310283687943262*z
+    """
+    expect_manipulator(robot)
+    if robot.platform.coordinates != ("x", "y", "z"):
+        pose = ", ".join(robot.platform.coordinates)
+        raise ModelError(
+            f"{robot.name}: Klipper moves x, y and z alone, and this machine's pose is {pose}; "
+            f"{INSTEAD}"
+        )
+    sections = tuple(_sections(robot))
+    prefix = prefix_of(robot)
+    text = rendered(
+        "pteron.export",
+        "klipper.cfg.j2",
+        banner=[line for line in banner(robot, "Klipper configuration") if "SI units" not in line],
+        sections=sections,
+        tool=[1000.0 * v for v in robot.platform.tool],
+    )
+    return write_texts(folder, {f"{prefix}.cfg": text})
+
+
+def _sections(robot: Manipulator) -> Iterator[Section]:
+    machine = Machine.of(robot)
+    if all(leg.row_is_constant for leg in machine.legs):
+        return cartesian(robot)
+    centers = [Center.of(machine, i) for i in range(3)]
+    if all(center is not None for center in centers):
+        found = [center for center in centers if center is not None]
+        if all(center.slides for center in found):
+            return delta(robot, found)
+        if not any(center.slides for center in found):
+            return rotary(robot, found)
+    raise ModelError(
+        f"{robot.name}: its legs are neither all linear in the pose, nor those of a Delta with "
+        f"guides or with cranks, which is what Klipper knows; {INSTEAD}"
+    )

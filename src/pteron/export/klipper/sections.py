@@ -1,0 +1,61 @@
+"""Sections of a Klipper configuration, and what stands in them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from pteron.errors import ModelError
+from pteron.manipulator import Manipulator
+
+INSTEAD = "use --linuxcnc, or --c for a controller of your own"
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section of the configuration: entries, with None for what only the builder knows."""
+
+    title: str
+    entries: tuple[tuple[str, str | None], ...]
+    comments: tuple[str, ...] = ()
+
+
+SPEEDS: tuple[tuple[str, None], ...] = (("max_velocity", None), ("max_accel", None))
+"""What Klipper asks of every printer."""
+
+PINS: tuple[tuple[str, None], ...] = (
+    ("step_pin", None),
+    ("dir_pin", None),
+    ("enable_pin", None),
+    ("microsteps", None),
+)
+"""What it asks of every stepper."""
+
+
+def differs(robot: Manipulator, leg: int, told: str, kind: str) -> ModelError:
+    """Return the refusal of a machine because of what is told of one of its legs."""
+    return ModelError(f"{robot.name}: Klipper's {kind} does not fit leg {leg}: {told}; {INSTEAD}")
+
+
+def mm(metres: float) -> str:
+    """Return a length in millimetres."""
+    return number(1000.0 * metres)
+
+
+def number(value: float) -> str:
+    """Return a number without an exponent."""
+    text = f"{value:.12f}".rstrip("0").rstrip(".")
+    return "0" if text in ("-0", "") else text
+
+
+def signed(value: float) -> str:
+    """Return a number as it is added to something: "+ 1.5"."""
+    return f"{'-' if value < 0.0 else '+'} {abs(value):.9g}"
+
+
+def rotation_distance(robot: Manipulator, leg: int) -> str | None:
+    """Return mm a turn of the motor, None where the machine's file does not say."""
+    drive = robot.legs[leg].drive
+    if drive is None or drive.ratio is None:
+        return None
+    return number(2000.0 * math.pi / abs(drive.ratio))
