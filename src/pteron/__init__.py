@@ -72,7 +72,16 @@ Leg = PRRR
 """The kind of leg that a file means where it does not say `type`."""
 
 if TYPE_CHECKING:
-    from pteron import export, identification, motion, plots, report, workspace
+    from pteron import (
+        controllers,
+        environments,
+        export,
+        identification,
+        motion,
+        plots,
+        report,
+        workspace,
+    )
     from pteron.export import export_c, export_st
     from pteron.reduction import (
         BaseParameters,
@@ -91,8 +100,11 @@ _LATER = {
     "export_c": "pteron.export",
     "export_st": "pteron.export",
 }
-_LATER_MODULES = ("export", "identification", "motion", "plots", "report", "workspace")
-"""What would slow the start of those who do not use it (SymPy, SciPy, matplotlib)."""
+_LATER_MODULES = (
+    *("controllers", "environments", "export", "identification"),
+    *("motion", "plots", "report", "workspace"),
+)
+"""What would slow the start of those who do not use it (SymPy, SciPy, matplotlib, Gymnasium)."""
 
 
 def __dir__() -> list[str]:
@@ -145,6 +157,7 @@ __all__ = [
     "direct_kinematics",
     "drive_accelerations",
     "drive_forces",
+    "environments",
     "export",
     "export_c",
     "export_st",
