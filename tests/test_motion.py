@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 import pteron
 from pteron.motion import joint_guides, joint_points, pick_and_place, scaled_to_reach
-from pteron.motion.cycle import Cycle, quintic
+from pteron.motion.trajectories.cycle import Cycle, quintic
 from pteron.workspace import home_pose, reserve
 
 NAMES = [

@@ -22,7 +22,7 @@ from pteron.motion import (
     size,
     with_payload,
 )
-from pteron.motion.gearing import peak_span, rated_span, speed_span, torques
+from pteron.motion.sizing.gearing import peak_span, rated_span, speed_span, torques
 from pteron.workspace import home_pose
 
 BARE = {

@@ -31,7 +31,7 @@ from pteron.identification.signals import samples
 from pteron.kernels import Array
 from pteron.kernels.c import compiler
 from pteron.motion import pick_and_place
-from pteron.motion.cycle import Cycle
+from pteron.motion.trajectories.cycle import Cycle
 from pteron.report.identification import numbers
 
 BANDWIDTH = 2.0 * np.pi * 10.0

@@ -233,8 +233,8 @@ def _adept(
     from dataclasses import replace
 
     from pteron.motion import check_path, cycle_path, time_optimal
-    from pteron.motion.pick_and_place import PEAK_ACCELERATION
-    from pteron.motion.time_law import in_time
+    from pteron.motion.trajectories.pick_and_place import PEAK_ACCELERATION
+    from pteron.motion.trajectories.time_law import in_time
 
     middle = _pose(machine, around, "--around")
     found = standard_cycle(machine, middle, scale)

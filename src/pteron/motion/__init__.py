@@ -1,23 +1,9 @@
 """Motions of the platform, what they ask of the drives, and simulation of the machine."""
 
-from pteron.motion.checks import check_motion, check_path
-from pteron.motion.demand import Peak, peaks
-from pteron.motion.drive_sizing import size
-from pteron.motion.fourier import FourierSeries, fourier_motion
-from pteron.motion.gearing import Span, best_ratio, best_ratios
-from pteron.motion.jerk_limited import jerk_limited
 from pteron.motion.joint_points import Guide, JointPoints, Part, joint_guides, joint_points
-from pteron.motion.limits import MotionLimits, limits_of
 from pteron.motion.motion import Motion
-from pteron.motion.motor_choice import Fit, choose
-from pteron.motion.motors import Motor, read_motors
 from pteron.motion.overloads import overloads
-from pteron.motion.path import LinePath, Path, line_path, there_and_back
 from pteron.motion.payload import with_payload
-from pteron.motion.pick_and_place import PickAndPlace, cycle_path, pick_and_place
-from pteron.motion.point_to_point import point_to_point
-from pteron.motion.replay import replay
-from pteron.motion.scaling import scaled_to_reach
 from pteron.motion.simulation import (
     Sensors,
     Simulation,
@@ -25,9 +11,23 @@ from pteron.motion.simulation import (
     longest_step,
     simulate,
 )
-from pteron.motion.sizing import Sizing
-from pteron.motion.time_law import along, shortest
-from pteron.motion.time_optimal import TimeOptimal, time_optimal
+from pteron.motion.sizing.gearing import Span, best_ratio, best_ratios
+from pteron.motion.sizing.motor_choice import Fit, choose
+from pteron.motion.sizing.motors import Motor, read_motors
+from pteron.motion.sizing.result import Sizing
+from pteron.motion.sizing.size import size
+from pteron.motion.trajectories.checks import check_motion, check_path
+from pteron.motion.trajectories.demand import Peak, peaks
+from pteron.motion.trajectories.fourier import FourierSeries, fourier_motion
+from pteron.motion.trajectories.jerk_limited import jerk_limited
+from pteron.motion.trajectories.limits import MotionLimits, limits_of
+from pteron.motion.trajectories.path import LinePath, Path, line_path, there_and_back
+from pteron.motion.trajectories.pick_and_place import PickAndPlace, cycle_path, pick_and_place
+from pteron.motion.trajectories.point_to_point import point_to_point
+from pteron.motion.trajectories.replay import replay
+from pteron.motion.trajectories.scaling import scaled_to_reach
+from pteron.motion.trajectories.time_law import along, shortest
+from pteron.motion.trajectories.time_optimal import TimeOptimal, time_optimal
 
 __all__ = [
     "Fit",

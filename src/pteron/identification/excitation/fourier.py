@@ -16,7 +16,7 @@ from pteron.kernels import Array, as_array
 from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator
 from pteron.motion import Motion
-from pteron.motion.fourier import fourier_basis
+from pteron.motion.trajectories.fourier import fourier_basis
 
 Space = Literal["platform", "joints"]
 """Whose coordinates the series are of: the platform's pose, or the joints'."""

@@ -17,7 +17,7 @@ from pteron.identification.signals.states import home
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.motion import pick_and_place
-from pteron.motion.cycle import Cycle, moves
+from pteron.motion.trajectories.cycle import Cycle, moves
 
 _LEAST_CYCLES = 4
 _LEAST_DURATION = 10.0

@@ -23,7 +23,7 @@ from pteron.identification.excitation.margins import Margins, margins, relative_
 from pteron.identification.excitation.movement import State
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
-from pteron.motion.cycle import quintic
+from pteron.motion.trajectories.cycle import quintic
 
 _LENGTHS = (1, 2, 4, 8)
 """Periods that a lead takes, the first that will do: a whole number ends where it began. One has

@@ -18,7 +18,7 @@ from pteron.kernels import Array, Columns, program
 from pteron.kinematics.evaluate import unchecked
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator, parameters
-from pteron.motion.fourier import fourier_basis
+from pteron.motion.trajectories.fourier import fourier_basis
 
 Criterion = Literal["condition", "logdet"]
 """What is made small: the scaled condition number, or the volume of the confidence ellipsoid."""

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pteron.kernels import Array
-from pteron.motion.sizing import Sizing
+from pteron.motion.sizing.result import Sizing
 from pteron.shapes import PerJoint
 
 _STILL = 1e-9

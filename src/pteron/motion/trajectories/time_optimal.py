@@ -23,12 +23,12 @@ import numpy as np
 from pteron.errors import DataError, ModelError, PteronError
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
-from pteron.motion.checks import check_path
-from pteron.motion.demand import Demand, demand
-from pteron.motion.limits import MotionLimits, limits_of
 from pteron.motion.motion import Motion
-from pteron.motion.path import Path
-from pteron.motion.time_law import STEP, Course, kept_motion, polynomial, stretch_times
+from pteron.motion.trajectories.checks import check_path
+from pteron.motion.trajectories.demand import Demand, demand
+from pteron.motion.trajectories.limits import MotionLimits, limits_of
+from pteron.motion.trajectories.path import Path
+from pteron.motion.trajectories.time_law import STEP, Course, kept_motion, polynomial, stretch_times
 
 _GRID = 400
 """Intervals of a stretch."""

@@ -195,7 +195,7 @@ class Sizing:
         """
         import polars as pl
 
-        from pteron.motion.gearing import best_ratios
+        from pteron.motion.sizing.gearing import best_ratios
 
         joints = [leg.joint for leg in self.robot.legs]
         turning = np.array([drive.ratio is not None for drive in self.drives])

@@ -13,8 +13,8 @@ from pteron.kernels import Array
 from pteron.kinematics import follow
 from pteron.kinematics.evaluate import checked, unchecked
 from pteron.manipulator import Manipulator
-from pteron.motion.checks import check_motion
 from pteron.motion.motion import Motion
+from pteron.motion.trajectories.checks import check_motion
 from pteron.shapes import PoseLike
 from pteron.tables import Table, read_table
 

@@ -15,8 +15,8 @@ from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator
-from pteron.motion.limits import MotionLimits
-from pteron.motion.tool import tool_motion
+from pteron.motion.trajectories.limits import MotionLimits
+from pteron.motion.trajectories.tool import tool_motion
 
 _WORDS = {
     "speed": ("moves at up to", "{unit}/s"),

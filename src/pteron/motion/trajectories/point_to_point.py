@@ -6,10 +6,10 @@ import numpy as np
 
 from pteron.kinematics.evaluate import checked
 from pteron.manipulator import Manipulator
-from pteron.motion.limits import MotionLimits
 from pteron.motion.motion import Motion
-from pteron.motion.path import line_path
-from pteron.motion.time_law import STEP, Law, along
+from pteron.motion.trajectories.limits import MotionLimits
+from pteron.motion.trajectories.path import line_path
+from pteron.motion.trajectories.time_law import STEP, Law, along
 from pteron.shapes import PoseLike
 
 

@@ -12,10 +12,10 @@ from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import checked
 from pteron.manipulator import Manipulator
-from pteron.motion.cycle import Cycle, moves
 from pteron.motion.motion import Motion
-from pteron.motion.path import BackPath, CyclePath
-from pteron.motion.scaling import LEAST_RESERVE, TURN, scaled_to_reach
+from pteron.motion.trajectories.cycle import Cycle, moves
+from pteron.motion.trajectories.path import BackPath, CyclePath
+from pteron.motion.trajectories.scaling import LEAST_RESERVE, TURN, scaled_to_reach
 from pteron.shapes import PoseLike
 
 PEAK_ACCELERATION = 10.0

@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
-from pteron.motion.checks import check_motion
 from pteron.motion.motion import Motion
-from pteron.motion.time_law import STEP, sampled
-from pteron.motion.tool import Curve
+from pteron.motion.trajectories.checks import check_motion
+from pteron.motion.trajectories.time_law import STEP, sampled
+from pteron.motion.trajectories.tool import Curve
 
 
 @dataclass(frozen=True)

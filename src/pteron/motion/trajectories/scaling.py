@@ -15,7 +15,7 @@ from pteron.kinematics import inverse_kinematics
 from pteron.kinematics.evaluate import checked
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator
-from pteron.motion.cycle import Cycle, moves
+from pteron.motion.trajectories.cycle import Cycle, moves
 from pteron.shapes import PoseLike
 
 LEAST_RESERVE = 0.2

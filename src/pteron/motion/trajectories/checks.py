@@ -19,9 +19,9 @@ from pteron.kernels import Array, numeric
 from pteron.kernels.functions import TYPE_I, TYPE_II
 from pteron.kinematics.singularities import is_singular_everywhere, singular_everywhere
 from pteron.manipulator import Manipulator
-from pteron.motion.demand import told_pose
 from pteron.motion.motion import Motion
-from pteron.motion.path import Path, poses_of
+from pteron.motion.trajectories.demand import told_pose
+from pteron.motion.trajectories.path import Path, poses_of
 
 _SAMPLES = 1001
 """Poses of a path that are looked at before its measures are followed between them."""

@@ -9,9 +9,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from pteron.errors import DataError
-from pteron.motion.gearing import Span, best_ratio, peak_span, rated_span, speed_span, torques
-from pteron.motion.motors import Motor
-from pteron.motion.sizing import Sizing
+from pteron.motion.sizing.gearing import (
+    Span,
+    best_ratio,
+    peak_span,
+    rated_span,
+    speed_span,
+    torques,
+)
+from pteron.motion.sizing.motors import Motor
+from pteron.motion.sizing.result import Sizing
 
 
 @dataclass(frozen=True)

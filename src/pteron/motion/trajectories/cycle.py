@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
-from pteron.motion.tool import pose_motion, turning_arm
+from pteron.motion.trajectories.tool import pose_motion, turning_arm
 from pteron.platforms import Platform
 
 LIFT = 0.025

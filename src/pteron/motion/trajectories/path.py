@@ -18,8 +18,8 @@ from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import checked
 from pteron.manipulator import Manipulator
-from pteron.motion.cycle import Cycle
-from pteron.motion.tool import Curve, pose_motion, tool_motion
+from pteron.motion.trajectories.cycle import Cycle
+from pteron.motion.trajectories.tool import Curve, pose_motion, tool_motion
 from pteron.platforms import Platform
 
 TURN = 0.1

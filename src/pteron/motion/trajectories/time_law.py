@@ -11,12 +11,12 @@ import numpy as np
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
-from pteron.motion.checks import check_path
-from pteron.motion.demand import demand, most_rate, peaks
-from pteron.motion.limits import MotionLimits, limits_of
 from pteron.motion.motion import Motion
-from pteron.motion.path import Path
-from pteron.motion.tool import Curve
+from pteron.motion.trajectories.checks import check_path
+from pteron.motion.trajectories.demand import demand, most_rate, peaks
+from pteron.motion.trajectories.limits import MotionLimits, limits_of
+from pteron.motion.trajectories.path import Path
+from pteron.motion.trajectories.tool import Curve
 
 Law = Literal["quintic", "seventh"]
 """The polynomial of a motion from rest to rest, by its degree."""
@@ -58,7 +58,7 @@ def polynomial(law: Law) -> Progress:
     Examples
     --------
     >>> import numpy as np
-    >>> from pteron.motion.time_law import polynomial
+    >>> from pteron.motion.trajectories.time_law import polynomial
     >>> [float(v[0]) for v in polynomial("seventh")(np.array([0.5]))]
     [0.5, 2.1875, 0.0]
     """

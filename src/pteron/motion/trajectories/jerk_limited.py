@@ -15,11 +15,11 @@ from pteron.kernels import Array
 from pteron.kinematics import follow, inverse_kinematics
 from pteron.kinematics.evaluate import checked, unchecked
 from pteron.manipulator import Manipulator
-from pteron.motion.checks import check_motion
-from pteron.motion.limits import MotionLimits, PerJointLimit, limits_of, per_joint
 from pteron.motion.motion import Motion
-from pteron.motion.time_law import STEP, Timed, kept_motion, sampled
-from pteron.motion.tool import Curve
+from pteron.motion.trajectories.checks import check_motion
+from pteron.motion.trajectories.limits import MotionLimits, PerJointLimit, limits_of, per_joint
+from pteron.motion.trajectories.time_law import STEP, Timed, kept_motion, sampled
+from pteron.motion.trajectories.tool import Curve
 from pteron.shapes import PoseLike
 
 _NEAR = 1e-6

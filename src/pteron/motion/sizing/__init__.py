@@ -1,0 +1,1 @@
+"""What a cycle asks of each drive, and which motors and ratios serve."""
