@@ -75,8 +75,8 @@ def replayed(robot: Manipulator, file: str, start: PoseLike | None = None) -> Mo
     rows = read_table(file)
     _check_rates(robot, rows)
     names = [n for n in (*robot.coordinates, *robot.joint_names) if n in rows.columns]
-    told_doubts(robot, names, rows.numbers(names), file)
     motion = replay(robot, rows, start=home_pose(robot) if start is None else start)
+    told_doubts(robot, names, rows.numbers(names), file)
     if float(np.median(np.diff(motion.time))) >= _SLOW:
         note(f"Note: {file}: t in steps of {motion.time[1]:g}: are these ms? s are expected")
     return motion
