@@ -64,7 +64,7 @@ ROBOTS = {
 # CasADi
 
 
-@pytest.mark.parametrize("name", ["quadrupteron", "delta", "par4", "3-rrr", "mixed"])
+@pytest.mark.parametrize("name", ["quadrupteron", "delta", "par4", "mixed"])
 def test_casadi_functions_are_the_librarys(name):
     robot = ROBOTS[name]
     functions = casadi_functions(robot)
@@ -591,9 +591,10 @@ def kinematics(robot, folder):
     return ctypes.CDLL(str(folder / "kins.so")), files
 
 
-LINUXCNC = ROBOTS | {
+LINUXCNC = {name: ROBOTS[name] for name in ("par4", "five-bar", "3-rrr", "mixed", "sliding")} | {
     "tripteron-oblique": CATALOG["tripteron-oblique"],
     "upside": pteron.turned(CATALOG["quadrupteron"], np.diag([1.0, -1.0, -1.0])),
+    "mühle": replace(CATALOG["linear-delta"], name="mühle"),
     "sideways": pteron.turned(CATALOG["quadrupteron"], [[0, 0, 1], [1, 0, 0], [0, 1, 0]]),
     "h4": CATALOG["h4"],
     "cranks": KLIPPER["cranks"],

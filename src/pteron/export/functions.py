@@ -228,7 +228,7 @@ def _exported(
         summary = summary.replace(", from the inertial parameters", "") + " From base parameters."
     if name in ("direct_kinematics", "closure_poses"):
         summary += MODES + ("" if machine.closure.keeps_modes else BRANCHES)
-    elif "pose" in taken and not any(node.operation == "sqrt" for node in graph.nodes):
+    elif "pose" in taken and not {"sqrt", "less"} & {node.operation for node in graph.nodes}:
         summary += " It does not ask whether the legs reach."
     meanings = {port.name: meaning(robot, port, output) for port in (*given.inputs, *outputs)}
     if controller:

@@ -142,7 +142,9 @@ def export_linuxcnc(robot: Manipulator, folder: str | Path = ".") -> list[Path]:
         files[f"{prefix}_matrixkins.hal"] = rendered(
             "pteron.export", "matrixkins.hal.j2", rows=rows.tolist(), offsets=offsets, **values
         )
-    return write_texts(folder, files)
+    # halcompile reads what the locale says: nothing but ASCII.
+    plain = {name: text.encode("ascii", "replace").decode() for name, text in files.items()}
+    return write_texts(folder, plain)
 
 
 def _linear(robot: Manipulator) -> bool:
