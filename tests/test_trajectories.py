@@ -316,7 +316,8 @@ def test_the_fastest_motion_of_one_slider_is_the_textbook_s():
     assert bang.bound == pytest.approx(2.0 * np.sqrt(0.15 / 20.0), rel=1e-6)
     cruise = time_optimal(robot, path, limits_of(robot, acceleration=20.0, speed=1.0), step=1e-4)
     assert cruise.bound == pytest.approx(0.15 / 1.0 + 1.0 / 20.0, rel=1e-3)
-    assert bang.duration < 1.02 * bang.bound
+    finer = time_optimal(robot, path, limits_of(robot, acceleration=20.0), step=1e-5)
+    assert 1.0 < finer.duration / finer.bound < 1.001
     tool = time_optimal(robot, path, limits_of(robot, tool_acceleration=20.0), step=1e-4)
     assert tool.bound == pytest.approx(bang.bound, rel=1e-6)
 
@@ -523,7 +524,8 @@ def test_the_command_writes_a_cycle_that_forces_reads(tmp_path):
     assert frames[0].columns[:4] == ["t", "x", "y", "z"]
     for rate, joint in (("drho1", "rho1"), ("ddrho1", "drho1")):
         slope = np.gradient(frames[0][joint].to_numpy(), 1e-3)
-        assert np.abs(slope - frames[0][rate].to_numpy())[2:-2].max() < 0.3
+        own = frames[0][rate].to_numpy()
+        assert np.median(np.abs(slope - own)) < 1e-3 * np.abs(own).max()
 
 
 def test_the_command_goes_lines_joints_and_tables(tmp_path):

@@ -34,6 +34,9 @@ KEPT = 1.0 + 1e-9
 """Share of a limit that counts as kept, for rounding."""
 
 _FINER = 10
+
+_TRIES = 8
+"""How often a motion is slowed until it keeps its limits: once or twice, but for rounding."""
 """How much finer than its samples a motion is checked."""
 
 
@@ -334,7 +337,7 @@ def kept_motion(robot: Manipulator, course: InTime, limits: MotionLimits, step: 
 
     Its duration is a multiple of the step; the course is slowed by what it exceeds a limit.
     """
-    for _ in range(20):
+    for _ in range(_TRIES):
         count = max(1, int(np.ceil(course.duration / _expect_time("step", step) - 1e-9)))
         course = course.slowed(count * step / course.duration)
         motion = sampled(course.at, course.duration, step)
@@ -344,7 +347,7 @@ def kept_motion(robot: Manipulator, course: InTime, limits: MotionLimits, step: 
             return motion
         course = course.slowed(1.0 / rate)
     raise DataError(
-        f"step: {step:g} s is too long for a motion of {course.duration:.3g} s; give a shorter one"
+        f"step: {step:g} s suits no motion of {course.duration:.3g} s; give a hundredth of it"
     )
 
 

@@ -341,68 +341,73 @@ def _solved(toppra: Any, rows: _Rows, grid: Array, before: Array, ahead: float) 
 
 
 class _Profile(NamedTuple):
-    """s(t) of constant accelerations between nodes: what TOPP-RA finds, and its integrals."""
+    """s(t) of constant accelerations between nodes (K,): what TOPP-RA finds."""
 
     time: Array
     s: Array
     rate: Array
     gain: Array
-    area: Array
-    """The integral of s, and that of it."""
-    volume: Array
+    """(K - 1,)"""
 
     @classmethod
     def of(cls, grid: Array, squares: Array) -> _Profile:
         """Take x = s'^2 on a grid; before and after s rests."""
         rate = np.sqrt(np.maximum(squares, 0.0))
-        gain = 0.5 * np.diff(squares) / np.diff(grid)
         spans = 2.0 * np.diff(grid) / (rate[1:] + rate[:-1])
-        s, v, u, d = grid[:-1], rate[:-1], gain, spans
-        areas = d * (s + d * (v / 2.0 + d * u / 6.0))
-        area = np.concatenate([[0.0], np.cumsum(areas)])
-        volumes = d * (area[:-1] + d * (s / 2.0 + d * (v / 6.0 + d * u / 24.0)))
-        return cls(
-            np.concatenate([[0.0], np.cumsum(spans)]),
-            grid,
-            rate,
-            np.append(gain, 0.0),
-            area,
-            np.concatenate([[0.0], np.cumsum(volumes)]),
-        )
+        time = np.concatenate([[0.0], np.cumsum(spans)])
+        return cls(time, grid, rate, 0.5 * np.diff(squares) / np.diff(grid))
 
     @property
     def duration(self) -> float:
         """From rest to rest, in units."""
         return float(self.time[-1])
 
-    def integrals(self, t: Array) -> tuple[Array, Array, Array]:
-        """Return s, its integral and that of it, (T,) each, at times (T,)."""
-        within = np.maximum(t, 0.0)
-        k = np.clip(np.searchsorted(self.time, within, side="right") - 1, 0, len(self.time) - 1)
-        d = within - self.time[k]
-        s, v, u, area = self.s[k], self.rate[k], self.gain[k], self.area[k]
-        return (
-            s + d * (v + d * u / 2.0),
-            area + d * (s + d * (v / 2.0 + d * u / 6.0)),
-            self.volume[k] + d * (area + d * (s / 2.0 + d * (v / 6.0 + d * u / 24.0))),
-        )
-
     def spread(self, h: float) -> Callable[[Array], tuple[Array, Array, Array]]:
         """Return s averaged over h before and after, by a triangle's weights, from rest to rest.
 
-        Its acceleration is continuous, and so is the jerk: both are second differences of what is.
+        Its acceleration is continuous, and its jerk too but for steps.
         """
         whole = self.duration + 2.0 * h
 
         def progress(tau: Array) -> tuple[Array, Array, Array]:
-            t = whole * tau - h
-            later, now, earlier = (self.integrals(t + shift) for shift in (h, 0.0, -h))
-            gain, rate, s = (
-                (a - 2.0 * b + c) / h**2 for a, b, c in zip(later, now, earlier, strict=True)
-            )
-            return s, rate * whole, gain * whole**2
+            t = np.clip(whole * tau - h, -h, self.duration + h)
+            s, rate = self._state(t)
+            after, before = self._moments(t, h), self._moments(t, -h)
+            gains, rates, ways = ((a + b) / h**2 for a, b in zip(after, before, strict=True))
+            return s + ways, (rate + rates) * whole, gains * whole**2
 
         return progress
+
+    def _state(self, t: Array) -> tuple[Array, Array]:
+        """Return s and s' (T,) at times (T,)."""
+        within = np.clip(t, 0.0, self.duration)
+        k = np.clip(np.searchsorted(self.time, within, side="right") - 1, 0, len(self.gain) - 1)
+        d = within - self.time[k]
+        inside = within == t
+        return (
+            self.s[k] + d * (self.rate[k] + d * self.gain[k] / 2.0),
+            np.where(inside, self.rate[k] + d * self.gain[k], 0.0),
+        )
+
+    def _moments(self, t: Array, h: float) -> tuple[Array, Array, Array]:
+        """Return what s'' from t to t + h, h of either sign, adds to s(t + h) and its integrals.
+
+        The integrals of (h - r)^k / k! s''(t + r) over r, k = 1, 2 and 3: small where h is, so that
+        averages are exact to rounding however little they take in.
+        """
+        edges = np.concatenate([[-np.inf], self.time, [np.inf]])
+        gain = np.concatenate([[0.0], self.gain, [0.0]])
+        ahead = int(h > 0.0)
+        k = np.searchsorted(self.time, t, side="right" if ahead else "left")
+        done, sums = np.zeros_like(t), [np.zeros_like(t) for _ in range(3)]
+        while (done != h).any():
+            to = edges[np.clip(k + ahead, 0, len(edges) - 1)] - t
+            to = np.minimum(to, h) if ahead else np.maximum(to, h)
+            u = gain[np.clip(k, 0, len(gain) - 1)]
+            for order, total in enumerate(sums, start=2):
+                total += u * ((h - done) ** order - (h - to) ** order) / math.factorial(order)
+            done, k = to, k + (1 if ahead else -1)
+        return sums[0], sums[1], sums[2]
 
 
 def _toppra() -> Any:
