@@ -29,6 +29,7 @@ _SCRIPTS = {
     "The paper's 41 %": "paper_claim.py",
     "Excitation": "excitation.py",
     "Limits of excitation": "excitation_limits.py",
+    "Control": "control.py",
     "From a log to a running machine": "identification/chain.py",
 }
 _PACKAGES = ("pteron", "numpy", "casadi", "numba", "jax", "pin", "mujoco")
