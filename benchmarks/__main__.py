@@ -31,6 +31,9 @@ _SCRIPTS = {
     "The same free motion in MuJoCo": "mujoco_convergence.py",
     "Limits of excitation": "excitation_limits.py",
     "Time-optimal cycles": "time_optimal.py",
+    "Control": "control.py",
+    "Simulation": "simulation.py",
+    "The Gymnasium environment": "environment.py",
     "From a log to a running machine": "identification/chain.py",
 }
 _PACKAGES = ("pteron", "numpy", "casadi", "numba", "jax", "pin", "mujoco")

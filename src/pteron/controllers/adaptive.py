@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from pteron.controllers.controller import SHARE, Controller
+from pteron.controllers.controller import Controller
 from pteron.controllers.gain_numbers import PerJoint, per_joint
 from pteron.controllers.joint_masses import joint_masses
 from pteron.controllers.shown import Moves, shown, typical
@@ -23,11 +23,12 @@ _SHARE = 0.02
 
 @dataclass(frozen=True)
 class Adaptive(Controller):
-    """F = Y theta + K_d s, theta' = Gamma Y^T s: Slotine and Li's law; theta are base parameters.
+    """F = Y theta + K_d z, theta' = Gamma Y^T z: Slotine and Li's law; theta are base parameters.
 
-    s = e' + bandwidth e, and Y theta is what the drives need for q'_r = q'_d + bandwidth e. Errors
+    z = e' + bandwidth e, and Y theta is what the drives need for q'_r = q'_d + bandwidth e. Errors
     vanish though the masses are not known; the estimates need not become the true values, only what
-    the motion asks of them. They stay within `uncertainty` of what they begin with.
+    the motion asks of them. They stay bounded: no farther from the start, in the measure of Gamma,
+    than where all parameters are off by `uncertainty`.
 
     Parameters
     ----------
@@ -39,13 +40,17 @@ class Adaptive(Controller):
         K_d, N s/m at a slider and N m s/rad at a crank; by default bandwidth times the joint's
         mass, see `joint_masses`.
     adaptation : float, optional
-        How quickly the best seen combination of parameters is learnt in a motion of 1 m/s and
-        10 m/s^2, rad/s; by default a fifth of the least bandwidth.
+        How quickly what the motion shows is learnt, rad/s; by default a fiftieth of the bandwidth,
+        and less where something would be learnt faster than errors go.
     uncertainty : float
-        By which share the bodies' parameters may be off; 0.5 is a half.
+        By which share the parameters may be off; 0.5 is a half. A first moment that is zero counts
+        as the mass times the body's radius of gyration.
     friction : bool
         Whether dry and viscous friction, offsets and motors' inertia are estimated too, or taken
         from the model.
+    motion : Motion, optional
+        What is to be learnt from: all that it shows is then learnt at one rate. By default a
+        typical motion, well inside the workspace, at 0.5 m/s and 5 m/s^2.
 
     Raises
     ------
@@ -63,6 +68,7 @@ class Adaptive(Controller):
     >>> from pteron.controllers import Adaptive
     >>> law = Adaptive().law(pteron.load("five-bar"))
     >>> law.base.names
+    ('I_u1', 'I_u2', 'mgx_l1', 'mgy_l1', 'mgx_l2', 'mgy_l2', 'm_e')
     """
 
     derivative: PerJoint | None = None
@@ -84,9 +90,8 @@ class Adaptive(Controller):
 
     def gains(self, model: Manipulator) -> Array:
         """Return its gains (G,) for a machine; see `Controller.gains`."""
-        bandwidth = SHARE / self.period if self.bandwidth is None else self.bandwidth
         # As Euler's method sees it, so that the error's poles are those of the bandwidth.
-        slope = -np.expm1(-per_joint(model, "bandwidth", bandwidth) * self.period) / self.period
+        slope = -np.expm1(-self.bandwidths(model) * self.period) / self.period
         derivative = slope * joint_masses(model)
         if self.derivative is not None:
             derivative = per_joint(model, "derivative", self.derivative)

@@ -6,15 +6,11 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
-from pteron.controllers.gain_numbers import PerJoint, above_zero, period_of
+from pteron.controllers.gain_numbers import PerJoint, above_zero, per_joint, period_of
 from pteron.controllers.law import Law
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.reduction import BaseParameters
-
-SHARE = 0.1
-"""The usual bandwidth, times the period: a controller ten times as slow as its samples allows for
-a delay of one of them, and for legs that are heavier together than each by itself."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +33,10 @@ class Controller(ABC):
     def what(self) -> str:
         """The name of its law, among `pteron.kernels.FUNCTIONS`."""
 
+    share: ClassVar[float] = 0.1
+    """The usual bandwidth, times the period: a controller ten times as slow as its samples allows
+    for a delay of one of them, and for joints that are lighter elsewhere."""
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "period", period_of(self.period))
         for name in self.positive:
@@ -48,6 +48,11 @@ class Controller(ABC):
     def base(self, model: Manipulator) -> BaseParameters | None:
         """Return the base parameters that it estimates of a machine; None where it does not."""
         return None
+
+    def bandwidths(self, model: Manipulator) -> Array:
+        """Return the bandwidth of each joint (n,), rad/s."""
+        usual = self.share / self.period
+        return per_joint(model, "bandwidth", usual if self.bandwidth is None else self.bandwidth)
 
     @abstractmethod
     def gains(self, model: Manipulator) -> Array:

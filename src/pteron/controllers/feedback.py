@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from pteron.controllers.controller import SHARE, Controller
+from pteron.controllers.controller import Controller
 from pteron.controllers.gain_numbers import PerJoint, per_joint
 from pteron.controllers.joint_masses import joint_masses
 from pteron.equations.control import GAINS
@@ -64,11 +64,7 @@ class Feedback(Controller):
                 )
             ]
         else:
-            bandwidth = SHARE / self.period if self.bandwidth is None else self.bandwidth
-            poles = (
-                per_joint(model, "bandwidth", bandwidth),
-                per_joint(model, "damping", self.damping),
-            )
+            poles = self.bandwidths(model), per_joint(model, "damping", self.damping)
             masses = 1.0 if self.of_accelerations else joint_masses(model)
             pair = [masses * gain for gain in pole_gains(*poles, self.period)]
         period = [self.period] if "period" in GAINS[self.what] else []
@@ -98,7 +94,7 @@ def pole_gains(bandwidth: Array, damping: Array, period: float) -> tuple[Array, 
     --------
     >>> import numpy as np
     >>> [float(g.round(2)) for g in pole_gains(np.array(100.0), np.array(1.0), 1e-6)]
-    [9999.0, 199.98]
+    [9999.0, 199.99]
     """
     root = np.emath.sqrt(np.asarray(damping) ** 2 - 1.0)
     # Without the loss of digits that 1 - z has for short periods.

@@ -50,7 +50,7 @@ def joint_masses(robot: Manipulator) -> Array:
     >>> import pteron
     >>> from pteron.controllers import joint_masses
     >>> joint_masses(pteron.load("five-bar")).round(5)
-    array([0.00042, 0.00042])
+    array([0.0004 , 0.00042])
     """
     poses = light_poses(robot)
     rows = jacobian(robot, poses)

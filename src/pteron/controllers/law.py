@@ -97,11 +97,13 @@ class Law:
         -------
         forces : array, shape (..., n)
             Of the drives, N at a slider, N m at a crank. NaN where a leg does not reach the wanted
-            pose, or Newton's method finds no pose for the joints.
+            pose, where that is singular, or Newton's method finds no pose for the joints.
         memory : array, shape (..., K)
         """
         wanted = pose, velocity, acceleration
-        forces, kept, _ = self._kernel(*wanted, joints, joint_rates, memory, self.gains)
+        forces, kept, status = self._kernel(*wanted, joints, joint_rates, memory, self.gains)
+        if not status.all():
+            forces[status == 0.0] = np.nan
         return forces, kept
 
     @cached_property

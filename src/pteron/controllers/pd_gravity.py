@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from pteron.controllers.feedback import Feedback
 
@@ -19,8 +20,8 @@ class PDGravity(Feedback):
     period : float
         Time between two samples, for which forces are held, s.
     bandwidth : float or one for each joint, optional
-        How quickly an error goes, rad/s; by default 0.1 / period. Times the joints' masses, see
-        `joint_masses`, it gives the gains.
+        How quickly an error goes, rad/s; by default 0.2 / period, since springs alone are to hold
+        the joints in motion. Times the joints' masses, see `joint_masses`, it gives the gains.
     damping : float or one for each joint
         1 is the least without overshoot.
     proportional, derivative : float or one for each joint, optional
@@ -38,6 +39,8 @@ class PDGravity(Feedback):
     Traceback (most recent call last):
     pteron.errors.DataError: bandwidth: -5.0 given, a number above 0 expected
     """
+
+    share: ClassVar[float] = 0.2
 
     @property
     def what(self) -> str:

@@ -146,21 +146,20 @@ def chosen(
     """
     identified = None if base is None else read_identified(robot, base)
     robot = identified.robot if identified else robot
+    asked = [] if functions is None else listed(functions)
+    given = {one.what: one for one in asked if isinstance(one, Controller)}
+    names = [one.what if isinstance(one, Controller) else one for one in asked]
     if functions is None:
         closed = closure_of(robot).closed_form
         step = {"direct_kinematics": "direct_step"}
-        own = [name if closed else step.get(name, name) for name in usual]
+        names = [name if closed else step.get(name, name) for name in usual]
         if identified:  # which leaves the bodies unknown
-            needs = {name: TABLE[name].inputs for name in own if name in TABLE}
-            own = [name for name in own if "parameters" not in needs.get(name, ())]
-            own += [name + _BASE for name in FEED]
+            needs = {name: TABLE[name].inputs for name in names if name in TABLE}
+            names = [name for name in names if "parameters" not in needs.get(name, ())]
+            names += [name + _BASE for name in FEED]
         elif has_drives(robot):
-            own += FEED
-        functions = own
-    asked = listed(functions)
-    given = {one.what: one for one in asked if isinstance(one, Controller)}
-    called = (one.what if isinstance(one, Controller) else one for one in asked)
-    names: list[str] = list(dict.fromkeys(called))
+            names += FEED
+    names = list(dict.fromkeys(names))
     allowed = sorted({*COMPILED, *(name + _BASE for name in REDUCIBLE)} - {"base_regressor"})
     valid = f"choose from {', '.join(allowed)}"
     for name in names:
