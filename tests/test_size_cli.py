@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from functools import lru_cache
 from io import StringIO
 from pathlib import Path
 
@@ -36,9 +37,14 @@ def driven() -> str:
     return "driven.toml"
 
 
+@lru_cache
+def home(robot: pteron.Manipulator) -> np.ndarray:
+    return home_pose(robot)
+
+
 def cycle_table(robot: pteron.Manipulator, **columns: float) -> pl.DataFrame:
     """Return a cycle as a table; `columns` are factors of some."""
-    cycle = pick_and_place(robot, home_pose(robot), scale=0.2, samples=51)
+    cycle = pick_and_place(robot, home(robot), scale=0.2, samples=51)
     names = [f"{rate}{name}" for rate in ("", "d", "dd") for name in robot.coordinates]
     values = np.hstack([cycle.pose, cycle.velocity, cycle.acceleration])
     found = {"t": cycle.time} | dict(zip(names, values.T, strict=True))
@@ -61,7 +67,7 @@ def test_payload_dwell_and_duration_count(driven: str):
     asked = "--payload 0.4 --dwell 0.2 --duration 0.5"
     data = json.loads(done(f"size {driven} {asked} --json"))
     robot = pteron.load(driven)
-    cycle = pick_and_place(robot, home_pose(robot), duration=0.5, samples=481)
+    cycle = pick_and_place(robot, home(robot), duration=0.5, samples=481)
     found = size(with_payload(robot, 0.4), cycle, dwell=0.2)
     assert data["duration"] == pytest.approx(0.7)
     assert [row["rms_force"] for row in data["drives"]] == pytest.approx(found.rms_forces, 1e-3)
@@ -123,7 +129,7 @@ def test_a_motion_of_a_table_is_sized_as_it_is():
     robot = pteron.load("delta")
     cycle_table(robot).write_csv("motion.csv")
     rows = pl.read_csv(StringIO(done("size delta --cycle motion.csv")))
-    cycle = pick_and_place(robot, home_pose(robot), scale=0.2, samples=51)
+    cycle = pick_and_place(robot, home(robot), scale=0.2, samples=51)
     assert rows["rms_force"].to_list() == pytest.approx(size(robot, cycle).rms_forces, rel=1e-9)
 
 
@@ -167,7 +173,7 @@ def test_a_table_that_is_no_motion_is_one_line(factors: dict[str, float], words:
 
 def test_a_table_of_the_joints_alone_is_sized_in_the_home_poses_mode():
     robot = pteron.load("delta")
-    cycle = pick_and_place(robot, home_pose(robot), scale=0.2, samples=301)
+    cycle = pick_and_place(robot, home(robot), scale=0.2, samples=301)
     joints = pteron.inverse_kinematics(robot, cycle.pose)
     columns = {"t": cycle.time} | dict(zip(robot.joint_names, joints.T, strict=True))
     pl.DataFrame(columns).write_csv("motion.csv")
