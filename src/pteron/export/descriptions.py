@@ -128,7 +128,7 @@ def law_meanings(what: str, texts: Mapping[str, str]) -> dict[str, str]:
         **{name: f"wanted now: {texts[name]}" for name in wanted},
         **{name: f"measured now: {texts[name]}" for name in ("joints", "joint_rates")},
         "memory": f"next_memory of the last sample: {remembered}; keep it where a status is not 0",
-        "next_memory": "what is to be the memory at the next sample",
+        "next_memory": "what is to be the memory at the next sample; another array than memory",
         "gains": f"see the table {what}_gains",
     }
 
