@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json as json_text
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -96,10 +97,10 @@ def simulate(
         raise DataError(f"--rate: {rate:g} given, samples a second above 0 expected")
     as_table = out is not None and Path(out).suffix.lower() in _TABLES
     _check_output(out, as_table=as_table)
-    acts = _controller(controller, 1.0 / rate, bandwidth)
     loaded = with_payload(machine, payload)
     with spinner(f"Simulating {machine.name}"):
         motion = cycle_of(machine, cycle, duration)
+        acts = _controller(controller, motion, 1.0 / rate, bandwidth)
         motion = motion if cycles == 1 else motion.repeated(cycles)
         overloads = _overloads(loaded, motion)
         if overloads and not anyway:
@@ -139,15 +140,16 @@ def simulate(
         raise Exit(_ENDED)
 
 
-def _controller(name: Name, period: float, bandwidth: float | None) -> Controller:
+def _controller(name: Name, motion: Motion, period: float, bandwidth: float | None) -> Controller:
+    """Return a controller; an adaptive one learns what the motion shows."""
     from pteron.controllers import Adaptive, ComputedTorque, FeedForwardPD, PDGravity
 
     made: dict[str, Any] = {
         "computed-torque": ComputedTorque,
         "feed-forward": FeedForwardPD,
         "pd": PDGravity,
-        "adaptive": Adaptive,
-        "adaptive-drives": lambda **given: Adaptive(friction=True, **given),
+        "adaptive": partial(Adaptive, motion=motion),
+        "adaptive-drives": partial(Adaptive, motion=motion, friction=True),
     }
     found: Controller = made[name](period=period, bandwidth=bandwidth)
     return found
