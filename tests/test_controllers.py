@@ -400,3 +400,18 @@ def test_a_law_needs_bodies_or_base_parameters():
     found = pteron.compile(robot, "computed_torque", base=base)(*given, memory, law.gains)
     expected = law(*given, memory)
     assert relative_error(found[0], expected[0]) < 1e-11
+
+
+@pytest.mark.parametrize("name", ["five-bar", "delta-4"])
+def test_a_crank_that_has_gone_round_is_where_it_was(name):
+    robot = pteron.load(name)
+    home, rest = home_pose(robot), np.zeros(robot.freedom)
+    joints = pteron.inverse_kinematics(robot, home)
+    round_ones = np.array([leg.goes_round for leg in robot.legs])
+    assert round_ones.any()
+    law = FeedForwardPD().law(robot)
+    memory = law.memory(home, rest)
+    near, _ = law(home, rest, rest, joints + 0.01, rest, memory)
+    for turns in (-1.0, 2.0):
+        whole = joints + 0.01 + 2.0 * np.pi * turns * round_ones
+        np.testing.assert_allclose(law(home, rest, rest, whole, rest, memory)[0], near, rtol=1e-9)
