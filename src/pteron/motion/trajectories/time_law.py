@@ -340,7 +340,7 @@ def kept_motion(robot: Manipulator, course: InTime, limits: MotionLimits, step: 
     for _ in range(_TRIES):
         count = max(1, int(np.ceil(course.duration / _expect_time("step", step) - 1e-9)))
         course = course.slowed(count * step / course.duration)
-        motion = sampled(course.at, course.duration, step)
+        motion = sampled(course.at, count * step, step)
         fine = motion.at(np.linspace(0.0, motion.duration, _FINER * count + 1))
         rate = most_rate(robot, demand(robot, *fine), limits, fine[0])
         if rate * KEPT >= 1.0:
