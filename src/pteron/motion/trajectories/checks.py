@@ -21,19 +21,11 @@ from pteron.kinematics.singularities import is_singular_everywhere, singular_eve
 from pteron.manipulator import Manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.demand import told_pose
+from pteron.motion.trajectories.least import first_below, least_along
 from pteron.motion.trajectories.path import Path, poses_of
 
 _SAMPLES = 1001
 """Poses of a path that are looked at before its measures are followed between them."""
-
-_VALLEYS = 3
-"""How many of a measure's lowest places are looked into more closely."""
-
-_FINER = 33
-_ZOOMS = 4
-"""Each time the place of a least value is known 16 times as well."""
-
-_HALVINGS = 50
 
 _ROUNDING = 1e-9
 """m, or rad, by which a joint may be beyond its limit: a pose on it is within."""
@@ -148,7 +140,7 @@ def _failed_reach(way: _Way, marks: Array) -> _Failure | None:
         found: Array = np.nan_to_num(numeric(robot, "squared_type_i")(way.poses(at))[0], nan=-1.0)
         return found
 
-    found = _first_below(squares, marks, TYPE_I**2)
+    found = first_below(squares, marks, TYPE_I**2)
     if found is None:
         return None
     at, i, square = found
@@ -188,12 +180,12 @@ def _failed_limit(way: _Way, marks: Array) -> _Failure | None:
         q = numeric(robot, "joint_coordinates")(way.poses(at))[0]
         return np.asarray(np.minimum(q - low, high - q))
 
-    found = _first_below(room, marks, -_ROUNDING)
+    found = first_below(room, marks, -_ROUNDING)
     if found is None:
         return None
     at, i, _ = found
     leg = robot.legs[i]
-    beyond = -float(_least(room, marks, -_ROUNDING)[1][i])
+    beyond = -float(least_along(room, marks, -_ROUNDING)[1][i])
     return _beyond(
         way,
         at,
@@ -210,11 +202,11 @@ def _failed_passive(way: _Way, marks: Array) -> _Failure | None:
     def room(at: Array) -> Array:
         return np.asarray(numeric(robot, "passive_room")(way.poses(at))[1])
 
-    found = _first_below(room, marks, -_ROUNDING)
+    found = first_below(room, marks, -_ROUNDING)
     if found is None:
         return None
     at, i, _ = found
-    places, least = _least(room, marks, -_ROUNDING)
+    places, least = least_along(room, marks, -_ROUNDING)
     shared, *legs = passive_joints(Machine.of(robot), ca.SX(ca.DM(way.pose(float(places[i])))))
     for joint in (*shared, *legs[i]):
         value = float(joint.value)
@@ -248,7 +240,7 @@ def _failed_type_ii(way: _Way, marks: Array) -> _Failure | None:
 
     # Its sign is that of the beginning, as far as the actuators hold the platform.
     side = 1.0 if float(measure(marks[:1])[0]) > 0.0 else -1.0
-    found = _first_below(lambda at: side * measure(at)[:, None], marks, TYPE_II)
+    found = first_below(lambda at: side * measure(at)[:, None], marks, TYPE_II)
     if found is None:
         return None
     at = found[0]
@@ -260,50 +252,3 @@ def _failed_type_ii(way: _Way, marks: Array) -> _Failure | None:
         index=(),
     )
     return _Failure(at, error)
-
-
-def _least(measure: Callable[[Array], Array], marks: Array, enough: float) -> tuple[Array, Array]:
-    """Return where each column of a measure (K, c) is least along a way, and how much: (c,) each.
-
-    Its lowest valleys among the marks are looked into, finer and finer, if it may go below
-    `enough` there: between two marks it changes by no more than twice what it does elsewhere.
-    """
-    values = measure(marks)
-    places, least = marks[values.argmin(axis=0)], values.min(axis=0)
-    for j in range(values.shape[1]):
-        column = values[:, j]
-        if not np.isfinite(column).all() or least[j] - enough > 2.0 * np.abs(np.diff(column)).max():
-            continue
-        padded = np.concatenate([[np.inf], column, [np.inf]])
-        valleys = np.flatnonzero((column <= padded[:-2]) & (column <= padded[2:]))
-        for k in valleys[np.argsort(column[valleys])][:_VALLEYS]:
-            low, high = marks[max(k - 1, 0)], marks[min(k + 1, len(marks) - 1)]
-            for _ in range(_ZOOMS):
-                fine = np.linspace(low, high, _FINER)
-                found = measure(fine)[:, j]
-                best = int(found.argmin())
-                low, high = fine[max(best - 1, 0)], fine[min(best + 1, _FINER - 1)]
-            if found[best] < least[j]:
-                places[j], least[j] = fine[best], found[best]
-    return places, least
-
-
-def _first_below(
-    measure: Callable[[Array], Array], marks: Array, least: float
-) -> tuple[float, int, float] | None:
-    """Return where a measure (K, c) first goes below a value, of which column, and its value."""
-    places, lowest = _least(measure, marks, least)
-    columns = np.flatnonzero(lowest < least)
-    if not len(columns):
-        return None
-    all_marks = np.sort(np.concatenate([marks, places[columns]]))
-    below = measure(all_marks) < least
-    k = int(below.any(axis=1).argmax())
-    i = int(below[k].argmax())
-    low, high = all_marks[max(k - 1, 0)], all_marks[k]
-    if k:
-        for _ in range(_HALVINGS):
-            middle = 0.5 * (low + high)
-            inside = float(measure(np.array([middle]))[0, i]) >= least
-            low, high = (middle, high) if inside else (low, middle)
-    return float(high), i, float(measure(np.array([high]))[0, i])

@@ -14,7 +14,8 @@ from pteron.kinematics.evaluate import checked
 from pteron.manipulator import Manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.cycle import Cycle, moves
-from pteron.motion.trajectories.path import BackPath, CyclePath
+from pteron.motion.trajectories.cycle_path import CyclePath
+from pteron.motion.trajectories.path import BackPath
 from pteron.motion.trajectories.scaling import LEAST_RESERVE, TURN, scaled_to_reach
 from pteron.shapes import PoseLike
 

@@ -9,7 +9,8 @@ from pteron.manipulator import Manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.limits import MotionLimits
 from pteron.motion.trajectories.path import line_path
-from pteron.motion.trajectories.time_law import STEP, Law, along
+from pteron.motion.trajectories.polynomials import Law
+from pteron.motion.trajectories.time_law import STEP, along
 from pteron.shapes import PoseLike
 
 

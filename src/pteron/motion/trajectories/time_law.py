@@ -1,10 +1,8 @@
-"""How a path is gone in time: polynomials from rest to rest, and the shortest that serve."""
+"""Motions along a path: by a polynomial between rests, in a given time or the shortest."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Literal, Protocol, get_args
 
 import numpy as np
 
@@ -13,13 +11,12 @@ from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.checks import check_path
+from pteron.motion.trajectories.course import Course, InTime, Timed
 from pteron.motion.trajectories.demand import demand, most_rate, peaks
 from pteron.motion.trajectories.limits import MotionLimits, limits_of
 from pteron.motion.trajectories.path import Path
+from pteron.motion.trajectories.polynomials import Law, Progress, polynomial
 from pteron.motion.trajectories.tool import Curve
-
-Law = Literal["quintic", "seventh"]
-"""The polynomial of a motion from rest to rest, by its degree."""
 
 STEP = 1e-3
 """Time between the samples of a motion, s."""
@@ -38,130 +35,6 @@ _FINER = 10
 _TRIES = 8
 """How often a motion is slowed until it keeps its limits: once or twice, but for rounding."""
 """How much finer than its samples a motion is checked."""
-
-
-class Progress(Protocol):
-    """How far a motion from rest to rest has come, over one unit of time."""
-
-    def __call__(self, tau: Array, /) -> tuple[Array, Array, Array]:
-        """Return a share of the way in [0, 1] and two derivatives, (T,) each, at tau (T,)."""
-
-
-def polynomial(law: Law) -> Progress:
-    """Return the polynomial from 0 to 1 whose derivatives vanish at both ends.
-
-    Of the fifth degree, 10 t^3 - 15 t^4 + 6 t^5, two of them; of the seventh, 35 t^4 - 84 t^5 +
-    70 t^6 - 20 t^7, three: the jerk begins and ends at zero too.
-
-    Raises
-    ------
-    DataError
-        If there is no such law.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from pteron.motion.trajectories.time_law import polynomial
-    >>> [float(v[0]) for v in polynomial("seventh")(np.array([0.5]))]
-    [0.5, 2.1875, 0.0]
-    """
-    if law not in get_args(Law):
-        raise DataError(f"law: {law!r} is not one of {', '.join(get_args(Law))}")
-    factors = {
-        "quintic": [0.0, 0.0, 0.0, 10.0, -15.0, 6.0],
-        "seventh": [0.0, 0.0, 0.0, 0.0, 35.0, -84.0, 70.0, -20.0],
-    }
-    s = np.polynomial.Polynomial(factors[law])
-    ds, dds = s.deriv(1), s.deriv(2)
-
-    def progress(tau: Array) -> tuple[Array, Array, Array]:
-        t = np.clip(tau, 0.0, 1.0)
-        return s(t), ds(t), dds(t)
-
-    return progress
-
-
-@dataclass(frozen=True)
-class Course:
-    """A path gone in time, from rest to rest to rest.
-
-    Attributes
-    ----------
-    path : Path
-        The way.
-    durations : tuple of float
-        Of each stretch between two rests, s.
-    laws : tuple of Progress
-        How each of them is gone.
-    """
-
-    path: Path
-    durations: tuple[float, ...]
-    laws: tuple[Progress, ...]
-
-    @property
-    def duration(self) -> float:
-        """Of all stretches, s."""
-        return float(sum(self.durations))
-
-    def slowed(self, factor: float) -> Course:
-        """Return the course with all its times longer by a factor."""
-        return Course(self.path, tuple(factor * d for d in self.durations), self.laws)
-
-    def at(self, time: Array) -> Curve:
-        """Return poses, velocities and accelerations, (T, m) each, at times (T,), s."""
-        starts = np.concatenate([[0.0], np.cumsum(self.durations)])
-        k = np.clip(np.searchsorted(starts, time, side="right") - 1, 0, len(self.laws) - 1)
-        s, rate, gain = (np.zeros(len(time)) for _ in range(3))
-        for j, law in enumerate(self.laws):
-            own = k == j
-            begin, end = self.path.rests[j : j + 2]
-            share, first, second = law((time[own] - starts[j]) / self.durations[j])
-            s[own] = begin + (end - begin) * share
-            rate[own] = (end - begin) * first / self.durations[j]
-            gain[own] = (end - begin) * second / self.durations[j] ** 2
-        pose, by_s, bend = self.path.at(s)
-        rate, gain = rate[:, None], gain[:, None]
-        return pose, by_s * rate, bend * rate**2 + by_s * gain
-
-
-@dataclass(frozen=True)
-class Timed:
-    """A curve of poses over one unit of time, gone in so many seconds.
-
-    Attributes
-    ----------
-    curve : callable
-        From tau (T,) in [0, 1] to poses (T, m) and two derivatives by tau.
-    duration : float
-        s.
-    """
-
-    curve: Callable[[Array], Curve]
-    duration: float
-
-    def slowed(self, factor: float) -> Timed:
-        """Return the same with all its times longer by a factor."""
-        return Timed(self.curve, factor * self.duration)
-
-    def at(self, time: Array) -> Curve:
-        """Return poses, velocities and accelerations, (T, m) each, at times (T,), s."""
-        pose, first, second = self.curve(time / self.duration)
-        return pose, first / self.duration, second / self.duration**2
-
-
-class InTime(Protocol):
-    """What moves, and can be slowed: a `Course`, or a curve that is `Timed`."""
-
-    @property
-    def duration(self) -> float:
-        """How long it takes, s."""
-
-    def at(self, time: Array, /) -> Curve:
-        """Return poses, velocities and accelerations, (T, m) each, at times (T,), s."""
-
-    def slowed(self, factor: float, /) -> InTime:
-        """Return the same with all its times longer by a factor."""
 
 
 def shortest(

@@ -25,10 +25,14 @@ from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.checks import check_path
+from pteron.motion.trajectories.course import Course
 from pteron.motion.trajectories.demand import Demand, demand
+from pteron.motion.trajectories.limit_rows import LimitRows, limit_rows
 from pteron.motion.trajectories.limits import MotionLimits, limits_of
 from pteron.motion.trajectories.path import Path
-from pteron.motion.trajectories.time_law import STEP, Course, kept_motion, polynomial, stretch_times
+from pteron.motion.trajectories.polynomials import polynomial
+from pteron.motion.trajectories.profile import Profile
+from pteron.motion.trajectories.time_law import STEP, kept_motion, stretch_times
 
 _GRID = 400
 """Intervals of a stretch."""
@@ -48,9 +52,6 @@ _SLOWER = (1.0, 0.5, 0.25, 0.1)
 
 _FASTEST = 1e6
 """The greatest s'^2, over its mean in the quintic's time."""
-
-_SIDES = 16
-"""Sides of the polygon, inscribed in a circle, within which the tool's acceleration stays."""
 
 _SPREAD = 4.0
 """Samples over which, before and after, a jump of the acceleration is spread."""
@@ -182,14 +183,14 @@ def _fastest(
         pose, first, second = path.at(begin + (end - begin) * share)
         return demand(robot, pose, (end - begin) * first, (end - begin) ** 2 * second)
 
-    rows = _rows(asked_at(grid), limits, unit)
+    rows = limit_rows(asked_at(grid), limits, unit)
     squares = _first(toppra, rows, grid)
     found: list[_Stretch] = []
     room, most = np.ones_like(rows.c), rows.most
     for k in range(_PASSES):
         tighter = rows._replace(c=rows.c + 1.0 - room, most=most)
         squares = _solved(toppra, tighter, grid, squares, _AHEAD[-1])
-        profile = _Profile.of(grid, squares)
+        profile = Profile.of(grid, squares)
         spread = min(_SPREAD * step / unit, _SHARE * profile.duration)
         progress = profile.spread(spread)
         # What the spreading exceeds is taken from the limits there.
@@ -197,7 +198,7 @@ def _fastest(
         share, rate, gain = progress(tau)
         whole = profile.duration + 2.0 * spread
         x, u = (rate / whole) ** 2, gain / whole**2
-        there = _rows(asked_at(share), limits, unit)
+        there = limit_rows(asked_at(share), limits, unit)
         used = there.used(u, x)
         fast = x / there.most
         slower = max(1.0, float(used.max(initial=0.0)) ** 0.5, float(fast.max()) ** 0.5)
@@ -211,7 +212,7 @@ def _fastest(
     return min(found, key=lambda one: one.duration * one.slower)
 
 
-def _first(toppra: Any, rows: _Rows, grid: Array) -> Array:
+def _first(toppra: Any, rows: LimitRows, grid: Array) -> Array:
     """Return x = s'^2 on the grid that viscous friction allows, from that of the quintic on."""
     share, rate, _ = polynomial("quintic")(np.linspace(0.0, 1.0, _LOOK))
     quintic = np.interp(grid, share, rate) ** 2
@@ -245,68 +246,7 @@ def _most_of(near: Array, values: Array) -> Array:
     return np.array([values[a:b].max(axis=0) for a, b in near.T])
 
 
-class _Rows(NamedTuple):
-    """Limits as a u + b x + c + v sqrt(x) <= 1, (K, R) each, and x <= `most` (K,)."""
-
-    a: Array
-    b: Array
-    c: Array
-    v: Array
-    most: Array
-
-    def used(self, u: Array, x: Array) -> Array:
-        """Return the share of each limit that s'' and s'^2, (K,) each, take, (K, R)."""
-        u, x = u[:, None], x[:, None]
-        return np.asarray(self.a * u + self.b * x + self.c + self.v * np.sqrt(x))
-
-
-def _rows(asked: Demand, limits: MotionLimits, unit: float) -> _Rows:
-    """Return what a stretch asks at points of it, its limits taken as 1, times in `unit`."""
-    count = len(asked.first)
-    none = np.zeros((count, 0))
-    a, b, c, v = [none], [none], [none], [none]
-
-    def add(linear: Array, square: Array, constant: Array, root: Array, limit: Array) -> None:
-        has = np.isfinite(limit)
-        for part, values in zip(
-            (a, b, c, v),
-            (linear / unit**2, square / unit**2, constant, root / unit),
-            strict=True,
-        ):
-            part.append((np.broadcast_to(values, linear.shape) / limit)[:, has])
-
-    zero = np.zeros_like(asked.first)
-    moving = np.sign(asked.first)
-    for side in (1.0, -1.0):
-        against = side * moving > 0.0
-        dry = np.where(against, asked.dry[1], asked.dry[0]) * side * moving
-        add(side * asked.first, side * asked.second, zero, zero, limits.acceleration)
-        still = side * asked.still + dry
-        root = side * asked.viscous * asked.first
-        add(side * asked.growth, side * asked.square, still, root, limits.force)
-    speed, bend = asked.tool
-    if math.isfinite(limits.tool_acceleration):
-        # Both lie in a plane: speed along its x, and what is left of the bend along its y.
-        size = np.linalg.norm(speed, axis=-1)
-        way = np.divide(speed, size[:, None], out=np.zeros_like(speed), where=size[:, None] > 0.0)
-        ahead = np.sum(bend * way, axis=-1)
-        aside = np.linalg.norm(bend - ahead[:, None] * way, axis=-1)
-        angles = 2.0 * np.pi * (np.arange(_SIDES) + 0.5) / _SIDES
-        cos, sin = np.cos(angles), np.sin(angles)
-        most = np.full(_SIDES, limits.tool_acceleration * np.cos(np.pi / _SIDES))
-        linear = size[:, None] * cos
-        square = ahead[:, None] * cos + aside[:, None] * sin
-        add(linear, square, np.zeros_like(linear), np.zeros_like(linear), most)
-    with np.errstate(divide="ignore"):
-        rates = np.minimum(
-            (limits.speed / np.abs(asked.first)).min(axis=-1),
-            limits.tool_speed / np.linalg.norm(speed, axis=-1),
-        )
-    found = [np.hstack(part) for part in (a, b, c, v)]
-    return _Rows(found[0], found[1], found[2], found[3], (rates * unit) ** 2)
-
-
-def _solved(toppra: Any, rows: _Rows, grid: Array, before: Array, ahead: float) -> Array:
+def _solved(toppra: Any, rows: LimitRows, grid: Array, before: Array, ahead: float) -> Array:
     """Return x = s'^2 on the grid, by TOPP-RA, given that of the pass before.
 
     With viscous friction it is no more than `ahead` times as large, where the chord ends.
@@ -338,76 +278,6 @@ def _solved(toppra: Any, rows: _Rows, grid: Array, before: Array, ahead: float) 
     if rates is None or not np.isfinite(rates).all():
         raise ModelError("TOPP-RA finds no motion along the path; give other limits")
     return np.asarray(rates, dtype=float) ** 2
-
-
-class _Profile(NamedTuple):
-    """s(t) of constant accelerations between nodes (K,): what TOPP-RA finds."""
-
-    time: Array
-    s: Array
-    rate: Array
-    gain: Array
-    """(K - 1,)"""
-
-    @classmethod
-    def of(cls, grid: Array, squares: Array) -> _Profile:
-        """Take x = s'^2 on a grid; before and after s rests."""
-        rate = np.sqrt(np.maximum(squares, 0.0))
-        spans = 2.0 * np.diff(grid) / (rate[1:] + rate[:-1])
-        time = np.concatenate([[0.0], np.cumsum(spans)])
-        return cls(time, grid, rate, 0.5 * np.diff(squares) / np.diff(grid))
-
-    @property
-    def duration(self) -> float:
-        """From rest to rest, in units."""
-        return float(self.time[-1])
-
-    def spread(self, h: float) -> Callable[[Array], tuple[Array, Array, Array]]:
-        """Return s averaged over h before and after, by a triangle's weights, from rest to rest.
-
-        Its acceleration is continuous, and its jerk too but for steps.
-        """
-        whole = self.duration + 2.0 * h
-
-        def progress(tau: Array) -> tuple[Array, Array, Array]:
-            t = np.clip(whole * tau - h, -h, self.duration + h)
-            s, rate = self._state(t)
-            after, before = self._moments(t, h), self._moments(t, -h)
-            gains, rates, ways = ((a + b) / h**2 for a, b in zip(after, before, strict=True))
-            return s + ways, (rate + rates) * whole, gains * whole**2
-
-        return progress
-
-    def _state(self, t: Array) -> tuple[Array, Array]:
-        """Return s and s' (T,) at times (T,)."""
-        within = np.clip(t, 0.0, self.duration)
-        k = np.clip(np.searchsorted(self.time, within, side="right") - 1, 0, len(self.gain) - 1)
-        d = within - self.time[k]
-        inside = within == t
-        return (
-            self.s[k] + d * (self.rate[k] + d * self.gain[k] / 2.0),
-            np.where(inside, self.rate[k] + d * self.gain[k], 0.0),
-        )
-
-    def _moments(self, t: Array, h: float) -> tuple[Array, Array, Array]:
-        """Return what s'' from t to t + h, h of either sign, adds to s(t + h) and its integrals.
-
-        The integrals of (h - r)^k / k! s''(t + r) over r, k = 1, 2 and 3: small where h is, so that
-        averages are exact to rounding however little they take in.
-        """
-        edges = np.concatenate([[-np.inf], self.time, [np.inf]])
-        gain = np.concatenate([[0.0], self.gain, [0.0]])
-        ahead = int(h > 0.0)
-        k = np.searchsorted(self.time, t, side="right" if ahead else "left")
-        done, sums = np.zeros_like(t), [np.zeros_like(t) for _ in range(3)]
-        while (done != h).any():
-            to = edges[np.clip(k + ahead, 0, len(edges) - 1)] - t
-            to = np.minimum(to, h) if ahead else np.maximum(to, h)
-            u = gain[np.clip(k, 0, len(gain) - 1)]
-            for order, total in enumerate(sums, start=2):
-                total += u * ((h - done) ** order - (h - to) ** order) / math.factorial(order)
-            done, k = to, k + (1 if ahead else -1)
-        return sums[0], sums[1], sums[2]
 
 
 def _toppra() -> Any:

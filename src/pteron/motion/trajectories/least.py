@@ -1,0 +1,67 @@
+"""Where measures of a way are least, between its samples too, and where they first go too low."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from pteron.kernels import Array
+
+_VALLEYS = 3
+"""How many of a measure's lowest places are looked into more closely."""
+
+_FINER = 33
+_ZOOMS = 4
+"""Each time the place of a least value is known 16 times as well."""
+
+_HALVINGS = 50
+
+
+def least_along(
+    measure: Callable[[Array], Array], marks: Array, enough: float
+) -> tuple[Array, Array]:
+    """Return where each column of a measure (K, c) is least along a way, and how much: (c,) each.
+
+    Its lowest valleys among the marks are looked into, finer and finer, if it may go below
+    `enough` there: between two marks it changes by no more than twice what it does elsewhere.
+    """
+    values = measure(marks)
+    places, least = marks[values.argmin(axis=0)], values.min(axis=0)
+    for j in range(values.shape[1]):
+        column = values[:, j]
+        if not np.isfinite(column).all() or least[j] - enough > 2.0 * np.abs(np.diff(column)).max():
+            continue
+        padded = np.concatenate([[np.inf], column, [np.inf]])
+        valleys = np.flatnonzero((column <= padded[:-2]) & (column <= padded[2:]))
+        for k in valleys[np.argsort(column[valleys])][:_VALLEYS]:
+            low, high = marks[max(k - 1, 0)], marks[min(k + 1, len(marks) - 1)]
+            for _ in range(_ZOOMS):
+                fine = np.linspace(low, high, _FINER)
+                found = measure(fine)[:, j]
+                best = int(found.argmin())
+                low, high = fine[max(best - 1, 0)], fine[min(best + 1, _FINER - 1)]
+            if found[best] < least[j]:
+                places[j], least[j] = fine[best], found[best]
+    return places, least
+
+
+def first_below(
+    measure: Callable[[Array], Array], marks: Array, least: float
+) -> tuple[float, int, float] | None:
+    """Return where a measure (K, c) first goes below a value, of which column, and its value."""
+    places, lowest = least_along(measure, marks, least)
+    columns = np.flatnonzero(lowest < least)
+    if not len(columns):
+        return None
+    all_marks = np.sort(np.concatenate([marks, places[columns]]))
+    below = measure(all_marks) < least
+    k = int(below.any(axis=1).argmax())
+    i = int(below[k].argmax())
+    low, high = all_marks[max(k - 1, 0)], all_marks[k]
+    if k:
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            inside = float(measure(np.array([middle]))[0, i]) >= least
+            low, high = (middle, high) if inside else (low, middle)
+    return float(high), i, float(measure(np.array([high]))[0, i])

@@ -1,0 +1,76 @@
+"""The limits of a motion along a path, as what is linear in s'' and s'^2 but for friction."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from pteron.kernels import Array
+from pteron.motion.trajectories.demand import Demand
+from pteron.motion.trajectories.limits import MotionLimits
+
+_SIDES = 16
+"""Sides of the polygon, inscribed in a circle, within which the tool's acceleration stays."""
+
+
+class LimitRows(NamedTuple):
+    """Limits as a u + b x + c + v sqrt(x) <= 1, (K, R) each, and x <= `most` (K,)."""
+
+    a: Array
+    b: Array
+    c: Array
+    v: Array
+    most: Array
+
+    def used(self, u: Array, x: Array) -> Array:
+        """Return the share of each limit that s'' and s'^2, (K,) each, take, (K, R)."""
+        u, x = u[:, None], x[:, None]
+        return np.asarray(self.a * u + self.b * x + self.c + self.v * np.sqrt(x))
+
+
+def limit_rows(asked: Demand, limits: MotionLimits, unit: float) -> LimitRows:
+    """Return what a stretch asks at points of it, its limits taken as 1, times in `unit`."""
+    count = len(asked.first)
+    none = np.zeros((count, 0))
+    a, b, c, v = [none], [none], [none], [none]
+
+    def add(linear: Array, square: Array, constant: Array, root: Array, limit: Array) -> None:
+        has = np.isfinite(limit)
+        for part, values in zip(
+            (a, b, c, v),
+            (linear / unit**2, square / unit**2, constant, root / unit),
+            strict=True,
+        ):
+            part.append((np.broadcast_to(values, linear.shape) / limit)[:, has])
+
+    zero = np.zeros_like(asked.first)
+    moving = np.sign(asked.first)
+    for side in (1.0, -1.0):
+        against = side * moving > 0.0
+        dry = np.where(against, asked.dry[1], asked.dry[0]) * side * moving
+        add(side * asked.first, side * asked.second, zero, zero, limits.acceleration)
+        still = side * asked.still + dry
+        root = side * asked.viscous * asked.first
+        add(side * asked.growth, side * asked.square, still, root, limits.force)
+    speed, bend = asked.tool
+    if math.isfinite(limits.tool_acceleration):
+        # Both lie in a plane: speed along its x, and what is left of the bend along its y.
+        size = np.linalg.norm(speed, axis=-1)
+        way = np.divide(speed, size[:, None], out=np.zeros_like(speed), where=size[:, None] > 0.0)
+        ahead = np.sum(bend * way, axis=-1)
+        aside = np.linalg.norm(bend - ahead[:, None] * way, axis=-1)
+        angles = 2.0 * np.pi * (np.arange(_SIDES) + 0.5) / _SIDES
+        cos, sin = np.cos(angles), np.sin(angles)
+        most = np.full(_SIDES, limits.tool_acceleration * np.cos(np.pi / _SIDES))
+        linear = size[:, None] * cos
+        square = ahead[:, None] * cos + aside[:, None] * sin
+        add(linear, square, np.zeros_like(linear), np.zeros_like(linear), most)
+    with np.errstate(divide="ignore"):
+        rates = np.minimum(
+            (limits.speed / np.abs(asked.first)).min(axis=-1),
+            limits.tool_speed / np.linalg.norm(speed, axis=-1),
+        )
+    found = [np.hstack(part) for part in (a, b, c, v)]
+    return LimitRows(found[0], found[1], found[2], found[3], (rates * unit) ** 2)

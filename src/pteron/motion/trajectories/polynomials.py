@@ -1,0 +1,54 @@
+"""Polynomials in time from rest to rest."""
+
+from __future__ import annotations
+
+from typing import Literal, Protocol, get_args
+
+import numpy as np
+
+from pteron.errors import DataError
+from pteron.kernels import Array
+
+Law = Literal["quintic", "seventh"]
+"""The polynomial of a motion from rest to rest, by its degree."""
+
+
+class Progress(Protocol):
+    """How far a motion from rest to rest has come, over one unit of time."""
+
+    def __call__(self, tau: Array, /) -> tuple[Array, Array, Array]:
+        """Return a share of the way in [0, 1] and two derivatives, (T,) each, at tau (T,)."""
+
+
+def polynomial(law: Law) -> Progress:
+    """Return the polynomial from 0 to 1 whose derivatives vanish at both ends.
+
+    Of the fifth degree, 10 t^3 - 15 t^4 + 6 t^5, two of them; of the seventh, 35 t^4 - 84 t^5 +
+    70 t^6 - 20 t^7, three: the jerk begins and ends at zero too.
+
+    Raises
+    ------
+    DataError
+        If there is no such law.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from pteron.motion.trajectories.polynomials import polynomial
+    >>> [float(v[0]) for v in polynomial("seventh")(np.array([0.5]))]
+    [0.5, 2.1875, 0.0]
+    """
+    if law not in get_args(Law):
+        raise DataError(f"law: {law!r} is not one of {', '.join(get_args(Law))}")
+    factors = {
+        "quintic": [0.0, 0.0, 0.0, 10.0, -15.0, 6.0],
+        "seventh": [0.0, 0.0, 0.0, 0.0, 35.0, -84.0, 70.0, -20.0],
+    }
+    s = np.polynomial.Polynomial(factors[law])
+    ds, dds = s.deriv(1), s.deriv(2)
+
+    def progress(tau: Array) -> tuple[Array, Array, Array]:
+        t = np.clip(tau, 0.0, 1.0)
+        return s(t), ds(t), dds(t)
+
+    return progress

@@ -1,0 +1,81 @@
+"""How a stretch is gone with piecewise constant acceleration, and with that averaged."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from pteron.kernels import Array
+
+
+class Profile(NamedTuple):
+    """s(t) of constant accelerations between nodes (K,): what TOPP-RA finds."""
+
+    time: Array
+    s: Array
+    rate: Array
+    gain: Array
+    """(K - 1,)"""
+
+    @classmethod
+    def of(cls, grid: Array, squares: Array) -> Profile:
+        """Take x = s'^2 on a grid; before and after s rests."""
+        rate = np.sqrt(np.maximum(squares, 0.0))
+        spans = 2.0 * np.diff(grid) / (rate[1:] + rate[:-1])
+        time = np.concatenate([[0.0], np.cumsum(spans)])
+        return cls(time, grid, rate, 0.5 * np.diff(squares) / np.diff(grid))
+
+    @property
+    def duration(self) -> float:
+        """From rest to rest, in units."""
+        return float(self.time[-1])
+
+    def spread(self, h: float) -> Callable[[Array], tuple[Array, Array, Array]]:
+        """Return s averaged over h before and after, by a triangle's weights, from rest to rest.
+
+        Its acceleration is continuous, and its jerk too but for steps.
+        """
+        whole = self.duration + 2.0 * h
+
+        def progress(tau: Array) -> tuple[Array, Array, Array]:
+            t = np.clip(whole * tau - h, -h, self.duration + h)
+            s, rate = self._state(t)
+            after, before = self._moments(t, h), self._moments(t, -h)
+            gains, rates, ways = ((a + b) / h**2 for a, b in zip(after, before, strict=True))
+            return s + ways, (rate + rates) * whole, gains * whole**2
+
+        return progress
+
+    def _state(self, t: Array) -> tuple[Array, Array]:
+        """Return s and s' (T,) at times (T,)."""
+        within = np.clip(t, 0.0, self.duration)
+        k = np.clip(np.searchsorted(self.time, within, side="right") - 1, 0, len(self.gain) - 1)
+        d = within - self.time[k]
+        inside = within == t
+        return (
+            self.s[k] + d * (self.rate[k] + d * self.gain[k] / 2.0),
+            np.where(inside, self.rate[k] + d * self.gain[k], 0.0),
+        )
+
+    def _moments(self, t: Array, h: float) -> tuple[Array, Array, Array]:
+        """Return what s'' from t to t + h, h of either sign, adds to s(t + h) and its integrals.
+
+        The integrals of (h - r)^k / k! s''(t + r) over r, k = 1, 2 and 3: small where h is, so that
+        averages are exact to rounding however little they take in.
+        """
+        edges = np.concatenate([[-np.inf], self.time, [np.inf]])
+        gain = np.concatenate([[0.0], self.gain, [0.0]])
+        ahead = int(h > 0.0)
+        k = np.searchsorted(self.time, t, side="right" if ahead else "left")
+        done, sums = np.zeros_like(t), [np.zeros_like(t) for _ in range(3)]
+        while (done != h).any():
+            to = edges[np.clip(k + ahead, 0, len(edges) - 1)] - t
+            to = np.minimum(to, h) if ahead else np.maximum(to, h)
+            u = gain[np.clip(k, 0, len(gain) - 1)]
+            for order, total in enumerate(sums, start=2):
+                total += u * ((h - done) ** order - (h - to) ** order) / math.factorial(order)
+            done, k = to, k + (1 if ahead else -1)
+        return sums[0], sums[1], sums[2]
