@@ -18,6 +18,8 @@ from pteron.manipulator import Manipulator
 from pteron.motion.trajectories.limits import MotionLimits
 from pteron.motion.trajectories.tool import tool_motion
 
+_ROUNDING = 1e-12
+
 _WORDS = {
     "speed": ("moves at up to", "{unit}/s"),
     "acceleration": ("accelerates by up to", "{unit}/s^2"),
@@ -79,8 +81,16 @@ def demand(robot: Manipulator, pose: Array, first: Array, second: Array) -> Dema
     )
 
 
-def most_rate(robot: Manipulator, asked: Demand, limits: MotionLimits, poses: Array) -> float:
-    """Return the largest constant p' at which a curve keeps the limits; inf without limits.
+def most_rate(
+    robot: Manipulator,
+    asked: Demand,
+    limits: MotionLimits,
+    poses: Array,
+    most: float = np.inf,
+) -> float:
+    """Return the largest constant p', `most` at most, at which a curve keeps the limits.
+
+    Infinite where it meets none.
 
     Raises
     ------
@@ -94,19 +104,32 @@ def most_rate(robot: Manipulator, asked: Demand, limits: MotionLimits, poses: Ar
             limits.tool_speed / np.linalg.norm(asked.tool[0], axis=-1),
             np.sqrt(limits.tool_acceleration / np.linalg.norm(asked.tool[1], axis=-1)),
         ]
-        least = min(float(np.nanmin(rate, initial=np.inf)) for rate in rates)
+        least = min(float(np.nanmin(rate, initial=most)) for rate in rates)
+    limited = np.isfinite(limits.force)
+    if not limited.any():
+        return least
+    # What each side of a drive's force has left: square p'^2 + root p' <= room.
+    rows = []
     for dry in asked.dry:
         still = asked.still + dry * np.sign(asked.first)
         _expect_strength(robot, still, limits, poses)
         for side in (1.0, -1.0):
-            # The smallest root of b u^2 + v u = room.
-            room = limits.force - side * still
-            b, v = side * asked.square, side * asked.viscous * asked.first
-            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-                below = v + np.sqrt(v**2 + 4.0 * b * room)
-                root = np.where(below > 0.0, 2.0 * room / below, np.inf)
-            root = np.where(np.isfinite(room), root, np.inf)
-            least = min(least, float(np.nanmin(root, initial=np.inf)))
+            parts = limits.force - side * still, side * asked.square
+            rows.append([*parts, side * asked.viscous * asked.first])
+    room, square, root = (
+        np.concatenate([row[k][:, limited].ravel() for row in rows]) for k in range(3)
+    )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        below = root + np.sqrt(root**2 + 4.0 * square * room)
+        edge = np.where(below > 0.0, 2.0 * room / below, np.inf)
+    if not np.isfinite(least):
+        least = float(np.nanmin(edge[(square > 0.0) | (square == 0.0)], initial=np.inf))
+    # Friction may pass a limit between two speeds where what is slower, and faster, keeps it.
+    while np.isfinite(least):
+        over = square * least**2 + root * least > room + _ROUNDING * np.abs(room)
+        if not over.any():
+            break
+        least = min(float(edge[over].min()), least * (1.0 - _ROUNDING))
     return least
 
 

@@ -94,8 +94,9 @@ def in_time(
         return shortest(robot, curve, limits, step)
     course = Timed(curve, _expect_time("duration", duration))
     fine = course.at(np.linspace(0.0, duration, _LOOK))
-    rate = most_rate(robot, demand(robot, *fine), limits, fine[0])
-    if rate * KEPT < 1.0:
+    asked = demand(robot, *fine)
+    if most_rate(robot, asked, limits, fine[0], 1.0) * KEPT < 1.0:
+        rate = most_rate(robot, asked, limits, fine[0])
         raise too_short(robot, course, limits, duration / rate)
     return sampled(course.at, duration, step)
 
@@ -171,9 +172,12 @@ def along(
     if duration is None:
         return kept_motion(robot, course, kept, step)
     _expect_time("duration", duration)
-    if kept.any and duration < course.duration / KEPT:
-        raise too_short(robot, course.slowed(duration / course.duration), kept, course.duration)
-    return sampled(course.slowed(duration / course.duration).at, duration, step)
+    given = course.slowed(duration / course.duration)
+    if kept.any:
+        fine = given.at(np.linspace(0.0, duration, _LOOK))
+        if most_rate(robot, demand(robot, *fine), kept, fine[0], 1.0) * KEPT < 1.0:
+            raise too_short(robot, given, kept, course.duration)
+    return sampled(given.at, duration, step)
 
 
 def stretch_times(
@@ -215,7 +219,7 @@ def kept_motion(robot: Manipulator, course: InTime, limits: MotionLimits, step: 
         course = course.slowed(count * step / course.duration)
         motion = sampled(course.at, count * step, step)
         fine = motion.at(np.linspace(0.0, motion.duration, _FINER * count + 1))
-        rate = most_rate(robot, demand(robot, *fine), limits, fine[0])
+        rate = most_rate(robot, demand(robot, *fine), limits, fine[0], 1.0)
         if rate * KEPT >= 1.0:
             return motion
         course = course.slowed(1.0 / rate)

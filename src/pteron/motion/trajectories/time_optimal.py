@@ -59,8 +59,8 @@ _SPREAD = 4.0
 _SHARE = 0.02
 """The same, as the share of a stretch's time that it is at most."""
 
-_LITTLE = 1e-4
-"""By what a motion may exceed its limits, to be slowed as a whole."""
+_SPARE = 1e-3
+"""Share of a limit that is left for what is between samples."""
 
 _LOOK = 2001
 """Points of a stretch at which its limits are held against it."""
@@ -185,9 +185,10 @@ def _fastest(
 
     rows = limit_rows(asked_at(grid), limits, unit)
     squares = _first(toppra, rows, grid)
+    bound = Profile.of(grid, squares).duration
     found: list[_Stretch] = []
-    room, most = np.ones_like(rows.c), rows.most
-    for k in range(_PASSES):
+    room, most = np.full_like(rows.c, 1.0 - _SPARE), rows.most
+    for _ in range(_PASSES):
         tighter = rows._replace(c=rows.c + 1.0 - room, most=most)
         squares = _solved(toppra, tighter, grid, squares, _AHEAD[-1])
         profile = Profile.of(grid, squares)
@@ -202,9 +203,8 @@ def _fastest(
         used = there.used(u, x)
         fast = x / there.most
         slower = max(1.0, float(used.max(initial=0.0)) ** 0.5, float(fast.max()) ** 0.5)
-        bound = profile.duration if k == 0 else found[0].bound / unit
         found.append(_Stretch(progress, whole * unit, bound * unit, slower))
-        if slower < 1.0 + _LITTLE:
+        if slower <= 1.0:
             break
         near = _near(tau * whole - spread, profile.time, 2.0 * spread)
         room = np.minimum(room, room - 1.05 * np.maximum(_most_of(near, used - 1.0), 0.0))
