@@ -125,11 +125,14 @@ def most_rate(
     if not np.isfinite(least):
         least = float(np.nanmin(edge[(square > 0.0) | (square == 0.0)], initial=np.inf))
     # Friction may pass a limit between two speeds where what is slower, and faster, keeps it.
+    step = _ROUNDING
     while np.isfinite(least):
         over = square * least**2 + root * least > room + _ROUNDING * np.abs(room)
         if not over.any():
             break
-        least = min(float(edge[over].min()), least * (1.0 - _ROUNDING))
+        # An edge may be off by rounding: it is left by a step, the longer the more were taken.
+        least = min(float(edge[over].min()), least * (1.0 - step))
+        step = min(2.0 * step, 0.1)
     return least
 
 
