@@ -9,7 +9,7 @@ from typing import ClassVar
 from pteron.controllers.gain_numbers import PerJoint, above_zero, per_joint, period_of
 from pteron.controllers.law import Law
 from pteron.kernels import Array
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, expect_manipulator
 from pteron.reduction import BaseParameters
 
 
@@ -91,4 +91,5 @@ class Controller(ABC):
         DataError
             If there are not as many gains as joints.
         """
+        expect_manipulator(model)
         return Law(self.what, model, self.gains(model), self.base(model))
