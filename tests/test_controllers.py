@@ -313,6 +313,7 @@ def test_wrong_numbers_are_refused_in_one_line():
         "damping: 0 given for joint 2, a number above 0 expected": {"damping": [1, 0, 1]},
         "bandwidth: 'fast' given, a number above 0 expected": {"bandwidth": "fast"},
         "bandwidth: nan given, a number above 0 expected": {"bandwidth": np.nan},
+        "bandwidth: [1] given for joint 1, a number above 0": {"bandwidth": [[1], [2, 3]]},
         "proportional: missing, but derivative is given": {"derivative": 3.0},
         "derivative: -1.0 given for joint 1": {"proportional": 1.0, "derivative": [-1.0]},
         "period: 1000 s given, at most 0.1 s expected; is it a rate in Hz? then give 0.001": {
@@ -329,6 +330,15 @@ def test_wrong_numbers_are_refused_in_one_line():
         Adaptive(uncertainty=-1)
     with pytest.raises(DataError, match="bandwidth: 2 numbers given, but delta has 3 joints"):
         ComputedTorque(bandwidth=[1.0, 2.0]).law(MACHINES["delta"])
+    with pytest.raises(ModelError, match="robot: 'delta' given, a Manipulator expected"):
+        ComputedTorque().law("delta")
+    motion = cycle("delta")
+    for wrong, message in (
+        (cycle("five-bar"), r"motion: poses of shape \(\d+, 2\) given, \(T, 3\) expected"),
+        (replace(motion, velocity=0 * motion.velocity), "motion: the platform rests all along"),
+    ):
+        with pytest.raises(DataError, match=message):
+            Adaptive(motion=wrong).law(MACHINES["delta"])
     law = ComputedTorque().law(MACHINES["delta"])
     with pytest.raises(DataError, match="computed_torque: it estimates nothing; use Adaptive"):
         law.estimates(law.memory(np.zeros(3), np.zeros(3)))

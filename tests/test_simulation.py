@@ -7,9 +7,18 @@ import numpy as np
 import pytest
 
 import pteron
+from pteron.controllers import FeedForwardPD
 from pteron.kernels import numeric
 from pteron.kernels.steps import Steps
-from pteron.motion import Motion, Sensors, advance, longest_step, pick_and_place, simulate
+from pteron.motion import (
+    Motion,
+    Sensors,
+    advance,
+    check_motion,
+    longest_step,
+    pick_and_place,
+    simulate,
+)
 from pteron.motion.simulation.sensors import Encoders
 from pteron.workspace import home_pose
 
@@ -152,6 +161,37 @@ def test_forces_are_limited_delayed_and_held():
     assert np.abs(early - late).min() > 1e-4
 
 
+def test_a_delay_beyond_the_end_holds_the_first_command():
+    robot = driven(pteron.load("tripteron"))
+    home, rest = home_pose(robot), np.zeros(3)
+    ramp = Held(lambda count: np.full(3, count))
+    found = simulate(robot, None, ramp, start=(home, rest), duration=0.01, delay=1e9)
+    np.testing.assert_array_equal(found.forces, np.zeros((11, 3)))
+
+
+def test_encoders_count_on_where_a_cranks_angle_jumps():
+    """The same machine, its angles counted from elsewhere: they pass half a turn on the way."""
+    robot, home = pteron.load("five-bar"), np.array([0.0, 0.138])
+    robot = replace(robot, legs=tuple(replace(leg, limits=None) for leg in robot.legs))
+    motion = pick_and_place(robot, home)
+    # The angle at home is then half a turn less a milliradian.
+    angles = pteron.inverse_kinematics(robot, home) - np.pi + 1e-3
+    legs = []
+    for leg, angle in zip(robot.legs, angles, strict=True):
+        zero = np.array(leg.zero_direction)
+        across = np.cross(leg.direction, zero)
+        zero = np.cos(angle) * zero + np.sin(angle) * across
+        legs.append(replace(leg, zero_direction=tuple(zero)))
+    found = [
+        simulate(machine, motion, FeedForwardPD(), sensors=Sensors(1e-5))
+        for machine in (robot, replace(robot, legs=tuple(legs)))
+    ]
+    assert np.abs(np.diff(found[1].joints, axis=0)).max() > 6.0
+    assert found[1].stopped is None
+    for run in found:
+        assert np.abs(run.error).max() < 1.2e-4
+
+
 def test_what_a_controller_is_told():
     robot = driven(pteron.load("delta"))
     home, rest = home_pose(robot), np.zeros(3)
@@ -268,10 +308,43 @@ def test_mistakes_are_told_in_a_line():
         "in the order of time": {"start": start, "duration": 1.0, "payload": [(1, 2), (0, 1)]},
         r"wrench: shape \(2,\) given": {"start": start, "duration": 1.0, "wrench": [1.0, 2.0]},
         "at least a sample": {"start": start, "duration": 1e-5},
+        "at most 10000000 are served": {"start": start, "duration": 1e12},
+        "duration: '1' given, a number above 0": {"start": start, "duration": "1"},
+        "delay: None given, 0 s or more": {"start": start, "duration": 1.0, "delay": None},
+        "start: 1 parts given, a pose and a velocity": {"start": (rest,), "duration": 1.0},
+        r"start, pose: shape \(2, 3\) given": {"start": (np.zeros((2, 3)), rest), "duration": 1.0},
+        r"wrench: \[nan, .* finite numbers": {
+            "start": start,
+            "duration": 1.0,
+            "wrench": 3 * [np.nan],
+        },
+        r"forces\(0\): .* finite": {
+            "start": start,
+            "duration": 1.0,
+            "forces": lambda _: rest / 0.0,
+        },
+        "payload: -2.0 given": {"start": start, "duration": 1.0, "payload": [(0, 1), (9, -2)]},
+        "pairs of time and mass": {"start": start, "duration": 1.0, "payload": [(np.nan, 1)]},
+        "payload: not an array": {"start": start, "duration": 1.0, "payload": [(0, 1), (1,)]},
+        "encoder: shape": {"start": start, "duration": 1.0, "sensors": Sensors((1e-6, 1e-6))},
+        "controller: .* given, one such as": {"motion": motion, "controller": Held},
+        "times expected that ascend": {
+            "motion": replace(motion, time=motion.time[::-1]),
+            "controller": Held(lambda _: rest),
+        },
+        r"motion.pose\[0, 0\]: nan given": {
+            "motion": replace(motion, pose=np.nan * motion.pose),
+            "controller": Held(lambda _: rest),
+        },
     }
     for message, given in told.items():
-        with pytest.raises(pteron.DataError, match=message):
+        with np.errstate(all="ignore"), pytest.raises(pteron.DataError, match=message):
             simulate(robot, **given)
+    for wrong, message in ((2.5, "count: 2.5 given"), (-1, "count: -1 given")):
+        with pytest.raises(pteron.DataError, match=message):
+            advance(robot, rest, rest, rest, 1e-4, wrong)
+    with pytest.raises(pteron.DataError, match="step: nan given"):
+        advance(robot, rest, rest, rest, np.nan, 1)
     with pytest.raises(pteron.UnreachablePose):
         simulate(robot, start=([5.0, 0.0, 0.0], rest), duration=1.0)
     with pytest.raises(pteron.DataError, match="encoder: -1"):
@@ -298,3 +371,21 @@ def test_a_motion_between_its_samples():
     np.testing.assert_allclose(twice.at(1.25)[0], cycle.at(0.25)[0], atol=1e-12)
     with pytest.raises(pteron.DataError, match="cannot be repeated"):
         motion.repeated(2)
+    with pytest.raises(pteron.DataError, match="a whole number of 1 or more"):
+        cycle.repeated(1.5)
+
+
+def test_a_motion_of_lists_and_of_wrong_shapes():
+    rest = [[0, 0, 0], [0, 0, 0]]
+    assert Motion([0, 1], rest, rest, rest).at(0.5)[0].tolist() == [0.0, 0.0, 0.0]
+    alone = Motion([2], rest[:1], rest[:1], rest[:1])
+    assert alone.at([1.0, 2.0])[1].tolist() == rest
+    for wrong, message in (
+        (([], [], [], []), r"motion.time: shape \(0,\) given"),
+        (([0, 1], [0, 0], rest, rest), r"motion.pose: shape \(2,\) given, \(2, m\)"),
+        (([0, 1], rest, rest[:1], rest), r"motion.velocity: shape \(1, 3\) given, \(2, 3\)"),
+    ):
+        with pytest.raises(pteron.DataError, match=message):
+            Motion(*wrong)
+    with pytest.raises(pteron.DataError, match="times expected that ascend"):
+        check_motion(pteron.load("tripteron"), alone)

@@ -323,7 +323,10 @@ def test_the_table_has_a_row_a_leg_and_no_number_that_is_not_one():
     ("change", "words"),
     [
         ({"time": np.zeros(201)}, "ascend"),
-        ({"pose": np.zeros((201, 3))}, "motion.pose: shape (201, 3) given, (201, 2) expected"),
+        (
+            dict.fromkeys(("pose", "velocity", "acceleration"), np.zeros((201, 3))),
+            "motion.pose: shape (201, 3) given, (201, 2) expected",
+        ),
         ({"velocity": np.zeros((7, 2))}, "motion.velocity: shape (7, 2)"),
     ],
 )

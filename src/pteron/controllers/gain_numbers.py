@@ -21,11 +21,14 @@ def above_zero(name: str, value: PerJoint | None) -> float | tuple[float, ...] |
     """Return a number or some, or refuse one that is not above zero."""
     if value is None:
         return None
-    if np.ndim(value) == 0:
-        return _number(f"{name}: {{}} given, a number above 0 expected", value)
+    several: object = value
+    if isinstance(several, np.ndarray):
+        several = several.tolist()
+    if not isinstance(several, list | tuple):
+        return _number(f"{name}: {{}} given, a number above 0 expected", several)
     return tuple(
         _number(f"{name}: {{}} given for joint {i}, a number above 0 expected", one)
-        for i, one in enumerate(np.asarray(value).tolist(), start=1)
+        for i, one in enumerate(several, start=1)
     )
 
 

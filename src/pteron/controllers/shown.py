@@ -13,6 +13,7 @@ from pteron.controllers.joint_masses import joint_masses, light_poses
 from pteron.dynamics import drive_forces
 from pteron.equations.control import ADAPTED
 from pteron.equations.drives import drive_numbers
+from pteron.errors import DataError
 from pteron.kernels import Array, numeric
 from pteron.kinematics import joint_accelerations, joint_rates
 from pteron.manipulator import Manipulator, parameter_data, parameters
@@ -66,7 +67,7 @@ class Shown:
         for places in body_places(parameter_data(self.robot)).values():
             if "I" in places:
                 sizes[[places[k] for k in ("mgx", "mgy") if k in places]] = np.sqrt(
-                    values[places["m"]] * values[places["I"]]
+                    np.abs(values[places["m"]] * values[places["I"]])
                 )
         forces = drive_forces(self.robot, *self.motion)
         force = _DRIVES * np.sqrt((forces**2).mean(axis=0))
@@ -118,6 +119,13 @@ def shown(robot: Manipulator, motion: Moves | None) -> Shown:
     """Return what a motion shows of a machine, or the typical one."""
     if motion is None:
         return typical(robot)
+    if np.shape(motion.pose)[-1:] != (robot.freedom,):
+        raise DataError(
+            f"motion: poses of shape {np.shape(motion.pose)} given, (T, {robot.freedom}) expected: "
+            f"{' '.join(robot.coordinates)} of {robot.name}"
+        )
+    if not (np.any(motion.velocity) and np.any(motion.acceleration)):
+        raise DataError("motion: the platform rests all along, which shows nothing; give a motion")
     thinned = slice(None, None, max(len(motion.pose) // _SAMPLES, 1))
     rng, unit = np.random.default_rng(0), _units(robot)
     parts = []

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pteron.errors import DataError
-from pteron.kernels import Array
+from pteron.errors import DataError, shown
+from pteron.kernels import Array, as_array
 
 
 @dataclass(frozen=True)
@@ -21,12 +21,43 @@ class Motion:
         s, ascending.
     pose, velocity, acceleration : array, shape (T, m)
         m, rad and s.
+
+    Raises
+    ------
+    DataError
+        If there is no sample, or not a row of pose, velocity and acceleration for each time.
     """
 
     time: Array
     pose: Array
     velocity: Array
     acceleration: Array
+
+    def __post_init__(self) -> None:
+        for field in fields(Motion):
+            name = field.name
+            object.__setattr__(self, name, as_array(getattr(self, name), f"motion.{name}", ()))
+        if self.time.ndim != 1 or not len(self.time):
+            raise DataError(f"motion.time: shape {self.time.shape} given, (T,) expected, T above 0")
+        rows = (len(self.time), self.pose.shape[-1] if self.pose.ndim == 2 else "m")
+        for field in fields(Motion)[1:]:
+            shape = getattr(self, field.name).shape
+            if shape != rows:
+                raise DataError(
+                    f"motion.{field.name}: shape {shape} given, ({rows[0]}, {rows[1]}) expected: a "
+                    "row for each time"
+                )
+
+    def expect_ascending(self) -> None:
+        """Refuse a motion whose times are fewer than two, or do not ascend.
+
+        Raises
+        ------
+        DataError
+            If they are not.
+        """
+        if len(self.time) < 2 or not (np.diff(self.time) > 0.0).all():
+            raise DataError("motion.time: two or more times expected that ascend, in seconds")
 
     @property
     def duration(self) -> float:
@@ -60,6 +91,9 @@ class Motion:
         True
         """
         asked = np.asarray(time, dtype=float)
+        if len(self.time) == 1:
+            rest = np.zeros((*asked.shape, self.pose.shape[-1]))
+            return rest + self.pose[0], rest, rest.copy()
         within = np.clip(asked, self.time[0], self.time[-1])
         k = np.clip(np.searchsorted(self.time, within, side="right") - 1, 0, len(self.time) - 2)
         span = (self.time[k + 1] - self.time[k])[..., None]
@@ -86,8 +120,9 @@ class Motion:
         DataError
             If the motion does not end at the pose, and with the velocity, of its beginning.
         """
-        if count < 1:
-            raise DataError(f"count: {count} given, 1 or more expected")
+        whole: object = count
+        if not isinstance(whole, int | np.integer) or count < 1:
+            raise DataError(f"count: {shown(whole)} given, a whole number of 1 or more expected")
         ends = [np.abs(part[-1] - part[0]).max() for part in (self.pose, self.velocity)]
         if max(ends) > 1e-9:
             raise DataError(

@@ -117,6 +117,7 @@ def run(
     # A command acts `whole` samples and a part of one after it was asked for; before there are any,
     # the first one holds the machine.
     period = float(time[1] - time[0])
+    delay = min(delay, period * len(time))  # later than the end is never
     whole = int(delay / period + _WHOLE)
     late = max(delay - whole * period, 0.0)
     late = late if late > _WHOLE * period else 0.0

@@ -10,8 +10,8 @@ from scipy.integrate import DOP853  # type: ignore[import-untyped]
 
 from pteron.dynamics import mass_matrix
 from pteron.equations.drives import Drives, drive_numbers
-from pteron.errors import DataError, PteronError
-from pteron.kernels import Array, numeric
+from pteron.errors import DataError, PteronError, shown
+from pteron.kernels import Array, as_array, numeric
 from pteron.kernels.steps import steps
 from pteron.kinematics import jacobian
 from pteron.manipulator import Manipulator
@@ -64,6 +64,11 @@ def advance(
     status : array of bool, shape (...)
         Whether all steps were made: not where a leg is out of reach or singular (type I).
 
+    Raises
+    ------
+    DataError
+        If shapes do not fit, a step is not a time, or count is not a whole number of 0 or more.
+
     Examples
     --------
     >>> import numpy as np, pteron
@@ -73,7 +78,11 @@ def advance(
     >>> bool(status), bool(np.allclose(velocity, [0.0, 0.0, -0.0981], atol=0.1))
     (True, True)
     """
-    span = np.array([step, count], dtype=float)
+    span = as_array([step, count], "step, count", (2,))
+    if not np.isfinite(span[0]):
+        raise DataError(f"step: {shown(step)} given, a time in s expected")
+    if not span[1] >= 0.0 or span[1] % 1.0:
+        raise DataError(f"count: {shown(count)} given, a whole number of 0 or more expected")
     given = [pose, velocity, forces, *([] if wrench is None else [wrench])]
     found = steps(robot, wrench=wrench is not None)(*given, span)
     return found[0], found[1], found[2] == count
@@ -94,6 +103,9 @@ def longest_step(robot: Manipulator, poses: PoseLike) -> float:
     decay = np.linalg.eigvals(np.linalg.solve(mass, rows.mT @ (damping[:, None] * rows)))
     return _STABLE / float(np.abs(decay).max())
 
+
+_FINEST = 100.0 * float(np.finfo(float).eps)
+"""The smallest relative error of a step that SciPy serves."""
 
 _LEAST = 1e-9
 """Share of a span in which a method of adaptive steps that makes such short ones goes nowhere."""
@@ -140,7 +152,7 @@ class Plant:
             state,
             self.time + span,
             first_step=span,  # its own choice goes on forever where the machine cannot be
-            rtol=self._tolerance,
+            rtol=max(self._tolerance, _FINEST),
             atol=1e-3 * self._tolerance,
         )
         while solver.status == "running":

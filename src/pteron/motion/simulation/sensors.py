@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pteron.errors import DataError
-from pteron.kernels import Array
+from pteron.kernels import Array, as_array
 from pteron.shapes import PerJoint
 
 
@@ -30,22 +30,42 @@ class Sensors:
     cutoff: float | None = None
 
     def __post_init__(self) -> None:
-        steps = np.asarray(self.encoder, dtype=float)
+        steps = as_array(self.encoder, "encoder", ())
         if not (np.isfinite(steps).all() and (steps >= 0.0).all()):
             raise DataError(f"encoder: {self.encoder} given, steps of 0 or more expected")
-        if self.cutoff is not None and not (np.isfinite(self.cutoff) and self.cutoff > 0.0):
+        cutoff = 1.0 if self.cutoff is None else as_array(self.cutoff, "cutoff", ())
+        if np.ndim(cutoff) or not (np.isfinite(cutoff) and cutoff > 0.0):
             raise DataError(f"cutoff: {self.cutoff} given, a frequency above 0 Hz expected")
 
 
 class Encoders:
-    """The encoders at work: what they told last is what rates are made of."""
+    """The encoders at work: what they told last is what rates are made of.
 
-    def __init__(self, sensors: Sensors, period: float, joints: PerJoint, rates: PerJoint) -> None:
-        self._steps = np.broadcast_to(np.asarray(sensors.encoder, dtype=float), joints.shape)
+    They count on where the angle of a crank that may go all the way round jumps by a turn: that of
+    such a one, `round_ones` (n,), is followed by the shorter way.
+    """
+
+    def __init__(
+        self,
+        sensors: Sensors,
+        period: float,
+        joints: PerJoint,
+        rates: PerJoint,
+        round_ones: Array | None = None,
+    ) -> None:
+        steps = np.asarray(sensors.encoder, dtype=float)
+        if steps.shape not in ((), joints.shape):
+            raise DataError(
+                f"encoder: shape {steps.shape} given, one step or {len(joints)} expected, one for "
+                "each joint"
+            )
+        self._steps = np.broadcast_to(steps, joints.shape)
         self._period = period
         self._share = 1.0
         if sensors.cutoff is not None:
             self._share = -float(np.expm1(-2.0 * np.pi * sensors.cutoff * period))
+        self._round_ones = np.zeros(joints.shape) if round_ones is None else round_ones
+        self._turns, self._joints = np.zeros(joints.shape), joints
         self._last = self._rounded(joints - period * rates)
         self._rates = np.array(rates)
 
@@ -53,10 +73,13 @@ class Encoders:
         """Return coordinates and rates (n,) as the controller is told them, of the true ones."""
         if not self._steps.any():
             return joints, rates
-        told = self._rounded(joints)
+        jumps = np.round((joints - self._joints) / (2.0 * np.pi))
+        self._turns = self._turns - self._round_ones * jumps
+        self._joints, gone = joints, 2.0 * np.pi * self._turns
+        told = self._rounded(joints + gone)
         self._rates = self._rates + self._share * ((told - self._last) / self._period - self._rates)
         self._last = told
-        return told, np.where(self._steps > 0.0, self._rates, rates)
+        return told - gone, np.where(self._steps > 0.0, self._rates, rates)
 
     def _rounded(self, joints: ArrayLike) -> Array:
         steps = np.where(self._steps > 0.0, self._steps, 1.0)

@@ -8,11 +8,11 @@ from typing import Protocol, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pteron.errors import DataError
+from pteron.errors import DataError, shown
 from pteron.kernels import Array, as_array
 from pteron.kinematics import inverse_kinematics, joint_rates
 from pteron.kinematics.evaluate import checked
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, expect_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.payload import with_payload
 from pteron.motion.simulation.loop import Controlled, Given, Law, Loads, Source, run
@@ -29,6 +29,9 @@ PERIOD = 1e-3
 
 _POSES = 64
 """Poses of a motion at which the step that friction allows is asked for."""
+
+_MOST = 10_000_000
+"""Samples that a simulation may have."""
 
 _STATE = ("start, pose", "start, velocity")
 
@@ -129,32 +132,36 @@ def simulate(
     >>> falling.stopped is None, bool(falling.velocity[-1, 2] < -0.9)
     (True, True)
     """
+    expect_manipulator(robot)
+    if controller is not None:
+        _expect_controller(controller)
+    if model is not None:
+        expect_manipulator(model)
     if controller is not None and forces is not None:
         raise DataError("controller and forces given; give one of them")
     if motion is not None and controller is None:
         raise DataError("motion given, but no controller that follows it")
     period = period if controller is None else controller.period
     _check(period=period, step=step, tolerance=tolerance)
-    if not (np.isfinite(delay) and delay >= 0.0):
-        raise DataError(f"delay: {delay} given, 0 s or more expected")
+    if not _is_number(delay) or delay < 0.0:
+        raise DataError(f"delay: {shown(delay)} given, 0 s or more expected")
     if method not in get_args(Method):
         raise DataError(f'method: {method!r} given, "rk4" or "dop853" expected')
 
     reference = _reference(robot, motion, start, duration, period)
     pose, velocity = reference.pose[0], reference.velocity[0]
     if start is not None:
-        pose, velocity = (
-            checked(robot, part, name) for part, name in zip(start, _STATE, strict=True)
-        )
+        pose, velocity = _state(robot, start)
     joints, rates = inverse_kinematics(robot, pose), joint_rates(robot, pose, velocity).actuated
     masses = _masses(payload, reference.time)
     loaded = {mass: with_payload(robot, mass) for mass in dict.fromkeys(masses.tolist())}
+    round_ones = np.array([float(leg.goes_round) for leg in robot.legs])
+    encoders = Encoders(sensors or Sensors(), period, joints, rates, round_ones)
 
     if controller is None:
         source: Source = Given(_of_time(forces, robot.freedom, "forces"), reference.time)
     else:
         believed = model or (loaded[masses[0]] if len(loaded) == 1 else robot)
-        encoders = Encoders(sensors or Sensors(), period, joints, rates)
         source = Controlled(controller.law(believed), encoders, reference, pose, velocity)
     about = np.vstack([pose, reference.pose[:: max(1, len(reference.time) // _POSES)]])
     plant = Plant(pose, velocity, method, allowed_step(robot, about, step), tolerance)
@@ -164,10 +171,33 @@ def simulate(
     )
 
 
+def _expect_controller(controller: object) -> None:
+    period = getattr(controller, "period", None)
+    if isinstance(controller, type) or not isinstance(period, float | int):
+        raise DataError(
+            f"controller: {shown(controller)} given, one such as ComputedTorque() expected"
+        )
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float | np.number) and bool(np.isfinite(value))
+
+
 def _check(**positive: float) -> None:
     for name, value in positive.items():
-        if not (np.isfinite(value) and value > 0.0):
-            raise DataError(f"{name}: {value} given, a number above 0 expected")
+        if not _is_number(value) or value <= 0.0:
+            raise DataError(f"{name}: {shown(value)} given, a number above 0 expected")
+
+
+def _state(robot: Manipulator, start: tuple[PoseLike, PoseLike]) -> tuple[Array, Array]:
+    """Return a pose and a velocity, (m,) each."""
+    if len(start) != len(_STATE):
+        raise DataError(f"start: {len(start)} parts given, a pose and a velocity expected")
+    pose, velocity = (checked(robot, v, name) for v, name in zip(start, _STATE, strict=True))
+    for part, name in zip((pose, velocity), _STATE, strict=True):
+        if part.ndim != 1:
+            raise DataError(f"{name}: shape {part.shape} given, ({robot.freedom},) expected")
+    return pose, velocity
 
 
 def _reference(
@@ -178,6 +208,8 @@ def _reference(
     period: float,
 ) -> Motion:
     """Return what the machine is to do, at the samples: the motion, or rest where it starts."""
+    if motion is not None:
+        motion.expect_ascending()
     if duration is None:
         if motion is None:
             raise DataError("duration: not given, nor a motion that has one; give it in s")
@@ -185,22 +217,33 @@ def _reference(
     _check(duration=duration)
     if duration < period:
         raise DataError(f"duration: {duration:g} s given, at least a sample of {period:g} s")
+    if duration > _MOST * period:
+        raise DataError(
+            f"duration: {duration:g} s given, {duration / period:.3g} samples of {period:g} s; at "
+            f"most {_MOST} are served"
+        )
     time: Array = period * np.arange(round(duration / period) + 1.0)
     if motion is not None:
-        return Motion(time, *motion.at(motion.time[0] + time))
+        names = ("motion.pose", "motion.velocity", "motion.acceleration")
+        parts = zip(motion.at(motion.time[0] + time), names, strict=True)
+        return Motion(time, *(checked(robot, part, name) for part, name in parts))
     if start is None:
         raise DataError("start: not given, nor a motion to start on; give a pose and a velocity")
     rest = np.zeros((len(time), robot.freedom))
-    return Motion(time, rest + checked(robot, start[0], _STATE[0]), rest, rest)
+    return Motion(time, rest + _state(robot, start)[0], rest, rest)
 
 
 def _masses(payload: float | Sequence[tuple[float, float]], time: Array) -> Array:
     """Return what is carried at each sample, kg."""
-    if np.ndim(payload) == 0:
-        return np.full(len(time), payload, dtype=float)
-    given = np.asarray(payload, dtype=float)
-    if given.ndim != 2 or given.shape[1:] != (2,) or (np.diff(given[:, 0]) < 0.0).any():
+    given = as_array(payload, "payload", ())
+    if given.ndim == 0:
+        return np.full(len(time), given)
+    pairs = given.ndim == 2 and given.shape[1:] == (2,) and bool(np.isfinite(given[:, 0]).all())
+    if not pairs or (np.diff(given[:, 0]) < 0.0).any():
         raise DataError("payload: a mass, or pairs of time and mass in the order of time, expected")
+    if not (given[:, 1] >= 0.0).all():
+        wrong = given[~(given[:, 1] >= 0.0), 1][0]
+        raise DataError(f"payload: {wrong} given, a mass of 0 kg or more expected")
     k = np.searchsorted(given[:, 0], time + 1e-9, side="right")
     masses: Array = np.append(0.0, given[:, 1])[k]
     return masses
@@ -210,7 +253,16 @@ def _of_time(
     given: ArrayLike | Callable[[float], ArrayLike] | None, size: int, name: str
 ) -> Callable[[float], Array]:
     """Return what gives (size,) numbers at a time: what was given, or zeros."""
+
+    def numbers(value: ArrayLike, told: str) -> Array:
+        found = as_array(value, told, (size,))
+        if found.ndim != 1:
+            raise DataError(f"{told}: shape {found.shape} given, ({size},) expected")
+        if not np.isfinite(found).all():
+            raise DataError(f"{told}: {shown(found.tolist())} given, finite numbers expected")
+        return found
+
     if callable(given):
-        return lambda now: as_array(given(now), f"{name}({now:g})", (size,))
-    held = np.zeros(size) if given is None else as_array(given, name, (size,))
+        return lambda now: numbers(given(now), f"{name}({now:g})")
+    held = np.zeros(size) if given is None else numbers(given, name)
     return lambda _: held

@@ -122,9 +122,7 @@ def _check(robot: Manipulator, motion: Motion, dwell: float) -> None:
                 f"motion.{name}: shape {getattr(motion, name).shape} given, {expected} expected: a "
                 f"row for each time, and {' '.join(robot.coordinates)} of {robot.name}"
             )
-    steps = np.diff(motion.time)
-    if len(motion.time) < 2 or not (np.isfinite(motion.time).all() and (steps > 0.0).all()):
-        raise DataError("motion.time: two or more times expected that ascend, in seconds")
+    motion.expect_ascending()
     if not (np.isfinite(dwell) and dwell >= 0.0):
         raise DataError(f"dwell: {dwell} given, 0 s or more expected")
     speeds = np.abs(motion.velocity)

@@ -69,7 +69,8 @@ def check_motion(robot: Manipulator, motion: Motion) -> None:
     Raises
     ------
     DataError
-        If the motion has another number of coordinates than the machine.
+        If the motion has another number of coordinates than the machine, or its times do not
+        ascend.
     UnreachablePose, SingularPose
         As `check_path`.
     """
@@ -77,6 +78,12 @@ def check_motion(robot: Manipulator, motion: Motion) -> None:
         raise DataError(
             f"motion: poses of {motion.pose.shape[-1]} numbers given, {robot.freedom} expected: "
             f"{' '.join(robot.coordinates)}"
+        )
+    motion.expect_ascending()
+    if not np.isfinite(motion.pose).all():
+        k = int(np.argmax(~np.isfinite(motion.pose).all(axis=-1)))
+        raise DataError(
+            f"motion.pose: {motion.pose[k].tolist()} in row {k}, finite numbers expected"
         )
     even = np.linspace(float(motion.time[0]), float(motion.time[-1]), _SAMPLES)
     marks = np.unique(np.concatenate([motion.time, even]))
