@@ -232,11 +232,27 @@ def test_options_that_cannot_be_are_one_line(options, words):
         ({"spread": np.nan}, "spread: nan given"),
         ({"render_mode": "human"}, "render_mode: 'human' given"),
         ({"robot": "five-barr"}, "five-barr"),
+        ({"motion": "cycle.csv"}, "motion: 'cycle.csv' given, a Motion expected"),
     ],
 )
 def test_arguments_that_cannot_be_are_one_line(given, words):
     with pytest.raises(pteron.PteronError, match=words.replace(".", r"\.")):
         PteronEnv(**{"robot": CATALOG["five-bar"], **given})
+
+
+@pytest.mark.parametrize(
+    ("action", "words"),
+    [
+        ([0.5], r"action: shape \(1,\) given, \(2,\) expected"),
+        ([np.nan, 0.0], "action: not finite numbers given"),
+        (["a", "b"], "action: not an array of real numbers"),
+    ],
+)
+def test_actions_that_cannot_be_are_one_line(action, words):
+    env = env_of("five-bar").unwrapped
+    env.reset(seed=1)
+    with pytest.raises(pteron.DataError, match=words):
+        env.step(action)
 
 
 def test_a_motion_that_cannot_be_followed_is_refused():

@@ -67,6 +67,37 @@ def test_a_payload_that_overloads_the_drives_is_refused(weak):
     assert data["drives"][2]["peak_force"] == 36.0
 
 
+def test_units_of_a_cycle_and_a_payload_are_doubted(tmp_path):
+    time = np.linspace(0.0, 1.0, 11)
+    poses = {"x": 0.0, "y": 0.0, "z": -0.02, "phi": 12.0 * np.sin(time)}
+    path = tmp_path / "degrees.csv"
+    pl.DataFrame(
+        {"t": time, **{key: value + 0.0 * time for key, value in poses.items()}}
+    ).write_csv(path)
+    refused = run("quadrupteron", "--cycle", path, code=2)
+    assert f"; {path}: phi up to 10.0977: are these degrees? rad are expected" in refused.stderr
+    heavy = run("tripteron", "--payload", 500, "--delay", "-1", code=2)
+    assert "Warning: a payload of 500 kg" in heavy.stderr
+
+
+def test_a_table_on_a_narrow_screen_keeps_its_numbers(monkeypatch):
+    monkeypatch.setattr("pteron.cli.simulate.is_terminal", lambda: True)
+    monkeypatch.setenv("COLUMNS", "60")
+    lines = run("delta", "--duration", 2).stdout.splitlines()
+    assert max(map(len, lines)) <= 60
+    cells = lines[-2].split()
+    assert cells[0] == "3"
+    assert [cell for cell in cells if not cell[0].isdigit()] == [
+        "N",
+        "m",
+        "N",
+        "m",
+        "rad/s",
+        "W",
+        "-",
+    ]
+
+
 @pytest.mark.parametrize(
     ("given", "told"),
     [

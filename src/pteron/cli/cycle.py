@@ -14,7 +14,7 @@ from pteron.cli.arguments import (
     parsed_list,
     parsed_numbers,
 )
-from pteron.cli.given_cycle import replayed, standard_cycle, told_doubts
+from pteron.cli.given_cycle import loaded, replayed, standard_cycle, told_doubts
 from pteron.cli.motion_table import motion_frame, peaks_table
 from pteron.cli.screen import note, plain, show, show_json, spinner
 from pteron.errors import DataError
@@ -144,9 +144,9 @@ def cycle(
     the joints (theta1 of cranks), and force1 ... (torque1) of the drives: pteron forces --table
     reads it. --speed, --acceleration, --force and --jerk take one number, or one for each joint.
     """
-    from pteron.motion import limits_of, with_payload
+    from pteron.motion import limits_of
 
-    machine = with_payload(load_robot(robot, elbows), payload)
+    machine = loaded(load_robot(robot, elbows), payload)
     if not 0.0 < rate < float("inf"):
         raise DataError(f"--rate: {rate} given, samples a second above 0 expected")
     if out is not None:

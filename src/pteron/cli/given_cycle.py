@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from pteron.cli.arguments import option
 from pteron.cli.screen import note
-from pteron.errors import DataError
+from pteron.errors import DataError, PteronError, SingularPose, UnreachablePose
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -29,6 +29,9 @@ _LEAST = 0.2
 
 _SLOW = 0.5
 """s between samples that is unlikely."""
+
+_HEAVY = 20.0
+"""How many times the machine's moving mass a payload may be before its unit is doubted."""
 
 _UNLIKE = 3.0
 """How many times as far a motion may go by its poses as by its velocities, or the inverse."""
@@ -71,15 +74,37 @@ def replayed(robot: Manipulator, file: str, start: PoseLike | None = None) -> Mo
     from pteron.motion import replay
     from pteron.tables import read_table
     from pteron.workspace import home_pose
+    from pteron.workspace.doubts import value_doubts
 
     rows = read_table(file)
     _check_rates(robot, rows)
     names = [n for n in (*robot.coordinates, *robot.joint_names) if n in rows.columns]
-    motion = replay(robot, rows, start=home_pose(robot) if start is None else start)
-    told_doubts(robot, names, rows.numbers(names), file)
+    values = rows.numbers(names)
+    try:
+        motion = replay(robot, rows, start=home_pose(robot) if start is None else start)
+    except (UnreachablePose, SingularPose) as error:
+        unlikely = "; ".join(value_doubts(robot, names, values))
+        if not unlikely or (isinstance(error, UnreachablePose) and error.millimetres):
+            raise
+        raise PteronError(f"{error}; {file}: {unlikely}") from None
+    told_doubts(robot, names, values, file)
     if float(np.median(np.diff(motion.time))) >= _SLOW:
         note(f"Note: {file}: t in steps of {motion.time[1]:g}: are these ms? s are expected")
     return motion
+
+
+def loaded(robot: Manipulator, payload: float) -> Manipulator:
+    """Return a machine with a payload, kg; what is unlikely in it is told."""
+    from pteron.motion import with_payload
+
+    bodies = [body for leg in robot.legs for body in leg.bodies.values()]
+    moving = sum(body.values[0] for body in (*bodies, robot.platform.joined))
+    if payload > _HEAVY * moving:
+        note(
+            f"Warning: a payload of {payload:g} kg, and the machine moves {moving:.3g} kg of its "
+            "own: is it in grams?"
+        )
+    return with_payload(robot, payload)
 
 
 def told_doubts(

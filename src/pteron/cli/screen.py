@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.markup import escape
+from rich.measure import Measurement
 from rich.table import Table
 from typer import echo
 
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
 _PIECE = 1 << 16
+
+_ANY_WIDTH = 10_000
+"""More columns than any screen has."""
 
 
 def is_terminal() -> bool:
@@ -51,8 +55,19 @@ def show(*things: str | Table) -> None:
     """Print texts, with Rich's markup, and tables on standard output."""
     console = Console(highlight=False, emoji=False)
     for thing in things:
+        if isinstance(thing, Table):
+            _fit(thing, console)
         # A terminal cuts text into lines; whoever reads a pipe wants it as it is.
         console.print(thing, soft_wrap=isinstance(thing, str) and not is_terminal())
+
+
+def _fit(made: Table, console: Console) -> None:
+    """Break the headings of a table at their blanks if it is wider than the screen."""
+    wide = console.options.update(max_width=_ANY_WIDTH)
+    if Measurement.get(console, wide, made).maximum <= console.width:
+        return
+    for column in made.columns:
+        column.header = str(column.header).replace(" ", "\n")
 
 
 def write(text: str) -> None:

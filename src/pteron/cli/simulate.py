@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from typer import Exit
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
-from pteron.cli.given_cycle import CYCLE, STANDARD, cycle_of
+from pteron.cli.given_cycle import CYCLE, STANDARD, cycle_of, loaded
 from pteron.cli.screen import is_terminal, note, plain, show, show_json, spinner, table, write
 from pteron.errors import DataError
 
@@ -88,7 +88,7 @@ def simulate(
     the machine does not come to the end; why is said.
     """
     machine = load_robot(robot, elbows)
-    from pteron.motion import Sensors, with_payload
+    from pteron.motion import Sensors
     from pteron.motion import simulate as simulated
 
     if cycles < 1:
@@ -97,12 +97,12 @@ def simulate(
         raise DataError(f"--rate: {rate:g} given, samples a second above 0 expected")
     as_table = out is not None and Path(out).suffix.lower() in _TABLES
     _check_output(out, as_table=as_table)
-    loaded = with_payload(machine, payload)
+    carrying = loaded(machine, payload)
     with spinner(f"Simulating {machine.name}"):
         motion = cycle_of(machine, cycle, duration)
         acts = _controller(controller, motion, 1.0 / rate, bandwidth)
         motion = motion if cycles == 1 else motion.repeated(cycles)
-        overloads = _overloads(loaded, motion)
+        overloads = _overloads(carrying, motion)
         if overloads and not anyway:
             raise DataError(
                 f"{'; '.join(overloads)}; give a smaller payload or a longer --duration, or see "
@@ -131,11 +131,10 @@ def simulate(
         show_json(data)
     elif is_terminal():
         _show(found, data)
-        show(*(f"Written: {plain(file)}" for file in data.get("files", ())))
     elif out is None:
         write(found.table().write_csv())
-    else:
-        note(f"Wrote {', '.join(data['files'])}")
+    if not json:
+        show(*(f"Written: {plain(file)}" for file in data.get("files", ())))
     if found.stopped:
         raise Exit(_ENDED)
 

@@ -10,22 +10,18 @@ import rich.table
 from typer import Exit
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
-from pteron.cli.given_cycle import CYCLE, STANDARD, cycle_of
+from pteron.cli.given_cycle import CYCLE, STANDARD, cycle_of, loaded
 from pteron.cli.screen import is_terminal, note, plain, show, show_json, spinner, table, write
 
 if TYPE_CHECKING:
     import polars as pl
 
-    from pteron.manipulator import Manipulator
-    from pteron.motion import Fit, Motor, Sizing
+    from pteron.motion import Fit, Sizing
 
 _OVERLOADED = 1
 _TABLES = (".csv", ".parquet")
 _BEST = 3
 """Motors a joint that a person is shown."""
-
-_HEAVY = 20.0
-"""How many times the machine's moving mass a payload may be before its unit is doubted."""
 
 
 def size(
@@ -65,16 +61,19 @@ def size(
     is 1 if the drives cannot do the cycle, or no motor of the list serves a joint.
     """
     machine = load_robot(robot, elbows)
-    from pteron.motion import choose, read_motors, with_payload
+    from pteron.motion import choose, read_motors
     from pteron.motion import size as sized
 
     chosen = () if motors is None else read_motors(motors)
     as_table = out is not None and Path(out).suffix.lower() in _TABLES
     _check_output(out, as_table=as_table)
-    _doubt(machine, chosen, payload)
+    for motor in chosen:
+        for text in motor.doubts:
+            note(f"Warning: {text}")
+    carrying = loaded(machine, payload)
     with spinner(f"Sizing the drives of {machine.name}"):
         motion = cycle_of(machine, cycle, duration)
-        found = sized(with_payload(machine, payload), motion, dwell=dwell)
+        found = sized(carrying, motion, dwell=dwell)
         fits = choose(found, chosen, margin=margin)
     for text in found.overloads:
         note(f"Warning: {text}")
@@ -89,11 +88,10 @@ def size(
         show_json(data)
     elif is_terminal():
         _show(found, fits, cycle, payload)
-        show(*(f"Written: {plain(file)}" for file in data.get("files", ())))
     elif out is None:
         write((_fits_table(found, fits) if fits else found.table()).write_csv())
-    else:
-        note(f"Wrote {', '.join(data['files'])}")
+    if not json:
+        show(*(f"Written: {plain(file)}" for file in data.get("files", ())))
     if found.overloads or unserved:
         raise Exit(_OVERLOADED)
 
@@ -110,20 +108,6 @@ def _check_output(out: str | None, *, as_table: bool) -> None:
         from pteron.report.write import checked_folder
 
         checked_folder(out)
-
-
-def _doubt(machine: Manipulator, motors: tuple[Motor, ...], payload: float) -> None:
-    """Tell what is possible but unlikely in the motors and the payload."""
-    for motor in motors:
-        for text in motor.doubts:
-            note(f"Warning: {text}")
-    bodies = [body for leg in machine.legs for body in leg.bodies.values()]
-    moving = sum(body.values[0] for body in (*bodies, machine.platform.joined))
-    if payload > _HEAVY * moving:
-        note(
-            f"Warning: a payload of {payload:g} kg, and the machine moves {moving:.3g} kg of its "
-            "own: is it in grams?"
-        )
 
 
 def _unserved(found: Sizing, fits: tuple[Fit, ...]) -> list[str]:

@@ -60,6 +60,11 @@ def world_of(
     given = (home, _forces(machine, home), period, period / count, count)
     world = World(machine, *given, spread, tolerance, least, motion)
     if motion is not None:
+        if not isinstance(motion, Motion):
+            raise DataError(
+                f"motion: {motion!r} given, a Motion expected, such as pteron.motion.replay makes "
+                "of a table"
+            )
         motion.repeated(2)
         low = world.reserve_of(motion.pose) <= ENDS
         if low.any():

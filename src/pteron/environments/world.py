@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pteron.environments.state import Bools, State
 from pteron.errors import DataError
-from pteron.kernels import Array, numeric
+from pteron.kernels import Array, as_array, numeric
 from pteron.manipulator import Manipulator
 from pteron.motion import Motion, advance
 from pteron.workspace import reserve
@@ -173,8 +173,13 @@ class World:
 
         reward = 1 - tanh(2 distance / spread) - 0.01 mean(action^2), at most 1; -1 where the
         episode ends.
+
+        Raises
+        ------
+        DataError
+            If the action has another shape, or is not of finite numbers.
         """
-        action = np.clip(np.asarray(action, dtype=float), -1.0, 1.0)
+        action = np.clip(self._action(action, state.pose.shape), -1.0, 1.0)
         pose, velocity, going = advance(
             self.robot, state.pose, state.velocity, action * self.forces, self.step, self.count
         )
@@ -186,6 +191,15 @@ class World:
         ended = ~np.asarray(going, dtype=bool) | (self.reserve_of(pose) < ENDS)
         ended = ended | (np.abs(velocity) > rates).any(axis=-1)
         return new, distance, np.where(ended, -1.0, reward), ended
+
+    def _action(self, action: Any, shape: tuple[int, ...]) -> Array:
+        """Return an action of machines (..., n) after a check; a machine has as many drives."""
+        given = as_array(action, "action", ())
+        if given.shape != shape:
+            raise DataError(f"action: shape {given.shape} given, {shape} expected")
+        if not np.isfinite(given).all():
+            raise DataError("action: not finite numbers given; numbers from -1 to 1 expected")
+        return given
 
     def why(self, pose: Array, velocity: Array) -> str:
         """Return why the episode of a machine ended, in its last state (m,)."""

@@ -111,8 +111,9 @@ def _halved(
 
 
 def _ended(joints: Array, k: int) -> UnreachablePose:
+    told = ", ".join(f"{value:.6g}" for value in joints[k])
     return UnreachablePose(
-        f"joints[{k}]: the platform does not follow to the joint coordinates {joints[k].tolist()}: "
+        f"joints[{k}]: the platform does not follow to the joint coordinates [{told}]: "
         "its assembly mode ends before, or the way from the sample before is too long",
         leg=0,
         shortfall=float("nan"),

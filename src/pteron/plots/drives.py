@@ -86,7 +86,7 @@ def force_speed_figure(
             spot(axes, rms[0][i], rms[1][i], LEG_COLORS[i], PAPER, 6.5, zorder=5)
         if k == 0:
             for x, y in ((-1.0, 1.0), (1.0, -1.0)):
-                remark(axes, "brakes", 0.8 * x * sizes[0], 0.78 * y * sizes[1], MUTED)
+                remark(axes, "brakes", 0.87 * x * sizes[0], (0.915 * y - 0.025) * sizes[1], MUTED)
     legend(figure, min(len(units), 4))
     return figure
 

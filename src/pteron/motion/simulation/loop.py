@@ -30,7 +30,7 @@ _WHOLE = 1e-9
 
 
 class Law(Protocol):
-    """What a controller does for one machine; `pteron.motion.controllers` has some."""
+    """What a controller does for one machine; `pteron.controllers` has some."""
 
     def memory(self, pose: Array, velocity: Array) -> Array:
         """Return what it knows at the start, (K,)."""

@@ -82,7 +82,7 @@ def simulate(
     motion : Motion, optional
         What it is to follow; without it a controller holds the pose at the start.
     controller : Controller, optional
-        Of `pteron.motion.controllers`, or anything like them.
+        Of `pteron.controllers`, or anything like them.
     start : (pose, velocity), optional
         Where the platform begins, (m,) each; by default on the motion.
     duration : float, optional
