@@ -571,3 +571,17 @@ def test_the_command_refuses_in_one_line(line, words):
     assert (code, told) == (2, "")
     assert words in error
     assert error.splitlines()[-1].startswith("Error: ")
+
+
+def test_an_angle_that_jumps_by_a_turn_in_a_table_goes_on():
+    t = np.linspace(0.0, 1.0, 201)
+    phi = np.pi - 0.1 + 0.2 * t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
+    rest = {"t": t, "x": 0.0 * t, "y": 0.0 * t, "z": 0.0 * t}
+    wrapped = np.mod(phi + np.pi, 2.0 * np.pi) - np.pi
+    assert np.abs(np.diff(wrapped)).max() > 6.0
+    one, other = (
+        replay(MACHINES["quadrupteron"], Table("wave", pl.DataFrame(rest | {"phi": values})))
+        for values in (phi, wrapped)
+    )
+    for part, most in (("pose", 1e-14), ("velocity", 1e-11), ("acceleration", 1e-7)):
+        np.testing.assert_allclose(getattr(one, part), getattr(other, part), rtol=0.0, atol=most)

@@ -71,12 +71,14 @@ def replay(
     m = robot.freedom
     if has.issuperset(whole):
         time, values = _read(rows, whole)
+        values[:, :m] = _turned_on(robot, values[:, :m])
         motion = Motion(time, values[:, :m], values[:, m : 2 * m], values[:, 2 * m :])
     elif has.issuperset(joints) and not has.issuperset(poses):
         time, values = _read(rows, joints)
         motion = _followed(robot, time, values, start)
     else:
         time, values = _read(rows, poses)
+        values = _turned_on(robot, values)
         motion = Motion(time, *_spline(time, values))
     check_motion(robot, motion)
     return motion
@@ -96,6 +98,12 @@ def _read(rows: Table, columns: Sequence[str]) -> tuple[Array, Array]:
             "ascend"
         )
     return time - time[0], values[:, 1:]
+
+
+def _turned_on(robot: Manipulator, poses: Array) -> Array:
+    """Return poses (T, m) whose angle goes on where, in a table, it jumps by a turn."""
+    angles = [name == "phi" for name in robot.coordinates]
+    return np.where(angles, np.unwrap(poses, axis=0), poses)
 
 
 def _spline(time: Array, values: Array) -> tuple[Array, Array, Array]:
