@@ -48,6 +48,16 @@ def test_a_folder_has_table_numbers_and_pictures(weak, tmp_path):
     assert again["duration"] == pytest.approx(2.0)
 
 
+def test_a_step_is_no_longer_than_a_sample():
+    assert json.loads(run("tripteron", "--step", 0.01, "--json").stdout)["step"] == 1e-3
+
+
+def test_the_model_has_the_machines_working_mode():
+    given = ["quadrupteron", "--elbows=+-++", "--duration", 2, "--json"]
+    own, other = (json.loads(run(*given, *more).stdout) for more in ([], ["--model", given[0]]))
+    assert own["tracking"] == other["tracking"]
+
+
 def test_a_pipe_gets_the_table(weak):
     text = run(weak, "--duration", 2, "--rate", 500, "--controller", "pd").stdout
     assert text.startswith("t,x,y,z,dx,dy,dz,ddx,ddy,ddz,xref,yref,zref,rho1,rho2,rho3,drho1")
@@ -110,6 +120,8 @@ def test_a_table_on_a_narrow_screen_keeps_its_numbers(monkeypatch):
         (["--step", "0"], "step: 0"),
         (["--encoder", "-1e-6"], "encoder: -1e-06"),
         (["--controller", "best"], "best"),
+        (["--model", "delta"], "--model delta: its joints are theta1 theta2 theta3, and of"),
+        (["--model", "quadrupteron"], "--model quadrupteron: its pose is x y z phi, and of"),
     ],
 )
 def test_mistakes_are_told_in_a_line(given, told, tmp_path, monkeypatch):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pteron.cli.arguments import (
@@ -12,16 +11,14 @@ from pteron.cli.arguments import (
     load_robot,
     option,
     parsed_list,
-    parsed_numbers,
 )
-from pteron.cli.given_cycle import loaded, replayed, standard_cycle, told_doubts
+from pteron.cli.given_cycle import loaded, replayed
 from pteron.cli.motion_table import motion_frame, peaks_table
 from pteron.cli.screen import note, plain, show, show_json, spinner
+from pteron.cli.ways import given_pose, joint_motion, line_motion, standard_motion
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pteron.manipulator import Manipulator
     from pteron.motion import Motion, MotionLimits
 
@@ -186,16 +183,16 @@ def cycle(
             if file is None:
                 raise DataError("no motion given; give --table FILE")
             motion = replayed(
-                machine, file, None if from_ is None else _pose(machine, from_, "--from")
+                machine, file, None if from_ is None else given_pose(machine, from_, "--from")
             )
         elif way == "joints":
-            motion = _jerk_limited(machine, from_, to, parsed_list(jerk, "--jerk"), limits, step)
+            motion = joint_motion(machine, from_, to, parsed_list(jerk, "--jerk"), limits, step)
         elif way == "line":
-            motion = _line(
+            motion = line_motion(
                 machine, from_, to, via, corner, back, limits, duration, optimal, law, step
             )
         else:
-            motion = _adept(machine, around, scale, limits, duration, optimal, step)
+            motion = standard_motion(machine, around, scale, limits, duration, optimal, step)
     _deliver(machine, way, motion, limits, payload, out=out, as_json=json)
 
 
@@ -207,102 +204,6 @@ def _expect_fitting(way: str, given: dict[str, tuple[Any, tuple[str, ...]]]) -> 
                 f"--{name}: has no use in a motion of kind {way}; leave it out, or give --kind "
                 f"{' or '.join(kinds)}"
             )
-
-
-def _pose(machine: Manipulator, text: str | None, name: str) -> NDArray[Any]:
-    import numpy as np
-
-    from pteron.workspace import home_pose
-
-    if text is None:
-        return home_pose(machine)
-    values = np.array(parsed_numbers([text], machine.coordinates, name))
-    told_doubts(machine, machine.coordinates, values, name)
-    return values
-
-
-def _adept(
-    machine: Manipulator,
-    around: str | None,
-    scale: float | None,
-    limits: MotionLimits,
-    duration: float | None,
-    optimal: bool,
-    step: float,
-) -> Motion:
-    from dataclasses import replace
-
-    from pteron.motion import check_path, cycle_path, time_optimal
-    from pteron.motion.trajectories.pick_and_place import PEAK_ACCELERATION
-    from pteron.motion.trajectories.time_law import in_time
-
-    middle = _pose(machine, around, "--around")
-    found = standard_cycle(machine, middle, scale)
-    path = cycle_path(found)
-    if optimal:
-        return time_optimal(machine, path, limits, step=step)
-    check_path(machine, path)
-    if duration is None and not limits.any:
-        note(
-            "Note: no limits given, and the machine's drives have none: the tool's acceleration is "
-            f"{PEAK_ACCELERATION:g} m/s^2 at most"
-        )
-        limits = replace(limits, tool_acceleration=PEAK_ACCELERATION)
-    return in_time(machine, found.cycle.at, duration, limits, step)
-
-
-def _line(
-    machine: Manipulator,
-    from_: str | None,
-    to: str | None,
-    via: str | None,
-    corner: float,
-    back: bool,
-    limits: MotionLimits,
-    duration: float | None,
-    optimal: bool,
-    law: Literal["quintic", "seventh"],
-    step: float,
-) -> Motion:
-    import numpy as np
-
-    from pteron.motion import along, line_path, there_and_back, time_optimal
-
-    if to is None and via is None:
-        raise DataError(f"no way given; give --to with {' '.join(machine.coordinates)}, or --via")
-    poses = [] if via is not None and from_ is None else [_pose(machine, from_, "--from")]
-    if via is not None:
-        from pteron.tables import read_table
-
-        passed = read_table(via).numbers(machine.coordinates)
-        told_doubts(machine, machine.coordinates, passed, via)
-        poses += list(passed)
-    if to is not None:
-        poses.append(_pose(machine, to, "--to"))
-    path: Any = line_path(machine, np.array(poses), corner)
-    if back:
-        path = there_and_back(path)
-    if optimal:
-        return time_optimal(machine, path, limits, step=step)
-    return along(machine, path, duration=duration, limits=limits, law=law, step=step)
-
-
-def _jerk_limited(
-    machine: Manipulator,
-    from_: str | None,
-    to: str | None,
-    jerk: Sequence[float] | None,
-    limits: MotionLimits,
-    step: float,
-) -> Motion:
-    from pteron.motion import jerk_limited
-
-    if to is None:
-        raise DataError(f"no way given; give --to with {' '.join(machine.coordinates)}")
-    if jerk is None:
-        raise DataError("--jerk is missing; give it, and --acceleration, for the joints")
-    ends = _pose(machine, from_, "--from"), _pose(machine, to, "--to")
-    return jerk_limited(machine, *ends, jerk, limits, step=step)
 
 
 def _deliver(

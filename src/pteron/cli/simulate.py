@@ -98,6 +98,7 @@ def simulate(
     as_table = out is not None and Path(out).suffix.lower() in _TABLES
     _check_output(out, as_table=as_table)
     carrying = loaded(machine, payload)
+    believed = None if model is None else _model(machine, model, elbows)
     with spinner(f"Simulating {machine.name}"):
         motion = cycle_of(machine, cycle, duration)
         acts = _controller(controller, motion, 1.0 / rate, bandwidth)
@@ -112,7 +113,7 @@ def simulate(
             machine,
             motion,
             acts,
-            model=None if model is None else load_robot(model, None),
+            model=believed,
             payload=payload,
             sensors=Sensors(encoder=encoder),
             delay=delay,
@@ -137,6 +138,21 @@ def simulate(
         show(*(f"Written: {plain(file)}" for file in data.get("files", ())))
     if found.stopped:
         raise Exit(_ENDED)
+
+
+def _model(machine: Manipulator, name: str, elbows: str | None) -> Manipulator:
+    """Return what a controller takes a machine for: one that moves as it does, in its mode."""
+    model = load_robot(name, elbows)
+    for what, own, other in (
+        ("pose is", machine.coordinates, model.coordinates),
+        ("joints are", machine.joint_names, model.joint_names),
+    ):
+        if own != other:
+            raise DataError(
+                f"--model {name}: its {what} {' '.join(other)}, and of {machine.name} "
+                f"{' '.join(own)}; give a model of the same machine"
+            )
+    return model
 
 
 def _controller(name: Name, motion: Motion, period: float, bandwidth: float | None) -> Controller:

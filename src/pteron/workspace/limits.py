@@ -73,8 +73,9 @@ def beyond_limits(robot: Manipulator, poses: Array) -> ModelError:
         for at in limited_joints(robot, pose)
         if not at.least < at.value < at.most
     ]
+    nearest = f"; nearest to it is one with {', '.join(told)}" if told else ""
     return ModelError(
-        "no pose in reach of all legs keeps the joints' limits; nearest to it is one with "
-        f"{', '.join(told)}; widen limits or move the guide points",
+        f"no pose in reach of all legs keeps the joints' limits{nearest}; widen limits or move the "
+        "guide points",
         subject=robot.name,
     )

@@ -178,7 +178,7 @@ def run(
         Motion(*(part[:end] for part in (time, *_parts(reference)))),
         loads.masses[:end],
         memory,
-        plant.step,
+        min(plant.step, period),
         stopped,
     )
 

@@ -31,10 +31,10 @@ KEPT = 1.0 + 1e-9
 """Share of a limit that counts as kept, for rounding."""
 
 _FINER = 10
+"""How much finer than its samples a motion is checked."""
 
 _TRIES = 8
 """How often a motion is slowed until it keeps its limits: once or twice, but for rounding."""
-"""How much finer than its samples a motion is checked."""
 
 
 def shortest(

@@ -1,0 +1,117 @@
+"""The motions that `pteron cycle` makes: a cycle, lines through poses, the joints' own way."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Literal
+
+from pteron.cli.arguments import parsed_numbers
+from pteron.cli.given_cycle import standard_cycle, told_doubts
+from pteron.cli.screen import note
+from pteron.errors import DataError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from pteron.manipulator import Manipulator
+    from pteron.motion import Motion, MotionLimits
+
+
+def given_pose(machine: Manipulator, text: str | None, name: str) -> NDArray[Any]:
+    """Return the pose (m,) of an option, or the home pose; what is unlikely in it is told."""
+    import numpy as np
+
+    from pteron.workspace import home_pose
+
+    if text is None:
+        return home_pose(machine)
+    values = np.array(parsed_numbers([text], machine.coordinates, name))
+    told_doubts(machine, machine.coordinates, values, name)
+    return values
+
+
+def standard_motion(
+    machine: Manipulator,
+    around: str | None,
+    scale: float | None,
+    limits: MotionLimits,
+    duration: float | None,
+    optimal: bool,
+    step: float,
+) -> Motion:
+    """Return the pick-and-place cycle about a pose, within limits or the usual acceleration."""
+    from dataclasses import replace
+
+    from pteron.motion import check_path, cycle_path, time_optimal
+    from pteron.motion.trajectories.pick_and_place import PEAK_ACCELERATION
+    from pteron.motion.trajectories.time_law import in_time
+
+    middle = given_pose(machine, around, "--around")
+    found = standard_cycle(machine, middle, scale)
+    path = cycle_path(found)
+    if optimal:
+        return time_optimal(machine, path, limits, step=step)
+    check_path(machine, path)
+    if duration is None and not limits.any:
+        note(
+            "Note: no limits given, and the machine's drives have none: the tool's acceleration is "
+            f"{PEAK_ACCELERATION:g} m/s^2 at most"
+        )
+        limits = replace(limits, tool_acceleration=PEAK_ACCELERATION)
+    return in_time(machine, found.cycle.at, duration, limits, step)
+
+
+def line_motion(
+    machine: Manipulator,
+    from_: str | None,
+    to: str | None,
+    via: str | None,
+    corner: float,
+    back: bool,
+    limits: MotionLimits,
+    duration: float | None,
+    optimal: bool,
+    law: Literal["quintic", "seventh"],
+    step: float,
+) -> Motion:
+    """Return the motion on straight lines from a pose, through a table's poses, to a pose."""
+    import numpy as np
+
+    from pteron.motion import along, line_path, there_and_back, time_optimal
+
+    if to is None and via is None:
+        raise DataError(f"no way given; give --to with {' '.join(machine.coordinates)}, or --via")
+    poses = [] if via is not None and from_ is None else [given_pose(machine, from_, "--from")]
+    if via is not None:
+        from pteron.tables import read_table
+
+        passed = read_table(via).numbers(machine.coordinates)
+        told_doubts(machine, machine.coordinates, passed, via)
+        poses += list(passed)
+    if to is not None:
+        poses.append(given_pose(machine, to, "--to"))
+    path: Any = line_path(machine, np.array(poses), corner)
+    if back:
+        path = there_and_back(path)
+    if optimal:
+        return time_optimal(machine, path, limits, step=step)
+    return along(machine, path, duration=duration, limits=limits, law=law, step=step)
+
+
+def joint_motion(
+    machine: Manipulator,
+    from_: str | None,
+    to: str | None,
+    jerk: Sequence[float] | None,
+    limits: MotionLimits,
+    step: float,
+) -> Motion:
+    """Return the motion of the joints from a pose to a pose with limited jerk."""
+    from pteron.motion import jerk_limited
+
+    if to is None:
+        raise DataError(f"no way given; give --to with {' '.join(machine.coordinates)}")
+    if jerk is None:
+        raise DataError("--jerk is missing; give it, and --acceleration, for the joints")
+    ends = given_pose(machine, from_, "--from"), given_pose(machine, to, "--to")
+    return jerk_limited(machine, *ends, jerk, limits, step=step)
