@@ -135,7 +135,10 @@ def run(
         forces = before if late else after
         rows.append((plant.pose, plant.velocity, joints, rates, forces, asked, source.memory))
         if not np.isfinite(asked).all():
-            why = f"no forces are asked for at the joints {told_pose(joints)}: the law has none"
+            why = (
+                f"no forces are asked for at the joints {told_pose(joints)}: they have no pose near "
+                "the last one, or the wanted pose is out of the controller's reach"
+            )
             break
         if k + 1 < len(time):
             loaded = loads.machines[float(loads.masses[k])]
