@@ -136,8 +136,8 @@ def run(
         rows.append((plant.pose, plant.velocity, joints, rates, forces, asked, source.memory))
         if not np.isfinite(asked).all():
             why = (
-                f"no forces are asked for at the joints {told_pose(joints)}: they have no pose near "
-                "the last one, or the wanted pose is out of the controller's reach"
+                f"no forces are asked for at the joints {told_pose(joints)}: they have no pose "
+                "near the last one, or the wanted pose is out of the controller's reach"
             )
             break
         if k + 1 < len(time):
