@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import json as json_text
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from typer import Exit
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
 from pteron.cli.given_cycle import CYCLE, STANDARD, cycle_of, loaded
-from pteron.cli.screen import is_terminal, note, plain, show, show_json, spinner, table, write
+from pteron.cli.outcome import Destination
+from pteron.cli.screen import note, plain, show, spinner, table
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
@@ -21,8 +20,6 @@ if TYPE_CHECKING:
 
 _ENDED = 1
 """Exit code where the machine did not come to the end."""
-
-_TABLES = (".csv", ".parquet")
 
 Name = Literal["computed-torque", "feed-forward", "pd", "adaptive", "adaptive-drives"]
 
@@ -95,8 +92,8 @@ def simulate(
         raise DataError(f"--cycles: {cycles} given, 1 or more expected")
     if not 0.0 < rate < float("inf"):
         raise DataError(f"--rate: {rate:g} given, samples a second above 0 expected")
-    as_table = out is not None and Path(out).suffix.lower() in _TABLES
-    _check_output(out, as_table=as_table)
+    destination = Destination(out, "simulation")
+    destination.check()
     carrying = loaded(machine, payload)
     believed = None if model is None else _model(machine, model, elbows)
     with spinner(f"Simulating {machine.name}"):
@@ -125,17 +122,9 @@ def simulate(
     if found.stopped:
         note(f"Stopped {found.stopped}")
     data = _data(found, controller, cycle, payload)
-    if out is not None:
-        files = _write(out, found, data, as_table=as_table)
-        data["files"] = [str(file) for file in files]
-    if json:
-        show_json(data)
-    elif is_terminal():
-        _show(found, data)
-    elif out is None:
-        write(found.table().write_csv())
-    if not json:
-        show(*(f"Written: {plain(file)}" for file in data.get("files", ())))
+    destination.deliver(
+        found.table(), data, lambda: _pictures(found), lambda: _show(found, data), as_json=json
+    )
     if found.stopped:
         raise Exit(_ENDED)
 
@@ -168,18 +157,6 @@ def _controller(name: Name, motion: Motion, period: float, bandwidth: float | No
     }
     found: Controller = made[name](period=period, bandwidth=bandwidth)
     return found
-
-
-def _check_output(out: str | None, *, as_table: bool) -> None:
-    """Refuse, before the work begins, where nothing can be written."""
-    if out is not None and as_table:
-        from pteron.tables import check_output
-
-        check_output(out)
-    elif out is not None:
-        from pteron.report.write import checked_folder
-
-        checked_folder(out)
 
 
 def _overloads(loaded: Manipulator, motion: Motion) -> tuple[str, ...]:
@@ -230,25 +207,14 @@ def _data(found: Simulation, controller: str, cycle: str, payload: float) -> dic
     }
 
 
-def _write(out: str, found: Simulation, data: dict[str, Any], *, as_table: bool) -> list[Path]:
-    if as_table:
-        from pteron.tables import write_table
-
-        return [write_table(found.table(), out)]
-    from pteron.atomic import plain as plain_data
-    from pteron.atomic import write_texts
+def _pictures(found: Simulation) -> dict[str, str]:
+    """Return the pictures of a simulation, by their files' names."""
     from pteron.plots import forces_figure, svg_file, tracking_figure
 
     units = ", ".join(dict.fromkeys(leg.joint.force_unit for leg in found.robot.legs))
     forces = forces_figure(found.time, found.forces, ylabel=f"drive force ({units})")
     tracking = tracking_figure(found.time, found.error, found.robot.coordinates)
-    texts = {
-        "simulation.csv": found.table().write_csv(),
-        "simulation.json": json_text.dumps(plain_data(data), indent=1, allow_nan=False) + "\n",
-        "tracking.svg": svg_file(tracking),
-        "forces.svg": svg_file(forces),
-    }
-    return write_texts(out, texts)
+    return {"tracking.svg": svg_file(tracking), "forces.svg": svg_file(forces)}
 
 
 def _show(found: Simulation, data: dict[str, Any]) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json as json_text
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import rich.table
@@ -11,7 +9,8 @@ from typer import Exit
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
 from pteron.cli.given_cycle import CYCLE, STANDARD, cycle_of, loaded
-from pteron.cli.screen import is_terminal, note, plain, show, show_json, spinner, table, write
+from pteron.cli.outcome import Destination
+from pteron.cli.screen import note, plain, show, spinner, table
 
 if TYPE_CHECKING:
     import polars as pl
@@ -19,7 +18,6 @@ if TYPE_CHECKING:
     from pteron.motion import Fit, Sizing
 
 _OVERLOADED = 1
-_TABLES = (".csv", ".parquet")
 _BEST = 3
 """Motors a joint that a person is shown."""
 
@@ -65,8 +63,8 @@ def size(
     from pteron.motion import size as sized
 
     chosen = () if motors is None else read_motors(motors)
-    as_table = out is not None and Path(out).suffix.lower() in _TABLES
-    _check_output(out, as_table=as_table)
+    destination = Destination(out, "sizing")
+    destination.check()
     for motor in chosen:
         for text in motor.doubts:
             note(f"Warning: {text}")
@@ -81,33 +79,17 @@ def size(
     for text in unserved:
         note(f"Warning: {text}")
     data = _data(found, fits, cycle, payload)
-    if out is not None:
-        files = _write(out, found, fits, data, as_table=as_table)
-        data["files"] = [str(file) for file in files]
-    if json:
-        show_json(data)
-    elif is_terminal():
-        _show(found, fits, cycle, payload)
-    elif out is None:
-        write((_fits_table(found, fits) if fits else found.table()).write_csv())
-    if not json:
-        show(*(f"Written: {plain(file)}" for file in data.get("files", ())))
+    # A list of motors is what its choice is asked for.
+    rows = _fits_table(found, fits) if fits and out is None else found.table()
+    destination.deliver(
+        rows,
+        data,
+        lambda: _more(found, fits),
+        lambda: _show(found, fits, cycle, payload),
+        as_json=json,
+    )
     if found.overloads or unserved:
         raise Exit(_OVERLOADED)
-
-
-def _check_output(out: str | None, *, as_table: bool) -> None:
-    """Refuse, before the work begins, where nothing can be written."""
-    if out is None:
-        return
-    if as_table:
-        from pteron.tables import check_output
-
-        check_output(out)
-    else:
-        from pteron.report.write import checked_folder
-
-        checked_folder(out)
 
 
 def _unserved(found: Sizing, fits: tuple[Fit, ...]) -> list[str]:
@@ -167,28 +149,16 @@ def _fits_table(found: Sizing, fits: tuple[Fit, ...]) -> pl.DataFrame:
     return pl.DataFrame(rows, infer_schema_length=None)
 
 
-def _write(
-    out: str, found: Sizing, fits: tuple[Fit, ...], data: dict[str, Any], *, as_table: bool
-) -> list[Path]:
-    """Write one table, or a folder with all there is."""
-    if as_table:
-        from pteron.tables import write_table
-
-        return [write_table(found.table(), out)]
-    from pteron.atomic import plain as plain_data
-    from pteron.atomic import write_texts
+def _more(found: Sizing, fits: tuple[Fit, ...]) -> dict[str, str]:
+    """Return what a folder has beside the table and the figures."""
     from pteron.plots import svg_file
     from pteron.report.drives import force_speed, power
 
     texts = {
-        "sizing.csv": found.table().write_csv(),
-        "sizing.json": json_text.dumps(plain_data(data), indent=1, allow_nan=False) + "\n",
         "power.svg": svg_file(power(found)),
         "force-speed.svg": svg_file(force_speed(found)),
     }
-    if fits:
-        texts["motors.csv"] = _fits_table(found, fits).write_csv()
-    return write_texts(out, texts)
+    return texts | ({"motors.csv": _fits_table(found, fits).write_csv()} if fits else {})
 
 
 def _show(found: Sizing, fits: tuple[Fit, ...], cycle: str, payload: float) -> None:

@@ -1,0 +1,83 @@
+"""Where an outcome goes, a table with figures and pictures: to a file, a folder, or a person."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pteron.cli.screen import is_terminal, plain, show, show_json, write
+
+if TYPE_CHECKING:
+    import polars as pl
+
+_TABLES = (".csv", ".parquet")
+
+
+@dataclass(frozen=True)
+class Destination:
+    """What `--out` names: a folder for everything, the file of a table, or nothing.
+
+    Attributes
+    ----------
+    out : str or None
+        As it was given.
+    name : str
+        What the folder's table and figures are called, without their endings.
+    """
+
+    out: str | None
+    name: str
+
+    @property
+    def is_table(self) -> bool:
+        """Whether it is the file of a table."""
+        return self.out is not None and Path(self.out).suffix.lower() in _TABLES
+
+    def check(self) -> None:
+        """Refuse, before the work begins, where nothing can be written."""
+        if self.is_table:
+            from pteron.tables import check_output
+
+            check_output(str(self.out))
+        elif self.out is not None:
+            from pteron.report.write import checked_folder
+
+            checked_folder(self.out)
+
+    def deliver(
+        self,
+        table: pl.DataFrame,
+        data: dict[str, Any],
+        more: Callable[[], dict[str, str]],
+        person: Callable[[], None],
+        *,
+        as_json: bool,
+    ) -> None:
+        """Write files if they are asked for; then print for a program, a person, or a pipe.
+
+        `data` are the figures, `more` makes the other files of a folder, by name, and `person`
+        prints what a person reads; a pipe gets the table.
+        """
+        files: list[Path] = []
+        if self.is_table:
+            from pteron.tables import write_table
+
+            files = [write_table(table, str(self.out))]
+        elif self.out is not None:
+            from pteron.atomic import plain as plain_data
+            from pteron.atomic import write_texts
+
+            figures = json.dumps(plain_data(data), indent=1, allow_nan=False) + "\n"
+            texts = {f"{self.name}.csv": table.write_csv(), f"{self.name}.json": figures}
+            files = write_texts(self.out, texts | more())
+        if as_json:
+            show_json(data | ({"files": [str(file) for file in files]} if files else {}))
+            return
+        if is_terminal():
+            person()
+        elif self.out is None:
+            write(table.write_csv())
+        show(*(f"Written: {plain(str(file))}" for file in files))
