@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -99,6 +99,7 @@ class Shown:
         return matrix, float(np.sqrt(seen.sum() / rate))
 
 
+@runtime_checkable
 class Moves(Protocol):
     """A motion, such as `pteron.motion.Motion`: samples (T, m) in m, rad and s."""
 

@@ -19,7 +19,6 @@ from functools import cached_property
 from typing import Literal, NamedTuple
 
 import casadi as ca
-import numpy as np
 
 from pteron.bodies.motion import Expression
 from pteron.equations.closing import direct_step
@@ -165,10 +164,14 @@ class Sample:
     @cached_property
     def error(self) -> Expression:
         """By how much the joints are behind, e (n, 1): a crank's by half a turn at most."""
-        behind = coordinates(self.now) - self.joints
-        turns = ca.floor(behind / (2 * np.pi) + 0.5)
-        round_ones = [float(leg.goes_round) for leg in self.machine.robot.legs]
-        return behind - 2 * np.pi * ca.DM(round_ones) * turns
+        behind = ca.vertsplit(coordinates(self.now) - self.joints)
+        legs = self.machine.robot.legs
+        return ca.vertcat(
+            *(
+                ca.atan2(ca.sin(e), ca.cos(e)) if leg.goes_round else e
+                for leg, e in zip(legs, behind, strict=True)
+            )
+        )
 
     @cached_property
     def error_rate(self) -> Expression:

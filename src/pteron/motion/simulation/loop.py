@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -29,6 +29,7 @@ _WHOLE = 1e-9
 """Share of a sample that is none."""
 
 
+@runtime_checkable
 class Law(Protocol):
     """What a controller does for one machine; `pteron.controllers` has some."""
 
@@ -47,6 +48,7 @@ class Law(Protocol):
         """Return forces (n,) and what it knows next, of the reference and the measured joints."""
 
 
+@runtime_checkable
 class Source(Protocol):
     """Where forces come from, sample by sample."""
 

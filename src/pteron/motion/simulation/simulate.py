@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Protocol, get_args
+from typing import Protocol, get_args, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -36,6 +36,7 @@ _MOST = 10_000_000
 _STATE = ("start, pose", "start, velocity")
 
 
+@runtime_checkable
 class Controls(Protocol):
     """A controller: how often it acts, and its law for the machine that it believes in."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -83,6 +83,7 @@ class Timed:
         return pose, first / self.duration, second / self.duration**2
 
 
+@runtime_checkable
 class InTime(Protocol):
     """What moves, and can be slowed: a `Course`, or a curve that is `Timed`."""
 

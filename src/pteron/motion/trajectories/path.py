@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,6 +34,7 @@ _STRAIGHT = 1.0 - 1e-12
 """The same, above which there is no corner."""
 
 
+@runtime_checkable
 class Path(Protocol):
     """A way of the platform, by the metres s that the tool has gone on it."""
 

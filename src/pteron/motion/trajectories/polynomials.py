@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, Protocol, get_args
+from typing import Literal, Protocol, get_args, runtime_checkable
 
 import numpy as np
 
@@ -13,6 +13,7 @@ Law = Literal["quintic", "seventh"]
 """The polynomial of a motion from rest to rest, by its degree."""
 
 
+@runtime_checkable
 class Progress(Protocol):
     """How far a motion from rest to rest has come, over one unit of time."""
 
