@@ -68,9 +68,10 @@ class Jitted(ArrayKernel):
 
     def _direct(self) -> Callable[..., Any]:
         """Return what takes one state of plain arrays to `one`, and all else to `checked`."""
+        one = self._module.one  # which says in a line if Numba is missing
         from numba.core.errors import NumbaError
 
-        one, checked, count, empty = self._module.one, self.checked, len(self.inputs), np.empty
+        checked, count, empty = self.checked, len(self.inputs), np.empty
         shapes = [port.shape for port in self.outputs]
         sizes = [port.size for port in self.outputs]
         order = [port.name in self.fixed for port in self.ports]
