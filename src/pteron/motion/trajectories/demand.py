@@ -24,7 +24,10 @@ _WORDS = {
     "speed": ("moves at up to", "{unit}/s"),
     "acceleration": ("accelerates by up to", "{unit}/s^2"),
     "force": ("takes up to", "{force_unit}"),
+    "tool_speed": ("moves at up to", "m/s"),
+    "tool_acceleration": ("accelerates by up to", "m/s^2"),
 }
+"""For each quantity that has a limit: a verb, and its unit."""
 
 
 class Demand(NamedTuple):
@@ -179,7 +182,7 @@ class Peak(NamedTuple):
     def told(self) -> str:
         """Return the peak and its limit as words."""
         who = f"leg {self.leg}" if self.leg else "the tool"
-        verb = _WORDS[self.name.removeprefix("tool_")][0]
+        verb, _ = _WORDS[self.name]
         return (
             f"{who} {verb} {self.size:.4g} {self.unit}, its limit is {self.limit:.4g} {self.unit}"
         )
@@ -217,11 +220,9 @@ def peaks(
             at = int(np.argmax(sizes[:, i]))
             size = float(sizes[at, i])
             found.append(Peak(name, i + 1, size, unit, float(getattr(limits, name)[i]), at))
-    for name, part, unit in (
-        ("tool_speed", asked.tool[0], "m/s"),
-        ("tool_acceleration", asked.tool[1], "m/s^2"),
-    ):
+    for name, part in zip(("tool_speed", "tool_acceleration"), asked.tool, strict=True):
         sizes = np.linalg.norm(part, axis=-1)
         at = int(np.argmax(sizes))
-        found.append(Peak(name, 0, float(sizes[at]), unit, float(getattr(limits, name)), at))
+        limit = float(getattr(limits, name))
+        found.append(Peak(name, 0, float(sizes[at]), _WORDS[name][1], limit, at))
     return tuple(found)
