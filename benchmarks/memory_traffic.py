@@ -60,7 +60,10 @@ def gradient(kernel: Callable[..., Any]) -> Callable[..., Any]:
     """Return the derivatives of the sum of all forces by every input of every state."""
     import jax
 
-    return jax.grad(lambda *motion: kernel(*motion).sum(), argnums=(0, 1, 2))
+    derivatives: Callable[..., Any] = jax.grad(
+        lambda *motion: kernel(*motion).sum(), argnums=(0, 1, 2)
+    )
+    return derivatives
 
 
 def traffic(function: Callable[..., Any], count: int) -> tuple[float, float, int]:

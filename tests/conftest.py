@@ -1,11 +1,41 @@
-"""Compiled code of a test run is kept apart, and only asked for by the tests that are about it."""
+"""Compiled code of a test run is kept apart, and only asked for by the tests that are about it.
+
+Pages are tried in the Chromium of the machine; where there is none these tests are left out,
+unless PTERON_BROWSER is set, which then names it.
+"""
 
 import os
+import shutil
 import signal
 import tempfile
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
 
 os.environ.setdefault("PTERON_CACHE", tempfile.mkdtemp(prefix="pteron-test-"))
 os.environ.setdefault("PTERON_KERNELS", "vm")
 
 # What a shell starts in the background ignores Ctrl-C; the tests of interruption want it.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+_FLAGS = (
+    *("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
+    *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
+)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """A headless browser, for the tests of a module; WebGL is drawn by the processor."""
+    program = os.environ.get("PTERON_BROWSER") or shutil.which("chromium")
+    if program is None:
+        pytest.skip("no Chromium on this machine; PTERON_BROWSER may name one")
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as play:
+        opened = play.chromium.launch(
+            executable_path=program, args=[*_FLAGS, "--use-gl=angle", "--use-angle=swiftshader"]
+        )
+        yield opened
+        opened.close()

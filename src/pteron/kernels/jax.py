@@ -55,7 +55,7 @@ class Traced(Kernel):
             ) from None
         if self.dtype == "float64":
             # Without it JAX would take float64 for float32 and say nothing.
-            jax.config.update("jax_enable_x64", True)  # type: ignore[no-untyped-call]
+            jax.config.update("jax_enable_x64", True)
 
         def stack(*values: Any) -> Any:
             return jnp.stack(jnp.broadcast_arrays(*values), axis=-1)
@@ -80,7 +80,8 @@ class Traced(Kernel):
                 results.append(value.reshape(lead + port.shape))
             return results[0] if len(results) == 1 else tuple(results)
 
-        return jax.jit(evaluate)
+        compiled: Callable[..., Any] = jax.jit(evaluate)
+        return compiled
 
     def _evaluate(self, *values: Any, **fixed: Any) -> Any:
         given = self._by_name(values, fixed)
