@@ -88,6 +88,8 @@ def regrouped(args: Sequence[str], valued: Collection[str]) -> list[str]:
     ['robot', '--json', '--', '-0.1', '0', '2']
     >>> regrouped(["robot", "--pose", "-1", "2", "--out", "-3"], ["--pose", "--out"])
     ['robot', '--pose=-1,2', '--out', '-3']
+    >>> regrouped(["robot", "--to", "0", "b", "-1", "--json"], [])
+    ['robot', '--to=0,b,-1', '--json']
     """
     kept: list[str] = []
     free: list[str] = []
@@ -97,16 +99,24 @@ def regrouped(args: Sequence[str], valued: Collection[str]) -> list[str]:
         if word == "--":
             free += rest
             break
-        if word in VECTORS and rest and _numeric(rest[0]):
-            values = []
-            while rest and _numeric(rest[0]):
-                values.append(rest.popleft())
-            kept.append(f"{word}={','.join(values)}")
+        if word in VECTORS and (count := _meant_for_vector(rest)):
+            kept.append(f"{word}={','.join(rest.popleft() for _ in range(count))}")
         elif word in valued and rest:
             kept += [word, rest.popleft()]
         else:
             (free if _numeric(word) else kept).append(word)
     return [*kept, "--", *free] if free else kept
+
+
+def _meant_for_vector(words: Sequence[str]) -> int:
+    """Return how many words go to an option before them: up to the last number before the next."""
+    count = 0
+    for i, word in enumerate(words, start=1):
+        if _numeric(word):
+            count = i
+        elif word.startswith("-"):
+            break
+    return count
 
 
 def _numeric(word: str) -> bool:
