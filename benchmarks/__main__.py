@@ -33,6 +33,8 @@ _SCRIPTS = {
     "Time-optimal cycles": "time_optimal.py",
     "Control": "control.py",
     "Simulation": "simulation.py",
+    "Energy": "energy.py",
+    "Exported FMUs": "fmu.py",
     "The Gymnasium environment": "environment.py",
     "From a log to a running machine": "identification/chain.py",
 }
