@@ -330,8 +330,8 @@ def test_wrong_numbers_are_refused_in_one_line():
         Adaptive(uncertainty=-1)
     with pytest.raises(DataError, match="bandwidth: 2 numbers given, but delta has 3 joints"):
         ComputedTorque(bandwidth=[1.0, 2.0]).law(MACHINES["delta"])
-    with pytest.raises(ModelError, match="robot: 'delta' given, a Manipulator expected"):
-        ComputedTorque().law("delta")
+    with pytest.raises(ModelError, match="robot: float given, a Manipulator expected"):
+        ComputedTorque().law(1.0)
     motion = cycle("delta")
     for wrong, message in (
         (cycle("five-bar"), r"motion: poses of shape \(\d+, 2\) given, \(T, 3\) expected"),

@@ -8,7 +8,7 @@ import pytest
 from mechanisms import CATALOG, states
 
 import pteron
-from pteron.errors import DataError, ModelError, PteronError, SingularPose, UnreachablePose
+from pteron.errors import DataError, PteronError, SingularPose, UnreachablePose
 
 ROBOT, DELTA = CATALOG["quadrupteron"], CATALOG["delta"]
 LOOSE = np.array([0.01, 0.02, -0.01, np.pi / 2])
@@ -372,19 +372,6 @@ def test_an_unknown_choice_on_failure_is_refused(choice):
         with pytest.raises(DataError) as caught:
             refused()
         assert str(caught.value) == f'on_failure: {choice!r} is neither "raise" nor "nan"'
-
-
-def test_the_name_of_a_robot_is_no_robot():
-    zero = np.zeros(4)
-    for refused in (
-        lambda: pteron.inverse_dynamics("quadrupteron", zero, zero, zero),
-        lambda: pteron.direct_kinematics("quadrupteron", zero),
-        lambda: pteron.compile("quadrupteron", "jacobian"),
-    ):
-        with pytest.raises(
-            ModelError, match=r"^robot: 'quadrupteron' given, a Manipulator expected; "
-        ):
-            refused()
 
 
 def test_a_jacobian_of_constant_rows_is_given_out_of_reach_and_at_singularities():

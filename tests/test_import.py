@@ -146,7 +146,7 @@ KNOWLEDGE = {
 ALLOWED = {
     ("__init__.py", "a kind of leg"): "hands the kinds on",
     ("manipulator/files.py", "a kind of leg"): "the kind where a file names none",
-    ("manipulator/manipulator.py", "an elbow"): "working modes",
+    ("manipulator/variants.py", "an elbow"): "working modes",
     ("cli/", "an elbow"): "--elbows, the working mode; and a leg as JSON",
     ("export/klipper/", "an elbow"): "where Klipper has it, in the message that refuses",
     ("report/", "an elbow"): "the working mode",

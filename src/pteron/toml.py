@@ -56,15 +56,25 @@ def read_toml(path: str | Path, error: type[PteronError], absent: str) -> dict[s
     PteronError
         If it cannot be read, or as `parsed_toml`.
     """
+    return parsed_toml(*toml_bytes(path, error, absent), error)
+
+
+def toml_bytes(path: str | Path, error: type[PteronError], absent: str) -> tuple[bytes, str]:
+    """Return the bytes of a TOML file, no more than one may have, and what messages call it.
+
+    Raises
+    ------
+    PteronError
+        If it cannot be read; see `read_toml`.
+    """
     source = shown(str(path), bare=True, longest=1000) or "''"
     try:
         with Path(path).open("rb") as file:
-            data = file.read(_LARGEST + 1)
+            return file.read(_LARGEST + 1), source
     except (FileNotFoundError, ValueError):  # ValueError: a NUL in the name
         raise error(absent, subject=source) from None
     except OSError as reason:
         raise error(f"cannot be read ({reason.strerror or reason})", subject=source) from None
-    return parsed_toml(data, source, error)
 
 
 def parsed_toml(data: bytes, source: str, error: type[PteronError]) -> dict[str, Any]:

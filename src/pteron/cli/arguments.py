@@ -162,7 +162,7 @@ def parsed_list(text: str | None, what: str) -> list[float] | None:
 def load_robot(name_or_path: str, elbows: str | None = None) -> Manipulator:
     """Load a machine, in the working mode that `elbows` says, such as ``++-+``."""
     from pteron.manipulator import load
-    from pteron.manipulator.manipulator import with_elbows
+    from pteron.manipulator.variants import with_elbows
 
     robot = load(name_or_path)
     if elbows is None:

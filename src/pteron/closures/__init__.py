@@ -22,3 +22,7 @@ def kind_for(
 
 
 __all__ = ["KINDS", "Closure", "kind_for"]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -27,3 +27,7 @@ __all__ = [
     "PDGravity",
     "joint_masses",
 ]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

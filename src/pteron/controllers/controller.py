@@ -9,7 +9,7 @@ from typing import ClassVar
 from pteron.controllers.gain_numbers import PerJoint, above_zero, per_joint, period_of
 from pteron.controllers.law import Law
 from pteron.kernels import Array
-from pteron.manipulator import Manipulator, expect_manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.reduction import BaseParameters
 
 
@@ -74,12 +74,12 @@ class Controller(ABC):
             If there are not as many numbers as joints.
         """
 
-    def law(self, model: Manipulator) -> Law:
+    def law(self, model: RobotLike) -> Law:
         """Return its law for a machine.
 
         Parameters
         ----------
-        model : Manipulator
+        model : Manipulator, name or path
             The machine as the controller knows it; what it controls may be another one.
 
         Returns
@@ -91,5 +91,5 @@ class Controller(ABC):
         DataError
             If there are not as many gains as joints.
         """
-        expect_manipulator(model)
+        model = as_manipulator(model)
         return Law(self.what, model, self.gains(model), self.base(model))

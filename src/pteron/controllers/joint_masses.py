@@ -12,7 +12,7 @@ from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kinematics import jacobian, random_poses
 from pteron.legs import Drive
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _POSES = 100
 _LEAST = (0.1, 0.01)
@@ -22,8 +22,7 @@ _SHARE = 0.1
 """The share of them at which a joint is lighter."""
 
 
-@lru_cache(maxsize=64)
-def joint_masses(robot: Manipulator) -> Array:
+def joint_masses(robot: RobotLike) -> Array:
     """Return what a joint's force accelerates while the other joints are free, at light poses.
 
     It is 1 / (J M^-1 J^T)_ii with the motors' inertia in M. Of n joints whose stiffness is w^2
@@ -32,7 +31,7 @@ def joint_masses(robot: Manipulator) -> Array:
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine, its motors included.
 
     Returns
@@ -52,6 +51,11 @@ def joint_masses(robot: Manipulator) -> Array:
     >>> joint_masses(pteron.load("five-bar")).round(5)
     array([0.0004 , 0.00042])
     """
+    return _joint_masses(as_manipulator(robot))
+
+
+@lru_cache(maxsize=64)
+def _joint_masses(robot: Manipulator) -> Array:
     poses = light_poses(robot)
     rows = jacobian(robot, poses)
     rotors = np.diag([(leg.drive or Drive()).inertia for leg in robot.legs])

@@ -29,3 +29,7 @@ __all__ = [
     "potential_energy",
     "regressor",
 ]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

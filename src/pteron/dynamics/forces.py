@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from pteron.kinematics.evaluate import evaluated
-from pteron.manipulator import Manipulator
+from pteron.manipulator import RobotLike
 from pteron.shapes import JointsLike, OnFailure, PerCoordinate, PerJoint, PoseLike, Regressors
 
 
 def inverse_dynamics(
-    robot: Manipulator,
+    robot: RobotLike,
     pose: PoseLike,
     velocity: PoseLike,
     acceleration: PoseLike,
@@ -22,7 +22,7 @@ def inverse_dynamics(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     pose, velocity, acceleration : array, shape (..., m)
         The platform's motion; m, rad and s. Leading axes broadcast.
@@ -58,7 +58,7 @@ def inverse_dynamics(
 
 
 def forward_dynamics(
-    robot: Manipulator,
+    robot: RobotLike,
     pose: PoseLike,
     velocity: PoseLike,
     forces: JointsLike,
@@ -72,7 +72,7 @@ def forward_dynamics(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     pose, velocity : array, shape (..., m)
         The platform's state; m, rad and s.
@@ -109,7 +109,7 @@ def forward_dynamics(
 
 
 def drive_forces(
-    robot: Manipulator,
+    robot: RobotLike,
     pose: PoseLike,
     velocity: PoseLike,
     acceleration: PoseLike,
@@ -125,7 +125,7 @@ def drive_forces(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     pose, velocity, acceleration : array, shape (..., m)
         The platform's motion; m, rad and s. Leading axes broadcast.
@@ -167,7 +167,7 @@ def drive_forces(
 
 
 def drive_accelerations(
-    robot: Manipulator,
+    robot: RobotLike,
     pose: PoseLike,
     velocity: PoseLike,
     forces: JointsLike,
@@ -182,7 +182,7 @@ def drive_accelerations(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     pose, velocity : array, shape (..., m)
         The platform's state; m, rad and s.
@@ -221,7 +221,7 @@ def drive_accelerations(
 
 
 def regressor(
-    robot: Manipulator,
+    robot: RobotLike,
     pose: PoseLike,
     velocity: PoseLike,
     acceleration: PoseLike,
@@ -232,7 +232,7 @@ def regressor(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine; its inertial parameters play no part.
     pose, velocity, acceleration : array, shape (..., m)
         The platform's motion; m, rad and s. Leading axes broadcast.

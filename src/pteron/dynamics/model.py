@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from pteron.kinematics.evaluate import evaluated
-from pteron.manipulator import Manipulator
+from pteron.manipulator import RobotLike
 from pteron.shapes import Matrices, Numbers, OnFailure, PerCoordinate, PoseLike
 
 
-def mass_matrix(robot: Manipulator, pose: PoseLike, *, on_failure: OnFailure = "raise") -> Matrices:
+def mass_matrix(robot: RobotLike, pose: PoseLike, *, on_failure: OnFailure = "raise") -> Matrices:
     """Return the mass matrix M of M x'' + h = J^T F, in platform coordinates.
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     pose : array, shape (..., m)
         The poses, m and rad.
@@ -42,7 +42,7 @@ def mass_matrix(robot: Manipulator, pose: PoseLike, *, on_failure: OnFailure = "
 
 
 def coriolis_matrix(
-    robot: Manipulator, pose: PoseLike, velocity: PoseLike, *, on_failure: OnFailure = "raise"
+    robot: RobotLike, pose: PoseLike, velocity: PoseLike, *, on_failure: OnFailure = "raise"
 ) -> Matrices:
     """Return C of M x'' + C x' + g = J^T F, from Christoffel's symbols of M.
 
@@ -50,7 +50,7 @@ def coriolis_matrix(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     pose, velocity : array, shape (..., m)
         The platform's state; m, rad and s.
@@ -72,13 +72,13 @@ def coriolis_matrix(
 
 
 def bias_forces(
-    robot: Manipulator, pose: PoseLike, velocity: PoseLike, *, on_failure: OnFailure = "raise"
+    robot: RobotLike, pose: PoseLike, velocity: PoseLike, *, on_failure: OnFailure = "raise"
 ) -> PerCoordinate:
     """Return h = C x' + g of M x'' + h = J^T F: Coriolis, centrifugal and gravity forces.
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     pose, velocity : array, shape (..., m)
         The platform's state; m, rad and s.
@@ -101,13 +101,13 @@ def bias_forces(
 
 
 def gravity_forces(
-    robot: Manipulator, pose: PoseLike, *, on_failure: OnFailure = "raise"
+    robot: RobotLike, pose: PoseLike, *, on_failure: OnFailure = "raise"
 ) -> PerCoordinate:
     """Return g of M x'' + C x' + g = J^T F: the gradient of the potential energy.
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     pose : array, shape (..., m)
         The poses, m and rad.
@@ -130,13 +130,13 @@ def gravity_forces(
 
 
 def kinetic_energy(
-    robot: Manipulator, pose: PoseLike, velocity: PoseLike, *, on_failure: OnFailure = "raise"
+    robot: RobotLike, pose: PoseLike, velocity: PoseLike, *, on_failure: OnFailure = "raise"
 ) -> Numbers:
     """Return the kinetic energy T = x'^T M x' / 2.
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     pose, velocity : array, shape (..., m)
         The platform's state; m, rad and s.
@@ -159,13 +159,13 @@ def kinetic_energy(
 
 
 def potential_energy(
-    robot: Manipulator, pose: PoseLike, *, on_failure: OnFailure = "raise"
+    robot: RobotLike, pose: PoseLike, *, on_failure: OnFailure = "raise"
 ) -> Numbers:
     """Return the potential energy of gravity, zero with every mass at the base frame's origin.
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     pose : array, shape (..., m)
         The poses, m and rad.

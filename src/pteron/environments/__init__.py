@@ -30,3 +30,7 @@ if REACH not in gymnasium.registry:
     )
 
 __all__ = ["EPISODE", "REACH", "PteronEnv", "PteronVectorEnv", "World"]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -11,7 +11,7 @@ from pteron.bodies.motion import Expression, Moments, moments_of
 from pteron.bodies.parameters import PLATFORM, PLATFORM_KINDS, Parameter, parameter_list
 from pteron.closures import Closure, kind_for
 from pteron.legs.leg import LegEquations, LegMotion
-from pteron.manipulator import Manipulator, expect_manipulator
+from pteron.manipulator import Manipulator
 from pteron.platforms import PlatformEquations, equations_class
 from pteron.platforms.motion import PlatformMotion
 
@@ -48,7 +48,6 @@ class Machine:
     @classmethod
     def of(cls, robot: Manipulator) -> Machine:
         """Return one machine, in numbers."""
-        expect_manipulator(robot)
         legs = tuple(leg.equations() for leg in robot.legs)
         frame = [ca.SX(list(axis)) for axis in robot.platform.frame]
         points, fixed = (

@@ -29,7 +29,7 @@ from pteron.kernels.code import (
     used_inputs,
 )
 from pteron.kernels.graph import CONSTANT
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 Real = Literal["double", "float"]
 
@@ -37,7 +37,7 @@ _WIDTH = 97
 
 
 def export_c(
-    robot: Manipulator,
+    robot: RobotLike,
     functions: Asked | None = None,
     folder: str | Path = ".",
     *,
@@ -58,7 +58,7 @@ def export_c(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine; its name becomes the prefix of the functions and the files.
     functions : sequence of str or of controllers
         Names of what `compile` accepts, and `"inverse_dynamics_base"`, `"feed_forward_base"` or
@@ -107,6 +107,7 @@ def export_c(
     >>> sorted(path.name for path in files)
     ['CMakeLists.txt', 'quadrupteron.c', 'quadrupteron.h', 'test_quadrupteron.c']
     """
+    robot = as_manipulator(robot)
     if real not in get_args(Real):
         raise ModelError(f'real: {real!r} is neither "double" nor "float"')
     exported = chosen(

@@ -20,7 +20,12 @@ from pteron.export.functions import has_drives
 from pteron.export.start_pose import good_poses, joint_limits, keeps_limits, start_pose
 from pteron.kernels import program, specialised
 from pteron.kernels.code import rendered
-from pteron.manipulator import Manipulator, expect_manipulator, parameters
+from pteron.manipulator import (
+    Manipulator,
+    RobotLike,
+    as_manipulator,
+    parameters,
+)
 
 _NAMES = {
     "inverse_kinematics": "joint_coordinates",
@@ -39,7 +44,7 @@ _NAMES = {
 _LOADED = ("inverse_dynamics", "forward_dynamics")
 
 
-def casadi_functions(robot: Manipulator) -> dict[str, ca.Function]:
+def casadi_functions(robot: RobotLike) -> dict[str, ca.Function]:
     """Return a machine's kinematics and dynamics as CasADi functions, to build upon.
 
     They are expressions of SX, so that CasADi differentiates them exactly and writes C from them.
@@ -49,7 +54,7 @@ def casadi_functions(robot: Manipulator) -> dict[str, ca.Function]:
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine, with n joints and m = n pose coordinates.
 
     Returns
@@ -78,7 +83,7 @@ def casadi_functions(robot: Manipulator) -> dict[str, ca.Function]:
     >>> functions["inverse_dynamics"].name_in()
     ['pose', 'velocity', 'acceleration', 'wrench']
     """
-    expect_manipulator(robot)
+    robot = as_manipulator(robot)
     missing = "direct_step" if closure_of(robot).closed_form else "direct_kinematics"
     found = {name: _plain(robot, name, what) for name, what in _NAMES.items() if name != missing}
     found |= {function.name(): function for function in _driven(robot)}
@@ -144,7 +149,7 @@ def _function(
     return ca.Function(name, [symbols[k] for k in inputs], outputs, inputs, list(results))
 
 
-def export_casadi(robot: Manipulator, folder: str | Path = ".") -> list[Path]:
+def export_casadi(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
     """Write a machine's CasADi functions, a module that loads them, and an example.
 
     The module needs CasADi alone. Its `ocp_model` has the names that acados and the like ask for:
@@ -153,7 +158,7 @@ def export_casadi(robot: Manipulator, folder: str | Path = ".") -> list[Path]:
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine; its name becomes the files' prefix.
     folder : path
         Where; made if it is missing.
@@ -179,6 +184,7 @@ def export_casadi(robot: Manipulator, folder: str | Path = ".") -> list[Path]:
     >>> sorted(path.name for path in files)[-2:]
     ['example_delta.py', 'load_delta.py']
     """
+    robot = as_manipulator(robot)
     functions, prefix = casadi_functions(robot), prefix_of(robot)
     target = make_folder(folder)
     files = {}

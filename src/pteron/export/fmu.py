@@ -34,7 +34,7 @@ from pteron.kernels import Array
 from pteron.kernels.c import c_compiler
 from pteron.kernels.code import rendered
 from pteron.kinematics import inverse_kinematics
-from pteron.manipulator import Manipulator, expect_manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _FUNCTIONS = ("drive_accelerations", "joint_coordinates", "jacobian", "squared_type_i")
 
@@ -58,7 +58,7 @@ _DATES = (1980, 1, 1, 0, 0, 0)
 
 
 def export_fmu(
-    robot: Manipulator, folder: str | Path = ".", *, pose: ArrayLike | None = None
+    robot: RobotLike, folder: str | Path = ".", *, pose: ArrayLike | None = None
 ) -> list[Path]:
     """Write a machine with its drives as an FMU of FMI 3.0, its sources inside.
 
@@ -70,7 +70,7 @@ def export_fmu(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine; its name becomes the file's.
     folder : path
         Where; made if it is missing.
@@ -94,7 +94,7 @@ def export_fmu(
     OutputError
         If the folder cannot be written.
     """
-    expect_manipulator(robot)
+    robot = as_manipulator(robot)
     prefix = prefix_of(robot)
     start = start_pose(robot) if pose is None else _expected(robot, pose)
     rest = np.zeros(robot.freedom)

@@ -24,7 +24,7 @@ from pteron.kernels import Array
 from pteron.kernels.code import rendered
 from pteron.kinematics import inverse_kinematics, jacobian
 from pteron.kinematics.evaluate import unchecked
-from pteron.manipulator import Manipulator, expect_manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _MILLIMETRES = 1000.0
 _DEGREES = 180.0 / math.pi
@@ -56,7 +56,7 @@ class _Joint:
     """The last four in mm or degrees, the speed per second; None where the file has none."""
 
 
-def export_linuxcnc(robot: Manipulator, folder: str | Path = ".") -> list[Path]:
+def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
     """Write a machine's kinematics for LinuxCNC, with lines for its INI and HAL files.
 
     The component is built by `halcompile --install NAMEkins.comp` and gives LinuxCNC 2.8 and 2.9
@@ -67,7 +67,7 @@ def export_linuxcnc(robot: Manipulator, folder: str | Path = ".") -> list[Path]:
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine; its name becomes the files' prefix.
     folder : path
         Where; made if it is missing.
@@ -94,7 +94,7 @@ def export_linuxcnc(robot: Manipulator, folder: str | Path = ".") -> list[Path]:
     >>> [path.name for path in files]
     ['quadrupteronkins.comp', 'quadrupteron.ini', 'quadrupteron.hal']
     """
-    expect_manipulator(robot)
+    robot = as_manipulator(robot)
     prefix = prefix_of(robot)
     closed = closure_of(robot).closed_form
     names = ("inverse_kinematics", "direct_kinematics" if closed else "direct_step")

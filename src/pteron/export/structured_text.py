@@ -19,7 +19,7 @@ from pteron.export.guards import INPUT_POWER, Names, Statements, element, power
 from pteron.export.outputs import Output
 from pteron.kernels import Graph, Port
 from pteron.kernels.code import rendered
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _BLOCKS = ("inverse_kinematics", "inverse_dynamics")
 """What is exported unless a choice is given."""
@@ -34,7 +34,7 @@ _STATUSES = (("Usable", 3), ("Reachable", 1), ("Regular", 2))
 
 
 def export_st(
-    robot: Manipulator,
+    robot: RobotLike,
     functions: Asked | None = None,
     folder: str | Path = ".",
     *,
@@ -53,7 +53,7 @@ def export_st(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine; its name becomes the prefix of the blocks and the files.
     functions : sequence of str
         As for `export_c`; by default inverse kinematics and inverse dynamics, and `feed_forward`
@@ -93,6 +93,7 @@ def export_st(
     >>> [path.name for path in files]
     ['Tripteron_InverseKinematics.st', 'Tripteron_InverseDynamics.st']
     """
+    robot = as_manipulator(robot)
     # A block is valid or not as a whole; but of two assembly modes one alone may be in reach.
     direct = "closure_poses" if closure_of(robot).closed_form else "direct_step"
     names = None if functions is None else listed(functions)

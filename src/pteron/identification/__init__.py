@@ -6,6 +6,7 @@ real bodies, `excitation` makes the motions worth recording. `estimate` takes a 
 robot.
 """
 
+from pteron.identification import consistency, estimators, excitation, logs, signals
 from pteron.identification.consistency import Bounds, Consistency, consistent_model
 from pteron.identification.drive_gains import DriveGains, identify_drive_gains
 from pteron.identification.errors import LogError
@@ -45,7 +46,6 @@ from pteron.identification.signals import Preprocessing, Processing, States, pre
 from pteron.identification.verdict import Verdict
 
 __all__ = [
-    "METHODS",
     "Bounds",
     "Consistency",
     "DriveGains",
@@ -58,6 +58,7 @@ __all__ = [
     "Limits",
     "Log",
     "LogError",
+    "METHODS",
     "Model",
     "Observations",
     "Payload",
@@ -71,9 +72,12 @@ __all__ = [
     "Trial",
     "Verdict",
     "column_errors",
+    "consistency",
     "consistent_model",
     "essential_parameters",
     "estimate",
+    "estimators",
+    "excitation",
     "halves",
     "huber",
     "identification_model",
@@ -81,6 +85,7 @@ __all__ = [
     "identify_drive_gains",
     "identify_payload",
     "instrumental",
+    "logs",
     "maximum_likelihood",
     "observations_of",
     "open_log",
@@ -90,8 +95,13 @@ __all__ = [
     "random_excitation",
     "read_log",
     "reduced",
+    "signals",
     "stacked",
     "total",
     "weighted",
     "write_log",
 ]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

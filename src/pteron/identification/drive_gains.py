@@ -21,7 +21,7 @@ from pteron.identification.observation import Observations
 from pteron.identification.payload import observations_with_payload
 from pteron.identification.signals import Processing
 from pteron.kernels import Array
-from pteron.manipulator import Manipulator
+from pteron.manipulator import RobotLike, as_manipulator
 from pteron.reduction import BaseParameters
 
 _UNSEEN = 1e-10
@@ -107,7 +107,7 @@ class DriveGains:
 
 
 def identify_drive_gains(
-    robot: Manipulator,
+    robot: RobotLike,
     log: Log,
     with_payload: Log | None = None,
     *,
@@ -126,7 +126,7 @@ def identify_drive_gains(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine: its geometry counts, its inertial parameters play no part.
     log : Log
         A log of currents (A, V or %), whose payload column has both phases, 0 and 1; or one
@@ -153,6 +153,7 @@ def identify_drive_gains(
     M. Gautier and S. Briot, "Global identification of joint drive gains and dynamic parameters of
     robots", Journal of Dynamic Systems, Measurement, and Control 136 (2014).
     """
+    robot = as_manipulator(robot)
     logs = [log] if with_payload is None else [log, with_payload]
     unit = _unit(logs)
     known = payload or logs[-1].description.payload or log.description.payload

@@ -38,7 +38,7 @@ from pteron.identification.signals import Preprocessing, Processing
 from pteron.identification.verdict import judged, verdict_of
 from pteron.kernels import Array
 from pteron.legs import Drive
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.reduction import base_parameters
 from pteron.reduction.sharing import Sharing
 
@@ -49,7 +49,7 @@ Stage = Callable[[str, int, int], None]
 
 
 def identify(
-    robot: Manipulator,
+    robot: RobotLike,
     logs: Logs,
     *,
     held_out: Logs = (),
@@ -57,7 +57,7 @@ def identify(
     shared: Sharing = False,
     estimator: str | Callable[[Observations], Estimate] = "weighted",
     processing: Processing | None = None,
-    cad: Manipulator | Literal["robot"] | None = "robot",
+    cad: RobotLike | Literal["robot"] | None = "robot",
     bounds: Bounds | None = None,
     progress: Stage | None = None,
 ) -> Identification:
@@ -69,7 +69,7 @@ def identify(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine as it is drawn: its geometry counts, its inertial parameters are where the
         search for real bodies begins.
     logs : Log, LogFile or a sequence of them
@@ -86,7 +86,7 @@ def identify(
         `functools.partial(huber, threshold=2.0)`.
     processing : Processing, optional
         How positions are differentiated and filtered; by default the data decide.
-    cad : Manipulator, "robot" or None
+    cad : Manipulator, name or path, "robot" or None
         What real bodies are to be nearest to.
     bounds : Bounds, optional
         What is known about the bodies.
@@ -101,6 +101,8 @@ def identify(
     ModelError
         If the estimator is not known, or the bounds contradict each other.
     """
+    robot = as_manipulator(robot)
+    drawn = robot if cad == "robot" else None if cad is None else as_manipulator(cad)
     if isinstance(estimator, str) and estimator not in METHODS:
         raise ModelError(f"estimator: {estimator!r} is not one of {', '.join(METHODS)}")
     report = progress or (lambda task, done, total: None)
@@ -176,8 +178,8 @@ def identify(
     known = np.zeros(len(model.names))
     for name, mass in _reflected(rotors).items():
         known += model.share_of(name, mass)
-    consistency, share, missing = _real_bodies(model, estimate, known, observations, cad, bounds)
-    advice = doubts(model, estimate, known, consistency, cad)
+    consistency, share, missing = _real_bodies(model, estimate, known, observations, drawn, bounds)
+    advice = doubts(model, estimate, known, consistency, drawn)
     if hidden or essential.dropped:
         weak = ", ".join(dict.fromkeys((*hidden, *essential.dropped)))
         advice.insert(
@@ -275,7 +277,7 @@ def _real_bodies(
     estimate: Estimate,
     known: Array,
     observations: Observations,
-    cad: Manipulator | Literal["robot"] | None,
+    cad: Manipulator | None,
     bounds: Bounds | None,
 ) -> tuple[Consistency | None, float, tuple[str, ...]]:
     """Return real bodies, how far their forces are off, and why there are none if so."""

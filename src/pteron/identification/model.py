@@ -15,7 +15,7 @@ from pteron.identification.signals import States
 from pteron.kernels import Array
 from pteron.kinematics import random_poses
 from pteron.kinematics.evaluate import unchecked
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.reduction import BaseParameters, base_parameters, base_regressor
 
 Passive = Literal["none", "shared", "each"]
@@ -253,13 +253,13 @@ class Model:
 
 
 def identification_model(
-    robot: Manipulator, terms: Terms | None = None, *, base: BaseParameters | None = None
+    robot: RobotLike, terms: Terms | None = None, *, base: BaseParameters | None = None
 ) -> Model:
     """Return the model of a machine for identification.
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine; its inertial parameters play no part.
     terms : Terms, optional
         What it has beside the base parameters; friction and offset of each joint by default.
@@ -279,6 +279,7 @@ def identification_model(
     >>> model.names[-9:-5], model.units[-9:-5]
     (('Fc1', 'Fc2', 'Fc3', 'Fv1'), ('N', 'N', 'N', 'N s/m'))
     """
+    robot = as_manipulator(robot)
     model = Model(base or base_parameters(robot), terms or Terms())
     speeds = np.atleast_1d(model.terms.stribeck or 1.0)
     if speeds.size not in (1, len(robot.legs)):

@@ -18,7 +18,7 @@ from pteron.identification.observation import Observations, observations_of, sta
 from pteron.identification.recordings import periodic_part
 from pteron.identification.signals import Processing, preprocessing_of
 from pteron.kernels import Array
-from pteron.manipulator import Manipulator
+from pteron.manipulator import RobotLike, as_manipulator
 from pteron.reduction import BaseParameters
 
 _NAMES = tuple(f"{name}_L" for name in PLATFORM_KINDS)
@@ -136,7 +136,7 @@ class Payload:
 
 
 def identify_payload(
-    robot: Manipulator,
+    robot: RobotLike,
     without: Log,
     with_payload: Log | None = None,
     *,
@@ -153,7 +153,7 @@ def identify_payload(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine: its geometry counts, its inertial parameters play no part.
     without : Log
         A log without payload; or one whose payload column has both phases, 0 and 1.
@@ -179,6 +179,7 @@ def identify_payload(
     W. Khalil, M. Gautier and P. Lemoine, "Identification of the payload inertial parameters of
     industrial manipulators", ICRA 2007: the log with payload and the one without, solved as one.
     """
+    robot = as_manipulator(robot)
     for log in (without, with_payload):
         if log is not None and log.description.force_unit != "N":
             unit = log.description.force_unit

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 
@@ -45,7 +44,7 @@ def doubts(
     estimate: Estimate,
     known: Array,
     consistency: Consistency | None,
-    cad: Manipulator | Literal["robot"] | None,
+    cad: Manipulator | None,
 ) -> list[str]:
     """Return what held-out forces cannot show: values may be right for the wrong machine.
 
@@ -62,7 +61,7 @@ def doubts(
             "units, legs that share parameters."
         )
     if cad is not None:
-        drawn = parameters(model.robot if cad == "robot" else cad)
+        drawn = parameters(cad)
         base = model.base
         usual = usual_sizes(base, drawn)
         values = (estimate.values - known)[: base.rank]

@@ -60,3 +60,7 @@ __all__ = [
     "same_layout",
     "specialised",
 ]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

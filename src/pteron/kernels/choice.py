@@ -17,7 +17,7 @@ from pteron.kernels.kernel import Array, Kernel, sliced
 from pteron.kernels.programs import Columns, bare, program
 from pteron.kernels.targets import FIXED, Selects, columns_of
 from pteron.kernels.vm import VirtualMachine
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 VARIABLE = "PTERON_KERNELS"
 """Environment variable: `vm` keeps the public functions on CasADi's virtual machine."""
@@ -27,7 +27,7 @@ _AT_WORK = threading.Semaphore(1)
 
 
 def numeric(
-    robot: Manipulator, what: str, *, base: Selects | None = None, wrench: bool = False
+    robot: RobotLike, what: str, *, base: Selects | None = None, wrench: bool = False
 ) -> Adaptive:
     """Return what evaluates a function for the public functions, by this policy.
 
@@ -39,11 +39,21 @@ def numeric(
     it was asked for. Nothing is compiled at import. `PTERON_KERNELS=vm` in the environment keeps to
     the virtual machine; `compile` gives a kernel of any target, compiled when asked.
     """
-    return _known(robot, what, None if base is None else columns_of(base), wrench)
+    columns = None if base is None else columns_of(base)
+    try:
+        return _known(robot, what, columns, wrench)
+    except TypeError:
+        if isinstance(robot, Manipulator):
+            raise
+        return _known(as_manipulator(robot), what, columns, wrench)
 
 
 @lru_cache(maxsize=512)
-def _known(robot: Manipulator, what: str, columns: Columns | None, wrench: bool) -> Adaptive:
+def _known(robot: RobotLike, what: str, columns: Columns | None, wrench: bool) -> Adaptive:
+    if not isinstance(robot, Manipulator):
+        # Nothing is kept under a name: what its file says may change. A call with a machine, whose
+        # kernel is known, never comes here, so that it pays nothing for this.
+        raise TypeError
     built = program(robot, what, columns, wrench=wrench, guarded=True)
     fixed = {p.name: FIXED[p.name](robot) for p in built.inputs if p.name in FIXED}
     kernel = VirtualMachine(built.name, built.function, built.inputs, built.outputs, fixed)

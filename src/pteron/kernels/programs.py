@@ -18,7 +18,7 @@ from pteron.errors import ModelError
 from pteron.kernels.functions import FUNCTIONS, TABLE, TYPE_I, TYPE_II, Entry, Output, Symbols
 from pteron.kernels.kernel import Port, count_operations
 from pteron.kernels.passes import optimised
-from pteron.manipulator import Manipulator, expect_manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _HUGE = 1e75
 """Inputs or outputs beyond this count as not finite: their squares might overflow."""
@@ -58,7 +58,7 @@ class Program:
 
 
 def program(
-    robot: Manipulator,
+    robot: RobotLike,
     what: str,
     columns: Columns | None = None,
     *,
@@ -110,10 +110,13 @@ def specialised(given: Program, values: dict[str, NDArray[np.float64]]) -> Progr
     return Program(given.name, optimised(function), inputs, given.outputs)
 
 
-@lru_cache(maxsize=256)
-def bare(robot: Manipulator) -> Manipulator:
+def bare(robot: RobotLike) -> Manipulator:
     """Return the machine with unit inertia and no drives: those of one geometry share programs."""
-    expect_manipulator(robot)
+    return _bare(as_manipulator(robot))
+
+
+@lru_cache(maxsize=256)
+def _bare(robot: Manipulator) -> Manipulator:
     unit = {"m": 1.0, "mgx": 0.0, "mgy": 0.0, "I": 1.0}
 
     def plain(body: Any) -> Any:
@@ -166,7 +169,7 @@ def _built(
     return min(forms, key=lambda form: count_operations(form.function))
 
 
-def general_program(robot: Manipulator, what: str) -> Program:
+def general_program(robot: RobotLike, what: str) -> Program:
     """Return the function `what` of a machine's topology: its first input is `geometry`.
 
     The vector's order is that of `equations.machine.numbers`.

@@ -20,7 +20,7 @@ from pteron.kernels.kernel import Array, Kernel
 from pteron.kernels.numba import Jitted
 from pteron.kernels.programs import Columns, Program, general_program, program, specialised
 from pteron.kernels.vm import VirtualMachine
-from pteron.manipulator import Manipulator, parameters
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator, parameters
 
 TARGETS: dict[str, type[Kernel]] = {
     "vm": VirtualMachine,
@@ -62,7 +62,7 @@ class Selects(Protocol):
 
 
 def compile(
-    robot: Manipulator,
+    robot: RobotLike,
     what: str,
     target: str = "vm",
     *,
@@ -76,7 +76,7 @@ def compile(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     what : str
         A function's name: `"inverse_dynamics"`, `"jacobian"`, ...; `pteron.kernels.FUNCTIONS` has
@@ -128,6 +128,7 @@ def compile(
     >>> kernel.operations, [port.name for port in kernel.ports]
     (409, ['pose', 'velocity', 'acceleration', 'parameters'])
     """
+    robot = as_manipulator(robot)
     if target not in TARGETS:
         raise ModelError(f"target: {target!r} is not known; choose from {', '.join(TARGETS)}")
     if grade not in get_args(Grade):
@@ -213,9 +214,9 @@ def _made(
     return kind(built.name, function, inputs, built.outputs, fixed, dtype, threads)
 
 
-def same_layout(one: Manipulator, other: Manipulator) -> bool:
+def same_layout(one: RobotLike, other: RobotLike) -> bool:
     """Return whether two machines have the same base parameters: layout and gravity are equal."""
-    return _layout(one) == _layout(other)
+    return _layout(as_manipulator(one)) == _layout(as_manipulator(other))
 
 
 def _layout(robot: Manipulator) -> tuple[Any, ...]:

@@ -39,3 +39,7 @@ __all__ = [
     "singular_orientations",
     "working_mode",
 ]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

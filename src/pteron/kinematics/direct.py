@@ -13,8 +13,8 @@ from pteron.kernels import Array
 from pteron.kinematics.assembly import every_pose, in_order, within_a_turn
 from pteron.kinematics.evaluate import checked, evaluated, place, unchecked
 from pteron.kinematics.singularities import is_singular_everywhere, singular_everywhere
-from pteron.manipulator import Manipulator
-from pteron.manipulator.manipulator import with_elbows
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.manipulator.variants import with_elbows
 from pteron.shapes import JointsLike, OnFailure, PerJoint, PoseLike, Poses
 
 _SAME_JOINT = 1e-6
@@ -23,7 +23,7 @@ where the other branch, which it is to tell apart, is no other."""
 
 
 def direct_kinematics(
-    robot: Manipulator,
+    robot: RobotLike,
     joints: JointsLike,
     *,
     all_branches: bool = False,
@@ -38,7 +38,7 @@ def direct_kinematics(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     joints : array, shape (..., n)
         Joint coordinates, m or rad.
@@ -77,6 +77,7 @@ def direct_kinematics(
     array([[0.01      , 0.02      , 0.03      , 0.        ],
            [0.01      , 0.02      , 0.03      , 3.14159265]])
     """
+    robot = as_manipulator(robot)
     if is_singular_everywhere(robot):
         raise singular_everywhere(robot)
     given = checked(robot, joints, "joints", on_failure)
@@ -95,13 +96,13 @@ def direct_kinematics(
 
 
 def assembly_mode(
-    robot: Manipulator, pose: PoseLike, *, all_branches: bool = False
+    robot: RobotLike, pose: PoseLike, *, all_branches: bool = False
 ) -> NDArray[np.int64]:
     """Return which of the poses with its joint coordinates a pose is.
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     pose : array, shape (..., m)
         Poses, m and rad.
@@ -129,6 +130,7 @@ def assembly_mode(
     >>> pteron.assembly_mode(robot, [[0.01, 0.02, 0.03, 0.0], [0.01, 0.02, 0.03, np.pi]])
     array([0, 1])
     """
+    robot = as_manipulator(robot)
     if is_singular_everywhere(robot):
         raise singular_everywhere(robot)
     given = checked(robot, pose, "pose")
@@ -136,12 +138,12 @@ def assembly_mode(
     return nearest(robot, _rows(robot, joints, all_branches=all_branches), given)
 
 
-def working_mode(robot: Manipulator, pose: PoseLike, joints: JointsLike) -> NDArray[np.int64]:
+def working_mode(robot: RobotLike, pose: PoseLike, joints: JointsLike) -> NDArray[np.int64]:
     """Return on which side the elbow of each leg is where a pose has given joint coordinates.
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     pose : array, shape (..., m)
         Poses, m and rad.
@@ -165,6 +167,7 @@ def working_mode(robot: Manipulator, pose: PoseLike, joints: JointsLike) -> NDAr
     array([[ 1,  1,  1],
            [-1, -1, -1]])
     """
+    robot = as_manipulator(robot)
     poses, given = checked(robot, pose, "pose", "nan"), checked(robot, joints, "joints", "nan")
     found = np.zeros(np.broadcast_shapes(poses.shape, given.shape), dtype=np.int64)
     own = [leg.elbow for leg in robot.legs]
@@ -175,13 +178,14 @@ def working_mode(robot: Manipulator, pose: PoseLike, joints: JointsLike) -> NDAr
     return found
 
 
-def assembly_modes(robot: Manipulator, joints: Array, *, all_branches: bool = False) -> Poses:
+def assembly_modes(robot: RobotLike, joints: Array, *, all_branches: bool = False) -> Poses:
     """Return the pose (..., k, m) of joint coordinates (..., n) in each assembly mode.
 
     Where the poses have a closed form they are not sorted, unlike those of `direct_kinematics`:
     along a motion each column is one mode, a side of the singularities. NaN where a mode has no
     pose, or one of other elbows.
     """
+    robot = as_manipulator(robot)
     closure = closure_of(robot)
     poses: Poses
     if closure.closed_form:
@@ -198,15 +202,20 @@ def assembly_modes(robot: Manipulator, joints: Array, *, all_branches: bool = Fa
     return poses
 
 
-@lru_cache(maxsize=64)
-def mode_of(robot: Manipulator, pose: tuple[float, ...]) -> int:
+def mode_of(robot: RobotLike, pose: tuple[float, ...]) -> int:
     """Return the column of `assembly_modes` that a pose is in."""
+    return _mode_of(as_manipulator(robot), pose)
+
+
+@lru_cache(maxsize=64)
+def _mode_of(robot: Manipulator, pose: tuple[float, ...]) -> int:
     joints: PerJoint = evaluated(robot, "inverse_kinematics", "raise", np.array(pose))
     return int(nearest(robot, assembly_modes(robot, joints, all_branches=True), np.array(pose)))
 
 
-def nearest(robot: Manipulator, poses: Array, pose: Array) -> NDArray[np.int64]:
+def nearest(robot: RobotLike, poses: Array, pose: Array) -> NDArray[np.int64]:
     """Return which of poses (..., k, m) is nearest to a pose (..., m), whole turns left out."""
+    robot = as_manipulator(robot)
     apart = poses - pose[..., None, :]
     lengths = len(robot.platform.directions)
     distance = np.linalg.norm(apart[..., :lengths], axis=-1)

@@ -16,7 +16,7 @@ from pteron.errors import DataError, PteronError, SingularPose, UnreachablePose
 from pteron.kernels import Array, Selects, as_array, needs_of, numeric
 from pteron.kernels.functions import TYPE_I, TYPE_II
 from pteron.kinematics.singularities import is_singular_everywhere, singular_everywhere
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import OnFailure
 
 _Outputs = TypeVar("_Outputs")
@@ -29,7 +29,7 @@ _MILLIMETRES = 20.0
 
 
 def evaluated(
-    robot: Manipulator,
+    robot: RobotLike,
     what: str,
     on_failure: OnFailure,
     *values: ArrayLike,
@@ -50,16 +50,14 @@ def evaluated(
         expect_choice(on_failure)
         if not good:
             if on_failure == "raise":
-                raise _failure(robot, what, values, status, wrench)
+                raise _failure(as_manipulator(robot), what, values, status, wrench)
             for result in results:
                 result[status == 0.0] = np.nan
     found: Any = results[0] if len(results) == 1 else tuple(results)
     return found  # type: ignore[no-any-return]
 
 
-def unchecked(
-    robot: Manipulator, what: str, *values: ArrayLike, base: Selects | None = None
-) -> Any:
+def unchecked(robot: RobotLike, what: str, *values: ArrayLike, base: Selects | None = None) -> Any:
     """Return the outputs of a function as they come: NaN, or what it may be, in a bad state."""
     *results, _ = numeric(robot, what, base=base)(*values)
     return results[0] if len(results) == 1 else tuple(results)

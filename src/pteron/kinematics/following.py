@@ -7,7 +7,7 @@ import numpy as np
 from pteron.errors import DataError, UnreachablePose
 from pteron.kernels import Array, Kernel, numeric
 from pteron.kinematics.evaluate import checked, unchecked
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import JointsLike, OnFailure, PerCoordinate, PoseLike
 
 _HALVINGS = 12
@@ -15,7 +15,7 @@ _HALVINGS = 12
 
 
 def follow(
-    robot: Manipulator, joints: JointsLike, start: PoseLike, *, on_failure: OnFailure = "raise"
+    robot: RobotLike, joints: JointsLike, start: PoseLike, *, on_failure: OnFailure = "raise"
 ) -> PerCoordinate:
     """Return the poses of joints that move, in one assembly mode: that of a pose to start from.
 
@@ -25,7 +25,7 @@ def follow(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     joints : array, shape (N, n)
         Joint coordinates along the motion, m or rad: close enough to tell the way between them,
@@ -55,6 +55,7 @@ def follow(
     >>> bool(np.allclose(pteron.follow(robot, joints, poses[0]), poses, atol=1e-12))
     True
     """
+    robot = as_manipulator(robot)
     given, pose = checked(robot, joints, "joints", on_failure), checked(robot, start, "start")
     if given.ndim != 2 or pose.ndim != 1:
         n = robot.freedom

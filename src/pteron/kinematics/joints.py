@@ -6,16 +6,16 @@ from dataclasses import dataclass
 
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import evaluated
-from pteron.manipulator import Manipulator
+from pteron.manipulator import RobotLike
 from pteron.shapes import OnFailure, PerJoint, PoseLike
 
 
-def joint_screws(robot: Manipulator, pose: PoseLike, *, on_failure: OnFailure = "raise") -> Array:
+def joint_screws(robot: RobotLike, pose: PoseLike, *, on_failure: OnFailure = "raise") -> Array:
     """Return the unit screws of every leg's joints about P, Eq. (8).
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     pose : array, shape (..., m)
         The poses, m and rad.
@@ -63,7 +63,7 @@ class JointMotion:
 
 
 def joint_rates(
-    robot: Manipulator, pose: PoseLike, velocity: PoseLike, *, on_failure: OnFailure = "raise"
+    robot: RobotLike, pose: PoseLike, velocity: PoseLike, *, on_failure: OnFailure = "raise"
 ) -> JointMotion:
     """Return the rates of all joints, passive ones included.
 
@@ -71,7 +71,7 @@ def joint_rates(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     pose, velocity : array, shape (..., m)
         The platform's motion; m, rad and s.
@@ -101,7 +101,7 @@ def joint_rates(
 
 
 def joint_accelerations(
-    robot: Manipulator,
+    robot: RobotLike,
     pose: PoseLike,
     velocity: PoseLike,
     acceleration: PoseLike,
@@ -112,7 +112,7 @@ def joint_accelerations(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     pose, velocity, acceleration : array, shape (..., m)
         The platform's motion; m, rad and s.

@@ -11,7 +11,7 @@ from pteron.equations.kinematics import passive_joints
 from pteron.equations.machine import Machine
 from pteron.kernels import Array, numeric
 from pteron.legs.leg import Passive
-from pteron.manipulator import Manipulator
+from pteron.manipulator import RobotLike, as_manipulator
 
 
 @dataclass(frozen=True)
@@ -49,8 +49,9 @@ class LimitedJoint:
         return f"at most {most}" if self.only_most else f"{told(self.least, self.unit)} to {most}"
 
 
-def limited_joints(robot: Manipulator, pose: Array) -> tuple[LimitedJoint, ...]:
+def limited_joints(robot: RobotLike, pose: Array) -> tuple[LimitedJoint, ...]:
     """Return all joints that have limits, actuated and passive, at a pose (m,) in reach."""
+    robot = as_manipulator(robot)
     joints = numeric(robot, "joint_coordinates")(pose)[0]
     angle, *legs = passive_joints(Machine.of(robot), ca.SX(ca.DM(pose)))
     found = [_limited(0, joint) for joint in angle]

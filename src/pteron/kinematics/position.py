@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import evaluated
-from pteron.manipulator import Manipulator
+from pteron.manipulator import RobotLike
 from pteron.shapes import Matrices, OnFailure, PerJoint, PoseLike, Vectors
 
 
 def inverse_kinematics(
-    robot: Manipulator, pose: PoseLike, *, on_failure: OnFailure = "raise"
+    robot: RobotLike, pose: PoseLike, *, on_failure: OnFailure = "raise"
 ) -> PerJoint:
     """Return the joint coordinates of poses, Eq. (4): rho of a slider, theta of a crank.
 
@@ -18,7 +18,7 @@ def inverse_kinematics(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine; its elbows choose the branch.
     pose : array, shape (..., m)
         (x, y, z, phi), or (x, y, z) for 3T; m and rad.
@@ -45,7 +45,7 @@ def inverse_kinematics(
 
 
 def link_vectors(
-    robot: Manipulator, pose: PoseLike, *, on_failure: OnFailure = "raise"
+    robot: RobotLike, pose: PoseLike, *, on_failure: OnFailure = "raise"
 ) -> tuple[Vectors, Vectors]:
     """Return the vectors of the upper links or cranks, and of the lower links or rods.
 
@@ -53,7 +53,7 @@ def link_vectors(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine; its elbows choose the branch.
     pose : array, shape (..., m)
         The poses, m and rad.
@@ -75,12 +75,12 @@ def link_vectors(
     return evaluated(robot, "link_vectors", on_failure, pose)
 
 
-def jacobian(robot: Manipulator, pose: PoseLike, *, on_failure: OnFailure = "raise") -> Matrices:
+def jacobian(robot: RobotLike, pose: PoseLike, *, on_failure: OnFailure = "raise") -> Matrices:
     """Return the input-output Jacobian J, with joint rates = J @ velocity, Eq. (10).
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     pose : array, shape (..., m)
         The poses, m and rad.
@@ -112,13 +112,13 @@ def jacobian(robot: Manipulator, pose: PoseLike, *, on_failure: OnFailure = "rai
 
 
 def link_jacobians(
-    robot: Manipulator, pose: PoseLike, *, on_failure: OnFailure = "raise"
+    robot: RobotLike, pose: PoseLike, *, on_failure: OnFailure = "raise"
 ) -> tuple[Array, Array]:
     """Return the link Jacobians J_u and J_l, Eqs. (11) and (12).
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     pose : array, shape (..., m)
         The poses, m and rad.

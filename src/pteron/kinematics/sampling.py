@@ -11,7 +11,7 @@ from pteron.equations.kinematics import passive_joints
 from pteron.equations.machine import Machine
 from pteron.errors import DataError, ModelError
 from pteron.kernels import Array, numeric
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import Poses
 
 _BATCH = 4096
@@ -25,7 +25,7 @@ _SELDOM = 0.1
 
 
 def random_poses(
-    robot: Manipulator,
+    robot: RobotLike,
     count: int,
     *,
     seed: int | np.random.Generator = 0,
@@ -40,7 +40,7 @@ def random_poses(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     count : int
         How many poses.
@@ -71,6 +71,7 @@ def random_poses(
     >>> pteron.random_poses(pteron.load("quadrupteron"), 5).shape
     (5, 4)
     """
+    robot = as_manipulator(robot)
     if isinstance(count, bool) or not isinstance(count, (int, np.integer)):
         raise DataError(f"count: {count!r} given, a whole number expected")
     if count < 0:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from pteron.equations.machine import closure_of
 from pteron.errors import DataError, ModelError, SingularPose
 from pteron.kernels import Array, as_array, numeric
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _VANISHING = 1e-10
 _SAMPLES = 64
@@ -37,8 +37,7 @@ _ZERO = 1e-9
 """The measure where its sign changes, but for rounding."""
 
 
-@lru_cache(maxsize=256)
-def is_singular_everywhere(robot: Manipulator) -> bool:
+def is_singular_everywhere(robot: RobotLike) -> bool:
     """Say whether det J vanishes at every pose.
 
     So it does, for one, where the rows of all legs lie in a plane, and for P-R-R-R layouts with
@@ -46,13 +45,18 @@ def is_singular_everywhere(robot: Manipulator) -> bool:
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
 
     Returns
     -------
     bool
     """
+    return _is_singular_everywhere(as_manipulator(robot))
+
+
+@lru_cache(maxsize=256)
+def _is_singular_everywhere(robot: Manipulator) -> bool:
     known = closure_of(robot).vanishes()
     if known is not None:
         return known
@@ -96,7 +100,7 @@ def best_type_ii(robot: Manipulator) -> float:
     return float(max(improved)) or 1.0
 
 
-def singular_orientations(robot: Manipulator, position: ArrayLike | None = None) -> Array:
+def singular_orientations(robot: RobotLike, position: ArrayLike | None = None) -> Array:
     """Return the orientations of the platform that are singular (type II), at a position.
 
     For P-R-R-R legs under a 3T1R platform det J is a multiple of A cos(phi) + B sin(phi), whatever
@@ -105,7 +109,7 @@ def singular_orientations(robot: Manipulator, position: ArrayLike | None = None)
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     position : array, shape (k,), optional
         The pose's lengths, k = 2 or 3, m. Without it only such orientations are returned as are
@@ -129,6 +133,7 @@ def singular_orientations(robot: Manipulator, position: ArrayLike | None = None)
     >>> np.degrees(pteron.singular_orientations(pteron.load("quadrupteron")))
     array([-90.,  90.])
     """
+    robot = as_manipulator(robot)
     if is_singular_everywhere(robot):
         raise singular_everywhere(robot)
     given = None

@@ -1,13 +1,8 @@
 """What a robot is: legs, platform and gravity as a value, its TOML files, and the catalog."""
 
-from pteron.manipulator.files import catalog, load, save
-from pteron.manipulator.manipulator import (
-    STANDARD_GRAVITY,
-    Manipulator,
-    expect_manipulator,
-    turned,
-    working_modes,
-)
+from pteron.manipulator.files import catalog, load
+from pteron.manipulator.given import RobotLike, as_manipulator
+from pteron.manipulator.manipulator import STANDARD_GRAVITY, Manipulator
 from pteron.manipulator.parameters import (
     parameter_data,
     parameter_names,
@@ -15,12 +10,15 @@ from pteron.manipulator.parameters import (
     parameters,
     with_parameters,
 )
+from pteron.manipulator.saving import save
+from pteron.manipulator.variants import turned, working_modes
 
 __all__ = [
     "STANDARD_GRAVITY",
     "Manipulator",
+    "RobotLike",
+    "as_manipulator",
     "catalog",
-    "expect_manipulator",
     "load",
     "parameter_data",
     "parameter_names",
@@ -31,3 +29,7 @@ __all__ = [
     "with_parameters",
     "working_modes",
 ]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

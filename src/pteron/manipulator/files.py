@@ -1,24 +1,23 @@
-"""Manipulators in TOML files: `load` reads one, by catalog name or path, and `save` writes one."""
+"""Manipulators in TOML files: `load` reads one, by catalog name or path."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field, is_dataclass
+from dataclasses import dataclass, field
 from difflib import get_close_matches
-from functools import partial
+from functools import lru_cache, partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pteron.atomic import write_text
 from pteron.bodies.vectors import unit_vector, vector
 from pteron.errors import ModelError, shown
 from pteron.legs import KINDS, LegKind
 from pteron.legs.circles import perpendicular_to
 from pteron.manipulator.manipulator import Manipulator, faults_of
 from pteron.platforms import Bar, Geared, Platform
-from pteron.toml import fault_lines, parsed_toml, read_toml, told
+from pteron.toml import fault_lines, parsed_toml, told, toml_bytes
 
 _Built = TypeVar("_Built")
 
@@ -27,6 +26,11 @@ _DEFAULT_KIND = "PRRR"
 
 def catalog() -> tuple[str, ...]:
     """Return the names of the machines that come with Pteron."""
+    return _names()
+
+
+@lru_cache(maxsize=1)
+def _names() -> tuple[str, ...]:
     folder = files("pteron.manipulator") / "catalog"
     return tuple(sorted(f.name[:-5] for f in folder.iterdir() if f.name.endswith(".toml")))
 
@@ -56,7 +60,13 @@ def load(name_or_path: str | Path) -> Manipulator:
     >>> pteron.load("tripteron").coordinates
     ('x', 'y', 'z')
     """
-    return _machine(document(name_or_path), str(name_or_path))
+    return _loaded(*_contents(name_or_path), str(name_or_path))
+
+
+@lru_cache(maxsize=64)
+def _loaded(data: bytes, source: str, given: str) -> Manipulator:
+    """Return the machine of a file's contents: what was read once is not read again."""
+    return _machine(parsed_toml(data, source, ModelError), given)
 
 
 def document(name_or_path: str | Path) -> dict[str, Any]:
@@ -67,15 +77,20 @@ def document(name_or_path: str | Path) -> dict[str, Any]:
     ModelError
         If there is no such file, or it is not TOML.
     """
+    return parsed_toml(*_contents(name_or_path), ModelError)
+
+
+def _contents(name_or_path: str | Path) -> tuple[bytes, str]:
+    """Return the bytes of a machine's file, and what messages call it."""
     name = str(name_or_path)
     if name in catalog():
         resource = files("pteron.manipulator") / "catalog" / f"{name}.toml"
-        return parsed_toml(resource.read_bytes(), name, ModelError)
+        return resource.read_bytes(), name
     close = get_close_matches(name, catalog(), n=1)
     guess = f'; did you mean "{close[0]}"?' if close else ""
     names = ", ".join(catalog())
     absent = f"neither a file nor a machine of the catalog ({names}){guess}"
-    return read_toml(name_or_path, ModelError, absent)
+    return toml_bytes(name_or_path, ModelError, absent)
 
 
 def explained(name_or_path: str | Path) -> str:
@@ -225,46 +240,3 @@ class _Reading:
         leg, faults = leg_of(kind, self.table(leg_table(kind), given, prefix))
         self.faults += [prefix + fault for fault in faults]
         return leg
-
-
-def save(robot: Manipulator, path: str | Path) -> Path:
-    """Write a manipulator to a TOML file that `load` reads back without loss.
-
-    Parameters
-    ----------
-    robot : Manipulator
-        The machine.
-    path : str or path
-        The file; it is replaced whole, or not at all.
-
-    Returns
-    -------
-    Path
-        The file written.
-
-    Raises
-    ------
-    OutputError
-        If the file cannot be written.
-    """
-    from pteron.manipulator.tables import leg_items
-    from pteron.manipulator.writing import written
-
-    x, _, axis = robot.platform.frame
-    platform: dict[str, Any] = {"motion": robot.platform.motion, "axis": axis, "x_axis": x}
-    platform |= {"tool": robot.platform.tool, **asdict(robot.platform.inertia)}
-    for name in ("slides", "limits", "bars", "geared"):
-        if given := getattr(robot.platform, name):
-            platform[name] = given
-    legs = [{k: v for k, v in leg_items(leg).items() if v is not None} for leg in robot.legs]
-    machine = {"name": robot.name, "gravity": robot.gravity, "platform": platform, "legs": legs}
-    return write_text(path, written(_plain(machine)))
-
-
-def _plain(value: Any) -> Any:
-    """Return what a file holds: a body as a table, a tuple as a list."""
-    if isinstance(value, dict):
-        return {key: _plain(one) for key, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
-    return asdict(value) if is_dataclass(value) and not isinstance(value, type) else value

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -20,8 +19,6 @@ from pteron.toml import told
 
 _VANISHING = 1e-9
 """Singular value of unit vectors below which they do not span another direction."""
-
-_ORTHOGONAL = 1e-9
 
 _COINCIDENT = 1e-9
 """m between points that are taken for one."""
@@ -105,13 +102,6 @@ class Manipulator:
     def force_names(self) -> tuple[str, ...]:
         """Names of the actuator forces: force1 of a slider, torque1 of a crank."""
         return tuple(f"{leg.joint.force}{i}" for i, leg in enumerate(self.legs, start=1))
-
-
-def expect_manipulator(robot: object) -> None:
-    """Refuse what is no manipulator, such as the name of one."""
-    if not isinstance(robot, Manipulator):
-        given = repr(robot) if isinstance(robot, str) else type(robot).__name__
-        raise ModelError(f"robot: {given} given, a Manipulator expected; pteron.load gives one")
 
 
 def faults_of(name: object, platform: Platform, legs: Sequence[LegKind | None]) -> list[str]:
@@ -224,77 +214,3 @@ def _complement(axes: ArrayLike) -> NDArray[np.float64]:
     _, sizes, rows = np.linalg.svd(matrix) if len(matrix) else (None, np.zeros(0), np.eye(3))
     complement: NDArray[np.float64] = rows[int((sizes > _VANISHING).sum()) :]
     return complement
-
-
-def working_modes(robot: Manipulator) -> tuple[Manipulator, ...]:
-    """Return the working modes of a manipulator: every choice of its elbows' sides, 2^n for n legs.
-
-    Parameters
-    ----------
-    robot : Manipulator
-        The machine; its own choice of elbows is one of those returned.
-
-    Returns
-    -------
-    tuple of Manipulator
-        In binary order of the elbows, leg 1 first: all +1 comes first, all -1 last.
-
-    Examples
-    --------
-    >>> import pteron
-    >>> modes = pteron.working_modes(pteron.load("quadrupteron"))
-    >>> len(modes), [leg.elbow for leg in modes[1].legs]
-    (16, [1, 1, 1, -1])
-    """
-    branches = (leg.branches for leg in robot.legs)
-    return tuple(with_elbows(robot, signs) for signs in product(*branches))
-
-
-def with_elbows(robot: Manipulator, signs: Sequence[int]) -> Manipulator:
-    """Return the machine in the working mode that has these elbows, +1 or -1 for each leg."""
-    legs = zip(robot.legs, signs, strict=True)
-    return replace(robot, legs=tuple(replace(leg, elbow=sign) for leg, sign in legs))
-
-
-def turned(robot: Manipulator, rotation: ArrayLike, *, gravity: bool = True) -> Manipulator:
-    """Return the machine turned as a whole about the base frame's origin.
-
-    Parameters
-    ----------
-    robot : Manipulator
-        The machine.
-    rotation : array, shape (3, 3)
-        A rotation matrix R; a point at x goes to R x.
-    gravity : bool
-        Whether gravity turns too, which only renames the base frame's axes and changes no force.
-        False mounts the machine otherwise: on a wall, upside down.
-
-    Returns
-    -------
-    Manipulator
-        The turned machine. The pose (p, phi) of the first is (R p, phi) of the second.
-
-    Raises
-    ------
-    ModelError
-        If the matrix is not a rotation.
-    """
-    try:
-        matrix = np.asarray(rotation, dtype=float)
-    except (TypeError, ValueError):
-        raise ModelError("rotation: not an array of real numbers") from None
-    if matrix.shape != (3, 3) or not np.allclose(matrix @ matrix.T, np.eye(3), atol=_ORTHOGONAL):
-        raise ModelError(f"rotation: not an orthogonal 3x3 matrix: {matrix.tolist()}")
-    if np.linalg.det(matrix) < 0:
-        raise ModelError("rotation: the matrix is a reflection (determinant -1); negate one column")
-
-    def turn(v: Vector) -> Vector:
-        return vector((matrix @ v).tolist(), "rotation")
-
-    x, _, axis = robot.platform.frame
-    return replace(
-        robot,
-        platform=replace(robot.platform, axis=turn(axis), x_axis=turn(x)),
-        legs=tuple(leg.turned(turn) for leg in robot.legs),
-        gravity=turn(robot.gravity) if gravity else robot.gravity,
-    )

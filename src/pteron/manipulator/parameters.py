@@ -13,17 +13,18 @@ from numpy.typing import ArrayLike, NDArray
 from pteron.bodies.inertia import Inertia
 from pteron.bodies.parameters import PLATFORM, Parameter, parameter_list
 from pteron.errors import ModelError
+from pteron.manipulator.given import RobotLike, as_manipulator
 from pteron.manipulator.manipulator import Manipulator
 
 
 def parameter_data(
-    robot: Manipulator, groups: Sequence[tuple[int, ...]] | None = None
+    robot: RobotLike, groups: Sequence[tuple[int, ...]] | None = None
 ) -> tuple[Parameter, ...]:
     """Return the inertial parameters as data: kind, body, legs and unit of each.
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     groups : sequence of tuple of int, optional
         Legs, counted from 1, that share one parameter set; every leg in one group. By default each
@@ -40,6 +41,7 @@ def parameter_data(
     >>> p.kind, p.body, p.legs, p.unit, p.name
     ('mgx', 'u', (1,), 'kg m', 'mgx_u1')
     """
+    robot = as_manipulator(robot)
     kinds = tuple(tuple((b, i.kinds) for b, i in leg.bodies.items()) for leg in robot.legs)
     return _listed(kinds, None if groups is None else tuple(groups))
 
@@ -52,12 +54,12 @@ def _listed(
     return parameter_list([dict(bodies) for bodies in kinds], groups)
 
 
-def parameter_names(robot: Manipulator) -> tuple[str, ...]:
+def parameter_names(robot: RobotLike) -> tuple[str, ...]:
     """Return the names of the N inertial parameters, in the paper's order (Eq. 16).
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
 
     Returns
@@ -74,20 +76,22 @@ def parameter_names(robot: Manipulator) -> tuple[str, ...]:
     >>> len(names), names[4:8]
     (40, ('m_u1', 'mgx_u1', 'mgy_u1', 'I_u1'))
     """
+    robot = as_manipulator(robot)
     return tuple(parameter.name for parameter in parameter_data(robot))
 
 
-def parameter_units(robot: Manipulator) -> tuple[str, ...]:
+def parameter_units(robot: RobotLike) -> tuple[str, ...]:
     """Return the SI unit of each parameter, in the order of `parameter_names`."""
+    robot = as_manipulator(robot)
     return tuple(parameter.unit for parameter in parameter_data(robot))
 
 
-def parameters(robot: Manipulator) -> NDArray[np.float64]:
+def parameters(robot: RobotLike) -> NDArray[np.float64]:
     """Return the values of the N inertial parameters, in the order of `parameter_names`.
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
 
     Returns
@@ -95,18 +99,19 @@ def parameters(robot: Manipulator) -> NDArray[np.float64]:
     array, shape (N,)
         kg, kg m and kg m^2.
     """
+    robot = as_manipulator(robot)
     legs = [leg.bodies for leg in robot.legs]
     listed = parameter_data(robot)
     bodies = (legs[p.legs[0] - 1][p.body] if p.legs else robot.platform.joined for p in listed)
     return np.array([b.values[b.kinds.index(p.kind)] for p, b in zip(listed, bodies, strict=True)])
 
 
-def with_parameters(robot: Manipulator, values: ArrayLike) -> Manipulator:
+def with_parameters(robot: RobotLike, values: ArrayLike) -> Manipulator:
     """Return the same machine with other inertial parameters.
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     values : array, shape (N,)
         The parameters in the order of `parameter_names`, SI units.
@@ -121,6 +126,7 @@ def with_parameters(robot: Manipulator, values: ArrayLike) -> Manipulator:
     ModelError
         If their number is wrong, or if they belong to no real bodies.
     """
+    robot = as_manipulator(robot)
     try:
         vector = np.asarray(np.ma.filled(values, np.nan), dtype=float)
     except (TypeError, ValueError):

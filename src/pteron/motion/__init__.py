@@ -76,3 +76,7 @@ __all__ = [
     "time_optimal",
     "with_payload",
 ]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

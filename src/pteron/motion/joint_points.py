@@ -12,7 +12,7 @@ from pteron.kinematics import inverse_kinematics
 from pteron.kinematics.evaluate import evaluated
 from pteron.legs import LegKind
 from pteron.legs.kind import SLIDER
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PerJoint, PoseLike
 
 _SAME = 1e-9
@@ -97,12 +97,12 @@ class Guide:
     path: Array
 
 
-def joint_points(robot: Manipulator, pose: PoseLike) -> JointPoints:
+def joint_points(robot: RobotLike, pose: PoseLike) -> JointPoints:
     """Return where the joints are.
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine; its elbows choose the branch.
     pose : array, shape (..., m)
         The poses, m and rad.
@@ -126,6 +126,7 @@ def joint_points(robot: Manipulator, pose: PoseLike) -> JointPoints:
            [0.  , 0.  , 0.05],
            [0.05, 0.  , 0.  ]])
     """
+    robot = as_manipulator(robot)
     given = np.asarray(pose, dtype=float)
     coordinates = inverse_kinematics(robot, given)
     chain: Array = evaluated(robot, "joint_points", "raise", given)
@@ -197,7 +198,7 @@ def _distinct(points: Array) -> Array:
     return points[[bool(apart[i, :i].all()) for i in range(len(points))]]
 
 
-def joint_guides(robot: Manipulator, poses: PoseLike) -> tuple[Guide, ...]:
+def joint_guides(robot: RobotLike, poses: PoseLike) -> tuple[Guide, ...]:
     """Return where each actuated joint lets its body go, for pictures.
 
     Within the joints' limits; a guide without limits is a little longer than the poses need, a
@@ -205,7 +206,7 @@ def joint_guides(robot: Manipulator, poses: PoseLike) -> tuple[Guide, ...]:
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     poses : array, shape (..., m)
         At least one pose, m and rad.
@@ -222,6 +223,7 @@ def joint_guides(robot: Manipulator, poses: PoseLike) -> tuple[Guide, ...]:
     >>> joint_guides(pteron.load("tripteron"), [0.0, 0.0, 0.0])[0].path[:, 0]
     array([-0.3,  0.3])
     """
+    robot = as_manipulator(robot)
     points = joint_points(robot, np.reshape(poses, (-1, robot.freedom)))
     found = []
     for i, leg in enumerate(robot.legs):

@@ -6,15 +6,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pteron.legs import Drive
-from pteron.manipulator import Manipulator
+from pteron.manipulator import RobotLike, as_manipulator
 
 
-def overloads(robot: Manipulator, forces: ArrayLike, speeds: ArrayLike) -> tuple[str, ...]:
+def overloads(robot: RobotLike, forces: ArrayLike, speeds: ArrayLike) -> tuple[str, ...]:
     """Return which drives a motion exceeds, one line each; nothing where a leg has no limit.
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine; limits are each drive's `max_force` and `max_speed`.
     forces : array, shape (..., n)
         Of the drives, such as `drive_forces` returns: friction and motors count. N, N m.
@@ -35,6 +35,7 @@ def overloads(robot: Manipulator, forces: ArrayLike, speeds: ArrayLike) -> tuple
     >>> overloads(replace(robot, legs=legs), [[3.0, -25.0, 8.0]], [[0.1, 0.2, 0.3]])
     ('leg 2: the motion takes up to 25 N, but its drive gives 20 N (max_force)',)
     """
+    robot = as_manipulator(robot)
     found = []
     peaks = [np.abs(np.atleast_2d(v)).reshape(-1, robot.freedom) for v in (forces, speeds)]
     # Rows that no pose serves are NaN.

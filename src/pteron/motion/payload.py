@@ -7,10 +7,10 @@ from dataclasses import replace
 
 from pteron.bodies.inertia import PlanarInertia
 from pteron.errors import DataError, ModelError
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 
-def with_payload(robot: Manipulator, mass: float) -> Manipulator:
+def with_payload(robot: RobotLike, mass: float) -> Manipulator:
     """Return the machine with a point mass at the tool's centre point.
 
     It is the same machine whose platform is heavier: m + m_L, m gamma + m_L s and I + m_L |s|^2,
@@ -18,7 +18,7 @@ def with_payload(robot: Manipulator, mass: float) -> Manipulator:
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     mass : float
         Of the payload m_L, kg; 0 or more.
@@ -43,6 +43,7 @@ def with_payload(robot: Manipulator, mass: float) -> Manipulator:
     >>> with_payload(robot, 0.5).platform.inertia.mass
     1.3
     """
+    robot = as_manipulator(robot)
     try:
         carried = float(mass)
     except (TypeError, ValueError):

@@ -20,3 +20,7 @@ def equations_class(platform: Platform) -> type[PlatformEquations]:
 
 
 __all__ = ["Bar", "Geared", "Platform", "PlatformEquations", "equations_class"]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -45,3 +45,7 @@ __all__ = [
     "tracking_figure",
     "svg_file",
 ]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

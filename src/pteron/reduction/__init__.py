@@ -22,3 +22,7 @@ __all__ = [
     "cheapest_parameters",
     "model_forms",
 ]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -15,7 +15,7 @@ from pteron.equations.virtual_work import inverse_dynamics
 from pteron.kernels import Array, Port, count_operations, program
 from pteron.kernels.graph import graph_of
 from pteron.kernels.hoisting import hoisted
-from pteron.manipulator import Manipulator, parameter_data
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator, parameter_data
 from pteron.reduction.find import base_parameters
 from pteron.reduction.result import BaseParameters
 
@@ -23,8 +23,7 @@ _NONZERO = 1e-9
 """Pivots of the grouping, whose entries are of order one in lengths of a link, are larger."""
 
 
-@lru_cache(maxsize=32)
-def cheapest_parameters(robot: Manipulator) -> BaseParameters:
+def cheapest_parameters(robot: RobotLike) -> BaseParameters:
     """Return base parameters with which the inverse dynamics need fewest operations.
 
     Any invertible combination of a base set is a base set. The masses that the lower links' m and
@@ -35,7 +34,7 @@ def cheapest_parameters(robot: Manipulator) -> BaseParameters:
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine; geometry and gravity matter, its inertial parameters do not.
 
     Returns
@@ -56,6 +55,11 @@ def cheapest_parameters(robot: Manipulator) -> BaseParameters:
     >>> base.rank, pteron.compile(robot, "inverse_dynamics", base=base).operations
     (26, 323)
     """
+    return _cheapest_parameters(as_manipulator(robot))
+
+
+@lru_cache(maxsize=32)
+def _cheapest_parameters(robot: Manipulator) -> BaseParameters:
     columns = parameter_data(robot)
     base = base_parameters(robot)
     grouping = _without_units(robot, base)

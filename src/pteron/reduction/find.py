@@ -7,7 +7,7 @@ from typing import Literal, get_args
 
 from pteron.bodies.parameters import Parameter
 from pteron.errors import ModelError
-from pteron.manipulator import Manipulator
+from pteron.manipulator import RobotLike, as_manipulator
 from pteron.reduction.exact import exact_grouping
 from pteron.reduction.grouping import Grouping
 from pteron.reduction.numerical import qr_grouping, svd_grouping
@@ -21,7 +21,7 @@ _NUMERICAL: dict[str, Callable[..., Grouping]] = {"svd": svd_grouping, "qr": qr_
 
 
 def base_parameters(
-    robot: Manipulator,
+    robot: RobotLike,
     method: Method = "exact",
     keep: Sequence[str] | None = None,
     *,
@@ -36,7 +36,7 @@ def base_parameters(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine; geometry and gravity matter, its inertial parameters do not.
     method : {"exact", "svd", "qr"}
         Exact arithmetic with a certificate (the default), or the two numerical methods of the
@@ -76,6 +76,7 @@ def base_parameters(
     >>> base.expressions(symbols=True)[0]
     'm_p1 + m_u1 + (1/ll1^2) I_l1'
     """
+    robot = as_manipulator(robot)
     if method not in get_args(Method):
         raise ModelError(f"method: {method!r} is not one of {', '.join(get_args(Method))}")
     columns, sharing = share(robot, leg_groups(robot, shared))

@@ -5,13 +5,13 @@ from __future__ import annotations
 from pteron.errors import ModelError
 from pteron.kernels import OTHER_LAYOUT, same_layout
 from pteron.kinematics.evaluate import evaluated
-from pteron.manipulator import Manipulator
+from pteron.manipulator import RobotLike, as_manipulator
 from pteron.reduction.result import BaseParameters
 from pteron.shapes import OnFailure, PoseLike, Regressors
 
 
 def base_regressor(
-    robot: Manipulator,
+    robot: RobotLike,
     base: BaseParameters,
     pose: PoseLike,
     velocity: PoseLike,
@@ -23,7 +23,7 @@ def base_regressor(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     base : BaseParameters
         Its base parameters, from `base_parameters`.
@@ -57,6 +57,7 @@ def base_regressor(
     >>> np.allclose(forces, pteron.inverse_dynamics(robot, *state))
     True
     """
+    robot = as_manipulator(robot)
     if base.robot is not robot and not same_layout(base.robot, robot):
         raise ModelError(OTHER_LAYOUT.format(base.robot.name, robot.name))
     motion = pose, velocity, acceleration

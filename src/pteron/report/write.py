@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 from pteron.atomic import write_texts
 from pteron.errors import OutputError
-from pteron.manipulator import Manipulator
+from pteron.manipulator import RobotLike, as_manipulator
 
 if TYPE_CHECKING:
     from pteron.report.contents import Report
 
 
-def write_report(robot: Manipulator, folder: str | Path) -> Path:
+def write_report(robot: RobotLike, folder: str | Path) -> Path:
     """Write the report on a machine: `report.html`, one page that needs no other file or network.
 
     `report.json` beside it holds the numbers. Each file is written whole or not at all, and the
@@ -24,7 +24,7 @@ def write_report(robot: Manipulator, folder: str | Path) -> Path:
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     folder : str or path
         Where to write; made if it is missing.
@@ -43,6 +43,7 @@ def write_report(robot: Manipulator, folder: str | Path) -> Path:
     SingularPose
         If the machine is singular at every pose.
     """
+    robot = as_manipulator(robot)
     # Matplotlib, SciPy and SymPy are behind these; the table of the paper needs none of them.
     from pteron.report.contents import contents
     from pteron.report.page import page

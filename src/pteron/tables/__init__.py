@@ -34,3 +34,7 @@ __all__ = [
     "table_bytes",
     "write_table",
 ]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

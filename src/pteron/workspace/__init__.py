@@ -22,3 +22,7 @@ __all__ = [
     "reserve",
     "joint_ranges",
 ]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -11,7 +11,7 @@ from scipy.optimize import minimize  # type: ignore[import-untyped]
 from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kinematics import inverse_kinematics, random_poses, singular_orientations
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import Numbers
 from pteron.workspace.limits import beyond_limits, nowhere
 from pteron.workspace.reserve import reserve
@@ -35,7 +35,7 @@ _MIDDLE = 0.9
 """The share that the middle between equals must have: from there the machine goes every way."""
 
 
-def home_pose(robot: Manipulator) -> Array:
+def home_pose(robot: RobotLike) -> Array:
     """Return the pose with the best reserve, rounded where that costs next to nothing.
 
     The reserve is the smallest of the type-I and type-II measures and of the joints' clearances
@@ -45,7 +45,7 @@ def home_pose(robot: Manipulator) -> Array:
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
 
     Returns
@@ -69,6 +69,7 @@ def home_pose(robot: Manipulator) -> Array:
     >>> home_pose(pteron.load("quadrupteron"))
     array([0., 0., 0., 0.])
     """
+    robot = as_manipulator(robot)
     singular_orientations(robot)  # refuses a machine that is singular everywhere
     drawn = _random_poses(robot)
     order = np.argsort(-_worth(robot, drawn), kind="stable")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pteron.errors import DataError
 from pteron.kernels import Array, numeric
 from pteron.kinematics.evaluate import checked
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike
 from pteron.workspace.reserve import room_to_limits
 from pteron.workspace.volume import bounding_box
@@ -63,7 +63,7 @@ def slice_planes(robot: Manipulator) -> tuple[Plane, ...]:
 
 
 def reach_slice(
-    robot: Manipulator,
+    robot: RobotLike,
     center: PoseLike,
     plane: Plane = "xy",
     *,
@@ -74,7 +74,7 @@ def reach_slice(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     center : array, shape (m,)
         The pose the slice goes through, m and rad.
@@ -105,6 +105,7 @@ def reach_slice(
     >>> cut.status[1, 1], cut.margin[1, 1].round(3)
     (np.int64(0), np.float64(0.095))
     """
+    robot = as_manipulator(robot)
     planes = slice_planes(robot)
     if plane not in planes:
         valid = ", ".join(f'"{one}"' for one in planes)

@@ -13,7 +13,7 @@ from pteron.errors import DataError
 from pteron.kernels import Array, numeric
 from pteron.kinematics import inverse_kinematics
 from pteron.kinematics.singularities import best_type_ii
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import Numbers, PerJoint, PoseLike
 
 
@@ -42,12 +42,12 @@ class Reserve:
     smallest: Numbers
 
 
-def reserve(robot: Manipulator, pose: PoseLike) -> Reserve:
+def reserve(robot: RobotLike, pose: PoseLike) -> Reserve:
     """Return the reserves of poses, in reach or not.
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     pose : array, shape (..., m)
         The poses, m and rad.
@@ -63,6 +63,7 @@ def reserve(robot: Manipulator, pose: PoseLike) -> Reserve:
     >>> reserve(pteron.load("quadrupteron"), [0.0, 0.0, 0.0, 0.0]).type_i.round(3)
     array([1.   , 1.   , 0.991, 1.   ])
     """
+    robot = as_manipulator(robot)
     facts = _facts(robot)
     margin, measure, _, _ = numeric(robot, "reach")(pose)
     # A shaft without lengths reaches everywhere.
@@ -135,12 +136,12 @@ class JointRanges:
     within: NDArray[np.bool_]
 
 
-def joint_ranges(robot: Manipulator, poses: PoseLike) -> JointRanges:
+def joint_ranges(robot: RobotLike, poses: PoseLike) -> JointRanges:
     """Return the least and the greatest joint coordinate over poses.
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     poses : array, shape (..., m)
         At least one pose, m and rad.
@@ -164,6 +165,7 @@ def joint_ranges(robot: Manipulator, poses: PoseLike) -> JointRanges:
     >>> ranges.greatest, bool(ranges.within.all())
     (array([0.1, 0.1, 0. ]), True)
     """
+    robot = as_manipulator(robot)
     joints = inverse_kinematics(robot, poses).reshape(-1, robot.freedom)
     if not len(joints):
         raise DataError("poses: none given, at least one expected")

@@ -12,7 +12,7 @@ from pteron.errors import DataError, ModelError
 from pteron.kernels import Array, numeric
 from pteron.kinematics.evaluate import checked
 from pteron.kinematics.sampling import search_ball
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike
 from pteron.workspace.reserve import room_to_limits
 
@@ -75,7 +75,7 @@ class ReachVolume:
     count: int
 
 
-def bounding_box(robot: Manipulator, pose: PoseLike) -> Array:
+def bounding_box(robot: RobotLike, pose: PoseLike) -> Array:
     """Return the box that bounds all positions in reach at the orientation of a pose.
 
     Random positions in reach are moved to each side: at first at random, ever nearer about those
@@ -83,7 +83,7 @@ def bounding_box(robot: Manipulator, pose: PoseLike) -> Array:
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     pose : array, shape (m,)
         Gives the orientation, and where the search starts; m and rad.
@@ -106,6 +106,7 @@ def bounding_box(robot: Manipulator, pose: PoseLike) -> Array:
     array([[-0.17, -0.17, -0.17],
            [ 0.3 ,  0.3 ,  0.3 ]])
     """
+    robot = as_manipulator(robot)
     given = checked(robot, pose, "pose")
     count = len(robot.platform.lengths)
 
@@ -204,7 +205,7 @@ def _furthest(room: Callable[[Array], Array], start: Array, objective: Array) ->
 
 
 def reach_volume(
-    robot: Manipulator, pose: PoseLike, *, count: int = 50_000, seed: int = 0
+    robot: RobotLike, pose: PoseLike, *, count: int = 50_000, seed: int = 0
 ) -> ReachVolume:
     """Return the volume in reach at the orientation of a pose, by random positions in its box.
 
@@ -212,7 +213,7 @@ def reach_volume(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     pose : array, shape (m,)
         Gives the orientation, and where the search for the box starts; m and rad.
@@ -232,6 +233,7 @@ def reach_volume(
     DataError
         If there are no samples.
     """
+    robot = as_manipulator(robot)
     if count < 1:
         raise DataError(f"count: {count} given, at least 1 expected")
     given = checked(robot, pose, "pose")

@@ -23,3 +23,7 @@ __all__ = [
     "pinocchio_model",
     "tree",
 ]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -31,7 +31,7 @@ from pteron.export.engines.writing import (
 )
 from pteron.kernels import Array
 from pteron.kernels.code import rendered
-from pteron.manipulator import Manipulator
+from pteron.manipulator import RobotLike, as_manipulator
 from pteron.shapes import PoseLike
 
 STEP = 2e-4
@@ -44,7 +44,7 @@ _SAME = 1e-6
 
 
 def export_mjcf(
-    robot: Manipulator, folder: str | Path = ".", *, home: PoseLike | None = None
+    robot: RobotLike, folder: str | Path = ".", *, home: PoseLike | None = None
 ) -> list[Path]:
     """Write a machine for MuJoCo: bodies, looks, closed loops, drives, and a keyframe.
 
@@ -55,7 +55,7 @@ def export_mjcf(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     folder : path
         Where the file goes; it is made if it is missing.
@@ -83,6 +83,7 @@ def export_mjcf(
     >>> [path.name for path in files]
     ['delta.xml']
     """
+    robot = as_manipulator(robot)
     return write_texts(folder, {f"{identifier(robot)}.xml": mjcf(tree(robot, home))})
 
 

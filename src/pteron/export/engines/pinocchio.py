@@ -29,12 +29,12 @@ from pteron.export.engines.writing import (
 )
 from pteron.kernels import Array
 from pteron.kernels.code import rendered
-from pteron.manipulator import Manipulator
+from pteron.manipulator import RobotLike, as_manipulator
 from pteron.shapes import PoseLike
 
 
 def export_pinocchio(
-    robot: Manipulator, folder: str | Path = ".", *, home: PoseLike | None = None
+    robot: RobotLike, folder: str | Path = ".", *, home: PoseLike | None = None
 ) -> list[Path]:
     """Write a Python file whose `build()` returns a Pinocchio model with its loops' constraints.
 
@@ -45,7 +45,7 @@ def export_pinocchio(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine; its platform must not slide (`slides`), whose halves need coupled joints.
     folder : path
         Where the file goes; it is made if it is missing.
@@ -74,12 +74,13 @@ def export_pinocchio(
     >>> [path.name for path in files]
     ['five_bar_pinocchio.py']
     """
+    robot = as_manipulator(robot)
     name = identifier(robot).replace("-", "_")
     name = f"robot_{name}" if name[0].isdigit() else name
     return write_texts(folder, {f"{name}_pinocchio.py": pinocchio_source(tree(robot, home))})
 
 
-def pinocchio_model(robot: Manipulator, *, home: PoseLike | None = None) -> Any:
+def pinocchio_model(robot: RobotLike, *, home: PoseLike | None = None) -> Any:
     """Return what `build()` of the exported file returns: a Pinocchio model with its constraints.
 
     Parameters
@@ -104,6 +105,7 @@ def pinocchio_model(robot: Manipulator, *, home: PoseLike | None = None) -> Any:
     >>> closed.model.nv, len(closed.constraints), closed.motors.shape
     (12, 3, (3, 12))
     """
+    robot = as_manipulator(robot)
     try:
         import pinocchio  # type: ignore[import-not-found,unused-ignore]  # noqa: F401
     except ImportError:

@@ -26,7 +26,7 @@ from pteron.export.engines.writing import (
     within,
 )
 from pteron.kernels.code import rendered
-from pteron.manipulator import Manipulator
+from pteron.manipulator import RobotLike, as_manipulator
 from pteron.shapes import PoseLike
 
 _SHARE = 1e-10
@@ -34,7 +34,7 @@ _SHARE = 1e-10
 
 
 def export_sdf(
-    robot: Manipulator, folder: str | Path = ".", *, home: PoseLike | None = None
+    robot: RobotLike, folder: str | Path = ".", *, home: PoseLike | None = None
 ) -> list[Path]:
     """Write a machine as SDF: a world with the closed machine in it.
 
@@ -43,7 +43,7 @@ def export_sdf(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     folder : path
         Where the file goes; it is made if it is missing.
@@ -70,6 +70,7 @@ def export_sdf(
     >>> [path.name for path in files]
     ['delta.sdf']
     """
+    robot = as_manipulator(robot)
     return write_texts(folder, {f"{identifier(robot)}.sdf": sdf(tree(robot, home))})
 
 

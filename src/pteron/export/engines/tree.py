@@ -23,20 +23,19 @@ from pteron.export.engines.platform import platform_bodies
 from pteron.kernels import Array
 from pteron.legs import Drive
 from pteron.legs.kind import LegKind
-from pteron.manipulator import Manipulator
-from pteron.manipulator.manipulator import expect_manipulator
+from pteron.manipulator import RobotLike, as_manipulator
 from pteron.shapes import PoseLike
 
 _NONE = 1e-9
 """Sine between directions that are taken for one."""
 
 
-def tree(robot: Manipulator, home: PoseLike | None = None) -> Tree:
+def tree(robot: RobotLike, home: PoseLike | None = None) -> Tree:
     """Return a machine as chains of bodies, and the points where their loops close.
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     home : array, shape (m,), optional
         The pose in which it stands, m and rad; where it is left out that with all joints in the
@@ -63,7 +62,7 @@ def tree(robot: Manipulator, home: PoseLike | None = None) -> Tree:
     >>> [joint.name for joint in opened.joints][:6]
     ['x', 'y', 'z', 'theta1', 'leg1_joint1', 'leg1_joint2']
     """
-    expect_manipulator(robot)
+    robot = as_manipulator(robot)
     pose = chosen_home(robot, home)
     stances = leg_stances(robot, pose)
     size = _size(stances, pose[: len(robot.platform.lengths)] @ robot.platform.directions)

@@ -30,7 +30,7 @@ from pteron.export.engines.writing import (
 )
 from pteron.kernels import Array
 from pteron.kernels.code import rendered
-from pteron.manipulator import Manipulator
+from pteron.manipulator import RobotLike, as_manipulator
 from pteron.shapes import PoseLike
 
 _MOST = 1e6
@@ -41,13 +41,13 @@ _FAR = 1e3
 
 
 def export_urdf(
-    robot: Manipulator, folder: str | Path = ".", *, home: PoseLike | None = None
+    robot: RobotLike, folder: str | Path = ".", *, home: PoseLike | None = None
 ) -> list[Path]:
     """Write the opened machine as URDF, and a closure file, YAML, that says how its loops close.
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     folder : path
         Where the files go; it is made if it is missing.
@@ -76,6 +76,7 @@ def export_urdf(
     >>> [path.name for path in files]
     ['delta.urdf', 'delta.closure.yaml']
     """
+    robot = as_manipulator(robot)
     opened, name = tree(robot, home), identifier(robot)
     texts = {f"{name}.urdf": urdf(opened), f"{name}.closure.yaml": closure_yaml(opened)}
     return write_texts(folder, texts)

@@ -14,7 +14,6 @@ from pteron.equations.machine import Machine
 from pteron.export.engines.parts import BASE, Tree, TreeBody
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
-from pteron.manipulator.manipulator import expect_manipulator
 
 _DIGITS = 15
 """After the point; what is beyond is rounding. m, rad, or parts of a unit vector."""
@@ -79,7 +78,6 @@ def parent_frame(opened: Tree, body: TreeBody) -> Array:
 
 def identifier(robot: Manipulator) -> str:
     """Return a machine's name as one of files and of XML."""
-    expect_manipulator(robot)
     name = re.sub(r"[^A-Za-z0-9]+", "-", robot.name).strip("-").lower()
     return name or "robot"
 

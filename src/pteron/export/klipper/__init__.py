@@ -3,3 +3,7 @@
 from pteron.export.klipper.export import export_klipper
 
 __all__ = ["export_klipper"]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

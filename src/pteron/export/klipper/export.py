@@ -22,10 +22,10 @@ from pteron.export.klipper.delta import delta
 from pteron.export.klipper.rotary_delta import rotary
 from pteron.export.klipper.sections import INSTEAD, Section
 from pteron.kernels.code import rendered
-from pteron.manipulator import Manipulator, expect_manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 
-def export_klipper(robot: Manipulator, folder: str | Path = ".") -> list[Path]:
+def export_klipper(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
     """Write the kinematic sections of a Klipper configuration, NAME.cfg.
 
     A machine whose joints are linear in the pose, as a Tripteron, becomes `generic_cartesian`; a
@@ -35,7 +35,7 @@ def export_klipper(robot: Manipulator, folder: str | Path = ".") -> list[Path]:
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine; its name becomes the file's.
     folder : path
         Where; made if it is missing.
@@ -61,7 +61,7 @@ def export_klipper(robot: Manipulator, folder: str | Path = ".") -> list[Path]:
     ...     print(next(line for line in path.read_text().splitlines() if "carriages:" in line))
     carriages: 1.063829787234042*x+0.310283687943262*z
     """
-    expect_manipulator(robot)
+    robot = as_manipulator(robot)
     if robot.platform.coordinates != ("x", "y", "z"):
         pose = ", ".join(robot.platform.coordinates)
         raise ModelError(

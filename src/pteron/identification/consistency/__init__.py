@@ -7,3 +7,7 @@ from pteron.identification.consistency.model import consistent_model
 from pteron.identification.consistency.result import Consistency
 
 __all__ = ["Bounds", "Consistency", "MissingSolver", "consistent_model", "real_bodies"]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -22,7 +23,14 @@ from pteron.identification.consistency.bounds import Bounds, Limits
 from pteron.identification.consistency.cones import RealBodies, closest, nearest, widest
 from pteron.identification.consistency.result import Consistency
 from pteron.kernels import Array
-from pteron.manipulator import Manipulator, parameter_names, parameters, with_parameters
+from pteron.manipulator import (
+    Manipulator,
+    RobotLike,
+    as_manipulator,
+    parameter_names,
+    parameters,
+    with_parameters,
+)
 from pteron.reduction import BaseParameters
 
 _DEEPEST = 2.0
@@ -44,12 +52,12 @@ _HOLDS = 1e-7
 
 
 def consistent_model(
-    robot: Manipulator,
+    robot: RobotLike,
     base: BaseParameters,
     values: ArrayLike,
     covariance: ArrayLike | None = None,
     *,
-    cad: Manipulator | ArrayLike | Literal["robot"] | None = "robot",
+    cad: RobotLike | ArrayLike | Literal["robot"] | None = "robot",
     bounds: Bounds | None = None,
 ) -> Consistency:
     """Return real bodies that reproduce identified base parameters.
@@ -63,7 +71,7 @@ def consistent_model(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine, of the geometry of `base.robot`.
     base : BaseParameters
         Its base parameters. Where they were made with `shared`, the legs returned share theirs.
@@ -106,6 +114,7 @@ def consistent_model(
     >>> result.feasible, result.distance
     (True, 0.0)
     """
+    robot = as_manipulator(robot)
     names = parameter_names(robot)
     if names != parameter_names(base.robot):
         raise ModelError(
@@ -217,16 +226,13 @@ def _square_root(covariance: ArrayLike, rank: int) -> Array:
     return np.asarray(deviations[:, None] * root)
 
 
-def _prior(robot: Manipulator, cad: Manipulator | ArrayLike | str | None) -> Array | None:
+def _prior(robot: Manipulator, cad: RobotLike | ArrayLike | None) -> Array | None:
     if cad is None:
         return None
-    if isinstance(cad, str):
-        if cad != "robot":
-            raise ModelError(
-                f'cad: {cad!r} is not "robot"; give a machine, its parameters or None, or load '
-                "the file first with pteron.load"
-            )
+    if isinstance(cad, str) and cad == "robot":
         return parameters(robot)
+    if isinstance(cad, str | Path):
+        cad = as_manipulator(cad)
     if isinstance(cad, Manipulator) and len(cad.legs) != len(robot.legs):
         raise ModelError(
             f"cad: {cad.name} has {len(cad.legs)} legs, {robot.name} has {len(robot.legs)}; give "

@@ -40,3 +40,7 @@ ESTIMATORS: dict[str, Callable[[Observations], Estimate]] = {
     "total": total,
 }
 """The estimators that need nothing but observations, by name."""
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

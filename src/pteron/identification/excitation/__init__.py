@@ -40,3 +40,7 @@ __all__ = [
     "scaled_condition",
     "stacked_regressor",
 ]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

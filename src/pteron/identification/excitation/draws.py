@@ -14,7 +14,7 @@ from pteron.identification.excitation.movement import Movement
 from pteron.identification.signals.states import home
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import unchecked
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _FINE = 800
 """Samples in a period of the highest harmonic at which the limits are checked."""
@@ -44,7 +44,7 @@ _DOUBLINGS = 12
 
 
 def random_excitation(
-    robot: Manipulator,
+    robot: RobotLike,
     *,
     space: Space = "platform",
     harmonics: int = 5,
@@ -59,7 +59,7 @@ def random_excitation(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     space : {"platform", "joints"}
         Whose coordinates the series are of.
@@ -89,6 +89,7 @@ def random_excitation(
     >>> motion.coefficients.shape
     (7, 3)
     """
+    robot = as_manipulator(robot)
     limits = limits or Limits.of(robot)
     if harmonics < 1:
         raise DataError(f"harmonics: {harmonics} given, 1 or more expected")

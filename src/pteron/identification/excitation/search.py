@@ -23,7 +23,7 @@ from pteron.identification.excitation.margins import margins
 from pteron.identification.excitation.program import Criterion, Setting
 from pteron.identification.excitation.result import Excitation, Start
 from pteron.kernels import columns_of
-from pteron.manipulator import Manipulator
+from pteron.manipulator import RobotLike, as_manipulator
 from pteron.reduction import BaseParameters, base_parameters
 
 _MOST_WORKERS = 4
@@ -42,7 +42,7 @@ _SEEN = 0.1
 
 
 def optimal_excitation(
-    robot: Manipulator,
+    robot: RobotLike,
     *,
     base: BaseParameters | None = None,
     space: Space = "platform",
@@ -66,7 +66,7 @@ def optimal_excitation(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     base : BaseParameters, optional
         What is to be seen; `base_parameters(robot)` unless given.
@@ -132,6 +132,7 @@ def optimal_excitation(
     >>> found.margins.kept, found.gain > 2.0
     (True, True)
     """
+    robot = as_manipulator(robot)
     limits = limits or Limits.of(robot)
     _check(criterion, starts, draws, seconds, workers)
     base = base or base_parameters(robot)

@@ -28,3 +28,7 @@ __all__ = [
     "write_description",
     "write_log",
 ]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -30,7 +30,7 @@ from pteron.identification.logs.sizes import (
 )
 from pteron.identification.logs.spikes import MARGIN, Spikes
 from pteron.identification.logs.time_stamps import TimeStamps
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.tables import CsvFile, Dialect, ParquetFile, open_table
 
 _FEWEST = 50
@@ -264,12 +264,13 @@ def _in_si(values: Values, unit: str) -> Values:
 
 
 def open_log(
-    path: str | Path, robot: Manipulator, *, description: Description | str | Path | None = None
+    path: str | Path, robot: RobotLike, *, description: Description | str | Path | None = None
 ) -> LogFile:
     """Open a log to read it in pieces: its columns are found, its first rows checked.
 
     Parameters and errors are those of `read_log`.
     """
+    robot = as_manipulator(robot)
     given = (find_description(path) or Description()) if description is None else description
     origin, about = (path, given) if isinstance(given, Description) else (given, None)
     about = about or read_description(origin)
@@ -282,7 +283,7 @@ def open_log(
 
 def read_log(
     path: str | Path,
-    robot: Manipulator,
+    robot: RobotLike,
     *,
     description: Description | str | Path | None = None,
     progress: Callable[[int], None] | None = None,
@@ -293,7 +294,7 @@ def read_log(
     ----------
     path : str or path
         A CSV or Parquet file; its ending says which.
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine it belongs to.
     description : Description or path, optional
         What is known beside the numbers; the TOML file of the same stem where it is not given.
@@ -326,4 +327,5 @@ def read_log(
     >>> log.rows, log.joints.shape, round(log.rate), log.findings
     (500, (500, 3), 1000, ())
     """
+    robot = as_manipulator(robot)
     return open_log(path, robot, description=description).read(progress)

@@ -41,3 +41,7 @@ __all__ = [
     "uniform",
     "white_noise",
 ]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

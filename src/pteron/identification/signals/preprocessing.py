@@ -30,7 +30,7 @@ from pteron.identification.signals.filters import (
 from pteron.identification.signals.fourier import FourierSeries, fitted_series
 from pteron.identification.signals.states import start_pose
 from pteron.kernels import Array
-from pteron.manipulator import Manipulator
+from pteron.manipulator import RobotLike, as_manipulator
 
 _LARGEST_PERIODIC = 4_000_000
 """Rows up to which a periodic log is fitted in one piece."""
@@ -194,7 +194,7 @@ class Preprocessing:
 
 
 def preprocessing_of(
-    robot: Manipulator,
+    robot: RobotLike,
     log: Log,
     processing: Processing | None = None,
     *,
@@ -205,7 +205,7 @@ def preprocessing_of(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     log : Log
         The log, or its first part.
@@ -221,6 +221,7 @@ def preprocessing_of(
     DataError
         If a frequency is beyond what the sampling allows, or there is less than one period.
     """
+    robot = as_manipulator(robot)
     wanted = processing or Processing()
     # Noise and cut-offs concern samples as they came: uneven steps are noise to them.
     head = _longest_part(log)

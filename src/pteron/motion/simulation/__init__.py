@@ -15,3 +15,7 @@ __all__ = [
     "longest_step",
     "simulate",
 ]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -14,7 +14,7 @@ from pteron.errors import DataError, PteronError, shown
 from pteron.kernels import Array, as_array, numeric
 from pteron.kernels.steps import steps
 from pteron.kinematics import jacobian
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike
 
 Method = Literal["rk4", "dop853"]
@@ -27,7 +27,7 @@ _SHORTEST = 1e-8
 
 
 def advance(
-    robot: Manipulator,
+    robot: RobotLike,
     pose: PoseLike,
     velocity: PoseLike,
     forces: ArrayLike,
@@ -43,7 +43,7 @@ def advance(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     pose, velocity : array, shape (..., m)
         The platform's state; m, rad and s.
@@ -78,6 +78,7 @@ def advance(
     >>> bool(status), bool(np.allclose(velocity, [0.0, 0.0, -0.0981], atol=0.1))
     (True, True)
     """
+    robot = as_manipulator(robot)
     span = as_array([step, count], "step, count", (2,))
     if not np.isfinite(span[0]):
         raise DataError(f"step: {shown(step)} given, a time in s expected")
@@ -88,12 +89,13 @@ def advance(
     return found[0], found[1], found[2] == count
 
 
-def longest_step(robot: Manipulator, poses: PoseLike) -> float:
+def longest_step(robot: RobotLike, poses: PoseLike) -> float:
     """Return the longest step that friction allows, s: infinite for a machine without friction.
 
     Next to rest a drive's dry friction is like a damper of coulomb / rest_speed, which makes a rate
     decay fast; the steps must follow that. The poses, (..., m), are where it may come to rest.
     """
+    robot = as_manipulator(robot)
     own = Drives(*drive_numbers(robot).reshape(len(Drives._fields), -1))
     damping = own.viscous + (own.coulomb + own.stribeck) / own.rest_speed
     if not damping.any():

@@ -12,7 +12,7 @@ from pteron.errors import DataError, shown
 from pteron.kernels import Array, as_array
 from pteron.kinematics import inverse_kinematics, joint_rates
 from pteron.kinematics.evaluate import checked
-from pteron.manipulator import Manipulator, expect_manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.payload import with_payload
 from pteron.motion.simulation.loop import Controlled, Given, Law, Loads, Source, run
@@ -49,14 +49,14 @@ class Controls(Protocol):
 
 
 def simulate(
-    robot: Manipulator,
+    robot: RobotLike,
     motion: Motion | None = None,
     controller: Controls | None = None,
     *,
     start: tuple[PoseLike, PoseLike] | None = None,
     duration: float | None = None,
     forces: ArrayLike | Callable[[float], ArrayLike] | None = None,
-    model: Manipulator | None = None,
+    model: RobotLike | None = None,
     payload: float | Sequence[tuple[float, float]] = 0.0,
     wrench: ArrayLike | Callable[[float], ArrayLike] | None = None,
     sensors: Sensors | None = None,
@@ -78,7 +78,7 @@ def simulate(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     motion : Motion, optional
         What it is to follow; without it a controller holds the pose at the start.
@@ -90,7 +90,7 @@ def simulate(
         s; by default the motion's.
     forces : array, shape (n,), or callable of the time (s), optional
         Of the drives, where there is no controller; none by default. N, N m at cranks.
-    model : Manipulator, optional
+    model : Manipulator, name or path, optional
         What the controller takes the machine for; by default what it is, with a payload that does
         not change.
     payload : float or sequence of (time, mass)
@@ -133,11 +133,11 @@ def simulate(
     >>> falling.stopped is None, bool(falling.velocity[-1, 2] < -0.9)
     (True, True)
     """
-    expect_manipulator(robot)
+    robot = as_manipulator(robot)
     if controller is not None:
         _expect_controller(controller)
     if model is not None:
-        expect_manipulator(model)
+        model = as_manipulator(model)
     if controller is not None and forces is not None:
         raise DataError("controller and forces given; give one of them")
     if motion is not None and controller is None:

@@ -14,7 +14,7 @@ from pteron.dynamics import drive_forces, mass_matrix
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.kinematics import jacobian, joint_accelerations, joint_rates
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.sizing.result import Sizing
 
@@ -23,7 +23,7 @@ _AT_REST = 1e-6
 
 
 def size(
-    robot: Manipulator,
+    robot: RobotLike,
     motion: Motion,
     *,
     dwell: float = 0.0,
@@ -33,7 +33,7 @@ def size(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine, with what its file says of the drives; `with_payload` gives it a payload.
     motion : Motion
         One cycle.
@@ -65,6 +65,7 @@ def size(
     >>> round(found.duration, 3), found.peak_forces.round(1)
     (0.6, array([78.1,  7.5, 47.7]))
     """
+    robot = as_manipulator(robot)
     _check(robot, motion, dwell)
     middles = (motion.time[:-1] + motion.time[1:]) / 2.0
     load = None if wrench is None else np.asarray(wrench, dtype=float)

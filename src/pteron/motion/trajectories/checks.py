@@ -18,7 +18,7 @@ from pteron.errors import DataError, PteronError, SingularPose, UnreachablePose
 from pteron.kernels import Array, numeric
 from pteron.kernels.functions import TYPE_I, TYPE_II
 from pteron.kinematics.singularities import is_singular_everywhere, singular_everywhere
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.demand import told_pose
 from pteron.motion.trajectories.least import first_below, least_along
@@ -34,12 +34,12 @@ _MILLIMETRES = 20.0
 """A way that misses a leg's reach by so many times its size was perhaps given in millimetres."""
 
 
-def check_path(robot: Manipulator, path: Path) -> None:
+def check_path(robot: RobotLike, path: Path) -> None:
     """Refuse a path that the machine cannot go.
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     path : Path
         Such as `line_path` makes.
@@ -52,16 +52,17 @@ def check_path(robot: Manipulator, path: Path) -> None:
     SingularPose
         If it comes to a singularity of type I, or crosses one of type II.
     """
+    robot = as_manipulator(robot)
     s, _ = poses_of(path, _SAMPLES)
     check_way(robot, lambda at: path.at(at)[0], s, lambda at: f"the path, {path.place(at)}")
 
 
-def check_motion(robot: Manipulator, motion: Motion) -> None:
+def check_motion(robot: RobotLike, motion: Motion) -> None:
     """Refuse a motion that the machine cannot do, as `check_path` does; it says at what time.
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     motion : Motion
         Any motion of its platform.
@@ -74,6 +75,7 @@ def check_motion(robot: Manipulator, motion: Motion) -> None:
     UnreachablePose, SingularPose
         As `check_path`.
     """
+    robot = as_manipulator(robot)
     if motion.pose.shape[-1] != robot.freedom:
         raise DataError(
             f"motion: poses of {motion.pose.shape[-1]} numbers given, {robot.freedom} expected: "

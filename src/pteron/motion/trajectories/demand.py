@@ -14,7 +14,7 @@ from pteron.equations.drives import Drives, drive_numbers
 from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import unchecked
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.trajectories.limits import MotionLimits
 from pteron.motion.trajectories.tool import tool_motion
 
@@ -189,13 +189,13 @@ class Peak(NamedTuple):
 
 
 def peaks(
-    robot: Manipulator, pose: Array, velocity: Array, acceleration: Array, limits: MotionLimits
+    robot: RobotLike, pose: Array, velocity: Array, acceleration: Array, limits: MotionLimits
 ) -> tuple[Peak, ...]:
     """Return the largest sizes in a motion (T, m), one for each leg and quantity, then the tool's.
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     pose, velocity, acceleration : array, shape (T, m)
         The motion; m, rad and s.
@@ -206,6 +206,7 @@ def peaks(
     -------
     tuple of Peak
     """
+    robot = as_manipulator(robot)
     asked = demand(robot, pose, velocity, acceleration)
     ones = np.ones(len(pose))
     force = np.abs(asked.drive_forces(ones, 0.0 * ones)).max(axis=0)

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from pteron.errors import DataError
 from pteron.kernels import Array
-from pteron.manipulator import Manipulator
+from pteron.manipulator import RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.checks import check_motion
 from pteron.motion.trajectories.time_law import STEP, sampled
@@ -88,12 +88,12 @@ def fourier_basis(times: Array, harmonics: int, period: float) -> tuple[Array, A
     )
 
 
-def fourier_motion(robot: Manipulator, series: FourierSeries, step: float = STEP) -> Motion:
+def fourier_motion(robot: RobotLike, series: FourierSeries, step: float = STEP) -> Motion:
     """Return one period of a Fourier series as a motion; it is already moving when it begins.
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     series : FourierSeries
         Of as many coordinates as the machine's poses have.
@@ -119,6 +119,7 @@ def fourier_motion(robot: Manipulator, series: FourierSeries, step: float = STEP
     >>> fourier_motion(pteron.load("tripteron"), swing).repeated(3).duration
     6.0
     """
+    robot = as_manipulator(robot)
     motion = sampled(series.at, series.period, step)
     check_motion(robot, motion)
     return motion

@@ -14,7 +14,7 @@ from pteron.errors import DataError, PteronError, UnreachablePose
 from pteron.kernels import Array
 from pteron.kinematics import follow, inverse_kinematics
 from pteron.kinematics.evaluate import checked, unchecked
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.checks import check_motion
 from pteron.motion.trajectories.course import Timed
@@ -31,7 +31,7 @@ _FAST = 1e6
 
 
 def jerk_limited(
-    robot: Manipulator,
+    robot: RobotLike,
     start: PoseLike,
     end: PoseLike,
     jerk: PerJointLimit,
@@ -46,7 +46,7 @@ def jerk_limited(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     start, end : array, shape (m,)
         m and rad.
@@ -83,6 +83,7 @@ def jerk_limited(
     >>> motion.pose[-1].round(6)
     array([ 0.2,  0.1, -0.8])
     """
+    robot = as_manipulator(robot)
     ends = [checked(robot, start, "start"), checked(robot, end, "end")]
     kept = limits_of(robot) if limits is None else limits
     jerks = per_joint(robot, "jerk", jerk, [None] * robot.freedom)

@@ -11,7 +11,7 @@ import numpy as np
 from pteron.errors import DataError, shown
 from pteron.kernels import Array
 from pteron.legs import Drive
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 PerJointLimit = float | Sequence[float] | Array | None
 """One number for every joint, or one for each; None for the drives' own, or none."""
@@ -50,7 +50,7 @@ class MotionLimits:
 
 
 def limits_of(
-    robot: Manipulator,
+    robot: RobotLike,
     *,
     speed: PerJointLimit = None,
     acceleration: PerJointLimit = None,
@@ -62,7 +62,7 @@ def limits_of(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine; its drives' `max_speed` and `max_force` count where nothing else is given.
     speed, acceleration, force : float or sequence of n floats, optional
         Of each joint: m/s, m/s^2 and N, or rad/s, rad/s^2 and N m.
@@ -85,6 +85,7 @@ def limits_of(
     >>> limits_of(pteron.load("tripteron"), speed=0.5, force=[40.0, 40.0, 60.0]).force
     array([40., 40., 60.])
     """
+    robot = as_manipulator(robot)
     drives = [leg.drive or Drive() for leg in robot.legs]
     return MotionLimits(
         per_joint(robot, "speed", speed, [drive.max_speed for drive in drives]),

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import checked
-from pteron.manipulator import Manipulator
+from pteron.manipulator import RobotLike, as_manipulator
 from pteron.motion.trajectories.tool import Curve, pose_motion, tool_motion
 from pteron.platforms import Platform
 
@@ -109,7 +109,7 @@ def _bezier(points: Array, u: Array) -> Array:
     return points[:, 0]
 
 
-def line_path(robot: Manipulator, poses: ArrayLike, corner: float = 0.0) -> LinePath:
+def line_path(robot: RobotLike, poses: ArrayLike, corner: float = 0.0) -> LinePath:
     """Return the path of the tool's centre point along straight lines through poses.
 
     The platform turns evenly along a line. A corner is rounded by a Bezier curve of the fifth
@@ -118,7 +118,7 @@ def line_path(robot: Manipulator, poses: ArrayLike, corner: float = 0.0) -> Line
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine; `platform.tool` is what goes straight.
     poses : array, shape (K, m)
         At least two, m and rad.
@@ -145,6 +145,7 @@ def line_path(robot: Manipulator, poses: ArrayLike, corner: float = 0.0) -> Line
     >>> path.rests
     (0.0, 0.2)
     """
+    robot = as_manipulator(robot)
     given = checked(robot, poses, "poses")
     if given.ndim != 2 or len(given) < 2:
         raise DataError(

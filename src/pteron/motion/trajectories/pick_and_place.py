@@ -11,7 +11,7 @@ from scipy.optimize import minimize_scalar  # type: ignore[import-untyped]
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import checked
-from pteron.manipulator import Manipulator
+from pteron.manipulator import RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.cycle import Cycle, moves
 from pteron.motion.trajectories.cycle_path import CyclePath
@@ -47,7 +47,7 @@ class PickAndPlace(Motion):
 
 
 def pick_and_place(
-    robot: Manipulator,
+    robot: RobotLike,
     around: PoseLike,
     *,
     scale: float | None = None,
@@ -68,7 +68,7 @@ def pick_and_place(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     around : array, shape (m,)
         The pose in the middle of the cycle, m and rad; `pteron.workspace.home_pose` is a good one.
@@ -110,6 +110,7 @@ def pick_and_place(
     >>> cycle.time, bool((cycle.pose[0] == cycle.pose[-1]).all())
     (array([0.  , 0.25, 0.5 , 0.75, 1.  ]), True)
     """
+    robot = as_manipulator(robot)
     for name, value in {"scale": scale, "duration": duration, "peak": peak}.items():
         if value is not None and not (np.isfinite(value) and value > 0.0):
             raise DataError(f"{name}: {value} given, a number above 0 expected")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pteron.kinematics.evaluate import checked
-from pteron.manipulator import Manipulator
+from pteron.manipulator import RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.limits import MotionLimits
 from pteron.motion.trajectories.path import line_path
@@ -15,7 +15,7 @@ from pteron.shapes import PoseLike
 
 
 def point_to_point(
-    robot: Manipulator,
+    robot: RobotLike,
     start: PoseLike,
     end: PoseLike,
     *,
@@ -30,7 +30,7 @@ def point_to_point(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     start, end : array, shape (m,)
         m and rad.
@@ -55,6 +55,7 @@ def point_to_point(
     >>> motion.at(0.25)[0]
     array([ 0.05,  0.  , -0.85])
     """
+    robot = as_manipulator(robot)
     ends = np.stack([checked(robot, start, "start"), checked(robot, end, "end")])
     path = line_path(robot, ends)
     return along(robot, path, duration=duration, limits=limits, law=law, step=step)

@@ -12,7 +12,7 @@ from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.kinematics import follow
 from pteron.kinematics.evaluate import checked, unchecked
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.checks import check_motion
 from pteron.shapes import PoseLike
@@ -24,14 +24,12 @@ TIME = "t"
 _DEGREE = 5
 
 
-def replay(
-    robot: Manipulator, table: str | File | Table, *, start: PoseLike | None = None
-) -> Motion:
+def replay(robot: RobotLike, table: str | File | Table, *, start: PoseLike | None = None) -> Motion:
     """Return the motion that a table holds.
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     table : path or Table
         CSV or Parquet. Its columns are t (s) and the pose's, such as x y z phi, or t and the
@@ -64,6 +62,7 @@ def replay(
     >>> float(replay(pteron.load("tripteron"), Table("wave", wave)).velocity[0, 0].round(9))
     0.1
     """
+    robot = as_manipulator(robot)
     rows = table if isinstance(table, Table) else read_table(table)
     poses, joints = robot.coordinates, robot.joint_names
     whole = [f"{order}{name}" for order in ("", "d", "dd") for name in poses]

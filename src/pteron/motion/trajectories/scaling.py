@@ -14,7 +14,7 @@ from pteron.kernels import Array, numeric
 from pteron.kinematics import inverse_kinematics
 from pteron.kinematics.evaluate import checked
 from pteron.kinematics.singularities import best_type_ii
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.trajectories.cycle import Cycle, moves
 from pteron.shapes import PoseLike
 
@@ -40,7 +40,7 @@ _WORTH = 1.01
 
 
 def scaled_to_reach(
-    robot: Manipulator,
+    robot: RobotLike,
     around: PoseLike,
     *,
     direction: ArrayLike | None = None,
@@ -55,7 +55,7 @@ def scaled_to_reach(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     around : array, shape (m,)
         The pose in the middle of the cycle, m and rad.
@@ -91,6 +91,7 @@ def scaled_to_reach(
     >>> 0.5 < scale <= 1.0
     True
     """
+    robot = as_manipulator(robot)
     middle = checked(robot, around, "around")
     scale, best = 0, None
     for across, up in moves(robot, direction, _DIRECTIONS):

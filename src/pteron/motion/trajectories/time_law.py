@@ -8,7 +8,7 @@ import numpy as np
 
 from pteron.errors import DataError
 from pteron.kernels import Array
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.checks import check_path
 from pteron.motion.trajectories.course import Course, InTime, Timed
@@ -38,7 +38,7 @@ _TRIES = 8
 
 
 def shortest(
-    robot: Manipulator,
+    robot: RobotLike,
     curve: Callable[[Array], Curve],
     limits: MotionLimits,
     step: float = STEP,
@@ -47,7 +47,7 @@ def shortest(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     curve : callable
         From tau (T,) in [0, 1] to poses (T, m) and two derivatives by tau.
@@ -67,6 +67,7 @@ def shortest(
     ModelError
         If the drives cannot hold the machine somewhere on the way.
     """
+    robot = as_manipulator(robot)
     pose, first, second = curve(np.linspace(0.0, 1.0, _LOOK))
     rate = most_rate(robot, demand(robot, pose, first, second), limits, pose)
     if not np.isfinite(rate):
@@ -109,7 +110,7 @@ def _unlimited() -> DataError:
 
 
 def along(
-    robot: Manipulator,
+    robot: RobotLike,
     path: Path,
     *,
     duration: float | None = None,
@@ -121,7 +122,7 @@ def along(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     path : Path
         Such as `line_path` makes.
@@ -158,6 +159,7 @@ def along(
     >>> along(robot, path, limits=limits_of(robot, acceleration=5.0)).duration
     0.34
     """
+    robot = as_manipulator(robot)
     check_path(robot, path)
     kept = limits_of(robot) if limits is None else limits
     laws = (polynomial(law),) * (len(path.rests) - 1)

@@ -22,7 +22,7 @@ import numpy as np
 
 from pteron.errors import DataError, ModelError, PteronError
 from pteron.kernels import Array
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.checks import check_path
 from pteron.motion.trajectories.course import Course
@@ -91,7 +91,7 @@ class TimeOptimal(Motion):
 
 
 def time_optimal(
-    robot: Manipulator,
+    robot: RobotLike,
     path: Path,
     limits: MotionLimits | None = None,
     *,
@@ -104,7 +104,7 @@ def time_optimal(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine; what its drives need for themselves counts as their force.
     path : Path
         Such as `line_path` makes.
@@ -136,6 +136,7 @@ def time_optimal(
     >>> time_optimal(robot, path, limits).duration < along(robot, path, limits=limits).duration
     True
     """
+    robot = as_manipulator(robot)
     kept = limits_of(robot) if limits is None else limits
     if not kept.bounds_acceleration:
         raise DataError(

@@ -12,3 +12,7 @@ __all__ = [
     "parameter_rows",
     "write_identification",
 ]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,46 @@
+"""A machine as a call is given it: the value, its name in the catalog, or its file's path."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pteron.errors import ModelError
+from pteron.manipulator.files import load
+from pteron.manipulator.manipulator import Manipulator
+
+RobotLike = Manipulator | str | Path
+"""What the public functions take for `robot`."""
+
+
+def as_manipulator(robot: RobotLike) -> Manipulator:
+    """Return the machine itself, or the one that `load` reads by its name or path.
+
+    Parameters
+    ----------
+    robot : Manipulator, str or Path
+        The machine, a catalog name, or the path of a TOML file. A file is looked at again at every
+        call, so that a change of it counts.
+
+    Returns
+    -------
+    Manipulator
+
+    Raises
+    ------
+    ModelError
+        If it is none of these; or as `load`.
+
+    Examples
+    --------
+    >>> from pteron.manipulator import as_manipulator
+    >>> as_manipulator("delta")
+    <Manipulator 'delta': 3 RSS under a 3T platform>
+    """
+    if isinstance(robot, Manipulator):
+        return robot
+    if isinstance(robot, str | Path):
+        return load(robot)
+    raise ModelError(
+        f"robot: {type(robot).__name__} given, a Manipulator expected, the name of one "
+        "(see pteron.catalog()), or the path of its file"
+    )

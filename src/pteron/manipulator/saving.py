@@ -1,0 +1,54 @@
+"""A manipulator as a TOML file: `save` writes it."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, is_dataclass
+from pathlib import Path
+from typing import Any
+
+from pteron.atomic import write_text
+from pteron.manipulator.given import RobotLike, as_manipulator
+
+
+def save(robot: RobotLike, path: str | Path) -> Path:
+    """Write a manipulator to a TOML file that `load` reads back without loss.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+    path : str or path
+        The file; it is replaced whole, or not at all.
+
+    Returns
+    -------
+    Path
+        The file written.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+    from pteron.manipulator.tables import leg_items
+    from pteron.manipulator.writing import written
+
+    robot = as_manipulator(robot)
+    x, _, axis = robot.platform.frame
+    platform: dict[str, Any] = {"motion": robot.platform.motion, "axis": axis, "x_axis": x}
+    platform |= {"tool": robot.platform.tool, **asdict(robot.platform.inertia)}
+    for name in ("slides", "limits", "bars", "geared"):
+        if given := getattr(robot.platform, name):
+            platform[name] = given
+    legs = [{k: v for k, v in leg_items(leg).items() if v is not None} for leg in robot.legs]
+    machine = {"name": robot.name, "gravity": robot.gravity, "platform": platform, "legs": legs}
+    return write_text(path, written(_plain(machine)))
+
+
+def _plain(value: Any) -> Any:
+    """Return what a file holds: a body as a table, a tuple as a list."""
+    if isinstance(value, dict):
+        return {key: _plain(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    return asdict(value) if is_dataclass(value) and not isinstance(value, type) else value

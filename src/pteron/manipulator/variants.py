@@ -1,0 +1,93 @@
+"""Machines made of a machine: its working modes, and the whole of it turned."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pteron.bodies.vectors import Vector, vector
+from pteron.errors import ModelError
+from pteron.manipulator.given import RobotLike, as_manipulator
+from pteron.manipulator.manipulator import Manipulator
+
+_ORTHOGONAL = 1e-9
+
+
+def working_modes(robot: RobotLike) -> tuple[Manipulator, ...]:
+    """Return the working modes of a manipulator: every choice of its elbows' sides, 2^n for n legs.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine; its own choice of elbows is one of those returned.
+
+    Returns
+    -------
+    tuple of Manipulator
+        In binary order of the elbows, leg 1 first: all +1 comes first, all -1 last.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> modes = pteron.working_modes(pteron.load("quadrupteron"))
+    >>> len(modes), [leg.elbow for leg in modes[1].legs]
+    (16, [1, 1, 1, -1])
+    """
+    robot = as_manipulator(robot)
+    branches = (leg.branches for leg in robot.legs)
+    return tuple(with_elbows(robot, signs) for signs in product(*branches))
+
+
+def with_elbows(robot: Manipulator, signs: Sequence[int]) -> Manipulator:
+    """Return the machine in the working mode that has these elbows, +1 or -1 for each leg."""
+    legs = zip(robot.legs, signs, strict=True)
+    return replace(robot, legs=tuple(replace(leg, elbow=sign) for leg, sign in legs))
+
+
+def turned(robot: RobotLike, rotation: ArrayLike, *, gravity: bool = True) -> Manipulator:
+    """Return the machine turned as a whole about the base frame's origin.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+    rotation : array, shape (3, 3)
+        A rotation matrix R; a point at x goes to R x.
+    gravity : bool
+        Whether gravity turns too, which only renames the base frame's axes and changes no force.
+        False mounts the machine otherwise: on a wall, upside down.
+
+    Returns
+    -------
+    Manipulator
+        The turned machine. The pose (p, phi) of the first is (R p, phi) of the second.
+
+    Raises
+    ------
+    ModelError
+        If the matrix is not a rotation.
+    """
+    robot = as_manipulator(robot)
+    try:
+        matrix = np.asarray(rotation, dtype=float)
+    except (TypeError, ValueError):
+        raise ModelError("rotation: not an array of real numbers") from None
+    if matrix.shape != (3, 3) or not np.allclose(matrix @ matrix.T, np.eye(3), atol=_ORTHOGONAL):
+        raise ModelError(f"rotation: not an orthogonal 3x3 matrix: {matrix.tolist()}")
+    if np.linalg.det(matrix) < 0:
+        raise ModelError("rotation: the matrix is a reflection (determinant -1); negate one column")
+
+    def turn(v: Vector) -> Vector:
+        return vector((matrix @ v).tolist(), "rotation")
+
+    x, _, axis = robot.platform.frame
+    return replace(
+        robot,
+        platform=replace(robot.platform, axis=turn(axis), x_axis=turn(x)),
+        legs=tuple(leg.turned(turn) for leg in robot.legs),
+        gravity=turn(robot.gravity) if gravity else robot.gravity,
+    )
