@@ -18,6 +18,7 @@ from pteron.cli.base import base, table1
 from pteron.cli.cycle import cycle
 from pteron.cli.excite import excite
 from pteron.cli.export import export
+from pteron.cli.film import film
 from pteron.cli.identify import identify
 from pteron.cli.interrupts import insistent_interrupts
 from pteron.cli.machines import catalog, check, new
@@ -182,6 +183,12 @@ _add(
     "pteron size delta --payload 1.0",
     "pteron size robot.toml --motors motors.csv --dwell 0.2 --out sizing",
     "pteron size quadrupteron --cycle motion.csv --out sizing.csv",
+)
+_add(
+    film,
+    "pteron film delta -o cycle.mp4",
+    "pteron film quadrupteron --speed 0.4 --forces --turns 0.5 -o slow.mp4",
+    "pteron film robot.toml --cycle motion.csv --size 640x480 -o motion.gif",
 )
 _add(
     base,

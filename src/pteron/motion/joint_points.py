@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -75,6 +75,20 @@ class JointPoints:
     coordinates: PerJoint
     bars: tuple[Array | None, ...]
     plane: Array | None
+
+    def at(self, index: int) -> JointPoints:
+        """Return the points of one of several poses, by its place among them."""
+        return replace(
+            self,
+            chain=self.chain[index],
+            links=tuple(line[index] for line in self.links),
+            platform_points=self.platform_points[index],
+            parts=tuple(Part(part.hub[index], part.corners[index]) for part in self.parts),
+            reference=self.reference[index],
+            tool=self.tool[index],
+            axes=self.axes[index],
+            coordinates=self.coordinates[index],
+        )
 
 
 @dataclass(frozen=True)

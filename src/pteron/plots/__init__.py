@@ -17,24 +17,30 @@ from pteron.plots.comparison import (
     residual_time_figure,
 )
 from pteron.plots.drives import Ability, force_speed_figure, power_figure
+from pteron.plots.films import Film, film
 from pteron.plots.forces import forces_figure, regularity_figure
+from pteron.plots.machine import draw, poses_figure, robot_figure
 from pteron.plots.reach import measure_figure, reach_figure
-from pteron.plots.robot import grid_step, robot_figure
+from pteron.plots.robot import grid_step
 from pteron.plots.tracking import tracking_figure
 
 __all__ = [
     "Ability",
+    "Film",
     "LEG_COLORS",
     "autocorrelation_figure",
     "certainty_figure",
     "comparison_figure",
     "correlation_figure",
+    "draw",
     "errors_figure",
+    "film",
     "force_speed_figure",
     "forces_figure",
     "grid_step",
     "histogram_figure",
     "measure_figure",
+    "poses_figure",
     "power_figure",
     "reach_figure",
     "regularity_figure",

@@ -44,6 +44,9 @@ _VARIABLES = {
 FONT_SIZE = 9.0
 """Points. Figures are about as wide as a phone's screen, so that text stays legible there."""
 
+SMALL = 0.6
+"""Width of lines in small pictures of a machine, over that in large ones."""
+
 _NO_METADATA = dict.fromkeys(("Creator", "Date", "Format", "Type"))
 
 

@@ -1,8 +1,9 @@
-"""The machine in space, or in its plane: guides and cranks, links, platform and frames."""
+"""How a machine is drawn, in space or in its plane: guides, cranks, links, platform and frames."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise, product
 
 import numpy as np
@@ -10,7 +11,7 @@ from matplotlib.figure import Figure
 
 from pteron.kernels import Array
 from pteron.motion import Guide, JointPoints, Part
-from pteron.plots.canvas import INK, LEG_COLORS, MUTED, PAPER, REACH, blank, nice_step
+from pteron.plots.canvas import INK, LEG_COLORS, MUTED, PAPER, REACH, nice_step
 from pteron.plots.sheet import Sheet
 from pteron.plots.space import Space, upright
 
@@ -26,80 +27,143 @@ APART = 0.018
 _SQUARES = 10.0
 """About so many squares of the grid are as long as the machine."""
 
-_WIDTH = 5.6
-"""Inches."""
+Box = tuple[float, float, float, float]
+"""Left, bottom, width and height, as shares of a figure."""
 
 _NONE = 1e-9
 """A part of gravity, over the whole, that is none but for rounding."""
 
 
-def robot_figure(
-    points: JointPoints,
-    guides: Sequence[Guide],
-    *,
-    gravity: Array | None = None,
-    path: Array | None = None,
-    angle: str = "",
-) -> Figure:
-    """Return the machine in one pose: in space with the vertical upwards, or in its plane.
+@dataclass(frozen=True)
+class Scene:
+    """What is the same in all pictures of a machine.
 
-    The points are those of one pose, the guides those of `pteron.motion.joint_guides`; the `path`
-    (T, 3) of a point in the base frame is in m. Gravity (3,) is drawn as an arrow, where the
-    picture's plane has it; in space without it the platform frame's z points up. The `angle`
-    stands, in words, beside the platform frame's x axis.
+    Attributes
+    ----------
+    guides : tuple of Guide
+        Where each actuated joint lets its body go.
+    plane : array, shape (2, 3), or None
+        Of a planar machine: the unit vectors along which its poses count.
+    gravity : array, shape (3,), or None
+        Where it is to be seen.
+    vertical : array, shape (3,)
+        What points up in space.
+    low, high : array, shape (3,) or (2,)
+        What the machine takes of the upright frame, or of its plane, m.
+    step : float
+        Side of the squares behind it, m.
+    base : array, shape (k, 3)
+        The centres of the cranks' circles, in the order round them.
     """
+
+    guides: tuple[Guide, ...]
+    plane: Array | None
+    gravity: Array | None
+    vertical: Array
+    low: Array
+    high: Array
+    step: float
+    base: Array
+
+    @property
+    def size(self) -> float:
+        """The machine's greatest extent, m."""
+        return float((self.high - self.low).max())
+
+    @property
+    def aspect(self) -> float:
+        """Height over width of a planar machine."""
+        wide, tall = self.high - self.low
+        return float(tall / wide)
+
+    def sheet(
+        self, figure: Figure, box: Box | None = None, *, small: bool = False
+    ) -> Space | Sheet:
+        """Return axes for the machine in a box of a figure: left, bottom, width, height."""
+        if self.plane is not None:
+            return Sheet(figure, self.plane, self.step, box, small=small)
+        return Space(figure, self.vertical, box or (0.0, 0.0, 1.0, 1.0), small=small)
+
+
+def scene_of(points: JointPoints, guides: Sequence[Guide], gravity: Array | None) -> Scene:
+    """Return the scene of a machine that has its joints at points, in one pose or in several."""
     everything = _everything(points, guides)
-    step = grid_step(points, guides)
-    sheet: Space | Sheet
+    vertical = np.zeros(3)
     if points.plane is None:
-        figure = blank(_WIDTH, 4.4)
-        sheet = space = Space(figure, points.axes[2] if gravity is None else -gravity)
-        turned = everything @ space.rotation.T
-        low, high = turned.min(axis=0), turned.max(axis=0)
-        space.ground(low, high, step)
+        upwards = points.axes.reshape(-1, 3, 3)[0, 2]
+        vertical = upwards if gravity is None else -gravity
+        flat = everything @ upright(vertical).T
     else:
         flat = everything @ points.plane.T
-        low, high = flat.min(axis=0), flat.max(axis=0)
-        wide, tall = high - low
-        figure = blank(_WIDTH, float(np.clip(0.6 + (_WIDTH - 0.6) * tall / wide, 2.6, 5.6)))
-        sheet = Sheet(figure, points.plane, step)
         if gravity is not None:
             pull = points.plane.T @ (points.plane @ gravity)
             gravity = pull if np.linalg.norm(pull) > _NONE * np.linalg.norm(gravity) else None
-    size = float((high - low).max())
-    base = base_outline(points, guides)
-    if len(base) > 1:
-        sheet.faces([base], MUTED, 0.18, raised=-0.03)
-        sheet.line(np.vstack([base, base[:1]]), MUTED, 2.0, raised=-0.02)
-    for i, guide in enumerate(guides):
-        _draw_leg(sheet, points, guide, i, size)
-    for part in points.parts:
-        _draw_part(sheet, part)
-    _draw_frame(sheet, points, size, angle)
-    if path is not None:
-        sheet.line(path, INK, 1.2, raised=1.0, style=(0, (1.5, 1.2)))
+    return Scene(
+        tuple(guides),
+        points.plane,
+        gravity,
+        vertical,
+        flat.min(axis=0),
+        flat.max(axis=0),
+        grid_step(points, guides),
+        base_outline(points, guides),
+    )
+
+
+def draw_surroundings(sheet: Space | Sheet, scene: Scene) -> None:
+    """Draw what does not move: the ground, the base, and the guides."""
+    if isinstance(sheet, Space):
+        sheet.ground(scene.low, scene.high, scene.step)
+    if len(scene.base) > 1:
+        sheet.faces([scene.base], MUTED, 0.18, raised=-0.03)
+        sheet.line(np.vstack([scene.base, scene.base[:1]]), MUTED, 2.0, raised=-0.02)
+    for guide in scene.guides:
+        _draw_guide(sheet, guide)
+
+
+def draw_directions(sheet: Space | Sheet, scene: Scene) -> None:
+    """Draw which way the base frame's axes and gravity point."""
+    low, high, size = scene.low, scene.high, scene.size
     if isinstance(sheet, Space):
         # At the near corner of the ground, in the upright frame: beside the machine, not in it.
-        corner = sheet.rotation.T @ (low + size * np.array([-0.02, -0.10, 0.0]))
+        near = low + size * np.array([-0.02, -0.10, 0.0])
+        corner = sheet.beside_eye(near, (low + high) / 2.0)
         for axis, name in zip(np.eye(3), "xyz", strict=True):
             sheet.line(np.array([corner, corner + 0.13 * size * axis]), INK, 1.6, raised=1.0)
             sheet.text(corner + 0.17 * size * axis, name, INK)
-        start = corner + size * (sheet.rotation.T @ np.array([-0.16, -0.02, 0.30]))
+        start = near + size * np.array([-0.16, -0.02, 0.30])
+        start = sheet.beside_eye(start, (low + high) / 2.0)
     else:
         start = np.array([low[0] - 0.06 * size, high[1]]) @ sheet.plane
-    if gravity is not None:
-        _draw_gravity(sheet, start, gravity, size)
-    sheet.fill()
-    return figure
+    if scene.gravity is not None:
+        _draw_gravity(sheet, start, scene.gravity, size)
+
+
+def draw_machine(sheet: Space | Sheet, scene: Scene, points: JointPoints, angle: str = "") -> None:
+    """Draw what moves, in one pose: sliders, cranks and links, and the platform with its frame.
+
+    The `angle` stands, in words, beside the platform frame's x axis.
+    """
+    for i, guide in enumerate(scene.guides):
+        _draw_leg(sheet, points, guide, i, scene.size)
+    for part in points.parts:
+        _draw_part(sheet, part)
+    _draw_frame(sheet, points, scene.size, angle)
+
+
+def draw_path(sheet: Space | Sheet, path: Array) -> None:
+    """Draw the way (T, 3) of a point in the base frame, m."""
+    sheet.line(path, INK, 1.2, raised=1.0, style=(0, (1.5, 1.2)))
 
 
 def _everything(points: JointPoints, guides: Sequence[Guide]) -> Array:
     """Return the points (K, 3) that a picture must hold."""
-    return np.vstack([*points.links, *(guide.path for guide in guides)])
+    lines = (line.reshape(-1, 3) for line in points.links)
+    return np.vstack([*lines, *(guide.path for guide in guides)])
 
 
 def grid_step(points: JointPoints, guides: Sequence[Guide]) -> float:
-    """Return the side of the squares, m, behind a picture of a machine in one pose."""
+    """Return the side of the squares, m, behind a picture of a machine, in one pose or several."""
     everything = _everything(points, guides)
     if points.plane is not None:
         everything = everything @ points.plane.T
@@ -107,9 +171,10 @@ def grid_step(points: JointPoints, guides: Sequence[Guide]) -> float:
 
 
 def base_outline(points: JointPoints, guides: Sequence[Guide]) -> Array:
-    """Return the centres (k, 3) of the cranks' circles in one pose, in the order round them."""
+    """Return the centres (k, 3) of the cranks' circles, in the order round them."""
     pairs = zip(points.links, guides, strict=True)
-    base = np.array([line[0] for line, guide in pairs if not guide.slides and len(guide.path) > 1])
+    turning = [line for line, guide in pairs if not guide.slides and len(guide.path) > 1]
+    base = np.array([line[..., 0, :].reshape(-1, 3)[0] for line in turning])
     if len(base) < 3:
         return base.reshape(-1, 3)
     away = base - base.mean(axis=0)
@@ -125,15 +190,20 @@ def rods(line: Array, bar: Array | None, size: float) -> list[Array]:
     return [one, other, *np.stack([one, other], axis=1)]
 
 
+def _draw_guide(sheet: Space | Sheet, guide: Guide) -> None:
+    if not guide.slides:
+        sheet.line(guide.path, MUTED, 0.9, raised=-0.01, style=(0, (2.0, 2.0)))
+        return
+    sheet.line(guide.path, MUTED, 3.4, raised=-0.01)
+    for end in guide.path:
+        sheet.mark(end, MUTED, MUTED, 3.0, raised=-0.01)
+
+
 def _draw_leg(sheet: Space | Sheet, points: JointPoints, guide: Guide, i: int, size: float) -> None:
     color, line = LEG_COLORS[i], points.links[i]
     if guide.slides:
-        sheet.line(guide.path, MUTED, 3.4, raised=-0.01)
-        for end in guide.path:
-            sheet.mark(end, MUTED, MUTED, 3.0, raised=-0.01)
         sheet.faces(_block(line[0], guide.axis, size), color, 0.95)
     else:
-        sheet.line(guide.path, MUTED, 0.9, raised=-0.01, style=(0, (2.0, 2.0)))
         axle = _AXLE * size * guide.axis
         sheet.line(np.array([line[0] - axle, line[0] + axle]), MUTED, 6.0, raised=-0.01)
     for pair in pairwise(line[:-1]):

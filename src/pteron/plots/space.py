@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.proj3d import proj_transform  # type: ignore[import-untyped]
 
 from pteron.kernels import Array
-from pteron.plots.canvas import FONT_SIZE, GRID, PAPER
+from pteron.plots.canvas import FONT_SIZE, GRID, PAPER, SMALL
 
 _ELEVATION, _AZIMUTH = 24.0, -52.0
 """Degrees, from which the machine is seen."""
@@ -28,20 +32,43 @@ def upright(vertical: Array) -> Array:
 
 
 class Space:
-    """Axes onto which segments and faces are put in the order of their distance."""
+    """Axes onto which segments and faces are put in the order of their distance.
 
-    def __init__(self, figure: Figure, vertical: Array) -> None:
+    They take a `box` of the figure: left, bottom, width and height, as shares of it. `things` are
+    what was drawn, in that order.
+    """
+
+    def __init__(
+        self,
+        figure: Figure,
+        vertical: Array,
+        box: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 1.0),
+        *,
+        small: bool = False,
+    ) -> None:
         axes = figure.add_subplot(projection="3d", computed_zorder=False)
         assert isinstance(axes, Axes3D)
         axes.patch.set_alpha(0.0)
         axes.set_axis_off()
         axes.set_proj_type("persp", focal_length=1.6)
-        axes.view_init(elev=_ELEVATION, azim=_AZIMUTH)
         self.figure = figure
         self.axes = axes
         self.rotation = upright(vertical)
+        self._box = box
+        self._weight = SMALL if small else 1.0
+        self._font = FONT_SIZE - 2.0 if small else FONT_SIZE
+        self.things: list[Artist] = []
         self._drawn: list[Array] = []
-        elevation, azimuth = np.radians(_ELEVATION), np.radians(_AZIMUTH)
+        self.turn(0.0)
+
+    def turn(self, angle: float) -> None:
+        """Look from another side: the eye goes round the vertical by an angle from the first, rad.
+
+        What is drawn from then on is put in the order of its distance from there.
+        """
+        self.angle = angle
+        azimuth, elevation = np.radians(_AZIMUTH) + angle, np.radians(_ELEVATION)
+        self.axes.view_init(elev=_ELEVATION, azim=float(np.degrees(azimuth)))
         across = np.cos(elevation)
         self._towards_eye = np.array(
             [across * np.cos(azimuth), across * np.sin(azimuth), np.sin(elevation)]
@@ -56,6 +83,13 @@ class Space:
         across = across / max(float(np.linalg.norm(across)), 1e-12)
         return np.asarray(np.copysign(1.0, across @ away) * across)
 
+    def beside_eye(self, point: Array, center: Array) -> Array:
+        """Return a point of the upright frame, in the base frame, gone round with the eye."""
+        x, y, _ = point - center
+        cos, sin = np.cos(self.angle), np.sin(self.angle)
+        moved = np.array([cos * x - sin * y - x, sin * x + cos * y - y, 0.0])
+        return np.asarray(self.rotation.T @ (point + moved))
+
     def line(
         self,
         points: Array,
@@ -68,15 +102,25 @@ class Space:
         """Draw a line through points (K, 3)."""
         p = points @ self.rotation.T
         self._drawn.append(p)
-        look = {"color": color, "linewidth": width, "linestyle": style, "solid_capstyle": "round"}
-        self.axes.plot(*p.T, zorder=self._order(p, raised), **look)
+        look = {
+            "color": color,
+            "linewidth": self._weight * width,
+            "linestyle": style,
+            "solid_capstyle": "round",
+        }
+        self.things += self.axes.plot(*p.T, zorder=self._order(p, raised), **look)
 
     def mark(self, point: Array, face: str, edge: str, size: float, raised: float = 0.03) -> None:
         """Draw a ring at a point."""
         p = (point @ self.rotation.T)[None]
-        look = {"marker": "o", "markersize": size, "markeredgewidth": 1.4, "linestyle": "none"}
+        look = {
+            "marker": "o",
+            "markersize": self._weight * size,
+            "markeredgewidth": 1.4 * self._weight,
+            "linestyle": "none",
+        }
         colors = {"markerfacecolor": face, "markeredgecolor": edge}
-        self.axes.plot(*p.T, zorder=self._order(p, raised), **look, **colors)
+        self.things += self.axes.plot(*p.T, zorder=self._order(p, raised), **look, **colors)
 
     def faces(self, faces: list[Array], color: str, alpha: float, raised: float = 0.0) -> None:
         """Draw polygons, at one distance."""
@@ -86,31 +130,60 @@ class Space:
         )
         collection.set_zorder(self._order(np.vstack(turned), raised))
         self.axes.add_collection3d(collection)
+        self.things.append(collection)
 
     def text(self, point: Array, text: str, color: str, *, bold: bool = False) -> None:
         """Write beside a point, over everything."""
         p = point @ self.rotation.T
         self._drawn.append(p[None])
-        look = {"fontsize": FONT_SIZE, "fontweight": "bold" if bold else "normal"}
-        self.axes.text(*p, text, color=color, ha="center", va="center", zorder=30.0, **look)
+        look: dict[str, Any] = {"fontsize": self._font, "fontweight": "bold" if bold else "normal"}
+        look |= {"ha": "center", "va": "center", "zorder": 30.0}
+        self.things.append(self.axes.text(*p, text, color=color, **look))
 
-    def fill(self) -> None:
-        """Place the axes so that what was drawn fills the figure."""
-        drawn = np.vstack(self._drawn)
+    def clear(self, kept: int) -> None:
+        """Take away what was drawn last, all but so many things."""
+        for thing in self.things[kept:]:
+            thing.remove()
+        del self.things[kept:]
+        self._drawn.clear()
+
+    @property
+    def drawn(self) -> Array:
+        """Return the points (K, 3) of what was drawn, as the axes have them."""
+        return np.vstack(self._drawn)
+
+    def hold(self, drawn: Array) -> None:
+        """Let `fill` leave room for points (K, 3) that other axes hold."""
+        self._drawn.append(drawn)
+
+    def fill(self, angles: Sequence[float] = (0.0,)) -> None:
+        """Place the axes so that what was drawn fills the box, seen from any of the angles, rad.
+
+        What is drawn later leaves them where they are.
+        """
+        drawn = self.drawn
         low, high = drawn.min(axis=0), drawn.max(axis=0)
         self.axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
         self.axes.set_box_aspect(high - low)
         self.figure.set_layout_engine("none")
         self.axes.set_position((0.0, 0.0, 1.0, 1.0))
         self.axes.apply_aspect()
-        x, y, _ = proj_transform(*drawn.T, self.axes.get_proj())
+        corners = np.array([self._seen(drawn, angle) for angle in angles])
+        self.turn(angles[0])
+        first, last = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
+        start, room = np.array(self._box[:2]), np.array(self._box[2:])
+        scale = (1.0 - 2.0 * _MARGIN) * float((room / (last - first)).min())
+        corner = start + room / 2.0 - scale * (first + last) / 2.0
+        self.axes.set_position((corner[0], corner[1], scale, scale))
+
+    def _seen(self, points: Array, angle: float) -> tuple[Array, Array]:
+        """Return the corners of what points (K, 3) take of the figure, seen from an angle."""
+        self.turn(angle)
+        x, y, _ = proj_transform(*points.T, self.axes.get_proj())
         seen = self.figure.transFigure.inverted().transform(
             self.axes.transData.transform(np.column_stack([x, y]))
         )
-        left, right = seen.min(axis=0), seen.max(axis=0)
-        scale = (1.0 - 2.0 * _MARGIN) / float((right - left).max())
-        corner = 0.5 - scale * (left + right) / 2.0
-        self.axes.set_position((corner[0], corner[1], scale, scale))
+        return seen.min(axis=0), seen.max(axis=0)
 
     def ground(self, low: Array, high: Array, step: float) -> None:
         """Draw squares of a side under everything, one rim wider than it."""
@@ -120,4 +193,6 @@ class Space:
         self._drawn.append(np.array([(a, b, z) for a in (x[0], x[-1]) for b in (y[0], y[-1])]))
         lines = [[(a, y[0], z), (a, y[-1], z)] for a in x]
         lines += [[(x[0], b, z), (x[-1], b, z)] for b in y]
-        self.axes.add_collection3d(Line3DCollection(lines, colors=GRID, linewidths=0.7, zorder=0.0))
+        squares = Line3DCollection(lines, colors=GRID, linewidths=0.7, zorder=0.0)
+        self.axes.add_collection3d(squares)
+        self.things.append(squares)

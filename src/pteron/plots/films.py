@@ -1,0 +1,211 @@
+"""Films of a motion, as MP4 or GIF: the frames, and how fast they go."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pteron.atomic import write_bytes
+from pteron.errors import DataError, OutputError, shown
+from pteron.kernels import Array, as_array
+from pteron.manipulator import Manipulator
+from pteron.motion import Motion
+from pteron.plots.encoders import ENCODERS, checked_encoder
+from pteron.plots.frames import frames
+
+_SPEEDS = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
+_LEAST = 2.0
+"""s that a film takes at least, where its speed is left to it."""
+
+_FPS = 30.0
+_SIZES = (160, 3840)
+"""Least and greatest side, pixels."""
+
+_MOST = 20_000
+"""Frames of one film."""
+
+
+@dataclass(frozen=True)
+class Film:
+    """A film that has been written.
+
+    Attributes
+    ----------
+    path : Path
+        Its file.
+    frames : int
+        How many there are.
+    fps : float
+        Frames a second; of a GIF what its file can tell, hundredths of a second a frame.
+    speed : float
+        Time in the film's world over time on the clock: below 1 is slow motion.
+    size : (int, int)
+        Width and height, pixels.
+    """
+
+    path: Path
+    frames: int
+    fps: float
+    speed: float
+    size: tuple[int, int]
+
+    @property
+    def duration(self) -> float:
+        """How long it takes to watch, s."""
+        return self.frames / self.fps
+
+
+def film(
+    robot: Manipulator,
+    motion: Motion,
+    path: str | Path,
+    *,
+    fps: float = _FPS,
+    speed: float | None = None,
+    size: tuple[int, int] = (960, 720),
+    turns: float = 0.0,
+    forces: ArrayLike | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Film:
+    """Write a film of a machine that goes through a motion.
+
+    The view is the same in all frames, the first frame is the motion's first sample and the last
+    one its last. The film says its speed in a corner.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    motion : Motion
+        What the platform does.
+    path : str or Path
+        The file: .mp4 (H.264, which every browser plays) or .gif.
+    fps : float
+        Frames a second, 1 to 120; a GIF takes the nearest that its file can tell, 50 at most.
+    speed : float, optional
+        Time in the film's world over time on the clock: 0.4 is slow motion. By default the largest
+        of 1, 0.5, 0.2, 0.1 ... at which the film takes 2 s.
+    size : (int, int)
+        Width and height, pixels, both even.
+    turns : float
+        How many times the eye goes round the machine; not for planar machines.
+    forces : array, shape (T, n), optional
+        Forces of the legs at the motion's samples, N or N m: their curves are drawn below.
+    progress : callable, optional
+        Is told how many frames are done, and of how many, after each.
+
+    Returns
+    -------
+    Film
+
+    Raises
+    ------
+    DataError
+        If a number makes no film, or the times of the motion do not ascend.
+    UnreachablePose
+        If a leg does not reach a pose.
+    OutputError
+        If the file cannot be written, or its ending is neither .mp4 nor .gif.
+    PteronError
+        If the encoder of MP4 files is not there: `pip install 'pteron[film]'` brings it.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.motion import pick_and_place
+    >>> robot = pteron.load("delta")
+    >>> cycle = pick_and_place(robot, [0.0, 0.0, -0.9])
+    >>> made = pteron.plots.film(robot, cycle, "cycle.gif", speed=0.2)  # doctest: +SKIP
+    """
+    target = checked_film(path)
+    motion.expect_ascending()
+    _expect_number("fps", fps, 1.0, 120.0)
+    if np.shape(size) != (2,) or any(
+        not _SIZES[0] <= side <= _SIZES[1] or side % 2 for side in size
+    ):
+        low, high = _SIZES
+        raise DataError(
+            f"size: {shown(size)} given, two even numbers from {low} to {high} expected, pixels"
+        )
+    if robot.platform.planar and turns:
+        raise DataError(
+            f"turns: {turns:g} given, but {robot.name} is planar and seen along its plane's "
+            "normal; leave it out"
+        )
+    _expect_number("turns", turns, -100.0, 100.0)
+    drawn = None if forces is None else _checked_forces(forces, motion, robot)
+    encoder = ENCODERS[target.suffix.lower()]
+    rate = encoder.rate(fps)
+    if speed is None:
+        speed = next((s for s in _SPEEDS if motion.duration >= _LEAST * s), _SPEEDS[-1])
+    _expect_number("speed", speed, 1e-4, 1e3)
+    steps = max(round(motion.duration / speed * rate), 1)
+    if steps >= _MOST:
+        raise DataError(
+            f"{motion.duration:.4g} s at a speed of {speed:g} make {steps} frames, {_MOST} at "
+            "most are possible; give a higher speed, or fewer frames a second"
+        )
+    times = np.linspace(float(motion.time[0]), float(motion.time[-1]), steps + 1)
+    sides = int(size[0]), int(size[1])
+    if (steps + 1) * sides[0] * sides[1] > encoder.most:
+        raise DataError(
+            f"{steps + 1} frames of {sides[0]}x{sides[1]} pixels are too much for a GIF; give an "
+            ".mp4, a smaller size, a higher speed or fewer frames a second"
+        )
+    pictures = frames(robot, motion, times, sides, turns=turns, forces=drawn, corner=_told(speed))
+    # Made elsewhere: a film that is not finished leaves nothing behind.
+    with TemporaryDirectory(prefix="pteron-film-") as folder:
+        made = Path(folder) / f"film{target.suffix.lower()}"
+        with closing(encoder.writer(made, sides, rate)) as writer:
+            for done, picture in enumerate(pictures, start=1):
+                writer.add(picture)
+                if progress is not None:
+                    progress(done, len(times))
+        write_bytes(target, made.read_bytes())
+    return Film(target, len(times), rate, speed, sides)
+
+
+def checked_film(path: str | Path) -> Path:
+    """Return a path after a check, before the work begins, that a film can be written there.
+
+    Raises
+    ------
+    OutputError
+        If its ending is unknown, its folder is missing, or it is a folder.
+    PteronError
+        If what writes such files is not there.
+    """
+    target = Path(path)
+    if target.is_dir():
+        raise OutputError(f"{path}: is a folder; name a file in it, such as cycle.mp4")
+    if target.suffix.lower() not in ENCODERS:
+        raise OutputError(f"{path}: {target.suffix or 'no'} ending, .mp4 or .gif expected")
+    if not target.parent.is_dir():
+        raise OutputError(f"{path}: there is no folder {target.parent}; make it first")
+    checked_encoder(target)
+    return target
+
+
+def _told(speed: float) -> str:
+    return "real time" if speed == 1.0 else f"{speed:.3g} \u00d7 real time"
+
+
+def _expect_number(name: str, value: float, low: float, high: float) -> None:
+    if not low <= value <= high:
+        raise DataError(f"{name}: {value:g} given, a number from {low:g} to {high:g} expected")
+
+
+def _checked_forces(forces: ArrayLike, motion: Motion, robot: Manipulator) -> Array:
+    found = as_array(forces, "forces", ())
+    expected = len(motion.time), robot.freedom
+    if found.shape != expected:
+        raise DataError(
+            f"forces: shape {found.shape} given, {expected} expected, as the motion has"
+        )
+    return found

@@ -1,0 +1,148 @@
+"""The frames of a film: one machine in the poses of a motion, always seen in one view."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from pteron.kernels import Array
+from pteron.manipulator import Manipulator
+from pteron.motion import JointPoints, Motion, joint_guides, joint_points
+from pteron.plots.canvas import FONT_SIZE, INK, MUTED, blank, leg_style, plain_axes
+from pteron.plots.encoders import Picture
+from pteron.plots.machine import gravity_of
+from pteron.plots.robot import (
+    Scene,
+    draw_directions,
+    draw_machine,
+    draw_path,
+    draw_surroundings,
+    scene_of,
+)
+from pteron.plots.sheet import Sheet
+from pteron.plots.space import Space
+
+_WIDTH = 6.4
+"""Inches, however many pixels: letters grow with the picture."""
+
+_STRIP = 1.35
+"""Height of the forces' curves, inches."""
+
+_SIDES = 0.62, 0.15
+"""Inches to the left and right of them."""
+
+_BELOW, _ABOVE = 0.42, 0.08
+"""Inches below and above them."""
+
+_PROBES = 24
+"""Poses, and views round the machine, that say how much room the picture needs."""
+
+_WAY = 1000
+"""Points of the tool's way."""
+
+
+def frames(
+    robot: Manipulator,
+    motion: Motion,
+    times: Array,
+    size: tuple[int, int],
+    *,
+    turns: float,
+    forces: Array | None,
+    corner: str,
+) -> Iterator[Picture]:
+    """Yield the pictures of a machine at times (K,), s, width and height in pixels.
+
+    The eye goes round it so many turns from the first to the last. Forces (T, n) at the motion's
+    samples are drawn below it, `corner` is written in a corner.
+    """
+    poses = motion.at(times)[0]
+    points, guides = joint_points(robot, poses), joint_guides(robot, motion.pose)
+    scene = scene_of(points, guides, gravity_of(robot))
+    some = motion.pose[:: max(len(motion.pose) // _WAY, 1)]
+    path = joint_points(robot, np.vstack([some, motion.pose[-1:]])).tool
+
+    figure = blank(_WIDTH, _WIDTH * size[1] / size[0])
+    figure.set_dpi(size[0] / _WIDTH)
+    figure.set_layout_engine("none")
+    figure.patch.set(facecolor="white", alpha=1.0)
+    share = 0.0 if forces is None else _STRIP / float(figure.get_size_inches()[1])
+    sheet = scene.sheet(figure, (0.0, share, 1.0, 1.0 - share))
+    style: dict[str, Any] = {"ha": "right", "va": "top", "fontsize": FONT_SIZE, "color": MUTED}
+    figure.text(0.985, 0.98, corner, **style)
+    angles = 2.0 * np.pi * turns * np.linspace(0.0, 1.0, len(times))
+    now = None if forces is None else _strip(figure, robot, motion, forces, share)
+
+    probes = np.unique(np.linspace(0, len(times) - 1, _PROBES).astype(int)).tolist()
+    _draw_still(sheet, scene, path)
+    for k in probes:
+        draw_machine(sheet, scene, points.at(k))
+    if isinstance(sheet, Space):
+        sheet.fill(angles[probes].tolist() if turns else (0.0,))
+    else:
+        sheet.fill()
+    sheet.clear(0)
+    yield from _drawn(figure, sheet, scene, points, path, angles, times, now)
+
+
+def _drawn(
+    figure: Figure,
+    sheet: Space | Sheet,
+    scene: Scene,
+    points: JointPoints,
+    path: Array,
+    angles: Array,
+    times: Array,
+    now: Sequence[Line2D] | None,
+) -> Iterator[Picture]:
+    canvas: Any = figure.canvas
+    turning = bool(angles[-1])
+    kept = 0
+    for k, time in enumerate(times):
+        if turning and isinstance(sheet, Space):
+            sheet.turn(float(angles[k]))
+        if turning or not kept:
+            _draw_still(sheet, scene, path)
+            kept = 0 if turning else len(sheet.things)
+        draw_machine(sheet, scene, points.at(k))
+        for line in now or ():
+            line.set_xdata([time, time])
+        canvas.draw()
+        yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
+        sheet.clear(kept)
+
+
+def _draw_still(sheet: Space | Sheet, scene: Scene, path: Array) -> None:
+    draw_surroundings(sheet, scene)
+    draw_directions(sheet, scene)
+    draw_path(sheet, path)
+
+
+def _strip(
+    figure: Figure, robot: Manipulator, motion: Motion, forces: Array, share: float
+) -> list[Line2D]:
+    """Draw the forces at the foot of a figure; return the lines that say when it is.
+
+    Legs of other units have axes of their own, beside the first.
+    """
+    units = [leg.joint.force_unit for leg in robot.legs]
+    groups = list(dict.fromkeys(units))
+    wide, tall = (float(side) for side in figure.get_size_inches())
+    each = wide / len(groups)
+    found = []
+    for k, unit in enumerate(groups):
+        axes: Axes = plain_axes(figure, "time (s)", f"drives ({unit})")
+        room = each - sum(_SIDES)
+        box = ((k * each + _SIDES[0]) / wide, _BELOW / tall, room / wide)
+        axes.set_position((*box, share - (_BELOW + _ABOVE) / tall))
+        axes.axhline(0.0, color=MUTED, linewidth=0.8)
+        for i in (i for i, own in enumerate(units) if own == unit):
+            axes.plot(motion.time, forces[:, i], **leg_style(i, 1.4))
+        axes.set_xlim(float(motion.time[0]), float(motion.time[-1]))
+        found.append(axes.axvline(float(motion.time[0]), color=INK, linewidth=1.2, clip_on=False))
+    return found

@@ -1,0 +1,250 @@
+"""Figures of the machine: in one pose, or in several beside each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from pteron.errors import DataError
+from pteron.kernels import Array
+from pteron.kinematics.evaluate import checked
+from pteron.manipulator import Manipulator
+from pteron.motion import Guide, JointPoints, joint_guides, joint_points
+from pteron.plots.canvas import FONT_SIZE, INK, blank
+from pteron.plots.robot import (
+    Scene,
+    draw_directions,
+    draw_machine,
+    draw_path,
+    draw_surroundings,
+    scene_of,
+)
+from pteron.shapes import PoseLike
+from pteron.workspace import home_pose
+
+_WIDTH = 5.6
+"""Inches."""
+
+_SPACE = 4.4
+"""Height of a picture in space, inches."""
+
+_PANEL = 2.4
+"""Width of one picture beside others, inches."""
+
+_SQUARE = 0.9
+"""Height over width of one in space."""
+
+_INSET = 0.02
+"""Share of its width that is free on each side of it."""
+
+_TITLE = 0.24
+"""Inches over a picture that its title takes."""
+
+
+def draw(
+    robot: Manipulator,
+    pose: PoseLike | None = None,
+    *,
+    along: PoseLike | None = None,
+    angle: str = "",
+) -> Figure:
+    """Return the machine in one pose: in space with the vertical upwards, or in its plane.
+
+    Gravity is an arrow; a planar machine's only if its plane has it. `robot_figure` draws the same
+    from points that are known.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    pose : array, shape (m,), optional
+        m and rad; by default the home pose.
+    along : array, shape (T, m), optional
+        Poses of a motion, m and rad: the tool's way is drawn as a dotted line.
+    angle : str
+        What stands beside the platform frame's x axis, such as "\u03c6 = 10\u00b0".
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    UnreachablePose
+        If a leg does not reach a pose.
+    DataError
+        If a pose has not m numbers, or there are several; `poses_figure` draws several.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> figure = pteron.plots.draw(pteron.load("delta"))
+    >>> figure.savefig("delta.png")  # doctest: +SKIP
+    """
+    shown = home_pose(robot) if pose is None else checked(robot, pose, "pose")
+    if shown.ndim != 1:
+        raise DataError(f"pose: {shown.shape[0]} given, 1 expected; poses_figure draws several")
+    way = None if along is None else np.reshape(checked(robot, along, "along"), (-1, robot.freedom))
+    return robot_figure(
+        joint_points(robot, shown),
+        joint_guides(robot, shown if way is None else np.vstack([shown[None], way])),
+        gravity=gravity_of(robot),
+        path=None if way is None else joint_points(robot, way).tool,
+        angle=angle,
+    )
+
+
+def gravity_of(robot: Manipulator) -> Array | None:
+    """Return a machine's gravity (3,), m/s^2, for a picture: None where there is none."""
+    return np.array(robot.gravity) if any(robot.gravity) else None
+
+
+def robot_figure(
+    points: JointPoints,
+    guides: Sequence[Guide],
+    *,
+    gravity: Array | None = None,
+    path: Array | None = None,
+    angle: str = "",
+) -> Figure:
+    """Return the machine in one pose: in space with the vertical upwards, or in its plane.
+
+    The points are those of one pose, the guides those of `pteron.motion.joint_guides`; the `path`
+    (T, 3) of a point in the base frame is in m. Gravity (3,) is drawn as an arrow, where the
+    picture's plane has it; in space without it the platform frame's z points up. The `angle`
+    stands, in words, beside the platform frame's x axis.
+    """
+    scene = scene_of(points, guides, gravity)
+    height = _SPACE
+    if scene.plane is not None:
+        height = float(np.clip(0.6 + (_WIDTH - 0.6) * scene.aspect, 2.6, 5.6))
+    figure = blank(_WIDTH, height)
+    sheet = scene.sheet(figure)
+    draw_surroundings(sheet, scene)
+    draw_machine(sheet, scene, points, angle)
+    if path is not None:
+        draw_path(sheet, path)
+    draw_directions(sheet, scene)
+    sheet.fill()
+    return figure
+
+
+def poses_figure(
+    robots: Manipulator | Sequence[Manipulator],
+    poses: PoseLike,
+    *,
+    titles: Sequence[str] = (),
+    columns: int | None = None,
+    along: PoseLike | None = None,
+) -> Figure:
+    """Return a machine in several poses beside each other, all seen from one place.
+
+    So are the moments of a motion, and the assembly modes of a machine, to be compared; its working
+    modes are robots of their own.
+
+    Parameters
+    ----------
+    robots : Manipulator, or a sequence of K
+        The machine, or one for each pose, which differ in their working modes.
+    poses : array, shape (K, m)
+        m and rad; one pose (m,) serves all robots.
+    titles : sequence of str
+        What stands over each.
+    columns : int, optional
+        How many stand in a row; by default up to four.
+    along : array, shape (T, m), optional
+        Poses of a motion, whose tool's way is drawn in each.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    UnreachablePose
+        If a leg does not reach a pose.
+    DataError
+        If the numbers of robots, poses and titles do not fit together.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> delta = pteron.load("delta")
+    >>> figure = pteron.plots.poses_figure(delta, [[0.0, 0.0, -0.8], [0.1, 0.0, -0.9]])
+    >>> len(figure.axes)
+    2
+    """
+    machines = [robots] if isinstance(robots, Manipulator) else list(robots)
+    if not machines:
+        raise DataError("robots: none given, at least 1 expected")
+    first = machines[0]
+    shown = np.reshape(checked(first, poses, "poses"), (-1, first.freedom))
+    count = max(len(machines), len(shown))
+    if len(shown) not in (1, count) or len(machines) not in (1, count):
+        raise DataError(f"poses: {len(shown)} given for {len(machines)} robots, as many expected")
+    if titles and len(titles) != count:
+        raise DataError(f"titles: {len(titles)} given, {count} expected, one for each pose")
+    if columns is not None and columns < 1:
+        raise DataError(f"columns: {columns} given, 1 or more expected")
+    path = None if along is None else joint_points(first, along).tool.reshape(-1, 3)
+    every = [
+        joint_points(machine, pose)
+        for machine, pose in zip(
+            machines * (count // len(machines)),
+            np.resize(shown, (count, first.freedom)),
+            strict=True,
+        )
+    ]
+    rails = [joint_guides(machine, shown) for machine in machines] * (count // len(machines))
+    scenes = _alike([scene_of(*pair, gravity_of(first)) for pair in zip(every, rails, strict=True)])
+    columns = columns or _columns(count)
+    rows = -(-count // columns)
+    tall = _PANEL * (_SQUARE if scenes[0].plane is None else min(max(scenes[0].aspect, 0.4), 1.2))
+    over = _TITLE if titles else 0.0
+    figure = blank(columns * _PANEL, rows * (tall + over))
+    sheets = []
+    for k, (scene, points) in enumerate(zip(scenes, every, strict=True)):
+        left, below = (k % columns) / columns, 1.0 - (k // columns + 1) / rows
+        share = tall / (tall + over) / rows
+        sheet = scene.sheet(
+            figure,
+            (left + _INSET / columns, below, (1.0 - 2 * _INSET) / columns, share),
+            small=True,
+        )
+        draw_surroundings(sheet, scene)
+        draw_machine(sheet, scene, points)
+        if path is not None:
+            draw_path(sheet, path)
+        draw_directions(sheet, scene)
+        if titles:
+            style: dict[str, Any] = {
+                "ha": "center",
+                "va": "bottom",
+                "fontsize": FONT_SIZE,
+                "color": INK,
+            }
+            figure.text(left + 0.5 / columns, below + share, titles[k], **style)
+        sheets.append(sheet)
+    together = np.vstack([sheet.drawn for sheet in sheets])
+    for sheet in sheets:
+        sheet.hold(together)
+        sheet.fill()
+    return figure
+
+
+def _alike(scenes: list[Scene]) -> list[Scene]:
+    """Return scenes that are as large as the largest of them."""
+    low = np.min([scene.low for scene in scenes], axis=0)
+    high = np.max([scene.high for scene in scenes], axis=0)
+    step = max(scene.step for scene in scenes)
+    return [replace(scene, low=low, high=high, step=step) for scene in scenes]
+
+
+def _columns(count: int) -> int:
+    """Return how many of so many pictures stand in a row: up to four, the rows alike."""
+    rows = -(-count // 4)
+    return -(-count // rows)
