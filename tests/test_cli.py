@@ -21,7 +21,7 @@ from typer.testing import CliRunner, Result
 import pteron
 from pteron.cli.arguments import regrouped
 from pteron.cli.main import app
-from pteron.manipulator.manipulator import with_elbows
+from pteron.manipulator.variants import with_elbows
 from pteron.workspace.doubts import doubts
 
 PROGRAM = [sys.executable, "-c", "from pteron_command import main; main()"]
@@ -29,7 +29,7 @@ PLAIN = {"COLUMNS": "60", "NO_COLOR": "1", "FORCE_COLOR": None, "TTY_COMPATIBLE"
 POSES = "x,y,z,phi\n0.01,0.02,-0.03,0.1\n0.02,-0.01,0.03,-0.2\n"
 COMMANDS = (
     *("catalog", "check", "report", "inverse", "direct", "forces", "base", "excite", "identify"),
-    *("cycle", "simulate", "size", "film", "table1"),
+    *("cycle", "simulate", "size", "film", "play", "table1"),
 )
 
 
@@ -821,7 +821,7 @@ def test_a_report_is_a_page_with_its_numbers(monkeypatch: pytest.MonkeyPatch):
     assert "singular phi" not in text
     assert f"Written to {page}" in text
     assert max(map(len, text.splitlines())) <= 60
-    monkeypatch.setattr("pteron.report.write_report", lambda machine, folder: page)
+    monkeypatch.setattr("pteron.report.write_report", lambda machine, folder, motion: page)
     found = json.loads(done("report tripteron --out other --json"))
     assert found["page"] == str(page)
     assert found["home"] == written["home"]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pteron.cli.arguments import option
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
 
     from pteron.manipulator import Manipulator
     from pteron.motion import Motion, PickAndPlace
+    from pteron.report.recordings import Recording
     from pteron.shapes import PoseLike
     from pteron.tables import Table
 
@@ -69,19 +71,48 @@ def replayed(robot: Manipulator, file: str, start: PoseLike | None = None) -> Mo
 
     A table of joints alone is followed from a pose to start from, the home pose if none is given.
     """
-    import numpy as np
-
     from pteron.motion import replay
     from pteron.tables import read_table
     from pteron.workspace import home_pose
-    from pteron.workspace.doubts import value_doubts
 
     rows = read_table(file)
+    begin = home_pose(robot) if start is None else start
+    return _doubted(robot, rows, lambda: replay(robot, rows, start=begin))
+
+
+def recorded(robot: Manipulator, file: str) -> Recording:
+    """Return a motion from a table, or a log, as it is shown; what is unlikely in it is told."""
+    from pteron.identification.logs import find_description
+    from pteron.report.recordings import is_measured, of_table, recording
+    from pteron.tables import read_table
+
+    if find_description(file) is not None:
+        return recording(robot, file)
+    rows = read_table(file)
+    if is_measured(robot, rows) and Path(file).is_file():
+        return recording(robot, file)
+    found: list[Recording] = []
+
+    def motion() -> Motion:
+        found.append(of_table(robot, rows))
+        return found[0].motion
+
+    _doubted(robot, rows, motion)
+    return found[0]
+
+
+def _doubted(robot: Manipulator, rows: Table, read: Callable[[], Motion]) -> Motion:
+    """Return a motion that is read from a table; what is unlikely in it is told."""
+    import numpy as np
+
+    from pteron.workspace.doubts import value_doubts
+
+    file = rows.source
     _check_rates(robot, rows)
     names = [n for n in (*robot.coordinates, *robot.joint_names) if n in rows.columns]
     values = rows.numbers(names)
     try:
-        motion = replay(robot, rows, start=home_pose(robot) if start is None else start)
+        motion = read()
     except (UnreachablePose, SingularPose) as error:
         unlikely = "; ".join(value_doubts(robot, names, values))
         if not unlikely or (isinstance(error, UnreachablePose) and error.millimetres):

@@ -23,6 +23,7 @@ from pteron.cli.identify import identify
 from pteron.cli.interrupts import insistent_interrupts
 from pteron.cli.machines import catalog, check, new
 from pteron.cli.motions import direct, forces, inverse
+from pteron.cli.play import play
 from pteron.cli.report import report
 from pteron.cli.screen import complain, note
 from pteron.cli.simulate import simulate
@@ -145,7 +146,11 @@ def pteron(
 _add(catalog, "pteron catalog --json")
 _add(new, "pteron new", "pteron new delta --out robot.toml")
 _add(check, "pteron check robot.toml")
-_add(report, "pteron report quadrupteron --out report")
+_add(
+    report,
+    "pteron report quadrupteron --out report",
+    "pteron report quadrupteron --motion motion.csv --out report",
+)
 _add(
     inverse,
     "pteron inverse quadrupteron 0.01 0.02 -0.03 0.1",
@@ -189,6 +194,12 @@ _add(
     "pteron film delta -o cycle.mp4",
     "pteron film quadrupteron --speed 0.4 --forces --turns 0.5 -o slow.mp4",
     "pteron film robot.toml --cycle motion.csv --size 640x480 -o motion.gif",
+)
+_add(
+    play,
+    "pteron play quadrupteron",
+    "pteron play quadrupteron motion.csv --out motion.html",
+    "pteron play my-robot.toml log.parquet --out log.html",
 )
 _add(
     base,

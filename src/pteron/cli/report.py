@@ -9,6 +9,7 @@ from typing import Annotated, Any
 from rich.table import Table
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
+from pteron.cli.given_cycle import recorded
 from pteron.cli.screen import note, plain, show, show_json, spinner, table
 
 _SERIES = ("time", "pose", "velocity", "acceleration", "forces")
@@ -18,6 +19,15 @@ _SERIES = ("time", "pose", "velocity", "acceleration", "forces")
 def report(
     robot: Robot,
     out: Annotated[str, option("out", "The folder to write it to.", "DIR")],
+    motion: Annotated[
+        str | None,
+        option(
+            "motion",
+            "Show this motion in place of the standard cycle: a table of it, or a log.",
+            "FILE",
+            show_default=False,
+        ),
+    ] = None,
     elbows: Elbows = None,
     as_json: Json = False,
 ) -> None:
@@ -29,7 +39,8 @@ def report(
     with spinner(f"Writing the report on {machine.name}"):
         from pteron.report import write_report
 
-        page = write_report(machine, out)
+        shown = None if motion is None else recorded(machine, motion)
+        page = write_report(machine, out, motion=shown)
     found = json.loads((page.parent / "report.json").read_text(encoding="utf-8"))
     for text in found["doubts"]:
         note(f"Warning: {text}")
@@ -54,7 +65,8 @@ def _machine(found: dict[str, Any]) -> Table:
     if "phi" in found["coordinates"]:
         made.add_row("singular phi there", f"{singular} deg" if singular else "none")
     made.add_row("reach", f"{factor * reach['volume']:.4g} {unit}")
-    made.add_row("cycle", f"{found['cycle']['duration']:.3g} s")
+    shown = "cycle" if found["cycle"]["standard"] else "motion"
+    made.add_row(shown, f"{found['cycle']['duration']:.3g} s")
     made.add_row("base parameters", f"{base['rank']} of {base['of']}")
     return made
 

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from pteron.atomic import write_bytes
 from pteron.errors import DataError, OutputError, shown
 from pteron.kernels import Array, as_array
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion import Motion
 from pteron.plots.encoders import ENCODERS, checked_encoder
 from pteron.plots.frames import frames
@@ -62,7 +62,7 @@ class Film:
 
 
 def film(
-    robot: Manipulator,
+    robot: RobotLike,
     motion: Motion,
     path: str | Path,
     *,
@@ -80,7 +80,7 @@ def film(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     motion : Motion
         What the platform does.
@@ -123,7 +123,7 @@ def film(
     >>> cycle = pick_and_place(robot, [0.0, 0.0, -0.9])
     >>> made = pteron.plots.film(robot, cycle, "cycle.gif", speed=0.2)  # doctest: +SKIP
     """
-    target = checked_film(path)
+    target, robot = checked_film(path), as_manipulator(robot)
     motion.expect_ascending()
     _expect_number("fps", fps, 1.0, 120.0)
     if np.shape(size) != (2,) or any(

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import checked
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion import Guide, JointPoints, joint_guides, joint_points
 from pteron.plots.canvas import FONT_SIZE, INK, blank
 from pteron.plots.robot import (
@@ -46,7 +46,7 @@ _TITLE = 0.24
 
 
 def draw(
-    robot: Manipulator,
+    robot: RobotLike,
     pose: PoseLike | None = None,
     *,
     along: PoseLike | None = None,
@@ -59,7 +59,7 @@ def draw(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     pose : array, shape (m,), optional
         m and rad; by default the home pose.
@@ -82,9 +82,10 @@ def draw(
     Examples
     --------
     >>> import pteron
-    >>> figure = pteron.plots.draw(pteron.load("delta"))
+    >>> figure = pteron.plots.draw("delta")
     >>> figure.savefig("delta.png")  # doctest: +SKIP
     """
+    robot = as_manipulator(robot)
     shown = home_pose(robot) if pose is None else checked(robot, pose, "pose")
     if shown.ndim != 1:
         raise DataError(f"pose: {shown.shape[0]} given, 1 expected; poses_figure draws several")
@@ -134,7 +135,7 @@ def robot_figure(
 
 
 def poses_figure(
-    robots: Manipulator | Sequence[Manipulator],
+    robots: RobotLike | Sequence[RobotLike],
     poses: PoseLike,
     *,
     titles: Sequence[str] = (),
@@ -148,7 +149,7 @@ def poses_figure(
 
     Parameters
     ----------
-    robots : Manipulator, or a sequence of K
+    robots : Manipulator, name or path, or a sequence of K
         The machine, or one for each pose, which differ in their working modes.
     poses : array, shape (K, m)
         m and rad; one pose (m,) serves all robots.
@@ -178,7 +179,8 @@ def poses_figure(
     >>> len(figure.axes)
     2
     """
-    machines = [robots] if isinstance(robots, Manipulator) else list(robots)
+    given = [robots] if isinstance(robots, RobotLike) else list(robots)
+    machines = [as_manipulator(robot) for robot in given]
     if not machines:
         raise DataError("robots: none given, at least 1 expected")
     first = machines[0]

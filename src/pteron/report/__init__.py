@@ -1,8 +1,11 @@
-"""Everything about a machine in one page, and the tables of numbers that stand in it."""
+"""Everything about a machine in one page, its motions in another, and the tables of their numbers.
 
-from pteron.report.write import write_report
+`write_report` has all that Pteron knows of a machine; `write_motion_page` shows one motion of it.
+"""
 
-__all__ = ["write_report"]
+from pteron.report.write import write_motion_page, write_report
+
+__all__ = ["write_motion_page", "write_report"]
 
 
 def __dir__() -> list[str]:

@@ -15,6 +15,7 @@ from pteron.manipulator import Manipulator
 from pteron.motion import (
     Guide,
     JointPoints,
+    Motion,
     PickAndPlace,
     Sizing,
     joint_guides,
@@ -25,6 +26,8 @@ from pteron.motion import (
 from pteron.plots import grid_step
 from pteron.reduction import BaseParameters, base_parameters
 from pteron.report.costs import Cost, costs
+from pteron.report.recordings import Recording
+from pteron.report.scene import Frames, frames
 from pteron.workspace import (
     BEYOND_LIMITS,
     REACHABLE,
@@ -45,7 +48,7 @@ from pteron.workspace.drive_doubts import load_doubts
 from pteron.workspace.reach import Plane, slice_planes
 
 _SAMPLES = 481
-"""Samples of the cycle: 120 steps of the moving picture, four each."""
+"""Samples of the cycle: two for each step of the moving picture."""
 
 _LEAST_RESERVE = 0.2
 _ANGLES = 361
@@ -112,8 +115,10 @@ class Measures:
 class Report:
     """All that a page says about a machine; the cycle has T samples.
 
-    The cycle keeps the reserve `least`; `sizing` is what it asks of the drives: forces, in N or
-    N m, include friction and the motors' inertia where the file tells of them (`driven`).
+    The cycle is the standard one, which keeps the reserve `least`, or a motion that was given, from
+    `source`; `shown` are the moments of it that the moving picture has. `sizing` is what it asks of
+    the drives: forces, in N or N m, include friction and the motors' inertia where the file tells
+    of them (`driven`).
     The slices go through the home pose and are all of one width. Of `orientations` and `measures`
     there is what the type-II measure depends on; neither where J is constant. The squares of the
     machine's pictures have sides of `grid`, m. `passive` has the passive joints that have limits,
@@ -125,8 +130,9 @@ class Report:
     home: Array
     reserve: Reserve
     least: float
-    cycle: PickAndPlace
-    points: JointPoints
+    cycle: Motion
+    source: str
+    shown: Frames
     home_points: JointPoints
     guides: tuple[Guide, ...]
     grid: float
@@ -140,6 +146,11 @@ class Report:
     measures: Measures | None
     base: BaseParameters
     costs: tuple[Cost, ...]
+
+    @property
+    def standard(self) -> PickAndPlace | None:
+        """The cycle, if it is the standard one."""
+        return self.cycle if isinstance(self.cycle, PickAndPlace) else None
 
     @property
     def driven(self) -> bool:
@@ -168,16 +179,25 @@ class Report:
         return any(drive.rotor_inertia > 0.0 for drive in self.sizing.drives)
 
 
-def contents(robot: Manipulator) -> Report:
-    """Return the report on a machine that reaches a pose and is not singular everywhere."""
+def contents(robot: Manipulator, motion: Recording | None = None) -> Report:
+    """Return the report on a machine that reaches a pose and is not singular everywhere.
+
+    It shows a motion, or the standard cycle where none is given.
+    """
     home = home_pose(robot)
     at_home = reserve(robot, home)
     # A machine with little reserve anywhere moves where it has half of its best.
     least = min(_LEAST_RESERVE, float(at_home.smallest) / 2.0)
-    cycle = pick_and_place(robot, home, samples=_SAMPLES, least=least)
+    cycle: Motion
+    if motion is None:
+        cycle = pick_and_place(robot, home, samples=_SAMPLES, least=least)
+    else:
+        cycle = motion.motion
+    sizing = size(robot, cycle)
     volume = reach_volume(robot, home)
     base = base_parameters(robot)
-    home_points, guides = joint_points(robot, home), joint_guides(robot, cycle.pose)
+    shown = frames(robot, cycle, sizing.forces[::2])
+    home_points, guides = joint_points(robot, home), joint_guides(robot, shown.pose)
     # Squares of one width, so that the pictures share a scale.
     half = (0.5 + _RIM) * float((volume.box[1] - volume.box[0]).max())
     return Report(
@@ -187,11 +207,12 @@ def contents(robot: Manipulator) -> Report:
         reserve=at_home,
         least=least,
         cycle=cycle,
-        points=joint_points(robot, cycle.pose),
+        source="" if motion is None else motion.source,
+        shown=shown,
         home_points=home_points,
         guides=guides,
         grid=grid_step(home_points, guides),
-        sizing=size(robot, cycle),
+        sizing=sizing,
         joints=joint_ranges(robot, cycle.pose),
         passive=tuple(joint for joint in limited_joints(robot, home) if not joint.actuated),
         slices=tuple(

@@ -6,14 +6,16 @@ from matplotlib.figure import Figure
 
 from pteron.motion import Sizing
 from pteron.plots import Ability, force_speed_figure, power_figure
+from pteron.report.scene import few
 
 
 def force_speed(found: Sizing) -> Figure:
     """Return force over speed of each drive, within what the machine's file says that it can do."""
     joints = [leg.joint for leg in found.robot.legs]
+    some = few(len(found.time))
     return force_speed_figure(
-        found.speeds,
-        found.forces,
+        found.speeds[some],
+        found.forces[some],
         units=[(f"{joint.unit}/s", joint.force_unit) for joint in joints],
         abilities=[
             Ability(drive.max_speed, drive.max_force, drive.rated_force) for drive in found.drives
@@ -24,4 +26,5 @@ def force_speed(found: Sizing) -> Figure:
 
 def power(found: Sizing) -> Figure:
     """Return the power of each drive over time, and their sum."""
-    return power_figure(found.time, found.power)
+    some = few(len(found.time))
+    return power_figure(found.time[some], found.power[some])

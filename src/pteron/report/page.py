@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from math import prod
 from operator import itemgetter
@@ -14,7 +13,6 @@ from markupsafe import Markup, escape
 import pteron
 from pteron.bodies.inertia import Inertia, with_center
 from pteron.errors import ModelError
-from pteron.kernels import Array
 from pteron.legs import LegKind
 from pteron.legs.drive_rows import drive_rows
 from pteron.manipulator import Manipulator
@@ -26,20 +24,14 @@ from pteron.plots import (
     robot_figure,
     svg,
 )
-from pteron.plots.robot import APART, base_outline
 from pteron.reduction import BaseParameters
 from pteron.reduction.expressions import html_symbol
 from pteron.report.contents import Report
 from pteron.report.drives import force_speed, power
-from pteron.report.joints import coordinate, force, nouns, readable, speed
+from pteron.report.joints import force, nouns, readable, speed
+from pteron.report.scene import few
+from pteron.report.stage import stage
 from pteron.report.typeset import compact, fixed, resource, template, triple
-
-_FRAMES = 120
-"""Frames of the moving picture; it repeats, so that the cycle's last sample is left out."""
-
-_DECIMALS = 6
-
-_ROUNDING = 1e-9
 
 _LONGEST = 200
 """Characters of a sum that a person still reads; an oblique Quadrupteron's take thousands."""
@@ -48,24 +40,34 @@ _LONGEST = 200
 def page(report: Report) -> str:
     """Return the page of a report, as HTML without any reference to another file or address."""
     robot = report.robot
-    joints = [leg.joint for leg in robot.legs]
+    joints, standard = [leg.joint for leg in robot.legs], report.standard
     made = template(
         "page.html.j2",
         degrees=lambda angle, places=1: fixed(float(np.degrees(angle)), places),
         lettered=lettered,
         readable=readable,
-        mm=lambda metres, places=1: fixed(1e3 * float(metres), places),
         signed=lambda text: re.sub(r"(?<![\w.-])-(?=\d)", "\u2212", text),
         triple=triple,
         typeset=lambda text: escape(text).replace("J^-T", Markup("<b>J</b><sup>\u2212T</sup>")),
         zip=zip,
     )
-    data = json.dumps(scene(report), separators=(",", ":"), allow_nan=False)
+    tooled = any(robot.platform.tool)
+    point, way = "the tool's centre point" if tooled else "P", "cycle" if standard else "motion"
     return made.render(
+        **stage(
+            robot,
+            report.shown,
+            report.guides,
+            report.home_points,
+            report.grid,
+            doing="on its pick-and-place cycle" if standard else "in motion",
+            still=f"The home pose, with the way of {point} on the {way}.",
+            force_title=f"{'Drive' if report.driven else 'Actuator'} {force(joints).name}",
+        ),
         report=report,
-        robot=robot,
         cycle=report.cycle,
-        legs=range(len(robot.legs)),
+        standard=standard,
+        way=way,
         kinds=kinds(robot),
         geometry=geometry(robot),
         drives=drive_rows(robot.legs),
@@ -73,14 +75,10 @@ def page(report: Report) -> str:
         letters=_letters(robot),
         reasons=_reasons(robot),
         weighed=_weighed(report),
-        coordinate=coordinate(joints),
-        force=force(joints),
         speed=speed(joints),
         joint=nouns(joints),
         joint_units=dict.fromkeys(joint.unit for joint in joints),
-        gravity=_gravity(robot),
         passive=[(joint, joint.told_limits(readable)) for joint in report.passive],
-        paired=any(leg.bar for leg in robot.legs),
         modes=prod(len(leg.branches) for leg in robot.legs),
         figures=_figures(report),
         sizing=report.sizing,
@@ -92,8 +90,6 @@ def page(report: Report) -> str:
         symbols=in_symbols(report.base),
         version=pteron.__version__,
         style=resource("page.css"),
-        script=resource("view.js"),
-        scene=Markup(data.replace("<", "\\u003c")),  # so that it cannot end its script element
     )
 
 
@@ -103,17 +99,6 @@ def lettered(text: str) -> Markup:
     safe = safe.replace("rho", "\u03c1").replace("theta", "\u03b8").replace("phi", "\u03c6")
     safe = re.sub(r"(?<![;'])\b([rdekps])\b", r"<b>\1</b>", safe)
     return Markup(re.sub(r"\bs0\b", "<b>s</b><sub>0</sub>", safe))
-
-
-def _gravity(robot: Manipulator) -> str:
-    """Return which way gravity acts in the picture of a planar machine, as a clause."""
-    gravity, frame = np.array(robot.gravity), np.array(robot.platform.frame)
-    if not gravity.any():
-        return "there is no gravity"
-    x, y, _ = frame @ gravity / np.linalg.norm(gravity)
-    if np.hypot(x, y) <= _ROUNDING:
-        return "gravity acts along the normal"
-    return "gravity acts along the arrow"
 
 
 def kinds(robot: Manipulator) -> list[tuple[LegKind, list[int]]]:
@@ -216,26 +201,27 @@ def _weighed(report: Report) -> list[str]:
 def _figures(report: Report) -> dict[str, Any]:
     """Return the pictures as SVG, by their names in the template."""
     robot, cycle, at = report.robot, report.cycle, report.orientations
-    gravity = np.array(robot.gravity)
-    out = slice(len(cycle.time) // 2 + 1)
-    lengths = robot.platform.lengths
-    path = cycle.pose[out, : len(lengths)]
+    gravity, shown, standard = np.array(robot.gravity), report.shown, report.standard
+    # The way back of the cycle is its way out.
+    out = slice(len(shown.time) // 2 + 1 if standard else None)
+    path = shown.pose[out, : len(robot.platform.lengths)]
     machine = robot_figure(
         report.home_points,
         report.guides,
         gravity=gravity if gravity.any() else None,
-        path=report.points.tool[out],
+        path=shown.points.tool[out],
         angle=f"φ = {fixed(float(np.degrees(report.home[-1])), 0)}°"
         if robot.platform.turns
         else "",
     )
     whose = "drive" if report.driven else "actuator"
     label = f"{whose} {force([leg.joint for leg in robot.legs]).axis}"
-    half = cycle.duration / 2.0
-    forces = forces_figure(cycle.time, report.forces, turning_point=half, ylabel=label)
+    half = cycle.duration / 2.0 if standard else None
+    some = few(len(cycle.time))
+    forces = forces_figure(cycle.time[some], report.forces[some], turning_point=half, ylabel=label)
     made: dict[str, Any] = {
         "robot": svg(machine, name="robot", title=f"{robot.name} in its home pose"),
-        "forces": svg(forces, name="forces", title="Actuator forces over the pick-and-place cycle"),
+        "forces": svg(forces, name="forces", title="Actuator forces over the motion"),
         "force_speed": svg(
             force_speed(report.sizing), name="speeds", title="Force over speed of every drive"
         ),
@@ -251,7 +237,8 @@ def _figures(report: Report) -> dict[str, Any]:
     }
     if at is not None:
         turns = cycle.pose[:, -1]
-        used, home = (float(turns.min()), float(turns.max())), float(report.home[-1])
+        used = (float(turns.min()), float(turns.max())) if standard else None
+        home = float(report.home[-1])
         figure = regularity_figure(at.angles, at.type_ii, at.singular, home=home, used=used)
         title = "The type-II measure over the orientation"
         made["orientations"] = svg(figure, name="orientations", title=title)
@@ -266,60 +253,6 @@ def _figures(report: Report) -> dict[str, Any]:
             for name, measure in (("I", report.measures.type_i), ("II", report.measures.type_ii))
         ]
     return made
-
-
-def scene(report: Report) -> dict[str, Any]:
-    """Return the machine and the frames of its motion as plain lists.
-
-    Everything is in m, rad, s, N and N m, in the base frame; of a planar machine along its pose's x
-    and y and the plane's normal, in the plane. A leg's `chains` in a frame are the points of its
-    line, a `guide` the way of its slider or of its crank's end, its `bars` what leads from the line
-    to each of parallel rods, over the machine's size.
-    """
-    robot, cycle, points = report.robot, report.cycle, report.points
-    step = (len(cycle.time) - 1) // _FRAMES
-    frames = slice(0, _FRAMES * step, step)
-    planar = robot.platform.planar
-    turn = np.array(robot.platform.frame) if planar else np.eye(3)
-
-    def seen(array: Array) -> Any:
-        return _plain(array @ turn.T * ([1.0, 1.0, 0.0] if planar else 1.0))
-
-    gravity = np.array(robot.gravity)
-    strength = float(np.linalg.norm(gravity)) or 1.0
-    lines = [seen(line[frames]) for line in points.links]
-    shown = coordinate([leg.joint for leg in robot.legs])
-    return {
-        "planar": planar,
-        "up": [0.0, 0.0, 1.0] if planar else _plain(cycle.up),
-        "gravity": seen(gravity / strength),
-        "grid": report.grid,
-        "duration": round(cycle.duration, _DECIMALS),
-        "guides": [seen(guide.path) for guide in report.guides],
-        "slides": [guide.slides for guide in report.guides],
-        "directions": _plain(np.array([guide.axis for guide in report.guides]) @ turn.T),
-        "bars": [None if bar is None else seen(APART * bar) for bar in points.bars],
-        "base": seen(base_outline(report.home_points, report.guides)),
-        "parts": [
-            {"hub": seen(part.hub[frames]), "corners": seen(part.corners[frames])}
-            for part in points.parts
-        ],
-        "position": seen(points.reference[frames]),
-        "tool": seen(points.tool[frames]) if any(robot.platform.tool) else None,
-        "time": _plain(cycle.time[frames]),
-        "pose": _plain(cycle.pose[frames]),
-        "scales": [180.0 / np.pi if name == "phi" else 1e3 for name in robot.coordinates],
-        "axes": _plain(points.axes[frames] @ turn.T),
-        "chains": [list(legs) for legs in zip(*lines, strict=True)],
-        "coordinates": _plain(points.coordinates[frames]),
-        "factors": shown.factors,
-        "forces": _plain(report.forces[frames]),
-        "units": [leg.joint.force_unit for leg in robot.legs],
-    }
-
-
-def _plain(array: Array) -> Any:
-    return (np.round(array, _DECIMALS) + 0.0).tolist()
 
 
 def in_symbols(base: BaseParameters) -> dict[str, list[Any]] | None:

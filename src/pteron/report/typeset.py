@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterable
 from importlib.resources import files
 from math import floor, isfinite, log10
@@ -45,6 +46,10 @@ def fixed(value: float, places: int = 1) -> str:
     return text.replace("-", _MINUS)
 
 
+def _millimetres(metres: float, places: int = 1) -> str:
+    return fixed(1e3 * float(metres), places)
+
+
 def compact(value: float, digits: int = 4) -> str:
     """Return a number with at most so many significant digits and no needless zeros."""
     return "0" if abs(value) < 1e-9 else f"{value:.{digits}g}".replace("-", _MINUS)
@@ -60,6 +65,12 @@ def resource(name: str) -> Markup:
     return Markup((files("pteron.report") / name).read_text(encoding="utf-8"))
 
 
+def embedded(data: Any) -> Markup:
+    """Return data as JSON that may stand in a page's script element, which it cannot end."""
+    text = json.dumps(data, separators=(",", ":"), allow_nan=False)
+    return Markup(text.replace("<", "\\u003c"))
+
+
 def template(name: str, **filters: Callable[..., Any]) -> jinja2.Template:
     """Return a page's template: strict, escaped, with the shared filters and some of its own."""
     made = jinja2.Environment(
@@ -72,6 +83,7 @@ def template(name: str, **filters: Callable[..., Any]) -> jinja2.Template:
     made.filters |= {
         "compact": compact,
         "fixed": fixed,
+        "mm": _millimetres,
         "significant": significant,
         "unit": lambda text: text.replace(" ", _NARROW).replace("^2", "²"),
         **filters,

@@ -30,12 +30,13 @@
   // The platform's parts: arms from a hub to corners, in each frame.
   const parts = data.parts.map((part) => ({ hub: deep(part.hub), corners: deep(part.corners) }));
   const position = deep(data.position), tool = data.tool && deep(data.tool), base = deep(data.base);
+  const way = data.closed ? (tool || position).concat([(tool || position)[0]]) : tool || position;
   const baseAxes = deep([[1, 0, 0], [0, 1, 0], [0, 0, 1]]).slice(0, data.planar ? 2 : 3);
 
   const rails = guides.filter((_, i) => slides[i]);
   const cloud = guides.flat().concat(chains.flat(2));
-  const low = [0, 1, 2].map((k) => Math.min(...cloud.map((p) => p[k])));
-  const high = [0, 1, 2].map((k) => Math.max(...cloud.map((p) => p[k])));
+  const ends = [0, 1, 2].map((k) => cloud.reduce(([least, most], p) => [Math.min(least, p[k]), Math.max(most, p[k])], [Infinity, -Infinity]));
+  const low = ends.map((pair) => pair[0]), high = ends.map((pair) => pair[1]);
   const size = Math.max(...[0, 1, 2].map((k) => high[k] - low[k]));
   const floor = low[2] - 0.03 * size, step = data.grid;
   const rim = data.planar ? 0.06 * size : 0; // the view ends where the squares of a planar machine end
@@ -44,11 +45,11 @@
   const center = [(gridLow[0] + gridHigh[0]) / 2, (gridLow[1] + gridHigh[1]) / 2, (floor + high[2]) / 2];
   // Bars of one unit share a scale.
   const peaks = data.units.map((unit) =>
-    Math.max(1e-9, ...data.forces.flatMap((row) => row.filter((_, i) => data.units[i] === unit).map(Math.abs))));
+    data.forces.reduce((most, row) => Math.max(most, ...row.filter((_, i) => data.units[i] === unit).map(Math.abs)), 1e-9));
 
   const start = data.planar ? { yaw: 0, pitch: Math.PI / 2, zoom: 1 } : { yaw: -0.95, pitch: 0.4, zoom: 1 };
   const camera = { ...start };
-  let width = 0, height = 0, scale = 1, middle = 0, frame = 0, playing = false, phase = 0, last = null, shown = true;
+  let width = 0, height = 0, scale = 1, middle = 0, frame = 0, playing = false, now = 0, last = null, shown = true;
   let colors = {};
 
   function theme() {
@@ -79,18 +80,32 @@
     width = canvas.clientWidth; height = canvas.clientHeight;
     canvas.width = Math.round(width * ratio); canvas.height = Math.round(height * ratio);
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
-    // The size that holds the machine from any side, at the pitch it starts with; a planar one from its own.
+    frameAll();
+  }
+  // The corners of everything that is drawn: of a cloud of points, those farthest out in many directions.
+  const outer = (() => {
     const corners = [gridLow, [gridLow[0], gridHigh[1]], gridHigh, [gridHigh[0], gridLow[1]]].map((p) => [...p, floor]);
     const frame = position.flatMap((p, k) => axes[k].map((axis) => add(p, axis, 0.1 * size)));
-    const outer = cloud.concat(corners, frame);
-    let wide = 0, top = 0, bottom = 0;
-    for (let turn = 0; turn < (data.planar ? 1 : 12); turn++) {
+    const all = cloud.concat(corners, frame), found = new Set();
+    for (let i = 0; i < 12; i++) {
+      for (const rise of [-1, -0.5, 0, 0.5, 1]) {
+        const way = [Math.cos((i * Math.PI) / 6), Math.sin((i * Math.PI) / 6), 2 * rise];
+        found.add(all.reduce((best, p) => (dot(p, way) > dot(best, way) ? p : best)));
+      }
+    }
+    return [...found];
+  })();
+  // The size that holds the machine at this tilt, however far it is turned; a planar one only as it is turned.
+  function frameAll() {
+    let wide = 0, top = Infinity, bottom = -Infinity;
+    for (let turn = 0; turn < (data.planar ? 1 : 24); turn++) {
       for (const p of outer) {
-        const q = project(p, start.yaw + (turn * Math.PI) / 6, start.pitch);
+        const q = project(p, camera.yaw + (turn * Math.PI) / 12, camera.pitch);
         wide = Math.max(wide, Math.abs(q[0])); top = Math.min(top, q[1]); bottom = Math.max(bottom, q[1]);
       }
     }
-    scale = 0.97 * Math.min(width / 2 / wide, height / (bottom - top));
+    // Half the breadth of a leg's number is kept free on every side.
+    scale = Math.min((width / 2 - 16) / wide, (height - 32) / (bottom - top));
     middle = (top + bottom) / 2;
   }
 
@@ -226,7 +241,7 @@
     }
     items.sort((a, b) => b[0] - a[0]).forEach((item) => item[1]());
 
-    pen.setLineDash([2, 4]); path((tool || position).slice(0, Math.floor(frames / 2) + 1));
+    pen.setLineDash([2, 4]); path(way);
     pen.strokeStyle = colors.ink; pen.lineWidth = 1.4; pen.stroke(); pen.setLineDash([]);
     const p = position[k];
     axes[k].slice(0, baseAxes.length).forEach((axis, j) => line(p, add(p, axis, (j < 2 ? 0.1 : 0.07) * size), colors.ink, 1.6));
@@ -254,7 +269,7 @@
       put("force" + i, minus(force, Math.max(1, 2 - Math.floor(Math.log10(peaks[i]))))); put("joint" + i, minus(data.factors[i] * data.coordinates[k][i], 1));
     }
     data.pose[k].forEach((value, j) => put("pose" + j, minus(value * data.scales[j], 1)));
-    put("clock", data.time[k].toFixed(2) + " s");
+    put("clock", data.time[k].toFixed(2) + " of " + data.duration.toFixed(2) + " s");
     seek.value = k;
     seek.setAttribute("aria-valuetext", data.time[k].toFixed(2) + " seconds");
   }
@@ -265,25 +280,37 @@
     queued = true;
     requestAnimationFrame(() => { queued = false; draw(); });
   };
-  function show(k) { frame = ((k % frames) + frames) % frames; phase = frame / frames; redraw(); }
-  function tick(now) {
+  function show(k) { frame = Math.min(Math.max(k, 0), frames - 1); now = data.time[frame]; redraw(); }
+  // The last frame that is not later than a time.
+  function frameAt(time) {
+    let low = 0, high = frames - 1;
+    while (low < high) {
+      const k = Math.ceil((low + high) / 2);
+      if (data.time[k] <= time + 1e-9) low = k; else high = k - 1;
+    }
+    return low;
+  }
+  function tick(clock) {
     if (!playing) return;
     if (last !== null && shown) {
-      // A real cycle is over in a second: the eye follows a slower one, and the page says how slow.
-      phase = (phase + (Number(pace.value) * (now - last)) / 1e3 / data.duration) % 1;
-      const k = Math.floor(phase * frames);
+      now += (Number(pace.value) * (clock - last)) / 1e3;
+      // A closed motion goes on from its beginning; another one stops, for it would jump there.
+      if (data.closed) now %= data.duration;
+      const k = frameAt(now);
       if (k !== frame) { frame = k; draw(); }
+      if (!data.closed && now >= data.duration) { show(frames - 1); run(false); return; }
     }
-    last = now; requestAnimationFrame(tick);
+    last = clock; requestAnimationFrame(tick);
   }
   function run(on) {
+    if (on && !data.closed && frame === frames - 1) show(0);
     playing = on; last = null;
     play.firstElementChild.textContent = on ? "\u275A\u275A" : "\u25B6";
-    play.setAttribute("aria-pressed", String(on));
+    play.setAttribute("aria-label", on ? "Pause" : "Play");
     if (on) requestAnimationFrame(tick);
   }
   function turn(yaw, pitch) {
-    camera.yaw += yaw; camera.pitch = Math.min(Math.PI / 2, Math.max(-0.3, camera.pitch + pitch)); redraw();
+    camera.yaw += yaw; camera.pitch = Math.min(Math.PI / 2, Math.max(-0.3, camera.pitch + pitch)); frameAll(); redraw();
   }
   function zoom(factor) { camera.zoom = Math.min(8, Math.max(0.5, camera.zoom * factor)); redraw(); }
 
@@ -319,7 +346,7 @@
     };
     if (keys[event.key] && !event.ctrlKey && !event.metaKey && !event.altKey) { keys[event.key](); event.preventDefault(); }
   });
-  function reset() { Object.assign(camera, start); redraw(); }
+  function reset() { Object.assign(camera, start); frameAll(); redraw(); }
   play.addEventListener("click", () => run(!playing));
   document.getElementById("reset").addEventListener("click", reset);
   seek.addEventListener("input", () => { run(false); show(Number(seek.value)); });

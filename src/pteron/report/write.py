@@ -1,4 +1,4 @@
-"""`write_report`: the page and its numbers, as files."""
+"""`write_report` and `write_motion_page`: pages and their numbers, as files."""
 
 from __future__ import annotations
 
@@ -8,15 +8,18 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pteron.atomic import write_texts
-from pteron.errors import OutputError
+from pteron.atomic import write_text, write_texts
+from pteron.errors import OutputError, shown
 from pteron.manipulator import RobotLike, as_manipulator
 
 if TYPE_CHECKING:
     from pteron.report.contents import Report
+    from pteron.report.recordings import Given
+
+_PAGES = (".html", ".htm")
 
 
-def write_report(robot: RobotLike, folder: str | Path) -> Path:
+def write_report(robot: RobotLike, folder: str | Path, *, motion: Given | None = None) -> Path:
     """Write the report on a machine: `report.html`, one page that needs no other file or network.
 
     `report.json` beside it holds the numbers. Each file is written whole or not at all, and the
@@ -28,6 +31,10 @@ def write_report(robot: RobotLike, folder: str | Path) -> Path:
         The machine.
     folder : str or path
         Where to write; made if it is missing.
+    motion : Motion, Simulation, Table, str or path, optional
+        What the page shows, and whose forces it tells, in place of the standard pick-and-place
+        cycle; see `pteron.report.recordings.recording`. The forces are those that the drives must
+        give for it.
 
     Returns
     -------
@@ -41,17 +48,95 @@ def write_report(robot: RobotLike, folder: str | Path) -> Path:
     ModelError
         If the machine reaches no pose.
     SingularPose
-        If the machine is singular at every pose.
+        If the machine is singular at every pose, or becomes so in the motion.
+    DataError, UnreachablePose
+        If the motion cannot be read, or the machine cannot do it; the message says in which row,
+        and which leg.
     """
     robot = as_manipulator(robot)
     # Matplotlib, SciPy and SymPy are behind these; the table of the paper needs none of them.
     from pteron.report.contents import contents
     from pteron.report.page import page
+    from pteron.report.recordings import recording
 
     target = checked_folder(folder)
-    report = contents(robot)
+    report = contents(robot, None if motion is None else recording(robot, motion))
     data = json.dumps(numbers(report), indent=1, allow_nan=False)
     return write_texts(target, {"report.html": page(report), "report.json": data + "\n"})[0]
+
+
+def write_motion_page(robot: RobotLike, motion: Given, path: str | Path) -> Path:
+    """Write a page that shows a motion: the machine in 3-D, and what its joints and drives do.
+
+    The page needs no other file or network. It is written whole or not at all.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+    motion : Motion, Simulation, Table, str or path
+        What it does: from Python, or a file with a table of the motion, of its joints, or a log;
+        see `pteron.report.recordings.recording`. Forces that come with it are shown; else those
+        that the drives must give.
+    path : str or path
+        The page, whose name ends in .html; its folder must be there.
+
+    Returns
+    -------
+    Path
+        The page.
+
+    Raises
+    ------
+    OutputError
+        If the page cannot be written.
+    DataError, UnreachablePose, SingularPose
+        If the motion cannot be read, or the machine cannot do it; the message says in which row,
+        and which leg.
+
+    Examples
+    --------
+    >>> import pteron, tempfile
+    >>> from pathlib import Path
+    >>> from pteron.motion import pick_and_place
+    >>> from pteron.report import write_motion_page
+    >>> robot = pteron.load("tripteron")
+    >>> cycle = pick_and_place(robot, [0.0, 0.0, 0.0], scale=0.5)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     page = write_motion_page(robot, cycle, Path(folder) / "cycle.html")
+    ...     page.stat().st_size < 1_000_000
+    True
+    """
+    from pteron.report.motion_page import motion_page
+    from pteron.report.recordings import recording
+
+    target, robot = checked_page(path), as_manipulator(robot)
+    return write_text(target, motion_page(robot, recording(robot, motion)))
+
+
+def checked_page(path: str | Path) -> Path:
+    """Return the file of a page after a check, which leaves nothing behind, that it can be written.
+
+    Raises
+    ------
+    OutputError
+        If its name has another ending, it is a folder, or its folder is missing or closed.
+    """
+    target = Path(path)
+    if target.suffix.lower() not in _PAGES:
+        raise OutputError(
+            f"{shown(str(path), bare=True) or 'the name is empty'}: a page is written, whose name "
+            "ends in .html"
+        )
+    if target.is_dir():
+        raise OutputError(f"{target}: is a folder; name a file in it")
+    if not target.parent.is_dir():
+        raise OutputError(f"{target}: there is no folder {target.parent}; make it first")
+    try:
+        with tempfile.TemporaryFile(dir=target.parent):
+            return target
+    except OSError as error:
+        raise OutputError(f"{target}: cannot be written ({error.strerror or error})") from None
 
 
 def checked_folder(path: str | Path) -> Path:
@@ -72,6 +157,7 @@ def checked_folder(path: str | Path) -> Path:
 def numbers(report: Report) -> dict[str, Any]:
     """Return the numbers of a report as plain data in SI units and radians."""
     robot, cycle, ranges = report.robot, report.cycle, report.joints
+    standard = report.standard
     orientations = report.orientations
     return {
         "robot": robot.name,
@@ -103,11 +189,13 @@ def numbers(report: Report) -> dict[str, Any]:
             "box": report.volume.box.tolist(),
         },
         "cycle": {
-            "scale": cycle.scale,
+            "standard": standard is not None,
+            "source": report.source or None,
+            "scale": None if standard is None else standard.scale,
             "duration": cycle.duration,
-            "across": cycle.across.tolist(),
-            "up": cycle.up.tolist(),
-            "turn": cycle.turn,
+            "across": None if standard is None else standard.across.tolist(),
+            "up": None if standard is None else standard.up.tolist(),
+            "turn": None if standard is None else standard.turn,
             "time": cycle.time.tolist(),
             "pose": cycle.pose.tolist(),
             "velocity": cycle.velocity.tolist(),

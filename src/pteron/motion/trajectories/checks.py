@@ -57,7 +57,9 @@ def check_path(robot: RobotLike, path: Path) -> None:
     check_way(robot, lambda at: path.at(at)[0], s, lambda at: f"the path, {path.place(at)}")
 
 
-def check_motion(robot: RobotLike, motion: Motion) -> None:
+def check_motion(
+    robot: RobotLike, motion: Motion, place: Callable[[float], str] | None = None
+) -> None:
     """Refuse a motion that the machine cannot do, as `check_path` does; it says at what time.
 
     Parameters
@@ -66,6 +68,8 @@ def check_motion(robot: RobotLike, motion: Motion) -> None:
         The machine.
     motion : Motion
         Any motion of its platform.
+    place : callable, optional
+        Returns in words where a time, s, is; such as the row of a table.
 
     Raises
     ------
@@ -89,7 +93,8 @@ def check_motion(robot: RobotLike, motion: Motion) -> None:
         )
     even = np.linspace(float(motion.time[0]), float(motion.time[-1]), _SAMPLES)
     marks = np.unique(np.concatenate([motion.time, even]))
-    check_way(robot, lambda at: motion.at(at)[0], marks, lambda at: f"the motion, at {at:.4g} s")
+    told = place or (lambda at: f"the motion, at {at:.4g} s")
+    check_way(robot, lambda at: motion.at(at)[0], marks, told)
 
 
 def check_way(

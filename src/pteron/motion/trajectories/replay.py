@@ -79,8 +79,14 @@ def replay(robot: RobotLike, table: str | File | Table, *, start: PoseLike | Non
         time, values = _read(rows, poses)
         values = _turned_on(robot, values)
         motion = Motion(time, *_spline(time, values))
-    check_motion(robot, motion)
+    check_motion(robot, motion, lambda at: _place(rows, motion, at))
     return motion
+
+
+def _place(rows: Table, motion: Motion, at: float) -> str:
+    """Return the row of a table that a time, s, is at or behind."""
+    k = int(np.searchsorted(motion.time, at, side="right")) - 1
+    return f"{rows.place(max(k, 0))}, at {at:.4g} s"
 
 
 def _read(rows: Table, columns: Sequence[str]) -> tuple[Array, Array]:

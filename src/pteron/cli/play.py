@@ -1,0 +1,85 @@
+"""`pteron play`: a page that shows a motion of the machine in 3-D."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from typer import Argument
+
+from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
+from pteron.cli.given_cycle import STANDARD, loaded, recorded, standard_cycle
+from pteron.cli.screen import plain, show, show_json, spinner
+from pteron.errors import DataError
+
+if TYPE_CHECKING:
+    from pteron.manipulator import Manipulator
+    from pteron.report.recordings import Recording
+
+
+def play(
+    robot: Robot,
+    motion: Annotated[
+        str | None,
+        Argument(
+            metavar="MOTION",
+            help="A table of a motion or of joints, or a log: a .csv or .parquet file.",
+            show_default=False,
+        ),
+    ] = None,
+    out: Annotated[str, option("out", "The page to write, a .html file.", "FILE")] = "motion.html",
+    cycle: Annotated[
+        str | None,
+        option(
+            "cycle",
+            f"{STANDARD}, the standard pick-and-place cycle, in place of a file.",
+            "CYCLE",
+            show_default=False,
+        ),
+    ] = None,
+    payload: Annotated[float, option("payload", "At the tool's centre point, kg.")] = 0.0,
+    elbows: Elbows = None,
+    json: Json = False,
+) -> None:
+    """Show a motion in 3-D: one page that needs no other file or network.
+
+    The page has the machine as it moves, in real time or slower, with its forces, joints and pose
+    at each moment, and what joints and drives do over time. The motion is what pteron cycle,
+    simulate or excite write, a table of your own (t and x y z phi, or t and rho1 theta2 ...), or a
+    log with the TOML file that describes it. Forces are those of the file, where it has them;
+    else what the drives must give. Without a file the page shows the standard cycle.
+    """
+    from pteron.report.write import checked_page, write_motion_page
+
+    machine = loaded(load_robot(robot, elbows), payload)
+    if motion is not None and cycle is not None:
+        raise DataError("MOTION and --cycle given; give one of them")
+    checked_page(out)
+    with spinner(f"Drawing {machine.name}"):
+        found = _recording(machine, motion or cycle or STANDARD)
+        page = write_motion_page(machine, found, out)
+    samples, size = len(found.motion.time), page.stat().st_size
+    if json:
+        show_json(
+            {
+                "robot": machine.name,
+                "page": str(page),
+                "bytes": size,
+                "source": found.source or STANDARD,
+                "log": found.log,
+                "duration": found.motion.duration,
+                "samples": samples,
+            }
+        )
+        return
+    show(f"{plain(machine.name)}: {found.motion.duration:.4g} s, {samples} samples")
+    show(f"Written: {plain(str(page))}, {size / 1e6:.1f} MB")
+
+
+def _recording(machine: Manipulator, motion: str) -> Recording:
+    """Return a motion by its name, or from a file; what is unlikely in it is told."""
+    from pteron.report.recordings import Recording
+
+    if motion == STANDARD and not Path(motion).exists():
+        return Recording(standard_cycle(machine))
+    return recorded(machine, motion)

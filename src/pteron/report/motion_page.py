@@ -1,0 +1,166 @@
+"""A motion as one HTML page: the machine in 3-D, and what its joints and drives do over time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+import pteron
+from pteron.dynamics import drive_forces
+from pteron.kernels import Array
+from pteron.kinematics import joint_rates
+from pteron.manipulator import Manipulator
+from pteron.motion import Guide, JointPoints, joint_guides, joint_points, overloads
+from pteron.motion.trajectories.tool import tool_motion
+from pteron.plots import forces_figure, grid_step, power_figure, robot_figure, svg
+from pteron.report.joints import Quantity, coordinate, force, nouns, speed
+from pteron.report.recordings import Recording
+from pteron.report.scene import Frames, few, frames
+from pteron.report.stage import stage
+from pteron.report.typeset import fixed, resource, template
+from pteron.workspace import JointRanges, joint_ranges
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What the page says of a motion with T samples.
+
+    Forces (T, n), N or N m, are those that came with the motion (`given`), or what the drives must
+    give for it; rates (T, n) are those of the joints, and `tool_speed` (T,), m/s, is the tool's.
+    """
+
+    robot: Manipulator
+    recording: Recording
+    frames: Frames
+    start: JointPoints
+    guides: tuple[Guide, ...]
+    grid: float
+    forces: Array
+    rates: Array
+    tool_speed: Array
+    joints: JointRanges
+    overloads: tuple[str, ...]
+
+    @property
+    def given(self) -> bool:
+        """Whether the forces came with the motion."""
+        return self.recording.forces is not None
+
+    @property
+    def driven(self) -> bool:
+        """Whether the machine's file tells of the drives."""
+        return any(leg.drive is not None for leg in self.robot.legs)
+
+
+def shown(robot: Manipulator, recorded: Recording) -> Shown:
+    """Return what the page says of a motion that the machine can do."""
+    motion = recorded.motion
+    forces = recorded.forces
+    if forces is None:
+        state = motion.pose, motion.velocity, motion.acceleration
+        forces = drive_forces(robot, *state, smooth=True)
+    rates = joint_rates(robot, motion.pose, motion.velocity).actuated
+    tool = tool_motion(robot.platform, motion.pose, motion.velocity, motion.acceleration)[1]
+    moments = frames(robot, motion, forces)
+    start, guides = joint_points(robot, motion.pose[0]), joint_guides(robot, moments.pose)
+    return Shown(
+        robot=robot,
+        recording=recorded,
+        frames=moments,
+        start=start,
+        guides=guides,
+        grid=grid_step(start, guides),
+        forces=forces,
+        rates=rates,
+        tool_speed=np.linalg.norm(tool[:, : len(robot.platform.lengths)], axis=-1),
+        joints=joint_ranges(robot, motion.pose),
+        overloads=overloads(robot, forces, rates),
+    )
+
+
+def motion_page(robot: Manipulator, recorded: Recording) -> str:
+    """Return the page of a motion, as HTML without any reference to another file or address."""
+    found = shown(robot, recorded)
+    joints = [leg.joint for leg in robot.legs]
+    whose, told = _forces_told(found)
+    name = f" of {recorded.source}" if recorded.source else ""
+    time = recorded.motion.time
+    made = template("motion.html.j2", count=lambda number: f"{number:,}".replace(",", "\u202f"))
+    return made.render(
+        **stage(
+            robot,
+            found.frames,
+            found.guides,
+            found.start,
+            found.grid,
+            doing=f"in the motion{name}",
+            still="Where the motion begins, with its way.",
+            force_title=f"{whose} {force(joints).name}",
+        ),
+        found=found,
+        recording=recorded,
+        motion=recorded.motion,
+        speed=speed(joints),
+        joint=nouns(joints),
+        figures=_figures(found),
+        told=told,
+        tooled=any(robot.platform.tool),
+        loads={
+            "peak": np.abs(found.forces).max(axis=0),
+            "speed": np.abs(found.rates).max(axis=0),
+            "power": (found.forces * found.rates).sum(axis=1).max(initial=0.0),
+            "rms": np.sqrt(np.trapezoid(found.forces**2, time, axis=0) / recorded.motion.duration),
+        },
+        version=pteron.__version__,
+        style=resource("page.css"),
+    )
+
+
+def _forces_told(found: Shown) -> tuple[str, str]:
+    """Return whose forces the page shows: in a word, and in a clause."""
+    if found.given and found.recording.log:
+        return "Measured", "as they were measured."
+    if found.given:
+        return "Given", "those of the table."
+    if found.driven:
+        return "Drive", "what the drives must give, friction and motors included."
+    return "Actuator", "what the bodies take; friction is left out."
+
+
+def _figures(found: Shown) -> dict[str, Any]:
+    """Return the pictures as SVG, by their names in the template."""
+    robot, motion, at = found.robot, found.recording.motion, found.frames
+    gravity = np.array(robot.gravity)
+    angle = fixed(float(np.degrees(motion.pose[0, -1])), 0)
+    machine = robot_figure(
+        found.start,
+        found.guides,
+        gravity=gravity if gravity.any() else None,
+        path=at.points.tool,
+        angle=f"φ = {angle}°" if robot.platform.turns else "",
+    )
+    joints = [leg.joint for leg in robot.legs]
+    some = few(len(motion.time))
+    time = motion.time[some] - motion.time[0]
+    return {
+        "robot": svg(machine, name="robot", title=f"{robot.name} where the motion begins"),
+        "forces": svg(
+            forces_figure(time, found.forces[some], ylabel=force(joints).axis),
+            name="forces",
+            title="Forces over time",
+        ),
+        "joints": _over_time(at.time, at.points.coordinates, coordinate(joints), "coordinates"),
+        "power": svg(
+            power_figure(time, found.forces[some] * found.rates[some]),
+            name="power",
+            title="Power of every drive over time",
+        ),
+        "rates": _over_time(time, found.rates[some], speed(joints), "speeds"),
+    }
+
+
+def _over_time(time: Array, values: Array, quantity: Quantity, name: str) -> Any:
+    figure = forces_figure(time, values * np.array(quantity.factors), ylabel=quantity.axis)
+    return svg(figure, name=name, title=f"Joint {name} over time")

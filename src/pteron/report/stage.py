@@ -1,0 +1,70 @@
+"""What the pages with a moving picture share: its words, its speeds and its data."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from pteron.manipulator import Manipulator
+from pteron.motion import Guide, JointPoints
+from pteron.report.joints import coordinate, force
+from pteron.report.scene import Frames, scene
+from pteron.report.typeset import embedded, resource
+
+_SHORT = 3.0
+"""s of a motion that the eye does not follow in real time."""
+
+_PACES = (
+    (0.0, 0.1, "10 % of real speed"),
+    (0.0, 0.4, "40 % of real speed"),
+    (0.0, 1.0, "real time"),
+    (10.0, 4.0, "4 times real speed"),
+    (60.0, 16.0, "16 times real speed"),
+)
+"""For motions of at least so many s, a speed of the playback, and its name."""
+
+_ROUNDING = 1e-9
+
+
+def stage(
+    robot: Manipulator,
+    shown: Frames,
+    guides: Sequence[Guide],
+    home: JointPoints,
+    grid: float,
+    **words: str,
+) -> dict[str, Any]:
+    """Return what `stage.html.j2` asks for; its pictures are the page's own affair.
+
+    The words are what the machine is `doing`, what the `still` picture shows, and the
+    `force_title` over the forces of the moment.
+    """
+    joints = [leg.joint for leg in robot.legs]
+    return {
+        "robot": robot,
+        "shown": shown,
+        "legs": range(len(robot.legs)),
+        "grid": grid,
+        "force": force(joints),
+        "coordinate": coordinate(joints),
+        "gravity": gravity_words(robot),
+        "paired": any(leg.bar for leg in robot.legs),
+        "paces": [(pace, text) for least, pace, text in _PACES if shown.duration >= least],
+        "pace": 0.4 if shown.duration < _SHORT else 1.0,
+        "script": resource("view.js"),
+        "scene": embedded(scene(robot, shown, guides, home, grid)),
+        **words,
+    }
+
+
+def gravity_words(robot: Manipulator) -> str:
+    """Return which way gravity acts in the picture of a planar machine, as a clause."""
+    gravity, frame = np.array(robot.gravity), np.array(robot.platform.frame)
+    if not gravity.any():
+        return "there is no gravity"
+    x, y, _ = frame @ gravity / np.linalg.norm(gravity)
+    if np.hypot(x, y) <= _ROUNDING:
+        return "gravity acts along the normal"
+    return "gravity acts along the arrow"
