@@ -26,6 +26,7 @@ from pteron.cli.report import report
 from pteron.cli.screen import complain, note
 from pteron.cli.simulate import simulate
 from pteron.cli.size import size
+from pteron.cli.view import view
 from pteron.errors import PteronError
 
 _USER_ERROR = 2
@@ -145,6 +146,12 @@ _add(catalog, "pteron catalog --json")
 _add(new, "pteron new", "pteron new delta --out robot.toml")
 _add(check, "pteron check robot.toml")
 _add(report, "pteron report quadrupteron --out report")
+_add(
+    view,
+    "pteron view delta",
+    "pteron view quadrupteron --motion adept --payload 0.5",
+    "pteron view robot.toml --motion log.csv --port 9000 --no-browser",
+)
 _add(
     inverse,
     "pteron inverse quadrupteron 0.01 0.02 -0.03 0.1",
