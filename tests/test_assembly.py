@@ -276,6 +276,16 @@ def test_a_motion_is_followed_through_home(name):
     np.testing.assert_allclose(few, poses[::40], rtol=0, atol=1e-12)
 
 
+@pytest.mark.parametrize(("name", "leg"), [("quadrupteron", 1), ("tripteron", 0)])
+def test_one_joint_is_followed_from_the_origin(name, leg):
+    """Of a leg whose plane stays in the origin all terms are zero, but for rounding."""
+    robot = pteron.load(name)
+    joints = np.zeros((9, robot.freedom))
+    joints[:, leg] = np.linspace(0.0, 0.02, 9)
+    poses = pteron.follow(robot, joints, np.zeros(robot.freedom))
+    np.testing.assert_allclose(pteron.inverse_kinematics(robot, poses), joints, rtol=0, atol=1e-12)
+
+
 @pytest.mark.parametrize("name", ["par4", "h4", "3-rrr", "delta"])
 def test_far_samples_are_followed_as_near_ones_are(name):
     robot = pteron.load(name)

@@ -15,10 +15,11 @@ from mechanisms import CATALOG, MECHANISMS, random_machine, with_elbows
 from test_workspace import fourfold, with_limits
 
 import pteron
+from pteron.kinematics.condition import jacobian_at
 from pteron.legs.cones import Cone
 from pteron.reduction import FORMS
 from pteron.report import write_report
-from pteron.report.contents import contents, jacobian_at
+from pteron.report.contents import contents
 from pteron.report.costs import dense_operations
 from pteron.report.page import bodies, geometry, in_symbols, lettered, page
 from pteron.report.typeset import fixed, significant, triple

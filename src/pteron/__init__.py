@@ -80,6 +80,7 @@ if TYPE_CHECKING:
         motion,
         plots,
         report,
+        viewer,
         workspace,
     )
     from pteron.export import export_c, export_st
@@ -102,7 +103,7 @@ _LATER = {
 }
 _LATER_MODULES = (
     *("controllers", "environments", "export", "identification"),
-    *("motion", "plots", "report", "workspace"),
+    *("motion", "plots", "report", "viewer", "workspace"),
 )
 """What would slow the start of those who do not use it (SymPy, SciPy, matplotlib, Gymnasium)."""
 
@@ -190,6 +191,7 @@ __all__ = [
     "save",
     "singular_orientations",
     "turned",
+    "viewer",
     "with_parameters",
     "working_mode",
     "working_modes",

@@ -28,6 +28,7 @@ from pteron.cli.report import report
 from pteron.cli.screen import complain, note
 from pteron.cli.simulate import simulate
 from pteron.cli.size import size
+from pteron.cli.view import view
 from pteron.errors import PteronError
 
 _USER_ERROR = 2
@@ -150,6 +151,12 @@ _add(
     report,
     "pteron report quadrupteron --out report",
     "pteron report quadrupteron --motion motion.csv --out report",
+)
+_add(
+    view,
+    "pteron view delta",
+    "pteron view quadrupteron --motion adept --payload 0.5",
+    "pteron view robot.toml --motion log.csv --port 9000 --no-browser",
 )
 _add(
     inverse,

@@ -31,6 +31,10 @@ that it counts as closed, but each step's determinant is half of the last one's 
 """
 
 
+_NOTHING = 1e-9
+"""m that are nothing beside a machine's size."""
+
+
 class Rows(NamedTuple):
     """The closures of legs whose joints are held, for v = (p - origin) / size.
 
@@ -101,7 +105,7 @@ class Misses(NamedTuple):
     rows: Expression
     """(n, m): their derivatives with respect to the pose."""
     relative: Expression
-    """The largest, as a share of the terms that it is the difference of."""
+    """The largest, as a share of the terms that they are the differences of, of all legs."""
 
     @property
     def step(self) -> tuple[Expression, Expression]:
@@ -114,7 +118,7 @@ def misses(machine: Machine, joints: Expression, pose: Expression) -> Misses:
     """Return by how much a pose (m, 1) misses the closures of joints (n, 1)."""
     rest = ca.SX.zeros(machine.freedom)
     platform = machine.platform.motion(pose, rest, rest)
-    lengths, rows, shares = [], [], []
+    lengths, rows, angles, sizes = [], [], [ca.SX(0)], [ca.SX(_NOTHING)]
     for leg, q, point, matrix in zip(
         machine.legs, ca.vertsplit(joints), platform.points, platform.matrices, strict=True
     ):
@@ -122,19 +126,25 @@ def misses(machine: Machine, joints: Expression, pose: Expression) -> Misses:
         if isinstance(locus, Turned):
             assert platform.angle is not None
             length, row = platform.angle.angle - locus.angle, ca.SX([[0, 0, 0, 1]])
-            size = 1 + ca.fabs(locus.angle)
+            angles.append(ca.fabs(length) / (1 + ca.fabs(locus.angle)))
         elif isinstance(locus, Plane):
             length, row = ca.dot(locus.normal, c) - locus.offset, ca.horzcat(locus.normal.T, 0)
-            size = locus.size + ca.dot(ca.fabs(locus.normal), ca.fabs(c))
+            sizes.append(locus.size + ca.dot(ca.fabs(locus.normal), ca.fabs(c)))
         else:
             b = _counted(machine, locus, c - locus.center)
             length = 0.5 * (ca.dot(b, b) / locus.radius - locus.radius)
             row = ca.horzcat(b.T / locus.radius, 0)
-            size = locus.radius + ca.norm_1(c) + ca.norm_1(locus.center)
+            sizes.append(locus.radius + ca.norm_1(c) + ca.norm_1(locus.center))
         lengths.append(length)
         rows.append(ca.mtimes(row, matrix))
-        shares.append(ca.fabs(length) / size)
-    return Misses(ca.vertcat(*lengths), ca.vertcat(*rows), ca.mmax(ca.vertcat(*shares)))
+    # The terms of all legs are the measure: those of a plane through the origin may all be zero.
+    missed = [
+        ca.fabs(length)
+        for leg, q, length in zip(machine.legs, ca.vertsplit(joints), lengths, strict=True)
+        if not isinstance(leg.locus(q), Turned)
+    ]
+    share = ca.mmax(ca.vertcat(*missed)) / ca.sum1(ca.vertcat(*sizes))
+    return Misses(ca.vertcat(*lengths), ca.vertcat(*rows), ca.mmax(ca.vertcat(share, *angles)))
 
 
 def newton_step(

@@ -9,7 +9,8 @@ import numpy as np
 
 from pteron.equations.machine import closure_of
 from pteron.kernels import Array, numeric
-from pteron.kinematics import jacobian, singular_orientations
+from pteron.kinematics import singular_orientations
+from pteron.kinematics.condition import JacobianAtPose, jacobian_at
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator
 from pteron.motion import (
@@ -61,23 +62,6 @@ _RIM = 0.08
 
 _FINE = 121
 """Points along each side of a measure's slice."""
-
-
-@dataclass(frozen=True)
-class JacobianAtHome:
-    """The Jacobian (n, m) at the home pose, Eq. (10), and its condition number.
-
-    The number is that of J with a crank's row times its length and the angle's column divided by
-    `radius`, so that no unit is mixed with another. The joint of a leg that follows the angle, such
-    as a shaft, is measured as that angle times the same radius: its gear does not count. The radius
-    is the root mean square distance of the platform points, as far as they turn, from the
-    platform's axis through P; None where the platform does not turn, or none of them does: then
-    nothing but such a leg moves with the angle.
-    """
-
-    matrix: Array
-    radius: float | None
-    condition: float
 
 
 @dataclass(frozen=True)
@@ -141,7 +125,7 @@ class Report:
     passive: tuple[LimitedJoint, ...]
     slices: tuple[ReachSlice, ...]
     volume: ReachVolume
-    jacobian: JacobianAtHome
+    jacobian: JacobianAtPose
     orientations: Orientations | None
     measures: Measures | None
     base: BaseParameters
@@ -264,21 +248,6 @@ def _measures(robot: Manipulator, home: Array, box: Array) -> Measures | None:
     type_i = numeric(robot, "reach")(poses)[1].min(axis=-1)
     type_ii = _type_ii(robot, poses)
     return Measures(cut, type_i, np.where(np.isnan(type_i), np.nan, type_ii))
-
-
-def jacobian_at(robot: Manipulator, home: Array) -> JacobianAtHome:
-    """Return the Jacobian at a pose, and its condition number."""
-    matrix = jacobian(robot, home)
-    held = [leg.platform_point[:2] for leg in robot.legs if not leg.follows_angle]
-    radius = float(np.sqrt((np.array(held) ** 2).sum(axis=-1).mean()))
-    unit = radius or 1.0
-    levers = [
-        unit / abs(row[-1]) if leg.follows_angle else leg.lever
-        for leg, row in zip(robot.legs, matrix, strict=True)
-    ]
-    columns = [unit if name == "phi" else 1.0 for name in robot.coordinates]
-    condition = float(np.linalg.cond(matrix * np.array(levers)[:, None] / columns))
-    return JacobianAtHome(matrix, radius or None if robot.platform.turns else None, condition)
 
 
 def _orientations(robot: Manipulator, home: Array) -> Orientations | None:

@@ -14,6 +14,7 @@ from pteron.tables.files import (
     open_table,
     read_table,
     table_bytes,
+    whole_table,
     write_table,
 )
 from pteron.tables.parquet_file import ParquetFile
@@ -32,6 +33,7 @@ __all__ = [
     "open_table",
     "read_table",
     "table_bytes",
+    "whole_table",
     "write_table",
 ]
 

@@ -98,10 +98,21 @@ def read_table(path: str | Path) -> Table:
             file = CsvFile(special.read_bytes(), source)
         else:
             file = open_table(path)
-        tables = list(file.tables())
+        return whole_table(file)
+
+
+def whole_table(file: CsvFile | ParquetFile) -> Table:
+    """Return all rows of an open file as one table.
+
+    Raises
+    ------
+    DataError
+        If it has no rows, or is ragged.
+    """
+    tables = list(file.tables())
     if not tables:
         below = f" below its header; the names are {listed(file.columns)}"
-        raise DataError(f"{source}: has no rows{below if isinstance(file, CsvFile) else ''}")
+        raise DataError(f"{file.source}: has no rows{below if isinstance(file, CsvFile) else ''}")
     return _joined(tables)
 
 

@@ -1,0 +1,81 @@
+"""`pteron view`: a machine in the browser, to be moved."""
+
+from __future__ import annotations
+
+import os
+import sys
+import webbrowser
+from threading import Event
+from typing import Annotated
+
+from typer import echo
+
+from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
+from pteron.cli.given_cycle import STANDARD
+from pteron.cli.screen import note, show_json, spinner
+
+_TICK = 0.5
+"""s between two looks for Ctrl-C, which some systems deliver only then."""
+
+
+def view(
+    robot: Robot,
+    motion: Annotated[
+        str | None,
+        option(
+            "motion",
+            f"Play {STANDARD}, the standard pick-and-place cycle, or a file: a motion, a "
+            "simulation or a log.",
+            "CYCLE",
+        ),
+    ] = None,
+    payload: Annotated[float, option("payload", "At the tool's centre point, kg.")] = 0.0,
+    host: Annotated[
+        str, option("host", "The address to serve at; by default this machine alone.")
+    ] = "127.0.0.1",
+    port: Annotated[
+        int, option("port", "Its port, or the next one that is free; 0 is any.")
+    ] = 8080,
+    no_browser: Annotated[
+        bool, option("no-browser", "Print the address, and open no browser.")
+    ] = False,
+    elbows: Elbows = None,
+    json: Json = False,
+) -> None:
+    """Show a machine in the browser, where it can be moved; Ctrl-C ends it.
+
+    Sliders move the platform or the joints; the page tells the drives' forces, the condition
+    number and how far the machine is from singularities and limits, shows slices of the workspace
+    and plays motions, logs and simulations. docs/view.md tells more.
+    """
+    machine = load_robot(robot, elbows)
+    with spinner(f"Preparing {machine.name}"):
+        from pteron.viewer import view as opened
+        from pteron.viewer.server import is_here
+
+        viewer = opened(machine, host=host, port=port, motion=motion, payload=payload)
+    with viewer:
+        if port not in (0, viewer.port):
+            note(f"Note: port {port} is in use; the page is at {viewer.port}")
+        if not is_here(host):
+            note(
+                f"Warning: --host {host}: anyone who can reach this machine over the network can "
+                "see the page and move the picture"
+            )
+        if json:
+            show_json({"robot": machine.name, "url": viewer.url, "port": viewer.port})
+        else:
+            echo(f"{machine.name} is at {viewer.url} (Ctrl-C ends it)")
+        sys.stdout.flush()
+        if not no_browser and _has_screen():
+            webbrowser.open(viewer.url)
+        never = Event()
+        while not never.wait(_TICK):
+            pass
+
+
+def _has_screen() -> bool:
+    """Say whether a person may see a browser that is opened here."""
+    if sys.platform in ("win32", "darwin"):
+        return True
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

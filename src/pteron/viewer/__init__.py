@@ -1,0 +1,5 @@
+"""A machine in the browser: seen in space, moved by sliders or by hand, with what it feels."""
+
+from pteron.viewer.view import Viewer, view
+
+__all__ = ["Viewer", "view"]

@@ -1,0 +1,160 @@
+"""How far a machine can go on its way to a pose, and what stops it there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.kernels import Array, numeric
+from pteron.kinematics import follow, inverse_kinematics
+from pteron.kinematics.limits import limited_joints
+from pteron.manipulator import Manipulator
+from pteron.report.joints import readable
+from pteron.report.typeset import fixed
+from pteron.workspace.reserve import clearances, room_to_limits
+
+LEAST_TYPE_I = 0.01
+"""The type-I measure at which a leg is at its end: forces still have most of their digits."""
+
+_ENDS = 2.0 * LEAST_TYPE_I
+"""The measure below which it is the leg that stops the machine, seen from before and beyond."""
+
+_ROUNDING = 1e-9
+"""m by which a joint may be beyond its limit: a pose on it is within."""
+
+_PIECES = 32
+"""Into how many pieces a way is divided, again and again, to find its end."""
+
+_ROUNDS = 5
+
+_STEPS = 8
+"""Pieces of a way of the joints; the platform is followed along each."""
+
+_SAME_JOINT = 1e-6
+
+
+def allowed(robot: Manipulator, poses: Array) -> NDArray[np.bool_]:
+    """Return which poses (..., m) are in reach of all legs and within all limits, (...)."""
+    measure = numeric(robot, "reach")(poses)[1]
+    bent = (measure >= LEAST_TYPE_I).all(axis=-1)
+    return np.asarray(bent & (room_to_limits(robot, poses).min(axis=-1) >= -_ROUNDING))
+
+
+def farthest(robot: Manipulator, start: Array, target: Array) -> tuple[Array, Array | None]:
+    """Return how far the platform can go on the straight way from one pose to another.
+
+    A target that is allowed is always come to.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    start, target : array, shape (m,)
+        The poses, m and rad.
+
+    Returns
+    -------
+    last : array, shape (m,)
+        The last pose that is allowed.
+    beyond : array, shape (m,), or None
+        One next to it that is not; None where nothing stops the platform.
+    """
+    if bool(allowed(robot, target)):
+        return target, None
+
+    def tried(shares: Array) -> tuple[Array, NDArray[np.bool_]]:
+        poses = start + shares[:, None] * (target - start)
+        return poses, allowed(robot, poses)
+
+    return _narrowed(tried, start, _PIECES)
+
+
+def followed(
+    robot: Manipulator, pose: Array, joints: Array, target: Array
+) -> tuple[Array, Array | None]:
+    """Return how far the platform follows joints on their straight way, in its assembly mode.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    pose : array, shape (m,)
+        Where it is, m and rad.
+    joints, target : array, shape (n,)
+        Where the joints are, and where they are to go, m or rad.
+
+    Returns
+    -------
+    last : array, shape (m,)
+        The last pose that is allowed.
+    beyond : array, shape (m,), or None
+        One next to it that is not, NaN where the assembly mode ends; None where nothing stops it.
+    """
+    rounds = np.array([leg.goes_round for leg in robot.legs])
+    turn = 2.0 * np.pi
+
+    def tried(shares: Array) -> tuple[Array, NDArray[np.bool_]]:
+        way = joints + shares[:, None] * (target - joints)
+        poses = follow(robot, way, pose, on_failure="nan")
+        apart = np.abs(inverse_kinematics(robot, poses, on_failure="nan") - way)
+        apart = np.where(rounds, np.abs((apart + np.pi) % turn - np.pi), apart)
+        return poses, allowed(robot, poses) & (apart <= _SAME_JOINT).all(axis=-1)
+
+    return _narrowed(tried, pose, _STEPS)
+
+
+def _narrowed(
+    tried: Callable[[Array], tuple[Array, NDArray[np.bool_]]], start: Array, pieces: int
+) -> tuple[Array, Array | None]:
+    """Return the last pose before the first that fails, and that one, by ever finer pieces."""
+    low, high, last = 0.0, 1.0, start
+    beyond: Array | None = None
+    for _ in range(_ROUNDS):
+        shares = np.linspace(low, high, pieces + 1)[1:]
+        poses, good = tried(shares)
+        if good.all():
+            return poses[-1], beyond
+        k = int(good.argmin())
+        beyond, high = poses[k], float(shares[k])
+        if k:
+            low, last = float(shares[k - 1]), poses[k - 1]
+    return last, beyond
+
+
+def what_stops(robot: Manipulator, beyond: Array) -> str:
+    """Return which leg, or limit, forbids a pose (m,), as a sentence without its full stop.
+
+    A pose that nothing forbids is one at which an assembly mode ends.
+    """
+    margin, measure, _, _ = numeric(robot, "reach")(beyond)
+    short = ~(measure >= _ENDS)
+    if short.any():
+        i = int(np.where(short, margin, np.inf).argmin())
+        return f"Leg {i + 1} reaches no further: {robot.legs[i].singular_text}"
+    joints = numeric(robot, "joint_coordinates")(beyond)[0]
+    room = clearances(robot, joints)
+    if room.min() < 0.0:
+        i = int(room.argmin())
+        leg = robot.legs[i]
+        assert leg.limits is not None
+        limit = min(leg.limits, key=lambda value: abs(value - joints[i]))
+        name, unit = leg.joint.noun, leg.joint.unit
+        return f"The {name} of leg {i + 1} is at its limit, {readable(limit, unit)}"
+    for joint in limited_joints(robot, beyond):
+        if not joint.actuated and not joint.least <= joint.value <= joint.most:
+            whose = f"of leg {joint.leg}" if joint.leg else "of the platform"
+            return f"The {joint.noun} {whose} is at its limit, {joint.told_limits(readable)}"
+    return "The assembly mode ends here (singular, type II)"
+
+
+def told_rest(robot: Manipulator, last: Array, target: Array) -> str:
+    """Return how far a pose (m,) is from the one that was asked for, in words."""
+    count = len(robot.platform.lengths)
+    way = float(np.linalg.norm(target[:count] - last[:count]))
+    parts = [f"{fixed(1e3 * way)} mm"] if way > 0.0 else []
+    if robot.platform.turns:
+        angle = abs(float(np.degrees(target[-1] - last[-1])))
+        parts += [f"{fixed(angle)}°"] if angle > 0.0 else []
+    return " and ".join(parts) or "0.0 mm"

@@ -1,0 +1,95 @@
+"""What the panel says of a machine: forces, condition, and how far it is from its ends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from pteron.dynamics import drive_forces
+from pteron.errors import PteronError
+from pteron.kernels import Array
+from pteron.kinematics.condition import jacobian_at
+from pteron.viewer.state import State
+from pteron.workspace import reserve
+
+Level = Literal["far", "near", "close"]
+
+_NEAR = 0.3
+_CLOSE = 0.1
+"""Reserves, of 1 at best, below which a pose is near, and close to, what ends the work."""
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """The numbers of a state.
+
+    Attributes
+    ----------
+    joints : array, shape (n,)
+        m or rad.
+    forces : array, shape (n,)
+        Of the drives, at rest or as the machine moves, N or N m; NaN where they are not determined.
+    shares : array, shape (n,)
+        Their sizes over what the drives can do; NaN where the file does not say it.
+    condition : float
+        Condition number of the Jacobian, no unit mixed with another; NaN at a singular pose.
+    type_i : array, shape (n,)
+        Each leg's type-I measure: 1 at best, 0 where the leg is stretched or folded.
+    type_ii : float
+        The type-II measure as a share of its best: 0 where the actuators hold the platform no more.
+    clearances : array, shape (n,)
+        From each leg's joints to the nearest limit, over half its range; 1 without limits.
+    fault : str
+        Why there are no forces; empty where there are.
+    """
+
+    joints: Array
+    forces: Array
+    shares: Array
+    condition: float
+    type_i: Array
+    type_ii: float
+    clearances: Array
+    fault: str = ""
+
+
+def readings(state: State) -> Readings:
+    """Return the numbers of a state, each as the library has it."""
+    robot, fault = state.robot, ""
+    unknown = np.full(robot.freedom, np.nan)
+    try:
+        forces: Array = drive_forces(state.loaded, state.pose, state.velocity, state.acceleration)
+    except PteronError as error:
+        forces, fault = unknown, str(error)
+    try:
+        condition = jacobian_at(robot, state.pose).condition
+    except PteronError:
+        condition = float("nan")
+    most = [leg.drive.max_force if leg.drive else None for leg in robot.legs]
+    shares = np.abs(forces) / np.array([np.nan if force is None else force for force in most])
+    at = reserve(robot, state.pose)
+    return Readings(
+        state.joints,
+        forces,
+        shares,
+        condition,
+        at.type_i,
+        float(at.type_ii),
+        at.clearances,
+        fault,
+    )
+
+
+def level(value: float) -> Level:
+    """Return how near a reserve, 1 at best, is to its end.
+
+    Examples
+    --------
+    >>> level(0.8), level(0.2), level(0.0)
+    ('far', 'near', 'close')
+    """
+    if value >= _NEAR:
+        return "far"
+    return "near" if value >= _CLOSE else "close"

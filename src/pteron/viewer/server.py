@@ -1,0 +1,122 @@
+"""The page's server: viser, quiet, on a port that is free, at the address that was asked for."""
+
+from __future__ import annotations
+
+import errno
+import io
+import logging
+import os
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout
+from typing import TYPE_CHECKING, Any
+
+from pteron.errors import DataError, ModelError, shown
+
+if TYPE_CHECKING:
+    import viser
+
+_TRIED = 100
+"""Ports that are tried, one after the other."""
+
+_MOST = 65535
+
+_NOT_OURS = (errno.EADDRNOTAVAIL, errno.EAFNOSUPPORT)
+
+_HERE = ("127.", "::1", "localhost")
+
+
+def serve(host: str, port: int, label: str) -> viser.ViserServer:
+    """Return a running server.
+
+    Raises
+    ------
+    DataError
+        If the host is no address of this machine, or no port from the given one on is free.
+    ModelError
+        If viser is not installed.
+    """
+    try:
+        import viser
+    except ImportError:
+        raise ModelError(
+            'the viewer needs viser, which is not installed; pip install "pteron[viewer]"'
+        ) from None
+    free = free_port(host, port)
+    logging.getLogger("websockets.server").addFilter(_worth_telling)
+    with _quiet():
+        server = viser.ViserServer(host=host, port=free, label=label, verbose=False)
+    # Any page that a browser shows could ask for a tunnel to the world; there is to be none.
+    refused: Any = server
+    refused.request_share_url = _no_tunnel
+    return server
+
+
+def stop(server: viser.ViserServer) -> None:
+    """Stop a server."""
+    with _quiet():
+        server.stop()
+
+
+def free_port(host: str, port: int) -> int:
+    """Return the first free port of a host from a given one on; 0 means any.
+
+    Raises
+    ------
+    DataError
+        If the host is no address of this machine, or there is no such port.
+    """
+    if not 0 <= port <= _MOST:
+        raise DataError(f"port: {shown(port)} given, a whole number from 0 to {_MOST} expected")
+    try:
+        addresses = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
+    except (OSError, UnicodeError):
+        raise DataError(
+            f"host: {shown(host)} is no address; give 127.0.0.1 for this machine alone, or 0.0.0.0 "
+            "for all who can reach it"
+        ) from None
+    if port == 0:
+        return 0
+    for candidate in range(port, min(port + _TRIED, _MOST + 1)):
+        if all(_is_free(family, address[0], candidate) for family, *_, address in addresses):
+            return candidate
+    raise DataError(f"port: none of {port} to {port + _TRIED - 1} is free; give another --port")
+
+
+def _is_free(family: int, address: Any, port: int) -> bool:
+    with socket.socket(family, socket.SOCK_STREAM) as tried:
+        if os.name == "posix":  # elsewhere it would take a port that is in use
+            tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            tried.bind((address, port))
+        except PermissionError:
+            return False
+        except OSError as error:
+            if error.errno in _NOT_OURS:
+                raise DataError(
+                    f"host: {shown(address)} is no address of this machine; give 127.0.0.1 for it "
+                    "alone, or 0.0.0.0 for all who can reach it"
+                ) from None
+            return False
+    return True
+
+
+def is_here(host: str) -> bool:
+    """Say whether only this machine can reach a host's address."""
+    return host.startswith(_HERE)
+
+
+def _worth_telling(record: logging.LogRecord) -> bool:
+    """Say whether a line of the server's log is: browsers open connections that they do not use."""
+    return record.getMessage() != "opening handshake failed"
+
+
+def _no_tunnel(verbose: bool = True) -> None:
+    """Refuse to publish the page."""
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep to itself what viser prints: standard output is for results."""
+    with redirect_stdout(io.StringIO()):
+        yield

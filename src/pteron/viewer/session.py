@@ -1,0 +1,228 @@
+"""What goes on in one viewer: a machine's state, the motion that plays, and every action on them.
+
+It knows nothing of a browser. All of it runs in one thread.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+
+import numpy as np
+
+from pteron.dynamics import drive_forces
+from pteron.errors import DataError, ModelError
+from pteron.kernels import Array
+from pteron.kinematics import inverse_kinematics, random_poses
+from pteron.manipulator import Manipulator, working_modes
+from pteron.motion import Motion, pick_and_place
+from pteron.motion.trajectories.checks import check_motion
+from pteron.viewer.files import motion_of_file
+from pteron.viewer.state import (
+    along,
+    assembled,
+    assembly_poses,
+    at_home,
+    at_rest,
+    carrying,
+    current_assembly,
+    in_working_mode,
+    joint_moved,
+    moved,
+    stopped,
+    typed_pose,
+)
+from pteron.workspace import bounding_box, reserve
+
+SPEEDS = {"1/10": 0.1, "1/4": 0.25, "1/2": 0.5, "real time": 1.0, "2 x": 2.0}
+"""What a motion's speed is called, and how many seconds of it a second shows."""
+
+STANDARD = "standard pick-and-place cycle"
+
+_LEAST_RESERVE = 0.2
+_SAMPLES = 481
+_DRAWN = 200
+_ROOM = 0.08
+_RIM = 0.05
+"""Shares of a range that sliders have beyond it."""
+
+
+class Session:
+    """A machine, what it does, and what people do to it.
+
+    Attributes
+    ----------
+    state : State
+        The machine now.
+    motion : Motion or None
+        What may be played, and its `title`.
+    time : float
+        Where in the motion the machine is, s from its beginning.
+    playing : bool
+    speed : float
+        Seconds of the motion in one second.
+    """
+
+    def __init__(self, robot: Manipulator, payload: float = 0.0) -> None:
+        self._first = robot
+        self.state = at_rest(robot)
+        if payload:
+            self.state = carrying(self.state, repr(payload))
+            if self.state.message:
+                raise DataError(f"payload: {payload!r} given, a mass of 0 kg or more expected")
+        self.motion: Motion | None = None
+        self.title = ""
+        self.time, self.playing, self.speed = 0.0, False, 1.0
+        self._set_ranges()
+
+    def _set_ranges(self) -> None:
+        """Find what the sliders span, and poses all over the reach, in this working mode."""
+        robot, home = self.state.robot, self.state.pose
+        self.home = home
+        self.examples = home[None]
+        with suppress(ModelError):
+            drawn = random_poses(robot, _DRAWN, type_i=0.0, type_ii=0.0)
+            self.examples = np.vstack([home, drawn])
+        count = len(robot.platform.lengths)
+        low, high = self.examples.min(axis=0), self.examples.max(axis=0)
+        with suppress(ModelError):  # guides without limits: a reach without end
+            low[:count], high[:count] = bounding_box(robot, home)
+        room = _ROOM * (high - low)
+        low, high = low - room, high + room
+        if robot.platform.turns:
+            limits = robot.platform.limits or (-np.pi, np.pi)
+            if robot.platform.slides:
+                limits = float(low[-1]), float(high[-1])
+            low[-1], high[-1] = limits
+        self.pose_range = np.array([low, high])
+        joints = inverse_kinematics(robot, self.examples)
+        low, high = joints.min(axis=0), joints.max(axis=0)
+        rim = _RIM * (high - low)
+        for i, leg in enumerate(robot.legs):
+            free = (-np.pi, np.pi) if leg.goes_round else (low[i] - rim[i], high[i] + rim[i])
+            low[i], high[i] = leg.limits or free
+        self.joint_range = np.array([low, high])
+
+    # What people do.
+
+    def set_coordinate(self, i: int, value: float) -> None:
+        """Move the platform along one of its pose's coordinates, from 0, to a value in m or rad."""
+        target = self.state.pose.copy()
+        target[i] = value
+        self.set_pose(target)
+
+    def set_pose(self, target: Array) -> None:
+        """Move the platform to a pose (m,), or as near to it as it goes."""
+        self.playing = False
+        self.state = moved(self.state, target)
+
+    def type_pose(self, text: str) -> None:
+        """Move the platform to a pose that is typed in mm and degrees."""
+        self.set_pose(typed_pose(self.state.robot, text))
+
+    def set_joint(self, i: int, value: float) -> None:
+        """Move one joint, from 0, to a value in m or rad."""
+        self.playing = False
+        self.state = joint_moved(self.state, i, value)
+
+    def set_payload(self, text: str) -> None:
+        """Carry what is typed, kg."""
+        self.state = carrying(self.state, text)
+
+    def go_home(self) -> None:
+        """Move the platform to its home pose."""
+        self.playing = False
+        self.state = at_home(self.state)
+
+    def modes(self) -> list[tuple[int, ...]]:
+        """Return the sides of the elbows of every working mode."""
+        return [tuple(leg.elbow for leg in robot.legs) for robot in working_modes(self._first)]
+
+    def set_working_mode(self, elbows: Sequence[int]) -> bool:
+        """Put the elbows on given sides; say whether the machine is another one now."""
+        before = self.state.robot
+        self.playing = False
+        self.state = in_working_mode(self.state, elbows)
+        if self.state.robot == before:
+            return False
+        state, dropped = self.state, self.motion is not None
+        self.motion, self.title, self.time = None, "", 0.0
+        # Ranges are those about the mode's home.
+        home = at_home(state)
+        self.state = home
+        self._set_ranges()
+        message = state.message
+        if dropped:
+            message = f"{message} The motion was of another working mode; load it again.".strip()
+        self.state = stopped(state, message)
+        return True
+
+    def assemblies(self) -> tuple[Array, int | None]:
+        """Return the poses (K, m) of the joints as they are, and which of them is the pose."""
+        poses = assembly_poses(self.state)
+        return poses, current_assembly(self.state, poses)
+
+    def set_assembly(self, pose: Array) -> None:
+        """Take another of the poses that the joints have."""
+        self.playing = False
+        self.state = assembled(self.state, pose)
+
+    # What plays.
+
+    def load(self, name: str, data: bytes) -> None:
+        """Take a motion from a file's name and content; it plays from its beginning."""
+        found = motion_of_file(self.state.robot, name, data, self.state.pose)
+        self.take(found, name)
+
+    def load_standard(self) -> None:
+        """Take the standard pick-and-place cycle about the home pose."""
+        robot = self.state.robot
+        least = min(_LEAST_RESERVE, float(reserve(robot, self.home).smallest) / 2.0)
+        self.take(pick_and_place(robot, self.home, samples=_SAMPLES, least=least), STANDARD)
+
+    def take(self, motion: Motion, title: str) -> None:
+        """Take a motion, after a check that the machine can do it."""
+        check_motion(self.state.robot, motion)
+        self.motion, self.title = motion, title
+        self.playing = True
+        self.seek(0.0)
+
+    def play(self, *, on: bool) -> None:
+        """Start or stop the motion."""
+        if self.motion is None:
+            self.state = stopped(self.state, "There is no motion to play: load one first.")
+            return
+        self.playing = on
+        if not on:
+            self.state = stopped(self.state)
+
+    def seek(self, time: float) -> None:
+        """Go to a time of the motion, s."""
+        if self.motion is not None:
+            self.time = min(max(time, 0.0), self.motion.duration)
+            self.state = along(self.state, self.motion, self.time)
+
+    def advance(self, elapsed: float) -> None:
+        """Let the motion go on for so many seconds of the clock; it begins again at its end."""
+        if self.motion is not None and self.playing:
+            self.seek((self.time + self.speed * elapsed) % (self.motion.duration or 1.0))
+
+    # What is shown.
+
+    def force_scale(self) -> Array:
+        """Return the force of each leg's drive, (n,), whose arrow has the usual length.
+
+        The largest of the motion, or at rest in the home pose; legs of one unit share a scale.
+        """
+        loaded = self.state.loaded
+        still = np.zeros_like(self.home)
+        states = [(self.home, still, still)]
+        if self.motion is not None:
+            states += list(
+                zip(self.motion.pose, self.motion.velocity, self.motion.acceleration, strict=True)
+            )
+        pose, velocity, acceleration = (np.array(part) for part in zip(*states, strict=True))
+        forces = drive_forces(loaded, pose, velocity, acceleration, on_failure="nan")
+        sizes = np.nan_to_num(np.abs(forces)).max(axis=0)
+        units = np.array([leg.joint.force_unit for leg in loaded.legs])
+        return np.array([sizes[units == unit].max() or 1.0 for unit in units])

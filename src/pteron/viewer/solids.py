@@ -1,0 +1,233 @@
+"""The machine in one pose as simple bodies: bars, balls and blocks, ready to be drawn together.
+
+A bar is a cylinder from one point to another; all bars of a machine are copies of one mesh, and so
+are all balls and all blocks, so that a browser draws each kind at one stroke.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.kernels import Array
+from pteron.motion import Guide, JointPoints
+from pteron.plots.canvas import INK, LEG_COLORS, MUTED, PAPER, REACH
+from pteron.plots.robot import base_outline, rods
+from pteron.plots.space import upright
+
+_LINK, _ROD, _ARM, _GUIDE, _AXIS, _JOINT = 0.011, 0.006, 0.007, 0.008, 0.003, 0.016
+"""Radii as shares of the machine's size."""
+
+_AXLE = 0.03
+_FRAME = 0.13
+"""Half the length of a crank's axle, and the length of a frame's axis, as such shares."""
+
+_BLOCK = np.array([0.04, 0.04, 0.072])
+"""The sides of a slider's block, along its guide last."""
+
+
+def rgb(color: str) -> tuple[int, int, int]:
+    """Return a colour such as "#0072b2" as three numbers from 0 to 255."""
+    return int(color[1:3], 16), int(color[3:5], 16), int(color[5:7], 16)
+
+
+@dataclass(frozen=True, eq=False)
+class Copies:
+    """Copies of one mesh: where each is, how it is turned and stretched, and its colour.
+
+    Attributes
+    ----------
+    positions : array, shape (K, 3)
+        m.
+    turns : array, shape (K, 4)
+        Unit quaternions, w x y z.
+    scales : array, shape (K, 3)
+        Along the mesh's own x, y and z, m.
+    colors : array of int, shape (K, 3)
+    """
+
+    positions: Array
+    turns: Array
+    scales: Array
+    colors: NDArray[np.uint8]
+
+
+@dataclass(frozen=True, eq=False)
+class Solids:
+    """The bodies of a machine; a face (k, 3) is the outline of a plane part of the platform."""
+
+    bars: Copies
+    balls: Copies
+    blocks: Copies
+    faces: tuple[Array, ...]
+
+
+def machine_size(points: JointPoints, guides: Sequence[Guide]) -> float:
+    """Return the greatest extent of a machine, guides included, m."""
+    everything = np.vstack([*points.links, *(guide.path for guide in guides)])
+    return float(np.ptp(everything, axis=0).max())
+
+
+def moving_solids(points: JointPoints, guides: Sequence[Guide], size: float) -> Solids:
+    """Return what moves: the legs and the platform, of points in one pose."""
+    bars, balls, blocks = _Bars(), _Balls(), []
+    for i, (line, guide) in enumerate(zip(points.links, guides, strict=True)):
+        color = LEG_COLORS[i]
+        for start, end in pairwise(line[:-1]):
+            bars.add(start, end, _LINK * size, color)
+        single = points.bars[i] is None
+        for start, end in rods(line, points.bars[i], size):
+            bars.add(start, end, (_LINK if single else _ROD) * size, color)
+        for joint in line:
+            balls.add(joint, _JOINT * size, color)
+        if guide.slides:
+            blocks.append((line[0], guide.axis, color))
+    for part in points.parts:
+        for corner in part.corners:
+            bars.add(part.hub, corner, _ARM * size, REACH)
+        balls.add(part.hub, _JOINT * size, REACH)
+    for axis in points.axes:
+        bars.add(points.reference, points.reference + _FRAME * size * axis, _AXIS * size, INK)
+    bars.add(points.reference, points.tool, _ROD * size, REACH)
+    balls.add(points.tool, 0.8 * _JOINT * size, INK)
+    balls.add(points.reference, 0.8 * _JOINT * size, PAPER)
+    faces = tuple(part.corners for part in points.parts if len(part.corners) > 2)
+    return Solids(bars.made(), balls.made(), _blocks(blocks, size), faces)
+
+
+def still_solids(
+    points: JointPoints, guides: Sequence[Guide], size: float, corner: Array
+) -> Solids:
+    """Return what stands still: guides, the cranks' axles and ways, the base and its frame."""
+    bars, balls = _Bars(), _Balls()
+    for line, guide in zip(points.links, guides, strict=True):
+        thick = _GUIDE if guide.slides else _AXIS
+        for start, end in pairwise(guide.path):
+            bars.add(start, end, thick * size, MUTED)
+        if guide.slides:
+            for end in guide.path[[0, -1]]:
+                balls.add(end, 1.3 * _GUIDE * size, MUTED)
+        else:
+            axle = _AXLE * size * guide.axis
+            bars.add(line[0] - axle, line[0] + axle, _JOINT * size, MUTED)
+    base = base_outline(points, guides)
+    for start, end in zip(base, np.roll(base, -1, axis=0), strict=True):
+        bars.add(start, end, _ARM * size, MUTED)
+    for axis in np.eye(3):
+        bars.add(corner, corner + _FRAME * size * axis, _AXIS * size, INK)
+    return Solids(bars.made(), balls.made(), _blocks([], size), (base,) if len(base) > 2 else ())
+
+
+def arrows(
+    starts: Array, ways: Array, radius: float, color: Sequence[str]
+) -> tuple[Copies, Copies]:
+    """Return the shafts and the heads of arrows from points (K, 3) along ways (K, 3), m.
+
+    A way that is NaN or has no length is no arrow.
+    """
+    ways = np.nan_to_num(ways)
+    starts = np.nan_to_num(starts)
+    lengths = np.linalg.norm(ways, axis=-1)
+    head = np.minimum(6.0 * radius, 0.6 * lengths)
+    units = np.divide(ways, lengths[:, None], out=np.zeros_like(ways), where=lengths[:, None] > 0.0)
+    necks = starts + (lengths - head)[:, None] * units
+    shafts, heads = _Bars(), _Bars()
+    for i in range(len(starts)):
+        shafts.add(starts[i], necks[i], radius, color[i])
+        heads.add(necks[i], necks[i] + head[i] * units[i], 2.6 * radius, color[i])
+    return shafts.made(), heads.made()
+
+
+class _Bars:
+    """Bars as they are found."""
+
+    def __init__(self) -> None:
+        self._ends: list[tuple[Array, Array]] = []
+        self._radii: list[float] = []
+        self._colors: list[tuple[int, int, int]] = []
+
+    def add(self, start: Array, end: Array, radius: float, color: str) -> None:
+        """Add one; of no length it is not seen."""
+        self._ends.append((start, end))
+        self._radii.append(radius)
+        self._colors.append(rgb(color))
+
+    def made(self) -> Copies:
+        """Return them as copies of a cylinder of radius and length 1 about its middle, along z."""
+        ends = np.array(self._ends, dtype=float).reshape(-1, 2, 3)
+        ways = ends[:, 1] - ends[:, 0]
+        lengths = np.linalg.norm(ways, axis=-1)
+        radii = np.where(lengths > 0.0, self._radii, 0.0)
+        scales = np.stack([radii, radii, lengths], axis=-1)
+        return Copies(ends.mean(axis=1), from_z(ways), scales, _colors(self._colors))
+
+
+class _Balls:
+    """Balls as they are found."""
+
+    def __init__(self) -> None:
+        self._centers: list[Array] = []
+        self._radii: list[float] = []
+        self._colors: list[tuple[int, int, int]] = []
+
+    def add(self, center: Array, radius: float, color: str) -> None:
+        """Add one."""
+        self._centers.append(center)
+        self._radii.append(radius)
+        self._colors.append(rgb(color))
+
+    def made(self) -> Copies:
+        """Return them as copies of a ball of radius 1."""
+        centers = np.array(self._centers, dtype=float).reshape(-1, 3)
+        turns = np.tile([1.0, 0.0, 0.0, 0.0], (len(centers), 1))
+        scales = np.repeat(np.array(self._radii)[:, None], 3, axis=1)
+        return Copies(centers, turns, scales, _colors(self._colors))
+
+
+def _blocks(found: Sequence[tuple[Array, Array, str]], size: float) -> Copies:
+    """Return blocks as copies of a cube of side 1."""
+    centers = np.array([center for center, _, _ in found]).reshape(-1, 3)
+    turns = np.array([_of_rows(upright(axis)) for _, axis, _ in found]).reshape(-1, 4)
+    scales = np.tile(size * _BLOCK, (len(found), 1))
+    return Copies(centers, turns, scales, _colors([rgb(color) for _, _, color in found]))
+
+
+def _colors(found: Sequence[tuple[int, int, int]]) -> NDArray[np.uint8]:
+    return np.array(found, dtype=np.uint8).reshape(-1, 3)
+
+
+def from_z(ways: Array) -> Array:
+    """Return unit quaternions (K, 4) that turn z along ways (K, 3); none where a way has no length.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from_z(np.array([[0.0, 0.0, 2.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])).round(3)
+    array([[ 1.   ,  0.   ,  0.   ,  0.   ],
+           [ 0.   ,  1.   ,  0.   ,  0.   ],
+           [ 0.707,  0.   ,  0.707,  0.   ]])
+    """
+    lengths = np.linalg.norm(ways, axis=-1, keepdims=True)
+    z = np.divide(ways, lengths, out=np.zeros_like(ways), where=lengths > 0.0)
+    # Half way between z and the direction; opposite ones are turned about x.
+    whole = np.stack([1.0 + z[:, 2], -z[:, 1], z[:, 0], np.zeros(len(z))], axis=-1)
+    whole[(whole[:, 0] < 1e-9) & (lengths[:, 0] > 0.0)] = [0.0, 1.0, 0.0, 0.0]
+    return np.asarray(whole / np.linalg.norm(whole, axis=-1, keepdims=True))
+
+
+def quaternion(rotation: Array) -> Array:
+    """Return the unit quaternion (4,), w x y z, of a rotation matrix (3, 3)."""
+    # SciPy is slow to load, and here the only thing of it that would be.
+    from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
+
+    x, y, z, w = Rotation.from_matrix(rotation).as_quat()
+    return np.array([w, x, y, z])
+
+
+def _of_rows(rows: Array) -> Array:
+    """Return the quaternion that turns x, y and z to three rows."""
+    return quaternion(rows.T)

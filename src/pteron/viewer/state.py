@@ -1,0 +1,211 @@
+"""What the viewer shows of a machine, as a value, and what each action makes of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pteron.errors import DataError, PteronError, shown
+from pteron.kernels import Array
+from pteron.kinematics import direct_kinematics, inverse_kinematics
+from pteron.manipulator import Manipulator
+from pteron.manipulator.manipulator import with_elbows
+from pteron.motion import Motion, with_payload
+from pteron.viewer.boundary import allowed, farthest, followed, told_rest, what_stops
+from pteron.workspace import home_pose
+
+_SAME_POSE = 1e-6
+"""m or rad within which two poses are one assembly mode."""
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A machine in a pose, moving or at rest, with what it carries.
+
+    Attributes
+    ----------
+    robot : Manipulator
+        The machine, in its working mode, without a payload.
+    pose, velocity, acceleration : array, shape (m,)
+        m, rad and s.
+    payload : float
+        At the tool's centre point, kg.
+    message : str
+        What became of the last action, where it did not do all that was asked; else empty.
+    """
+
+    robot: Manipulator
+    pose: Array
+    velocity: Array
+    acceleration: Array
+    payload: float = 0.0
+    message: str = ""
+
+    @property
+    def joints(self) -> Array:
+        """The joint coordinates (n,), m or rad."""
+        found: Array = inverse_kinematics(self.robot, self.pose)
+        return found
+
+    @property
+    def loaded(self) -> Manipulator:
+        """The machine with its payload."""
+        return with_payload(self.robot, self.payload) if self.payload else self.robot
+
+
+def at_rest(robot: Manipulator, pose: Array | None = None) -> State:
+    """Return a machine at rest in a pose, by default its home pose.
+
+    Raises
+    ------
+    ModelError
+        If it reaches no pose.
+    SingularPose
+        If it is singular at every pose.
+    """
+    found = home_pose(robot) if pose is None else pose
+    return State(robot, found, np.zeros_like(found), np.zeros_like(found))
+
+
+def moved(state: State, target: Array) -> State:
+    """Return the machine at rest in another pose (m,), or as near to it as it can go straight."""
+    if not np.isfinite(target).all():
+        return replace(state, message="The pose is to have finite numbers.")
+    last, beyond = farthest(state.robot, state.pose, target)
+    if beyond is None:
+        return _rest(state, target)
+    rest = told_rest(state.robot, last, target)
+    why = what_stops(state.robot, beyond)
+    return _rest(state, last, f"{why}. The platform stops {rest} before the pose asked for.")
+
+
+def joint_moved(state: State, i: int, value: float) -> State:
+    """Return the machine with one joint, from 0, elsewhere; the platform keeps its assembly mode.
+
+    It stops where a leg, a limit or the end of the assembly mode stops it.
+    """
+    joints = state.joints
+    target = joints.copy()
+    target[i] = value
+    last, beyond = followed(state.robot, state.pose, joints, target)
+    if beyond is None:
+        return _rest(state, last)
+    leg = state.robot.legs[i]
+    why = what_stops(state.robot, beyond if np.isfinite(beyond).all() else last)
+    return _rest(state, last, f"{why}. The {leg.joint.noun} of leg {i + 1} stops there.")
+
+
+def assembly_poses(state: State) -> Array:
+    """Return the poses (K, m) with the same joint coordinates, in the robot's working mode."""
+    try:
+        poses = direct_kinematics(state.robot, state.joints)
+    except PteronError:
+        return state.pose[None]
+    return np.asarray(poses[~np.isnan(poses).any(axis=-1)])
+
+
+def current_assembly(state: State, poses: Array) -> int | None:
+    """Return which of the assembly modes' poses the machine is in; None if in none of them."""
+    apart = np.abs(poses - state.pose)
+    if state.robot.platform.turns and not state.robot.platform.slides and len(poses):
+        turn = 2.0 * np.pi
+        apart[:, -1] = np.abs((apart[:, -1] + np.pi) % turn - np.pi)
+    near = np.flatnonzero((apart <= _SAME_POSE).all(axis=-1))
+    return int(near[0]) if len(near) else None
+
+
+def assembled(state: State, pose: Array) -> State:
+    """Return the machine in another assembly mode, that of a pose with the same joints."""
+    if not allowed(state.robot, pose):
+        why = what_stops(state.robot, pose)
+        return replace(state, message=f"This assembly mode is not possible. {why}.")
+    return _rest(state, pose)
+
+
+def in_working_mode(state: State, elbows: Sequence[int]) -> State:
+    """Return the machine with its elbows on given sides, in its pose or, failing that, at home."""
+    robot = with_elbows(state.robot, elbows)
+    other = replace(state, robot=robot)
+    if allowed(robot, state.pose):
+        return _rest(other, state.pose)
+    try:
+        home = home_pose(robot)
+    except PteronError as error:
+        return replace(state, message=f"This working mode is not possible: {error}")
+    return _rest(other, home, "The pose is out of reach in this working mode: here is its home.")
+
+
+def at_home(state: State) -> State:
+    """Return the machine at rest in its home pose."""
+    return _rest(state, home_pose(state.robot))
+
+
+def carrying(state: State, text: str) -> State:
+    """Return the machine with a payload that is typed in kg; one that cannot be changes nothing."""
+    try:
+        mass = _number(text, "payload", "a mass of 0 kg or more")
+        with_payload(state.robot, mass)
+    except PteronError as error:
+        return replace(state, message=f"{error}. The payload stays {state.payload:g} kg.")
+    return replace(state, payload=mass, message="")
+
+
+def typed_pose(robot: Manipulator, text: str) -> Array:
+    """Return a pose that is typed in mm and degrees.
+
+    Raises
+    ------
+    DataError
+        If it has not as many numbers as the machine's poses, or what is no number.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> typed_pose(pteron.load("five-bar"), "10 -20")
+    array([ 0.01, -0.02])
+    """
+    words = text.replace(";", " ").split()
+    names = " ".join(robot.coordinates)
+    if len(words) != robot.freedom:
+        raise DataError(
+            f"pose: {len(words)} numbers given, {robot.freedom} expected: {names}, in mm"
+            f"{' and degrees' if robot.platform.turns else ''}, with blanks between them"
+        )
+    factors = pose_factors(robot)
+    pairs = zip(words, robot.coordinates, strict=True)
+    return np.array([_number(word, name, "a number") for word, name in pairs]) / factors
+
+
+def pose_factors(robot: Manipulator) -> Array:
+    """Return what turns a pose (m,) into mm and degrees."""
+    return np.array([180.0 / np.pi if name == "phi" else 1e3 for name in robot.coordinates])
+
+
+def _number(text: str, name: str, wanted: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        comma = "; write the decimal sign as a point" if "," in text else ""
+        raise DataError(f"{name}: {shown(text)} given, {wanted} expected{comma}")
+    return value
+
+
+def along(state: State, motion: Motion, time: float) -> State:
+    """Return the machine as it is at a time of a motion, s from its beginning."""
+    pose, velocity, acceleration = motion.at(motion.time[0] + time)
+    return replace(state, pose=pose, velocity=velocity, acceleration=acceleration, message="")
+
+
+def stopped(state: State, message: str = "") -> State:
+    """Return the machine at rest where it is."""
+    return _rest(state, state.pose, message)
+
+
+def _rest(state: State, pose: Array, message: str = "") -> State:
+    still = np.zeros_like(pose)
+    return replace(state, pose=pose, velocity=still, acceleration=still, message=message)
