@@ -123,7 +123,7 @@ def film(
     >>> cycle = pick_and_place(robot, [0.0, 0.0, -0.9])
     >>> made = pteron.plots.film(robot, cycle, "cycle.gif", speed=0.2)  # doctest: +SKIP
     """
-    target, robot = checked_film(path), as_manipulator(robot)
+    robot, target = as_manipulator(robot), checked_film(path)
     motion.expect_ascending()
     _expect_number("fps", fps, 1.0, 120.0)
     if np.shape(size) != (2,) or any(

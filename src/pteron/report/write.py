@@ -110,7 +110,7 @@ def write_motion_page(robot: RobotLike, motion: Given, path: str | Path) -> Path
     from pteron.report.motion_page import motion_page
     from pteron.report.recordings import recording
 
-    target, robot = checked_page(path), as_manipulator(robot)
+    robot, target = as_manipulator(robot), checked_page(path)
     return write_text(target, motion_page(robot, recording(robot, motion)))
 
 

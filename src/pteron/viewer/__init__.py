@@ -3,3 +3,7 @@
 from pteron.viewer.view import Viewer, view
 
 __all__ = ["Viewer", "view"]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

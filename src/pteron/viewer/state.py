@@ -12,7 +12,7 @@ from pteron.errors import DataError, PteronError, shown
 from pteron.kernels import Array
 from pteron.kinematics import direct_kinematics, inverse_kinematics
 from pteron.manipulator import Manipulator
-from pteron.manipulator.manipulator import with_elbows
+from pteron.manipulator.variants import with_elbows
 from pteron.motion import Motion, with_payload
 from pteron.viewer.boundary import allowed, farthest, followed, told_rest, what_stops
 from pteron.workspace import home_pose

@@ -14,8 +14,7 @@ import numpy as np
 
 from pteron.errors import DataError, PteronError, shown
 from pteron.kernels import Array
-from pteron.manipulator import Manipulator
-from pteron.manipulator.manipulator import expect_manipulator
+from pteron.manipulator import RobotLike, as_manipulator
 from pteron.motion import Motion, Simulation
 from pteron.shapes import PoseLike
 from pteron.viewer.handle import Handle
@@ -260,7 +259,7 @@ def _sentence(text: str) -> str:
 
 
 def view(
-    robot: Manipulator,
+    robot: RobotLike,
     *,
     host: str = "127.0.0.1",
     port: int = 8080,
@@ -276,7 +275,7 @@ def view(
 
     Parameters
     ----------
-    robot : Manipulator
+    robot : Manipulator, name or path
         The machine.
     host : str
         The address to serve it at; by default only this machine can reach it.
@@ -306,15 +305,13 @@ def view(
 
     Examples
     --------
-    >>> import pteron
     >>> from pteron.viewer import view
-    >>> with view(pteron.load("five-bar"), port=0) as viewer:
+    >>> with view("five-bar", port=0) as viewer:
     ...     viewer.move_to([0.0, 0.12])
     ...     viewer.url[:17]
     'http://127.0.0.1:'
     """
-    expect_manipulator(robot)
-    session = Session(robot, payload)
+    session = Session(as_manipulator(robot), payload)
     if isinstance(motion, Motion | Simulation):
         session.take(motion.motion if isinstance(motion, Simulation) else motion, "motion")
     elif motion == STANDARD_CYCLE:
