@@ -83,6 +83,11 @@ class Manipulator:
         )
         return f"<Manipulator {self.name!r}: {kinds} under a {self.platform.motion} platform>"
 
+    def _repr_html_(self) -> str:
+        from pteron.manipulator.notebook import machine_table
+
+        return machine_table(self)
+
     @property
     def freedom(self) -> int:
         """Number of pose coordinates m, which is also the number of legs n."""
