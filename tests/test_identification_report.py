@@ -162,6 +162,18 @@ def test_the_page_shows_the_numbers(name):
         assert html(name).count('<span class="chip weak">border</span>') == 6
 
 
+def test_a_notebook_shows_the_values_too():
+    for name in ("quadrupteron", "hostile"):
+        found = result(name)
+        shown = found._repr_html_()
+        assert f"identified, {found.verdict.grade}" in shown
+        for row in parameter_rows(found):
+            assert f'{row.expression}</td><td class="number">' in shown
+            assert f"{row.half:.2g}</td>".replace("-", "\u2212") in shown.replace("-", "\u2212")
+        known = f"{len(found.estimate.values)} values, {found.verdict.grade}>"
+        assert repr(found).endswith(f": {known}")
+
+
 def test_values_are_judged_one_by_one():
     found = result("quadrupteron")
     rows = parameter_rows(found)

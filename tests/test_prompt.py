@@ -4,6 +4,8 @@ import importlib
 import inspect
 import pkgutil
 import rlcompleter
+from dataclasses import replace
+from html.parser import HTMLParser
 from pathlib import Path
 
 import jedi
@@ -119,3 +121,64 @@ def test_what_is_no_robot_is_refused_in_a_line(wrong):
         with pytest.raises(ModelError, match=f"^{message}") as caught:
             call()
         assert "\n" not in str(caught.value)
+
+
+class Balance(HTMLParser):
+    """Refuses HTML whose elements do not close in order, or that fetches or runs anything."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open = []
+        self.cells = []
+        self.feed(text)
+        assert self.open == []
+
+    def handle_starttag(self, tag, attributes):
+        assert tag not in ("script", "link", "img")
+        assert {name for name, _ in attributes} <= {"class"}
+        self.open.append(tag)
+        if tag == "tr":
+            self.cells.append(0)
+        if tag in ("td", "th"):
+            self.cells[-1] += 1
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def values():
+    """Return values of every kind that a notebook shows, by name."""
+    driven = pteron.load("delta")
+    drive = pteron.Drive(coulomb=1.0, max_force=40.0, max_speed=10.0)
+    legs = (*(replace(leg, drive=drive) for leg in driven.legs[:2]), driven.legs[2])
+    motion = pteron.motion.pick_and_place("delta", [0.0, 0.0, -0.8], samples=21)
+    run = pteron.motion.simulate("delta", motion, ComputedTorque(), duration=0.01)
+    found = {name: pteron.load(name) for name in ("quadrupteron", "five-bar", "h4")}
+    found |= {"driven": replace(driven, legs=legs), "<b>": replace(driven, name="a < b")}
+    found |= {"base": pteron.base_parameters("delta", "qr"), "motion": motion, "run": run}
+    return found | {"sizing": pteron.motion.size("delta", motion)}
+
+
+def test_values_are_shown_as_a_short_line_and_as_a_table():
+    for name, value in values().items():
+        assert len(repr(value)) < 100, name
+        assert repr(value).startswith("<"), name
+        html = value._repr_html_()
+        table = Balance(html)
+        assert len(set(table.cells)) == 1, name
+        assert len(table.cells) > 2, name
+        assert len(html) < 8000, name
+        assert "http" not in html, name
+
+
+def test_the_table_says_what_the_value_does():
+    shown = values()
+    assert "<b>a &lt; b</b>" in shown["<b>"]._repr_html_()
+    assert "up to 40 N m, 10 rad/s</td></tr>" in shown["driven"]._repr_html_()
+    base = shown["base"]
+    html = base._repr_html_()
+    assert all(f">{text}</td>" in html for text in base.expressions("html"))
+    assert repr(base) == "<BaseParameters of 'delta': 13 of 25, qr>"
+    assert f"{base.values()[0]:.5g}" in html
+    assert f"{shown['sizing'].peak_forces[0]:.4g} N m" in shown["sizing"]._repr_html_()
+    assert repr(shown["run"]) == "<Simulation of 'delta': 0.01 s, 11 samples>"

@@ -7,7 +7,8 @@ in a plane, without phi where the platform does not turn.
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -16,9 +17,23 @@ from numpy.typing import ArrayLike
 OnFailure = Literal["raise", "nan"]
 """What a batch function does with a pose it cannot serve: raise the error, or return NaN there."""
 
-PoseLike = ArrayLike
+
+@runtime_checkable
+class HasColumns(Protocol):
+    """A table: its columns have names, and are got by them."""
+
+    @property
+    def columns(self) -> Any:
+        """The names."""
+
+
+Columns = HasColumns | Mapping[str, Any]
+"""A table whose columns are read by their names, as `Manipulator.column_names` has them: a
+DataFrame of pandas or polars, or a mapping. Others than those asked for do not matter."""
+
+PoseLike = ArrayLike | Columns
 """(..., m): poses, velocities, accelerations or wrenches, as given."""
-JointsLike = ArrayLike
+JointsLike = ArrayLike | Columns
 """(..., n): joint coordinates or actuator forces, as given."""
 
 PerCoordinate = Float[np.ndarray, "*batch m"]

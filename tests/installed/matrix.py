@@ -84,7 +84,7 @@ def tried(python: Path, wheel: Path, extra: str, work: Path) -> str:
     wanted = str(wheel) if extra == "none" else f"{wheel}[{extra}]"
     start = time.perf_counter()
     log = work / "log.txt"
-    pip = [str(programs / "python"), "-m", "pip", "install", "--quiet"]
+    pip = [str(programs / "python"), "-m", "pip", "install", "--quiet", "--no-compile"]
     # Nothing is built here: a wheel for everything, as where there is no compiler.
     done = subprocess.run(
         [*pip, "--only-binary", ":all:", wanted],

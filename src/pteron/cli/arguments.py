@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from typer import Argument, Option
 from typer.core import TyperCommand
 
+from pteron.cli.completion import machines
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
@@ -23,7 +24,11 @@ def option(name: str, help: str, metavar: str | None = None, **more: Any) -> Any
 
 Robot = Annotated[
     str,
-    Argument(metavar="ROBOT", help="A machine of the catalog (see pteron catalog) or a TOML file."),
+    Argument(
+        metavar="ROBOT",
+        help="A machine of the catalog (see pteron catalog) or a TOML file.",
+        autocompletion=machines,
+    ),
 ]
 Json = Annotated[bool, option("json", "Print data for a program, as JSON.")]
 Out = Annotated[str | None, option("out", "Write the result to a .csv or .parquet file.", "FILE")]

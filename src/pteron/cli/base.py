@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from typer import Exit, echo
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
+from pteron.cli.completion import parameters
 from pteron.cli.screen import is_terminal, plain, show, show_json, spinner, table
 
 if TYPE_CHECKING:
@@ -26,7 +27,13 @@ def base(
         option("method", "Exact arithmetic with a proof, or a numerical rank."),
     ] = "exact",
     keep: Annotated[
-        str | None, option("keep", "Parameters to keep before others: I_l1,m_l4.", "NAMES")
+        str | None,
+        option(
+            "keep",
+            "Parameters to keep before others: I_l1,m_l4.",
+            "NAMES",
+            autocompletion=parameters,
+        ),
     ] = None,
     shared: Annotated[
         bool, option("shared", "All legs share one set of inertial parameters.")

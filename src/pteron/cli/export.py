@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
+from pteron.cli.completion import functions
 from pteron.cli.screen import note, plain, show, show_json, spinner
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
     from pteron.manipulator import Manipulator
 
-_FUNCTIONS = (
+FUNCTIONS = (
     "adaptive",
     "adaptive_drives",
     "bias_forces",
@@ -100,7 +101,12 @@ def export(
     ] = None,
     function: Annotated[
         list[str] | None,
-        option("function", f"What to write; again for more: {', '.join(_FUNCTIONS)}.", "NAME"),
+        option(
+            "function",
+            f"What to write; again for more: {', '.join(FUNCTIONS)}.",
+            "NAME",
+            autocompletion=functions,
+        ),
     ] = None,
     single: Annotated[bool, option("float", "C: float instead of double.")] = False,
     specialised: Annotated[

@@ -10,6 +10,7 @@ from rich.table import Table
 from typer import Argument
 
 from pteron.cli.arguments import Elbows, Json, load_robot, option
+from pteron.cli.completion import machines
 from pteron.cli.screen import plain, show, show_json, spinner, stages, table
 from pteron.errors import DataError
 
@@ -38,7 +39,10 @@ def identify(
         list[str],
         Argument(metavar="LOG...", help="Recorded motions, .csv or .parquet: t, joints, forces."),
     ],
-    robot: Annotated[str, option("robot", "The machine as it is drawn.", "ROBOT")],
+    robot: Annotated[
+        str,
+        option("robot", "The machine as it is drawn.", "ROBOT", autocompletion=machines),
+    ],
     out: Annotated[str, option("out", "The folder to write it to.", "DIR")],
     held_out: Annotated[
         list[str] | None,

@@ -11,6 +11,7 @@ from rich.table import Table
 from typer import Argument, Exit
 
 from pteron.cli.arguments import Elbows, Json, load_robot, option, signs
+from pteron.cli.completion import machines
 from pteron.cli.screen import complain, note, plain, show, show_json, spinner, table, write
 from pteron.errors import ModelError, OutputError, PteronError
 
@@ -45,7 +46,10 @@ def new(
     kind: Annotated[
         str | None,
         Argument(
-            metavar="KIND", help="A machine of the catalog, or a TOML file.", show_default=False
+            metavar="KIND",
+            help="A machine of the catalog, or a TOML file.",
+            show_default=False,
+            autocompletion=machines,
         ),
     ] = None,
     out: Annotated[str | None, option("out", "Write it to this TOML file.", "FILE")] = None,
@@ -86,7 +90,9 @@ def _machine(robot: Manipulator) -> dict[str, Any]:
 
 
 def check(
-    file: Annotated[str, Argument(metavar="FILE", help="A machine's TOML file.")],
+    file: Annotated[
+        str, Argument(metavar="FILE", help="A machine's TOML file.", autocompletion=machines)
+    ],
     elbows: Elbows = None,
     json: Json = False,
 ) -> None:

@@ -102,7 +102,6 @@ app = Typer(
     name="pteron",
     cls=Program,
     rich_markup_mode="rich",
-    add_completion=False,
     pretty_exceptions_enable=False,
 )
 

@@ -28,9 +28,6 @@ if TYPE_CHECKING:
 
     from pteron.tables import Table
 
-_LOADS = {"x": "fx", "y": "fy", "z": "fz", "phi": "mk"}
-"""What acts on the platform along each coordinate of the pose."""
-
 
 def inverse(
     robot: Robot,
@@ -177,8 +174,9 @@ def forces(
 
     machine = load_robot(robot, elbows)
     m = machine.freedom
-    loads = tuple(_LOADS[name] for name in machine.coordinates)
-    motion = [f"{rate}{name}" for rate in ("", "d", "dd") for name in machine.coordinates]
+    names = machine.column_names
+    loads = names["wrench"]
+    motion = [*names["pose"], *names["velocity"], *names["acceleration"]]
     typed = [pose, velocity, acceleration, wrench]
     if all(text is None for text in typed):
         rows = rows_of_table(table, "pose", motion)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from typer import Exit
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
+from pteron.cli.completion import machines
 from pteron.cli.given_cycle import CYCLE, STANDARD, cycle_of, loaded
 from pteron.cli.outcome import Destination
 from pteron.cli.screen import note, plain, show, spinner, table
@@ -51,6 +52,7 @@ def simulate(
             "What the controller takes the machine for; by default what it is, payload and all.",
             "ROBOT",
             show_default=False,
+            autocompletion=machines,
         ),
     ] = None,
     encoder: Annotated[

@@ -63,8 +63,11 @@ class Law:
         array, shape (..., K)
         """
         robot = self.model
-        place = as_array(pose, "pose", (robot.freedom,))
-        place = np.broadcast_arrays(place, as_array(velocity, "velocity", (robot.freedom,)))[0]
+        place, rate = (
+            as_array(value, name, (robot.freedom,), columns=robot.column_names[name])
+            for name, value in (("pose", pose), ("velocity", velocity))
+        )
+        place = np.broadcast_arrays(place, rate)[0]
         zeros = [
             np.zeros((*place.shape[:-1], size)) if name != "measured" else place
             for name, size in self._sizes(MEMORY).items()

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from pteron.html_table import Column, html_table
 from pteron.identification.consistency import Consistency
 from pteron.identification.estimators import Essential, Estimate
 from pteron.identification.faults import Trial
@@ -21,7 +22,7 @@ from pteron.legs import Drive, Stribeck
 from pteron.manipulator import Manipulator
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Identification:
     """What a log says about a machine.
 
@@ -73,6 +74,34 @@ class Identification:
     findings: tuple[Finding, ...]
     notes: tuple[str, ...] = ()
     rotors: tuple[tuple[float, float], ...] | None = None
+
+    def __repr__(self) -> str:
+        """Return the result in a line."""
+        grade, known = self.verdict.grade, len(self.estimate.values)
+        return f"<Identification of {self.robot.name!r}: {known} values, {grade}>"
+
+    def _repr_html_(self) -> str:
+        from pteron.identification.names_in_html import html_expressions
+
+        drawn = [*self.model.base.values(self.robot).tolist()]
+        drawn += [None] * (len(self.estimate.values) - len(drawn))
+        low, high = self.estimate.intervals()
+        rows = zip(
+            html_expressions(self.model),
+            self.estimate.values.tolist(),
+            (f"{half:.2g}" for half in 0.5 * (high - low)),
+            drawn,
+            (unit.replace("^2", "\u00b2") for unit in self.estimate.units),
+            strict=True,
+        )
+        columns = [Column("value", "long"), Column("identified", "number")]
+        columns += [
+            Column("\u00b1 95 %", "number"),
+            Column("drawn", "number"),
+            Column("unit"),
+        ]
+        about = f"identified, {self.verdict.grade}"
+        return html_table(self.robot.name, about, columns, rows, self.verdict.reasons)
 
     @cached_property
     def machine(self) -> Manipulator | None:

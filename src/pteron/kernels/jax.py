@@ -18,6 +18,7 @@ from pteron.errors import DataError, ModelError
 from pteron.kernels.code import PYTHON, names_of, statements
 from pteron.kernels.graph import graph_of
 from pteron.kernels.kernel import Kernel, unmasked
+from pteron.kernels.named_columns import by_name
 
 _PRINTED = PYTHON | {"select": "where({0}, {1}, 0.0)"}
 
@@ -86,7 +87,9 @@ class Traced(Kernel):
     def _evaluate(self, *values: Any, **fixed: Any) -> Any:
         given = self._by_name(values, fixed)
         for port in self.ports:
-            given[port.name] = unmasked(given[port.name], port.name)
+            given[port.name] = by_name(
+                unmasked(given[port.name], port.name), port.columns, port.name
+            )
             shape = np.shape(given[port.name])
             if shape[max(len(shape) - len(port.shape), 0) :] != port.shape:
                 expected = ", ".join(["...", *map(str, port.shape)])

@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pteron.errors import DataError
+from pteron.kernels.named_columns import by_name
+from pteron.shapes import PoseLike
 
 Array = NDArray[np.float64]
 
@@ -38,11 +40,14 @@ class Port:
         Its shape for one state; the batch axes lead.
     shared : bool
         For an input: one value serves the whole batch.
+    columns : tuple of str
+        What the columns of a table are called that is given in its place; none if none can be.
     """
 
     name: str
     shape: tuple[int, ...]
     shared: bool = False
+    columns: tuple[str, ...] = ()
 
     @property
     def size(self) -> int:
@@ -186,7 +191,9 @@ class ArrayKernel(Kernel):
         """Evaluate the kernel, after checking, converting and broadcasting what is given."""
         given = self._by_name(values, fixed)
         for port in self.ports:
-            given[port.name] = as_array(given[port.name], port.name, port.shape, self.dtype)
+            given[port.name] = as_array(
+                given[port.name], port.name, port.shape, self.dtype, port.columns
+            )
             if port.shared and given[port.name].shape != port.shape:
                 raise DataError(
                     f"{port.name}: shape {given[port.name].shape} given, {port.shape} expected: "
@@ -247,13 +254,22 @@ def count_operations(function: ca.Function) -> int:
     return sum(function.instruction_id(k) not in _FREE for k in range(function.n_instructions()))
 
 
-def as_array(value: ArrayLike, name: str, shape: tuple[int, ...], dtype: str = "float64") -> Array:
-    """Return `value` as floats whose last axes are `shape`, or say what was expected."""
+def as_array(
+    value: PoseLike,
+    name: str,
+    shape: tuple[int, ...],
+    dtype: str = "float64",
+    columns: Sequence[str] = (),
+) -> Array:
+    """Return `value` as floats whose last axes are `shape`, or say what was expected.
+
+    Of a table they are the `columns` of these names.
+    """
     array: Array
     if type(value) is np.ndarray and value.dtype == np.dtype(dtype) and value.flags.aligned:
         array = value
     else:
-        array = _converted(value, name, dtype)
+        array = _converted(by_name(value, columns, name), name, dtype)
     if len(shape) > array.ndim or array.shape[array.ndim - len(shape) :] != shape:
         expected = ", ".join(["...", *map(str, shape)])
         raise DataError(f"{name}: shape {array.shape} given, ({expected}) expected")

@@ -221,8 +221,10 @@ def _program(
     )
     if not plain:
         function = optimised(function)
+    columns = machine.robot.column_names
     inputs = tuple(
-        Port(name, symbol.shape[:1], shared=name in _SHARED) for name, symbol in symbols.items()
+        Port(name, symbol.shape[:1], name in _SHARED, columns.get(name, ()))
+        for name, symbol in symbols.items()
     )
     ports = tuple(Port(name, tuple(shape)) for name, (_, shape) in outputs.items())
     return Program(what, function, inputs, ports)

@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from pteron.equations.machine import closure_of
 from pteron.errors import DataError, PteronError, SingularPose, UnreachablePose
@@ -17,7 +16,7 @@ from pteron.kernels import Array, Selects, as_array, needs_of, numeric
 from pteron.kernels.functions import TYPE_I, TYPE_II
 from pteron.kinematics.singularities import is_singular_everywhere, singular_everywhere
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.shapes import OnFailure
+from pteron.shapes import OnFailure, PoseLike
 
 _Outputs = TypeVar("_Outputs")
 
@@ -32,7 +31,7 @@ def evaluated(
     robot: RobotLike,
     what: str,
     on_failure: OnFailure,
-    *values: ArrayLike,
+    *values: PoseLike,
     base: Selects | None = None,
     wrench: bool = False,
 ) -> _Outputs:  # type: ignore[type-var]
@@ -57,7 +56,7 @@ def evaluated(
     return found  # type: ignore[no-any-return]
 
 
-def unchecked(robot: RobotLike, what: str, *values: ArrayLike, base: Selects | None = None) -> Any:
+def unchecked(robot: RobotLike, what: str, *values: PoseLike, base: Selects | None = None) -> Any:
     """Return the outputs of a function as they come: NaN, or what it may be, in a bad state."""
     *results, _ = numeric(robot, what, base=base)(*values)
     return results[0] if len(results) == 1 else tuple(results)
@@ -70,14 +69,16 @@ def expect_choice(on_failure: str) -> None:
 
 
 def checked(
-    robot: Manipulator, value: ArrayLike, name: str, on_failure: OnFailure = "raise"
+    robot: Manipulator, value: PoseLike, name: str, on_failure: OnFailure = "raise"
 ) -> Array:
     """Return an array (..., m) of finite numbers, or say which element is not one.
 
     Under ``on_failure="nan"`` a row with a number that is not finite becomes NaN as a whole.
     """
     expect_choice(on_failure)
-    array = as_array(value, name, (robot.freedom,))
+    names = robot.column_names
+    columns = names.get(name, names["pose"])
+    array = as_array(value, name, (robot.freedom,), columns=columns)
     good = np.isfinite(array)
     if good.all():
         return array
@@ -92,13 +93,13 @@ def _not_finite(name: str, array: Array, index: tuple[int, ...]) -> DataError:
 
 
 def _failure(
-    robot: Manipulator, what: str, values: tuple[ArrayLike, ...], status: Array, wrench: bool
+    robot: Manipulator, what: str, values: tuple[PoseLike, ...], status: Array, wrench: bool
 ) -> PteronError:
     """Return what is wrong with the first state that does not serve."""
     index = tuple(int(i) for i in np.argwhere(status == 0.0)[0])
     ports = [p for p in numeric(robot, what, wrench=wrench).inputs if not p.shared]
     for port, value in zip(ports, values, strict=True):
-        array = np.asarray(value, dtype=float)
+        array = as_array(value, port.name, port.shape, columns=port.columns)
         whole = np.broadcast_to(array, status.shape + port.shape)[index]
         bad = np.argwhere(~(np.abs(whole) < 1e70))
         if len(bad):

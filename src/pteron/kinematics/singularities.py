@@ -138,7 +138,8 @@ def singular_orientations(robot: RobotLike, position: ArrayLike | None = None) -
         raise singular_everywhere(robot)
     given = None
     if position is not None:
-        given = as_array(position, "position", (len(robot.platform.lengths),))
+        names = tuple(name for name in robot.coordinates if name != "phi")
+        given = as_array(position, "position", (len(names),), columns=names)
         if given.ndim > 1 or not np.isfinite(given).all():
             raise DataError(f"position: {given.tolist()} given, one row of finite numbers expected")
     orientation = closure_of(robot).orientation

@@ -83,6 +83,11 @@ class Manipulator:
         )
         return f"<Manipulator {self.name!r}: {kinds} under a {self.platform.motion} platform>"
 
+    def _repr_html_(self) -> str:
+        from pteron.manipulator.notebook import machine_table
+
+        return machine_table(self)
+
     @property
     def freedom(self) -> int:
         """Number of pose coordinates m, which is also the number of legs n."""
@@ -102,6 +107,26 @@ class Manipulator:
     def force_names(self) -> tuple[str, ...]:
         """Names of the actuator forces: force1 of a slider, torque1 of a crank."""
         return tuple(f"{leg.joint.force}{i}" for i, leg in enumerate(self.legs, start=1))
+
+    @cached_property
+    def column_names(self) -> dict[str, tuple[str, ...]]:
+        """Names of the columns of tables that hold a pose, a velocity and so on.
+
+        A pose is x y z phi, a velocity dx dy dz dphi, an acceleration ddx ddy ddz ddphi, a wrench
+        fx fy fz mk: those that the machine has. Joints are rho1 or theta1, their rates drho1 or
+        dtheta1, forces force1 or torque1.
+        """
+        pose, joints = self.coordinates, self.joint_names
+        return {
+            "pose": pose,
+            "velocity": tuple(f"d{name}" for name in pose),
+            "acceleration": tuple(f"dd{name}" for name in pose),
+            "wrench": tuple("mk" if name == "phi" else f"f{name}" for name in pose),
+            "joints": joints,
+            "joint_rates": tuple(f"d{name}" for name in joints),
+            "joint_accelerations": tuple(f"dd{name}" for name in joints),
+            "forces": self.force_names,
+        }
 
 
 def faults_of(name: object, platform: Platform, legs: Sequence[LegKind | None]) -> list[str]:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pteron.kernels import Array
+from pteron.kernels import Array, as_array
 from pteron.kinematics import inverse_kinematics
 from pteron.kinematics.evaluate import evaluated
 from pteron.legs import LegKind
@@ -238,7 +238,8 @@ def joint_guides(robot: RobotLike, poses: PoseLike) -> tuple[Guide, ...]:
     array([-0.3,  0.3])
     """
     robot = as_manipulator(robot)
-    points = joint_points(robot, np.reshape(poses, (-1, robot.freedom)))
+    given = as_array(poses, "poses", (robot.freedom,), columns=robot.coordinates)
+    points = joint_points(robot, given.reshape(-1, robot.freedom))
     found = []
     for i, leg in enumerate(robot.legs):
         used, axis = points.coordinates[:, i], np.array(leg.joint_axis)

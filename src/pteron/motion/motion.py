@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pteron.errors import DataError, shown
+from pteron.html_table import Column, html_table
 from pteron.kernels import Array, as_array
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Motion:
     """A motion of the platform, sampled in time.
 
@@ -47,6 +48,22 @@ class Motion:
                     f"motion.{field.name}: shape {shape} given, ({rows[0]}, {rows[1]}) expected: a "
                     "row for each time"
                 )
+
+    def __repr__(self) -> str:
+        """Return the motion in a line."""
+        rows = f"{len(self.time)} samples of {self.pose.shape[1]} coordinates"
+        return f"<{type(self).__name__}: {self.duration:.6g} s, {rows}>"
+
+    def _repr_html_(self) -> str:
+        columns = [Column("coordinate", "number"), Column("from", "number")]
+        columns += [Column(name, "number") for name in ("to", "speed", "acceleration")]
+        extremes = (
+            *(self.pose.min(axis=0), self.pose.max(axis=0)),
+            *(np.abs(self.velocity).max(axis=0), np.abs(self.acceleration).max(axis=0)),
+        )
+        rows = [(i, *map(float, row)) for i, row in enumerate(zip(*extremes, strict=True), start=1)]
+        about = f"{self.duration:.6g} s, {len(self.time)} samples; what it reaches, in m, rad and s"
+        return html_table(type(self).__name__, about, columns, rows)
 
     def expect_ascending(self) -> None:
         """Refuse a motion whose times are fewer than two, or do not ascend.

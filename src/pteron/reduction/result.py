@@ -9,9 +9,11 @@ from functools import cached_property
 from typing import Any, Literal, get_args
 
 import numpy as np
+from markupsafe import Markup
 
 from pteron.bodies.parameters import Parameter
 from pteron.errors import ModelError
+from pteron.html_table import Column, html_table
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.manipulator import parameters as values_of
@@ -25,7 +27,7 @@ from pteron.reduction.transfers import Transfer
 Form = Literal["text", "sympy", "latex", "html"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class BaseParameters:
     """The parameters that alone act on the actuator forces, each a sum of inertial parameters.
 
@@ -50,11 +52,11 @@ class BaseParameters:
     robot: Manipulator
     parameters: tuple[Parameter, ...]
     kept: tuple[int, ...]
-    grouping: Array = field(repr=False, compare=False)
-    selection: Array = field(repr=False, compare=False)
-    transfers: tuple[Transfer, ...] = field(repr=False, compare=False)
-    certificate: Certificate = field(repr=False)
-    shares: Shares = field(repr=False, compare=False)
+    grouping: Array = field(compare=False)
+    selection: Array = field(compare=False)
+    transfers: tuple[Transfer, ...] = field(compare=False)
+    certificate: Certificate
+    shares: Shares = field(compare=False)
 
     @classmethod
     def of(
@@ -77,6 +79,25 @@ class BaseParameters:
             certificate=grouping.certificate,
             shares=grouping.given,
         )
+
+    def __repr__(self) -> str:
+        """Return what was found in a line; `expressions` and `values` have it all."""
+        columns, method = len(self.columns), self.certificate.method
+        return f"<BaseParameters of {self.robot.name!r}: {self.rank} of {columns}, {method}>"
+
+    def _repr_html_(self) -> str:
+        columns = [Column("", "number"), Column("base parameter", "long")]
+        columns += [Column("value", "number"), Column("unit")]
+        sums, values = self.expressions("html"), self.values()
+        rows = [
+            (i, Markup(text), float(value), self.parameters[column].unit.replace("^2", "\u00b2"))
+            for i, (text, value, column) in enumerate(
+                zip(sums, values, self.kept, strict=True), start=1
+            )
+        ]
+        about = f"{self.rank} base parameters of {len(self.columns)} inertial parameters"
+        proof = self.certificate.summary().splitlines()[0]
+        return html_table(self.robot.name, about, columns, rows, [proof])
 
     @property
     def rank(self) -> int:

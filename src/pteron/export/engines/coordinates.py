@@ -6,7 +6,7 @@ import numpy as np
 
 from pteron.export.engines.chains import LegStance, leg_stances
 from pteron.export.engines.parts import Tree
-from pteron.kernels import Array
+from pteron.kernels import Array, as_array
 from pteron.kinematics import inverse_kinematics
 from pteron.shapes import PoseLike
 
@@ -38,7 +38,7 @@ def coordinates(opened: Tree, poses: PoseLike) -> Array:
         If a leg does not reach a pose.
     """
     robot = opened.robot
-    given = np.asarray(poses, dtype=float)
+    given = as_array(poses, "poses", (robot.freedom,), columns=robot.coordinates)
     flat = given.reshape(-1, robot.freedom)
     joints = inverse_kinematics(robot, flat)
     values = {name: flat[:, k] for k, name in enumerate(robot.coordinates)}

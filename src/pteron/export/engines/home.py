@@ -30,7 +30,7 @@ def chosen_home(robot: Manipulator, home: PoseLike | None) -> Array:
     """
     if home is None:
         return np.array(_middle(robot))
-    pose = as_array(home, "home", (robot.freedom,))
+    pose = as_array(home, "home", (robot.freedom,), columns=robot.coordinates)
     if pose.ndim > 1:
         raise DataError(f"home: shape {pose.shape} given, one pose ({robot.freedom},) expected")
     inverse_kinematics(robot, pose)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pteron.html_table import Column, html_table
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.motion.motion import Motion
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     import polars as pl
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Simulation:
     """A machine's motion under the forces of its drives, at each sample of the controller.
 
@@ -60,6 +61,41 @@ class Simulation:
     step: float
     stopped: str | None
 
+    def __repr__(self) -> str:
+        """Return the simulation in a line; `table` has its samples."""
+        end = f"; stopped: {self.stopped}" if self.stopped else ""
+        rows = f"{self.time[-1]:.6g} s, {len(self.time)} samples"
+        return f"<Simulation of {self.robot.name!r}: {rows}{end}>"
+
+    def _repr_html_(self) -> str:
+        headings = ("error, rms", "error, largest", "peak speed", "peak force", "at its limit")
+        columns = [Column("coordinate"), *(Column(name, "number") for name in headings[:2])]
+        columns += [Column("joint"), *(Column(name, "number") for name in headings[2:])]
+        error = self.error
+        parts = zip(
+            self.robot.coordinates,
+            np.sqrt((error**2).mean(axis=0)),
+            np.abs(error).max(axis=0),
+            self.robot.joint_names,
+            np.abs(self.joint_rates).max(axis=0),
+            np.abs(self.forces).max(axis=0),
+            self.saturated,
+            (leg.joint for leg in self.robot.legs),
+            strict=True,
+        )
+        rows = [
+            (
+                *(name, _with_unit(rms, "rad" if name == "phi" else "m")),
+                *(_with_unit(most, "rad" if name == "phi" else "m"), joint),
+                *(_with_unit(speed, f"{kind.unit}/s"), _with_unit(force, kind.force_unit)),
+                f"{100.0 * share:.3g} %",
+            )
+            for name, rms, most, joint, speed, force, share, kind in parts
+        ]
+        about = f"simulated for {self.time[-1]:.6g} s, {len(self.time)} samples"
+        notes = [f"Stopped: {self.stopped}"] if self.stopped else []
+        return html_table(self.robot.name, about, columns, rows, notes)
+
     @property
     def error(self) -> Array:
         """Pose less reference, (T, m), m and rad."""
@@ -101,3 +137,7 @@ class Simulation:
         for titles, values in blocks:
             columns |= dict(zip(titles, values.T, strict=True))
         return pl.DataFrame(columns | {"payload": self.payload})
+
+
+def _with_unit(value: float, unit: str) -> str:
+    return f"{value:.4g} {unit}"

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pteron.html_table import Column, html_table
 from pteron.kernels import Array
 from pteron.legs import Drive
 from pteron.manipulator import Manipulator
@@ -22,7 +23,7 @@ _NONE = 1e-9
 """Share of the energy given that is none."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Sizing:
     """What the drives of a machine do over one cycle: a motion, and perhaps a rest after it.
 
@@ -52,14 +53,34 @@ class Sizing:
     """
 
     robot: Manipulator
-    time: Array = field(repr=False)
-    forces: Array = field(repr=False)
-    loads: Array = field(repr=False)
-    speeds: Array = field(repr=False)
-    accelerations: Array = field(repr=False)
+    time: Array
+    forces: Array
+    loads: Array
+    speeds: Array
+    accelerations: Array
     dwell: float
     holding: Array
     load_inertia: Array
+
+    def __repr__(self) -> str:
+        """Return the sizing in a line; `table` has it all."""
+        return f"<Sizing of {self.robot.name!r}: a cycle of {self.duration:.6g} s>"
+
+    def _repr_html_(self) -> str:
+        headings = ("peak force", "rms force", "peak speed", "peak power", "mean power")
+        columns = [Column("joint"), *(Column(name, "number") for name in headings)]
+        values = (
+            *(self.peak_forces, self.rms_forces, self.peak_speeds),
+            *(self.peak_power, self.mean_power),
+        )
+        rows = []
+        for name, leg, *found in zip(self.robot.joint_names, self.robot.legs, *values, strict=True):
+            force, speed = leg.joint.force_unit, f"{leg.joint.unit}/s"
+            units = (force, force, speed, "W", "W")
+            told = (f"{value:.4g} {unit}" for value, unit in zip(found, units, strict=True))
+            rows.append((name, *told))
+        about = f"drives over a cycle of {self.duration:.6g} s"
+        return html_table(self.robot.name, about, columns, rows, self.overloads)
 
     @property
     def duration(self) -> float:

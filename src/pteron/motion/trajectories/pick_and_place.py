@@ -23,7 +23,7 @@ PEAK_ACCELERATION = 10.0
 """Of the tool's centre point, where no duration is given, m/s^2."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PickAndPlace(Motion):
     """A pick-and-place cycle: up, across and down, and the same way back.
 

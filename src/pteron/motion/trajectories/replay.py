@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path as File
+from typing import Any
 
 import numpy as np
+import polars as pl
 from scipy.interpolate import make_interp_spline  # type: ignore[import-untyped]
 
 from pteron.errors import DataError
@@ -15,8 +17,8 @@ from pteron.kinematics.evaluate import checked, unchecked
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.checks import check_motion
-from pteron.shapes import PoseLike
-from pteron.tables import Table, read_table
+from pteron.shapes import Columns, PoseLike
+from pteron.tables import Table, listed, read_table
 
 TIME = "t"
 """The column of the time, s."""
@@ -24,18 +26,20 @@ TIME = "t"
 _DEGREE = 5
 
 
-def replay(robot: RobotLike, table: str | File | Table, *, start: PoseLike | None = None) -> Motion:
+def replay(
+    robot: RobotLike, table: str | File | Table | Columns, *, start: PoseLike | None = None
+) -> Motion:
     """Return the motion that a table holds.
 
     Parameters
     ----------
     robot : Manipulator, name or path
         The machine.
-    table : path or Table
-        CSV or Parquet. Its columns are t (s) and the pose's, such as x y z phi, or t and the
-        joints', such as rho1 theta2. With the poses' velocities and accelerations (dx ... ddx ...)
-        these count; else they are those of the interpolating spline of the fifth degree, for which
-        samples must be smooth.
+    table : path, Table, DataFrame or mapping
+        CSV or Parquet, or a table that is there already, of pandas or polars. Its columns are t (s)
+        and the pose's, such as x y z phi, or t and the joints', such as rho1 theta2. With the
+        poses' velocities and accelerations (dx ... ddx ...) these count; else they are those of the
+        interpolating spline of the fifth degree, for which samples must be smooth.
     start : array, shape (m,), optional
         A pose in the assembly mode of the joints, from which a straight way leads to the table's
         first row; needed where there are joints only.
@@ -56,16 +60,16 @@ def replay(robot: RobotLike, table: str | File | Table, *, start: PoseLike | Non
     --------
     >>> import numpy as np, polars as pl, pteron
     >>> from pteron.motion import replay
-    >>> from pteron.tables import Table
     >>> t = np.linspace(0.0, 1.0, 101)
     >>> wave = pl.DataFrame({"t": t, "x": 0.1 * np.sin(t), "y": 0.0 * t, "z": 0.0 * t})
-    >>> float(replay(pteron.load("tripteron"), Table("wave", wave)).velocity[0, 0].round(9))
+    >>> float(replay("tripteron", wave).velocity[0, 0].round(9))
     0.1
     """
     robot = as_manipulator(robot)
-    rows = table if isinstance(table, Table) else read_table(table)
-    poses, joints = robot.coordinates, robot.joint_names
-    whole = [f"{order}{name}" for order in ("", "d", "dd") for name in poses]
+    names = robot.column_names
+    poses, joints = names["pose"], names["joints"]
+    whole = [*poses, *names["velocity"], *names["acceleration"]]
+    rows = _rows(table, [TIME, *whole, *joints])
     has = set(rows.columns)
     m = robot.freedom
     if has.issuperset(whole):
@@ -87,6 +91,24 @@ def _place(rows: Table, motion: Motion, at: float) -> str:
     """Return the row of a table that a time, s, is at or behind."""
     k = int(np.searchsorted(motion.time, at, side="right")) - 1
     return f"{rows.place(max(k, 0))}, at {at:.4g} s"
+
+
+def _rows(given: str | File | Table | Columns, useful: Sequence[str]) -> Table:
+    """Return a table with its useful columns, or the file's of that name."""
+    if isinstance(given, Table):
+        return given
+    if isinstance(given, str | File):
+        return read_table(given)
+    held: Any = given
+    names = list(held if isinstance(held, Mapping) else getattr(held, "columns", ()))
+    try:
+        frame = pl.DataFrame({name: np.asarray(held[name]) for name in useful if name in names})
+    except (TypeError, ValueError, pl.exceptions.PolarsError):
+        raise DataError("table: columns of numbers expected, as long as each other") from None
+    if TIME not in names or not frame.height:
+        what = "no rows" if TIME in names else f"no column {TIME}, the time in s"
+        raise DataError(f"table: {what}; its columns are {listed(list(map(str, names)))}")
+    return Table("table", frame)
 
 
 def _read(rows: Table, columns: Sequence[str]) -> tuple[Array, Array]:

@@ -11,10 +11,9 @@ from markupsafe import Markup
 
 from pteron.bodies.inertia import Inertia, with_center
 from pteron.bodies.parameters import PLATFORM
-from pteron.identification import Identification, Model
-from pteron.identification.model import Term
+from pteron.identification import Identification
+from pteron.identification.names_in_html import html_expressions, html_names
 from pteron.kernels import Array
-from pteron.reduction.expressions import html_name
 from pteron.report.typeset import fixed, significant
 
 _STRONG = 0.95
@@ -102,32 +101,6 @@ def measured(value: float, half: float) -> tuple[str, str]:
     # 0.0996 is 0.10 in two digits: the size counts after rounding.
     places = max(1 - floor(log10(float(f"{half:.1e}"))), 0)
     return fixed(value, places), fixed(half, places)
-
-
-def html_expressions(model: Model) -> tuple[Markup, ...]:
-    """Return what each value of a model is, in HTML: sums of parameters, or names of terms."""
-    names = [_term_html(term) for term in model.kept_terms]
-    found = [*model.base.expressions("html"), *names]
-    terms = {term.name: _term_html(term) for term in model.joining_terms}
-    for name, shares in model.joins.items():
-        for kept, share in shares.items():
-            size = "" if abs(abs(share) - 1.0) < 1e-9 else f"{abs(share):.4g}\u202f"
-            sign = "\u2212" if share < 0.0 else "+"
-            found[model.names.index(kept)] += f" {sign} {size}{terms[name]}"
-    return tuple(Markup(text) for text in found)
-
-
-def html_names(model: Model) -> dict[str, Markup]:
-    """Return the names of a model's values in HTML."""
-    base = (html_name(model.base.parameters[column]) for column in model.base.kept)
-    found = (*base, *(_term_html(term) for term in model.kept_terms))
-    return {name: Markup(text) for name, text in zip(model.names, found, strict=True)}
-
-
-def _term_html(term: Term) -> str:
-    """Return the name of a term; a word is not in italics, as a letter is."""
-    letter = term.letter if term.kind == "offset" else f"<i>{term.letter}</i>"
-    return f"{letter}<sub>{term.subscript}</sub>"
 
 
 @dataclass(frozen=True)

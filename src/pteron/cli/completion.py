@@ -1,0 +1,48 @@
+"""What a shell completes: machines, parameters and functions; files it completes by itself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from typer import Context
+
+from pteron.errors import PteronError
+
+
+def machines(incomplete: str) -> list[str]:
+    """Return the names of the catalog and the TOML files that begin so.
+
+    Where there is none the shell goes on with the names of all files and folders.
+    """
+    from pteron.manipulator import catalog
+
+    folder, _, _ = incomplete.rpartition("/")
+    head = f"{folder}/" if "/" in incomplete else ""
+    try:
+        files = sorted(path.name for path in Path(head or ".").glob("*.toml"))
+    except (OSError, ValueError):
+        files = []
+    found = [*catalog(), *(f"{head}{name}" for name in files)]
+    return [name for name in found if name.startswith(incomplete)]
+
+
+def functions(incomplete: str) -> list[str]:
+    """Return the functions that can be exported and begin so."""
+    from pteron.cli.export import FUNCTIONS
+
+    return [name for name in FUNCTIONS if name.startswith(incomplete)]
+
+
+def parameters(ctx: Context, incomplete: str) -> list[str]:
+    """Return inertial parameters of the machine that was named; the last of a list is completed."""
+    from pteron.manipulator import load, parameter_names
+
+    done, comma, last = incomplete.rpartition(",")
+    # Where what is completed is an option's value, what stands before it is not parsed yet.
+    robot = ctx.params.get("robot") or next(iter(ctx.args), "")
+    try:
+        names = parameter_names(load(robot))
+    except PteronError:
+        return []
+    given = done.split(",")
+    return [f"{done}{comma}{n}" for n in names if n.startswith(last) and n not in given]

@@ -1,0 +1,34 @@
+"""What was identified, in HTML: sums of inertial parameters, and the names of other terms."""
+
+from __future__ import annotations
+
+from markupsafe import Markup
+
+from pteron.identification.model import Model, Term
+from pteron.reduction.expressions import html_name
+
+
+def html_expressions(model: Model) -> tuple[Markup, ...]:
+    """Return what each value of a model is, in HTML: sums of parameters, or names of terms."""
+    names = [_term_html(term) for term in model.kept_terms]
+    found = [*model.base.expressions("html"), *names]
+    terms = {term.name: _term_html(term) for term in model.joining_terms}
+    for name, shares in model.joins.items():
+        for kept, share in shares.items():
+            size = "" if abs(abs(share) - 1.0) < 1e-9 else f"{abs(share):.4g}\u202f"
+            sign = "\u2212" if share < 0.0 else "+"
+            found[model.names.index(kept)] += f" {sign} {size}{terms[name]}"
+    return tuple(Markup(text) for text in found)
+
+
+def html_names(model: Model) -> dict[str, Markup]:
+    """Return the names of a model's values in HTML."""
+    base = (html_name(model.base.parameters[column]) for column in model.base.kept)
+    found = (*base, *(_term_html(term) for term in model.kept_terms))
+    return {name: Markup(text) for name, text in zip(model.names, found, strict=True)}
+
+
+def _term_html(term: Term) -> str:
+    """Return the name of a term; a word is not in italics, as a letter is."""
+    letter = term.letter if term.kind == "offset" else f"<i>{term.letter}</i>"
+    return f"{letter}<sub>{term.subscript}</sub>"

@@ -1,0 +1,87 @@
+"""Numbers by the names of their columns: a table where an array is expected."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from pteron.errors import DataError, shown
+
+_MANY = 12
+"""Columns of a table that a message lists."""
+
+
+def by_name(value: Any, columns: Sequence[str], name: str) -> Any:
+    """Return the columns of a table, in the order asked for; what is no table as it is.
+
+    Parameters
+    ----------
+    value : array or table
+        A DataFrame of pandas or polars, a `pteron.tables.Table`, a mapping from names to numbers or
+        arrays, a row of a DataFrame with its names, or a structured array. Other columns than those
+        asked for do not matter. A table whose columns have no names is an array.
+    columns : sequence of str
+        The names that are asked for; none where a table has no meaning.
+    name : str
+        What messages call the value.
+
+    Returns
+    -------
+    array, shape (..., len(columns)), or `value`
+
+    Raises
+    ------
+    DataError
+        If columns are missing, or one of them has no numbers or another length.
+    """
+    has = _names(value) if columns else []
+    if not has:
+        return value
+    if missing := [column for column in columns if column not in has]:
+        more = f" and {len(has) - _MANY} more" if len(has) > _MANY else ""
+        listed = ", ".join(shown(one, bare=True) for one in has[:_MANY])
+        raise DataError(
+            f"{name}: no column {', '.join(missing)} in a table of {listed}{more}; name its "
+            "columns so, in SI units and radians, or give an array"
+        )
+    if callable(numbers := getattr(value, "numbers", None)):
+        return numbers(columns)
+    for column in columns:
+        if has.count(column) > 1:
+            raise DataError(f"{name}, column {column}: stands twice in the table; keep one")
+    parts = [_column(value[column], f"{name}, column {column}") for column in columns]
+    try:
+        return np.stack(np.broadcast_arrays(*parts), axis=-1)
+    except ValueError:
+        shapes = ", ".join(f"{c} {p.shape}" for c, p in zip(columns, parts, strict=True))
+        raise DataError(f"{name}: columns of different lengths: {shapes}") from None
+
+
+def _names(value: Any) -> list[str]:
+    """Return the names of a table's columns; none of what is no table, or has no names."""
+    if isinstance(value, np.ndarray):
+        return list(value.dtype.names or ())
+    if isinstance(value, list | tuple | float | int):
+        return []
+    if isinstance(value, Mapping):
+        given: Any = value.keys()
+    else:
+        given = getattr(value, "columns", None)
+        if given is None and callable(keys := getattr(value, "keys", None)):
+            given = keys()  # a row of a DataFrame of pandas
+    try:
+        names = list(() if given is None or callable(given) else given)
+    except TypeError:
+        return []
+    return names if any(isinstance(one, str) for one in names) else []
+
+
+def _column(value: Any, name: str) -> np.ndarray[Any, np.dtype[np.float64]]:
+    try:
+        if (array := np.asarray(value)).dtype.kind not in "biufO":
+            raise TypeError
+        return np.asarray(array, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise DataError(f"{name}: not real numbers") from None

@@ -1,0 +1,59 @@
+"""A machine as a notebook shows it: a table of its legs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from pteron.html_table import Cell, Column, html_table
+
+if TYPE_CHECKING:
+    from pteron.legs import LegKind
+    from pteron.manipulator.manipulator import Manipulator
+
+
+def machine_table(robot: Manipulator) -> str:
+    """Return the legs of a machine as a table in HTML, and its platform above it."""
+    driven = any(leg.drive for leg in robot.legs)
+    columns = [
+        *(Column("leg", "number"), Column("kind"), Column("joint"), Column("limits")),
+        *(Column("guide point, m"), Column("platform point, m"), Column("masses, kg")),
+        *([Column("drive")] if driven else []),
+    ]
+    names = robot.joint_names
+    rows = []
+    for i, (leg, name) in enumerate(zip(robot.legs, names, strict=True), start=1):
+        masses = " + ".join(
+            f"{dict(zip(body.kinds, body.values, strict=True))['m']:.4g}"
+            for body in leg.bodies.values()
+        )
+        cells: list[Cell] = [i, leg.type, f"{leg.joint.noun} {name}", _limits(leg)]
+        cells += [_numbers(leg.guide_point), _numbers(leg.platform_point), masses]
+        rows.append([*cells, *([_drive(leg)] if driven else [])])
+    platform = robot.platform
+    gravity = f"gravity {_numbers(robot.gravity)} m/s\u00b2" if any(robot.gravity) else "no gravity"
+    about = (
+        f"{platform.motion} platform of {platform.inertia.mass:.4g} kg, pose "
+        f"({', '.join(robot.coordinates)}), {gravity}"
+    )
+    return html_table(robot.name, about, columns, rows)
+
+
+def _numbers(values: Sequence[float]) -> str:
+    return ", ".join(f"{value:.4g}" for value in values).replace("-", "\u2212")
+
+
+def _limits(leg: LegKind) -> str:
+    if leg.limits is None:
+        return "none"
+    low, high = (f"{limit:.4g}".replace("-", "\u2212") for limit in leg.limits)
+    return f"{low} to {high} {leg.joint.unit}"
+
+
+def _drive(leg: LegKind) -> str:
+    drive, joint = leg.drive, leg.joint
+    if drive is None:
+        return "none"
+    limits = ((drive.max_force, joint.force_unit), (drive.max_speed, f"{joint.unit}/s"))
+    told = [f"{value:.4g} {unit}" for value, unit in limits if value is not None]
+    return f"up to {', '.join(told)}" if told else "without limits"

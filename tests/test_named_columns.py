@@ -1,0 +1,134 @@
+"""Tables where arrays are expected: columns count by their names, in any order."""
+
+import numpy as np
+import pandas as pd
+import polars as pl
+import pytest
+
+import pteron
+from pteron.errors import DataError
+from pteron.kernels import as_array
+from pteron.tables import Table
+
+MACHINES = ("quadrupteron", "delta", "five-bar", "3-rrr")
+
+
+def motion_of(robot, rows=4):
+    """Return poses, velocities, accelerations and wrenches (rows, m) of a machine."""
+    poses = pteron.random_poses(robot, rows, seed=2)
+    rng = np.random.default_rng(1)
+    return poses, *rng.normal(size=(3, rows, robot.freedom))
+
+
+def columns_of(robot, parts):
+    """Return a motion as columns, in an order of their own, with others among them."""
+    names = robot.column_names
+    blocks = zip(("pose", "velocity", "acceleration", "wrench"), parts, strict=True)
+    found = {n: v for kind, part in blocks for n, v in zip(names[kind], part.T, strict=True)}
+    mixed = dict(sorted(found.items(), key=lambda item: item[0][::-1]))
+    return {"remark": np.arange(len(parts[0])), **mixed, "t": 0.1 * np.arange(len(parts[0]))}
+
+
+FORMS = {
+    "pandas": pd.DataFrame,
+    "polars": pl.DataFrame,
+    "mapping": dict,
+    "lists": lambda columns: {name: list(values) for name, values in columns.items()},
+    "file": lambda columns: Table("a file", pl.DataFrame(columns)),
+    "records": lambda columns: pd.DataFrame(columns).to_records(index=False),
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("name", MACHINES)
+def test_columns_are_read_by_their_names_in_any_order(name, form):
+    robot = pteron.load(name)
+    parts = motion_of(robot)
+    table = FORMS[form](columns_of(robot, parts))
+    expected = pteron.inverse_dynamics(robot, *parts)
+    assert (pteron.inverse_dynamics(robot, *[table] * 4) == expected).all()
+    joints = pteron.inverse_kinematics(robot, parts[0])
+    assert (pteron.inverse_kinematics(name, table) == joints).all()
+    named = FORMS[form](dict(zip(robot.joint_names, joints.T, strict=True)))
+    np.testing.assert_array_equal(
+        pteron.direct_kinematics(robot, named), pteron.direct_kinematics(robot, joints)
+    )
+    forces = dict(zip(robot.force_names, expected.T, strict=True))
+    forces = FORMS[form](columns_of(robot, parts) | forces)
+    back = pteron.forward_dynamics(robot, forces, forces, forces, forces)
+    np.testing.assert_allclose(back, parts[2], rtol=1e-7, atol=1e-7)
+
+
+@pytest.mark.parametrize("target", ["vm", "numba", "c", "jax"])
+def test_every_compiled_kernel_takes_tables(target):
+    robot = pteron.load("delta")
+    parts = motion_of(robot)[:3]
+    kernel = pteron.compile(robot, "inverse_dynamics", target)
+    table = pd.DataFrame(columns_of(robot, motion_of(robot)))
+    assert (np.asarray(kernel(*[table] * 3)) == np.asarray(kernel(*parts))).all()
+
+
+def test_a_row_is_a_state():
+    robot = pteron.load("quadrupteron")
+    parts = motion_of(robot)
+    row = pd.DataFrame(columns_of(robot, parts)).iloc[2]
+    first = {name: float(values[2]) for name, values in columns_of(robot, parts).items()}
+    expected = pteron.inverse_dynamics(robot, *(part[2] for part in parts))
+    for one in (row, first):
+        assert pteron.inverse_dynamics(robot, *[one] * 4).shape == (4,)
+        np.testing.assert_allclose(pteron.inverse_dynamics(robot, *[one] * 4), expected, rtol=1e-14)
+
+
+def test_a_table_without_names_is_an_array():
+    robot = pteron.load("delta")
+    poses = motion_of(robot)[0]
+    assert (pteron.jacobian(robot, pd.DataFrame(poses)) == pteron.jacobian(robot, poses)).all()
+    assert (pteron.jacobian(robot, pd.Series(poses[0])) == pteron.jacobian(robot, poses[0])).all()
+    assert (as_array(pd.DataFrame({"a": [1.0], "b": [2.0]}), "x", (2,)) == [[1.0, 2.0]]).all()
+
+
+def test_a_motion_is_made_of_a_table():
+    t = np.linspace(0.0, 1.0, 101)
+    wave = {"y": 0.0 * t, "x": 0.1 * np.sin(t), "z": 0.05 * t**3, "t": t}
+    expected = pteron.motion.replay("tripteron", Table("wave", pl.DataFrame(wave)))
+    for form in (pd.DataFrame, pl.DataFrame, dict):
+        motion = pteron.motion.replay("tripteron", form(wave))
+        assert (motion.velocity == expected.velocity).all()
+
+
+HOLE = pl.DataFrame({"x": [0.0, None], "y": [0.0, 0.0], "z": [-0.8, -0.8]})
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        (pd.DataFrame({"x": [0.0], "phi": [0.0]}), "pose: no column y, z in a table of x, phi; "),
+        ({"x": 0.0, "y": 0.0, "z": "far"}, "pose, column z: not real numbers"),
+        (pl.DataFrame({"x": ["0"], "y": [0.0], "z": [0.0]}), "pose, column x: not real numbers"),
+        (
+            {"x": [0.0, 1.0], "y": [0.0] * 3, "z": 0.0},
+            r"pose: columns of different lengths: x \(2,",
+        ),
+        (HOLE, r"pose\[1, 0\]: nan given, a finite number expected"),
+        (Table("a.csv", HOLE), "a.csv: row 2"),
+        (
+            pd.DataFrame(np.zeros((2, 4)), columns=["x", "x", "y", "z"]),
+            "pose, column x: stands twice",
+        ),
+        ({"x": -1e6, "y": 0.0, "z": 0.0}, "pose: leg 1 misses it by"),
+    ],
+)
+def test_what_a_table_lacks_is_told_in_a_line(table, message):
+    with pytest.raises((DataError, pteron.UnreachablePose), match=f"^{message}") as caught:
+        pteron.inverse_kinematics("delta", table)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_motion_needs_a_time():
+    for table, message in (
+        ({"x": [0.0]}, "table: no column t, the time in s; its columns are x"),
+        (pl.DataFrame({"t": []}), "table: no rows; its columns are t"),
+        (3.0, "table: no column t, the time in s; its columns are "),
+    ):
+        with pytest.raises(DataError, match=f"^{message}$"):
+            pteron.motion.replay("tripteron", table)
