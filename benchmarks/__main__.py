@@ -34,6 +34,7 @@ _SCRIPTS = {
     "Control": "control.py",
     "Simulation": "simulation.py",
     "The Gymnasium environment": "environment.py",
+    "The viewer": "viewer.py",
     "From a log to a running machine": "identification/chain.py",
 }
 _PACKAGES = ("pteron", "numpy", "casadi", "numba", "jax", "pin", "mujoco")

@@ -150,6 +150,7 @@ ALLOWED = {
     ("cli/", "an elbow"): "--elbows, the working mode; and a leg as JSON",
     ("export/klipper/", "an elbow"): "where Klipper has it, in the message that refuses",
     ("report/", "an elbow"): "the working mode",
+    ("viewer/", "an elbow"): "the working mode",
     ("kinematics/direct.py", "an elbow"): "the working mode that a pose is in",
     ("kinematics/evaluate.py", "an elbow"): "the kind of a singularity, in its message",
     ("reduction/configurations.py", "an elbow"): "the side that a leg says it closed on",
