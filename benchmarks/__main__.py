@@ -36,6 +36,7 @@ _SCRIPTS = {
     "Energy": "energy.py",
     "Exported FMUs": "fmu.py",
     "The Gymnasium environment": "environment.py",
+    "The viewer": "viewer.py",
     "From a log to a running machine": "identification/chain.py",
 }
 _PACKAGES = ("pteron", "numpy", "casadi", "numba", "jax", "pin", "mujoco")

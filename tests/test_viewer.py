@@ -4,7 +4,6 @@ import re
 import socket
 import subprocess
 import sys
-import threading
 from contextlib import contextmanager
 from dataclasses import replace
 from itertools import pairwise
@@ -354,13 +353,6 @@ def slide(tab, label, keys):
         tab.keyboard.press(key)
 
 
-def settle(viewer):
-    """Wait until the viewer has done what it was told."""
-    done = threading.Event()
-    viewer.do("test", done.set)
-    assert done.wait(10.0)
-
-
 @pytest.fixture(scope="module")
 def viewer():
     with view(pteron.load("quadrupteron"), port=0) as found:
@@ -372,7 +364,7 @@ def viewer():
 def page(browser, viewer):
     """The page, the machine at home and without a payload."""
     viewer.move_to([0.0, 0.0, 0.0, 0.0])
-    settle(viewer)
+    assert viewer.wait(10.0)
     with opened(browser, viewer.url) as tab:
         yield tab
 
@@ -387,7 +379,7 @@ def test_a_slider_moves_the_robot_and_the_forces_are_the_librarys(page, viewer):
     page.evaluate("() => new Promise(done => setTimeout(done, 500))")
     slide(page, "x (mm)", ["PageUp"] * 3 + ["ArrowRight"] * 5)
     wait_for(page, "() => document.querySelector('table.legs').innerText.includes('.5')")
-    settle(viewer)
+    assert viewer.wait(10.0)
     pose = viewer.state.pose
     assert pose[0] > 0.0
     assert pose[1:].tolist() == [0.0, 0.0, 0.0]
@@ -407,7 +399,7 @@ def test_a_drag_out_of_reach_stops_and_names_the_leg(page, viewer):
     slide(page, "y (mm)", ["End"])
     text = said(page, "stops")
     assert re.match(r"Leg 1 reaches no further: .* The platform stops \d+\.\d mm before", text)
-    settle(viewer)
+    assert viewer.wait(10.0)
     assert viewer.state.message == text
     assert allowed(viewer.state.robot, viewer.state.pose)
     # The slider comes back to where the platform is.
@@ -458,13 +450,13 @@ def test_a_reload_and_a_second_tab_show_the_same(page, viewer, browser):
     slide(page, "z (mm)", ["ArrowRight"] * 7)
     slide(page, "phi (°)", ["ArrowRight"] * 9)
     wait_for(page, "() => document.querySelector('table.legs').innerText.includes('0.7 mm')")
-    settle(viewer)
+    assert viewer.wait(10.0)
     numbers = page.inner_text("table.legs")
     with opened(browser, viewer.url) as other:
         assert other.inner_text("table.legs") == numbers
         slide(other, "x (mm)", ["ArrowLeft"] * 3)
         wait_for(page, SHOWN, [-0.3, 0.0, 0.7, 0.9])
-        settle(viewer)
+        assert viewer.wait(10.0)
         page.reload()
         wait_for(page, SHOWN, [-0.3, 0.0, 0.7, 0.9])
         assert page.inner_text("table.legs") == other.inner_text("table.legs")
@@ -479,7 +471,7 @@ def test_what_is_typed_wrongly_is_told_on_the_page(page, viewer):
     settled = "() => !document.querySelector('[role=status]').innerText.includes('payload')"
     wait_for(page, settled)
     page.wait_for_timeout(300)
-    settle(viewer)
+    assert viewer.wait(10.0)
     assert viewer.state.payload == 0.4
     for text in ("-1", "half a kilo"):
         field(page, "payload (kg)").fill(text)
@@ -493,7 +485,7 @@ def test_what_is_typed_wrongly_is_told_on_the_page(page, viewer):
     field(page, "type a pose").fill("10 20 30 0")
     page.get_by_role("button", name="Go there").click()
     said(page, "at rest")
-    settle(viewer)
+    assert viewer.wait(10.0)
     assert np.allclose(viewer.state.pose, [0.01, 0.02, 0.03, 0.0], atol=1e-12)
 
 
@@ -521,7 +513,7 @@ def test_a_lost_connection_and_a_server_that_starts_again(browser):
         with view(robot, port=port) as second:
             assert second.port == port
             second.move_to([0.01, 0.12])
-            settle(second)
+            assert second.wait(10.0)
             wanted = readable(second.state.joints[0], "rad")
             wait_for(
                 tab,

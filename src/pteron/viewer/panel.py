@@ -171,7 +171,8 @@ class Panel:
     def _on(self, control: Any, name: str, act: Callable[[Any], object]) -> None:
         """Let a control act when a person, and not the viewer itself, has changed it."""
 
-        async def changed(event: Any) -> None:
+        # Not a coroutine: the viewer's own changes come by here too, and are to cost nothing.
+        def changed(event: Any) -> None:
             if event.client_id is not None:
                 value = control.value
                 self._touched[name] = monotonic()

@@ -162,7 +162,7 @@ class Scene:
             shafts, heads = arrows(start[None], way[None], 0.004 * self.size, [MUTED])
             self._add_copies("gravity", cylinder(), shafts)
             self._add_copies("gravity-head", cylinder(0.0), heads)
-            self._add_label("g", "g", start)
+            self._add_label("g", "g", start - 0.3 * way)
         for axis, name in zip(np.eye(3), "xyz", strict=True):
             self._add_label(f"base-{name}", name, corner + 0.16 * self.size * axis)
         for i, (line, guide) in enumerate(zip(points.links, self._guides, strict=True), start=1):

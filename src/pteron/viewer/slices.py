@@ -7,15 +7,15 @@ from numpy.typing import NDArray
 
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
-from pteron.plots.canvas import REACH
 from pteron.viewer.meshes import Mesh, cells
 from pteron.workspace import BEYOND_LIMITS, REACHABLE, reach_slice
 from pteron.workspace.reach import slice_planes
 
-POINTS = 71
+POINTS = 111
 """Points along each side of a slice."""
 
-BEYOND = "#e0a030"
+SERVES, BEYOND = "#2f7fc4", "#e0a030"
+"""Colours: in reach, and in reach but beyond a joint's limit."""
 
 NONE = "none"
 
@@ -52,7 +52,7 @@ def slice_meshes(
     extent = left, right, low, high
     cut = reach_slice(robot, pose, chosen, extent=extent, points=POINTS)
     found = []
-    for status, color in ((REACHABLE, REACH), (BEYOND_LIMITS, BEYOND)):
+    for status, color in ((REACHABLE, SERVES), (BEYOND_LIMITS, BEYOND)):
         flat, faces = cells(cut.first, cut.second, np.asarray(cut.status == status))
         found.append(((_in_space(robot, pose, i, j, flat), faces), color))
     return found

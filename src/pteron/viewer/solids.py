@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -191,7 +192,7 @@ class _Balls:
 def _blocks(found: Sequence[tuple[Array, Array, str]], size: float) -> Copies:
     """Return blocks as copies of a cube of side 1."""
     centers = np.array([center for center, _, _ in found]).reshape(-1, 3)
-    turns = np.array([_of_rows(upright(axis)) for _, axis, _ in found]).reshape(-1, 4)
+    turns = np.array([_turn_to(tuple(axis.tolist())) for _, axis, _ in found]).reshape(-1, 4)
     scales = np.tile(size * _BLOCK, (len(found), 1))
     return Copies(centers, turns, scales, _colors([rgb(color) for _, _, color in found]))
 
@@ -228,6 +229,7 @@ def quaternion(rotation: Array) -> Array:
     return np.array([w, x, y, z])
 
 
-def _of_rows(rows: Array) -> Array:
-    """Return the quaternion that turns x, y and z to three rows."""
-    return quaternion(rows.T)
+@lru_cache(maxsize=256)
+def _turn_to(axis: tuple[float, ...]) -> Array:
+    """Return the quaternion of a block whose guide is along an axis."""
+    return quaternion(upright(np.array(axis)).T)

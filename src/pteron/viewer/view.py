@@ -59,6 +59,7 @@ class Viewer:
         self._actions: dict[str, Callable[[], object]] = {}
         self._wake = threading.Condition()
         self._closed = False
+        self._idle = threading.Event()
         self._faults: list[str] = []
         gui, scene = self._server.gui, self._server.scene
         gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
@@ -117,7 +118,18 @@ class Viewer:
         with self._wake:
             self._actions.pop(name, None)
             self._actions[name] = act
+            self._idle.clear()
             self._wake.notify()
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Wait until all that was asked for is done and sent to the page; say whether it is.
+
+        Parameters
+        ----------
+        timeout : float, optional
+            s.
+        """
+        return self._idle.wait(timeout)
 
     def close(self) -> None:
         """End the page; tabs say that the connection is lost."""
@@ -137,6 +149,8 @@ class Viewer:
         settled = True
         while True:
             with self._wake:
+                if not self._actions:
+                    self._idle.set()
                 if not self._actions and not self._closed:
                     self._wake.wait(self._until(last, changed, settled))
                 if self._closed:

@@ -1,0 +1,60 @@
+"""Draw the pictures of docs/view.md: the page of `pteron view`, in headless Chromium."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+
+import pteron
+from pteron.viewer import Viewer, view
+
+_HERE = Path(__file__).parent
+_FLAGS = ("--no-sandbox", "--disable-gpu", "--use-gl=angle", "--use-angle=swiftshader")
+_SIZE = {"width": 1180, "height": 760}
+_STILL = 2500
+"""ms after which the page no longer changes."""
+
+
+def main() -> None:
+    """Write view.png, the Quadrupteron with a slice, and view-planar.png, a 3-RRR at its end."""
+    program = os.environ.get("PTERON_BROWSER") or shutil.which("chromium")
+    if program is None:
+        sys.exit("docs/view_picture.py: no Chromium on this machine; PTERON_BROWSER may name one")
+    with view(pteron.load("quadrupteron"), port=0) as viewer:
+        viewer.move_to([0.03, 0.05, 0.06, np.radians(25.0)])
+        _shoot(program, viewer, "view.png", ("Show", "workspace slice", "xz"))
+    with view(pteron.load("3-rrr"), port=0) as viewer:
+        viewer.move_to([0.0, 0.3, 0.0])
+        _shoot(program, viewer, "view-planar.png", None)
+
+
+def _shoot(program: str, viewer: Viewer, name: str, choice: tuple[str, str, str] | None) -> None:
+    """Write a picture of the page, after a choice in one of its tabs."""
+    from playwright.sync_api import sync_playwright
+
+    viewer.wait()
+    with sync_playwright() as play:
+        browser = play.chromium.launch(executable_path=program, args=list(_FLAGS))
+        page = browser.new_page(viewport=_SIZE)  # type: ignore[arg-type]
+        page.goto(viewer.url)
+        page.wait_for_selector("table.legs")
+        if choice is not None:
+            tab, label, value = choice
+            page.get_by_role("tab", name=tab).click()
+            row = page.get_by_text(label).locator("xpath=ancestor::*[.//input][1]")
+            row.locator("input").first.click()
+            page.get_by_role("option", name=value, exact=True).click()
+            page.wait_for_timeout(_STILL)
+        # Chromium without a graphics card says so in a corner.
+        page.add_style_tag(content=".mantine-Notifications-root { display: none }")
+        page.wait_for_timeout(_STILL)
+        page.screenshot(path=str(_HERE / name))
+        browser.close()
+
+
+if __name__ == "__main__":
+    main()
