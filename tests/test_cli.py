@@ -350,7 +350,7 @@ def test_a_long_table_shows_a_bar_and_has_the_same_result(monkeypatch: pytest.Mo
     monkeypatch.setattr("pteron.cli.rows.LONG", 99)
     monkeypatch.setattr("pteron.cli.rows.CHUNK", 7)
     assert done(line) == expected
-    # A terminal is where colours are forced.
+    monkeypatch.setattr("pteron.cli.screen.is_watched", lambda: True)
     shown = run(line, FORCE_COLOR="1")
     assert shown.stdout == expected
     assert "motion.csv" in shown.stderr
@@ -642,6 +642,12 @@ def test_forces_of_drives_and_what_they_exceed():
             "Note: leg 3: the motion takes up to 2 m/s, but its drive gives 1.5 m/s (max_speed)\n"
         )
     assert done("forces tripteron --pose 0,0,0 --drives") == done("forces tripteron --pose 0,0,0")
+
+
+def test_colours_that_are_asked_for_bring_no_moving_pictures_into_a_pipe():
+    plain, coloured = run("check quadrupteron"), run("check quadrupteron", FORCE_COLOR="1")
+    assert "\x1b[" in coloured.stdout
+    assert plain.stderr == coloured.stderr == ""
 
 
 def test_a_name_is_no_markup():

@@ -115,6 +115,13 @@ def test_millimetres_are_asked_about(robot):
         pteron.inverse_kinematics(robot, [10.0, 20.0, -900.0, 0.0][: robot.freedom])
 
 
+def test_millimetres_are_asked_about_where_a_motion_begins_near_zero():
+    motion = np.linspace([0.0, 0.0, 0.0, 0.0], [60.0, 0.0, 0.0, 0.0], 1001)
+    with pytest.raises(UnreachablePose, match="is it in millimetres\\? lengths are") as caught:
+        pteron.inverse_kinematics(ROBOT, motion)
+    assert caught.value.shortfall < 0.1
+
+
 def test_a_pose_too_near_is_unreachable_too():
     shortest = ROBOT.legs[0].lower_length - ROBOT.legs[0].upper_length
     robot = replace(ROBOT, legs=(ROBOT.legs[0], *(longer(leg) for leg in ROBOT.legs[1:])))

@@ -32,6 +32,15 @@ def is_terminal() -> bool:
     return sys.stdout.isatty()
 
 
+def is_watched() -> bool:
+    """Say whether a person watches standard error.
+
+    Rich takes FORCE_COLOR for one, which Jupyter and build servers set: colours are meant, not
+    pictures that move.
+    """
+    return sys.stderr.isatty()
+
+
 def plain(text: str) -> str:
     r"""Return a text in which neither Rich nor a terminal finds a command.
 
@@ -108,11 +117,10 @@ def complain(message: str) -> None:
 @contextmanager
 def spinner(task: str) -> Iterator[None]:
     """Show a person on standard error that work of unknown length goes on."""
-    console = Console(stderr=True)
-    if not console.is_terminal:
+    if not is_watched():
         yield
         return
-    with console.status(plain(task)):
+    with Console(stderr=True).status(plain(task)):
         yield
 
 
@@ -153,13 +161,12 @@ def stages(task: str, rows: int) -> Iterator[Callable[[str, int, int], None]]:
 def _bar() -> Progress:
     from rich import progress
 
-    console = Console(stderr=True)
     return progress.Progress(
         progress.TextColumn("{task.description}"),
         progress.BarColumn(),
         progress.TaskProgressColumn(),
         progress.TimeRemainingColumn(),
-        console=console,
-        disable=not console.is_terminal,
+        console=Console(stderr=True),
+        disable=not is_watched(),
         transient=True,
     )

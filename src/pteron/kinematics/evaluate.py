@@ -109,9 +109,10 @@ def _failure(
             return _not_finite(port.name, array, (*at, *(int(i) for i in bad[0])))
         if port.name == "pose":
             pose = whole
-    others = int((status == 0.0).sum()) - 1
+            all_bad = np.broadcast_to(array, status.shape + port.shape)[status == 0.0]
+    others = len(all_bad) - 1
     many = f" ({others + 1} such poses in the batch)" if others else ""
-    return _bad_pose(robot, pose, needs_of(what), index, many)
+    return _bad_pose(robot, pose, needs_of(what), index, many, far=_some_far(robot, all_bad))
 
 
 def place(name: str, index: tuple[int, ...]) -> str:
@@ -119,8 +120,23 @@ def place(name: str, index: tuple[int, ...]) -> str:
     return f"{name}[{', '.join(map(str, index))}]" if index else name
 
 
+def _some_far(robot: Manipulator, poses: Array) -> bool:
+    """Say whether one of the poses (K, m) is so far out that millimetres are likelier.
+
+    The first one that fails need not be: a motion in millimetres may begin at zero.
+    """
+    misses = -numeric(robot, "reach")(poses)[0]
+    return bool((misses > _MILLIMETRES * np.array([leg.size for leg in robot.legs])).any())
+
+
 def _bad_pose(
-    robot: Manipulator, pose: Array, needs: tuple[str, ...], index: tuple[int, ...], many: str
+    robot: Manipulator,
+    pose: Array,
+    needs: tuple[str, ...],
+    index: tuple[int, ...],
+    many: str,
+    *,
+    far: bool,
 ) -> PteronError:
     where = place("pose", index)
     margin, type_i, spread, _ = numeric(robot, "reach")(pose)
@@ -130,10 +146,9 @@ def _bad_pose(
     if np.isnan(type_i).any():
         i = int(np.isnan(type_i).argmax())
         leg, shortfall = robot.legs[i], max(-float(margin[i]), 0.0)
-        millimetres = shortfall > _MILLIMETRES * leg.size
         doubt = (
             "is it in millimetres? lengths are in metres"
-            if millimetres
+            if far
             else "move the pose towards the legs' reach"
         )
         return UnreachablePose(
@@ -141,7 +156,7 @@ def _bad_pose(
             leg=i + 1,
             shortfall=shortfall,
             index=index,
-            millimetres=millimetres,
+            millimetres=far,
         )
     for i, leg in enumerate(robot.legs):
         undetermined = bool(spread[i] <= _COINCIDENT * leg.size)

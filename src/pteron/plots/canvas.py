@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from html import escape
-from io import StringIO
+from io import BytesIO, StringIO
 from typing import Any
 
 import matplotlib as mpl
@@ -50,11 +50,30 @@ SMALL = 0.6
 _NO_METADATA = dict.fromkeys(("Creator", "Date", "Format", "Type"))
 
 
+_NOTEBOOK_DPI = 144
+"""Dots an inch of a picture in a notebook, which shows it at 96."""
+
+
+class Picture(Figure):
+    """A figure that notebooks show, on white, without pyplot."""
+
+    def _ipython_display_(self) -> None:
+        # The way that goes before pyplot's, whose pictures are without a ground in a dark notebook.
+        from IPython.display import display
+
+        buffer = BytesIO()
+        self.savefig(buffer, format="png", dpi=_NOTEBOOK_DPI, facecolor="white")
+        width, height = (round(96.0 * inches) for inches in self.get_size_inches())
+        size = {"width": width, "height": height}
+        shown = {"image/png": buffer.getvalue(), "text/plain": repr(self)}
+        display(shown, metadata={"image/png": size}, raw=True)
+
+
 def blank(width: float, height: float) -> Figure:
     """Return a figure of so many inches, transparent, with a canvas of its own."""
-    figure = Figure(figsize=(width, height), layout="constrained")
+    figure = Picture(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
-    figure.patch.set_alpha(0.0)
+    figure.set_facecolor("none")  # an alpha of 0 would stay when another ground is asked for
     return figure
 
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pteron.errors import ModelError
 from pteron.identification.excitation.draws import is_clear
@@ -21,8 +22,9 @@ from pteron.identification.excitation.fourier import FourierMotion
 from pteron.identification.excitation.limits import Limits
 from pteron.identification.excitation.margins import Margins, margins, relative_margins
 from pteron.identification.excitation.movement import State
-from pteron.kernels import Array
+from pteron.kernels import Array, as_array
 from pteron.manipulator import Manipulator
+from pteron.motion.motion import Motion
 from pteron.motion.trajectories.cycle import quintic
 
 _LENGTHS = (1, 2, 4, 8)
@@ -83,7 +85,7 @@ class LedMotion:
     >>> led = LedMotion(motion, found_lead(motion, Limits()), periods=3)
     >>> led.start, led.end, led.duration
     (5.0, 20.0, 25.0)
-    >>> ends = led.states(np.array([0.0, led.duration]))
+    >>> ends = led.at([0.0, led.duration])
     >>> bool(abs(ends.velocity).max() < 1e-12), bool(np.ptp(ends.pose, axis=0).max() < 1e-12)
     (True, True)
     """
@@ -111,6 +113,12 @@ class LedMotion:
     def duration(self) -> float:
         """How long it takes from rest to rest, s."""
         return self.end + self.lead.duration
+
+    def at(self, time: ArrayLike) -> Motion:
+        """Return the platform's motion at times (T,), s; it rests before and after."""
+        times = as_array(time, "time", ())
+        found = self.states(times)
+        return Motion(times, found.pose, found.velocity, found.acceleration)
 
     def states(self, times: Array) -> State:
         """Return the motion of platform and joints at times (T,), s; it rests before and after."""
