@@ -80,7 +80,7 @@ def test_a_notebook_shows_a_picture_on_white_without_pyplot(monkeypatch):
 
 def test_a_saved_picture_has_the_ground_that_was_asked_for():
     figure = forces_figure(np.array([0.0, 1.0]), np.array([[1.0], [2.0]]))
-    for look, alpha in (({"facecolor": "white"}, 1.0), ({}, 0.0)):
+    for look, alpha in (({}, 1.0), ({"transparent": True}, 0.0)):
         file = BytesIO()
         figure.savefig(file, format="png", **look)
         file.seek(0)

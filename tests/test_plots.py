@@ -8,25 +8,39 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from mechanisms import CATALOG, MECHANISMS, random_machine
 from mpl_toolkits.mplot3d.art3d import Line3D, Poly3DCollection
+from PIL import Image
 from scipy.spatial.transform import Rotation
 
 import pteron
 from pteron.motion import joint_guides, joint_points
 from pteron.plots import (
     LEG_COLORS,
+    WIDTHS,
     Ability,
+    condition_figure,
+    draw,
     force_speed_figure,
     forces_figure,
+    joints_figure,
     measure_figure,
+    operations_figure,
+    parameters_figure,
+    poses_figure,
     power_figure,
     reach_figure,
     regularity_figure,
+    resized,
     robot_figure,
+    save_figure,
+    singularities_figure,
     svg,
     svg_file,
+    trajectory_figure,
 )
 from pteron.plots.canvas import PAPER
 from pteron.plots.space import upright
@@ -88,6 +102,23 @@ def powers():
     return power_figure(t, np.sin(np.outer(t, [1, 2, 3])))
 
 
+def courses():
+    t = np.linspace(0.0, 1.0, 9)
+    wave = np.sin(np.outer(t, [1, 2, 3, 4]))
+    return trajectory_figure(t, wave, 2.0 * wave, names=("x", "y", "z", "phi"))
+
+
+def values():
+    found, drawn = np.array([1.0, 2.0, 0.1]), np.array([1.0, 2.6, 0.2])
+    return parameters_figure(
+        ["m_1", "m_2", "mgx_1"],
+        found,
+        intervals=[0.1, 0.5, np.nan],
+        units=["kg", "kg", "kg m"],
+        reference=drawn,
+    )
+
+
 PICTURES = {
     "machine": (machine, "quadrupteron turned"),
     "plane": (machine, "3-rrr"),
@@ -97,6 +128,9 @@ PICTURES = {
     "regularity": (regularity,),
     "drives": (drives,),
     "powers": (powers,),
+    "courses": (courses,),
+    "values": (values,),
+    "operations": (lambda: operations_figure(["all", "base"], [809, 675]),),
 }
 
 
@@ -320,3 +354,139 @@ def test_a_picture_in_a_file_of_its_own_is_whole():
     assert root.tag == "{http://www.w3.org/2000/svg}svg"
     assert svg_file(powers()) == text
     assert "<metadata" not in text
+    assert re.search(r"<path d=[^>]*fill: #ffffff", text.replace("\n", " ")), "on white"
+
+
+def test_draw_is_the_picture_of_a_robot_in_a_pose():
+    robot = CATALOG["five-bar"]
+    home = home_pose(robot)
+    guides = joint_guides(robot, home)
+    expected = svg_file(robot_figure(joint_points(robot, home), guides, gravity=robot.gravity))
+    assert svg_file(draw(robot)) == expected
+    way = draw(robot, home, along=[home, np.add(home, [0.0, 0.01])])
+    np.testing.assert_allclose(lines(way)[-1][0], [home, np.add(home, [0.0, 0.01])], atol=1e-12)
+    with pytest.raises(pteron.DataError, match="2 given, 1 expected; poses_figure"):
+        draw(robot, [home, home])
+    with pytest.raises(pteron.UnreachablePose, match="leg 1"):
+        draw(robot, np.add(home, [1.0, 0.0]))
+
+
+def test_several_poses_are_seen_from_one_place():
+    robot = CATALOG["delta"]
+    home = home_pose(robot)
+    poses = np.add(home, [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.05]])
+    figure = poses_figure(robot, poses, titles=["a", "b", "c"], columns=2, along=poses)
+    views = {(axes.get_xlim(), axes.get_ylim(), axes.get_zlim()) for axes in figure.axes}
+    assert len(views) == 1
+    assert [text.get_text() for text in figure.texts] == ["a", "b", "c"]
+    modes = pteron.working_modes(CATALOG["five-bar"])
+    flat = poses_figure(modes, home_pose(modes[0]))
+    assert len(flat.axes) == len(modes)
+    assert len({axes.get_xlim() + axes.get_ylim() for axes in flat.axes}) == 1
+    for arguments, options in (
+        ((robot, poses), {"titles": ["a"]}),
+        ((robot, poses), {"columns": 0}),
+        (([robot, robot], poses), {}),
+        (([], poses), {}),
+        ((robot, poses[:, :2]), {}),
+    ):
+        with pytest.raises(pteron.DataError, match="given"):
+            poses_figure(*arguments, **options)
+
+
+def test_courses_stand_over_their_derivatives_and_units_beside_each_other():
+    axes = courses().axes
+    assert [one.get_ylabel() for one in axes] == [
+        *("pose (m)", "pose (rad)", "velocity (m/s)", "velocity (rad/s)"),
+    ]
+    mixed = MACHINES["random RPP 0"]
+    t = np.linspace(0.0, 1.0, 5)
+    wave = np.outer(t, [1.0, 2.0, 3.0])
+    found = joints_figure(t, wave, robot=mixed).axes
+    assert [one.get_ylabel() for one in found] == ["joint (rad)", "joint (m)"]
+    np.testing.assert_array_equal(found[1].lines[-1].get_ydata(), wave[:, 2])
+    forces = forces_figure(t, wave, robot=mixed).axes
+    assert [one.get_ylabel() for one in forces] == ["actuator torque (N m)", "actuator force (N)"]
+    with pytest.raises(pteron.DataError, match=r"velocity: shape \(5, 2\) given, \(5, 3\)"):
+        trajectory_figure(t, wave, wave[:, :2], names=("x", "y", "z"))
+    with pytest.raises(pteron.DataError, match="0 courses given"):
+        joints_figure(t, robot=mixed)
+
+
+def test_a_value_whose_interval_misses_its_reference_is_red():
+    upper, lower = values().axes
+    red = to_rgba("#b3261e")
+    marks = [line for line in upper.lines if line.get_marker() == "o"]
+    found = {line.get_xdata()[0]: to_rgba(line.get_markerfacecolor()) == red for line in marks}
+    assert (found[1.0], found[2.0]) == (False, True)
+    assert (upper.get_xlabel(), lower.get_xlabel()) == ("kg", "kg m")
+    with pytest.raises(pteron.DataError, match=r"intervals: shape \(2,\) given, \(1,\)"):
+        parameters_figure(["m"], [1.0], intervals=[1.0, 2.0])
+
+
+def test_singularities_are_drawn_where_the_determinant_is_zero():
+    robot = CATALOG["quadrupteron"]
+    x, phi = np.linspace(-0.05, 0.05, 9), np.linspace(-3.0, 3.0, 601)
+    poses = np.zeros((len(phi), len(x), 4))
+    poses[..., 0], poses[..., 3] = np.meshgrid(x, phi)
+    jacobians = pteron.jacobian(robot, poses, on_failure="nan")
+    axes = singularities_figure(x, phi, np.linalg.det(jacobians), names=("x", "phi")).axes[0]
+    inked = [c for c in axes.collections if len(c.get_edgecolor())]
+    (red,) = [c for c in inked if np.allclose(c.get_edgecolor(), to_rgba("#b3261e"))]
+    drawn = np.vstack([path.vertices for path in red.get_paths()])
+    expected = np.degrees(pteron.singular_orientations(robot))
+    near = np.abs(drawn[:, 1, None] - expected).min(axis=1)
+    assert near.max() < 0.1
+    assert set(np.abs(drawn[:, 1, None] - expected).argmin(axis=1)) == {0, 1}
+
+
+def test_a_condition_number_has_its_named_levels_where_it_takes_them():
+    x, y = np.linspace(-0.1, 0.1, 201), np.linspace(-0.2, 0.2, 401)
+    values = 1.0 + 100.0 * np.hypot(*np.meshgrid(x, y))
+    values[:, 0] = np.inf
+    axes = condition_figure(x, y, values).axes[0]
+    assert {text.get_text() for text in axes.texts} <= {"1.5", "2", "3", "5", "10"}
+    line = next(c for c in axes.collections if len(c.get_paths()) == 5)
+    assert set(np.round(line.levels, 1)) == {1.5, 2.0, 3.0, 5.0, 10.0}
+    for level, path in zip(line.levels, line.get_paths(), strict=True):
+        np.testing.assert_allclose(np.hypot(*path.vertices.T), 10.0 * (level - 1.0), atol=0.1)
+    with pytest.raises(pteron.DataError, match=r"shape \(3, 2\) given, \(401, 201\)"):
+        condition_figure(x, y, np.ones((3, 2)))
+    with pytest.raises(pteron.DataError, match="ascend"):
+        condition_figure(x[::-1], y, values)
+
+
+@pytest.mark.parametrize("picture", PICTURES)
+def test_in_print_letters_are_legible_and_all_is_on_the_paper(picture):
+    make, *arguments = PICTURES[picture]
+    figure = resized(make(*arguments), "column")
+    assert figure.get_size_inches()[0] == WIDTHS["column"]
+    figure.canvas.draw()
+    words = [text for text in figure.findobj(Text) if text.get_text() and text.get_visible()]
+    assert min(text.get_fontsize() for text in words) >= 6.0
+    picture = np.asarray(figure.canvas.buffer_rgba())
+    for edge in (picture[0], picture[-1], picture[:, 0], picture[:, -1]):
+        assert edge.min() > 250, "something is cut"
+
+
+def test_a_saved_figure_keeps_its_text_and_is_the_same_each_time(tmp_path):
+    first = {}
+    for ending in ("svg", "pdf", "png"):
+        for name in "ab":
+            path = save_figure(powers(), tmp_path / f"{name}.{ending}", width="column")
+            first.setdefault(ending, path.read_bytes())
+            assert path.read_bytes() == first[ending]
+    assert b"power (W)</text>" in first["svg"]
+    assert b"FontFile2" in first["pdf"], "letters, not drawings of them"
+    with Image.open(tmp_path / "a.png") as image:
+        assert image.size[0] == 300 * WIDTHS["column"]
+        assert image.convert("RGBA").getpixel((0, 0)) == (255, 255, 255, 255)
+    for path, words in (
+        ("a.jpg", ".jpg ending, .svg, .pdf, .png expected"),
+        ("no/a.svg", "cannot be written"),
+    ):
+        with pytest.raises(pteron.OutputError, match=words):
+            save_figure(powers(), tmp_path / path)
+    for width in ("colum", 0.0, -1, float("nan"), None):
+        with pytest.raises(pteron.DataError, match='"column", "page"'):
+            resized(powers(), width)

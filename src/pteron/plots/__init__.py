@@ -16,21 +16,27 @@ from pteron.plots.comparison import (
     residual_speed_figure,
     residual_time_figure,
 )
+from pteron.plots.courses import joints_figure, trajectory_figure
 from pteron.plots.drives import Ability, force_speed_figure, power_figure
 from pteron.plots.films import Film, film
 from pteron.plots.forces import forces_figure, regularity_figure
 from pteron.plots.machine import draw, poses_figure, robot_figure
+from pteron.plots.maps import condition_figure, singularities_figure
+from pteron.plots.printing import WIDTHS, resized, save_figure
 from pteron.plots.reach import measure_figure, reach_figure
 from pteron.plots.robot import grid_step
 from pteron.plots.tracking import tracking_figure
+from pteron.plots.values import operations_figure, parameters_figure
 
 __all__ = [
     "Ability",
     "Film",
     "LEG_COLORS",
+    "WIDTHS",
     "autocorrelation_figure",
     "certainty_figure",
     "comparison_figure",
+    "condition_figure",
     "correlation_figure",
     "draw",
     "errors_figure",
@@ -39,16 +45,23 @@ __all__ = [
     "forces_figure",
     "grid_step",
     "histogram_figure",
+    "joints_figure",
     "measure_figure",
+    "operations_figure",
+    "parameters_figure",
     "poses_figure",
     "power_figure",
     "reach_figure",
     "regularity_figure",
+    "resized",
     "residual_speed_figure",
     "residual_time_figure",
     "robot_figure",
+    "save_figure",
+    "singularities_figure",
     "svg",
     "tracking_figure",
+    "trajectory_figure",
     "svg_file",
 ]
 

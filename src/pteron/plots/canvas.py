@@ -55,14 +55,14 @@ _NOTEBOOK_DPI = 144
 
 
 class Picture(Figure):
-    """A figure that notebooks show, on white, without pyplot."""
+    """A figure that notebooks show without pyplot."""
 
     def _ipython_display_(self) -> None:
-        # The way that goes before pyplot's, whose pictures are without a ground in a dark notebook.
+        # The way that goes before pyplot's, which notebooks know only once it is imported.
         from IPython.display import display
 
         buffer = BytesIO()
-        self.savefig(buffer, format="png", dpi=_NOTEBOOK_DPI, facecolor="white")
+        self.savefig(buffer, format="png", dpi=_NOTEBOOK_DPI)
         width, height = (round(96.0 * inches) for inches in self.get_size_inches())
         size = {"width": width, "height": height}
         shown = {"image/png": buffer.getvalue(), "text/plain": repr(self)}
@@ -70,10 +70,9 @@ class Picture(Figure):
 
 
 def blank(width: float, height: float) -> Figure:
-    """Return a figure of so many inches, transparent, with a canvas of its own."""
-    figure = Picture(figsize=(width, height), layout="constrained")
+    """Return a figure of so many inches, on white, with a canvas of its own."""
+    figure = Picture(figsize=(width, height), layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)
-    figure.set_facecolor("none")  # an alpha of 0 would stay when another ground is asked for
     return figure
 
 
@@ -104,6 +103,23 @@ def stack(
     for axes in found[:-1]:
         axes.sharex(found[-1])
         axes.tick_params(labelbottom=False)
+    return found
+
+
+def panels(figure: Figure, xlabel: str, ylabels: list[list[str]]) -> list[list[Axes]]:
+    """Return rows of axes beside each other, all over one scale along x, named below the last."""
+    rows, columns = len(ylabels), len(ylabels[0])
+    grid = GridSpec(rows, columns, figure=figure)
+    found = [[plain_axes(figure, "", label) for label in row] for row in ylabels]
+    for i, row in enumerate(found):
+        for j, axes in enumerate(row):
+            axes.set_subplotspec(grid[i, j])
+            axes.sharex(found[-1][j])
+            axes.tick_params(labelbottom=i == rows - 1)
+    for axes in found[-1]:
+        axes.set_xlabel(xlabel)
+    for one in zip(*found, strict=True):
+        figure.align_ylabels(one)
     return found
 
 
@@ -154,14 +170,14 @@ def remark(axes: Axes, text: str, x: float, y: float, color: str, rise: float = 
 
 
 def svg(figure: Figure, *, name: str, title: str) -> Markup:
-    """Return a figure as one `<svg>` element for an HTML page.
+    """Return a figure as one `<svg>` element for an HTML page, without a background.
 
     It holds no date, no random identifier and no address, and its colours are CSS variables with
     the printed colours as defaults. Text stays text, in the page's font. The name, of letters and
     digits, is put before every identifier, which must be unique in a page; the title says what the
     picture shows to those who cannot see it.
     """
-    text = _drawn(figure)
+    text = _drawn(figure, facecolor="none")
     text = text[text.index("<svg") :].rstrip()
     text = re.sub(r"\s*<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
     text = re.sub(r"<!--.*?-->\s*", "", text, flags=re.DOTALL)
@@ -187,7 +203,7 @@ def svg(figure: Figure, *, name: str, title: str) -> Markup:
 
 def svg_file(figure: Figure) -> str:
     """Return a figure as the text of an SVG file that stands alone, on white, without a date."""
-    return _drawn(figure, facecolor="white")
+    return _drawn(figure)
 
 
 def _drawn(figure: Figure, **look: Any) -> str:

@@ -10,6 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pteron.kernels import Array
+from pteron.legs import Drive
+from pteron.manipulator import RobotLike, as_manipulator
 from pteron.plots.canvas import (
     INK,
     LEG_COLORS,
@@ -22,6 +24,7 @@ from pteron.plots.canvas import (
     remark,
     spot,
 )
+from pteron.plots.joints import joints_of
 
 _ROOM = 1.15
 """The axes' half width over what is drawn."""
@@ -43,9 +46,10 @@ def force_speed_figure(
     speeds: Array,
     forces: Array,
     *,
-    units: Sequence[tuple[str, str]],
-    abilities: Sequence[Ability],
-    rms: tuple[Array, Array],
+    units: Sequence[tuple[str, str]] = (),
+    abilities: Sequence[Ability] = (),
+    rms: tuple[Array, Array] | None = None,
+    robot: RobotLike | None = None,
 ) -> Figure:
     """Return each drive's force over its speed, within what it can do.
 
@@ -55,13 +59,20 @@ def force_speed_figure(
     ----------
     speeds, forces : array, shape (K, n)
         Over the cycle.
-    units : sequence of (str, str)
+    units : sequence of (str, str), optional
         Of each leg's speed and force; legs of other units get axes of their own.
-    abilities : sequence of Ability
+    abilities : sequence of Ability, optional
         Drawn dashed in the leg's colour, the rated force dotted; in grey where all have the same.
-    rms : (array, array), shape (n,)
-        Root mean squares of speed and force, drawn as a dot.
+    rms : (array, array), shape (n,), optional
+        Root mean squares of speed and force, drawn as a dot; by default those of the samples.
+    robot : Manipulator, name or path, optional
+        Says units and abilities where they are not given; without it all are sliders.
     """
+    joints = joints_of(robot, forces)
+    units = units or [(f"{joint.unit}/s", joint.force_unit) for joint in joints]
+    abilities = abilities or _abilities(robot) or [Ability(None, None, None)] * len(units)
+    if rms is None:
+        rms = np.sqrt((speeds**2).mean(axis=0)), np.sqrt((forces**2).mean(axis=0))
     groups = list(dict.fromkeys(units))
     figure = blank(5.4, 3.4 * len(groups))
     for k, (rate, unit) in enumerate(groups):
@@ -89,6 +100,13 @@ def force_speed_figure(
                 remark(axes, "brakes", 0.87 * x * sizes[0], (0.915 * y - 0.025) * sizes[1], MUTED)
     legend(figure, min(len(units), 4))
     return figure
+
+
+def _abilities(robot: RobotLike | None) -> list[Ability]:
+    """Return what the drives of a machine can do, as its file says."""
+    legs = () if robot is None else as_manipulator(robot).legs
+    drives = [leg.drive or Drive() for leg in legs]
+    return [Ability(drive.max_speed, drive.max_force, drive.rated_force) for drive in drives]
 
 
 def _box(axes: Axes, ability: Ability, sizes: Sequence[float], color: str) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from pteron.kernels import Array
+from pteron.manipulator import RobotLike
 from pteron.plots.canvas import (
     GRID,
     INK,
@@ -21,7 +22,9 @@ from pteron.plots.canvas import (
     plain_axes,
     remark,
     spot,
+    stack,
 )
+from pteron.plots.joints import joints_of
 
 _ROOM = 75.0
 """Degrees that a remark takes which says in words what an orientation is."""
@@ -32,24 +35,33 @@ def forces_figure(
     forces: Array,
     *,
     turning_point: float | None = None,
-    ylabel: str = "actuator force (N)",
+    ylabel: str | None = None,
+    robot: RobotLike | None = None,
 ) -> Figure:
     """Return the forces (T, n) of all legs, N or N m, over time (T,), s.
 
-    The way back begins at the turning point, s. Other quantities of the legs look the same, under
+    The way back begins at the turning point, s. The robot says which legs give forces and which
+    torques: of both, each have axes of their own. Other quantities of the legs look the same, under
     another label.
     """
-    figure = blank(5.4, 3.3)
-    axes = plain_axes(figure, "time (s)", ylabel)
-    axes.axhline(0.0, color=MUTED, linewidth=0.8)
-    for i, force in enumerate(forces.T):
+    joints = joints_of(robot, forces)
+    words = [ylabel or f"actuator {joint.force} ({joint.force_unit})" for joint in joints]
+    groups = list(dict.fromkeys(words))
+    figure = blank(5.4, 3.3 if len(groups) == 1 else 1.2 + 1.6 * len(groups))
+    found = stack(figure, "time (s)", groups)
+    for axes in found:
+        axes.axhline(0.0, color=MUTED, linewidth=0.8)
+    for i, (force, word) in enumerate(zip(forces.T, words, strict=True)):
+        axes = found[groups.index(word)]
         axes.plot(time, force, label=f"leg {i + 1}", **leg_style(i, 1.8))
     start, end = float(time[0]), float(time[-1])
-    axes.set_xlim(start, end)
+    for axes in found:
+        axes.set_xlim(start, end)
+        if turning_point is not None:
+            axes.axvline(turning_point, color=MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
     if turning_point is not None:
-        axes.axvline(turning_point, color=MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
-        remark(axes, "out", (start + turning_point) / 2.0, inf, MUTED, 3.0)
-        remark(axes, "back", (turning_point + end) / 2.0, inf, MUTED, 3.0)
+        remark(found[0], "out", (start + turning_point) / 2.0, inf, MUTED, 3.0)
+        remark(found[0], "back", (turning_point + end) / 2.0, inf, MUTED, 3.0)
     legend(figure, forces.shape[1])
     return figure
 

@@ -56,6 +56,14 @@ class ReachSlice:
     margin: Array
     leg_margins: Array
 
+    @property
+    def poses(self) -> Array:
+        """The poses of the grid, shape (B, A, m), m and rad."""
+        found = np.broadcast_to(self.center, (*self.status.shape, len(self.center))).copy()
+        i, j = ("xyz".index(letter) for letter in self.plane)
+        found[..., i], found[..., j] = self.first, self.second[:, None]
+        return found
+
 
 def slice_planes(robot: Manipulator) -> tuple[Plane, ...]:
     """Return the planes in which slices are possible: in space three, of a planar machine one."""

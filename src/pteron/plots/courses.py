@@ -1,0 +1,144 @@
+"""Courses over time: of the platform and of the joints, with their derivatives below."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
+
+from pteron.errors import DataError
+from pteron.kernels import Array, as_array
+from pteron.manipulator import RobotLike
+from pteron.plots.canvas import LEG_COLORS, MUTED, blank, leg_style, legend, panels
+from pteron.plots.joints import joints_of
+
+_ORDERS = ("", "/s", "/s²", "/s³", "/s⁴")
+
+_OF_POSE = ("pose", "velocity", "acceleration", "jerk", "snap")
+_OF_JOINTS = ("joint", "speed", "acceleration", "jerk", "snap")
+
+_WIDE, _TALL, _HEAD = 5.4, 1.35, 0.75
+"""Inches of the figure, of each row, and of what is above and below them."""
+
+
+def trajectory_figure(time: ArrayLike, *courses: ArrayLike, names: Sequence[str]) -> Figure:
+    """Return a motion of the platform: pose, velocity, acceleration and jerk over time.
+
+    Lengths and the angle stand beside each other, derivatives below what they are derivatives of.
+
+    Parameters
+    ----------
+    time : array, shape (T,)
+        s.
+    *courses : array, shape (T, m)
+        The pose and, as many as there are, its derivatives; m, rad and s.
+    names : sequence of str
+        The pose's coordinates, `robot.coordinates`: "phi" is the angle, in rad.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    DataError
+        If the shapes do not fit together.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.motion import pick_and_place
+    >>> robot = pteron.load("delta")
+    >>> cycle = pick_and_place(robot, [0.0, 0.0, -0.9])
+    >>> figure = pteron.plots.trajectory_figure(
+    ...     cycle.time, cycle.pose, cycle.velocity, names=robot.coordinates
+    ... )
+    >>> [axes.get_ylabel() for axes in figure.axes]
+    ['pose (m)', 'velocity (m/s)']
+    """
+    told = ["\u03c6" if name == "phi" else name for name in names]
+    groups = _groups(["rad" if name == "phi" else "m" for name in names])
+    return _courses_figure(time, courses, told, groups, _OF_POSE)
+
+
+def joints_figure(time: ArrayLike, *courses: ArrayLike, robot: RobotLike | None = None) -> Figure:
+    """Return the joints' coordinates over time, and below their speeds, accelerations and jerks.
+
+    Parameters
+    ----------
+    time : array, shape (T,)
+        s.
+    *courses : array, shape (T, n)
+        The joint coordinates and, as many as there are, their derivatives; m or rad, and s.
+    robot : Manipulator, name or path, optional
+        Says which joints slide and which turn, beside each other; without it all slide.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    DataError
+        If the shapes do not fit together.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.motion import pick_and_place
+    >>> cycle = pick_and_place("delta", [0.0, 0.0, -0.9])
+    >>> joints = pteron.inverse_kinematics("delta", cycle.pose)
+    >>> figure = pteron.plots.joints_figure(cycle.time, joints, robot="delta")
+    >>> figure.axes[0].get_ylabel()
+    'joint (rad)'
+    """
+    known = courses and np.ndim(courses[0]) == 2
+    units = [joint.unit for joint in joints_of(robot, courses[0] if known else np.empty((0, 0)))]
+    names = [f"leg {i + 1}" for i in range(len(units))]
+    return _courses_figure(time, courses, names, _groups(units), _OF_JOINTS)
+
+
+def _groups(units: Sequence[str]) -> dict[str, list[int]]:
+    """Return which columns have each unit."""
+    return {
+        unit: [i for i, own in enumerate(units) if own == unit] for unit in dict.fromkeys(units)
+    }
+
+
+def _courses_figure(
+    time: ArrayLike,
+    courses: Sequence[ArrayLike],
+    names: Sequence[str],
+    groups: dict[str, list[int]],
+    words: Sequence[str],
+) -> Figure:
+    t = as_array(time, "time", ())
+    values = [as_array(course, words[min(k, 4)], ()) for k, course in enumerate(courses)]
+    _expect_fitting(t, values, len(names), words)
+    labels = [
+        [f"{word} ({unit}{order})" for unit in groups]
+        for word, order, _ in zip(words, _ORDERS, values, strict=False)
+    ]
+    figure = blank(_WIDE, _HEAD + _TALL * len(values))
+    for row, course in zip(panels(figure, "time (s)", labels), values, strict=True):
+        for axes, own in zip(row, groups.values(), strict=True):
+            axes.axhline(0.0, color=MUTED, linewidth=0.8)
+            for i in own:
+                look = leg_style(i % len(LEG_COLORS), 1.6)
+                label = names[i] if course is values[0] else None
+                axes.plot(t, course[:, i], label=label, **look)
+            axes.set_xlim(float(t[0]), float(t[-1]))
+    legend(figure, len(names))
+    return figure
+
+
+def _expect_fitting(time: Array, values: list[Array], width: int, words: Sequence[str]) -> None:
+    if time.ndim != 1 or len(time) < 2:
+        raise DataError(f"time: shape {time.shape} given, (T,) expected, T above 1")
+    if not 1 <= len(values) <= len(_ORDERS):
+        raise DataError(f"{len(values)} courses given, 1 to {len(_ORDERS)} expected")
+    for word, course in zip(words, values, strict=False):
+        if course.shape != (len(time), width):
+            raise DataError(f"{word}: shape {course.shape} given, ({len(time)}, {width}) expected")

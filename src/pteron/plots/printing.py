@@ -1,0 +1,146 @@
+"""Figures for print: as wide as a column, and in files with text that stays text."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from pathlib import Path
+from typing import Any, Literal
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from pteron.atomic import write_bytes
+from pteron.errors import DataError, OutputError, shown
+from pteron.plots.canvas import FONT_SIZE, legend
+
+Width = Literal["column", "page"]
+
+WIDTHS: dict[str, float] = {"column": 3.5, "page": 7.16}
+"""Inches of a journal's column, and of both with what is between them."""
+
+_PRINTED = 8.0
+"""Points of the letters in print."""
+
+_NARROWEST, _WIDEST = 1.5, 40.0
+
+_METADATA: dict[str, dict[str, Any]] = {
+    ".svg": dict.fromkeys(("Creator", "Date", "Format", "Type")),
+    ".pdf": dict.fromkeys(("Creator", "Producer", "CreationDate")),
+    ".png": {"Software": None},
+}
+"""By the ending of the file: without a date a figure makes the same file on every run."""
+
+_TEXT: Any = {"svg.fonttype": "none", "svg.hashsalt": "pteron", "pdf.fonttype": 42}
+"""Text stays text, which a journal's printer and a search find."""
+
+
+def resized(figure: Figure, width: Width | float) -> Figure:
+    """Return the same figure for print, with letters of 8 points.
+
+    Maps and machines keep their shape; curves keep more of their height.
+
+    Parameters
+    ----------
+    figure : Figure
+        Any of this module's; it is changed.
+    width : {"column", "page"} or float
+        A journal's column (3.5 inches), its page (7.16), or inches.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    DataError
+        If it is no width.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from pteron.plots import power_figure, resized
+    >>> figure = power_figure(np.linspace(0.0, 1.0, 5), np.ones((5, 3)))
+    >>> [float(side) for side in resized(figure, "column").get_size_inches().round(1)]
+    [3.5, 2.7]
+    """
+    inches: Any = WIDTHS.get(width, 0.0) if isinstance(width, str) else width
+    if not isinstance(inches, int | float) or not _NARROWEST <= inches <= _WIDEST:
+        names = ", ".join(f'"{name}"' for name in WIDTHS)
+        raise DataError(
+            f"width: {shown(width)} given; {names} or {_NARROWEST:g} to {_WIDEST:g} inches expected"
+        )
+    wide, tall = (float(side) for side in figure.get_size_inches())
+    shaped = any(axes.name == "3d" or axes.get_aspect() != "auto" for axes in figure.axes)
+    ratio = inches / wide
+    figure.set_size_inches(inches, tall * (ratio if shaped else ratio**0.5))
+    for text in figure.findobj(Text):
+        assert isinstance(text, Text)
+        text.set_fontsize(float(text.get_fontsize()) * _PRINTED / FONT_SIZE)
+    for scale in (scale for axes in figure.axes for scale in (axes.xaxis, axes.yaxis)):
+        for label in scale.get_ticklabels()[:1]:
+            scale.set_tick_params(labelsize=label.get_fontsize())  # also of those to come
+    _fit_legend(figure, inches)
+    return figure
+
+
+def _fit_legend(figure: Figure, inches: float) -> None:
+    """Break the legend into as many rows as it needs."""
+    if not figure.legends:
+        return
+    columns = len(figure.legends[0].get_texts())
+    while True:
+        figure.legends[0].remove()
+        legend(figure, columns)
+        box = figure.legends[0].get_window_extent()
+        if box.width <= inches * figure.dpi or columns == 1:
+            return
+        columns = -(-columns // 2)
+
+
+def save_figure(
+    figure: Figure, path: str | Path, *, width: Width | float | None = None, dpi: float = 300.0
+) -> Path:
+    """Write a figure to a file, whole or not at all; text in it stays text.
+
+    The same figure makes the same file on every run.
+
+    Parameters
+    ----------
+    figure : Figure
+        What to write.
+    path : str or Path
+        The file: .svg, .pdf or .png.
+    width : {"column", "page"} or float, optional
+        What `resized` makes of it first; by default it is written as it is.
+    dpi : float
+        Dots an inch of a .png.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    OutputError
+        If the ending is another one, or the file cannot be written.
+    DataError
+        If it is no width.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> figure = pteron.plots.draw(pteron.load("delta"))
+    >>> pteron.plots.save_figure(figure, "delta.pdf", width="column")  # doctest: +SKIP
+    PosixPath('delta.pdf')
+    """
+    target = Path(path)
+    ending = target.suffix.lower()
+    if ending not in _METADATA:
+        raise OutputError(f"{path}: {ending or 'no'} ending, {', '.join(_METADATA)} expected")
+    if width is not None:
+        resized(figure, width)
+    buffer = BytesIO()
+    with mpl.rc_context(_TEXT):
+        figure.savefig(buffer, format=ending[1:], dpi=dpi, metadata=_METADATA[ending])
+    return write_bytes(target, buffer.getvalue())

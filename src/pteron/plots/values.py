@@ -1,0 +1,158 @@
+"""Values of parameters with their intervals, and counts, as one row a name."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
+
+from pteron.errors import DataError
+from pteron.kernels import Array
+from pteron.plots.canvas import (
+    FONT_SIZE,
+    GRID,
+    INK,
+    MUTED,
+    PAPER,
+    REACH,
+    WARNING,
+    blank,
+    plain_axes,
+    spot,
+)
+
+_WIDE = 5.4
+_ROW = 0.185
+_HEAD = 0.5
+"""Inches of the figure, of each row, and of the scale below the rows of one unit."""
+
+
+def parameters_figure(
+    names: Sequence[str],
+    values: ArrayLike,
+    *,
+    intervals: ArrayLike | None = None,
+    units: Sequence[str] = (),
+    reference: ArrayLike | None = None,
+) -> Figure:
+    """Return the values of parameters with their intervals, each unit on a scale of its own.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the p parameters.
+    values : array, shape (p,)
+        In their units.
+    intervals : array, shape (p,), optional
+        Half the width of each interval, such as 1.96 standard deviations; NaN where it is unknown.
+    units : sequence of str, optional
+        Of each; without them all share one scale.
+    reference : array, shape (p,), optional
+        What the values are compared with, such as the drawing's: open rings. A value whose
+        interval does not hold its reference is red.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    DataError
+        If there is not one of each for each name.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> base = pteron.base_parameters(pteron.load("delta"))
+    >>> units = [base.parameters[k].unit for k in base.kept]
+    >>> figure = pteron.plots.parameters_figure(base.names, base.values(), units=units)
+    >>> [axes.get_xlabel() for axes in figure.axes]
+    ['kg m', 'kg m^2', 'kg']
+    """
+    found = _fitting(names, values, "values")
+    wide = np.full(len(names), np.nan)
+    if intervals is not None:
+        wide = _fitting(names, intervals, "intervals")
+    known = None if reference is None else _fitting(names, reference, "reference")
+    if units and len(units) != len(names):
+        raise DataError(f"units: {len(units)} given, {len(names)} expected, one for each name")
+    groups: dict[str, list[int]] = {}
+    for i, unit in enumerate(units or ["value"] * len(names)):
+        groups.setdefault(unit, []).append(i)
+    counts = [len(own) for own in groups.values()]
+    figure = blank(_WIDE, _HEAD * len(groups) + _ROW * len(names))
+    grid = figure.add_gridspec(len(groups), 1, height_ratios=[count + 1.0 for count in counts])
+    for k, (unit, own) in enumerate(groups.items()):
+        axes = _rows(figure, [names[i] for i in own], unit)
+        axes.set_subplotspec(grid[k])
+        axes.axvline(0.0, color=MUTED, linewidth=0.8)
+        for y, i in enumerate(reversed(own)):
+            if known is not None:
+                spot(axes, known[i], y, PAPER, INK, 7.5, markeredgewidth=1.2)
+            missed = known is not None and abs(found[i] - known[i]) > wide[i]
+            color = WARNING if missed else REACH
+            if np.isfinite(wide[i]):
+                ends = [found[i] - wide[i], found[i] + wide[i]]
+                axes.plot(ends, [y, y], color=color, linewidth=2.0, marker="|", markersize=6.0)
+            spot(axes, found[i], y, color, PAPER, 5.0, markeredgewidth=0.6)
+    return figure
+
+
+def operations_figure(names: Sequence[str], counts: ArrayLike) -> Figure:
+    """Return bars of how much each of some costs, such as operations, with its number.
+
+    Parameters
+    ----------
+    names : sequence of str
+        What is counted, from the top.
+    counts : array, shape (p,)
+        0 or more.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    DataError
+        If there is not one for each name.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> robot = pteron.load("delta")
+    >>> kernel = pteron.compile(robot, "inverse_dynamics", "vm")
+    >>> figure = pteron.plots.operations_figure(["delta"], [kernel.operations])
+    """
+    numbers = _fitting(names, counts, "counts")
+    figure = blank(_WIDE, 0.6 + 0.3 * len(names))
+    axes = _rows(figure, names, "operations")
+    rows = np.arange(len(names))[::-1]
+    axes.barh(rows, numbers, height=0.6, color=REACH)
+    for row, number in zip(rows, numbers, strict=True):
+        style: dict[str, Any] = {"va": "center", "fontsize": FONT_SIZE, "color": INK}
+        axes.annotate(
+            f"{number:g}", (number, row), xytext=(4, 0), textcoords="offset points", **style
+        )
+    axes.set_xlim(0.0, 1.12 * float(numbers.max(initial=0.0)) or 1.0)
+    return figure
+
+
+def _rows(figure: Figure, names: Sequence[str], xlabel: str) -> Axes:
+    axes = plain_axes(figure, xlabel, "")
+    axes.grid(visible=False, axis="y")
+    axes.grid(visible=True, axis="x", color=GRID, linewidth=0.6)
+    axes.set_ylim(-0.7, len(names) - 0.3)
+    axes.set_yticks(range(len(names)), list(reversed(names)), fontsize=FONT_SIZE - 1.0)
+    return axes
+
+
+def _fitting(names: Sequence[str], values: ArrayLike, what: str) -> Array:
+    found = np.asarray(values, dtype=float)
+    if found.shape != (len(names),):
+        raise DataError(f"{what}: shape {found.shape} given, ({len(names)},) expected")
+    return found
