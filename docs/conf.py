@@ -102,7 +102,7 @@ if GALLERY.is_dir() and find_spec("sphinx_gallery") is not None:
         "min_reported_time": 1e9,
         "show_memory": False,
         "show_signature": False,
-        "plot_gallery": True,
+        "capture_repr": ("_repr_html_",),
     }
 
 

@@ -161,6 +161,7 @@ WITH_BLOCKS = [name for name, text in TEXTS.items() if name != "README.md" and b
 def test_python_runs(name, tmp_path, monkeypatch):
     """In order, in one session; what follows `>>>` is compared with what is shown."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("builtins.input", lambda *words: "")  # Enter ends the viewer
     names: dict[str, object] = {}
     finder = doctest.DocTestParser()
     runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS)
