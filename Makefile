@@ -1,4 +1,4 @@
-# `make demo` and `make test` set up what they need in .venv; only Python 3.11+ and make are expected.
+# `make demo`, `make test` and `make docs` set up what they need in .venv; only Python 3.11+ and make are expected.
 
 PYTHON ?= python3
 VENV := .venv
@@ -7,7 +7,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
 QUICK := published kinematics delta family manipulator errors toml passes payload costs
 
-.PHONY: demo quick test lint bench clean
+.PHONY: demo quick test lint bench docs clean
 
 demo: $(VENV)/.runtime
 	$(BIN)/pteron report quadrupteron --out demo
@@ -31,6 +31,13 @@ lint: $(VENV)/.dev
 bench: $(VENV)/.dev
 	$(BIN)/python benchmarks
 
+# The site, docs/_build/html: every picture and table drawn, every notebook and example run anew;
+# a warning is an error, and then every link of it is followed.
+docs: $(VENV)/.docs
+	$(BIN)/python docs/pictures/draw.py
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m sphinx -W --keep-going -n -q -d docs/_build/doctrees docs docs/_build/html
+	$(BIN)/python docs/check_site.py docs/_build/html
+
 $(VENV)/.runtime: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(PIP) install --editable '.[consistency]'
@@ -41,5 +48,11 @@ $(VENV)/.dev: pyproject.toml
 	$(PIP) install --editable '.[dev]'
 	touch $@ $(VENV)/.runtime
 
+$(VENV)/.docs: pyproject.toml
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(PIP) install --editable '.[docs]'
+	touch $@ $(VENV)/.runtime
+
 clean:
-	rm -rf $(VENV) demo dist build
+	rm -rf $(VENV) demo dist build docs/_build docs/gallery docs/measured
+	rm -rf docs/reference/functions docs/reference/inside docs/reference/modules

@@ -1,10 +1,9 @@
-"""Draw the pictures of docs/view.md: the page of `pteron view`, in headless Chromium."""
+"""Draw view.png and view-planar.png for docs/view.md: the page of `pteron view` in Chromium."""
 
 from __future__ import annotations
 
 import os
 import shutil
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,27 +11,27 @@ import numpy as np
 import pteron
 from pteron.viewer import Viewer, view
 
-_HERE = Path(__file__).parent
 _FLAGS = ("--no-sandbox", "--disable-gpu", "--use-gl=angle", "--use-angle=swiftshader")
 _SIZE = {"width": 1180, "height": 760}
 _STILL = 2500
 """ms after which the page no longer changes."""
 
 
-def main() -> None:
+def draw(docs: Path) -> None:
     """Write view.png, the Quadrupteron with a slice, and view-planar.png, a 3-RRR at its end."""
     program = os.environ.get("PTERON_BROWSER") or shutil.which("chromium")
     if program is None:
-        sys.exit("docs/view_picture.py: no Chromium on this machine; PTERON_BROWSER may name one")
+        print("view.png is left as it is: no Chromium here; PTERON_BROWSER may name one")
+        return
     with view(pteron.load("quadrupteron"), port=0) as viewer:
         viewer.move_to([0.03, 0.05, 0.06, np.radians(25.0)])
-        _shoot(program, viewer, "view.png", ("Show", "workspace slice", "xz"))
+        _shoot(program, viewer, docs / "view.png", ("Show", "workspace slice", "xz"))
     with view(pteron.load("3-rrr"), port=0) as viewer:
         viewer.move_to([0.0, 0.3, 0.0])
-        _shoot(program, viewer, "view-planar.png", None)
+        _shoot(program, viewer, docs / "view-planar.png", None)
 
 
-def _shoot(program: str, viewer: Viewer, name: str, choice: tuple[str, str, str] | None) -> None:
+def _shoot(program: str, viewer: Viewer, path: Path, choice: tuple[str, str, str] | None) -> None:
     """Write a picture of the page, after a choice in one of its tabs."""
     from playwright.sync_api import sync_playwright
 
@@ -52,9 +51,5 @@ def _shoot(program: str, viewer: Viewer, name: str, choice: tuple[str, str, str]
         # Chromium without a graphics card says so in a corner.
         page.add_style_tag(content=".mantine-Notifications-root { display: none }")
         page.wait_for_timeout(_STILL)
-        page.screenshot(path=str(_HERE / name))
+        page.screenshot(path=str(path))
         browser.close()
-
-
-if __name__ == "__main__":
-    main()

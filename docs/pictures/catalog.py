@@ -1,4 +1,4 @@
-"""Draw the machines of the catalog at home for docs/catalog.md: docs/catalog/NAME.png."""
+"""Draw the machines of the catalog at home, for docs/catalog.md: catalog/NAME.png."""
 
 from __future__ import annotations
 
@@ -11,19 +11,14 @@ from pteron.motion import joint_guides, joint_points
 from pteron.plots import robot_figure
 from pteron.workspace import home_pose
 
-FOLDER = Path(__file__).parent / "catalog"
 
-
-def main() -> None:
+def draw(docs: Path) -> None:
     """Draw all of them."""
-    FOLDER.mkdir(exist_ok=True)
+    (docs / "catalog").mkdir(exist_ok=True)
     for name in pteron.catalog():
         robot = pteron.load(name)
         home = home_pose(robot)
         guides = joint_guides(robot, home[None])
         figure = robot_figure(joint_points(robot, home), guides, gravity=np.array(robot.gravity))
-        figure.savefig(FOLDER / f"{name}.png", dpi=50, facecolor="white", bbox_inches="tight")
-
-
-if __name__ == "__main__":
-    main()
+        path = docs / "catalog" / f"{name}.png"
+        figure.savefig(path, dpi=50, facecolor="white", bbox_inches="tight")

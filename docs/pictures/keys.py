@@ -20,8 +20,6 @@ from pteron.manipulator.tables import (
     leg_table,
 )
 
-PAGE = Path(__file__).parent / "robot-file.md"
-
 TABLES: dict[str, type[Table]] = {
     "the machine": MachineTable,
     "platform": PlatformTable,
@@ -57,5 +55,8 @@ def filled(page: str) -> str:
     return _MARKED.sub(lambda found: f"{found[1]}{key_table(TABLES[found[2]])}{found[3]}", page)
 
 
-if __name__ == "__main__":
-    PAGE.write_text(filled(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+def write(page: Path) -> None:
+    """Write the tables into the page."""
+    text = page.read_text(encoding="utf-8")
+    if filled(text) != text:
+        page.write_text(filled(text), encoding="utf-8")

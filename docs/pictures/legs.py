@@ -1,4 +1,4 @@
-"""Draw each kind of leg with its frames for docs/robot-file.md: docs/legs/TYPE.svg.
+"""Draw each kind of leg with its frames, for docs/robot-file.md: legs/TYPE.svg.
 
 The points and axes are those of the leg's equations in one pose; only the names are put by hand.
 """
@@ -20,8 +20,6 @@ from pteron import PRR, PRRR, PSS, RRR, RSS, RUPU, PlanarInertia, RodInertia
 from pteron.bodies.motion import AngleMotion, PointMotion
 from pteron.kernels import Array
 from pteron.legs import LegKind
-
-FOLDER = Path(__file__).parent / "legs"
 
 INK, MUTED, PAPER = "#1c2630", "#8a949e", "#ffffff"
 UPPER, LOWER, PLATE, GIVEN = "#0072b2", "#d55e00", "#3d6b8f", "#00795a"
@@ -387,12 +385,8 @@ def rupu() -> Sheet:
 DRAWINGS = {"PRRR": prrr, "PSS": pss, "RSS": rss, "RRR": rrr, "PRR": prr, "RUPU": rupu}
 
 
-def main(folder: Path = FOLDER, suffix: str = ".svg") -> None:
-    """Write all drawings into a folder."""
-    folder.mkdir(exist_ok=True)
-    for name, draw in DRAWINGS.items():
-        draw().save(folder / f"{name}{suffix}")
-
-
-if __name__ == "__main__":
-    main()
+def draw(docs: Path) -> None:
+    """Write all drawings."""
+    (docs / "legs").mkdir(exist_ok=True)
+    for name, drawn in DRAWINGS.items():
+        drawn().save(docs / "legs" / f"{name}.svg")

@@ -1,0 +1,61 @@
+"""Where each numbered equation of the theory stands in the code. A test holds both ends."""
+
+_E, _L, _R = "pteron.equations", "pteron.legs", "pteron.reduction"
+
+CODE: dict[str, tuple[str, ...]] = {
+    # The paper's.
+    "1": (f"{_L}.circles.links_from_triangle",),
+    "2": (f"{_L}.circles.links_from_triangle",),
+    "3": (f"{_L}.prrr.PRRREquations",),
+    "4": (f"{_L}.prrr.PRRREquations.motion", f"{_E}.kinematics.inverse_position"),
+    "5": (f"{_L}.prrr.PRRREquations",),
+    "6": (f"{_E}.kinematics.link_vectors", f"{_L}.circles.links_from_triangle"),
+    "7": (f"{_E}.kinematics.link_vectors", f"{_L}.circles.links_from_triangle"),
+    "8": (f"{_E}.kinematics.joint_screws",),
+    "9": (f"{_E}.kinematics.joint_screws", f"{_E}.kinematics.chain_motion"),
+    "10": (f"{_E}.kinematics.jacobian",),
+    "11": (f"{_E}.kinematics.link_jacobians", f"{_E}.kinematics.body_jacobian"),
+    "12": (f"{_E}.kinematics.link_jacobians", f"{_E}.kinematics.body_jacobian"),
+    "13": (f"{_E}.virtual_work.inverse_dynamics", f"{_L}.leg.LegEquations.needs"),
+    "14": (f"{_E}.virtual_work.needed_forces", "pteron.bodies.motion.needed_wrench"),
+    "15": (f"{_E}.regressor.paper_regressor", f"{_E}.virtual_work.inverse_dynamics"),
+    "16": ("pteron.bodies.parameters.parameter_list", "pteron.bodies.inertia.PlanarInertia"),
+    # Ours: kinematics.
+    "K1": (f"{_L}.circles.squared_reach",),
+    "K2": (f"{_L}.prrr.PRRREquations",),
+    "K3": ("pteron.platforms.turning.Turning.motion",),
+    "K4": (f"{_L}.prrr.PRRREquations", f"{_E}.kinematics.link_turning"),
+    "K5": (f"{_L}.prrr.PRRREquations", f"{_E}.kinematics.link_turning"),
+    # Virtual work, and the Lagrangian form.
+    "V1": ("pteron.bodies.motion.needed_wrench", "pteron.bodies.motion.wrench_matrix"),
+    "V2": (
+        *(f"{_E}.lagrangian.mass_matrix", f"{_E}.lagrangian.coriolis_matrix"),
+        f"{_E}.lagrangian.forward_dynamics",
+    ),
+    # Base parameters.
+    "B1": (f"{_R}.base_parameters", f"{_R}.base_regressor"),
+    "B2": (f"{_R}.transfers.transfers", f"{_L}.prrr.PRRR.transfers"),
+    "B3": (f"{_R}.transfers.transfers",),
+    # The family of legs.
+    "F1": (f"{_L}.slide.SlideEquations.state",),
+    "F2": (f"{_L}.crank.CrankEquations.state",),
+    "F3": (f"{_L}.slide.SlideEquations.state", f"{_L}.crank.CrankEquations.state"),
+    "F4": ("pteron.closures.closure.Closure.forces", "pteron.closures.closure.plain_rows"),
+    "F5": (f"{_L}.slide.SlideEquations.needs", f"{_L}.crank.CrankEquations.needs"),
+    "F6": (f"{_E}.virtual_work.needed_forces",),
+    "F7": ("pteron.platforms.turning.Turning.motion", "pteron.platforms.sliding.Sliding.motion"),
+    # Direct position.
+    "P1": ("pteron.closures.constant_rows.ConstantRows.poses",),
+    "P2": (f"{_E}.closing.closure_rows",),
+    "P3": (f"{_E}.closing.closure_rows", "pteron.kinematics.assembly.every_pose"),
+    "P4": (f"{_E}.closing.newton_step", f"{_E}.closing.direct_step"),
+    # Singularities.
+    "T1": ("pteron.closures.closure.Closure.measure",),
+    "T2": ("pteron.closures.constant_rows.ConstantRows", "pteron.singular_orientations"),
+    # Drives, control, identification.
+    "D1": (f"{_E}.drives.drive_forces", f"{_E}.drives.friction"),
+    "D2": (f"{_E}.drives.drive_accelerations",),
+    "D3": (f"{_E}.laws.adaptive", f"{_E}.mixed.mixed_forces"),
+    "I1": ("pteron.identification.observations_of",),
+    "I2": ("pteron.identification.weighted",),
+}

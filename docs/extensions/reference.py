@@ -1,0 +1,225 @@
+"""The reference: pages of everything public, written from what the package says of itself.
+
+A function that no topic names comes under "More", a module of `pteron.__all__` gets a page of its
+own, so that nothing public is left out.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Iterable
+from importlib import import_module
+from pkgutil import iter_modules
+from types import ModuleType
+from typing import Any
+
+from sphinx.application import Sphinx
+from sphinx.domains.python import ObjectEntry, PythonDomain
+from sphinx.environment import BuildEnvironment
+from sphinx.ext import autosummary
+
+import pteron
+
+TOPICS: dict[str, tuple[str, ...]] = {
+    "Robots": (
+        *("load", "save", "catalog", "Manipulator", "Platform", "Bar", "Geared", "turned"),
+        *("PRRR", "PSS", "RSS", "RRR", "PRR", "RUPU", "Leg", "Cone", "Drive", "Stribeck"),
+        *("PlanarInertia", "RodInertia"),
+    ),
+    "Parameters": (
+        *("parameters", "parameter_names", "parameter_units", "parameter_data", "Parameter"),
+        *("with_parameters", "base_parameters", "BaseParameters", "base_regressor"),
+        "cheapest_parameters",
+    ),
+    "Kinematics": (
+        *("inverse_kinematics", "direct_kinematics", "follow", "jacobian", "joint_rates"),
+        *("joint_accelerations", "JointMotion", "joint_screws", "link_vectors", "link_jacobians"),
+        *("working_mode", "working_modes", "assembly_mode", "singular_orientations"),
+        *("is_singular_everywhere", "random_poses"),
+    ),
+    "Dynamics": (
+        *("inverse_dynamics", "forward_dynamics", "regressor", "drive_forces"),
+        *("drive_accelerations", "mass_matrix", "bias_forces", "coriolis_matrix"),
+        *("gravity_forces", "kinetic_energy", "potential_energy"),
+    ),
+    "Code": ("compile", "export_c", "export_st"),
+    "Errors": (
+        *("PteronError", "ModelError", "UnreachablePose", "SingularPose", "DataError"),
+        "OutputError",
+    ),
+}
+"""What stands on which page, in order."""
+
+MORE_MODULES = ("pteron.reduction",)
+"""Public, though `pteron.__all__` has its functions only."""
+
+INSIDE = {
+    "equations": "The paper, as expressions: [the theory](../../theory/index.md) links here.",
+    "legs": "One file for each kind of leg; read [how to write one](../../how-to/own-leg.md).",
+    "closures": "How the legs' rows make up the Jacobian, and back.",
+    "platforms": "One file for each kind of platform.",
+    "bodies": "Vectors, inertia, parameters, and a body in motion.",
+    "reduction": "Which parameters count: the parts of `pteron.reduction`.",
+    "kinematics": "Numbers: what stands behind the functions of kinematics.",
+}
+"""Packages whose parts have a page, for those who read on."""
+
+
+def directive_for(value: object) -> str:
+    """Return which directive documents a thing."""
+    if inspect.isclass(value):
+        return "autoexception" if issubclass(value, BaseException) else "autoclass"
+    return "autofunction" if callable(value) else "autodata"
+
+
+def by_topic() -> dict[str, tuple[str, ...]]:
+    """Return the public names by page."""
+    named = {name for names in TOPICS.values() for name in names}
+    modules = {name for name in pteron.__all__ if isinstance(getattr(pteron, name), ModuleType)}
+    found = {
+        topic: tuple(name for name in names if name in pteron.__all__)
+        for topic, names in TOPICS.items()
+    }
+    rest = tuple(name for name in pteron.__all__ if name not in named | modules)
+    return found | ({"More": rest} if rest else {})
+
+
+def public_modules() -> list[ModuleType]:
+    """Return the modules that `pteron` hands on."""
+    values = [getattr(pteron, name) for name in pteron.__all__]
+    found = [value for value in values if isinstance(value, ModuleType)]
+    return [*found, *map(import_module, MORE_MODULES)]
+
+
+def parts(package: str) -> list[str]:
+    """Return the modules of a package, by their full names."""
+    whole = import_module(f"pteron.{package}")
+    return sorted(f"{whole.__name__}.{part.name}" for part in iter_modules(whole.__path__))
+
+
+def _documented(owner: ModuleType, names: Iterable[str]) -> list[str]:
+    """Return the lines that list names of a module, and then tell about each."""
+    lines = [f".. currentmodule:: {owner.__name__}", "", ".. autosummary::", ""]
+    lines += [f"   {name}" for name in names] + [""]
+    for name in names:
+        lines += [f".. {directive_for(getattr(owner, name))}:: {name}", ""]
+    return lines
+
+
+def _page(title: str, lines: list[str]) -> str:
+    return "\n".join([f"# {title}", "", "```{eval-rst}", *lines, "```", ""])
+
+
+def pages() -> dict[str, str]:
+    """Return the pages in Markdown by where they stand in reference/."""
+    found = {}
+    for topic, names in by_topic().items():
+        found[f"functions/{topic.lower()}.md"] = _page(topic, _documented(pteron, names))
+    for module in public_modules():
+        lines = [f".. automodule:: {module.__name__}", "   :no-members:", ""]
+        lines += _documented(module, sorted(module.__all__, key=str.lower))
+        path = f"modules/{module.__name__.removeprefix('pteron.')}.md"
+        found[path] = _page(f"`{module.__name__}`", lines)
+    for package, intro in INSIDE.items():
+        text = [f"# Inside `pteron.{package}`", "", intro, ""]
+        for part in parts(package):
+            text += [f"## `{part.removeprefix('pteron.')}`", "", "```{eval-rst}"]
+            text += [f".. automodule:: {part}", "   :members:", "```", ""]
+        found[f"inside/{package}.md"] = "\n".join(text)
+    return found
+
+
+def write_pages(app: Sphinx) -> None:
+    """Write the pages that have changed, and remove those that are no more."""
+    folder = app.srcdir / "reference"
+    wanted = pages()
+    for part in ("functions", "modules", "inside"):
+        (folder / part).mkdir(exist_ok=True)
+        for old in (folder / part).glob("*.md"):
+            if f"{part}/{old.name}" not in wanted:
+                old.unlink()
+    for name, text in wanted.items():
+        path = folder / name
+        if not path.is_file() or path.read_text(encoding="utf-8") != text:
+            path.write_text(text, encoding="utf-8")
+
+
+_BAR = re.compile(r"(`[^`]*`)|\|")
+_VALUES = ("attribute", "data", "property")
+
+
+def whole_values(
+    app: Sphinx, what: str, name: str, thing: object, options: Any, lines: list[str]
+) -> None:
+    """Keep what is said of a value whole: napoleon takes "(n, 1): m or rad" for a type."""
+    if what in _VALUES and lines:
+        lines[0] = lines[0].replace(":", _COLON)
+
+
+def plain_bars(
+    app: Sphinx, what: str, name: str, thing: object, options: Any, lines: list[str]
+) -> None:
+    """Keep |w|, a length in plain text, from being read as markup."""
+    lines[:] = [
+        line if line.lstrip().startswith((">>>", "...")) else _BAR.sub(_without_meaning, line)
+        for line in (line.replace(_COLON, ":") for line in lines)
+    ]
+
+
+_COLON = "\N{RATIO}"
+"""What stands for a colon while napoleon reads."""
+
+
+def _without_meaning(found: re.Match[str]) -> str:
+    return found[1] or "\\|"
+
+
+def without_aliases(
+    app: Sphinx, what: str, name: str, thing: object, skip: bool, options: Any
+) -> bool | None:
+    """Leave out fields of named tuples that say no more than their number."""
+    said = getattr(thing, "__doc__", None) or ""
+    return True if said.startswith("Alias for field number") else None
+
+
+class Names(PythonDomain):
+    """Names in docstrings: exactly, in their class or module, or as pteron's public names.
+
+    Of others a class, or a name with a dot, is found by its end; a word like `value` is a word.
+    """
+
+    def find_obj(
+        self,
+        env: BuildEnvironment,
+        modname: str | None,
+        classname: str | None,
+        name: str,
+        type: str | None,  # noqa: A002
+        searchmode: int = 0,
+    ) -> list[tuple[str, ObjectEntry]]:
+        """Return the one thing that a name means, if there is one."""
+        name = name.removesuffix("()").removeprefix("pteron.")
+        places = (f"{modname}.{classname}", f"{modname}", f"pteron.{classname}", "pteron")
+        found = [f"{place}.{name}" for place in places]
+        if "." in name or name[:1].isupper():
+            found += sorted((n for n in self.objects if n.endswith(f".{name}")), key=len)
+        return [(full, self.objects[full]) for full in found if full in self.objects][:1]
+
+
+# What does not end the first sentence of a docstring.
+setattr(  # noqa: B010
+    autosummary,
+    "WELL_KNOWN_ABBREVIATIONS",
+    (*autosummary.WELL_KNOWN_ABBREVIATIONS, "Eq.", "Eqs."),
+)
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    """Tell Sphinx."""
+    app.connect("builder-inited", write_pages)
+    app.connect("autodoc-process-docstring", whole_values, priority=450)
+    app.connect("autodoc-process-docstring", plain_bars, priority=550)
+    app.connect("autodoc-skip-member", without_aliases)
+    app.add_domain(Names, override=True)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,0 +1,43 @@
+"""Whether two pictures look the same, though another version of matplotlib has drawn them."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+from matplotlib.image import imread
+
+_FRINGE = 2
+"""Pixels by which a picture's size may differ, as its text is a little wider."""
+
+_DIFFERENCE = 0.01
+"""Mean difference of colours, of 1, that nobody sees."""
+
+_SHIFT = 0.5
+"""How far a point of an SVG may have moved."""
+
+
+def alike(old: Path, new: Path) -> bool:
+    """Return whether two PNG or two SVG files show the same."""
+    if not old.is_file():
+        return False
+    return _same_drawing(old, new) if new.suffix == ".svg" else _same_pixels(old, new)
+
+
+def _same_pixels(old: Path, new: Path) -> bool:
+    a, b = (imread(path)[..., :3].astype(float) for path in (old, new))
+    if max(abs(m - n) for m, n in zip(a.shape, b.shape, strict=True)) > _FRINGE:
+        return False
+    rows, columns = np.minimum(a.shape[:2], b.shape[:2])
+    return bool(np.abs(a[:rows, :columns] - b[:rows, :columns]).mean() < _DIFFERENCE)
+
+
+def _same_drawing(old: Path, new: Path) -> bool:
+    a, b = _numbers(old), _numbers(new)
+    return len(a) == len(b) and bool((np.abs(a - b) < _SHIFT).all())
+
+
+def _numbers(path: Path) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    text = re.sub(r"(?s)<metadata>.*?</metadata>", "", path.read_text(encoding="utf-8"))
+    return np.array([float(x) for x in re.findall(r"(?<![\w#.-])-?\d+\.\d+", text)])

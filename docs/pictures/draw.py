@@ -1,0 +1,49 @@
+"""Make every picture and table of README and docs anew: `python docs/pictures/draw.py`.
+
+What looks as it did stays as it is, to the byte; what does not is replaced, and named.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import catalog
+import cycle
+import engines
+import keys
+import legs
+import view_page
+from alike import alike
+
+DOCS = Path(__file__).parents[1]
+
+DRAWN: dict[str, Callable[[Path], None]] = {
+    "catalog": catalog.draw,
+    "cycle": cycle.draw,
+    "engines": engines.draw,
+    "legs": legs.draw,
+    "view_page": view_page.draw,
+}
+"""What writes each group of pictures into a folder laid out as docs, by the script's name."""
+
+
+def main() -> None:
+    """Draw all of them, and say which have changed."""
+    keys.write(DOCS / "robot-file.md")
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        for draw in DRAWN.values():
+            draw(folder)
+        for picture in sorted(path for path in folder.rglob("*") if path.is_file()):
+            kept = DOCS / picture.relative_to(folder)
+            if not alike(kept, picture):
+                print(f"drawn anew: {kept.relative_to(DOCS.parent)}", flush=True)
+                kept.parent.mkdir(exist_ok=True)
+                shutil.copy(picture, kept)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,242 @@
+"""README and docs show what is there: links, names, commands, examples, pictures, equations.
+
+What Sphinx itself refuses is left to `make docs`. The commands of docs/from-log-to-controller.md
+run in test_walk.py, README's doctests where pytest collects them, the examples in test_examples.py.
+"""
+
+import ast
+import doctest
+import importlib
+import re
+import runpy
+import shlex
+import sys
+from pathlib import Path
+
+import pytest
+from typer.main import get_command
+from typer.testing import CliRunner
+
+import pteron
+from pteron.cli.main import app
+
+ROOT = Path(__file__).parent.parent
+DOCS = ROOT / "docs"
+MADE = ("_build", "gallery", "measured", "functions", "inside", "modules")
+"""Folders of docs that `make docs` fills."""
+
+PAGES = sorted(
+    (ROOT / "README.md", *(p for p in DOCS.rglob("*.md") if not {*p.parts} & {*MADE})),
+)
+TEXTS = {str(page.relative_to(ROOT)): page.read_text(encoding="utf-8") for page in PAGES}
+NAMES = pytest.mark.parametrize("name", TEXTS)
+
+sys.path.insert(0, str(DOCS / "extensions"))
+
+
+# Links.
+
+
+def headings(page):
+    """Return the anchors of a page: of its headings as GitHub and MyST make them, and labels."""
+    text = re.sub(r"(?ms)^```.*?^```", "", page.read_text(encoding="utf-8"))
+    found = {
+        re.sub(r"[^\w\- ]", "", title.lower()).strip().replace(" ", "-")
+        for title in re.findall(r"(?m)^#+ (.*)$", text)
+    }
+    return found | set(re.findall(r"(?m)^\((.*)\)=$", text))
+
+
+@NAMES
+def test_links_lead_somewhere(name):
+    page, text = ROOT / name, re.sub(r"(?s)```.*?```", "", TEXTS[name])
+    links = re.findall(r"\]\(([^)\s]+)\)", text) + re.findall(r'src="([^"]+)"', text)
+    for link in links:
+        if link.startswith(("https://", "http://")):
+            continue
+        path, _, anchor = link.partition("#")
+        target = (page.parent / path).resolve() if path else page
+        assert target.exists(), f"{name}: {link}"
+        if anchor:
+            assert anchor in headings(target), f"{name}: {link}"
+
+
+@NAMES
+def test_names_and_paths_are_there(name):
+    for path in re.findall(r"`((?:tests|benchmarks|examples|docs)/[\w./-]+)`", TEXTS[name]):
+        assert (ROOT / path).exists() or path == "docs/_build/html", f"{name}: {path}"
+    for path in re.findall(r"`((?:legs|closures|platforms|equations)/\w+\.py)`", TEXTS[name]):
+        assert (ROOT / "src" / "pteron" / path).exists(), f"{name}: {path}"
+    roles = re.findall(r"\{py:\w+\}`(?:[^`<]*<)?([\w.]+)>?`", TEXTS[name])
+    for dotted in [*roles, *re.findall(r"`(pteron(?:\.\w+)+)(?:\(.*?\))?`", TEXTS[name])]:
+        thing, *rest = dotted.split(".")
+        found = importlib.import_module(thing)
+        for part in rest:
+            if not hasattr(found, part):
+                found = importlib.import_module(f"{found.__name__}.{part}")
+            else:
+                found = getattr(found, part)
+
+
+# Commands.
+
+_LINE = re.compile(r"(?m)^(?: {4})?(?:\$ )?((?:\.venv/bin/)?pteron(?: .*)?)$")
+
+
+def commands(text):
+    """Return the commands of the program that stand on lines of their own, without remarks."""
+    text = re.sub(r"(?ms)^```(?!console).*?^```", "", text)
+    lines = (line for line in _LINE.findall(text) if not line.startswith("pteron."))
+    return [line.split("  #")[0].rstrip().removeprefix(".venv/bin/") for line in lines]
+
+
+@NAMES
+def test_options_that_are_shown_exist(name):
+    group = get_command(app)
+    for line in commands(TEXTS[name]):
+        _, subcommand, *words = shlex.split(line)
+        assert subcommand in group.commands, f"{name}: {line}"
+        known = {option for p in group.commands[subcommand].params for option in p.opts}
+        used = {word.split("=")[0] for word in words if word.startswith("--")}
+        assert used <= known, f"{name}: {line}"
+
+
+RUN = ("README.md", "docs/start/first-result.md", "docs/start/install.md")
+LEFT = {
+    "excite": "searches for its motion; test_excitation_files.py",
+    "identify": "wants a log; test_walk.py",
+    "report": "test_report.py",
+    "simulate": "test_simulate_cli.py",
+}
+"""Subcommands that are not run here, and where they are."""
+
+
+@pytest.mark.parametrize("name", RUN)
+def test_commands_run(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    ran = 0
+    for line in commands(TEXTS[name]):
+        _, subcommand, *words = shlex.split(line)
+        if subcommand in LEFT or "..." in words:
+            continue
+        result = CliRunner().invoke(app, [subcommand, *words])
+        assert result.exit_code == 0, f"{line}\n{result.stderr}"
+        ran += 1
+    assert ran
+
+
+def sessions(text):
+    """Yield commands after `$ ` with what is shown below them."""
+    for block in re.findall(r"(?m)(?:^(?: {4}.*)?\n)+", text):
+        shown = re.split(r"(?m)^ {4}\$ ", block)
+        for part in shown[1:]:
+            line, _, output = part.partition("\n")
+            if output.strip() and line.startswith("pteron "):
+                yield line, [row.strip() for row in output.splitlines() if row.strip()]
+
+
+SESSIONS = [(name, *found) for name, text in TEXTS.items() for found in sessions(text)]
+
+
+@pytest.mark.parametrize(("name", "line", "shown"), SESSIONS, ids=[s[1] for s in SESSIONS])
+def test_output_is_what_is_shown(name, line, shown, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = CliRunner().invoke(app, shlex.split(line)[1:])
+    printed = " ".join(result.output.split())
+    assert printed == " ".join(" ".join(shown).split()), name
+
+
+# Examples in Python.
+
+
+def blocks(text):
+    """Return the fenced blocks of Python of a page."""
+    return re.findall(r"(?ms)^```python\n(.*?)^```", text)
+
+
+WITH_BLOCKS = [name for name, text in TEXTS.items() if name != "README.md" and blocks(text)]
+
+
+@pytest.mark.parametrize("name", WITH_BLOCKS)
+def test_python_runs(name, tmp_path, monkeypatch):
+    """In order, in one session; what follows `>>>` is compared with what is shown."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("builtins.input", lambda *words: "")  # Enter ends the viewer
+    names: dict[str, object] = {}
+    finder = doctest.DocTestParser()
+    runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS)
+    for block in blocks(TEXTS[name]):
+        if ">>>" in block:
+            test = finder.get_doctest(block, names, name, name, 0)
+            assert runner.run(test, clear_globs=False).failed == 0
+            names |= test.globs
+        else:
+            exec(compile(ast.parse(block), name, "exec"), names)
+
+
+# Pictures.
+
+
+def test_pictures_are_those_that_are_drawn(tmp_path, monkeypatch):
+    """Those of the catalog take longer, and MuJoCo's need OpenGL: `make docs` compares all."""
+    monkeypatch.syspath_prepend(DOCS / "pictures")
+    script = runpy.run_path(str(DOCS / "pictures" / "draw.py"))
+    for name in ("cycle", "legs"):
+        script["DRAWN"][name](tmp_path)
+    drawn = [path for path in tmp_path.rglob("*") if path.is_file()]
+    assert len(drawn) == 2 + len(pteron.legs.KINDS)
+    for path in drawn:
+        kept = DOCS / path.relative_to(tmp_path)
+        assert script["alike"](kept, path), f"{kept} is not what is drawn; run make docs"
+    other = next(path for path in drawn if path.name == "PSS.svg")
+    assert not script["alike"](DOCS / "legs" / "RSS.svg", other)
+    assert not script["alike"](DOCS / "catalog" / "delta.png", DOCS / "catalog" / "par4.png")
+    assert not script["alike"](DOCS / "catalog" / "none.png", DOCS / "catalog" / "par4.png")
+
+
+# The theory.
+
+
+def test_each_equation_has_code_and_each_citation_an_equation():
+    from equation_code import CODE
+    from equations import cited
+
+    theory = "\n".join(text for name, text in TEXTS.items() if "/theory/" in name)
+    labels = re.findall(r"(?m)^\$\$ \(eq-(\w+)\)$", theory)
+    assert len(labels) == len(set(labels))
+    assert set(labels) == set(CODE)
+    assert {str(number) for number in range(1, 17)} <= set(labels)
+    for place in {place for places in CODE.values() for place in places}:
+        parts = place.split(".")
+        for k in range(len(parts), 0, -1):
+            try:
+                found = importlib.import_module(".".join(parts[:k]))
+            except ImportError:
+                continue
+            for part in parts[k:]:
+                found = getattr(found, part)
+            break
+        assert callable(found), place
+    source = "\n".join(p.read_text(encoding="utf-8") for p in (ROOT / "src").rglob("*.py"))
+    assert set(cited(source)) <= set(labels)
+    assert set(re.findall(r"\{eq\}`eq-(\w+)`", theory)) <= set(labels)
+    assert len(set(cited(source))) > 10
+
+
+def test_figures_of_the_claim_are_those_of_the_readme():
+    """README's are counted from the graphs by test_costs.py."""
+    shown = re.findall(r"\| (\d{3}) \| (\d{3}) \|", TEXTS["docs/theory/corrections.md"])
+    assert len(shown) == 3
+    assert all(f"| {whole} | {reduced} |" in TEXTS["README.md"] for whole, reduced in shown)
+
+
+def test_sources_that_are_cited_are_in_the_bibliography():
+    known = set(re.findall(r"@\w+\{(\w+),", (DOCS / "references.bib").read_text(encoding="utf-8")))
+    cited = {
+        key
+        for text in TEXTS.values()
+        for keys in re.findall(r"\{cite:p\}`([\w,]+)`", text)
+        for key in keys.split(",")
+    }
+    assert cited
+    assert cited <= known
