@@ -146,7 +146,7 @@ def test_a_cycle_goes_up_across_down_and_back(name):
     np.testing.assert_allclose(offset @ third, 0.0, atol=1e-15)
     np.testing.assert_allclose(found.pose, found.pose[::-1], atol=2e-15)
     for ends in (found.velocity, found.acceleration):
-        np.testing.assert_allclose(ends[[0, 200, -1]], 0.0, atol=1e-12)
+        np.testing.assert_allclose(ends[[0, 240, -1]], 0.0, atol=1e-12)
     if robot.platform.turns:
         assert np.ptp(found.pose[:, -1]) == pytest.approx(np.pi / 3 * found.scale)
     axis, pull = np.array(robot.platform.axis), np.array(robot.gravity)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pteron.manipulator import Manipulator
-    from pteron.motion import Motion, PickAndPlace
+    from pteron.motion import Motion
     from pteron.report.recordings import Recording
     from pteron.shapes import PoseLike
     from pteron.tables import Table
@@ -25,9 +25,6 @@ STANDARD = "adept"
 CYCLE = option(
     "cycle", f"{STANDARD}, the standard pick-and-place cycle, or a table of a motion.", "CYCLE"
 )
-
-_SAMPLES = 481
-_LEAST = 0.2
 
 _SLOW = 0.5
 """s between samples that is unlikely."""
@@ -42,28 +39,12 @@ _UNLIKE = 3.0
 def cycle_of(robot: Manipulator, cycle: str, duration: float | None) -> Motion:
     """Return a cycle by its name, or from a table: of poses, or of joints, from the home pose."""
     if cycle == STANDARD:
-        return standard_cycle(robot, duration=duration)
+        from pteron.motion import pick_and_place
+
+        return pick_and_place(robot, duration=duration)
     if duration is not None:
         raise DataError(f"--duration is for --cycle {STANDARD}; a table has its own time")
     return replayed(robot, cycle)
-
-
-def standard_cycle(
-    robot: Manipulator,
-    around: PoseLike | None = None,
-    scale: float | None = None,
-    duration: float | None = None,
-) -> PickAndPlace:
-    """Return the standard cycle about a pose, the home pose if none is given."""
-    from pteron.motion import pick_and_place
-    from pteron.workspace import home_pose, reserve
-
-    middle = home_pose(robot) if around is None else around
-    # A machine with little reserve anywhere moves where it has half of its best.
-    least = min(_LEAST, float(reserve(robot, middle).smallest) / 2.0)
-    return pick_and_place(
-        robot, middle, scale=scale, samples=_SAMPLES, duration=duration, least=least
-    )
 
 
 def replayed(robot: Manipulator, file: str, start: PoseLike | None = None) -> Motion:

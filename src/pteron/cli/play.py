@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from typer import Argument
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
-from pteron.cli.given_cycle import STANDARD, loaded, recorded, standard_cycle
+from pteron.cli.given_cycle import STANDARD, loaded, recorded
 from pteron.cli.screen import plain, show, show_json, spinner
 from pteron.errors import DataError
 
@@ -78,8 +78,9 @@ def play(
 
 def _recording(machine: Manipulator, motion: str) -> Recording:
     """Return a motion by its name, or from a file; what is unlikely in it is told."""
+    from pteron.motion import pick_and_place
     from pteron.report.recordings import Recording
 
     if motion == STANDARD and not Path(motion).exists():
-        return Recording(standard_cycle(machine))
+        return Recording(pick_and_place(machine))
     return recorded(machine, motion)

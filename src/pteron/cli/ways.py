@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 from pteron.cli.arguments import parsed_numbers
-from pteron.cli.given_cycle import standard_cycle, told_doubts
+from pteron.cli.given_cycle import told_doubts
 from pteron.cli.screen import note
 from pteron.errors import DataError
 
@@ -42,12 +42,12 @@ def standard_motion(
     """Return the pick-and-place cycle about a pose, within limits or the usual acceleration."""
     from dataclasses import replace
 
-    from pteron.motion import check_path, cycle_path, time_optimal
+    from pteron.motion import check_path, cycle_path, pick_and_place, time_optimal
     from pteron.motion.trajectories.pick_and_place import PEAK_ACCELERATION
     from pteron.motion.trajectories.time_law import in_time
 
     middle = given_pose(machine, around, "--around")
-    found = standard_cycle(machine, middle, scale)
+    found = pick_and_place(machine, middle, scale=scale)
     path = cycle_path(found)
     if optimal:
         return time_optimal(machine, path, limits, step=step)

@@ -25,7 +25,7 @@ from pteron.motion.trajectories.path import LinePath, Path, line_path, there_and
 from pteron.motion.trajectories.pick_and_place import PickAndPlace, cycle_path, pick_and_place
 from pteron.motion.trajectories.point_to_point import point_to_point
 from pteron.motion.trajectories.replay import replay
-from pteron.motion.trajectories.scaling import scaled_to_reach
+from pteron.motion.trajectories.scaling import least_reserve, scaled_to_reach
 from pteron.motion.trajectories.time_law import along, shortest
 from pteron.motion.trajectories.time_optimal import TimeOptimal, time_optimal
 
@@ -59,6 +59,7 @@ __all__ = [
     "jerk_limited",
     "joint_guides",
     "joint_points",
+    "least_reserve",
     "limits_of",
     "line_path",
     "longest_step",

@@ -21,6 +21,7 @@ from pteron.motion import (
     Sizing,
     joint_guides,
     joint_points,
+    least_reserve,
     pick_and_place,
     size,
 )
@@ -48,10 +49,6 @@ from pteron.workspace.doubts import doubts
 from pteron.workspace.drive_doubts import load_doubts
 from pteron.workspace.reach import Plane, slice_planes
 
-_SAMPLES = 481
-"""Samples of the cycle: two for each step of the moving picture."""
-
-_LEAST_RESERVE = 0.2
 _ANGLES = 361
 
 _CONSTANT = 1e-6
@@ -170,13 +167,7 @@ def contents(robot: Manipulator, motion: Recording | None = None) -> Report:
     """
     home = home_pose(robot)
     at_home = reserve(robot, home)
-    # A machine with little reserve anywhere moves where it has half of its best.
-    least = min(_LEAST_RESERVE, float(at_home.smallest) / 2.0)
-    cycle: Motion
-    if motion is None:
-        cycle = pick_and_place(robot, home, samples=_SAMPLES, least=least)
-    else:
-        cycle = motion.motion
+    cycle = pick_and_place(robot, home) if motion is None else motion.motion
     sizing = size(robot, cycle)
     volume = reach_volume(robot, home)
     base = base_parameters(robot)
@@ -189,7 +180,7 @@ def contents(robot: Manipulator, motion: Recording | None = None) -> Report:
         doubts=(*doubts(robot), *load_doubts(robot, home)),
         home=home,
         reserve=at_home,
-        least=least,
+        least=least_reserve(robot, home),
         cycle=cycle,
         source="" if motion is None else motion.source,
         shown=shown,

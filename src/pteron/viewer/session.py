@@ -32,15 +32,13 @@ from pteron.viewer.state import (
     stopped,
     typed_pose,
 )
-from pteron.workspace import bounding_box, reserve
+from pteron.workspace import bounding_box
 
 SPEEDS = {"1/10": 0.1, "1/4": 0.25, "1/2": 0.5, "real time": 1.0, "2 x": 2.0}
 """What a motion's speed is called, and how many seconds of it a second shows."""
 
 STANDARD = "standard pick-and-place cycle"
 
-_LEAST_RESERVE = 0.2
-_SAMPLES = 481
 _DRAWN = 200
 _ROOM = 0.08
 _RIM = 0.05
@@ -176,9 +174,7 @@ class Session:
 
     def load_standard(self) -> None:
         """Take the standard pick-and-place cycle about the home pose."""
-        robot = self.state.robot
-        least = min(_LEAST_RESERVE, float(reserve(robot, self.home).smallest) / 2.0)
-        self.take(pick_and_place(robot, self.home, samples=_SAMPLES, least=least), STANDARD)
+        self.take(pick_and_place(self.state.robot, self.home), STANDARD)
 
     def take(self, motion: Motion, title: str) -> None:
         """Take a motion, after a check that the machine can do it."""

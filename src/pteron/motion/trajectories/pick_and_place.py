@@ -16,8 +16,9 @@ from pteron.motion.motion import Motion
 from pteron.motion.trajectories.cycle import Cycle, moves
 from pteron.motion.trajectories.cycle_path import CyclePath
 from pteron.motion.trajectories.path import BackPath
-from pteron.motion.trajectories.scaling import LEAST_RESERVE, TURN, scaled_to_reach
+from pteron.motion.trajectories.scaling import TURN, scaled_to_reach
 from pteron.shapes import PoseLike
+from pteron.workspace import home_pose
 
 PEAK_ACCELERATION = 10.0
 """Of the tool's centre point, where no duration is given, m/s^2."""
@@ -48,15 +49,15 @@ class PickAndPlace(Motion):
 
 def pick_and_place(
     robot: RobotLike,
-    around: PoseLike,
+    around: PoseLike | None = None,
     *,
     scale: float | None = None,
     duration: float | None = None,
-    samples: int = 401,
+    samples: int = 481,
     direction: ArrayLike | None = None,
     turn: float = TURN,
     peak: float = PEAK_ACCELERATION,
-    least: float = LEAST_RESERVE,
+    least: float | None = None,
 ) -> PickAndPlace:
     """Return the standard pick-and-place cycle: 25 mm up, 305 mm across, 25 mm down, and back.
 
@@ -70,8 +71,8 @@ def pick_and_place(
     ----------
     robot : Manipulator, name or path
         The machine.
-    around : array, shape (m,)
-        The pose in the middle of the cycle, m and rad; `pteron.workspace.home_pose` is a good one.
+    around : array, shape (m,), optional
+        The pose in the middle of the cycle, m and rad; by default `pteron.workspace.home_pose`.
     scale : float, optional
         Factor on the cycle's size, taken as it is; by default the largest up to 1 that
         `scaled_to_reach` finds.
@@ -85,7 +86,7 @@ def pick_and_place(
         Turn of the platform on its way across, at scale 1, rad; without effect where it does not.
     peak : float
         Largest acceleration of the tool's centre point, m/s^2, where no duration is given.
-    least : float
+    least : float, optional
         Reserve that the cycle keeps, where no scale is given; see `scaled_to_reach`.
 
     Returns
@@ -104,9 +105,8 @@ def pick_and_place(
 
     Examples
     --------
-    >>> import pteron
     >>> from pteron.motion import pick_and_place
-    >>> cycle = pick_and_place(pteron.load("tripteron"), [0.0, 0.0, 0.0], duration=1.0, samples=5)
+    >>> cycle = pick_and_place("tripteron", duration=1.0, samples=5)
     >>> cycle.time, bool((cycle.pose[0] == cycle.pose[-1]).all())
     (array([0.  , 0.25, 0.5 , 0.75, 1.  ]), True)
     """
@@ -116,7 +116,7 @@ def pick_and_place(
             raise DataError(f"{name}: {value} given, a number above 0 expected")
     if samples < 2:
         raise DataError(f"samples: {samples} given, at least 2 expected")
-    middle = checked(robot, around, "around")
+    middle = home_pose(robot) if around is None else checked(robot, around, "around")
     if scale is None:
         scale, direction = scaled_to_reach(
             robot, middle, direction=direction, turn=turn, least=least

@@ -17,8 +17,9 @@ from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.trajectories.cycle import Cycle, moves
 from pteron.shapes import PoseLike
+from pteron.workspace import reserve
 
-LEAST_RESERVE = 0.2
+_LEAST_RESERVE = 0.2
 """Least reserve, of type I and of type II, that a cycle keeps."""
 
 TURN = np.pi / 3.0
@@ -39,13 +40,33 @@ _WORTH = 1.01
 """Factor by which a later direction must allow a larger cycle to be preferred to an earlier one."""
 
 
+def least_reserve(robot: RobotLike, around: PoseLike) -> float:
+    """Return the reserve that a cycle about a pose keeps, if nothing else is said.
+
+    It is 0.2; a machine with little reserve moves where it has half of what the pose has.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+    around : array, shape (m,)
+        The pose in the middle of the cycle, m and rad.
+
+    Returns
+    -------
+    float
+        Of the reserves of `pteron.workspace.reserve`, without unit.
+    """
+    return min(_LEAST_RESERVE, float(reserve(robot, around).smallest) / 2.0)
+
+
 def scaled_to_reach(
     robot: RobotLike,
     around: PoseLike,
     *,
     direction: ArrayLike | None = None,
     turn: float = TURN,
-    least: float = LEAST_RESERVE,
+    least: float | None = None,
 ) -> tuple[float, Array]:
     """Return the scale of the largest pick-and-place cycle about a pose, and its direction.
 
@@ -64,8 +85,8 @@ def scaled_to_reach(
         By default the best of twelve, the platform's x axis where another is hardly better.
     turn : float
         Turn of the platform on its way across, at scale 1, rad; without effect where it does not.
-    least : float
-        What the reserves must keep.
+    least : float, optional
+        What the reserves must keep; by default `least_reserve`.
 
     Returns
     -------
@@ -93,6 +114,8 @@ def scaled_to_reach(
     """
     robot = as_manipulator(robot)
     middle = checked(robot, around, "around")
+    if least is None:
+        least = least_reserve(robot, middle)
     scale, best = 0, None
     for across, up in moves(robot, direction, _DIRECTIONS):
         fits = _largest(robot, Cycle(robot.platform, middle, across, up, turn, 1.0), least)
