@@ -3,7 +3,7 @@
 A key moves a slider of the page in headless Chromium, whose WebGL the processor draws. The clock
 runs from the key's event until the picture with the new pose has been drawn; it also runs on the
 server alone, from an action to its last message. Then a mouse drags random sliders to random
-places: `--minutes 10` is the run whose figures the documents have.
+places; `--minutes 10` does only that, for so long.
 """
 
 from __future__ import annotations
@@ -51,6 +51,9 @@ _CLOCK = """() => {
 
 def main() -> None:
     """Print the times of each machine, then what dragging leaves behind."""
+    if "--minutes" in sys.argv:
+        _leave_behind(float(sys.argv[sys.argv.index("--minutes") + 1]))
+        return
     machines = ("five-bar",) if quick() else ("quadrupteron", "delta", "five-bar", "par4")
     print("from a slider to the picture, ms: median, 95 %")
     for name in machines:
@@ -58,7 +61,11 @@ def main() -> None:
             print(f"  {name:<14} server {_told(_on_the_server(viewer))}", end="")
             with _page(viewer) as page:
                 print(f"   page {_told(_in_the_browser(page))}" if page else "   (no Chromium)")
-    minutes = float(sys.argv[sys.argv.index("--minutes") + 1]) if "--minutes" in sys.argv else 0.05
+    _leave_behind(0.05 if quick() else 1.0)
+
+
+def _leave_behind(minutes: float) -> None:
+    """Print what so many minutes of random dragging leave behind."""
     with view(pteron.load("quadrupteron"), port=0) as viewer, _page(viewer) as page:
         if page:
             _drag(viewer, page, 60.0 * minutes)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import webbrowser
+from contextlib import suppress
 from threading import Event
 from typing import Annotated
 
@@ -54,7 +55,8 @@ def view(
         from pteron.viewer.server import is_here
 
         viewer = opened(machine, host=host, port=port, motion=motion, payload=payload)
-    with viewer:
+    # Ctrl-C is the usual way to end it.
+    with viewer, suppress(KeyboardInterrupt):
         if port not in (0, viewer.port):
             note(f"Note: port {port} is in use; the page is at {viewer.port}")
         if not is_here(host):

@@ -207,10 +207,10 @@ def from_z(ways: Array) -> Array:
     Examples
     --------
     >>> import numpy as np
-    >>> from_z(np.array([[0.0, 0.0, 2.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])).round(3)
-    array([[ 1.   ,  0.   ,  0.   ,  0.   ],
-           [ 0.   ,  1.   ,  0.   ,  0.   ],
-           [ 0.707,  0.   ,  0.707,  0.   ]])
+    >>> from_z(np.array([[0.0, 0.0, 2.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])).round(3) + 0.0
+    array([[1.   , 0.   , 0.   , 0.   ],
+           [0.   , 1.   , 0.   , 0.   ],
+           [0.707, 0.   , 0.707, 0.   ]])
     """
     lengths = np.linalg.norm(ways, axis=-1, keepdims=True)
     z = np.divide(ways, lengths, out=np.zeros_like(ways), where=lengths > 0.0)

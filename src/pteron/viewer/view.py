@@ -19,7 +19,7 @@ from pteron.motion import Motion, Simulation
 from pteron.shapes import PoseLike
 from pteron.viewer.handle import Handle
 from pteron.viewer.panel import Panel
-from pteron.viewer.readings import readings
+from pteron.viewer.readings import Readings, readings
 from pteron.viewer.scene import Scene
 from pteron.viewer.server import serve, stop
 from pteron.viewer.session import Session
@@ -70,7 +70,6 @@ class Viewer:
         self._panel = Panel(self._server, session, self.do)
         self._looks: tuple[object, ...] = ()
         self._sliced: tuple[object, ...] = ()
-        self._scale = session.force_scale()
         self._scaled: tuple[object, ...] = ()
         self._set_up()
         self._show(settled=True)
@@ -211,37 +210,38 @@ class Viewer:
         self.do("handle", lambda: self._session.set_pose(pose))
 
     def _show(self, *, settled: bool = False) -> None:
-        session, server = self._session, self._server
+        """Show all of the session's state: the picture first, which the panel need not delay."""
+        server = self._server
+        found = self._show_picture()
         with server.atomic():
-            if session.state.robot != self._robot:
-                self._handle.remove()
-                self._scene.remove()
-                self._set_up()
-                self._panel.show_ranges()
-                self._looks = self._sliced = ()
-            self._show_looks()
-            found = readings(session.state)
-            if settled or self._scaled != self._scaled_for():
-                self._scale, self._scaled = session.force_scale(), self._scaled_for()
-            self._scene.show(session.state, found.forces, self._scale)
-            self._handle.show(session.state)
             self._panel.show(found, settled=settled)
             if settled:
                 self._panel.show_settled()
                 self._show_slice()
         server.flush()
 
+    def _show_picture(self) -> Readings:
+        """Show the machine; return its numbers."""
+        state, server = self._session.state, self._server
+        found = readings(state)
+        with server.atomic():
+            if state.robot != self._robot:
+                self._handle.remove()
+                self._scene.remove()
+                self._set_up()
+                self._panel.show_ranges()
+                self._looks = self._sliced = ()
+            if self._scaled != self._scaled_for():
+                self._scale, self._scaled = self._session.force_scale(), self._scaled_for()
+            self._show_looks()
+            self._scene.show(state, found.forces, self._scale)
+            self._handle.show(state)
+        server.flush()
+        return found
+
     def _scaled_for(self) -> tuple[object, ...]:
         state = self._session.state
         return state.robot, state.payload, self._session.title
-
-    def _show_picture(self) -> None:
-        """Show the machine, and leave the panel as it is."""
-        state = self._session.state
-        with self._server.atomic():
-            self._scene.show(state, readings(state).forces, self._scale)
-            self._handle.show(state)
-        self._server.flush()
 
     def _show_looks(self) -> None:
         panel = self._panel
