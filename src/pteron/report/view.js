@@ -86,7 +86,8 @@
   const outer = (() => {
     const corners = [gridLow, [gridLow[0], gridHigh[1]], gridHigh, [gridHigh[0], gridLow[1]]].map((p) => [...p, floor]);
     const frame = position.flatMap((p, k) => axes[k].map((axis) => add(p, axis, 0.1 * size)));
-    const all = cloud.concat(corners, frame), found = new Set();
+    const base = baseAxes.map((axis) => add(corners[0], axis, 0.17 * size));
+    const all = cloud.concat(corners, frame, base), found = new Set(base);
     for (let i = 0; i < 12; i++) {
       for (const rise of [-1, -0.5, 0, 0.5, 1]) {
         const way = [Math.cos((i * Math.PI) / 6), Math.sin((i * Math.PI) / 6), 2 * rise];
