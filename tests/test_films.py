@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import tempfile
+from base64 import b64encode
 from pathlib import Path
 
 import imageio_ffmpeg
@@ -66,6 +67,7 @@ def test_an_mp4_plays_in_a_browser_at_the_speed_it_says(turns):
     away = [np.abs(frame - frames[0]).mean() for frame in frames]
     assert 5.0 * away[-1] < away[8]
     assert not list(Path("unfinished").iterdir())
+    assert b64encode(made.path.read_bytes()).decode() in made._repr_html_()
 
 
 @pytest.mark.parametrize("name", ["tripteron", "five-bar", "h4"])

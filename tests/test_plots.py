@@ -5,6 +5,7 @@ import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -490,3 +491,10 @@ def test_a_saved_figure_keeps_its_text_and_is_the_same_each_time(tmp_path):
     for width in ("colum", 0.0, -1, float("nan"), None):
         with pytest.raises(pteron.DataError, match='"column", "page"'):
             resized(powers(), width)
+
+
+def test_every_figure_is_in_the_page_about_them():
+    page = (Path(__file__).parent.parent / "docs" / "plots.md").read_text()
+    figures = [name for name in pteron.plots.__all__ if name.endswith("_figure")]
+    assert len(figures) > 20
+    assert [name for name in (*figures, "draw", "film", "resized") if name not in page] == []

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -59,6 +61,20 @@ class Film:
     def duration(self) -> float:
         """How long it takes to watch, s."""
         return self.frames / self.fps
+
+    def _repr_html_(self) -> str:
+        """Return the film itself, for a notebook; where its file is gone, its name."""
+        if not self.path.is_file():
+            return f"<code>{escape(str(self.path))}</code>"
+        data = b64encode(self.path.read_bytes()).decode()
+        width = f'width="{self.size[0]}"'
+        if self.path.suffix.lower() == ".gif":
+            return f'<img {width} alt="film" src="data:image/gif;base64,{data}">'
+        kind = 'type="video/mp4"'
+        return (
+            f"<video {width} controls loop muted><source {kind} "
+            f'src="data:video/mp4;base64,{data}"></video>'
+        )
 
 
 def film(

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from io import BytesIO
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
 
 import matplotlib as mpl
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
+from matplotlib.ticker import MultipleLocator
 
 from pteron.atomic import write_bytes
 from pteron.errors import DataError, OutputError, shown
@@ -18,6 +21,9 @@ Width = Literal["column", "page"]
 
 WIDTHS: dict[str, float] = {"column": 3.5, "page": 7.16}
 """Inches of a journal's column, and of both with what is between them."""
+
+_GAP = 3.0
+"""Pixels, 100 an inch, between two numbers of a scale, at least."""
 
 _PRINTED = 8.0
 """Points of the letters in print."""
@@ -81,7 +87,22 @@ def resized(figure: Figure, width: Width | float) -> Figure:
         for label in scale.get_ticklabels()[:1]:
             scale.set_tick_params(labelsize=label.get_fontsize())  # also of those to come
     _fit_legend(figure, inches)
+    figure.draw_without_rendering()
+    for axes in figure.axes:
+        _thin(axes)
     return figure
+
+
+def _thin(axes: Axes) -> None:
+    """Take out every second number of even scales while those along x run into each other."""
+    while isinstance(axes.xaxis.get_major_locator(), MultipleLocator):
+        numbers = [text.get_window_extent() for text in axes.get_xticklabels() if text.get_text()]
+        places = sorted((box.x0, box.x1) for box in numbers)
+        ticks = axes.get_xticks()
+        if len(ticks) < 3 or all(one[1] + _GAP < other[0] for one, other in pairwise(places)):
+            return
+        for scale in (axes.xaxis, axes.yaxis):
+            scale.set_major_locator(MultipleLocator(2.0 * float(ticks[1] - ticks[0])))
 
 
 def _fit_legend(figure: Figure, inches: float) -> None:

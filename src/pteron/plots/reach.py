@@ -47,7 +47,8 @@ def reach_figure(cut: ReachSlice, *, path: Array | None = None) -> Figure:
     In reach, the shade deepens with the margin. Outside, the colour is that of the leg that misses
     the pose by most; a line in a leg's colour is the end of its reach (type I).
     """
-    figure = blank(3.9, 3.9)
+    shape = float(np.ptp(cut.second) / np.ptp(cut.first))
+    figure = blank(3.9, min(max(0.6 + 3.3 * shape, 1.8), 5.6))
     axes = plain_axes(figure, f"{cut.plane[0]} (mm)", f"{cut.plane[1]} (mm)")
     axes.grid(visible=False)
     first, second = 1e3 * cut.first, 1e3 * cut.second

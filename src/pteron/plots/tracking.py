@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from pteron.kernels import Array
-from pteron.plots.canvas import LEG_COLORS, MUTED, blank, legend, stack
+from pteron.plots.canvas import MUTED, blank, leg_style, legend, stack
 
 _SCALES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))
 
@@ -31,8 +31,7 @@ def tracking_figure(time: Array, error: Array, names: Sequence[str]) -> Figure:
     ):
         axes.axhline(0.0, color=MUTED, linewidth=0.8)
         for i in own:
-            color = LEG_COLORS[i % len(LEG_COLORS)]
-            axes.plot(time, factor * error[:, i], label=names[i], color=color, linewidth=1.4)
+            axes.plot(time, factor * error[:, i], label=names[i], **leg_style(i, 1.4))
         axes.set_xlim(float(time[0]), float(time[-1]))
     legend(figure, len(names))
     return figure
