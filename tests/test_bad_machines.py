@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 import pteron
 from pteron import ModelError, PlanarInertia
 from pteron.legs.cones import Cone
-from pteron.manipulator.manipulator import turned
+from pteron.manipulator.variants import turned
 from pteron.workspace import home_pose, reserve
 from pteron.workspace.doubts import doubts
 from pteron.workspace.drive_doubts import load_doubts
