@@ -2,6 +2,8 @@
 
 import json
 import re
+import shutil
+import subprocess
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
@@ -13,6 +15,7 @@ from mechanisms import MECHANISMS, random_machine, relative_error, states
 from scipy.spatial.transform import Rotation
 
 import pteron
+from pteron.errors import ModelError
 from pteron.reduction import ExactCertificate, NumericalCertificate, base_regressor
 from pteron.reduction.exact_geometry import exact_geometry
 from pteron.reduction.symbols import algebraic_values
@@ -271,12 +274,15 @@ SHARED = ("quadrupteron, shared", "tripteron-oblique, shared", "delta, shared", 
 def test_symbols_evaluate_to_the_exact_coefficients(case):
     base = found(case)
     exact = algebraic_values(exact_geometry(base.robot))
-    values = {symbol: exact[symbol] for symbol in base.geometry_values}
     numbers = base.expressions("sympy")
-    for symbolic, number in zip(base.expressions("sympy", symbols=True), numbers, strict=True):
-        names = sorted(number.free_symbols | symbolic.free_symbols, key=str)
-        misfit = sympy.Poly(symbolic.subs(values) - number, *names)
-        assert all(abs(sympy.N(c, 40)) < 1e-30 for c in misfit.coeffs())
+    ways = {True: base.geometry_values, "leg": base.leg_geometry_values}
+    for symbols, known in list(ways.items())[: 1 + bool(base.shared_symbols)]:
+        values = {symbol: exact[symbol] for symbol in known}
+        sums = base.expressions("sympy", symbols=symbols)
+        for symbolic, number in zip(sums, numbers, strict=True):
+            names = sorted(number.free_symbols | symbolic.free_symbols, key=str)
+            misfit = sympy.Poly(symbolic.subs(values) - number, *names)
+            assert all(abs(sympy.N(c, 40)) < 1e-30 for c in misfit.coeffs())
 
 
 def value_of(text, numbers):
@@ -303,14 +309,59 @@ def test_what_is_printed_evaluates_to_the_values(name):
     base = found(name)
     robot = base.robot
     parameters = dict(zip(pteron.parameter_names(robot), pteron.parameters(robot), strict=True))
-    numbers = base.geometry_values | {key: float(value) for key, value in parameters.items()}
+    numbers = base.leg_geometry_values | {key: float(v) for key, v in parameters.items()}
     # Sums of large opposite terms: relative to the terms, not to what is left of them.
     scale = np.abs(base.grouping) @ np.abs(pteron.parameters(robot))
     for form, evaluate in (("text", value_of), ("latex", value_of_latex)):
-        for symbols in (False, True):
+        for symbols in (False, True, "leg")[: 2 + bool(base.shared_symbols)]:
             texts = base.expressions(form, symbols=symbols, digits=17)
             values = [evaluate(text, numbers) for text in texts]
             assert (np.abs(values - base.values()) <= 1e-12 * scale).all()
+
+
+def test_a_legs_own_symbols_are_its_own():
+    base = found("quadrupteron")
+    lines = base.expressions(symbols="leg")
+    assert lines[10] == "I_u3 + (lu3^2/ll3^2) I_l3"  # lu3 = ll3
+    assert base.expressions(symbols=True)[10] == "I_u3 + I_l3"
+    assert "lu4" in base.leg_geometry_values
+    assert "lu4" not in base.geometry_values
+    for number, line in zip("1234", lines[:4], strict=True):
+        assert line == f"m_p{number} + m_u{number} + (1/ll{number}^2) I_l{number}"
+    with pytest.raises(ModelError, match=r"^symbols: 'legs' is not True"):
+        base.expressions(symbols="legs")
+
+
+@pytest.mark.parametrize("symbols", [False, "leg"])
+@pytest.mark.parametrize("name", ["quadrupteron", "delta", "five-bar"])
+def test_the_table_for_a_paper_is_sound_latex(name, symbols, tmp_path):
+    base = found(name)
+    base = replace(base, robot=replace(base.robot, name="50 % of #1_a & {b}^~\\"))
+    text = base.to_latex(symbols=symbols, digits=12)
+    assert r"of 50 \% of \#1\_a \& \{b\}\textasciicircum{}\textasciitilde{}\text" in text
+    body = text.partition(r"\midrule")[2].partition(r"\bottomrule")[0].strip().splitlines()
+    assert len(body) == base.rank
+    numbers = base.leg_geometry_values | dict(
+        zip(pteron.parameter_names(base.robot), pteron.parameters(base.robot), strict=True)
+    )
+    for i, (row, value) in enumerate(zip(body, base.values(), strict=True), start=1):
+        number, sums, printed, unit = re.fullmatch(
+            r"\s*(\d+) & \$(.*)\$ & \$(.*)\$ & \$\\mathrm\{(.*)\}\$ \\\\", row
+        ).groups()
+        assert int(number) == i
+        assert unit == base.parameters[base.kept[i - 1]].unit.replace(" ", r"\,")
+        printed = re.sub(r" \\times 10\^\{(.*)\}", r"e\1", printed)
+        np.testing.assert_allclose(float(printed), value, rtol=1e-11)
+        sums = sums.replace(r"\begin{aligned}[t]", "").replace(r"\end{aligned}", "")
+        sums = sums.replace("& ", "").replace(r" \\ ", " ").replace("tfrac", "frac").strip()
+        np.testing.assert_allclose(value_of_latex(sums, numbers), value, rtol=1e-9)
+    if program := shutil.which("pdflatex"):
+        head = r"\documentclass{article}\usepackage{amsmath, booktabs}\begin{document}"
+        whole = "\n".join([head, text, r"\end{document}"])
+        (tmp_path / "table.tex").write_text(whole, encoding="utf-8")
+        run = [program, "-interaction=nonstopmode", "-halt-on-error", "table.tex"]
+        done = subprocess.run(run, cwd=tmp_path, capture_output=True, check=False)
+        assert done.returncode == 0, done.stdout[-2000:]
 
 
 @pytest.mark.parametrize("name", [*MECHANISMS, *FAMILY])

@@ -862,6 +862,13 @@ def test_base_parameters_in_other_forms():
     symbols = done("base quadrupteron --symbols")
     assert "ll1" in symbols.splitlines()[0]
     assert "share a symbol: s1y stands for s2x, s3y, s4x too; lu3 stands for ll3 too" in symbols
+    assert "With --leg-symbols each leg has its own." in symbols
+    own = done("base quadrupteron --leg-symbols")
+    assert "I_u3 + (lu3^2/ll3^2) I_l3" in own
+    assert "each with its symbol: s1y, s2x, s3y, s4x; lu3, ll3; lu2, lu4; ll2, ll4." in own
+    table = done("base five-bar --format booktabs").splitlines()
+    assert table[1] == r"\begin{table}"
+    assert all(line.startswith("% ") for line in table[table.index(r"\end{table}") + 1 :])
     latex = done("base quadrupteron --format latex").splitlines()
     assert latex[0].startswith("m_{p1} + m_{u1}")
     assert all(line.startswith("% ") for line in latex[26:])

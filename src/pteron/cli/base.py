@@ -12,11 +12,12 @@ from pteron.cli.screen import is_terminal, plain, show, show_json, spinner, tabl
 
 if TYPE_CHECKING:
     from pteron.reduction import BaseParameters
+    from pteron.reduction.result import Symbols
 
 
-Format = Literal["text", "sympy", "latex", "json"]
+Format = Literal["text", "sympy", "latex", "booktabs", "json"]
 
-_COMMENTS = {"sympy": "#", "latex": "%"}
+_COMMENTS = {"sympy": "#", "latex": "%", "booktabs": "%"}
 """What begins a line that is for the reader, not for SymPy or LaTeX."""
 
 
@@ -42,10 +43,17 @@ def base(
     symbols: Annotated[
         bool, option("symbols", "Write the coefficients in symbols of the geometry.")
     ] = False,
+    leg_symbols: Annotated[
+        bool, option("leg-symbols", "The same, and equal lengths of several legs share no symbol.")
+    ] = False,
     elbows: Elbows = None,
     json: Json = False,
 ) -> None:
-    """Find the base inertial parameters: the sums of parameters that act on the forces."""
+    """Find the base inertial parameters: the sums of parameters that act on the forces.
+
+    Formats latex and booktabs are lines of mathematics, and a table with values for a paper.
+    """
+    written: Symbols = "leg" if leg_symbols else symbols
     machine = load_robot(robot, elbows)
     with spinner(f"Grouping the inertial parameters of {machine.name}"):
         from pteron.reduction import base_parameters
@@ -54,23 +62,26 @@ def base(
         found = base_parameters(machine, method, names, shared=shared)
     if json or format == "json":
         data = found.as_dict()
-        if symbols:
-            data["symbolic"] = list(found.expressions(symbols=True))
-            data["geometry"] = found.geometry_values
-            data["shared_symbols"] = found.shared_symbols
+        if written:
+            data["symbolic"] = list(found.expressions(symbols=written))
+            data["geometry"] = _geometry(found, written)
+            data["shared_symbols"] = {} if written == "leg" else found.shared_symbols
         show_json(data)
     elif format == "text":
-        _show(found, symbols=symbols)
+        _show(found, written)
     else:
-        for expression in found.expressions(format, symbols=symbols):
-            echo(str(expression))
-        for line in _closing(found, symbols=symbols):
+        if format == "booktabs":
+            echo(found.to_latex(symbols=written))
+        else:
+            for expression in found.expressions(format, symbols=written):
+                echo(str(expression))
+        for line in _closing(found, written):
             echo(f"{_COMMENTS[format]} {line}")
 
 
-def _show(found: BaseParameters, *, symbols: bool) -> None:
+def _show(found: BaseParameters, symbols: Symbols) -> None:
     expressions = found.expressions(symbols=symbols)
-    closing = [plain(line) for line in _closing(found, symbols=symbols)]
+    closing = [plain(line) for line in _closing(found, symbols)]
     if not is_terminal():
         show(*(plain(line) for line in expressions), "", *closing)
         return
@@ -87,16 +98,27 @@ def _show(found: BaseParameters, *, symbols: bool) -> None:
     )
 
 
-def _closing(found: BaseParameters, *, symbols: bool) -> list[str]:
+def _geometry(found: BaseParameters, symbols: Symbols) -> dict[str, float]:
+    return found.leg_geometry_values if symbols == "leg" else found.geometry_values
+
+
+def _closing(found: BaseParameters, symbols: Symbols) -> list[str]:
     """Return what the symbols stand for, if there are any, and the proof."""
     lines = []
     if symbols:
-        lengths = ", ".join(f"{name} = {v:g}" for name, v in found.geometry_values.items())
+        given = _geometry(found, symbols)
+        lengths = ", ".join(f"{name} = {v:g}" for name, v in given.items())
         lines.append(f"In metres: {lengths}.")
-        shared = [f"{one} stands for {', '.join(m)} too" for one, m in found.shared_symbols.items()]
-        if shared:
-            text = "; ".join(shared)
-            lines.append(f"Values that are equal but for their sign share a symbol: {text}.")
+        shared = found.shared_symbols.items()
+        if shared and symbols == "leg":
+            text = "; ".join(", ".join((one, *others)) for one, others in shared)
+            lines.append(f"Equal but for their sign, each with its symbol: {text}.")
+        elif shared:
+            text = "; ".join(f"{one} stands for {', '.join(others)} too" for one, others in shared)
+            lines.append(
+                f"Values that are equal but for their sign share a symbol: {text}. With "
+                "--leg-symbols each leg has its own."
+            )
     return [*lines, *found.certificate.summary().splitlines()]
 
 

@@ -21,10 +21,14 @@ from pteron.reduction.certificate import Certificate, ExactCertificate
 from pteron.reduction.exact_geometry import exact_geometry
 from pteron.reduction.expressions import as_html, as_latex, as_sympy, as_text, terms_of
 from pteron.reduction.grouping import Grouping, Shares
-from pteron.reduction.symbols import named_values, symbolic_shares
+from pteron.reduction.latex_table import latex_table
+from pteron.reduction.symbols import named_values, symbolic_shares, values_by_leg
 from pteron.reduction.transfers import Transfer
 
 Form = Literal["text", "sympy", "latex", "html"]
+
+Symbols = bool | Literal["leg"]
+"""Whether coefficients are in symbols, and whether each leg has its own."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -120,7 +124,17 @@ class BaseParameters:
 
     @cached_property
     def _symbolic(self) -> Shares:
-        """The shares in symbols of the geometry."""
+        """The shares in symbols of the geometry, those that are equal in one."""
+        return self._in_symbols(named_values(exact_geometry(self.robot)))
+
+    @cached_property
+    def _by_leg(self) -> Shares:
+        """The shares in symbols of the geometry, each leg with its own."""
+        if not self.shared_symbols:
+            return self._symbolic
+        return self._in_symbols(values_by_leg(exact_geometry(self.robot)))
+
+    def _in_symbols(self, named: dict[str, Any]) -> Shares:
         if not isinstance(self.certificate, ExactCertificate):
             raise ModelError(
                 f'symbols: not known to method "{self.certificate.method}"; use method="exact"'
@@ -136,19 +150,19 @@ class BaseParameters:
             {column: Fraction(1), **{k: -share for k, share in self.shares[column].items()}}
             for column in unexplained
         ]
-        named = named_values(exact_geometry(self.robot))
         return symbolic_shares(self.parameters, self.kept, self.transfers, extra, named)
 
     @property
     def geometry_values(self) -> dict[str, float]:
         """The geometric symbols of the expressions, and their values in metres."""
-        exact = exact_geometry(self.robot)
-        named = named_values(exact)
-        return {
-            name: float(value)
-            for name, value in exact.symbols().items()
-            if str(named[name]) == name
-        }
+        named = named_values(exact_geometry(self.robot))
+        return {k: v for k, v in self.leg_geometry_values.items() if str(named[k]) == k}
+
+    @property
+    def leg_geometry_values(self) -> dict[str, float]:
+        """The geometric symbols where each leg has its own, and their values in metres."""
+        values = exact_geometry(self.robot).symbols().items()
+        return {name: float(value) for name, value in values if value.q != 0}
 
     @property
     def shared_symbols(self) -> dict[str, tuple[str, ...]]:
@@ -161,7 +175,7 @@ class BaseParameters:
         return found
 
     def expressions(
-        self, form: Form = "text", *, symbols: bool = False, digits: int = 4
+        self, form: Form = "text", *, symbols: Symbols = False, digits: int = 4
     ) -> tuple[Any, ...]:
         """Return each base parameter as a sum of inertial parameters.
 
@@ -169,10 +183,11 @@ class BaseParameters:
         ----------
         form : {"text", "sympy", "latex", "html"}
             Strings to read, SymPy expressions, LaTeX, or HTML.
-        symbols : bool
+        symbols : bool or "leg"
             Whether coefficients are written in symbols of the geometry (1/ll1^2, lu1/ll1^2, ...)
             instead of numbers. `geometry_values` says what they stand for; lengths that are equal
-            share a symbol. Relations that no mass transfer explains stay numbers.
+            share a symbol, which `shared_symbols` tells. With "leg" each leg has symbols of its
+            own, of `leg_geometry_values`. Relations that no mass transfer explains stay numbers.
         digits : int
             Significant digits of numbers; SymPy keeps fractions exact.
 
@@ -187,12 +202,47 @@ class BaseParameters:
         """
         if form not in get_args(Form):
             raise ModelError(f"form: {form!r} is not one of {', '.join(get_args(Form))}")
-        shares = self._symbolic if symbols else self.shares
+        if symbols not in (False, True, "leg"):
+            raise ModelError(f'symbols: {symbols!r} is not True, False or "leg"')
+        shares = self._by_leg if symbols == "leg" else self._symbolic if symbols else self.shares
         sums = [terms_of(column, shares) for column in self.kept]
         if form == "sympy":
             return tuple(as_sympy(self.columns, terms) for terms in sums)
         write = {"text": as_text, "latex": as_latex, "html": as_html}[form]
         return tuple(write(self.parameters, terms, digits) for terms in sums)
+
+    def to_latex(self, *, symbols: Symbols = False, digits: int = 4) -> str:
+        r"""Return the base parameters and their values as a table in LaTeX.
+
+        It takes the packages amsmath and booktabs; long sums go over several lines.
+
+        Parameters
+        ----------
+        symbols, digits
+            As for `expressions`; values have so many digits too.
+
+        Returns
+        -------
+        str
+            An environment `table` with a caption and a label.
+
+        Raises
+        ------
+        ModelError
+            As `expressions`.
+
+        Examples
+        --------
+        >>> import pteron
+        >>> table = pteron.base_parameters("five-bar").to_latex()
+        >>> print(table.splitlines()[8])
+            1 & $I_{u1} + I_{l1}$ & $0.0002835$ & $\mathrm{kg\,m^2}$ \\
+        """
+        sums, printed = (
+            self.expressions(form, symbols=symbols, digits=digits) for form in ("latex", "text")
+        )
+        units = [self.parameters[column].unit for column in self.kept]
+        return latex_table(self.robot.name, sums, printed, self.values().tolist(), units, digits)
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything as plain data, fractions as text."""

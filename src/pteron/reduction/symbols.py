@@ -33,6 +33,12 @@ def named_values(geometry: ExactGeometry) -> dict[str, Any]:
     return named
 
 
+def values_by_leg(geometry: ExactGeometry) -> dict[str, Any]:
+    """Return a symbol of its own for each geometric symbol, or zero: equal values share none."""
+    values = geometry.symbols().items()
+    return {name: Integer(0) if value.q == 0 else Symbol(name) for name, value in values}
+
+
 def algebraic_values(geometry: ExactGeometry) -> dict[str, Any]:
     """Return the values of the geometric symbols as exact SymPy numbers."""
     return {name: sympify(value.q) * sqrt(value.s) for name, value in geometry.symbols().items()}

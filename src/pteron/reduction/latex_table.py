@@ -1,0 +1,106 @@
+r"""Base parameters as a table in LaTeX, with the rules of the package booktabs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+_NEEDS = r"% In the preamble: \usepackage{amsmath, booktabs}"
+
+_LONGEST = 55
+"""Printed letters of a sum that stand in a line; the next term begins another."""
+
+_SPECIAL = {letter: rf"\{letter}" for letter in "&%$#_{}"} | {
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+}
+
+
+def latex_table(
+    name: str,
+    sums: Sequence[str],
+    printed: Sequence[str],
+    values: Sequence[float],
+    units: Sequence[str],
+    digits: int,
+) -> str:
+    r"""Return a `table` of base parameters: number, sum, value and unit.
+
+    Parameters
+    ----------
+    name : str
+        Whose they are, for the caption.
+    sums, printed : sequence of str
+        Each sum in LaTeX's mathematics, and in plain text, which tells how wide it is.
+    values : sequence of float
+        SI units.
+    units : sequence of str
+        Such as "kg m^2".
+    digits : int
+        Significant digits of the values.
+    """
+    rows = [
+        rf"    {i} & ${_broken(one, plain)}$ & ${_number(value, digits)}$ & {_unit(unit)} \\"
+        for i, (one, plain, value, unit) in enumerate(
+            zip(sums, printed, values, units, strict=True), start=1
+        )
+    ]
+    fractions = any(r"\frac" in one for one in sums)
+    lines = [
+        *(_NEEDS, r"\begin{table}", r"  \centering"),
+        *([r"  \renewcommand{\arraystretch}{1.4}"] if fractions else []),
+        rf"  \caption{{Base inertial parameters of {_escaped(name)}.}}",
+        *(r"  \label{tab:base-parameters}", r"  \begin{tabular}{@{}rlrl@{}}", r"    \toprule"),
+        r"    & Base parameter & Value & Unit \\",
+        *(r"    \midrule", *rows, r"    \bottomrule"),
+        *(r"  \end{tabular}", r"\end{table}"),
+    ]
+    return "\n".join(lines)
+
+
+def _broken(latex: str, printed: str) -> str:
+    """Return a sum, in several lines where it is long."""
+    widths = [_width(term) for term in _terms(printed)]
+    if sum(widths) <= _LONGEST:
+        return latex
+    lines, width = [""], 0
+    for term, size in zip(_terms(latex.replace(r"\frac", r"\tfrac")), widths, strict=True):
+        if width and width + size > _LONGEST:
+            lines.append("")
+            width = 0
+        lines[-1] += term
+        width += size
+    inner = r" \\ ".join(f"& {line.strip()}" for line in lines)
+    return rf"\begin{{aligned}}[t] {inner} \end{{aligned}}"
+
+
+def _width(printed: str) -> int:
+    """Return the printed letters of a term: a fraction is as wide as its longer part."""
+    top, _, bottom = printed.partition("/")
+    letters = (sum(letter not in "_^*(){}" for letter in part) for part in (top, bottom))
+    return max(letters)
+
+
+def _terms(text: str) -> list[str]:
+    """Return the terms of a sum with their signs; what is in brackets belongs to its term."""
+    found, depth = [""], 0
+    for k, letter in enumerate(text):
+        depth += (letter in "({") - (letter in ")}")
+        if not depth and letter in "+-" and text[k - 1 : k + 2] == f" {letter} ":
+            found.append("")
+        found[-1] += letter
+    return found
+
+
+def _number(value: float, digits: int) -> str:
+    mantissa, _, exponent = f"{value:.{digits}g}".partition("e")
+    return rf"{mantissa} \times 10^{{{int(exponent)}}}" if exponent else mantissa
+
+
+def _unit(unit: str) -> str:
+    spaced = unit.replace(" ", r"\,")
+    return rf"$\mathrm{{{spaced}}}$"
+
+
+def _escaped(text: str) -> str:
+    return "".join(_SPECIAL.get(letter, letter) for letter in text)
