@@ -34,6 +34,7 @@ bench: $(VENV)/.dev
 # The site, docs/_build/html: every picture and table drawn, every notebook and example run anew;
 # a warning is an error, and then every link of it is followed.
 docs: $(VENV)/.docs
+	rm -rf docs/_build docs/gallery
 	$(BIN)/python docs/pictures/draw.py
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m sphinx -W --keep-going -n -q -d docs/_build/doctrees docs docs/_build/html
 	$(BIN)/python docs/check_site.py docs/_build/html

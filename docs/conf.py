@@ -103,6 +103,7 @@ if GALLERY.is_dir() and find_spec("sphinx_gallery") is not None:
         "show_memory": False,
         "show_signature": False,
         "capture_repr": ("_repr_html_",),
+        "default_thumb_file": str(DOCS / "catalog" / "delta.png"),  # of a film
     }
 
 

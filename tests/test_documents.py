@@ -194,6 +194,29 @@ def test_pictures_are_those_that_are_drawn(tmp_path, monkeypatch):
     assert not script["alike"](DOCS / "catalog" / "none.png", DOCS / "catalog" / "par4.png")
 
 
+# The site.
+
+
+def test_the_check_of_a_site_finds_what_is_wrong(tmp_path):
+    """`make docs` ends with it."""
+    faults = runpy.run_path(str(DOCS / "check_site.py"))["faults"]
+    (tmp_path / "searchindex.js").write_text('"jacobian" "delta"')
+    (tmp_path / "index.html").write_text('<p id="top"><a href="next.html#end">on</a>')
+    (tmp_path / "next.html").write_text('<p id="end"><a href="index.html#top">back</a>')
+    assert faults(tmp_path) == []
+    (tmp_path / "index.html").write_text(
+        '<script src="https://cdn.example/x.js"></script><a href="none.html">a</a>'
+        '<a href="https://example.com">elsewhere</a><a href="#nowhere">b</a>'
+    )
+    assert set(faults(tmp_path)) == {
+        "index.html: none.html leads nowhere",
+        "index.html: #nowhere names no place of its page",
+        "index.html: https://cdn.example/x.js is loaded from the network",
+        "next.html: index.html#top names no place of its page",
+        "next.html: no way leads there",
+    }
+
+
 # The theory.
 
 

@@ -21,7 +21,14 @@ def test_it_runs(script, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("sys.argv", [str(script)])
     with patch.dict(KINDS):  # a kind of leg that an example adds is gone after it
         runpy.run_path(str(script), run_name="__main__")
-    assert capsys.readouterr().out.strip()
+    printed = capsys.readouterr().out
+    assert printed.strip()
+    # What README shows of it, up to its "...", is what it prints.
+    readme = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
+    _, command, shown = readme.partition(f"$ .venv/bin/python examples/{script.name}\n")
+    if command:
+        lines = shown.split("    ...\n")[0].splitlines()
+        assert printed.splitlines()[: len(lines)] == [line.removeprefix("    ") for line in lines]
 
 
 @pytest.mark.parametrize("script", GALLERY, ids=lambda path: path.name)

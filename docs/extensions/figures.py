@@ -1,12 +1,11 @@
-"""What the gallery shows of its scripts: every new figure or film among a block's names.
+"""What the gallery shows of its scripts: every new matplotlib figure among a block's names.
 
-Pteron's figures are not made by pyplot, which the usual scraper asks.
+Pteron's figures are not made by pyplot, which the usual scraper asks. A film shows itself, where a
+block ends with it.
 """
 
 from __future__ import annotations
 
-import shutil
-from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
@@ -14,10 +13,10 @@ from sphinx_gallery.scrapers import figure_rst
 
 
 class FigureScraper:
-    """Save each figure that a block of a script has made, and each film, a GIF file's path."""
+    """Save each figure that a block of a script has made."""
 
     def __init__(self) -> None:
-        self._shown: dict[str, list[Any]] = {}
+        self._shown: dict[str, list[Figure]] = {}
 
     def __repr__(self) -> str:
         return "FigureScraper()"
@@ -27,15 +26,10 @@ class FigureScraper:
         shown = self._shown.setdefault(block_vars["src_file"], [])
         paths = []
         for value in block_vars["example_globals"].values():
-            film = isinstance(value, Path) and value.suffix == ".gif" and value.is_file()
-            if not (film or isinstance(value, Figure)) or any(value is one for one in shown):
+            if not isinstance(value, Figure) or any(value is one for one in shown):
                 continue
             shown.append(value)
-            path = Path(next(block_vars["image_path_iterator"]))
-            if film:
-                path = path.with_suffix(".gif")
-                shutil.copy(value, path)
-            else:
-                value.savefig(path, dpi=160, facecolor="white")
-            paths.append(str(path))
+            path = next(block_vars["image_path_iterator"])
+            value.savefig(path, dpi=160, facecolor="white")
+            paths.append(path)
         return str(figure_rst(paths, gallery_conf["src_dir"]))

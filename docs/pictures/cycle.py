@@ -27,5 +27,5 @@ def draw(docs: Path) -> None:
     cycle = pick_and_place(robot, home_pose(robot))
     torques = pteron.inverse_dynamics(robot, cycle.pose, cycle.velocity, cycle.acceleration)
     (docs / "start").mkdir(exist_ok=True)
-    figure = forces_figure(cycle.time, torques, turning_point=cycle.duration / 2)
+    figure = forces_figure(cycle.time, torques, robot=robot, turning_point=cycle.duration / 2)
     figure.savefig(docs / "start" / "torques.png", dpi=110)
