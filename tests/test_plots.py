@@ -363,7 +363,7 @@ def test_draw_is_the_picture_of_a_robot_in_a_pose():
     home = home_pose(robot)
     guides = joint_guides(robot, home)
     expected = svg_file(robot_figure(joint_points(robot, home), guides, gravity=robot.gravity))
-    assert svg_file(draw(robot)) == expected
+    assert svg_file(draw(robot)) == svg_file(draw(robot, [home])) == expected
     way = draw(robot, home, along=[home, np.add(home, [0.0, 0.01])])
     np.testing.assert_allclose(lines(way)[-1][0], [home, np.add(home, [0.0, 0.01])], atol=1e-12)
     with pytest.raises(pteron.DataError, match="2 given, 1 expected; poses_figure"):

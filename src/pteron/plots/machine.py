@@ -87,8 +87,10 @@ def draw(
     """
     robot = as_manipulator(robot)
     shown = home_pose(robot) if pose is None else checked(robot, pose, "pose")
-    if shown.ndim != 1:
-        raise DataError(f"pose: {shown.shape[0]} given, 1 expected; poses_figure draws several")
+    if shown.size != robot.freedom:  # a table's row is one pose too
+        count = shown.size // robot.freedom
+        raise DataError(f"pose: {count} given, 1 expected; poses_figure draws several")
+    shown = shown.ravel()
     way = None if along is None else np.reshape(checked(robot, along, "along"), (-1, robot.freedom))
     return robot_figure(
         joint_points(robot, shown),
