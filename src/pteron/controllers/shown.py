@@ -29,7 +29,8 @@ _HARDLY = 1e-3
 """The share of the best seen combination below which another counts as not seen."""
 
 _NEAR = 0.1
-"""Share by which velocities and accelerations are disturbed: what errors call for counts too."""
+"""Share by which velocities and accelerations are disturbed at most: what errors call for counts
+too. Bounded, as one far sample would slow down all learning."""
 
 _SAMPLES = 400
 """Of a motion, at least."""
@@ -132,7 +133,7 @@ def shown(robot: Manipulator, motion: Moves | None) -> Shown:
     parts = []
     for part, share in ((motion.pose, 0.0), (motion.velocity, _NEAR), (motion.acceleration, _NEAR)):
         size = np.sqrt(((part[thinned] / unit) ** 2).sum(axis=-1).mean())
-        parts.append(part[thinned] + share * size * unit * rng.normal(size=part[thinned].shape))
+        parts.append(part[thinned] + share * size * unit * rng.uniform(-1.0, 1.0, part[thinned].shape))
     return Shown(robot, typical(robot).base, (parts[0], parts[1], parts[2]))
 
 
