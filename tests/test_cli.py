@@ -835,6 +835,42 @@ def test_a_report_is_a_page_with_its_numbers(monkeypatch: pytest.MonkeyPatch):
     assert "forces" not in found["cycle"]
 
 
+def test_a_motion_is_a_page_or_in_a_report(monkeypatch: pytest.MonkeyPatch):
+    done("cycle tripteron --to 0.1 0 0.05 --acceleration 5 --rate 200 --out way.csv")
+    samples = len(pl.read_csv("way.csv"))
+    text = done("play tripteron way.csv --out way.html --payload 0.5")
+    assert re.search(rf"tripteron: \S+ s, {samples} samples\nWritten: way.html, 0\.\d MB", text)
+    assert "way.csv" in Path("way.html").read_text("utf-8")
+    found = json.loads(done("play tripteron --json"))
+    assert found["page"] == "motion.html"
+    assert found["bytes"] == Path("motion.html").stat().st_size
+    assert (found["source"], found["log"]) == ("adept", False)
+    seen = []
+
+    def noted(machine, folder, motion):
+        seen.append(motion)
+        raise pteron.OutputError("noted")
+
+    monkeypatch.setattr("pteron.report.write_report", noted)
+    refused("report tripteron --out one --motion way.csv", "noted")
+    assert len(seen[0].motion.time) == samples
+    assert seen[0].source == "way.csv"
+
+
+def test_a_motion_that_cannot_be_shown_is_one_line():
+    Path("far.csv").write_text("t,x,y,z\n0,0,0,0\n1,0,0,0.1\n2,0,0,0.9\n")
+    Path("empty.csv").write_text("")
+    Path("words.csv").write_text("t,x,y,z\n0,0,0,zero\n1,0,0,0\n")
+    refused("play tripteron far.csv", "far.csv: row 2 (line 3)", "its slider passes its limits")
+    refused("report tripteron --out new --motion far.csv", "far.csv: row 2 (line 3)")
+    refused("play tripteron empty.csv", "empty.csv")
+    refused("play tripteron words.csv", "row 1 (line 2), column z: 'zero' given")
+    refused("play tripteron none.csv", "none.csv: no such file")
+    refused("play tripteron far.csv --payload -1", "-1.0 given, a mass of 0 kg or more expected")
+    refused("play tripteron far.csv --cycle adept", "MOTION and --cycle given; give one of them")
+    refused("play tripteron --out page.pdf", "page.pdf: a page is written", ".html")
+
+
 def test_a_report_that_cannot_be_written_is_one_line():
     Path("file").write_text("mine")
     refused("report tripteron --out file", "file: cannot be written to as a folder (it is a file)")
