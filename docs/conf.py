@@ -99,7 +99,7 @@ if GALLERY.is_dir() and find_spec("sphinx_gallery") is not None:
         "only_warn_on_example_error": False,
         "download_all_examples": False,
         "remove_config_comments": True,
-        "min_reported_time": 1e9,
+        "write_computation_times": False,
         "show_memory": False,
         "show_signature": False,
         "capture_repr": ("_repr_html_",),

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import inspect
 import re
+import sys
 from collections.abc import Iterable
 from importlib import import_module
+from inspect import cleandoc
 from pkgutil import iter_modules
 from types import ModuleType
 from typing import Any
@@ -18,6 +20,7 @@ from sphinx.application import Sphinx
 from sphinx.domains.python import ObjectEntry, PythonDomain
 from sphinx.environment import BuildEnvironment
 from sphinx.ext import autosummary
+from sphinx.pycode import ModuleAnalyzer
 
 import pteron
 
@@ -157,6 +160,25 @@ def whole_values(
         lines[0] = lines[0].replace(":", _COLON)
 
 
+def said_where_defined(
+    app: Sphinx, what: str, name: str, thing: object, options: Any, lines: list[str]
+) -> None:
+    """Take what is said of a value that a package hands on from the module that defines it.
+
+    Else it is what Python says of dictionaries, or of tuples.
+    """
+    if what != "data" or lines[:1] != cleandoc(type(thing).__doc__ or "").splitlines()[:1]:
+        return
+    package, _, last = name.rpartition(".")
+    lines.clear()
+    for module in sorted(part for part in sys.modules if part.startswith(f"{package}.")):
+        if getattr(sys.modules[module], last, None) is thing:
+            said = ModuleAnalyzer.for_module(module).find_attr_docs().get(("", last))
+            lines += said or []
+            if said:
+                return
+
+
 def plain_bars(
     app: Sphinx, what: str, name: str, thing: object, options: Any, lines: list[str]
 ) -> None:
@@ -218,6 +240,7 @@ setattr(  # noqa: B010
 def setup(app: Sphinx) -> dict[str, Any]:
     """Tell Sphinx."""
     app.connect("builder-inited", write_pages)
+    app.connect("autodoc-process-docstring", said_where_defined, priority=440)
     app.connect("autodoc-process-docstring", whole_values, priority=450)
     app.connect("autodoc-process-docstring", plain_bars, priority=550)
     app.connect("autodoc-skip-member", without_aliases)
