@@ -21,10 +21,10 @@ from test_report import driven
 import pteron
 from pteron.identification import identify
 from pteron.identification.logs import write_log
+from pteron.identification.playback import Playback, playback
 from pteron.motion import Motion, pick_and_place
 from pteron.report import write_motion_page, write_report
 from pteron.report.identification import write_identification
-from pteron.report.recordings import Recording, recording
 from pteron.report.scene import frames
 from pteron.report.typeset import significant
 from pteron.workspace import home_pose
@@ -455,7 +455,7 @@ def test_a_log_is_shown_as_it_was_measured(tmp_path):
     robot = CATALOG["quadrupteron"]
     log = log_of(robot, duration=4.0, rate=500.0, joint_noise=1e-7, force_noise=0.05)
     file = write_log(log, tmp_path / "log.csv")
-    found = recording(robot, file)
+    found = playback(robot, file)
     assert found.log
     assert found.source == "log.csv"
     assert len(found.motion.time) == len(log.time)
@@ -474,7 +474,7 @@ def test_a_log_is_shown_as_it_was_measured(tmp_path):
     other.with_suffix(".toml").write_text(
         '[joints]\ncolumns = ["s1", "s2", "s3", "s4"]\nunit = "mm"\n[motion]\nperiod = 1.0\n'
     )
-    again = recording(robot, other)
+    again = playback(robot, other)
     start = int(np.argmin(np.abs(log.forces - again.forces[0]).sum(axis=1)))
     np.testing.assert_allclose(again.motion.pose[0], found.motion.pose[start], atol=1e-6)
 
@@ -487,13 +487,13 @@ def test_a_simulation_and_a_table_bring_their_forces(tmp_path):
     forces = np.full_like(motion.pose, 7.25)
     values = np.column_stack([motion.time, motion.pose, forces])
     np.savetxt(table, values, delimiter=",", header=",".join(names), comments="", fmt="%.12g")
-    found = recording(robot, table)
+    found = playback(robot, table)
     np.testing.assert_array_equal(found.forces, forces)
     page = write_motion_page(robot, found, tmp_path / "a.html").read_text("utf-8")
     assert "Given force" in page
     assert "those of the table" in page
     assert json.loads(re.search(r'id="scene">(.*?)</script>', page)[1])["forces"][5] == [7.25] * 3
-    held = Recording(motion)
+    held = Playback(motion)
     assert "Drive force" in write_motion_page(robot, held, tmp_path / "b.html").read_text("utf-8")
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from pteron.cli.arguments import option
@@ -13,9 +12,9 @@ from pteron.errors import DataError, PteronError, SingularPose, UnreachablePose
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from pteron.identification.playback import Playback
     from pteron.manipulator import Manipulator
     from pteron.motion import Motion
-    from pteron.report.recordings import Recording
     from pteron.shapes import PoseLike
     from pteron.tables import Table
 
@@ -52,40 +51,25 @@ def replayed(robot: Manipulator, file: str, start: PoseLike | None = None) -> Mo
 
     A table of joints alone is followed from a pose to start from, the home pose if none is given.
     """
-    from pteron.motion import replay
     from pteron.tables import read_table
-    from pteron.workspace import home_pose
 
-    rows = read_table(file)
-    begin = home_pose(robot) if start is None else start
-    return _doubted(robot, rows, lambda: replay(robot, rows, start=begin))
+    return _doubted(robot, read_table(file), start).motion
 
 
-def recorded(robot: Manipulator, file: str) -> Recording:
+def played(robot: Manipulator, file: str) -> Playback:
     """Return a motion from a table, or a log, as it is shown; what is unlikely in it is told."""
-    from pteron.identification.logs import find_description
-    from pteron.report.recordings import is_measured, of_table, recording
-    from pteron.tables import read_table
+    from pteron.identification.playback import playback, read_motion
+    from pteron.tables import Table
 
-    if find_description(file) is not None:
-        return recording(robot, file)
-    rows = read_table(file)
-    if is_measured(robot, rows) and Path(file).is_file():
-        return recording(robot, file)
-    found: list[Recording] = []
-
-    def motion() -> Motion:
-        found.append(of_table(robot, rows))
-        return found[0].motion
-
-    _doubted(robot, rows, motion)
-    return found[0]
+    found = read_motion(robot, file)
+    return _doubted(robot, found) if isinstance(found, Table) else playback(robot, found)
 
 
-def _doubted(robot: Manipulator, rows: Table, read: Callable[[], Motion]) -> Motion:
+def _doubted(robot: Manipulator, rows: Table, start: PoseLike | None = None) -> Playback:
     """Return a motion that is read from a table; what is unlikely in it is told."""
     import numpy as np
 
+    from pteron.identification.playback import of_table
     from pteron.workspace.doubts import value_doubts
 
     file = rows.source
@@ -93,16 +77,16 @@ def _doubted(robot: Manipulator, rows: Table, read: Callable[[], Motion]) -> Mot
     names = [n for n in (*robot.coordinates, *robot.joint_names) if n in rows.columns]
     values = rows.numbers(names)
     try:
-        motion = read()
+        found = of_table(robot, rows, start)
     except (UnreachablePose, SingularPose) as error:
         unlikely = "; ".join(value_doubts(robot, names, values))
         if not unlikely or (isinstance(error, UnreachablePose) and error.millimetres):
             raise
         raise PteronError(f"{error}; {file}: {unlikely}") from None
     told_doubts(robot, names, values, file)
-    if float(np.median(np.diff(motion.time))) >= _SLOW:
-        note(f"Note: {file}: t in steps of {motion.time[1]:g}: are these ms? s are expected")
-    return motion
+    if float(np.median(np.diff(found.motion.time))) >= _SLOW:
+        note(f"Note: {file}: t in steps of {found.motion.time[1]:g}: are these ms? s are expected")
+    return found
 
 
 def loaded(robot: Manipulator, payload: float) -> Manipulator:

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 from typer import Argument
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
-from pteron.cli.given_cycle import STANDARD, loaded, recorded
+from pteron.cli.given_cycle import STANDARD, loaded, played
 from pteron.cli.screen import plain, show, show_json, spinner
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
+    from pteron.identification.playback import Playback
     from pteron.manipulator import Manipulator
-    from pteron.report.recordings import Recording
 
 
 def play(
@@ -56,7 +56,7 @@ def play(
         raise DataError("MOTION and --cycle given; give one of them")
     checked_page(out)
     with spinner(f"Drawing {machine.name}"):
-        found = _recording(machine, motion or cycle or STANDARD)
+        found = _playback(machine, motion or cycle or STANDARD)
         page = write_motion_page(machine, found, out)
     samples, size = len(found.motion.time), page.stat().st_size
     if json:
@@ -76,11 +76,11 @@ def play(
     show(f"Written: {plain(str(page))}, {size / 1e6:.1f} MB")
 
 
-def _recording(machine: Manipulator, motion: str) -> Recording:
+def _playback(machine: Manipulator, motion: str) -> Playback:
     """Return a motion by its name, or from a file; what is unlikely in it is told."""
+    from pteron.identification.playback import Playback
     from pteron.motion import pick_and_place
-    from pteron.report.recordings import Recording
 
     if motion == STANDARD and not Path(motion).exists():
-        return Recording(pick_and_place(machine))
-    return recorded(machine, motion)
+        return Playback(pick_and_place(machine))
+    return played(machine, motion)

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from rich.table import Table
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
-from pteron.cli.given_cycle import recorded
+from pteron.cli.given_cycle import played
 from pteron.cli.screen import note, plain, show, show_json, spinner, table
 
 _SERIES = ("time", "pose", "velocity", "acceleration", "forces")
@@ -39,7 +39,7 @@ def report(
     with spinner(f"Writing the report on {machine.name}"):
         from pteron.report import write_report
 
-        shown = None if motion is None else recorded(machine, motion)
+        shown = None if motion is None else played(machine, motion)
         page = write_report(machine, out, motion=shown)
     found = json.loads((page.parent / "report.json").read_text(encoding="utf-8"))
     for text in found["doubts"]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pteron.equations.machine import closure_of
+from pteron.identification.playback import Playback
 from pteron.kernels import Array, numeric
 from pteron.kinematics import singular_orientations
 from pteron.kinematics.condition import JacobianAtPose, jacobian_at
@@ -28,7 +29,6 @@ from pteron.motion import (
 from pteron.plots import grid_step
 from pteron.reduction import BaseParameters, base_parameters
 from pteron.report.costs import Cost, costs
-from pteron.report.recordings import Recording
 from pteron.report.scene import Frames, frames
 from pteron.workspace import (
     BEYOND_LIMITS,
@@ -160,7 +160,7 @@ class Report:
         return any(drive.rotor_inertia > 0.0 for drive in self.sizing.drives)
 
 
-def contents(robot: Manipulator, motion: Recording | None = None) -> Report:
+def contents(robot: Manipulator, motion: Playback | None = None) -> Report:
     """Return the report on a machine that reaches a pose and is not singular everywhere.
 
     It shows a motion, or the standard cycle where none is given.

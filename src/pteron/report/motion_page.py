@@ -9,6 +9,7 @@ import numpy as np
 
 import pteron
 from pteron.dynamics import drive_forces
+from pteron.identification.playback import Playback
 from pteron.kernels import Array
 from pteron.kinematics import joint_rates
 from pteron.manipulator import Manipulator
@@ -16,7 +17,6 @@ from pteron.motion import Guide, JointPoints, joint_guides, joint_points, overlo
 from pteron.motion.trajectories.tool import tool_motion
 from pteron.plots import forces_figure, grid_step, power_figure, robot_figure, svg
 from pteron.report.joints import Quantity, coordinate, force, nouns, speed
-from pteron.report.recordings import Recording
 from pteron.report.scene import Frames, few, frames
 from pteron.report.stage import stage
 from pteron.report.typeset import fixed, resource, template
@@ -32,7 +32,7 @@ class Shown:
     """
 
     robot: Manipulator
-    recording: Recording
+    playback: Playback
     frames: Frames
     start: JointPoints
     guides: tuple[Guide, ...]
@@ -46,7 +46,7 @@ class Shown:
     @property
     def given(self) -> bool:
         """Whether the forces came with the motion."""
-        return self.recording.forces is not None
+        return self.playback.forces is not None
 
     @property
     def driven(self) -> bool:
@@ -54,7 +54,7 @@ class Shown:
         return any(leg.drive is not None for leg in self.robot.legs)
 
 
-def shown(robot: Manipulator, recorded: Recording) -> Shown:
+def shown(robot: Manipulator, recorded: Playback) -> Shown:
     """Return what the page says of a motion that the machine can do."""
     motion = recorded.motion
     forces = recorded.forces
@@ -67,7 +67,7 @@ def shown(robot: Manipulator, recorded: Recording) -> Shown:
     start, guides = joint_points(robot, motion.pose[0]), joint_guides(robot, moments.pose)
     return Shown(
         robot=robot,
-        recording=recorded,
+        playback=recorded,
         frames=moments,
         start=start,
         guides=guides,
@@ -80,7 +80,7 @@ def shown(robot: Manipulator, recorded: Recording) -> Shown:
     )
 
 
-def motion_page(robot: Manipulator, recorded: Recording) -> str:
+def motion_page(robot: Manipulator, recorded: Playback) -> str:
     """Return the page of a motion, as HTML without any reference to another file or address."""
     found = shown(robot, recorded)
     joints = [leg.joint for leg in robot.legs]
@@ -100,7 +100,7 @@ def motion_page(robot: Manipulator, recorded: Recording) -> str:
             force_title=f"{whose} {force(joints).name}",
         ),
         found=found,
-        recording=recorded,
+        playback=recorded,
         motion=recorded.motion,
         speed=speed(joints),
         joint=nouns(joints),
@@ -120,7 +120,7 @@ def motion_page(robot: Manipulator, recorded: Recording) -> str:
 
 def _forces_told(found: Shown) -> tuple[str, str]:
     """Return whose forces the page shows: in a word, and in a clause."""
-    if found.given and found.recording.log:
+    if found.given and found.playback.log:
         return "Measured", "as they were measured."
     if found.given:
         return "Given", "those of the table."
@@ -131,7 +131,7 @@ def _forces_told(found: Shown) -> tuple[str, str]:
 
 def _figures(found: Shown) -> dict[str, Any]:
     """Return the pictures as SVG, by their names in the template."""
-    robot, motion, at = found.robot, found.recording.motion, found.frames
+    robot, motion, at = found.robot, found.playback.motion, found.frames
     gravity = np.array(robot.gravity)
     angle = fixed(float(np.degrees(motion.pose[0, -1])), 0)
     machine = robot_figure(

@@ -13,8 +13,8 @@ from pteron.errors import OutputError, shown
 from pteron.manipulator import RobotLike, as_manipulator
 
 if TYPE_CHECKING:
+    from pteron.identification.playback import Given
     from pteron.report.contents import Report
-    from pteron.report.recordings import Given
 
 _PAGES = (".html", ".htm")
 
@@ -33,8 +33,8 @@ def write_report(robot: RobotLike, folder: str | Path, *, motion: Given | None =
         Where to write; made if it is missing.
     motion : Motion, Simulation, Table, str or path, optional
         What the page shows, and whose forces it tells, in place of the standard pick-and-place
-        cycle; see `pteron.report.recordings.recording`. The forces are those that the drives must
-        give for it.
+        cycle; see `pteron.identification.playback.playback`. The forces are those that the drives
+        must give for it.
 
     Returns
     -------
@@ -55,12 +55,12 @@ def write_report(robot: RobotLike, folder: str | Path, *, motion: Given | None =
     """
     robot = as_manipulator(robot)
     # Matplotlib, SciPy and SymPy are behind these; the table of the paper needs none of them.
+    from pteron.identification.playback import playback
     from pteron.report.contents import contents
     from pteron.report.page import page
-    from pteron.report.recordings import recording
 
     target = checked_folder(folder)
-    report = contents(robot, None if motion is None else recording(robot, motion))
+    report = contents(robot, None if motion is None else playback(robot, motion))
     data = json.dumps(numbers(report), indent=1, allow_nan=False)
     return write_texts(target, {"report.html": page(report), "report.json": data + "\n"})[0]
 
@@ -76,8 +76,8 @@ def write_motion_page(robot: RobotLike, motion: Given, path: str | Path) -> Path
         The machine.
     motion : Motion, Simulation, Table, str or path
         What it does: from Python, or a file with a table of the motion, of its joints, or a log;
-        see `pteron.report.recordings.recording`. Forces that come with it are shown; else those
-        that the drives must give.
+        see `pteron.identification.playback.playback`. Forces that come with it are shown; else
+        those that the drives must give.
     path : str or path
         The page, whose name ends in .html; its folder must be there.
 
@@ -107,11 +107,11 @@ def write_motion_page(robot: RobotLike, motion: Given, path: str | Path) -> Path
     ...     page.stat().st_size < 1_000_000
     True
     """
+    from pteron.identification.playback import playback
     from pteron.report.motion_page import motion_page
-    from pteron.report.recordings import recording
 
     robot, target = as_manipulator(robot), checked_page(path)
-    return write_text(target, motion_page(robot, recording(robot, motion)))
+    return write_text(target, motion_page(robot, playback(robot, motion)))
 
 
 def checked_page(path: str | Path) -> Path:

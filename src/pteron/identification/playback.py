@@ -1,0 +1,175 @@
+"""A motion to be shown: its samples, and the forces that came with them.
+
+It comes from Python, from a simulation, or from a file: a table of poses or of joints, or a log,
+whose joints are smoothed as identification does it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from pteron.identification.logs import Description, Log, LogFile, find_description, read_log
+from pteron.identification.signals import States, preprocessing_of, samples, spline_motion
+from pteron.kernels import Array
+from pteron.manipulator import Manipulator
+from pteron.motion import Motion, Simulation, check_motion, replay
+from pteron.shapes import PoseLike
+from pteron.tables import CsvFile, Dialect, ParquetFile, Table, open_table, read_table, whole_table
+from pteron.workspace import home_pose
+
+
+@dataclass(frozen=True)
+class Playback:
+    """A motion with T samples, and the forces of the drives that came with it.
+
+    Attributes
+    ----------
+    motion : Motion
+        What the platform does.
+    forces : array, shape (T, n), or None
+        N or N m; None where there are none beside the motion.
+    source : str
+        The name of its file, without the folder; empty where it has none.
+    log : bool
+        Whether it was measured: poses then follow from smoothed joints.
+    """
+
+    motion: Motion
+    forces: Array | None = None
+    source: str = ""
+    log: bool = False
+
+
+Given = Motion | Simulation | Playback | Table | Log | str | Path
+"""What a motion is given as."""
+
+
+def playback(robot: Manipulator, motion: Given, start: PoseLike | None = None) -> Playback:
+    """Return a motion as it is to be shown, after a check that the machine can do it.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    motion : Motion, Simulation, Playback, Table, Log, str or path
+        A file is a table (CSV or Parquet) of `t` and poses, or of `t` and joints, as `replay` reads
+        it; with a TOML file that describes it beside it, or with joints and forces but no rates of
+        the pose, or other names than these, it is a log.
+    start : array, shape (m,), optional
+        A pose in the assembly mode of a table's joints, m and rad; by default the home pose.
+
+    Returns
+    -------
+    Playback
+
+    Raises
+    ------
+    DataError
+        If a file is no table, or a column is missing, or a time does not ascend.
+    UnreachablePose, SingularPose
+        If the machine cannot do it; the message says where it fails, and which leg.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.motion import pick_and_place
+    >>> from pteron.identification.playback import playback
+    >>> robot = pteron.load("tripteron")
+    >>> cycle = pick_and_place(robot, [0.0, 0.0, 0.0], scale=0.5)
+    >>> playback(robot, cycle).forces is None
+    True
+    """
+    if isinstance(motion, Playback):
+        return motion
+    if isinstance(motion, Simulation):
+        return Playback(_checked(robot, motion.motion), motion.forces)
+    if isinstance(motion, Motion):
+        return Playback(_checked(robot, motion))
+    if isinstance(motion, str | Path):
+        motion = read_motion(robot, motion)
+    if isinstance(motion, Log):
+        return of_log(robot, motion)
+    return of_table(robot, motion, start)
+
+
+def read_motion(robot: Manipulator, path: str | Path) -> Table | Log:
+    """Return the table or the log that is in a file; ``-`` is a table on standard input."""
+    if find_description(path) is not None:
+        return read_log(path, robot)
+    if not Path(path).is_file():
+        return read_table(path)
+    plain = open_table(path)
+    return whole_table(plain) if is_table(robot, plain.columns) else read_log(path, robot)
+
+
+def read_content(robot: Manipulator, data: bytes, source: str) -> Table | Log:
+    """Return the table or the log that is in the content of a file of that name."""
+    if Path(source).suffix.lower() == ".csv":
+        plain = CsvFile(data, source)
+        if is_table(robot, plain.columns):
+            return whole_table(plain)
+        return LogFile(CsvFile(data, source, Dialect()), robot, Description()).read()
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "motion.parquet"
+        path.write_bytes(data)
+        file = ParquetFile(path, source)
+        if is_table(robot, file.columns):
+            return whole_table(file)
+        return LogFile(file, robot, Description()).read()
+
+
+def is_table(robot: Manipulator, columns: Sequence[str]) -> bool:
+    """Say whether columns are those of a table of a motion, rather than of a log.
+
+    A log has joints and forces, but no rates of the pose; or it calls everything by other names.
+    """
+    has = set(columns)
+    if has.issuperset((*robot.joint_names, *robot.force_names)):
+        return bool(has & {f"d{name}" for name in robot.coordinates})
+    return bool(has.intersection((*robot.coordinates, *robot.joint_names)))
+
+
+def of_table(robot: Manipulator, rows: Table, start: PoseLike | None = None) -> Playback:
+    """Return the motion of a table, with its forces where it has them all."""
+    if start is None and not set(rows.columns) >= set(robot.coordinates):
+        start = home_pose(robot)
+    motion = replay(robot, rows, start=start)
+    has_forces = set(rows.columns) >= set(robot.force_names)
+    forces = rows.numbers(robot.force_names) if has_forces else None
+    return Playback(motion, forces, Path(rows.source).name)
+
+
+def of_log(robot: Manipulator, log: Log) -> Playback:
+    """Return the motion of a log's joints, smoothed, with its forces where they are N or N m."""
+    # All of it is to be seen, and not the part alone that repeats.
+    whole = replace(log, description=replace(log.description, period=None, start=None, end=None))
+    how = preprocessing_of(robot, whole)
+    if len(log.segments) == 1:
+        moves = spline_motion(log.time, log.joints, how.cutoff)
+        states = [States.of_joints(robot, moves, log.time, how.start, source=log.source)]
+        forces = log.forces
+    else:
+        # Filters lose what is next to a gap, where a spline would invent a motion.
+        parts = list(samples(robot, whole, how))
+        states = [part.states for part in parts]
+        forces = np.concatenate([part.forces for part in parts])
+
+    def joined(name: str) -> Array:
+        return np.concatenate([getattr(one, name) for one in states])
+
+    time = joined("time")
+    motion = Motion(time - time[0], joined("pose"), joined("velocity"), joined("acceleration"))
+    check_motion(robot, motion)
+    # Else they are in a drive's own unit, such as A.
+    known = log.description.force_unit == "N"
+    return Playback(motion, forces if known else None, Path(log.source).name, log=True)
+
+
+def _checked(robot: Manipulator, motion: Motion) -> Motion:
+    check_motion(robot, motion)
+    return motion
