@@ -66,8 +66,8 @@ def _written(folder, kind, name):
         return write_motion_page(MACHINES[name], way_out(name), target)
     if kind == "report":
         return write_report(MACHINES[name], folder / name)
-    robot = CATALOG["five-bar"]
-    log = log_of(robot, duration=4.0, rate=250.0, joint_noise=2e-7, force_noise=0.01)
+    robot = CATALOG["delta"]
+    log = log_of(robot, duration=5.0, rate=300.0, joint_noise=2e-7, force_noise=0.05)
     return write_identification(identify(robot, log), folder / "identified").page
 
 
