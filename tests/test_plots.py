@@ -273,6 +273,20 @@ def test_forces_are_drawn_as_given():
     assert "s" in axes.get_xlabel()
 
 
+def test_plain_lists_serve_and_what_does_not_fit_is_told():
+    three = [[1.0, 2.0, 3.0], [2.0, 3.0, 4.0]]
+    for make in (forces_figure, power_figure):
+        assert len(make([0.0, 1.0], three).legends[0].get_texts()) >= 3
+        with pytest.raises(pteron.DataError, match=r"shape \(2, 3\) given, \(3, (n|3)\) expected"):
+            make([0.0, 1.0, 2.0], three)
+        with pytest.raises(pteron.DataError, match="numbers"):
+            make([0.0, 1.0], [["a", "b"], ["c", "d"]])
+    with pytest.raises(pteron.DataError, match=r"shape \(2, 3\) given, \(2, 4\) expected"):
+        forces_figure([0.0, 1.0], three, robot="quadrupteron")
+    with pytest.raises(pteron.DataError, match="a column for each leg"):
+        forces_figure([0.0, 1.0], 3.0)
+
+
 def test_singular_orientations_are_marked():
     figure = regularity()
     axes = figure.axes[0]
