@@ -9,11 +9,10 @@ four cycles it learns what the motion asks for, and the error goes.
 import pteron
 from pteron.controllers import Adaptive
 from pteron.motion import pick_and_place, simulate
-from pteron.workspace import home_pose
 
 robot = pteron.load("delta")
 believed = pteron.with_parameters(robot, 0.7 * pteron.parameters(robot))
-cycle = pick_and_place(robot, home_pose(robot), duration=0.5, samples=251)
+cycle = pick_and_place(robot, duration=0.5, samples=251)
 found = simulate(
     robot, cycle.repeated(4), Adaptive(period=1e-3, motion=cycle), model=believed, step=2e-4
 )

@@ -11,10 +11,9 @@ from tempfile import gettempdir
 
 import pteron
 from pteron.motion import pick_and_place
-from pteron.workspace import home_pose
 
 robot = pteron.load("delta")
-cycle = pick_and_place(robot, home_pose(robot))
+cycle = pick_and_place(robot)
 torques = pteron.inverse_dynamics(robot, cycle.pose, cycle.velocity, cycle.acceleration)
 
 # %%

@@ -8,10 +8,9 @@ actuators of a Quadrupteron?
 
 import pteron
 from pteron.motion import pick_and_place
-from pteron.workspace import home_pose
 
 robot = pteron.load("quadrupteron")
-cycle = pick_and_place(robot, home_pose(robot))
+cycle = pick_and_place(robot)
 
 # %%
 # The machine at four moments of the way out. The dotted line is the tool's way.

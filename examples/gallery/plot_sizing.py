@@ -7,10 +7,9 @@ Which torque, at which speed, does a cycle with 1 kg ask of each drive?
 
 import pteron
 from pteron.motion import pick_and_place, size, with_payload
-from pteron.workspace import home_pose
 
 robot = with_payload(pteron.load("delta"), 1.0)
-found = size(robot, pick_and_place(robot, home_pose(robot)))
+found = size(robot, pick_and_place(robot))
 
 # %%
 # A dot is the root mean square, which heats the motor. In two of the quadrants the drive brakes.

@@ -8,10 +8,9 @@ limit of one drive or another.
 
 import pteron
 from pteron.motion import cycle_path, limits_of, pick_and_place, shortest, time_optimal
-from pteron.workspace import home_pose
 
 robot = pteron.load("quadrupteron")
-cycle = pick_and_place(robot, home_pose(robot))
+cycle = pick_and_place(robot)
 limits = limits_of(robot, force=60.0, speed=1.5)
 
 # %%

@@ -8,10 +8,9 @@ A Quadrupteron picks up 0.5 kg in the middle of the cycle, which its controller 
 import pteron
 from pteron.controllers import ComputedTorque
 from pteron.motion import pick_and_place, simulate
-from pteron.workspace import home_pose
 
 robot = pteron.load("quadrupteron")
-motion = pick_and_place(robot, home_pose(robot))
+motion = pick_and_place(robot)
 found = simulate(robot, motion, ComputedTorque(period=1e-3), payload=[(0.0, 0.0), (0.5, 0.5)])
 
 # %%

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 
 from pteron.kernels import Array
 from pteron.legs import Drive
@@ -24,7 +25,7 @@ from pteron.plots.canvas import (
     remark,
     spot,
 )
-from pteron.plots.joints import joints_of
+from pteron.plots.joints import joints_of, rows
 
 _ROOM = 1.15
 """The axes' half width over what is drawn."""
@@ -125,8 +126,9 @@ def _box(axes: Axes, ability: Ability, sizes: Sequence[float], color: str) -> No
             axes.plot([-x, x], [side, side], color=color, linewidth=1.0, linestyle=(0, (1, 1.6)))
 
 
-def power_figure(time: Array, power: Array) -> Figure:
+def power_figure(time: ArrayLike, power: ArrayLike) -> Figure:
     """Return the power (K, n) of all drives over time (K,), s, and their sum; W."""
+    time, power = rows(time, power, "power")
     figure = blank(5.4, 3.3)
     axes = plain_axes(figure, "time (s)", "power (W)")
     axes.axhline(0.0, color=MUTED, linewidth=0.8)

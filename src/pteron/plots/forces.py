@@ -6,6 +6,7 @@ from math import inf
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 
 from pteron.kernels import Array
 from pteron.manipulator import RobotLike
@@ -24,15 +25,15 @@ from pteron.plots.canvas import (
     spot,
     stack,
 )
-from pteron.plots.joints import joints_of
+from pteron.plots.joints import joints_of, rows
 
 _ROOM = 75.0
 """Degrees that a remark takes which says in words what an orientation is."""
 
 
 def forces_figure(
-    time: Array,
-    forces: Array,
+    time: ArrayLike,
+    forces: ArrayLike,
     *,
     turning_point: float | None = None,
     ylabel: str | None = None,
@@ -45,6 +46,7 @@ def forces_figure(
     another label.
     """
     joints = joints_of(robot, forces)
+    time, forces = rows(time, forces, "forces", len(joints))
     words = [ylabel or f"actuator {joint.force} ({joint.force_unit})" for joint in joints]
     groups = list(dict.fromkeys(words))
     figure = blank(5.4, 3.3 if len(groups) == 1 else 1.2 + 1.6 * len(groups))

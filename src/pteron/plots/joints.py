@@ -5,12 +5,35 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pteron.errors import DataError
+from pteron.kernels import Array, as_array
 from pteron.legs.kind import SLIDER, ActuatedJoint
 from pteron.manipulator import RobotLike, as_manipulator
 
 
 def joints_of(robot: RobotLike | None, values: ArrayLike) -> list[ActuatedJoint]:
     """Return each leg's joint; without a machine, a slider for each column of values (..., n)."""
+    if np.ndim(values) == 0:
+        raise DataError("one number given, an array (T, n) expected: a column for each leg")
     if robot is None:
         return [SLIDER] * np.shape(values)[-1]
     return [leg.joint for leg in as_manipulator(robot).legs]
+
+
+def rows(
+    time: ArrayLike, values: ArrayLike, what: str, columns: int | None = None
+) -> tuple[Array, Array]:
+    """Return times (T,) and a row of values (T, n) for each, as arrays.
+
+    Raises
+    ------
+    DataError
+        If they do not fit together, or there are not so many columns.
+    """
+    t, found = as_array(time, "time", ()), as_array(values, what, ())
+    expected = "n" if columns is None else columns
+    if t.ndim != 1 or not len(t):
+        raise DataError(f"time: shape {t.shape} given, (T,) expected, T above 0")
+    if found.ndim != 2 or len(found) != len(t) or columns not in (None, found.shape[1]):
+        raise DataError(f"{what}: shape {found.shape} given, ({len(t)}, {expected}) expected")
+    return t, found

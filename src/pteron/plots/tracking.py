@@ -6,18 +6,21 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 
 from pteron.kernels import Array
 from pteron.plots.canvas import MUTED, blank, leg_style, legend, stack
+from pteron.plots.joints import rows
 
 _SCALES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))
 
 
-def tracking_figure(time: Array, error: Array, names: Sequence[str]) -> Figure:
+def tracking_figure(time: ArrayLike, error: ArrayLike, names: Sequence[str]) -> Figure:
     """Return the errors (T, m) of the pose over time (T,), s.
 
     `names` are its coordinates; the angle "phi", in rad, gets axes of its own, lengths are in m.
     """
+    time, error = rows(time, error, "error", len(names))
     lengths = [i for i, name in enumerate(names) if name != "phi"]
     angles = [i for i, name in enumerate(names) if name == "phi"]
     groups = [(own, unit) for own, unit in ((lengths, "m"), (angles, "rad")) if own]
