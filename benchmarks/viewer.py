@@ -132,14 +132,17 @@ def _drag(viewer: Viewer, page: Any, duration: float) -> None:
     boxes = [box for box in boxes if box]
 
     def dragged(until: float) -> int:
-        count = 0
+        """Drag until a time; return how often the machine was found in another pose."""
+        count, before = 0, viewer.state.pose
         while perf_counter() < until:
             box = rng.choice(boxes)
-            page.mouse.move(box["x"] + box["width"] * rng.random(), box["y"] + 5)
+            height = box["y"] + 0.5 * box["height"]
+            page.mouse.move(box["x"] + box["width"] * rng.random(), height)
             page.mouse.down()
             for _ in range(rng.randint(1, 15)):
-                page.mouse.move(box["x"] + box["width"] * rng.uniform(-0.1, 1.1), box["y"] + 5)
-                count += 1
+                page.mouse.move(box["x"] + box["width"] * rng.uniform(-0.1, 1.1), height)
+                count += viewer.state.pose is not before
+                before = viewer.state.pose
             page.mouse.up()
         return count
 
@@ -149,7 +152,7 @@ def _drag(viewer: Viewer, page: Any, duration: float) -> None:
     before = _memory(), _heap(devtools)
     count = dragged(begin + duration)
     after = _memory(), _heap(devtools)
-    print(f"{duration / 60.0:.2g} min of random dragging, {count} moves of the mouse:")
+    print(f"{duration / 60.0:.2g} min of random dragging, {count} poses seen:")
     print(f"  exceptions: {len(viewer.faults)} on the server, {len(errors)} on the page")
     for where, one, other in zip(("server", "page"), before, after, strict=True):
         print(f"  memory of the {where}: {one:.1f} MB, then {other:.1f} MB: {other - one:+.1f} MB")

@@ -209,7 +209,10 @@ class Panel:
         if self._play.value != session.playing:
             self._play.value = session.playing
         if session.motion is not None:
-            self._set("time", self._time, round(session.time, 2), settled)
+            most = max(_SHORT, round(session.motion.duration, 2))
+            if self._time.max != most:
+                self._time.max = most
+            self._set("time", self._time, min(most, round(session.time, 2)), settled)
 
     def _set(self, name: str, slider: Any, value: float, settled: bool) -> None:
         """Move a slider, whose range grows where it must."""
@@ -236,8 +239,6 @@ class Panel:
         self._mode.value = _signs(tuple(leg.elbow for leg in state.robot.legs))
         motion = session.motion
         self._time.disabled = motion is None
-        if motion is not None:
-            self._time.max = max(_SHORT, round(motion.duration, 3))
         name = f"{session.title}: {motion.duration:.3g} s" if motion else ""
         self._title.content = status("", empty=name or "No motion is loaded")
 

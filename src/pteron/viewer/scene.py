@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     import viser
 
 _SCREW = 0.09
-_SCREW_RADIUS = 0.0035
 _FORCE = 0.3
 _FORCE_RADIUS = 0.011
 """Lengths and radii of arrows as shares of the machine's size: of the largest force in view."""
@@ -48,8 +47,8 @@ _DOWN = 0.2
 _NONE = 1e-9
 """m/s^2 of gravity that are none."""
 
-_SLIDING = "#b8860b"
-"""Screws of sliding joints; those of turning joints are the colour of ink."""
+_TURNING, _SLIDING = (0.0035, INK), (0.0095, "#d9a400")
+"""Radius and colour of joints' screws: those that slide are thicker than their guides."""
 
 _FAR = 1.9
 """Distance of the camera, in sizes of the machine."""
@@ -77,7 +76,8 @@ class Scene:
             self._add_mesh(f"face{k}", fan(outline), REACH, 0.5)
         count = robot.freedom * points.chain.shape[-2]
         for name, most in (("screws", count), ("forces", robot.freedom)):
-            shafts, heads = arrows(np.zeros((most, 3)), np.zeros((most, 3)), 1.0, [INK] * most)
+            none = np.zeros((most, 3))
+            shafts, heads = arrows(none, none, [1.0] * most, [INK] * most)
             self._add_copies(name, cylinder(), shafts, visible=False)
             self._add_copies(f"{name}-heads", cylinder(0.0), heads, visible=False)
         self._aim(points)
@@ -159,7 +159,7 @@ class Scene:
         if np.linalg.norm(gravity) > _NONE:
             way = _DOWN * self.size * gravity / np.linalg.norm(gravity)
             start = corner - 1.2 * way - 0.06 * self.size * _across(way / np.linalg.norm(way))
-            shafts, heads = arrows(start[None], way[None], 0.004 * self.size, [MUTED])
+            shafts, heads = arrows(start[None], way[None], [0.004 * self.size], [MUTED])
             self._add_copies("gravity", cylinder(), shafts)
             self._add_copies("gravity-head", cylinder(0.0), heads)
             self._add_label("g", "g", start - 0.3 * way)
@@ -255,9 +255,10 @@ class Scene:
         length = _SCREW * self.size
         units = axes / np.linalg.norm(axes, axis=-1, keepdims=True)
         ways = np.where(np.isnan(starts), np.nan, 2.0 * length * units)
-        colors = [INK if turns else _SLIDING for turns in turning.ravel()]
+        looks = [_TURNING if turns else _SLIDING for turns in turning.ravel()]
+        radii, colors = [self.size * radius for radius, _ in looks], [color for _, color in looks]
         flat = (starts - length * units).reshape(-1, 3)
-        return arrows(flat, ways.reshape(-1, 3), _SCREW_RADIUS * self.size, colors)
+        return arrows(flat, ways.reshape(-1, 3), radii, colors)
 
     def _force_arrows(
         self, points: JointPoints, forces: Array, scale: Array
@@ -267,7 +268,8 @@ class Scene:
         starts = np.array([line[0] for line in points.links])
         axes = np.array([guide.axis for guide in self._guides])
         ways = _FORCE * self.size * shares[:, None] * axes
-        return arrows(starts, ways, _FORCE_RADIUS * self.size, LEG_COLORS[: len(starts)])
+        radii = [_FORCE_RADIUS * self.size] * len(starts)
+        return arrows(starts, ways, radii, LEG_COLORS[: len(starts)])
 
 
 def _box(points: JointPoints, guides: Sequence[Guide]) -> tuple[Array, Array]:

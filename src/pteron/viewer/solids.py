@@ -124,23 +124,23 @@ def still_solids(
 
 
 def arrows(
-    starts: Array, ways: Array, radius: float, color: Sequence[str]
+    starts: Array, ways: Array, radii: Sequence[float], colors: Sequence[str]
 ) -> tuple[Copies, Copies]:
     """Return the shafts and the heads of arrows from points (K, 3) along ways (K, 3), m.
 
     A way that is NaN or has no length is no arrow.
     """
-    ways = np.nan_to_num(ways)
-    starts = np.nan_to_num(starts)
+    ways, starts = np.nan_to_num(ways), np.nan_to_num(starts)
     lengths = np.linalg.norm(ways, axis=-1)
-    head = np.minimum(6.0 * radius, 0.6 * lengths)
+    heads = np.minimum(6.0 * np.array(radii), 0.6 * lengths)
     units = np.divide(ways, lengths[:, None], out=np.zeros_like(ways), where=lengths[:, None] > 0.0)
-    necks = starts + (lengths - head)[:, None] * units
-    shafts, heads = _Bars(), _Bars()
-    for i in range(len(starts)):
-        shafts.add(starts[i], necks[i], radius, color[i])
-        heads.add(necks[i], necks[i] + head[i] * units[i], 2.6 * radius, color[i])
-    return shafts.made(), heads.made()
+    necks = starts + (lengths - heads)[:, None] * units
+    tips = starts + ways
+    shafts, cones = _Bars(), _Bars()
+    for i, (radius, color) in enumerate(zip(radii, colors, strict=True)):
+        shafts.add(starts[i], necks[i], radius, color)
+        cones.add(necks[i], tips[i], 2.6 * radius, color)
+    return shafts.made(), cones.made()
 
 
 class _Bars:

@@ -245,7 +245,9 @@ class Viewer:
 
     def _show_looks(self) -> None:
         panel = self._panel
-        looks = panel.screws.value, panel.forces.value, panel.handle.value
+        # A handle is for a platform that waits to be moved.
+        handle = panel.handle.value and not self._session.playing
+        looks = panel.screws.value, panel.forces.value, handle
         if looks != self._looks:
             self._looks = looks
             self._scene.set_visible("screws", looks[0])
