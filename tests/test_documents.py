@@ -135,7 +135,7 @@ def sessions(text):
                 yield line, [row.strip() for row in output.splitlines() if row.strip()]
 
 
-NOT_REPEATED = {"pteron play quadrupteron far.csv": "the page does not show the file; test_play.py"}
+NOT_REPEATED = {"pteron play quadrupteron far.csv": "the page does not show the file"}
 """Commands whose output is not compared here, and why; that their options exist is."""
 SESSIONS = [
     (name, *found)
