@@ -135,7 +135,14 @@ def sessions(text):
                 yield line, [row.strip() for row in output.splitlines() if row.strip()]
 
 
-SESSIONS = [(name, *found) for name, text in TEXTS.items() for found in sessions(text)]
+NOT_REPEATED = {"pteron play quadrupteron far.csv": "the page does not show the file"}
+"""Commands whose output is not compared here, and why; that their options exist is."""
+SESSIONS = [
+    (name, *found)
+    for name, text in TEXTS.items()
+    for found in sessions(text)
+    if found[0] not in NOT_REPEATED
+]
 
 
 @pytest.mark.parametrize(("name", "line", "shown"), SESSIONS, ids=[s[1] for s in SESSIONS])
