@@ -133,7 +133,9 @@ def shown(robot: Manipulator, motion: Moves | None) -> Shown:
     parts = []
     for part, share in ((motion.pose, 0.0), (motion.velocity, _NEAR), (motion.acceleration, _NEAR)):
         size = np.sqrt(((part[thinned] / unit) ** 2).sum(axis=-1).mean())
-        parts.append(part[thinned] + share * size * unit * rng.uniform(-1.0, 1.0, part[thinned].shape))
+        parts.append(
+            part[thinned] + share * size * unit * rng.uniform(-1.0, 1.0, part[thinned].shape)
+        )
     return Shown(robot, typical(robot).base, (parts[0], parts[1], parts[2]))
 
 
