@@ -7,7 +7,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
 QUICK := published kinematics delta family manipulator errors toml passes payload costs
 
-.PHONY: demo quick test lint bench docs clean
+.PHONY: demo quick test lint bench docs wheels clean
 
 demo: $(VENV)/.runtime
 	$(BIN)/pteron report quadrupteron --out demo
@@ -38,6 +38,10 @@ docs: $(VENV)/.docs
 	$(BIN)/python docs/pictures/draw.py
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m sphinx -W --keep-going -n -q -d docs/_build/doctrees docs docs/_build/html
 	$(BIN)/python docs/check_site.py docs/_build/html
+
+# The wheel in empty environments: every Python here, each extra alone and all; over half an hour.
+wheels:
+	$(PYTHON) tests/installed/matrix.py
 
 $(VENV)/.runtime: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)

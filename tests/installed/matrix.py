@@ -88,7 +88,7 @@ def tried(python: Path, wheel: Path, extra: str, work: Path) -> str:
     # Nothing is built here: a wheel for everything, as where there is no compiler.
     done = subprocess.run(
         [*pip, "--only-binary", ":all:", wanted],
-        env={**os.environ, "PIP_CACHE_DIR": str(wheel.parent / "cache")},
+        env={"PIP_CACHE_DIR": str(wheel.parent / "cache"), **os.environ},
         capture_output=True,
         text=True,
         check=False,
@@ -101,7 +101,7 @@ def tried(python: Path, wheel: Path, extra: str, work: Path) -> str:
     kept = {name: os.environ[name] for name in ("SYSTEMROOT",) if name in os.environ}
     bare = {**kept, "PATH": str(programs), "HOME": str(home), "USERPROFILE": str(home)}
     done = subprocess.run(
-        [str(programs / "python"), "-W", "error::SyntaxWarning", str(FEATURES), extra],
+        [str(programs / "python"), str(FEATURES), extra],
         cwd=home,
         env=bare,
         capture_output=True,

@@ -185,7 +185,9 @@ def _compiled(prefix: str, sources: Mapping[str, str]) -> tuple[bytes, str]:
 
 
 def _run(command: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    return subprocess.run(
+        command, cwd=folder, capture_output=True, text=True, errors="replace", check=False
+    )
 
 
 def _platform() -> tuple[str, str]:

@@ -50,6 +50,12 @@ _FLAGS = (
     *("-ffp-contract=off", "-fno-tree-slp-vectorize"),
 )
 
+_LINKED = (
+    "-shared",
+    # On macOS a module must say that Python itself brings the symbols of its interface.
+    *(("-undefined", "dynamic_lookup") if sys.platform == "darwin" else ()),
+)
+
 _LIBRARY = "pteron_kernel" + EXTENSION_SUFFIXES[0]
 
 
@@ -83,7 +89,10 @@ def _version(command: tuple[str, ...]) -> str:
 
 
 def _run(command: Sequence[str], *more: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([*command, *more], capture_output=True, text=True, check=False)
+    # Messages may be in any language and encoding; what cannot be read of them does not matter.
+    return subprocess.run(
+        [*command, *more], capture_output=True, text=True, errors="replace", check=False
+    )
 
 
 def module_source(
@@ -186,7 +195,7 @@ class Code:
         source, library = folder / "kernel.c", folder / _LIBRARY
         source.write_text(self.source, encoding="utf-8")
         headers = (f"-I{path}" for path in (sysconfig.get_path("include"), np.get_include()))
-        done = _run(command, *_FLAGS, *headers, "-shared", str(source), "-o", str(library), "-lm")
+        done = _run(command, *_FLAGS, *headers, *_LINKED, str(source), "-o", str(library), "-lm")
         if done.returncode != 0:
             lines = done.stderr.strip().splitlines() or [f"exit code {done.returncode}"]
             raise ModelError(
