@@ -110,10 +110,17 @@ def _examples(*lines: str) -> str:
     return "\n\n".join(["[bold]Examples[/bold]", *lines])
 
 
-def _add(function: Callable[..., None], *examples: str, cls: type[Command] = Command) -> None:
+def _add(
+    panel: str, function: Callable[..., None], *examples: str, cls: type[Command] = Command
+) -> None:
     # One line a paragraph, for the terminal to cut.
     paragraphs = (" ".join(part.split()) for part in cleandoc(function.__doc__ or "").split("\n\n"))
-    app.command(cls=cls, help="\n\n".join(paragraphs), epilog=_examples(*examples))(function)
+    app.command(
+        cls=cls,
+        help="\n\n".join(paragraphs),
+        epilog=_examples(*examples),
+        rich_help_panel=panel,
+    )(function)
 
 
 @app.callback(
@@ -143,39 +150,90 @@ def pteron(
         raise Exit
 
 
-_add(catalog, "pteron catalog --json")
-_add(new, "pteron new", "pteron new delta --out robot.toml")
-_add(check, "pteron check robot.toml")
+_MACHINES = "Machines"
 _add(
+    _MACHINES,
+    catalog,
+    "pteron catalog --json",
+)
+_add(
+    _MACHINES,
+    new,
+    "pteron new",
+    "pteron new delta --out robot.toml",
+)
+_add(
+    _MACHINES,
+    check,
+    "pteron check robot.toml",
+)
+_add(
+    _MACHINES,
     report,
     "pteron report quadrupteron --out report",
     "pteron report quadrupteron --motion motion.csv --out report",
 )
+
+_SEE = "See it"
 _add(
+    _SEE,
     view,
     "pteron view delta",
     "pteron view quadrupteron --motion adept --payload 0.5",
     "pteron view robot.toml --motion log.csv --port 9000 --no-browser",
 )
 _add(
+    _SEE,
+    play,
+    "pteron play quadrupteron",
+    "pteron play quadrupteron motion.csv --out motion.html",
+    "pteron play my-robot.toml log.parquet --out log.html",
+)
+_add(
+    _SEE,
+    film,
+    "pteron film delta -o cycle.mp4",
+    "pteron film quadrupteron --speed 0.4 --forces --turns 0.5 -o slow.mp4",
+    "pteron film robot.toml --cycle motion.csv --size 640x480 -o motion.gif",
+)
+
+_COMPUTE = "Compute"
+_add(
+    _COMPUTE,
     inverse,
     "pteron inverse quadrupteron 0.01 0.02 -0.03 0.1",
     "pteron inverse tripteron --table poses.csv --out joints.csv",
     cls=NumbersCommand,
 )
 _add(
+    _COMPUTE,
     direct,
     "pteron direct quadrupteron 0.03 0.02 0.01 0.02",
     "pteron direct quadrupteron --table log.csv --out poses.parquet",
     cls=NumbersCommand,
 )
 _add(
+    _COMPUTE,
     forces,
     "pteron forces quadrupteron --pose 0.01 0.02 -0.03 0.1 --velocity 0 0 0.5 0",
     "pteron forces quadrupteron --table motion.csv --out forces.csv",
     cls=NumbersCommand,
 )
 _add(
+    _COMPUTE,
+    base,
+    "pteron base quadrupteron --symbols",
+    "pteron base quadrupteron --keep I_l1,m_l4 --format latex",
+)
+_add(
+    _COMPUTE,
+    table1,
+    "pteron table1",
+)
+
+_MOVE = "Move"
+_add(
+    _MOVE,
     cycle,
     "pteron cycle quadrupteron",
     "pteron cycle my-robot.toml --optimal --force 60 --payload 0.5 --out cycle.csv",
@@ -184,35 +242,36 @@ _add(
     cls=NumbersCommand,
 )
 _add(
+    _MOVE,
     simulate,
     "pteron simulate delta --payload 1.0",
     "pteron simulate robot.toml --controller adaptive --model drawing.toml --cycles 10 --out run",
     "pteron simulate quadrupteron --cycle motion.csv --encoder 1e-6 --delay 5e-4 --out run.csv",
 )
 _add(
+    _MOVE,
     size,
     "pteron size delta --payload 1.0",
     "pteron size robot.toml --motors motors.csv --dwell 0.2 --out sizing",
     "pteron size quadrupteron --cycle motion.csv --out sizing.csv",
 )
+
+_LOG = "From a log to a controller"
 _add(
-    film,
-    "pteron film delta -o cycle.mp4",
-    "pteron film quadrupteron --speed 0.4 --forces --turns 0.5 -o slow.mp4",
-    "pteron film robot.toml --cycle motion.csv --size 640x480 -o motion.gif",
+    _LOG,
+    excite,
+    "pteron excite quadrupteron --out exciting.csv",
+    "pteron excite my-robot.toml --out exciting.csv --period 5 --speed 0.5 --force 60",
+    "pteron excite delta --out exciting.csv --angle-unit deg --time-unit ms --decimal ,",
 )
 _add(
-    play,
-    "pteron play quadrupteron",
-    "pteron play quadrupteron motion.csv --out motion.html",
-    "pteron play my-robot.toml log.parquet --out log.html",
+    _LOG,
+    identify,
+    "pteron identify log.csv --robot quadrupteron --out identified",
+    "pteron identify a.csv b.csv --held-out c.csv --robot my-robot.toml --out identified",
 )
 _add(
-    base,
-    "pteron base quadrupteron --symbols",
-    "pteron base quadrupteron --keep I_l1,m_l4 --format latex",
-)
-_add(
+    _LOG,
     export,
     "pteron export quadrupteron --c controller",
     "pteron export my-robot.toml --c controller --float --function inverse_kinematics",
@@ -221,18 +280,6 @@ _add(
     "pteron export linear-delta --klipper printer",
     "pteron export robot.toml --base result/identification.json --c controller",
 )
-_add(
-    excite,
-    "pteron excite quadrupteron --out exciting.csv",
-    "pteron excite my-robot.toml --out exciting.csv --period 5 --speed 0.5 --force 60",
-    "pteron excite delta --out exciting.csv --angle-unit deg --time-unit ms --decimal ,",
-)
-_add(
-    identify,
-    "pteron identify log.csv --robot quadrupteron --out identified",
-    "pteron identify a.csv b.csv --held-out c.csv --robot my-robot.toml --out identified",
-)
-_add(table1, "pteron table1")
 
 
 def main() -> None:
