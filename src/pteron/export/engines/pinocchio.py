@@ -108,9 +108,11 @@ def pinocchio_model(robot: RobotLike, *, home: PoseLike | None = None) -> Any:
     robot = as_manipulator(robot)
     try:
         import pinocchio  # type: ignore[import-not-found,unused-ignore]  # noqa: F401
-    except ImportError:
+    except ImportError as error:
+        absent = isinstance(error, ModuleNotFoundError) and error.name == "pinocchio"
         raise ModelError(
-            'Pinocchio is not installed; pip install "pteron[oracles]", or pip install pin'
+            f"Pinocchio {'is not installed' if absent else f'cannot be imported ({error})'}; "
+            'pip install "pteron[oracles]", or pip install pin'
         ) from None
     source = pinocchio_source(tree(robot, home))
     # What is returned in this process is what the written file returns: one code for both.
