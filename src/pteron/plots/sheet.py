@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from pteron.kernels import Array
-from pteron.plots.canvas import FONT_SIZE, PAPER, SMALL, nice_step, plain_axes
+from pteron.plots.canvas import PAPER, nice_step, plain_axes
+from pteron.plots.drawn import Drawn
 
 _RIM = 0.06
 """Share of what is drawn that the scales show around it."""
@@ -24,11 +24,8 @@ _LEFT, _BELOW, _TOP = 0.62, 0.46, 0.1
 """Inches of a box that the scales and their names take, and that are free over the axes."""
 
 
-class Sheet:
-    """Axes with scales in mm, onto which points in space are put where the plane has them.
-
-    `things` are what was drawn, in that order.
-    """
+class Sheet(Drawn):
+    """Axes with scales in mm, onto which points in space are put where the plane has them."""
 
     def __init__(
         self,
@@ -44,6 +41,7 @@ class Sheet:
         They take a box of the figure (left, bottom, width, height, shares of it), or all of it;
         `small` ones have no scales.
         """
+        super().__init__(small=small)
         axes = plain_axes(figure, "x (mm)", "y (mm)")
         axes.set_aspect("equal")
         if box is not None:
@@ -61,10 +59,6 @@ class Sheet:
                 spine.set_visible(False)
         self._small, self._step = small, step
         self.axes, self.plane = axes, plane
-        self._weight = SMALL if small else 1.0
-        self._font = FONT_SIZE - 2.0 if small else FONT_SIZE
-        self.things: list[Artist] = []
-        self._drawn: list[Array] = []
 
     def _flat(self, points: Array) -> Array:
         flat = 1e3 * points @ self.plane.T
@@ -119,22 +113,6 @@ class Sheet:
         look: dict[str, Any] = {"fontsize": self._font, "fontweight": "bold" if bold else "normal"}
         look |= {"ha": "center", "va": "center", "zorder": 30.0}
         self.things.append(self.axes.text(x, y, text, color=color, **look))
-
-    def clear(self, kept: int) -> None:
-        """Take away what was drawn last, all but so many things."""
-        for thing in self.things[kept:]:
-            thing.remove()
-        del self.things[kept:]
-        self._drawn.clear()
-
-    @property
-    def drawn(self) -> Array:
-        """Return the points (K, 2) of what was drawn, as the axes have them."""
-        return np.vstack(self._drawn)
-
-    def hold(self, drawn: Array) -> None:
-        """Let `fill` leave room for points (K, 2) that other axes hold."""
-        self._drawn.append(drawn)
 
     def fill(self) -> None:
         """Let the scales end a rim beyond what was drawn."""

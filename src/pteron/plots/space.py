@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.proj3d import proj_transform  # type: ignore[import-untyped]
 
 from pteron.kernels import Array
-from pteron.plots.canvas import FONT_SIZE, GRID, PAPER, SMALL
+from pteron.plots.canvas import GRID, PAPER
+from pteron.plots.drawn import Drawn
 
 _ELEVATION, _AZIMUTH = 24.0, -52.0
 """Degrees, from which the machine is seen."""
@@ -31,11 +31,10 @@ def upright(vertical: Array) -> Array:
     return np.array([np.cross(y, z), y, z])
 
 
-class Space:
+class Space(Drawn):
     """Axes onto which segments and faces are put in the order of their distance.
 
-    They take a `box` of the figure: left, bottom, width and height, as shares of it. `things` are
-    what was drawn, in that order.
+    They take a `box` of the figure: left, bottom, width and height, as shares of it.
     """
 
     def __init__(
@@ -46,6 +45,7 @@ class Space:
         *,
         small: bool = False,
     ) -> None:
+        super().__init__(small=small)
         axes = figure.add_subplot(projection="3d", computed_zorder=False)
         assert isinstance(axes, Axes3D)
         axes.patch.set_alpha(0.0)
@@ -55,10 +55,6 @@ class Space:
         self.axes = axes
         self.rotation = upright(vertical)
         self._box = box
-        self._weight = SMALL if small else 1.0
-        self._font = FONT_SIZE - 2.0 if small else FONT_SIZE
-        self.things: list[Artist] = []
-        self._drawn: list[Array] = []
         self.turn(0.0)
 
     def turn(self, angle: float) -> None:
@@ -139,22 +135,6 @@ class Space:
         look: dict[str, Any] = {"fontsize": self._font, "fontweight": "bold" if bold else "normal"}
         look |= {"ha": "center", "va": "center", "zorder": 30.0}
         self.things.append(self.axes.text(*p, text, color=color, **look))
-
-    def clear(self, kept: int) -> None:
-        """Take away what was drawn last, all but so many things."""
-        for thing in self.things[kept:]:
-            thing.remove()
-        del self.things[kept:]
-        self._drawn.clear()
-
-    @property
-    def drawn(self) -> Array:
-        """Return the points (K, 3) of what was drawn, as the axes have them."""
-        return np.vstack(self._drawn)
-
-    def hold(self, drawn: Array) -> None:
-        """Let `fill` leave room for points (K, 3) that other axes hold."""
-        self._drawn.append(drawn)
 
     def fill(self, angles: Sequence[float] = (0.0,)) -> None:
         """Place the axes so that what was drawn fills the box, seen from any of the angles, rad.
