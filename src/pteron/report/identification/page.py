@@ -30,6 +30,10 @@ from pteron.report.identification.values import measured
 from pteron.report.joints import force, nouns
 from pteron.report.typeset import resource, significant, template
 
+_COMMAND = r"pteron [a-z]+ ROBOT(?: --[a-z-]+ [\w.]*\w)+"
+
+_CODE = r"<code>\g<0></code>"
+
 
 def page(result: Identification, model_file: str | None = None) -> str:
     """Return the page as HTML without reference to another file but the machine's, beside it."""
@@ -61,9 +65,10 @@ def page(result: Identification, model_file: str | None = None) -> str:
 
 
 def _prose(text: str) -> Markup:
-    """Return a message with true minus signs, and options of the command line kept in one piece."""
+    """Return a message with true minus signs; commands and options are code, in one piece."""
     signed = re.sub(r"(?<![\w.-])-(?=\d)", "\u2212", str(escape(text)))
-    return Markup(re.sub(r"--[a-z][a-z-]*(?: each)?", r"<code>\g<0></code>", signed))
+    commands = re.sub(_COMMAND, lambda found: re.sub(r"\S+", _CODE, found[0]), signed)
+    return Markup(re.sub(r"(?<!<code>)--[a-z][a-z-]*(?: each)?", _CODE, commands))
 
 
 def _percent(share: float) -> str:
