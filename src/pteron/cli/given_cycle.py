@@ -28,9 +28,6 @@ CYCLE = option(
 _SLOW = 0.5
 """s between samples that is unlikely."""
 
-_HEAVY = 20.0
-"""How many times the machine's moving mass a payload may be before its unit is doubted."""
-
 _UNLIKE = 3.0
 """How many times as far a motion may go by its poses as by its velocities, or the inverse."""
 
@@ -92,14 +89,10 @@ def _doubted(robot: Manipulator, rows: Table, start: PoseLike | None = None) -> 
 def loaded(robot: Manipulator, payload: float) -> Manipulator:
     """Return a machine with a payload, kg; what is unlikely in it is told."""
     from pteron.motion import with_payload
+    from pteron.motion.payload import payload_doubt
 
-    bodies = [body for leg in robot.legs for body in leg.bodies.values()]
-    moving = sum(body.values[0] for body in (*bodies, robot.platform.joined))
-    if payload > _HEAVY * moving:
-        note(
-            f"Warning: a payload of {payload:g} kg, and the machine moves {moving:.3g} kg of its "
-            "own: is it in grams?"
-        )
+    if doubt := payload_doubt(robot, payload):
+        note(f"Warning: {doubt}")
     return with_payload(robot, payload)
 
 

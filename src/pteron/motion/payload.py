@@ -9,6 +9,21 @@ from pteron.bodies.inertia import PlanarInertia
 from pteron.errors import DataError, ModelError
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
+_HEAVY = 20.0
+"""How many times the machine's moving mass a payload may be before its unit is doubted."""
+
+
+def payload_doubt(robot: Manipulator, mass: float) -> str:
+    """Return what is unlikely about a payload, kg, as a clause; empty where nothing is."""
+    bodies = [body for leg in robot.legs for body in leg.bodies.values()]
+    moving = sum(body.values[0] for body in (*bodies, robot.platform.joined))
+    if mass <= _HEAVY * moving:
+        return ""
+    return (
+        f"a payload of {mass:g} kg, and the machine moves {moving:.3g} kg of its own: is it in "
+        "grams?"
+    )
+
 
 def with_payload(robot: RobotLike, mass: float) -> Manipulator:
     """Return the machine with a point mass at the tool's centre point.

@@ -105,7 +105,7 @@ class Panel:
             hint="Poses with the same joint coordinates: choose one",
         )
         self._on(self._assembly, "assembly", self._to_assembly)
-        self._payload = gui.add_text(
+        self._payload: viser.GuiInputHandle[str] = gui.add_text(
             "payload (kg)", f"{session.state.payload:g}", hint="At the tool's centre point"
         )
         self._on(self._payload, "payload", session.set_payload)
@@ -208,6 +208,11 @@ class Panel:
                 self._set(f"{name}{i}", slider, round(float(value), 1), settled)
         if self._play.value != session.playing:
             self._play.value = session.playing
+        # A text that was refused goes with the next action, and not while it is being typed.
+        carried = f"{state.payload:g}"
+        last = max(self._touched, key=self._touched.__getitem__, default="")
+        if last != "payload" and self._payload.value != carried:
+            self._payload.value = carried
         if session.motion is not None:
             most = max(_SHORT, round(session.motion.duration, 2))
             if self._time.max != most:

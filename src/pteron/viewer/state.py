@@ -14,6 +14,7 @@ from pteron.kinematics import direct_kinematics, inverse_kinematics
 from pteron.manipulator import Manipulator
 from pteron.manipulator.variants import with_elbows
 from pteron.motion import Motion, with_payload
+from pteron.motion.payload import payload_doubt
 from pteron.viewer.boundary import allowed, farthest, followed, told_rest, what_stops
 from pteron.workspace import home_pose
 
@@ -150,7 +151,8 @@ def carrying(state: State, text: str) -> State:
         with_payload(state.robot, mass)
     except PteronError as error:
         return replace(state, message=f"{error}. The payload stays {state.payload:g} kg.")
-    return replace(state, payload=mass, message="")
+    doubt = payload_doubt(state.robot, mass)
+    return replace(state, payload=mass, message=f"{doubt[:1].upper()}{doubt[1:]}")
 
 
 def typed_pose(robot: Manipulator, text: str) -> Array:

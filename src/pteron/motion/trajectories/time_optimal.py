@@ -141,7 +141,7 @@ def time_optimal(
     if not kept.bounds_acceleration:
         raise DataError(
             "nothing limits the acceleration: neither a limit given nor the drives' max_force; "
-            "give force or acceleration"
+            "give a limit of force or of acceleration"
         )
     toppra = _toppra()
     check_path(robot, path)
