@@ -232,12 +232,18 @@ def test_options_that_cannot_be_are_one_line(options, words):
         ({"spread": np.nan}, "spread: nan given"),
         ({"render_mode": "human"}, "render_mode: 'human' given"),
         ({"robot": "five-barr"}, "five-barr"),
+        ({"robot": None}, "robot: NoneType given, a Manipulator expected"),
         ({"motion": "cycle.csv"}, "motion: 'cycle.csv' given, a Motion expected"),
     ],
 )
 def test_arguments_that_cannot_be_are_one_line(given, words):
     with pytest.raises(pteron.PteronError, match=words.replace(".", r"\.")):
         PteronEnv(**{"robot": CATALOG["five-bar"], **given})
+
+
+def test_a_machine_may_be_a_path(tmp_path):
+    path = pteron.save(CATALOG["five-bar"], tmp_path / "mine.toml")
+    assert PteronEnv(path).world.robot == PteronEnv(str(path)).world.robot
 
 
 @pytest.mark.parametrize(

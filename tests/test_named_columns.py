@@ -79,6 +79,34 @@ def test_a_row_is_a_state():
         np.testing.assert_allclose(pteron.inverse_dynamics(robot, *[one] * 4), expected, rtol=1e-14)
 
 
+@pytest.mark.parametrize("name", MACHINES)
+def test_where_the_joints_are_is_read_by_names_too(name):
+    robot = pteron.load(name)
+    poses = motion_of(robot)[0]
+    table = pd.DataFrame(columns_of(robot, motion_of(robot)))
+    expected = pteron.motion.joint_points(robot, poses)
+    assert (pteron.motion.joint_points(robot, table).chain == expected.chain).all()
+    reverse = table[list(robot.coordinates)[::-1]]
+    assert (pteron.motion.joint_points(robot, reverse).tool == expected.tool).all()
+
+
+def test_a_table_of_one_row_is_one_pose():
+    robot = pteron.load("delta")
+    home = pteron.workspace.home_pose(robot)
+    table = pd.DataFrame({"note": ["home"], "z": home[2], "y": home[1], "x": home[0]})
+    limited = pteron.workspace.limited_joints
+    assert limited(robot, table) == limited(robot, home)
+    assert limited(robot, table.iloc[0]) == limited(robot, home)
+    cycle = pteron.motion.pick_and_place(robot, table)
+    assert (cycle.pose == pteron.motion.pick_and_place(robot, home).pose).all()
+    box = pteron.workspace.bounding_box
+    assert (box(robot, table) == box(robot, home)).all()
+    several = {"x": [0.0, 0.1], "y": 0.0, "z": -0.9}
+    for call in (pteron.motion.pick_and_place, pteron.motion.least_reserve, box, limited):
+        with pytest.raises(DataError, match="2 poses given, 1 expected"):
+            call(robot, several)
+
+
 def test_a_table_without_names_is_an_array():
     robot = pteron.load("delta")
     poses = motion_of(robot)[0]

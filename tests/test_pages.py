@@ -497,6 +497,19 @@ def test_a_simulation_and_a_table_bring_their_forces(tmp_path):
     assert "Drive force" in write_motion_page(robot, held, tmp_path / "b.html").read_text("utf-8")
 
 
+def test_a_table_of_poses_may_have_semicolons_and_decimal_commas(tmp_path):
+    robot = MACHINES["driven"]
+    motion = cycle("driven")
+    plain, other = tmp_path / "plain.csv", tmp_path / "other.csv"
+    values = np.column_stack([motion.time, motion.pose])
+    header = ",".join(["t", *robot.coordinates])
+    np.savetxt(plain, values, delimiter=",", header=header, comments="", fmt="%.12g")
+    other.write_text(plain.read_text().replace(",", ";").replace(".", ","))
+    found = playback(robot, other)
+    assert not found.log
+    np.testing.assert_array_equal(found.motion.pose, playback(robot, plain).motion.pose)
+
+
 def test_a_report_shows_the_motion_that_it_is_given(tmp_path):
     robot = MACHINES["driven"]
     motion = way_out("driven")

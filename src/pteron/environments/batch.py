@@ -16,7 +16,7 @@ from pteron.environments.picture import Picture
 from pteron.environments.single import Numbers, checked_mode, spaces
 from pteron.environments.state import Bools, State
 from pteron.errors import DataError
-from pteron.manipulator import Manipulator
+from pteron.manipulator import RobotLike
 from pteron.motion import Motion
 
 
@@ -58,7 +58,7 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
 
     def __init__(
         self,
-        robot: Manipulator | str = "quadrupteron",
+        robot: RobotLike = "quadrupteron",
         num_envs: int = 1,
         *,
         motion: Motion | None = None,

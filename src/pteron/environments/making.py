@@ -12,7 +12,7 @@ from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.kinematics import jacobian
 from pteron.legs import Drive
-from pteron.manipulator import Manipulator, load
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion import Motion, longest_step
 from pteron.workspace import home_pose, reserve
 
@@ -30,7 +30,7 @@ _SPREAD = 0.25
 
 
 def world_of(
-    robot: Manipulator | str,
+    robot: RobotLike,
     *,
     motion: Motion | None = None,
     period: float = 0.01,
@@ -46,7 +46,7 @@ def world_of(
     ModelError
         If there is no such machine, or it reaches no pose.
     """
-    machine = load(robot) if isinstance(robot, str) else robot
+    machine = as_manipulator(robot)
     sizes = {"period": period, "tolerance": tolerance, "spread": spread}
     for name, value in sizes.items():
         if value is not None and not (np.isfinite(value) and value > 0.0):

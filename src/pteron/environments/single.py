@@ -13,7 +13,7 @@ from pteron.environments.picture import Picture
 from pteron.environments.state import State
 from pteron.errors import DataError
 from pteron.kernels import Array
-from pteron.manipulator import Manipulator
+from pteron.manipulator import RobotLike
 from pteron.motion import Motion
 
 Numbers = NDArray[Any]
@@ -36,7 +36,7 @@ class PteronEnv(gymnasium.Env[Numbers, Numbers]):
 
     Parameters
     ----------
-    robot : str or Manipulator
+    robot : Manipulator, name or path
         A machine of the catalog, a TOML file, or a machine. What an action of 1 gives is each
         drive's max_force, or enough to move briskly.
     motion : Motion, optional
@@ -71,7 +71,7 @@ class PteronEnv(gymnasium.Env[Numbers, Numbers]):
 
     def __init__(
         self,
-        robot: Manipulator | str = "quadrupteron",
+        robot: RobotLike = "quadrupteron",
         *,
         motion: Motion | None = None,
         period: float = 0.01,

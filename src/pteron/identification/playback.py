@@ -104,7 +104,11 @@ def read_motion(robot: Manipulator, path: str | Path) -> Table | Log:
     if not Path(path).is_file():
         return read_table(path)
     plain = open_table(path)
-    return whole_table(plain) if is_table(robot, plain.columns) else read_log(path, robot)
+    if is_table(robot, plain.columns):
+        return whole_table(plain)
+    # Semicolons, decimal commas: a table may be written as logs are.
+    found = open_table(path, dialect=Dialect())
+    return whole_table(found) if is_table(robot, found.columns) else read_log(path, robot)
 
 
 def read_content(robot: Manipulator, data: bytes, source: str) -> Table | Log:

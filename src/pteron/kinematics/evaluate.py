@@ -87,6 +87,14 @@ def checked(
     return np.where(good.all(axis=-1, keepdims=True), array, np.nan)
 
 
+def checked_one(robot: Manipulator, value: PoseLike, name: str) -> Array:
+    """Return one pose (m,) of finite numbers, as `checked`; a table of one row is one pose too."""
+    array = checked(robot, value, name)
+    if array.size != robot.freedom:
+        raise DataError(f"{name}: {array.size // robot.freedom} poses given, 1 expected")
+    return array.reshape(robot.freedom)
+
+
 def _not_finite(name: str, array: Array, index: tuple[int, ...]) -> DataError:
     wanted = "a finite number" if not np.isfinite(array[index]) else "a number of sensible size"
     return DataError(f"{name}{list(index)}: {array[index]} given, {wanted} expected")

@@ -9,9 +9,11 @@ import casadi as ca
 
 from pteron.equations.kinematics import passive_joints
 from pteron.equations.machine import Machine
-from pteron.kernels import Array, numeric
+from pteron.kernels import numeric
+from pteron.kinematics.evaluate import checked_one
 from pteron.legs.leg import Passive
 from pteron.manipulator import RobotLike, as_manipulator
+from pteron.shapes import PoseLike
 
 
 @dataclass(frozen=True)
@@ -49,11 +51,12 @@ class LimitedJoint:
         return f"at most {most}" if self.only_most else f"{told(self.least, self.unit)} to {most}"
 
 
-def limited_joints(robot: RobotLike, pose: Array) -> tuple[LimitedJoint, ...]:
+def limited_joints(robot: RobotLike, pose: PoseLike) -> tuple[LimitedJoint, ...]:
     """Return all joints that have limits, actuated and passive, at a pose (m,) in reach."""
     robot = as_manipulator(robot)
-    joints = numeric(robot, "joint_coordinates")(pose)[0]
-    angle, *legs = passive_joints(Machine.of(robot), ca.SX(ca.DM(pose)))
+    given = checked_one(robot, pose, "pose")
+    joints = numeric(robot, "joint_coordinates")(given)[0]
+    angle, *legs = passive_joints(Machine.of(robot), ca.SX(ca.DM(given)))
     found = [_limited(0, joint) for joint in angle]
     for i, (leg, q, passive) in enumerate(zip(robot.legs, joints, legs, strict=True), start=1):
         if leg.limits is not None:

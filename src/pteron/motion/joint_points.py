@@ -141,7 +141,7 @@ def joint_points(robot: RobotLike, pose: PoseLike) -> JointPoints:
            [0.05, 0.  , 0.  ]])
     """
     robot = as_manipulator(robot)
-    given = np.asarray(pose, dtype=float)
+    given = as_array(pose, "pose", (robot.freedom,), columns=robot.coordinates)
     coordinates = inverse_kinematics(robot, given)
     chain: Array = evaluated(robot, "joint_points", "raise", given)
     points: Array = evaluated(robot, "platform_points", "raise", given)

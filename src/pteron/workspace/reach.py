@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pteron.errors import DataError
 from pteron.kernels import Array, numeric
-from pteron.kinematics.evaluate import checked
+from pteron.kinematics.evaluate import checked_one
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike
 from pteron.workspace.reserve import room_to_limits
@@ -120,7 +120,7 @@ def reach_slice(
         raise DataError(f"plane: {plane!r} is not one of {valid}")
     if points < 2:
         raise DataError(f"points: {points} given, at least 2 expected")
-    pose = checked(robot, center, "center")
+    pose = checked_one(robot, center, "center")
     i, j = (robot.coordinates.index(letter) for letter in plane)
     if extent is None:
         box = bounding_box(robot, pose)

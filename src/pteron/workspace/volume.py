@@ -10,7 +10,7 @@ from scipy.optimize import minimize  # type: ignore[import-untyped]
 
 from pteron.errors import DataError, ModelError
 from pteron.kernels import Array, numeric
-from pteron.kinematics.evaluate import checked
+from pteron.kinematics.evaluate import checked_one
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike
@@ -107,7 +107,7 @@ def bounding_box(robot: RobotLike, pose: PoseLike) -> Array:
            [ 0.3 ,  0.3 ,  0.3 ]])
     """
     robot = as_manipulator(robot)
-    given = checked(robot, pose, "pose")
+    given = checked_one(robot, pose, "pose")
     count = len(robot.platform.lengths)
 
     def room(p: Array) -> Array:
@@ -236,7 +236,7 @@ def reach_volume(
     robot = as_manipulator(robot)
     if count < 1:
         raise DataError(f"count: {count} given, at least 1 expected")
-    given = checked(robot, pose, "pose")
+    given = checked_one(robot, pose, "pose")
     box = bounding_box(robot, given)
     poses = np.tile(given, (count, 1))
     size = (count, len(box[0]))

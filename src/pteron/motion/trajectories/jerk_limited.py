@@ -13,7 +13,7 @@ import numpy as np
 from pteron.errors import DataError, PteronError, UnreachablePose
 from pteron.kernels import Array
 from pteron.kinematics import follow, inverse_kinematics
-from pteron.kinematics.evaluate import checked, unchecked
+from pteron.kinematics.evaluate import checked_one, unchecked
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.checks import check_motion
@@ -84,7 +84,7 @@ def jerk_limited(
     array([ 0.2,  0.1, -0.8])
     """
     robot = as_manipulator(robot)
-    ends = [checked(robot, start, "start"), checked(robot, end, "end")]
+    ends = [checked_one(robot, start, "start"), checked_one(robot, end, "end")]
     kept = limits_of(robot) if limits is None else limits
     jerks = per_joint(robot, "jerk", jerk, [None] * robot.freedom)
     if not np.isfinite([*kept.acceleration, *jerks]).all():

@@ -10,7 +10,7 @@ from scipy.optimize import minimize_scalar  # type: ignore[import-untyped]
 
 from pteron.errors import DataError
 from pteron.kernels import Array
-from pteron.kinematics.evaluate import checked
+from pteron.kinematics.evaluate import checked_one
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.cycle import Cycle, moves
@@ -116,7 +116,7 @@ def pick_and_place(
             raise DataError(f"{name}: {value} given, a number above 0 expected")
     if samples < 2:
         raise DataError(f"samples: {samples} given, at least 2 expected")
-    middle = home_pose(robot) if around is None else checked(robot, around, "around")
+    middle = home_pose(robot) if around is None else checked_one(robot, around, "around")
     if scale is None:
         scale, direction = scaled_to_reach(
             robot, middle, direction=direction, turn=turn, least=least

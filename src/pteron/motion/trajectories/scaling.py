@@ -12,7 +12,7 @@ from pteron.equations.machine import closure_of
 from pteron.errors import ModelError
 from pteron.kernels import Array, numeric
 from pteron.kinematics import inverse_kinematics
-from pteron.kinematics.evaluate import checked
+from pteron.kinematics.evaluate import checked_one
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.trajectories.cycle import Cycle, moves
@@ -57,7 +57,9 @@ def least_reserve(robot: RobotLike, around: PoseLike) -> float:
     float
         Of the reserves of `pteron.workspace.reserve`, without unit.
     """
-    return min(_LEAST_RESERVE, float(reserve(robot, around).smallest) / 2.0)
+    robot = as_manipulator(robot)
+    middle = checked_one(robot, around, "around")
+    return min(_LEAST_RESERVE, float(reserve(robot, middle).smallest) / 2.0)
 
 
 def scaled_to_reach(
@@ -113,7 +115,7 @@ def scaled_to_reach(
     True
     """
     robot = as_manipulator(robot)
-    middle = checked(robot, around, "around")
+    middle = checked_one(robot, around, "around")
     if least is None:
         least = least_reserve(robot, middle)
     scale, best = 0, None
