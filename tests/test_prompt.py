@@ -10,6 +10,7 @@ from pathlib import Path
 
 import jedi
 import numpy as np
+import pandas as pd
 import pytest
 
 import pteron
@@ -182,3 +183,18 @@ def test_the_table_says_what_the_value_does():
     assert f"{base.values()[0]:.5g}" in html
     assert f"{shown['sizing'].peak_forces[0]:.4g} N m" in shown["sizing"]._repr_html_()
     assert repr(shown["run"]) == "<Simulation of 'delta': 0.01 s, 11 samples>"
+
+
+def test_tables_of_forces_count_by_name_in_figures_and_simulations():
+    time, order = np.linspace(0.0, 1.0, 5), ["torque3", "torque1", "torque2"]
+    forces = pd.DataFrame(np.arange(15.0).reshape(5, 3), columns=order)
+    figure = pteron.plots.forces_figure(time, forces, robot="delta")
+    drawn = [line.get_ydata()[0] for line in figure.axes[0].lines[1:]]
+    assert drawn == [1.0, 2.0, 0.0]
+    home = [0.0, 0.0, -0.9]
+    given = {"torque3": 3.0, "torque1": 1.0, "torque2": 2.0}
+    runs = [
+        pteron.motion.simulate("delta", forces=one, start=(home, [0.0, 0.0, 0.0]), duration=0.01)
+        for one in (given, [1.0, 2.0, 3.0])
+    ]
+    assert (runs[0].pose == runs[1].pose).all()

@@ -25,7 +25,7 @@ from pteron.plots.canvas import (
     remark,
     spot,
 )
-from pteron.plots.joints import joints_of, rows
+from pteron.plots.joints import joints_of, named, rows
 
 _ROOM = 1.15
 """The axes' half width over what is drawn."""
@@ -70,6 +70,8 @@ def force_speed_figure(
         Says units and abilities where they are not given; without it all are sliders.
     """
     joints = joints_of(robot, forces)
+    speeds = np.asarray(named(robot, speeds, "joint_rates"), dtype=float)
+    forces = np.asarray(named(robot, forces, "forces"), dtype=float)
     units = units or [(f"{joint.unit}/s", joint.force_unit) for joint in joints]
     abilities = abilities or _abilities(robot) or [Ability(None, None, None)] * len(units)
     if rms is None:

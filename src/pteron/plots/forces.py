@@ -25,7 +25,7 @@ from pteron.plots.canvas import (
     spot,
     stack,
 )
-from pteron.plots.joints import joints_of, rows
+from pteron.plots.joints import joints_of, named, rows
 
 _ROOM = 75.0
 """Degrees that a remark takes which says in words what an orientation is."""
@@ -46,7 +46,7 @@ def forces_figure(
     another label.
     """
     joints = joints_of(robot, forces)
-    time, forces = rows(time, forces, "forces", len(joints))
+    time, forces = rows(time, named(robot, forces, "forces"), "forces", len(joints))
     words = [ylabel or f"actuator {joint.force} ({joint.force_unit})" for joint in joints]
     groups = list(dict.fromkeys(words))
     figure = blank(5.4, 3.3 if len(groups) == 1 else 1.2 + 1.6 * len(groups))

@@ -7,17 +7,26 @@ from numpy.typing import ArrayLike
 
 from pteron.errors import DataError
 from pteron.kernels import Array, as_array
+from pteron.kernels.named_columns import by_name
 from pteron.legs.kind import SLIDER, ActuatedJoint
 from pteron.manipulator import RobotLike, as_manipulator
 
 
 def joints_of(robot: RobotLike | None, values: ArrayLike) -> list[ActuatedJoint]:
     """Return each leg's joint; without a machine, a slider for each column of values (..., n)."""
+    if robot is not None:
+        return [leg.joint for leg in as_manipulator(robot).legs]
     if np.ndim(values) == 0:
         raise DataError("one number given, an array (T, n) expected: a column for each leg")
+    return [SLIDER] * np.shape(values)[-1]
+
+
+def named(robot: RobotLike | None, values: ArrayLike, what: str) -> ArrayLike:
+    """Return a table's columns of a machine, such as its "forces"; an array as it is."""
     if robot is None:
-        return [SLIDER] * np.shape(values)[-1]
-    return [leg.joint for leg in as_manipulator(robot).legs]
+        return values
+    found: ArrayLike = by_name(values, as_manipulator(robot).column_names[what], what)
+    return found
 
 
 def rows(

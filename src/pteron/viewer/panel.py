@@ -105,7 +105,7 @@ class Panel:
             hint="Poses with the same joint coordinates: choose one",
         )
         self._on(self._assembly, "assembly", self._to_assembly)
-        self._payload: viser.GuiInputHandle[str] = gui.add_text(
+        self._payload: Any = gui.add_text(
             "payload (kg)", f"{session.state.payload:g}", hint="At the tool's centre point"
         )
         self._on(self._payload, "payload", session.set_payload)

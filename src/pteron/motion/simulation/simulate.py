@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from pteron.errors import DataError, shown
 from pteron.kernels import Array, as_array
+from pteron.kernels.named_columns import by_name
 from pteron.kinematics import inverse_kinematics, joint_rates
 from pteron.kinematics.evaluate import checked
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -160,13 +161,13 @@ def simulate(
     encoders = Encoders(sensors or Sensors(), period, joints, rates, round_ones)
 
     if controller is None:
-        source: Source = Given(_of_time(forces, robot.freedom, "forces"), reference.time)
+        source: Source = Given(_of_time(forces, robot, "forces"), reference.time)
     else:
         believed = model or (loaded[masses[0]] if len(loaded) == 1 else robot)
         source = Controlled(controller.law(believed), encoders, reference, pose, velocity)
     about = np.vstack([pose, reference.pose[:: max(1, len(reference.time) // _POSES)]])
     plant = Plant(pose, velocity, method, allowed_step(robot, about, step), tolerance)
-    loads = Loads(masses, loaded, _of_time(wrench, robot.freedom, "wrench"))
+    loads = Loads(masses, loaded, _of_time(wrench, robot, "wrench"))
     return run(
         robot, plant, source, reference, loads, delay, limits=limits and controller is not None
     )
@@ -251,12 +252,14 @@ def _masses(payload: float | Sequence[tuple[float, float]], time: Array) -> Arra
 
 
 def _of_time(
-    given: ArrayLike | Callable[[float], ArrayLike] | None, size: int, name: str
+    given: ArrayLike | Callable[[float], ArrayLike] | None, robot: Manipulator, name: str
 ) -> Callable[[float], Array]:
-    """Return what gives (size,) numbers at a time: what was given, or zeros."""
+    """Return what gives a machine's forces or a wrench at a time: what was given, or zeros."""
+    columns = robot.column_names[name]
+    size = len(columns)
 
     def numbers(value: ArrayLike, told: str) -> Array:
-        found = as_array(value, told, (size,))
+        found = as_array(by_name(value, columns, told), told, (size,))
         if found.ndim != 1:
             raise DataError(f"{told}: shape {found.shape} given, ({size},) expected")
         if not np.isfinite(found).all():
