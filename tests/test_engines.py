@@ -268,8 +268,8 @@ def test_wrong_homes_are_refused(tmp_path):
         export_sdf(robot, tmp_path, home=[0.0, 0.0, np.nan])
     with pytest.raises(pteron.UnreachablePose, match="leg 1"):
         export_urdf(robot, tmp_path, home=[0.0, 0.0, -900.0])
-    with pytest.raises(pteron.ModelError, match="robot: 'delta' given"):
-        export_sdf("delta", tmp_path)
+    with pytest.raises(pteron.ModelError, match="robot: int given"):
+        export_sdf(3, tmp_path)
     assert not list(tmp_path.iterdir())
 
 

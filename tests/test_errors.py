@@ -330,7 +330,7 @@ def test_a_wrong_shape_or_kind_is_refused_with_what_was_expected(name):
             (["1", "2", "3", "4"], f"{argument}: not an array of real numbers"),
             ([1j, 0, 0, 0], f"{argument}: not an array of real numbers"),
             ([[1, 2, 3, 4], [1]], f"{argument}: not an array of real numbers"),
-            ({"x": 1}, f"{argument}: not an array of real numbers"),
+            (object(), f"{argument}: not an array of real numbers"),
         ):
             with pytest.raises(DataError) as caught:
                 CALLS[name][0](ROBOT, *values[:k], wrong, *values[k + 1 :])

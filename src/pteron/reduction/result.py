@@ -235,7 +235,7 @@ class BaseParameters:
         --------
         >>> import pteron
         >>> table = pteron.base_parameters("five-bar").to_latex()
-        >>> print(table.splitlines()[8])
+        >>> print(table.splitlines()[9])
             1 & $I_{u1} + I_{l1}$ & $0.0002835$ & $\mathrm{kg\,m^2}$ \\
         """
         sums, printed = (
