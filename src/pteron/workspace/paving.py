@@ -115,7 +115,7 @@ def paving(
     tolerance: float = 0.01,
     within: ArrayLike | None = None,
     given: tuple[Condition, ...] | None = None,
-    most: int = 4_000_000,
+    most: int = 6_000_000,
 ) -> Paving:
     """Return the workspace at the orientation of a pose, in boxes that are proved.
 
@@ -163,16 +163,14 @@ def paving(
         raise DataError(f"tolerance: {tolerance!r} given, a share above 0 expected")
     box = region_box(robot, at, within)
     asked = conditions(robot) if given is None else given
-    done, left, open_, complete = _refined(judge(robot, asked), box, tolerance, most)
-    moving = np.flatnonzero(box[0] < box[1])
-    inner, boundary = (_joined(boxes)[:, :, moving] for boxes in (done, left))
+    inner, boundary, open_, complete = _refined(judge(robot, asked), box, tolerance, most)
     if not len(inner) and complete:
         raise ModelError(
             "no position is in reach of all legs, within the joints' limits, at the orientation of "
             f"pose {at.tolist()}; this is proved",
             subject=robot.name,
         )
-    axes = tuple(robot.coordinates[i] for i in moving)
+    axes = tuple(robot.coordinates[i] for i in np.flatnonzero(box[0] < box[1]))
     volumes = [math.fsum(np.prod(b[:, 1] - b[:, 0], axis=1)) for b in (inner, boundary)]
     lengths = sum(axis != "phi" for axis in axes)
     unit = f"m^{lengths}" + (" rad" if "phi" in axes else "")
@@ -202,43 +200,52 @@ def region_box(robot: Manipulator, at: Array, within: ArrayLike | None) -> Array
 
 def _refined(
     judging: Judge, box: Array, tolerance: float, most: int
-) -> tuple[list[Array], list[Array], NDArray[np.uint64], bool]:
+) -> tuple[Array, Array, NDArray[np.uint64], bool]:
     """Return inner and undecided boxes, what is open in the latter, and whether it is enough."""
-    inner: list[Array] = []
-    left, open_ = box[None], np.array([judging.all])
+    moving = np.flatnonzero(box[0] < box[1])
+    found: list[Array] = []
+    left, open_ = box[None][:, :, moving], np.array([judging.all])
     inside, undecided = 0.0, math.inf
-    while True:
-        size = left[0, 1] - left[0, 0]
-        each = float(np.prod(size[size > 0.0]))
-        undecided = each * len(left)
-        kept, kept_open = [], []
+    first = True
+    while len(left):
+        halves = left if first else halved(left[:1])
+        each = float(np.prod(halves[0, 1] - halves[0, 0]))
+        undecided = each * len(left) * len(halves)
+        done, kept, kept_open = False, [], []
         for start in range(0, len(left), _SLICE):
-            part = left[start : start + _SLICE]
-            outside, still = judging(part[:, 0], part[:, 1], open_[start : start + _SLICE])
+            rest = slice(start + _SLICE, None)
+            part, still = left[start : start + _SLICE], open_[start : start + _SLICE]
+            if not first:
+                part, still = halved(part), np.repeat(still, 2)
+            outside, still = judging(*_whole(box, moving, part), still)
             sure = (still == 0) & ~outside
-            inner.append(part[sure])
-            inside += each * int(sure.sum())
-            undecided -= each * int((sure | outside).sum())
+            found.append(part[sure])
             kept.append(part[~sure & ~outside])
             kept_open.append(still[~sure & ~outside])
-            if inside and undecided <= tolerance * inside:
-                # The other boxes stay as undecided as they are.
-                rest = slice(start + _SLICE, None)
-                return inner, [*kept, left[rest]], np.concatenate([*kept_open, open_[rest]]), True
+            inside += each * int(sure.sum())
+            undecided -= each * int((sure | outside).sum())
+            done = inside > 0.0 and undecided <= tolerance * inside
+            if done or sum(map(len, kept)) + len(left[rest]) > most:
+                left = np.concatenate([*kept, left[rest]])
+                return np.concatenate(found), left, np.concatenate([*kept_open, open_[rest]]), done
         left, open_ = np.concatenate(kept), np.concatenate(kept_open)
-        if not len(left) or 2 * len(left) > most or each < _SMALLEST:
-            return inner, [left], open_, not len(left)
-        left, open_ = halved(left, size), np.repeat(open_, 2)
+        first = False
+        if each < _SMALLEST:
+            return np.concatenate(found), left, open_, False
+    return np.concatenate(found), left, open_, True
 
 
-def halved(boxes: Array, size: Array) -> Array:
-    """Return both halves of boxes (N, 2, m) of one size, across their longest side."""
-    axis = int(size.argmax())
+def _whole(box: Array, moving: NDArray[np.intp], boxes: Array) -> tuple[Array, Array]:
+    """Return the corners (B, m), each, of boxes (B, 2, k) of the coordinates that vary."""
+    low, high = (np.repeat(corner[None], len(boxes), axis=0) for corner in box)
+    low[:, moving], high[:, moving] = boxes[:, 0], boxes[:, 1]
+    return low, high
+
+
+def halved(boxes: Array) -> Array:
+    """Return both halves of boxes (N, 2, k) of one size, across their longest side."""
+    axis = int((boxes[0, 1] - boxes[0, 0]).argmax())
     halves = np.repeat(boxes, 2, axis=0)
     middle = 0.5 * (boxes[:, 0, axis] + boxes[:, 1, axis])
     halves[0::2, 1, axis] = halves[1::2, 0, axis] = middle
     return halves
-
-
-def _joined(boxes: list[Array]) -> Array:
-    return np.concatenate(boxes)
