@@ -1,11 +1,16 @@
 """Where a machine can work: its reserves, its home pose, its reach and its joints' ranges."""
 
 from pteron.kinematics.limits import LimitedJoint, limited_joints
+from pteron.workspace.components import Component, Components, components
 from pteron.workspace.conditions import Condition, conditions
+from pteron.workspace.cube_bound import cube_bound
 from pteron.workspace.home import home_pose
 from pteron.workspace.inscribed import Inscribed, largest_cube, largest_cylinder
+from pteron.workspace.modes import Contact, mode_contacts, mode_pavings
+from pteron.workspace.orientations import VolumesOverAngles, over_angles
 from pteron.workspace.paving import Paving, paving
 from pteron.workspace.proofs import Proof, prove
+from pteron.workspace.quadrature import Quadrature, quadrature_volume
 from pteron.workspace.reach import BEYOND_LIMITS, REACHABLE, ReachSlice, reach_slice
 from pteron.workspace.regions import Box, Cylinder, Region
 from pteron.workspace.reserve import JointRanges, Reserve, joint_ranges, reserve
@@ -14,27 +19,38 @@ from pteron.workspace.volume import ReachVolume, bounding_box, reach_volume
 __all__ = [
     "BEYOND_LIMITS",
     "Box",
+    "Component",
+    "Components",
     "Condition",
+    "Contact",
     "Cylinder",
     "Inscribed",
     "JointRanges",
     "LimitedJoint",
     "Paving",
     "Proof",
+    "Quadrature",
     "REACHABLE",
     "ReachSlice",
     "ReachVolume",
     "Region",
     "Reserve",
+    "VolumesOverAngles",
     "bounding_box",
+    "components",
     "conditions",
+    "cube_bound",
     "home_pose",
     "joint_ranges",
     "largest_cube",
     "largest_cylinder",
     "limited_joints",
+    "mode_contacts",
+    "mode_pavings",
+    "over_angles",
     "paving",
     "prove",
+    "quadrature_volume",
     "reach_slice",
     "reach_volume",
     "reserve",
