@@ -53,12 +53,12 @@ def main() -> None:
         robot = pteron.load(name)
         pose = np.zeros(4) if name == "quadrupteron" else home_pose(robot)
         found, taken = timed(robot, pose, 0.2 if quick() else tolerance)
-        volume = quadrature_volume(robot, pose, lines=20 if quick() else 400)
-        checked(found, volume.volume, name)
+        total, error = quadrature_volume(robot, pose, lines=20 if quick() else 400)
+        checked(found, total, name)
         print(
-            f"\n{name}: {found.inner_volume:.6f} <= {volume.volume:.6f} (quadrature, within "
-            f"{volume.error:.0e}) <= {found.outer_volume:.6f} m^3: {100.0 * found.gap:.2f} % "
-            f"apart, {len(found.inner)} boxes inside, {len(found.boundary)} undecided, {taken:.1f} s"
+            f"\n{name}: {found.inner_volume:.6f} <= {total:.6f} (quadrature, within {error:.0e}) "
+            f"<= {found.outer_volume:.6f} m^3: {100.0 * found.gap:.2f} % apart, "
+            f"{len(found.inner)} boxes inside, {len(found.boundary)} undecided, {taken:.1f} s"
         )
         if not quick() and (found.gap > tolerance or taken > _SECONDS):
             sys.exit(f"{name}: {100.0 * tolerance:g} % in {_SECONDS:g} s was asked for")
