@@ -107,6 +107,7 @@ LEFT = {
     "identify": "wants a log; test_walk.py",
     "report": "test_report.py",
     "simulate": "test_simulate_cli.py",
+    "view": "serves until it is interrupted; test_viewer.py",
 }
 """Subcommands that are not run here, and where they are."""
 
