@@ -109,7 +109,7 @@ LEFT = {
     "play": "wants a motion; test_pages.py",
     "report": "test_report.py",
     "simulate": "test_simulate_cli.py",
-    "view": "serves until it is interrupted; test_viewer.py",
+    "view": "stays open until it is ended; test_viewer.py",
 }
 """Subcommands that are not run here, and where they are."""
 
