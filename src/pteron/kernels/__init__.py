@@ -7,13 +7,13 @@ from pteron.kernels.choice import numeric
 from pteron.kernels.fields import Field, NoSquareRoot, PrimeField, RationalField, evaluate
 from pteron.kernels.functions import FUNCTIONS, needs_of
 from pteron.kernels.graph import Graph, graph_of
+from pteron.kernels.kept import Program
 from pteron.kernels.kernel import Array, Kernel, Port, as_array, count_operations
 from pteron.kernels.programs import (
     LOADED,
     REDUCIBLE,
     SELECTED,
     Columns,
-    Program,
     bare,
     general_program,
     program,
