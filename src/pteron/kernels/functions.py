@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Literal
@@ -10,7 +10,16 @@ from typing import Any, Literal
 import casadi as ca
 
 from pteron.bodies.motion import Expression
-from pteron.equations import closing, control, drives, kinematics, lagrangian, regressor
+from pteron.equations import (
+    closing,
+    control,
+    drives,
+    indices,
+    kinematics,
+    lagrangian,
+    reactions,
+    regressor,
+)
 from pteron.equations.friction import passive_friction
 from pteron.equations.laws import LAWS
 from pteron.equations.machine import Machine
@@ -142,6 +151,31 @@ def _platform_motion(m: Machine, v: Symbols) -> Outputs:
     return {"velocity": velocity, "acceleration": acceleration}
 
 
+def _reactions(m: Machine, v: Symbols) -> Outputs:
+    found = reactions.equilibrium(m, _state(m, v), v["parameters"])
+    wrenches = [[ca.vertcat(at.force, at.moment) for at in leg.wrenches] for leg in found.legs]
+    points, passed = (
+        ca.vertcat(*(_padded(rows, max(map(len, columns))) for rows in columns))
+        for columns in ([leg.points for leg in found.legs], wrenches)
+    )
+    return {
+        "rows": (found.rows, found.rows.shape),
+        "right": found.right,
+        "presumed_rows": (found.presumed_rows, found.presumed_rows.shape),
+        "presumed_right": found.presumed_right,
+        "driven_rows": (found.driven_rows, found.driven_rows.shape),
+        "driven": found.driven,
+        "points": (points, (m.freedom, points.shape[0] // m.freedom, 3)),
+        "passed": (passed, (m.freedom, passed.shape[0] // m.freedom, 6)),
+    }
+
+
+def _padded(columns: Sequence[Expression], count: int) -> Expression:
+    """Return columns as rows (count, k), NaN where there are too few."""
+    rows = ca.horzcat(*columns).T
+    return ca.vertcat(rows, ca.SX.nan(count - rows.shape[0], rows.shape[1]))
+
+
 def _passive_friction(m: Machine, v: Symbols) -> Outputs:
     forces = passive_friction(m, _state(m, v))
     return {"forces": (forces, forces.shape)}
@@ -186,6 +220,20 @@ def _drive_accelerations(m: Machine, v: Symbols) -> Outputs:
     given = v["pose"], v["velocity"], v["forces"], v["parameters"], wrench
     acceleration = drives.drive_accelerations(m, *given, drives.Drives.of(v["drives"]))
     return {"acceleration": acceleration}
+
+
+def _homogeneous_jacobian(m: Machine, v: Symbols) -> Outputs:
+    found = indices.homogeneous(m, _state(m, v))
+    return {"jacobian": found.matrix, "length": found.length}
+
+
+def _geometric_index(m: Machine, v: Symbols, *, what: str) -> Outputs:
+    return {"value": indices.OF_GEOMETRY[what](m, _state(m, v))}
+
+
+def _kappa(m: Machine, v: Symbols) -> Outputs:
+    mass = lagrangian.mass_matrix(m, v["pose"], v["parameters"])
+    return {"value": indices.kappa(m, _state(m, v), mass)}
 
 
 def _coriolis_matrix(m: Machine, v: Symbols) -> Outputs:
@@ -271,6 +319,7 @@ TABLE: dict[str, Entry] = {
     "jacobian": Entry(
         _POSE, lambda m, v: {"jacobian": kinematics.jacobian(_state(m, v))}, ("rows",)
     ),
+    "homogeneous_jacobian": Entry(_POSE, _homogeneous_jacobian, ("rows",)),
     "link_jacobians": Entry(_POSE, _link_jacobians, _BENT),
     "joint_screws": Entry(
         _POSE, lambda m, v: {"screws": [s.T for s in kinematics.joint_screws(_state(m, v))]}, _BENT
@@ -281,6 +330,7 @@ TABLE: dict[str, Entry] = {
         ("pose", "joint_rates", "joint_accelerations"), _platform_motion, _HELD
     ),
     "passive_friction": Entry(_RATE, _passive_friction, _HELD),
+    "reactions": Entry((*_MOTION, "parameters"), _reactions, _HELD),
     "inverse_dynamics": Entry((*_MOTION, "parameters"), _inverse_dynamics, _HELD),
     "forward_dynamics": Entry((*_RATE, "forces", "parameters"), _forward_dynamics, _BENT),
     "drive_forces": Entry(
@@ -327,7 +377,26 @@ TABLE: dict[str, Entry] = {
 }
 
 FUNCTIONS = tuple(TABLE)
-"""What `compile` accepts."""
+"""What `compile` accepts, beside the indices."""
+
+_DEFINED = (
+    *("condition", "condition_points", "speed_least", "speed_most", "turning_speed"),
+    *("force_least", "turning_moment", "pressure_angle", "output_pressure_angle"),
+)
+"""The indices of geometry that are defined at type-II singularities too, if only as infinite."""
+
+INDICES: dict[str, Entry] = {
+    **{
+        what: Entry(
+            _POSE, partial(_geometric_index, what=what), _BENT if what in _DEFINED else _HELD
+        )
+        for what in indices.OF_GEOMETRY
+    },
+    "kappa": Entry((*_POSE, "parameters"), _kappa, _BENT),
+}
+"""The indices of performance, each one number for a pose: `pteron.indices` says what they mean."""
+
+TABLE |= INDICES
 
 
 def needs_of(what: str) -> tuple[Need, ...]:
