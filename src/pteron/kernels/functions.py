@@ -23,6 +23,7 @@ from pteron.equations import (
 from pteron.equations.friction import passive_friction
 from pteron.equations.laws import LAWS
 from pteron.equations.machine import Machine
+from pteron.equations.room import rooms
 from pteron.equations.virtual_work import generalized_forces, inverse_dynamics
 
 Output = Expression | list[Expression] | tuple[Expression, tuple[int, ...]]
@@ -309,6 +310,9 @@ TABLE: dict[str, Entry] = {
     "direct_step": Entry(("joints", "pose"), _direct_step),
     "reach": Entry(_POSE, _reach),
     "passive_room": Entry(_POSE, _passive_room),
+    "room": Entry(
+        _POSE, lambda m, v: {"room": ca.vertcat(*(room.value for room in rooms(m, v["pose"])))}
+    ),
     "joint_points": Entry(
         _POSE, lambda m, v: {"points": kinematics.chain_points(_state(m, v))}, ("reach",)
     ),
