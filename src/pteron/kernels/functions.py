@@ -11,6 +11,7 @@ import casadi as ca
 
 from pteron.bodies.motion import Expression
 from pteron.equations import closing, control, drives, kinematics, lagrangian, regressor
+from pteron.equations.constraints import constraint_measure
 from pteron.equations.friction import passive_friction
 from pteron.equations.laws import LAWS
 from pteron.equations.machine import Machine
@@ -268,6 +269,11 @@ TABLE: dict[str, Entry] = {
     "discriminants": Entry(_POSE, _discriminants),
     "squared_type_i": Entry(_POSE, _squared_type_i),
     "type_ii": Entry(_POSE, _type_ii),
+    "constraint": Entry(
+        _POSE,
+        lambda m, v: {"constraint": constraint_measure(m, _state(m, v))},
+        ("reach",),
+    ),
     "jacobian": Entry(
         _POSE, lambda m, v: {"jacobian": kinematics.jacobian(_state(m, v))}, ("rows",)
     ),

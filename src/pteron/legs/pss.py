@@ -22,7 +22,15 @@ from pteron.legs.cones import Cone
 from pteron.legs.keys import Key
 from pteron.legs.kind import Quantity
 from pteron.legs.leg import Joint, LegMotion, Passive, Sphere
-from pteron.legs.rods import ROD_KEYS, cones, free_axes, hinge_doubts, rod_body, universal_joints
+from pteron.legs.rods import (
+    ROD_KEYS,
+    cones,
+    couples,
+    free_axes,
+    hinge_doubts,
+    rod_body,
+    universal_joints,
+)
 from pteron.legs.slide import SLIDER_KEYS, SlideEquations, SlideLeg, SlideState
 
 
@@ -111,6 +119,9 @@ class PSS(SlideLeg):
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return free_axes(self.rods, self.bar_direction, axis)
+
+    def couples(self, motion: LegMotion, axis: Vector | None) -> Sequence[Expression] | None:
+        return couples(self, motion)
 
     def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
         return cones(self, motion, ca.SX.eye(3), still, turned)

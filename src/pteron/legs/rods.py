@@ -41,6 +41,20 @@ def free_axes(rods: int, bar: Vector | None, axis: Vector | None) -> tuple[Vecto
     return tuple(v for v in (bar, axis) if v is not None)
 
 
+def couples(leg: Any, motion: LegMotion) -> list[Expression] | None:
+    """Return the couple about bar x rod that parallel rods hold: both push along themselves.
+
+    Its length is the sine between bar and rod: it is lost where the parallelogram is flat. What
+    turns the bar about the rods they do not hold. None where the bar is not told.
+    """
+    if leg.rods == 1:
+        return []
+    rod = motion.links[1]
+    if leg.bar is None or rod is None:
+        return None
+    return [ca.cross(ca.SX(list(leg.bar)), rod) / leg.lower_length]
+
+
 def cones(
     leg: Any, motion: LegMotion, tip: Expression, still: Expression, turned: Expression
 ) -> list[Passive]:

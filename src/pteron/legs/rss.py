@@ -23,7 +23,15 @@ from pteron.legs.cones import Cone
 from pteron.legs.crank import CRANK_KEYS, CrankEquations, CrankLeg, CrankState
 from pteron.legs.keys import Condition, Key
 from pteron.legs.leg import Joint, LegMotion, Passive, Sphere
-from pteron.legs.rods import ROD_KEYS, cones, free_axes, hinge_doubts, rod_body, universal_joints
+from pteron.legs.rods import (
+    ROD_KEYS,
+    cones,
+    couples,
+    free_axes,
+    hinge_doubts,
+    rod_body,
+    universal_joints,
+)
 
 
 def _check_bar(bar: Vector | None, direction: Vector) -> None:
@@ -117,6 +125,9 @@ class RSS(CrankLeg):
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return free_axes(self.rods, self.direction, axis)
+
+    def couples(self, motion: LegMotion, axis: Vector | None) -> Sequence[Expression] | None:
+        return couples(self, motion)
 
     def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
         crank = motion.bodies["u"]
