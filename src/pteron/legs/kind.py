@@ -219,6 +219,9 @@ class LegKind(ABC):
         """
         return None
 
+    bar_length: float | None = None
+    """How far its parallel rods are apart, m, where the file says so."""
+
     @property
     def lever(self) -> float:
         """Metres that the actuated body's end moves per unit of the joint: 1 for a slider.

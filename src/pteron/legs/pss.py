@@ -68,6 +68,8 @@ class PSS(SlideLeg):
     tip_cone, platform_cone : Cone, optional
         Where the ball joints at the rod's ends let it point: at the slider in the base frame, at
         the platform in the platform's, which for parallel rods is that at phi = 0.
+    bar_length : float, optional
+        How far parallel rods are apart, m.
     """
 
     lower: RodInertia
@@ -75,6 +77,7 @@ class PSS(SlideLeg):
     bar_direction: Vector | None = None
     tip_cone: Cone | None = None
     platform_cone: Cone | None = None
+    bar_length: float | None = None
 
     type = "PSS"
     names: ClassVar = {"p": "slider", "l": "rod"}

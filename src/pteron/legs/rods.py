@@ -18,6 +18,12 @@ ROD_KEYS: dict[str, Key] = {
     "rods": Key(
         "count", "parallel rods, which keep their bars parallel; lower is their sum", default=2
     ),
+    "bar_length": Key(
+        "length",
+        "how far parallel rods are apart, m: clearances then take them for two",
+        default=None,
+        example=0.08,
+    ),
     "platform_cone": Key(
         "cone",
         "how far the rod may lean at the platform; axis in the platform frame, at phi = 0 for "

@@ -81,6 +81,8 @@ class RSS(CrankLeg):
     tip_cone, platform_cone : Cone, optional
         Where the ball joints at the rod's ends let it point: at the crank's end in the crank's
         frame, at the platform in the platform's, which for parallel rods is that at phi = 0.
+    bar_length : float, optional
+        How far parallel rods are apart, m.
     """
 
     lower: RodInertia
@@ -88,6 +90,7 @@ class RSS(CrankLeg):
     bar_direction: Vector | None = None
     tip_cone: Cone | None = None
     platform_cone: Cone | None = None
+    bar_length: float | None = None
 
     type = "RSS"
     names: ClassVar = {"u": "crank", "l": "rod"}

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pteron.bodies.vectors import Vector, complement, parallel, vector
 from pteron.errors import ModelError
 from pteron.legs import LegKind
+from pteron.manipulator.radii import Radii
 from pteron.platforms import Platform
 from pteron.toml import told
 
@@ -40,6 +41,8 @@ class Manipulator:
         Of any kind in `pteron.legs`, in the order of the joint coordinates.
     gravity : vector
         Acceleration of gravity in the base frame, m/s^2.
+    radii : Radii, optional
+        How thick its bodies are, for `pteron.workspace.clearance`.
 
     Raises
     ------
@@ -52,6 +55,7 @@ class Manipulator:
     platform: Platform
     legs: tuple[LegKind, ...]
     gravity: Vector = STANDARD_GRAVITY
+    radii: Radii | None = None
 
     def __hash__(self) -> int:
         """Hash once: the public functions look machines up at every call."""
@@ -59,7 +63,7 @@ class Manipulator:
 
     @cached_property
     def _hash(self) -> int:
-        return hash((self.name, self.platform, self.legs, self.gravity))
+        return hash((self.name, self.platform, self.legs, self.gravity, self.radii))
 
     def __getstate__(self) -> dict[str, Any]:
         # Texts hash differently in every process.

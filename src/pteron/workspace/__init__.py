@@ -1,6 +1,7 @@
 """Where a machine can work: its reserves, its home pose, its reach and its joints' ranges."""
 
 from pteron.kinematics.limits import LimitedJoint, limited_joints
+from pteron.workspace.clearance import Clearance, clearance
 from pteron.workspace.home import home_pose
 from pteron.workspace.reach import BEYOND_LIMITS, REACHABLE, ReachSlice, reach_slice
 from pteron.workspace.reserve import JointRanges, Reserve, joint_ranges, reserve
@@ -8,6 +9,7 @@ from pteron.workspace.volume import ReachVolume, bounding_box, reach_volume
 
 __all__ = [
     "BEYOND_LIMITS",
+    "Clearance",
     "REACHABLE",
     "ReachSlice",
     "ReachVolume",
@@ -15,6 +17,7 @@ __all__ = [
     "JointRanges",
     "LimitedJoint",
     "bounding_box",
+    "clearance",
     "home_pose",
     "limited_joints",
     "reach_slice",
