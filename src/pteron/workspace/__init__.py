@@ -3,6 +3,7 @@
 from pteron.kinematics.limits import LimitedJoint, limited_joints
 from pteron.workspace.clearance import Clearance, clearance
 from pteron.workspace.home import home_pose
+from pteron.workspace.nearest import NearestSingularity, nearest_singularities
 from pteron.workspace.reach import BEYOND_LIMITS, REACHABLE, ReachSlice, reach_slice
 from pteron.workspace.reserve import JointRanges, Reserve, joint_ranges, reserve
 from pteron.workspace.volume import ReachVolume, bounding_box, reach_volume
@@ -16,10 +17,12 @@ __all__ = [
     "Reserve",
     "JointRanges",
     "LimitedJoint",
+    "NearestSingularity",
     "bounding_box",
     "clearance",
     "home_pose",
     "limited_joints",
+    "nearest_singularities",
     "reach_slice",
     "reach_volume",
     "reserve",
