@@ -11,6 +11,7 @@ from __future__ import annotations
 import casadi as ca
 
 from pteron.bodies.motion import Expression
+from pteron.bodies.vectors import Vector
 from pteron.closures.determinants import determinant
 from pteron.equations.machine import Machine, State
 
@@ -30,7 +31,8 @@ def constraint_rows(machine: Machine, state: State) -> Expression | None:
     across = turns or robot.platform.planar
     axis = robot.platform.axis if turns else None
     columns = ca.horzcat(x0, y0) if across else ca.SX.eye(3)
-    couples, parts = [], []
+    couples: list[Expression] = []
+    parts: list[Vector | None] = []
     for leg, motion in zip(robot.legs, state.legs, strict=True):
         held = leg.couples(motion, axis)
         if held is None:

@@ -36,7 +36,7 @@ class Radii:
     platform: float = 0.0
 
     def __post_init__(self) -> None:
-        faults = []
+        faults: list[str] = []
         for field in fields(self):
             try:
                 value = number(getattr(self, field.name), field.name)

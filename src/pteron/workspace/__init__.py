@@ -2,6 +2,7 @@
 
 from pteron.kinematics.limits import LimitedJoint, limited_joints
 from pteron.workspace.clearance import Clearance, clearance
+from pteron.workspace.free_regions import FreeRegion, free_of_singularities
 from pteron.workspace.home import home_pose
 from pteron.workspace.nearest import NearestSingularity, nearest_singularities
 from pteron.workspace.reach import BEYOND_LIMITS, REACHABLE, ReachSlice, reach_slice
@@ -15,11 +16,13 @@ __all__ = [
     "ReachSlice",
     "ReachVolume",
     "Reserve",
+    "FreeRegion",
     "JointRanges",
     "LimitedJoint",
     "NearestSingularity",
     "bounding_box",
     "clearance",
+    "free_of_singularities",
     "home_pose",
     "limited_joints",
     "nearest_singularities",

@@ -186,8 +186,8 @@ def _changes(vanishing: _Vanishing, start: Array, way: Array, places: Array) -> 
     It is looked for between each two of `places` (S,).
     """
     poses = start + places[:, None, None] * way
-    values, reached = vanishing(poses.reshape(-1, poses.shape[-1]))
-    negative, reached = (part.reshape(poses.shape[:-1]) for part in (values < 0.0, reached))
+    values, known = vanishing(poses)
+    negative, reached = values < 0.0, known
     changed = (negative[1:] != negative[:-1]) & reached[1:] & reached[:-1]
     rays = np.flatnonzero(changed.any(axis=0))
     first = changed[:, rays].argmax(axis=0)
