@@ -36,8 +36,11 @@ from pteron.errors import (
 )
 from pteron.kernels import compile
 from pteron.kinematics import (
+    Architecture,
     JointMotion,
+    architecture,
     assembly_mode,
+    constraint_measure,
     direct_kinematics,
     follow,
     inverse_kinematics,
@@ -128,6 +131,7 @@ __all__ = [
     "DataError",
     "Drive",
     "Geared",
+    "Architecture",
     "JointMotion",
     "Leg",
     "Manipulator",
@@ -147,6 +151,7 @@ __all__ = [
     "SingularPose",
     "Stribeck",
     "UnreachablePose",
+    "architecture",
     "assembly_mode",
     "base_parameters",
     "base_regressor",
@@ -155,6 +160,7 @@ __all__ = [
     "cheapest_parameters",
     "compile",
     "controllers",
+    "constraint_measure",
     "coriolis_matrix",
     "direct_kinematics",
     "drive_accelerations",

@@ -20,6 +20,8 @@ from pteron.equations import (
     reactions,
     regressor,
 )
+from pteron.equations.clearance import clearances
+from pteron.equations.constraints import constraint_measure
 from pteron.equations.friction import passive_friction
 from pteron.equations.laws import LAWS
 from pteron.equations.machine import Machine
@@ -291,6 +293,11 @@ def _controlled(m: Machine, v: Symbols, *, what: str) -> Outputs:
     return {"forces": forces, "next_memory": ca.vertcat(*(kept[name] for name in memory))}
 
 
+def _stacked(column: Expression) -> tuple[Expression, tuple[int, ...]]:
+    """Return a column as a vector, also where it has one element or none."""
+    return column, column.shape[:1]
+
+
 _POSE, _RATE = ("pose",), ("pose", "velocity")
 _MOTION = ("pose", "velocity", "acceleration")
 _BENT: tuple[Need, ...] = ("reach", "type I")
@@ -320,6 +327,14 @@ TABLE: dict[str, Entry] = {
     "discriminants": Entry(_POSE, _discriminants),
     "squared_type_i": Entry(_POSE, _squared_type_i),
     "type_ii": Entry(_POSE, _type_ii),
+    "clearances": Entry(
+        _POSE, lambda m, v: {"distances": _stacked(clearances(m, v["pose"]))}, ("reach",)
+    ),
+    "constraint": Entry(
+        _POSE,
+        lambda m, v: {"constraint": constraint_measure(m, _state(m, v))},
+        ("reach",),
+    ),
     "jacobian": Entry(
         _POSE, lambda m, v: {"jacobian": kinematics.jacobian(_state(m, v))}, ("rows",)
     ),
