@@ -9,6 +9,7 @@ gone, is `dask.distributed`'s business.
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
@@ -124,11 +125,9 @@ def _here(
     task: Callable[[int, Any], None], tasks: Iterator[tuple[int, Any]], threads: int
 ) -> Iterator[None]:
     """Do the tasks in this process; yield after each."""
-    yield task(*next(tasks))
-    if threads == 1:
-        for one in tasks:
-            yield task(*one)
-        return
+    for one in islice(tasks, 1 if threads > 1 else None):
+        task(*one)
+        yield
     with ThreadPoolExecutor(threads) as pool:
         pending = {pool.submit(task, *one) for one in islice(tasks, _AHEAD * threads)}
         try:
@@ -149,13 +148,7 @@ def _elsewhere(
     workers: int | None,
 ) -> Iterator[None]:
     """Do the tasks in other processes; yield after each."""
-    try:
-        from distributed import KilledWorker, as_completed
-    except ImportError:
-        raise ModelError(
-            "other processes need dask.distributed, which is not installed; "
-            'pip install "pteron[cluster]"'
-        ) from None
+    distributed = _distributed()
 
     def submitted(one: tuple[int, Any]) -> Future[None]:
         # Each is a task of its own: that its result is none does not mean it is not needed.
@@ -164,11 +157,11 @@ def _elsewhere(
 
     with _client(scheduler, workers) as client:
         ahead = _AHEAD * max(1, sum(client.nthreads().values()))
-        pending = as_completed([submitted(one) for one in islice(tasks, ahead)])
+        pending = distributed.as_completed([submitted(one) for one in islice(tasks, ahead)])
         for future in pending:
             try:
                 yield future.result()
-            except KilledWorker as error:
+            except distributed.KilledWorker as error:
                 raise PteronError(
                     f"a chunk has ended {error.allowed_failures + 1} workers one after another: do "
                     "they have enough memory? What is finished is kept: run it again"
@@ -180,14 +173,11 @@ def _elsewhere(
 @contextmanager
 def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
     """Yield a client of a cluster that answers and has Pteron as it is here."""
-    import logging
-
-    from distributed import Client, LocalCluster
-
+    distributed = _distributed()
     with ExitStack() as opened:
         if scheduler is None:
             # One thread each: its kernels then share no lock with another's.
-            cluster = LocalCluster(
+            cluster = distributed.LocalCluster(
                 n_workers=workers,
                 threads_per_worker=1,
                 dashboard_address=None,
@@ -197,7 +187,7 @@ def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
         else:
             address, where = scheduler, f"scheduler {scheduler}"
         try:
-            client = opened.enter_context(Client(address, timeout=_WAIT))
+            client = opened.enter_context(distributed.Client(address, timeout=_WAIT))
         except (OSError, ValueError, TypeError) as error:
             raise PteronError(
                 f"{where}: does not answer ({str(error).splitlines()[0]}); start one with: "
@@ -217,6 +207,18 @@ def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
                     "the same there"
                 )
         yield client
+
+
+def _distributed() -> Any:
+    """Return `dask.distributed`, whose functions have no types."""
+    try:
+        import distributed
+    except ImportError:
+        raise ModelError(
+            "other processes need dask.distributed, which is not installed; "
+            'pip install "pteron[cluster]"'
+        ) from None
+    return distributed
 
 
 def _version() -> str:
