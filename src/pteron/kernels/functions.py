@@ -96,6 +96,11 @@ def _passive_room(m: Machine, v: Symbols) -> Outputs:
     return {"shares": shares, "metres": metres}
 
 
+def _standing(m: Machine, v: Symbols) -> Outputs:
+    status, margin = kinematics.standing(m, v["pose"])
+    return {"standing": status, "margin": margin}
+
+
 def _platform_points(m: Machine, v: Symbols) -> Outputs:
     points = m.platform.motion(v["pose"], *[ca.SX.zeros(m.freedom)] * 2).points
     return {"points": ca.vertcat(*(point.position.T for point in points))}
@@ -261,6 +266,7 @@ TABLE: dict[str, Entry] = {
     "direct_step": Entry(("joints", "pose"), _direct_step),
     "reach": Entry(_POSE, _reach),
     "passive_room": Entry(_POSE, _passive_room),
+    "standing": Entry(_POSE, _standing),
     "joint_points": Entry(
         _POSE, lambda m, v: {"points": kinematics.chain_points(_state(m, v))}, ("reach",)
     ),
