@@ -56,9 +56,7 @@ def _function(
         ) from None
     jax.config.update("jax_enable_x64", True)
     kernels = {
-        name: guarded(robot, name, Traced)
-        for name in ("standing", *names)
-        if name != MARGIN.name
+        name: guarded(robot, name, Traced) for name in ("standing", *names) if name != MARGIN.name
     }
 
     def evaluate(pose: Any, *values: Any) -> dict[str, Any]:

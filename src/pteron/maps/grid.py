@@ -209,7 +209,7 @@ def _box(robot: Manipulator, pose: Array, angles: tuple[float, ...] | None) -> A
     if angles is None:
         return bounding_box(robot, pose)
     boxes = []
-    for angle in np.linspace(*angles[:2], _TURNS):
+    for angle in np.linspace(angles[0], angles[1], _TURNS):
         try:
             boxes.append(bounding_box(robot, [*pose[:-1], angle]))
         except ModelError as error:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 MARGIN = Index(
     "margin",
     "distance to the end of the reach",
-    r"\\min_i \\{\\text{reach}_i, \\text{limits}_i\\}",
+    r"\min_i \min(d_i, l_i)",
     "the legs' closed forms",
     "m",
     "more",
@@ -150,7 +150,9 @@ class Map:
         )
 
     def _pose(self, place: int) -> Array:
-        region = tuple(slice(int(i), int(i) + 1) for i in np.unravel_index(place, self.status.shape))
+        region = tuple(
+            slice(int(i), int(i) + 1) for i in np.unravel_index(place, self.status.shape)
+        )
         return self.grid.poses(region).reshape(-1)
 
     def table(self) -> pl.DataFrame:
@@ -169,15 +171,17 @@ class Map:
         frame = pl.DataFrame(columns | {"status": self.status.ravel()})
         return frame.with_columns(pl.col(pl.Float64).fill_nan(None))
 
-    def slices(self) -> Iterator[tuple[float, Map]]:
-        """Yield the values of the last coordinate that varies, each with the map at it."""
-        *axes, last = self.grid.axes
-        place = self.grid.coordinates.index(last.name)
-        for k, value in enumerate(last.values.tolist()):
-            pose = (*self.grid.pose[:place], value, *self.grid.pose[place + 1 :])
-            values = {name: own[..., k] for name, own in self.values.items()}
-            grid = Grid(self.grid.coordinates, pose, tuple(axes))
-            yield value, Map(self.robot, grid, values, self.status[..., k])
+    def at(self, name: str, value: float) -> Map:
+        """Return the map at the value of a coordinate that is nearest to one, m or rad."""
+        k = [axis.name for axis in self.grid.axes].index(name)
+        axes = list(self.grid.axes)
+        steps = axes.pop(k).values
+        i = int(np.abs(steps - value).argmin())
+        pose = list(self.grid.pose)
+        pose[self.grid.coordinates.index(name)] = float(steps[i])
+        values = {index: np.take(own, i, axis=k) for index, own in self.values.items()}
+        grid = Grid(self.grid.coordinates, tuple(pose), tuple(axes))
+        return Map(self.robot, grid, values, np.take(self.status, i, axis=k))
 
 
 def headed(index: Index) -> str:

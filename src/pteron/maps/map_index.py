@@ -22,6 +22,7 @@ from pteron.maps.files import checked_map_file, save_map
 from pteron.maps.grid import Grid, Region, pose_grid
 from pteron.maps.map import MARGIN, Map
 from pteron.maps.stores import MapStore, MemoryStore
+from pteron.maps.surfaces import ENDINGS as SURFACES
 from pteron.maps.sweep import cores, sweep
 
 Engine = Literal["auto", "jax"]
@@ -102,6 +103,8 @@ def map_index(
             f"grid: of poses ({', '.join(poses.coordinates)}), while those of {robot.name} are "
             f"({', '.join(robot.coordinates)})"
         )
+    if target is not None and target.suffix.lower() in SURFACES:
+        names = tuple(dict.fromkeys((*names, MARGIN.name)))  # whose zero is the reach's surface
     streams = target is not None and target.suffix.lower() == ".zarr"
     here = scheduler is None and workers is None
     with ExitStack() as opened:
@@ -109,7 +112,7 @@ def map_index(
         if streams or not here:
             place = target if streams else Path(opened.enter_context(_folder()), "map.zarr")
             assert place is not None
-            store = MapStore(place, robot.name, poses, names, _plan(robot, engine))
+            store = MapStore.of(place, robot.name, poses, names, _plan(robot, engine))
         else:
             store = MemoryStore(poses, names)
         if engine == "auto":

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import tempfile
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pteron.errors import DataError, ModelError, OutputError
-from pteron.kernels import Array
 from pteron.maps.grid import Axis, Grid
 from pteron.maps.map import ALL, Map
 from pteron.maps.plan import expect_same
@@ -36,7 +35,7 @@ class MemoryStore:
         """Return no chunk: nothing is there before the sweep begins."""
         return ()
 
-    def write(self, number: int, result: Mapping[str, Array]) -> None:
+    def write(self, number: int, result: Mapping[str, NDArray[Any]]) -> None:
         """Keep what a chunk gave."""
         region = self._regions[number]
         for name, values in self._values.items():
@@ -48,66 +47,71 @@ class MemoryStore:
         return Map(robot, self._grid, self._values, self._status)
 
 
+@dataclass(frozen=True)
 class MapStore:
     """A map in a Zarr store, which is a folder: a file a chunk and index, so that tasks share none.
 
     It is an array of the grid's shape for each index, one for `status`, one for each axis's values,
     and `finished`, a number a chunk: written last, it says that the chunk is whole. Arrays carry
     the names of their axes and their units, so that xarray reads the store.
-
-    Parameters
-    ----------
-    path : Path
-        The store. Where it holds a part of the same map, that is kept.
-    robot : str
-        The machine's name.
-    grid : Grid
-        The poses.
-    names : tuple of str
-        The indices.
-    plan : mapping
-        What else makes the numbers what they are, as JSON has them.
-
-    Raises
-    ------
-    OutputError
-        If it is the store of another map, or cannot be written.
-    ModelError
-        If Zarr is not installed.
     """
 
-    def __init__(
-        self, path: Path, robot: str, grid: Grid, names: tuple[str, ...], plan: Mapping[str, Any]
-    ) -> None:
-        self.path, self._grid, self._names = path.resolve(), grid, names
+    path: Path
+    grid: Grid
+    names: tuple[str, ...]
+
+    @classmethod
+    def of(
+        cls, path: Path, robot: str, grid: Grid, names: tuple[str, ...], plan: Mapping[str, Any]
+    ) -> MapStore:
+        """Return the store of a map of a machine of that name, made if it is not there.
+
+        Parameters
+        ----------
+        path : Path
+            Where the same map was begun, it goes on.
+        robot, grid, names
+            The machine's name, the poses and the indices.
+        plan : mapping
+            What else makes the numbers what they are, as JSON has them.
+
+        Raises
+        ------
+        OutputError
+            If it is the store of another map, or cannot be written.
+        ModelError
+            If Zarr is not installed.
+        """
+        store = cls(path.resolve(), grid, names)
         wanted = {"index": list(names), "grid": _plain(grid), **plan}
-        if not self.path.exists():
-            self._make({"name": robot, "plan": wanted})
-        found = _attributes(self.path)
+        if not path.exists():
+            store._make({"name": robot, "plan": wanted})
+        found = _attributes(path)
         if "plan" not in found:
             raise OutputError(f"{path}: is no map's store; name another place, or remove it")
         expect_same(path, found["plan"], wanted)
+        return store
 
     def finished(self) -> frozenset[int]:
         """Return the numbers of the chunks that are written."""
         return frozenset(np.flatnonzero(_group(self.path)[_FINISHED][:]).tolist())
 
-    def write(self, number: int, result: Mapping[str, Array]) -> None:
+    def write(self, number: int, result: Mapping[str, NDArray[Any]]) -> None:
         """Write what a chunk gave, each array's part through a temporary file and a rename."""
-        region, group = self._grid.regions()[number], _group(self.path)
-        for name in (*self._names, _STATUS):
+        region, group = self.grid.regions()[number], _group(self.path)
+        for name in (*self.names, _STATUS):
             group[name][region] = result[name]
         group[_FINISHED][number] = 1
 
     def map(self, robot: str) -> Map:
         """Return the map, read into memory."""
         group = _group(self.path)
-        values = {name: np.asarray(group[name][...]) for name in self._names}
-        return Map(robot, self._grid, values, np.asarray(group[_STATUS][...]))
+        values = {name: np.asarray(group[name][...]) for name in self.names}
+        return Map(robot, self.grid, values, np.asarray(group[_STATUS][...]))
 
     def _make(self, attributes: dict[str, Any]) -> None:
         """Make the store without chunks, whole or not at all."""
-        zarr, grid = _zarr(), self._grid
+        zarr, grid = _zarr(), self.grid
         try:
             work = tempfile.mkdtemp(prefix=f".{self.path.name}.", dir=self.path.parent)
         except OSError as error:
@@ -120,7 +124,7 @@ class MapStore:
             for axis in grid.axes:
                 made = group.create_array(axis.name, data=axis.values, dimension_names=(axis.name,))
                 made.attrs["units"] = axis.unit
-            for name in (*self._names, _STATUS):
+            for name in (*self.names, _STATUS):
                 index = ALL.get(name)
                 made = group.create_array(
                     name,
@@ -137,8 +141,8 @@ class MapStore:
             group.create_array(
                 _FINISHED, shape=(count,), chunks=(1,), dtype="uint8", compressors=None
             )
-            os.chmod(work, 0o755)
-            os.rename(work, self.path)
+            Path(work).chmod(0o755)
+            Path(work).rename(self.path)
         except OSError:
             if not self.path.exists():  # else another has just made it
                 raise
@@ -163,8 +167,7 @@ def read_store(path: Path) -> Map:
         tuple(given["pose"]),
         tuple(Axis(**axis) for axis in given["axes"]),
     )
-    store = MapStore.__new__(MapStore)
-    store.path, store._grid, store._names = path, grid, tuple(found["plan"]["index"])
+    store = MapStore(path.resolve(), grid, tuple(found["plan"]["index"]))
     missing = len(grid.regions()) - len(store.finished())
     if missing:
         raise DataError(
