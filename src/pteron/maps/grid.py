@@ -133,6 +133,7 @@ def pose_grid(
     *,
     points: int | None = None,
     center: PoseLike | None = None,
+    rim: float = 0.0,
 ) -> Grid:
     """Return a grid of a machine's poses.
 
@@ -151,6 +152,9 @@ def pose_grid(
         How many values along each axis; by default 200 in a plane, 100 in three dimensions.
     center : array, shape (m,), optional
         Gives what `held` does not, m and rad; by default the home pose.
+    rim : float
+        Share of the bounding box by which lengths go beyond it on each side: pictures show where
+        the reach ends.
 
     Returns
     -------
@@ -192,6 +196,7 @@ def pose_grid(
     lengths = [name for name in free if name != "phi"]
     if lengths:
         box = _box(robot, pose, spans.get("phi"))
+        box += rim * np.array([-1.0, 1.0])[:, None] * np.ptp(box, axis=0)
         spans |= {name: tuple(box[:, names.index(name)].tolist()) for name in lengths}
     axes = []
     for name in varying_names:

@@ -6,21 +6,22 @@ from collections.abc import Callable, Sequence
 from contextlib import closing
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import LogNorm, Normalize
+from matplotlib.colors import LogNorm, Normalize, to_hex, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 from matplotlib.patches import Patch
+from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt  # type: ignore[import-untyped]
 
 from pteron.atomic import write_bytes
 from pteron.errors import DataError
 from pteron.kernels import Array
-from pteron.maps import Axis, Map
+from pteron.maps import Axis, Map, Summary
 from pteron.maps.map import ALL, MARGIN, cause
 from pteron.plots.canvas import (
     FONT_SIZE,
@@ -50,8 +51,16 @@ _MISSED = 127
 _WIDE = 20.0
 """From that ratio of the greatest value to the middle one on, colours go by the logarithm."""
 
+_ALIKE = 1e-6
+"""Relative differences that are none to see."""
+
+_TINY = 1e-12
+
 _LAST = 99.0
 """Percent of the values that have a colour of their own where a few are far off."""
+
+_BELOW = 4.5
+"""Sizes of a letter from the axes to the legend: the scale's numbers and its name stand there."""
 
 _FPS = 10.0
 _DPI = 160
@@ -61,8 +70,8 @@ def map_figure(given: Map, *names: str) -> Figure:
     """Return the picture of a map: a panel for each index, one below the other.
 
     Over one coordinate it is a curve, over two a plane. Over three it is the three planes through
-    the pose at which the first index is best. Colours are for the colour-blind too (cividis), and
-    the bright ones are always the better ones. Lengths are in mm, angles in degrees.
+    the pose that is deepest among those that serve. Colours are for the colour-blind too (cividis),
+    and the bright ones are always the better ones. Lengths are in mm, angles in degrees.
 
     Parameters
     ----------
@@ -91,7 +100,7 @@ def map_figure(given: Map, *names: str) -> Figure:
     for name in chosen:
         if name not in given.values:
             raise DataError(f"{name}: is not in this map; it has {', '.join(given.values)}")
-    planes = _planes(given, chosen[0])
+    planes = _planes(given)
     scales = {name: _normalised(given, name) for name in chosen}
     panels = [(plane, name) for name in chosen for plane in planes]
     return _drawn(panels, scales)
@@ -158,16 +167,16 @@ def map_film(
 def _frame(plane: Map, name: str, scales: dict[str, Normalize]) -> NDArray[np.uint8]:
     """Return a picture (height, width, 3), both even, of the same size for all planes of a map."""
     figure = _drawn([(plane, name)], scales, every=True)
-    canvas = cast(FigureCanvasAgg, figure.canvas)
+    canvas: Any = figure.canvas
     figure.set_dpi(_DPI)
-    sides = [2 * round(_DPI * float(side) / 2.0) / _DPI for side in figure.get_size_inches()]
-    figure.set_size_inches(*sides)
+    width, height = (2 * round(_DPI * float(v) / 2.0) / _DPI for v in figure.get_size_inches())
+    figure.set_size_inches(width, height)
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[..., :3]
 
 
-def _planes(given: Map, name: str) -> list[Map]:
-    """Return the map itself, or of one over three coordinates the planes through the best pose."""
+def _planes(given: Map) -> list[Map]:
+    """Return the map itself, or of one over three coordinates the planes through its middle."""
     axes = given.grid.axes
     if len(axes) < 3:
         return [given]
@@ -176,13 +185,11 @@ def _planes(given: Map, name: str) -> list[Map]:
             f"{', '.join(axis.name for axis in axes)} vary: a picture shows three coordinates; "
             "hold the others"
         )
-    try:
-        pose = given.summary(name).best_pose
-    except DataError:
-        pose = np.array(given.grid.pose)
-    places = [given.grid.coordinates.index(axis.name) for axis in axes]
+    depth = distance_transform_edt(np.pad(given.reachable, 1))[1:-1, 1:-1, 1:-1]
+    middle = np.unravel_index(int(depth.argmax()), depth.shape)
+    places = [axis.values[i] for axis, i in zip(axes, middle, strict=True)]
     return [
-        given.at(axis.name, pose[place])
+        given.at(axis.name, float(place))
         for axis, place in zip(reversed(axes), reversed(places), strict=True)
     ]
 
@@ -194,8 +201,8 @@ def _normalised(given: Map, name: str) -> Normalize:
     if not len(known):
         return Normalize(0.0, 1.0)
     low, high = float(known.min()), float(known.max())
-    if high - low <= 1e-6 * max(abs(low), abs(high)):
-        return Normalize(low - 0.05 * abs(low), high + 0.05 * abs(high) + 1e-12)
+    if high - low <= _ALIKE * max(abs(low), abs(high)):
+        return Normalize(0.9 * low, 1.1 * low + _TINY)
     middle, last = np.percentile(known, [50.0, _LAST]).tolist()
     if low > 0.0 and high > _WIDE * middle:
         return LogNorm(low, last if last > low else high)
@@ -254,21 +261,19 @@ def _plane(
     handles = _hatched(axes, plane, name, first, second, every=every)
     if drawn.count():
         _best(axes, plane, name, handles)
-    ends = float(scale.vmin or 0.0), float(scale.vmax or 0.0)
-    low = drawn.count() > 0 and float(drawn.min()) < ends[0] * (1.0 - 1e-9) - 1e-12
-    high = drawn.count() > 0 and float(drawn.max()) > ends[1] * (1.0 + 1e-9) + 1e-12
-    bar = figure.colorbar(
-        mesh,
-        ax=axes,
-        fraction=0.05,
-        pad=0.02,
-        extend={(False, False): "neither", (True, False): "min", (False, True): "max"}.get(
-            (low, high), "both"
-        ),
-    )
-    bar.set_label(f"{_named(name)}\nbright is better", fontsize=FONT_SIZE, color=INK)
+    bar = figure.colorbar(mesh, ax=axes, fraction=0.05, pad=0.02, extend=_extended(drawn, scale))
+    told = "bright is better"
+    if drawn.count() and _alike(summary := plane.summary(name)):
+        bar.set_ticks([factor * summary.best], labels=[f"{factor * summary.best:.4g}"])
+        told = "the same everywhere here"
+    elif isinstance(scale, LogNorm):
+        bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        bar.ax.yaxis.set_major_formatter("{x:g}")
+        bar.ax.yaxis.set_minor_formatter(NullFormatter())
+    bar.set_label(f"{_named(name)}\n{told}", fontsize=FONT_SIZE, color=INK)
     bar.ax.tick_params(labelsize=FONT_SIZE - 1.0, colors=INK, color=MUTED)
-    bar.outline.set_visible(False)  # type: ignore[operator]
+    outline: Any = bar.outline
+    outline.set_visible(False)
     axes.set(xlim=(first[0], first[-1]), ylim=(second[0], second[-1]))
     if plane.grid.axes[0].unit == plane.grid.axes[1].unit:
         axes.set_aspect("equal")
@@ -276,12 +281,22 @@ def _plane(
         axes.legend(
             handles=handles,
             loc="upper center",
-            bbox_to_anchor=(0.5, -0.17),
+            bbox_to_anchor=(0.5, 0.0),
+            borderaxespad=_BELOW,
             ncols=2,
             frameon=False,
             fontsize=FONT_SIZE - 1.0,
             labelcolor=INK,
         )
+
+
+def _extended(drawn: Any, scale: Normalize) -> str:
+    """Return at which ends of its colours a picture has values beyond."""
+    low, high = float(scale.vmin or 0.0), float(scale.vmax or 0.0)
+    slack = _ALIKE * (high - low)
+    under = drawn.count() > 0 and float(drawn.min()) < low - slack
+    over = drawn.count() > 0 and float(drawn.max()) > high + slack
+    return ("both" if over else "min") if under else ("max" if over else "neither")
 
 
 def _hatched(
@@ -323,16 +338,20 @@ def _hatched(
 def _best(axes: Axes, plane: Map, name: str, handles: list[Any]) -> None:
     """Mark the best pose of a plane, unless all are alike."""
     found = plane.summary(name)
-    if abs(found.best - found.worst) <= 1e-6 * abs(found.best):
+    if _alike(found):
         return
     factor = _SCALES.get(found.unit, (1.0, ""))[0]
     at = [
         _SCALES[axis.unit][0] * found.best_pose[plane.grid.coordinates.index(axis.name)]
         for axis in plane.grid.axes
     ]
-    label = f"best here: {factor * found.best:.4g}"
+    label = f"best here: {factor * found.best:.4g} {_unit(name)}".rstrip()
     spot(axes, at[0], at[1], PAPER, INK, 6.0, zorder=5, label=label)
     handles.append(axes.lines[-1])
+
+
+def _alike(found: Summary) -> bool:
+    return abs(found.best - found.worst) <= _ALIKE * abs(found.best)
 
 
 def _curve(axes: Axes, given: Map, name: str) -> None:
@@ -357,10 +376,10 @@ def _curve(axes: Axes, given: Map, name: str) -> None:
         axes.legend(frameon=False, fontsize=FONT_SIZE - 1.0, labelcolor=INK)
 
 
-def _light(color: str) -> tuple[float, ...]:
+def _light(color: str) -> str:
     """Return a colour mixed with white."""
-    parts = [int(color[k : k + 2], 16) / 255.0 for k in (1, 3, 5)]
-    return tuple(0.75 + 0.25 * part for part in parts)
+    red, green, blue = (0.75 + 0.25 * part for part in to_rgb(color))
+    return to_hex((red, green, blue))
 
 
 def _shown(axis: Axis) -> Array:
@@ -372,9 +391,13 @@ def _label(axis: Axis) -> str:
 
 
 def _named(name: str) -> str:
-    index = ALL[name]
-    unit = _SCALES.get(index.unit, (1.0, index.unit))[1]
-    return f"{index.title} ({unit})" if unit else index.title
+    unit = _unit(name)
+    return f"{ALL[name].title} ({unit})" if unit else ALL[name].title
+
+
+def _unit(name: str) -> str:
+    """Return the unit in which an index is shown."""
+    return _SCALES.get(ALL[name].unit, (1.0, ALL[name].unit))[1]
 
 
 def _title(given: Map) -> str:
