@@ -108,6 +108,11 @@ def _passive_room(m: Machine, v: Symbols) -> Outputs:
     return {"shares": shares, "metres": metres}
 
 
+def _standing(m: Machine, v: Symbols) -> Outputs:
+    status, margin = kinematics.standing(m, v["pose"])
+    return {"standing": status, "margin": margin}
+
+
 def _platform_points(m: Machine, v: Symbols) -> Outputs:
     points = m.platform.motion(v["pose"], *[ca.SX.zeros(m.freedom)] * 2).points
     return {"points": ca.vertcat(*(point.position.T for point in points))}
@@ -320,6 +325,7 @@ TABLE: dict[str, Entry] = {
     "room": Entry(
         _POSE, lambda m, v: {"room": ca.vertcat(*(room.value for room in rooms(m, v["pose"])))}
     ),
+    "standing": Entry(_POSE, _standing),
     "joint_points": Entry(
         _POSE, lambda m, v: {"points": kinematics.chain_points(_state(m, v))}, ("reach",)
     ),
