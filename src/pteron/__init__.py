@@ -125,13 +125,13 @@ def __getattr__(name: str) -> Any:
 
 
 __all__ = [
+    "Architecture",
     "Bar",
     "BaseParameters",
     "Cone",
     "DataError",
     "Drive",
     "Geared",
-    "Architecture",
     "JointMotion",
     "Leg",
     "Manipulator",
@@ -159,8 +159,8 @@ __all__ = [
     "catalog",
     "cheapest_parameters",
     "compile",
-    "controllers",
     "constraint_measure",
+    "controllers",
     "coriolis_matrix",
     "direct_kinematics",
     "drive_accelerations",

@@ -5,37 +5,59 @@ from pteron.workspace.clearance import Clearance, clearance
 from pteron.workspace.conditions import Condition, conditions
 from pteron.workspace.free_regions import FreeRegion, free_of_singularities
 from pteron.workspace.home import home_pose
+<<<<<<< HEAD
 from pteron.workspace.nearest import NearestSingularity, nearest_singularities
+=======
+from pteron.workspace.inscribed import Inscribed, largest_cube, largest_cylinder
+>>>>>>> certify
 from pteron.workspace.paving import Paving, paving
+from pteron.workspace.proofs import Proof, prove
 from pteron.workspace.reach import BEYOND_LIMITS, REACHABLE, ReachSlice, reach_slice
+from pteron.workspace.regions import Box, Cylinder, Region
 from pteron.workspace.reserve import JointRanges, Reserve, joint_ranges, reserve
 from pteron.workspace.volume import ReachVolume, bounding_box, reach_volume
 
 __all__ = [
     "BEYOND_LIMITS",
+<<<<<<< HEAD
     "Clearance",
+=======
+    "Box",
+>>>>>>> certify
     "Condition",
+    "Cylinder",
+    "Inscribed",
+    "JointRanges",
+    "LimitedJoint",
     "Paving",
+    "Proof",
     "REACHABLE",
     "ReachSlice",
     "ReachVolume",
+    "Region",
     "Reserve",
+<<<<<<< HEAD
     "FreeRegion",
     "JointRanges",
     "LimitedJoint",
     "NearestSingularity",
+=======
+>>>>>>> certify
     "bounding_box",
     "clearance",
     "conditions",
     "free_of_singularities",
     "home_pose",
+    "joint_ranges",
+    "largest_cube",
+    "largest_cylinder",
     "limited_joints",
     "nearest_singularities",
     "paving",
+    "prove",
     "reach_slice",
     "reach_volume",
     "reserve",
-    "joint_ranges",
 ]
 
 
