@@ -5,11 +5,8 @@ from pteron.workspace.clearance import Clearance, clearance
 from pteron.workspace.conditions import Condition, conditions
 from pteron.workspace.free_regions import FreeRegion, free_of_singularities
 from pteron.workspace.home import home_pose
-<<<<<<< HEAD
-from pteron.workspace.nearest import NearestSingularity, nearest_singularities
-=======
 from pteron.workspace.inscribed import Inscribed, largest_cube, largest_cylinder
->>>>>>> certify
+from pteron.workspace.nearest import NearestSingularity, nearest_singularities
 from pteron.workspace.paving import Paving, paving
 from pteron.workspace.proofs import Proof, prove
 from pteron.workspace.reach import BEYOND_LIMITS, REACHABLE, ReachSlice, reach_slice
@@ -19,11 +16,8 @@ from pteron.workspace.volume import ReachVolume, bounding_box, reach_volume
 
 __all__ = [
     "BEYOND_LIMITS",
-<<<<<<< HEAD
-    "Clearance",
-=======
     "Box",
->>>>>>> certify
+    "Clearance",
     "Condition",
     "Cylinder",
     "Inscribed",
@@ -36,13 +30,8 @@ __all__ = [
     "ReachVolume",
     "Region",
     "Reserve",
-<<<<<<< HEAD
     "FreeRegion",
-    "JointRanges",
-    "LimitedJoint",
     "NearestSingularity",
-=======
->>>>>>> certify
     "bounding_box",
     "clearance",
     "conditions",
