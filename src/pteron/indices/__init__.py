@@ -2,12 +2,15 @@
 
 from pteron.indices.evaluate import evaluate
 from pteron.indices.index import INDICES, Index, indices_of
+from pteron.indices.reactions import Reactions, reactions
 
 __all__ = [
     "INDICES",
     "Index",
+    "Reactions",
     "evaluate",
     "indices_of",
+    "reactions",
 ]
 
 

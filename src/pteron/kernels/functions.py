@@ -173,6 +173,7 @@ def _reactions(m: Machine, v: Symbols) -> Outputs:
         "presumed_right": found.presumed_right,
         "driven_rows": (found.driven_rows, found.driven_rows.shape),
         "driven": found.driven,
+        "ends": _platform_points(m, v)["points"],
         "points": (points, (m.freedom, points.shape[0] // m.freedom, 3)),
         "passed": (passed, (m.freedom, passed.shape[0] // m.freedom, 6)),
     }
