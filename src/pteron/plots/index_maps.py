@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, NullFormatter
+from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt  # type: ignore[import-untyped]
 
@@ -45,9 +46,6 @@ _SCALES = {"m": (1e3, "mm"), "rad": (180.0 / np.pi, "degrees")}
 """What people read in place of m and rad."""
 
 _HATCHES = {BEYOND_LIMITS: "....", 1: "////", 2: "\\\\\\\\", 3: "xxxx", 4: "----"}
-_MISSED = 127
-"""Stands for every leg where the picture does not tell them apart."""
-
 _WIDE = 20.0
 """From that ratio of the greatest value to the middle one on, colours go by the logarithm."""
 
@@ -103,7 +101,7 @@ def map_figure(given: Map, *names: str) -> Figure:
     planes = _planes(given)
     scales = {name: _normalised(given, name) for name in chosen}
     panels = [(plane, name) for name in chosen for plane in planes]
-    return _drawn(panels, scales)
+    return _drawn(panels, scales, {})
 
 
 def map_film(
@@ -150,27 +148,39 @@ def map_film(
     last, scales = given.grid.axes[-1], {name: _normalised(given, name)}
     encoder = ENCODERS[target.suffix.lower()]
     rate = encoder.rate(fps)
+    values = last.values.tolist()
+    figure = _drawn([(given.at(last.name, values[0]), name)], scales, given.causes)
+    size = _even(figure)
+    figure.draw_without_rendering()
+    places = [axes.get_position() for axes in figure.axes]
     with TemporaryDirectory(prefix="pteron-film-") as folder:
         made = Path(folder, f"film{target.suffix.lower()}")
-        values = last.values.tolist()
-        first = _frame(given.at(last.name, values[0]), name, scales)
-        size = first.shape[1], first.shape[0]
         with closing(encoder.writer(made, size, rate)) as writer:
             for done, value in enumerate(values, start=1):
-                writer.add(_frame(given.at(last.name, value), name, scales))
+                figure = _drawn([(given.at(last.name, value), name)], scales, given.causes)
+                writer.add(_picture(figure, size, places))
                 if progress is not None:
                     progress(done, len(values))
         write_bytes(target, made.read_bytes())
     return Film(target, last.count, rate, 1.0, size)
 
 
-def _frame(plane: Map, name: str, scales: dict[str, Normalize]) -> NDArray[np.uint8]:
-    """Return a picture (height, width, 3), both even, of the same size for all planes of a map."""
-    figure = _drawn([(plane, name)], scales, every=True)
-    canvas: Any = figure.canvas
+def _even(figure: Figure) -> tuple[int, int]:
+    """Return a figure's width and height, pixels, made even, as films want them."""
+    width, height = (2 * round(_DPI * float(side) / 2.0) for side in figure.get_size_inches())
     figure.set_dpi(_DPI)
-    width, height = (2 * round(_DPI * float(v) / 2.0) / _DPI for v in figure.get_size_inches())
-    figure.set_size_inches(width, height)
+    figure.set_size_inches(width / _DPI, height / _DPI)
+    return width, height
+
+
+def _picture(figure: Figure, size: tuple[int, int], places: Sequence[Bbox]) -> NDArray[np.uint8]:
+    """Return the picture (height, width, 3) of a figure, its axes in the same places as ever."""
+    figure.set_layout_engine("none")
+    figure.set_dpi(_DPI)
+    figure.set_size_inches(size[0] / _DPI, size[1] / _DPI)
+    for axes, place in zip(figure.axes, places, strict=True):
+        axes.set_position(place)
+    canvas: Any = figure.canvas
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[..., :3]
 
@@ -210,9 +220,9 @@ def _normalised(given: Map, name: str) -> Normalize:
 
 
 def _drawn(
-    panels: Sequence[tuple[Map, str]], scales: dict[str, Normalize], *, every: bool = False
+    panels: Sequence[tuple[Map, str]], scales: Mapping[str, Normalize], causes: Mapping[str, Any]
 ) -> Figure:
-    """Return a figure of panels; with `every` each names all causes, there or not."""
+    """Return a figure of panels, whose legends have these causes too, there or not."""
     heights = [_height(plane) for plane, _ in panels]
     figure = blank(_WIDTH, sum(heights))
     grid = GridSpec(len(panels), 1, figure=figure, height_ratios=heights)
@@ -224,7 +234,7 @@ def _drawn(
         if len(labels) == 1:
             _curve(axes, plane, name)
         else:
-            _plane(figure, axes, plane, name, scales[name], every=every)
+            _plane(figure, axes, plane, name, scales[name], causes)
     return figure
 
 
@@ -240,7 +250,12 @@ def _height(plane: Map) -> float:
 
 
 def _plane(
-    figure: Figure, axes: Axes, plane: Map, name: str, scale: Normalize, *, every: bool
+    figure: Figure,
+    axes: Axes,
+    plane: Map,
+    name: str,
+    scale: Normalize,
+    causes: Mapping[str, Any],
 ) -> None:
     """Draw an index over two coordinates."""
     axes.grid(visible=False)
@@ -258,7 +273,7 @@ def _plane(
         shading="nearest",
         rasterized=True,
     )
-    handles = _hatched(axes, plane, name, first, second, every=every)
+    handles = _hatched(axes, plane, name, causes)
     if drawn.count():
         _best(axes, plane, name, handles)
     bar = figure.colorbar(mesh, ax=axes, fraction=0.05, pad=0.02, extend=_extended(drawn, scale))
@@ -299,40 +314,37 @@ def _extended(drawn: Any, scale: Normalize) -> str:
     return ("both" if over else "min") if under else ("max" if over else "neither")
 
 
-def _hatched(
-    axes: Axes,
-    plane: Map,
-    name: str,
-    first: Array,
-    second: Array,
-    *,
-    every: bool,
-) -> list[Any]:
+def _hatched(axes: Axes, plane: Map, name: str, causes: Mapping[str, Any]) -> list[Any]:
     """Draw where poses do not serve, and return what stands for it in the legend."""
-    status = plane.status.T
-    if name != MARGIN.name:
-        status = np.where(status > REACHABLE, _MISSED, status)
-    handles = []
-    for code in np.unique(status[status != REACHABLE]).tolist():
-        face = GRID if code in (BEYOND_LIMITS, _MISSED) else _light(LEG_COLORS[code - 1])
-        hatch = _HATCHES.get(code, "////")
-        region = axes.contourf(
-            *(first, second, (status == code).astype(float)),
-            levels=[0.5, 1.5],
-            colors=[face],
-            hatches=[hatch],
-        )
-        region.set(edgecolor=MUTED, linewidth=0.0)
-        label = "out of reach" if code == _MISSED else cause(code)
-        handles.append(Patch(facecolor=face, edgecolor=MUTED, hatch=hatch, label=label, lw=0.0))
+    first, second = (_shown(axis) for axis in plane.grid.axes)
+    status, told = plane.status.T, name == MARGIN.name
+    handles: dict[str, Any] = {}
+    for code in (BEYOND_LIMITS, *range(1, len(_HATCHES))):
+        here = status == code
+        if not here.any() and cause(code) not in causes:
+            continue
+        known = told or code == BEYOND_LIMITS
+        face = _light(LEG_COLORS[code - 1]) if told and code != BEYOND_LIMITS else GRID
+        hatch = _HATCHES[code if known else 1]
+        if here.any():
+            region = axes.contourf(
+                *(first, second, here.astype(float)),
+                levels=[0.5, 1.5],
+                colors=[face],
+                hatches=[hatch],
+            )
+            region.set(edgecolor=MUTED, linewidth=0.0)
+        label = cause(code) if known else "out of reach"
+        handles[label] = Patch(facecolor=face, edgecolor=MUTED, hatch=hatch, label=label, lw=0.0)
     undetermined = (status == REACHABLE) & ~np.isfinite(plane.values[name].T)
     if undetermined.any():
         axes.contourf(*(first, second, undetermined.astype(float)), levels=[0.5, 1.5], colors=[INK])
-        handles.append(Patch(facecolor=INK, label="singular: not determined", lw=0.0))
+        label = "singular: not determined"
+        handles[label] = Patch(facecolor=INK, label=label, lw=0.0)
     serves = (status == REACHABLE).astype(float)
     if 0.0 == serves.min() < serves.max():
         axes.contour(first, second, serves, levels=[0.5], colors=[MUTED], linewidths=0.8)
-    return handles
+    return list(handles.values())
 
 
 def _best(axes: Axes, plane: Map, name: str, handles: list[Any]) -> None:
