@@ -36,8 +36,11 @@ from pteron.errors import (
 )
 from pteron.kernels import compile
 from pteron.kinematics import (
+    Architecture,
     JointMotion,
+    architecture,
     assembly_mode,
+    constraint_measure,
     direct_kinematics,
     follow,
     inverse_kinematics,
@@ -77,6 +80,7 @@ if TYPE_CHECKING:
         environments,
         export,
         identification,
+        indices,
         motion,
         plots,
         report,
@@ -102,7 +106,7 @@ _LATER = {
     "export_st": "pteron.export",
 }
 _LATER_MODULES = (
-    *("controllers", "environments", "export", "identification"),
+    *("controllers", "environments", "export", "identification", "indices"),
     *("motion", "plots", "report", "viewer", "workspace"),
 )
 """What would slow the start of those who do not use it (SymPy, SciPy, matplotlib, Gymnasium)."""
@@ -121,6 +125,7 @@ def __getattr__(name: str) -> Any:
 
 
 __all__ = [
+    "Architecture",
     "Bar",
     "BaseParameters",
     "Cone",
@@ -146,6 +151,7 @@ __all__ = [
     "SingularPose",
     "Stribeck",
     "UnreachablePose",
+    "architecture",
     "assembly_mode",
     "base_parameters",
     "base_regressor",
@@ -153,6 +159,7 @@ __all__ = [
     "catalog",
     "cheapest_parameters",
     "compile",
+    "constraint_measure",
     "controllers",
     "coriolis_matrix",
     "direct_kinematics",
@@ -166,6 +173,7 @@ __all__ = [
     "forward_dynamics",
     "gravity_forces",
     "identification",
+    "indices",
     "inverse_dynamics",
     "inverse_kinematics",
     "is_singular_everywhere",

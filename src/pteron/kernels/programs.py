@@ -121,7 +121,7 @@ def _bare(robot: Manipulator) -> Manipulator:
         for leg in robot.legs
     )
     platform = robot.platform.with_joined(plain(robot.platform.joined))
-    return replace(robot, name="any", legs=legs, platform=platform)
+    return replace(robot, name="any", legs=legs, platform=platform, radii=None)
 
 
 @lru_cache(maxsize=512)
