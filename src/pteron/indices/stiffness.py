@@ -11,6 +11,7 @@ from pteron.dynamics import mass_matrix
 from pteron.errors import DataError
 from pteron.indices.elasticity import Elasticity, Section
 from pteron.indices.internal_forces import Equations, hold, moved, on_platform
+from pteron.indices.sensitivities import tool_arm
 from pteron.kernels import Array, as_array
 from pteron.kinematics.evaluate import checked, evaluated
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -156,8 +157,7 @@ def stiffness(
         compliance[good] = at_p
         frequencies[good] = _frequencies(at_p, masses)
         if any(robot.platform.tool):
-            arm = robot.platform.arms(np.array([robot.platform.tool]), at)[..., 0, :]
-            compliance[good] = _compliance(robot, given, energy, arm)
+            compliance[good] = _compliance(robot, given, energy, tool_arm(robot, at))
     return Stiffness(
         compliance.reshape(*lead, m, m),
         frequencies.reshape((*lead, m)),
