@@ -29,6 +29,7 @@ from pteron.cli.screen import complain, note
 from pteron.cli.simulate import simulate
 from pteron.cli.size import size
 from pteron.cli.view import view
+from pteron.cli.workspace import workspace
 from pteron.errors import PteronError
 
 _USER_ERROR = 2
@@ -195,6 +196,15 @@ _add(
     "pteron film delta -o cycle.mp4",
     "pteron film quadrupteron --speed 0.4 --forces --turns 0.5 -o slow.mp4",
     "pteron film robot.toml --cycle motion.csv --size 640x480 -o motion.gif",
+)
+
+_add(
+    _SEE,
+    workspace,
+    "pteron workspace delta",
+    "pteron workspace quadrupteron --index kappa --slice z=0,phi=0 --out kappa.png",
+    "pteron workspace quadrupteron --index condition --slice phi=0 --out condition.vtk",
+    "pteron workspace robot.toml --index kappa --slice z=0 --points 400 --out kappa.zarr",
 )
 
 _COMPUTE = "Compute"

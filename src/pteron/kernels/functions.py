@@ -20,9 +20,12 @@ from pteron.equations import (
     reactions,
     regressor,
 )
+from pteron.equations.clearance import clearances
+from pteron.equations.constraints import constraint_measure
 from pteron.equations.friction import passive_friction
 from pteron.equations.laws import LAWS
 from pteron.equations.machine import Machine
+from pteron.equations.room import rooms
 from pteron.equations.virtual_work import generalized_forces, inverse_dynamics
 
 Output = Expression | list[Expression] | tuple[Expression, tuple[int, ...]]
@@ -103,6 +106,11 @@ def _reach(m: Machine, v: Symbols) -> Outputs:
 def _passive_room(m: Machine, v: Symbols) -> Outputs:
     shares, metres = kinematics.passive_room(m, v["pose"])
     return {"shares": shares, "metres": metres}
+
+
+def _standing(m: Machine, v: Symbols) -> Outputs:
+    status, margin = kinematics.standing(m, v["pose"])
+    return {"standing": status, "margin": margin}
 
 
 def _platform_points(m: Machine, v: Symbols) -> Outputs:
@@ -298,6 +306,11 @@ def _controlled(m: Machine, v: Symbols, *, what: str) -> Outputs:
     return {"forces": forces, "next_memory": ca.vertcat(*(kept[name] for name in memory))}
 
 
+def _stacked(column: Expression) -> tuple[Expression, tuple[int, ...]]:
+    """Return a column as a vector, also where it has one element or none."""
+    return column, column.shape[:1]
+
+
 _POSE, _RATE = ("pose",), ("pose", "velocity")
 _MOTION = ("pose", "velocity", "acceleration")
 _BENT: tuple[Need, ...] = ("reach", "type I")
@@ -317,6 +330,10 @@ TABLE: dict[str, Entry] = {
     "direct_step": Entry(("joints", "pose"), _direct_step),
     "reach": Entry(_POSE, _reach),
     "passive_room": Entry(_POSE, _passive_room),
+    "room": Entry(
+        _POSE, lambda m, v: {"room": ca.vertcat(*(room.value for room in rooms(m, v["pose"])))}
+    ),
+    "standing": Entry(_POSE, _standing),
     "joint_points": Entry(
         _POSE, lambda m, v: {"points": kinematics.chain_points(_state(m, v))}, ("reach",)
     ),
@@ -324,6 +341,14 @@ TABLE: dict[str, Entry] = {
     "discriminants": Entry(_POSE, _discriminants),
     "squared_type_i": Entry(_POSE, _squared_type_i),
     "type_ii": Entry(_POSE, _type_ii),
+    "clearances": Entry(
+        _POSE, lambda m, v: {"distances": _stacked(clearances(m, v["pose"]))}, ("reach",)
+    ),
+    "constraint": Entry(
+        _POSE,
+        lambda m, v: {"constraint": constraint_measure(m, _state(m, v))},
+        ("reach",),
+    ),
     "jacobian": Entry(
         _POSE, lambda m, v: {"jacobian": kinematics.jacobian(_state(m, v))}, ("rows",)
     ),

@@ -26,6 +26,7 @@ from pteron.legs.rods import (
     ROD_KEYS,
     cones,
     couple,
+    couples,
     free_axes,
     hinge_doubts,
     rod_body,
@@ -68,6 +69,8 @@ class PSS(SlideLeg):
     tip_cone, platform_cone : Cone, optional
         Where the ball joints at the rod's ends let it point: at the slider in the base frame, at
         the platform in the platform's, which for parallel rods is that at phi = 0.
+    bar_length : float, optional
+        How far parallel rods are apart, m.
     """
 
     lower: RodInertia
@@ -75,6 +78,7 @@ class PSS(SlideLeg):
     bar_direction: Vector | None = None
     tip_cone: Cone | None = None
     platform_cone: Cone | None = None
+    bar_length: float | None = None
 
     type = "PSS"
     names: ClassVar = {"p": "slider", "l": "rod"}
@@ -119,6 +123,9 @@ class PSS(SlideLeg):
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return free_axes(self.rods, self.bar_direction, axis)
+
+    def couples(self, motion: LegMotion, axis: Vector | None) -> Sequence[Expression] | None:
+        return couples(self, motion)
 
     def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
         return cones(self, motion, ca.SX.eye(3), still, turned)

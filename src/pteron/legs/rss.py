@@ -27,6 +27,7 @@ from pteron.legs.rods import (
     ROD_KEYS,
     cones,
     couple,
+    couples,
     free_axes,
     hinge_doubts,
     rod_body,
@@ -81,6 +82,8 @@ class RSS(CrankLeg):
     tip_cone, platform_cone : Cone, optional
         Where the ball joints at the rod's ends let it point: at the crank's end in the crank's
         frame, at the platform in the platform's, which for parallel rods is that at phi = 0.
+    bar_length : float, optional
+        How far parallel rods are apart, m.
     """
 
     lower: RodInertia
@@ -88,6 +91,7 @@ class RSS(CrankLeg):
     bar_direction: Vector | None = None
     tip_cone: Cone | None = None
     platform_cone: Cone | None = None
+    bar_length: float | None = None
 
     type = "RSS"
     names: ClassVar = {"u": "crank", "l": "rod"}
@@ -125,6 +129,9 @@ class RSS(CrankLeg):
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return free_axes(self.rods, self.direction, axis)
+
+    def couples(self, motion: LegMotion, axis: Vector | None) -> Sequence[Expression] | None:
+        return couples(self, motion)
 
     def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
         crank = motion.bodies["u"]
