@@ -179,6 +179,13 @@ def _reactions(m: Machine, v: Symbols) -> Outputs:
     }
 
 
+def _beams(m: Machine, v: Symbols) -> Outputs:
+    found = reactions.beams(m, _state(m, v))
+    *links, couples = found._asdict().items()
+    rows = ca.horzcat(*couples[1]).T
+    return {**dict(links), "couples": (rows, rows.shape)}
+
+
 def _padded(columns: Sequence[Expression], count: int) -> Expression:
     """Return columns as rows (count, k), NaN where there are too few."""
     rows = ca.horzcat(*columns).T
@@ -357,6 +364,7 @@ TABLE: dict[str, Entry] = {
     ),
     "passive_friction": Entry(_RATE, _passive_friction, _HELD),
     "reactions": Entry((*_MOTION, "parameters"), _reactions, _HELD),
+    "beams": Entry(_POSE, _beams, _BENT),
     "inverse_dynamics": Entry((*_MOTION, "parameters"), _inverse_dynamics, _HELD),
     "forward_dynamics": Entry((*_RATE, "forces", "parameters"), _forward_dynamics, _BENT),
     "drive_forces": Entry(
