@@ -30,12 +30,15 @@ class Place:
         Which component of a vector; None of a number that is none.
     sign : int
         1, or -1 where the path has a minus before it.
+    role : str
+        What the key holds: "point", "direction", "length" or "number".
     """
 
     leg: int
     key: str
     part: int | None
     sign: int
+    role: str
 
     @property
     def path(self) -> str:
@@ -100,13 +103,14 @@ def _in_leg(
             f"{shown(path)}: leg {i}, a {leg.type}, has no number {key}; it has "
             f"{', '.join(known)}{guess}"
         )
-    scalar = leg.every_key()[key].role in ("length", "number")
+    role = leg.every_key()[key].role
+    scalar = role in ("length", "number")
     if scalar and part is not None:
         raise ModelError(f"{shown(path)}: {key} is one number; leave out .{part}")
     if part is not None and part not in ("x", "y", "z"):
         raise ModelError(f"{shown(path)}: .{part} is none of .x, .y and .z")
     if scalar:
-        yield Place(i, key, None, sign)
+        yield Place(i, key, None, sign, role)
     else:
         for k in range(3) if part is None else ["xyz".index(part)]:
-            yield Place(i, key, k, sign)
+            yield Place(i, key, k, sign, role)

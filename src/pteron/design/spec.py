@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
-from functools import cached_property
+import math
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -11,9 +10,7 @@ from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from pteron.bodies.tables import Count, Number, Table, Three, Two
 from pteron.errors import DataError, shown
-from pteron.manipulator import Manipulator, load
-from pteron.manipulator.saving import robot_text
-from pteron.toml import read_toml, told, validated
+from pteron.toml import read_toml, validated
 
 _ABSENT = "no such file; it should describe a search for a design"
 
@@ -176,6 +173,22 @@ class RequirementTable(Table):
         return self
 
 
+    def missed_by(self, value: float, failed: float) -> float:
+        """Return by how much a value misses it, over the bound; `failed` where there is none."""
+        if math.isnan(value):
+            return failed
+        bounds = ((self.least, 1.0), (self.most, -1.0))
+        gaps = (s * (bound - value) / (abs(bound) or 1.0) for bound, s in bounds if bound is not None)
+        return max(0.0, *gaps)
+
+    @property
+    def words(self) -> str:
+        """What is asked, in words: "links at most 1.2"."""
+        ends = (("at least", self.least), ("at most", self.most))
+        told = (f"{word} {bound:g}" for word, bound in ends if bound is not None)
+        return f"{self.quantity} {' and '.join(told)}"
+
+
 class SearchTable(Table):
     """`[search]`: how long, and how."""
 
@@ -207,18 +220,28 @@ class Spec(Table):
     floors: FloorsTable = FloorsTable()
     motion: MotionTable = MotionTable()
     search: SearchTable = SearchTable()
-    folder: Path = Field(Path(), exclude=True, repr=False)
 
-    @cached_property
-    def start(self) -> Manipulator:
-        """The machine to begin with."""
-        beside = self.folder / self.robot
-        return load(beside if beside.is_file() else self.robot)
 
-    @property
-    def fingerprint(self) -> str:
-        """What tells this search from any other: its content, its machine's, and the version."""
-        from pteron import __version__
+def read_spec(path: str | Path) -> Spec:
+    """Read a search for a design from a TOML file.
 
-        told = "\n".join((__version__, self.model_dump_json(), robot_text(self.start)))
-        return hashlib.sha256(told.encode()).hexdigest()[:16]
+    A machine's file is looked for beside it first.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file; the page "Design a machine" of the documentation has all its keys.
+
+    Returns
+    -------
+    Spec
+
+    Raises
+    ------
+    DataError
+        If it cannot be read, has unknown keys, or asks for what cannot be; all its faults are told.
+    """
+    source = shown(str(path), bare=True, longest=1000)
+    spec = validated(Spec, read_toml(path, DataError, _ABSENT), source, DataError)
+    beside = Path(path).parent / spec.robot
+    return spec.model_copy(update={"robot": str(beside)}) if beside.is_file() else spec

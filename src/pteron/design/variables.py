@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from pteron.design.masses import with_stretched_bodies
-from pteron.design.paths import Place, geometric_keys, places
-from pteron.design.spec import Spec, VariableTable
+from pteron.design.paths import Place, places
+from pteron.design.spec import VariableTable
 from pteron.equations.machine import numbers
-from pteron.errors import DataError, ModelError
+from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
+from pteron.toml import told
 
 _STEP = 1e-6
 """Share of a range over which the geometry's change is measured."""
@@ -45,6 +46,12 @@ class Variable:
     high: float
     start: float
 
+    @property
+    def unit(self) -> str:
+        """Of its value: m of lengths and points; none of factors, directions and plain numbers."""
+        scale = {"length", "point"} & {place.role for place in self.places}
+        return "m" if scale and self.by != "factor" else ""
+
     def number(self, place: Place, start: float, value: float) -> float:
         """Return what one of the numbers becomes; `start` is what it was."""
         if self.by == "factor":
@@ -52,37 +59,37 @@ class Variable:
         return place.sign * value + (start if self.by == "offset" else 0.0)
 
 
-def variables_of(spec: Spec) -> tuple[Variable, ...]:
-    """Return the variables of a search.
+def variables_of(robot: Manipulator, tables: Sequence[VariableTable]) -> tuple[Variable, ...]:
+    """Return the variables of a search that begins with a machine.
 
     Raises
     ------
-    DataError
-        With all that is wrong with them, a line each.
+    ModelError
+        With all that is wrong with them.
     """
     found: list[Variable] = []
     faults: list[str] = []
-    for i, table in enumerate(spec.variables, start=1):
+    for i, table in enumerate(tables, start=1):
         try:
-            found += _variables(spec.start, table)
+            found += _variables(robot, table)
         except ModelError as error:
             faults += [f"variables, item {i}: {fault}" for fault in error.faults]
-    moved: dict[tuple[int, str, int | None], str] = {}
+    taken: dict[tuple[int, str, int | None], str] = {}
     for variable in found:
         for place in variable.places:
             key = place.leg, place.key, place.part
-            if key in moved:
-                faults.append(f"{place.path}: moved by {moved[key]} and by {variable.name}")
-            moved[key] = variable.name
+            if key in taken:
+                faults.append(f"{place.path}: moved by {taken[key]} and by {variable.name}")
+            taken[key] = variable.name
     if faults:
-        raise DataError("\n".join(faults))
+        raise ModelError(told(faults), faults=faults)
     return tuple(found)
 
 
 def _variables(robot: Manipulator, table: VariableTable) -> list[Variable]:
-    moved = [place for path in table.moves for place in places(robot, path)]
-    legs = sorted({place.leg for place in moved})
-    groups = [[p for p in moved if p.leg == leg] for leg in legs] if table.each else [moved]
+    named = [place for path in table.moves for place in places(robot, path)]
+    legs = sorted({place.leg for place in named})
+    groups = [[p for p in named if p.leg == leg] for leg in legs] if table.each else [named]
     found = []
     for group in groups:
         starts = [place.sign * place.read(robot) for place in group]
@@ -97,15 +104,27 @@ def _variables(robot: Manipulator, table: VariableTable) -> list[Variable]:
     return found
 
 
-def design_of(spec: Spec, variables: Sequence[Variable], values: Sequence[float]) -> Manipulator:
-    """Return the machine of a design: the start with its variables at these values.
+def moved(
+    robot: Manipulator, variables: Sequence[Variable], values: Sequence[float], *, stretch: bool
+) -> Manipulator:
+    """Return a machine with its variables at other values.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine to begin with.
+    variables : sequence of Variable
+        Its variables.
+    values : sequence of float
+        Theirs.
+    stretch : bool
+        Whether links of another length have another inertia.
 
     Raises
     ------
     ModelError
         If there can be no such machine.
     """
-    robot = spec.start
     legs = list(robot.legs)
     changed: dict[int, dict[str, list[float]]] = {}
     for variable, value in zip(variables, values, strict=True):
@@ -122,22 +141,31 @@ def design_of(spec: Spec, variables: Sequence[Variable], values: Sequence[float]
             key: tuple(parts) if len(parts) > 1 else parts[0] for key, parts in fields.items()
         }
         other = replace(leg, **given)
-        legs[i - 1] = with_stretched_bodies(leg, other) if spec.masses == "per length" else other
+        legs[i - 1] = with_stretched_bodies(leg, other) if stretch else other
     return replace(robot, legs=tuple(legs))
 
 
-def geometry_slopes(spec: Spec, variables: Sequence[Variable], values: Array) -> Array:
+def geometry_slopes(
+    robot: Manipulator, variables: Sequence[Variable], values: Sequence[float]
+) -> Array:
     """Return d geometry / d values (G, V): how `equations.machine.numbers` follow the variables.
 
     Lengths and points are linear in them, so that a difference is exact but for rounding.
     """
-    columns = []
+
+    def geometry(values: Array) -> Array:
+        return np.array(numbers(moved(robot, variables, values.tolist(), stretch=False)))
+
+    return slopes_of(geometry, variables, values).T
+
+
+def slopes_of(
+    function: Callable[[Array], Any], variables: Sequence[Variable], values: Sequence[float]
+) -> Array:
+    """Return the derivatives (V, ...) of a function of the variables, by central differences."""
+    found = []
     for k, variable in enumerate(variables):
-        step = _STEP * (variable.high - variable.low)
-        ends = []
-        for side in (1.0, -1.0):
-            moved = np.array(values, dtype=float)
-            moved[k] += side * step
-            ends.append(np.array(numbers(design_of(spec, variables, moved))))
-        columns.append((ends[0] - ends[1]) / (2.0 * step))
-    return np.array(columns).T
+        step = _STEP * (variable.high - variable.low) * np.eye(len(variables))[k]
+        low, high = (function(np.asarray(values) + side * step) for side in (-1.0, 1.0))
+        found.append((np.asarray(high) - low) / (2.0 * step[k]))
+    return np.array(found)
