@@ -77,6 +77,7 @@ if TYPE_CHECKING:
         environments,
         export,
         identification,
+        indices,
         motion,
         plots,
         report,
@@ -102,7 +103,7 @@ _LATER = {
     "export_st": "pteron.export",
 }
 _LATER_MODULES = (
-    *("controllers", "environments", "export", "identification"),
+    *("controllers", "environments", "export", "identification", "indices"),
     *("motion", "plots", "report", "viewer", "workspace"),
 )
 """What would slow the start of those who do not use it (SymPy, SciPy, matplotlib, Gymnasium)."""
@@ -166,6 +167,7 @@ __all__ = [
     "forward_dynamics",
     "gravity_forces",
     "identification",
+    "indices",
     "inverse_dynamics",
     "inverse_kinematics",
     "is_singular_everywhere",

@@ -10,7 +10,15 @@ from typing import Any, Literal
 import casadi as ca
 
 from pteron.bodies.motion import Expression
-from pteron.equations import closing, control, drives, kinematics, lagrangian, regressor
+from pteron.equations import (
+    closing,
+    control,
+    drives,
+    indices,
+    kinematics,
+    lagrangian,
+    regressor,
+)
 from pteron.equations.friction import passive_friction
 from pteron.equations.laws import LAWS
 from pteron.equations.machine import Machine
@@ -188,6 +196,20 @@ def _drive_accelerations(m: Machine, v: Symbols) -> Outputs:
     return {"acceleration": acceleration}
 
 
+def _homogeneous_jacobian(m: Machine, v: Symbols) -> Outputs:
+    found = indices.homogeneous(m, _state(m, v))
+    return {"jacobian": found.matrix, "length": found.length}
+
+
+def _geometric_index(m: Machine, v: Symbols, *, what: str) -> Outputs:
+    return {"value": indices.OF_GEOMETRY[what](m, _state(m, v))}
+
+
+def _kappa(m: Machine, v: Symbols) -> Outputs:
+    mass = lagrangian.mass_matrix(m, v["pose"], v["parameters"])
+    return {"value": indices.kappa(m, _state(m, v), mass)}
+
+
 def _coriolis_matrix(m: Machine, v: Symbols) -> Outputs:
     return {"coriolis": lagrangian.coriolis_matrix(m, v["pose"], v["velocity"], v["parameters"])}
 
@@ -271,6 +293,7 @@ TABLE: dict[str, Entry] = {
     "jacobian": Entry(
         _POSE, lambda m, v: {"jacobian": kinematics.jacobian(_state(m, v))}, ("rows",)
     ),
+    "homogeneous_jacobian": Entry(_POSE, _homogeneous_jacobian, ("rows",)),
     "link_jacobians": Entry(_POSE, _link_jacobians, _BENT),
     "joint_screws": Entry(
         _POSE, lambda m, v: {"screws": [s.T for s in kinematics.joint_screws(_state(m, v))]}, _BENT
@@ -327,7 +350,24 @@ TABLE: dict[str, Entry] = {
 }
 
 FUNCTIONS = tuple(TABLE)
-"""What `compile` accepts."""
+"""What `compile` accepts, beside the indices."""
+
+_DEFINED = ("condition", "condition_points", "speed_least", "speed_most", "turning_speed")
+_DEFINED += ("force_least", "turning_moment", "pressure_angle", "output_pressure_angle")
+"""The indices of geometry that are defined at type-II singularities too, if only as infinite."""
+
+INDICES: dict[str, Entry] = {
+    **{
+        what: Entry(
+            _POSE, partial(_geometric_index, what=what), _BENT if what in _DEFINED else _HELD
+        )
+        for what in indices.OF_GEOMETRY
+    },
+    "kappa": Entry((*_POSE, "parameters"), _kappa, _BENT),
+}
+"""The indices of performance, each one number for a pose: `pteron.indices` says what they mean."""
+
+TABLE |= INDICES
 
 
 def needs_of(what: str) -> tuple[Need, ...]:

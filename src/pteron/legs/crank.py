@@ -267,6 +267,9 @@ class CrankEquations(LegEquations):
         margin = ca.fmin(self.ll - near, far - self.ll)
         return Reach(margin, quarter, (self.lu * self.ll) ** 2, n)
 
+    def lever(self, length: Expression) -> Expression:
+        return self.lu
+
     def tip(self, q: Expression) -> Expression:
         """Return the crank's end at an angle q."""
         turn = q - self.middle

@@ -183,6 +183,13 @@ class LegEquations(ABC):
     def reach(self, c: Expression) -> Reach:
         """Return whether the leg reaches c."""
 
+    def lever(self, length: Expression) -> Expression:
+        """Return the metres that a unit of its joint counts for; 1 for a slider.
+
+        `length` is what a radian of the platform counts for.
+        """
+        return ca.SX(1)
+
     @abstractmethod
     def locus(self, q: Expression) -> Locus:
         """Return where c may be while the actuated joint is at q."""
