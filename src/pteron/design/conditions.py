@@ -46,16 +46,12 @@ class Conditions:
         found: Array = self.values(poses, geometry=geometry, side=np.array([side]))
         return found
 
-    def derivatives(
-        self, geometry: Array, poses: Array, side: float
-    ) -> tuple[Array, Array, Array]:
+    def derivatives(self, geometry: Array, poses: Array, side: float) -> tuple[Array, Array, Array]:
         """Return rows (..., R) and their derivatives by geometry and pose; finite everywhere.
 
         A row that is NaN counts as kept, at 1 and level: a row before it says what is wrong.
         """
-        rows, by_geometry, by_pose = self.slopes(
-            poses, geometry=geometry, side=np.array([side])
-        )
+        rows, by_geometry, by_pose = self.slopes(poses, geometry=geometry, side=np.array([side]))
         lost = ~np.isfinite(rows)
         rows = np.where(lost, 1.0, rows)
         lost = lost[..., None]
@@ -104,14 +100,15 @@ def _built(robot: Manipulator, type_i: float, type_ii: float) -> Conditions:
         Port("geometry", geometry.shape[:1], shared=True),
     )
     fixed = {"side": np.ones(1), "geometry": np.zeros(geometry.shape[0])}
-    count = len(rows)
 
     def kernel(target: str, name: str, *outputs: ca.SX) -> Kernel:
         dense = ca.cse([ca.densify(output).T for output in outputs])
         function = ca.Function(name, [pose, side, geometry], dense)
-        shapes = [(count, *output.shape[1:]) if output.shape[1] > 1 else (count,) for output in outputs]
-        found = [Port(f"out{k}", shape) for k, shape in enumerate(shapes)]
-        return TARGETS[target](name, function, ports, tuple(found), fixed)
+        found = tuple(
+            Port(f"out{k}", output.shape if k else output.shape[:1])
+            for k, output in enumerate(outputs)
+        )
+        return TARGETS[target](name, function, ports, found, fixed)
 
     fast = "vm" if compiler() is None else "c"
     return Conditions(

@@ -62,9 +62,7 @@ def largest(
     ball : (array, float)
         Centre (k,) and radius that hold every position in reach, m.
     """
-    found = [
-        _from_grid(conditions, geometry, orientations, ball, side) for side in (1.0, -1.0)
-    ]
+    found = [_from_grid(conditions, geometry, orientations, ball, side) for side in (1.0, -1.0)]
     best = max(found, key=lambda cube: (cube.edge, cube.reserve))
     if best.edge == 0.0:
         return best
@@ -79,8 +77,8 @@ def largest(
         [(float(c) - size, float(c) + size) for c in best.center] + [(0.0, 2.0 * size)],
     )
     samples, dense = (cube_samples(orientations, lengths, n) for n in (_FIRST, _CHECKED))
-    found = improved(program, samples, dense, _shrunk(program, dense, best))
-    return Cube(found[:-1], float(found[-1]), best.side, _least(program.rows(dense, found, found)))
+    z = improved(program, samples, dense, _shrunk(program, dense, best))
+    return Cube(z[:-1], float(z[-1]), best.side, _least(program.rows(dense, z, z)))
 
 
 def _shrunk(program: Program, dense: Samples, cube: Cube) -> Array:
@@ -114,7 +112,10 @@ def _from_grid(
     nearest = Cube(ball[0], 0.0, side, -np.inf)
     for _ in range(2):
         step = float((high - low).max()) / _COARSE
-        axes = [a + step * np.arange(int(np.ceil((b - a) / step)) + 1) for a, b in zip(low, high, strict=True)]
+        axes = [
+            a + step * np.arange(int(np.ceil((b - a) / step)) + 1)
+            for a, b in zip(low, high, strict=True)
+        ]
         grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
         lengths = grid.shape[-1]
         least = np.full(grid.shape[:-1], np.inf)
@@ -135,7 +136,9 @@ def _from_grid(
         far = distance_transform_cdt(np.pad(inside, 1), metric="chessboard")
         far = far[tuple(slice(1, -1) for _ in range(lengths))]
         at = np.unravel_index(int(far.argmax()), far.shape)
-        nearest = Cube(grid[at], max(2.0 * (float(far[at]) - 1.0), 0.5) * step, side, float(least[at]))
+        nearest = Cube(
+            grid[at], max(2.0 * (float(far[at]) - 1.0), 0.5) * step, side, float(least[at])
+        )
         places = grid[inside]
         low, high = places.min(axis=0) - step, places.max(axis=0) + step
     return nearest

@@ -50,7 +50,10 @@ class Design:
 
     def values(self, what: str) -> Array:
         """Return a function's first output at these poses."""
-        found = self.task.function(what)(self.poses, geometry=self.geometry)
+        function = self.task.function(what)
+        own = {"geometry": self.geometry, "parameters": parameters(self.robot)}
+        given = {name: value for name, value in own.items() if name in function.fixed}
+        found = function(self.poses, **given)
         return np.asarray(found[0] if isinstance(found, tuple) else found)
 
     @cached_property
@@ -84,7 +87,10 @@ class Design:
         own = first.joints.max(axis=0) - first.joints.min(axis=0)
         limits = [leg.limits for leg in first.robot.legs]
         return np.array(
-            [way if pair is None else pair[1] - pair[0] for way, pair in zip(own, limits, strict=True)]
+            [
+                way if pair is None else pair[1] - pair[0]
+                for way, pair in zip(own, limits, strict=True)
+            ]
         )
 
     @cached_property
@@ -109,7 +115,9 @@ class Design:
             parameters=parameters(self.robot),
             drives=drive_numbers(self.robot),
         )
-        return DriveMotion(np.einsum("kij,lj->kli", jacobians, velocity).reshape(-1, self.robot.freedom), forces)
+        return DriveMotion(
+            np.einsum("kij,lj->kli", jacobians, velocity).reshape(-1, self.robot.freedom), forces
+        )
 
     @cached_property
     def _sides(self) -> dict[float, float]:

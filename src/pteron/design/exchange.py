@@ -155,10 +155,10 @@ def improved(program: Program, samples: Samples, dense: Samples, z0: Array) -> A
         values = program.rows(everywhere, z, z0)
         pairs |= _worst(values)
         way = _feasible_way(program, everywhere, good, z, z0)
-        gain = program.objective @ (good - z)
+        gain = float(program.objective @ (good - z))
         good = good + way * (z - good)
         share = min(2.0 * share, 1.0) if way > _MOST_OF_IT else 0.5 * share
-        if way > _MOST_OF_IT and gain * way < _GAIN * max(abs(program.objective @ good), _GAIN):
+        if way > _MOST_OF_IT and gain < _GAIN * abs(float(program.objective @ good)):
             break
     return good
 

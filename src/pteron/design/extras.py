@@ -61,8 +61,6 @@ class Evolution:
         from pymoo.core.population import Population
         from pymoo.problems.static import StaticProblem
 
-        whole = Population.merge(
-            self._asked, Population.new("X", designs[len(self._asked) :])
-        )
+        whole = Population.merge(self._asked, Population.new("X", designs[len(self._asked) :]))
         Evaluator().eval(StaticProblem(self._problem, F=costs, G=misses), whole)
         self._algorithm.tell(infills=whole)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pteron.design.design import Design
 from pteron.design.quantities import quantities
 from pteron.design.task import Task
+from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 
@@ -106,64 +109,88 @@ def front_of(task: Task, designs: pl.DataFrame) -> Front:
     ModelError
         If none of them keeps all that is asked; the message says what is missed by least, and how.
     """
+    return front_of_parts(task, [designs])
+
+
+def front_of_parts(task: Task, parts: Iterable[pl.DataFrame]) -> Front:
+    """Return the front of designs that come in parts, of which only the front so far is held.
+
+    Raises
+    ------
+    ModelError
+        As `front_of`.
+    """
+    import polars as pl
+
+    best: pl.DataFrame | None = None
+    nearest: pl.DataFrame | None = None
+    evaluated = kept = 0
+    for part in parts:
+        missed = _missed(part)
+        good = part.filter(missed == 0.0)
+        evaluated, kept = evaluated + len(part), kept + len(good)
+        if len(good):
+            best = _foremost(task, good if best is None else pl.concat([best, good]))
+        elif best is None:
+            near = part[[int(missed.argmin())]]
+            both = near if nearest is None else pl.concat([nearest, near])
+            nearest = both[[int(_missed(both).argmin())]]
+    if best is None:
+        assert nearest is not None  # there is at least one design
+        raise _impossible(task, nearest, evaluated)
+    return Front(task, best, evaluated, kept)
+
+
+def _missed(designs: pl.DataFrame) -> Array:
+    """Return how much each design misses, all in all."""
+    names = [name for name in designs.columns if name.startswith(_MISSES)]
+    return np.asarray(designs.select(names).to_numpy().sum(axis=1))
+
+
+def _foremost(task: Task, good: pl.DataFrame) -> pl.DataFrame:
+    """Return the rows that no other betters, each once, in the order of the objectives."""
     from pteron.design.extras import non_dominated
 
-    misses = [name for name in designs.columns if name.startswith(_MISSES)]
-    total = np.nan_to_num(designs.select(misses).to_numpy(), nan=np.inf)
-    kept = np.flatnonzero((total <= 0.0).all(axis=1))
-    if not len(kept):
-        raise _impossible(task, designs, misses, total)
-    good = designs[kept]
     signs = np.array([o.sign for o in task.spec.objectives])
     costs = good.select([o.quantity for o in task.spec.objectives]).to_numpy() * signs
     costs = np.where(np.isfinite(costs), costs, np.inf)
     best = non_dominated(costs)
-    order = np.lexsort(costs[best].T[::-1])
-    best = best[order]
-    # A design that was found twice counts once.
-    first = np.append(True, (np.diff(costs[best], axis=0) != 0.0).any(axis=1))
-    return Front(task, good[best[first]], len(designs), len(kept))
+    best = best[np.lexsort(costs[best].T[::-1])]
+    apart = np.append(True, (np.diff(costs[best], axis=0) != 0.0).any(axis=1))
+    found: pl.DataFrame = good[best[apart]]
+    return found
 
 
-def _impossible(
-    task: Task, designs: pl.DataFrame, misses: list[str], total: Array
-) -> Exception:
-    from pteron.errors import ModelError
-
-    least = total.sum(axis=1).argmin()
-    row = designs.row(int(least), named=True)
+def _impossible(task: Task, nearest: pl.DataFrame, evaluated: int) -> ModelError:
+    """Return what is said where no design keeps all that is asked."""
+    row = nearest.row(0, named=True)
     told = []
-    for k, name in enumerate(misses):
-        alone = total[:, k].min() > 0.0
-        if total[least, k] <= 0.0:
-            continue
-        if name == "misses workspace":
-            what = "the workspace is not kept"
-            design = task.machine([row[v.name] for v in task.variables])
-            what += f" ({_worst_condition(task, design)})"
+    for name in (name for name in nearest.columns if name.startswith(_MISSES) and row[name] > 0.0):
+        if name == f"{_MISSES}workspace":
+            machine = task.machine([row[v.name] for v in task.variables])
+            what = "the workspace" if task.spec.workspace else "a cube"
+            told.append(f"{what} is not kept ({_worst_condition(Design(task, machine))})")
         else:
-            asked = task.spec.requirements[k - 1]
-            what = f"{asked.words} is missed: {row[asked.quantity]:.4g}"
-        told.append(f"{what}, which no design keeps" if alone else what)
+            asked = task.spec.requirements[int(name.split()[1]) - 1]
+            told.append(f"{asked.words} is missed, with {row[asked.quantity]:.4g}")
     at = ", ".join(f"{v.name} = {row[v.name]:.4g}" for v in task.variables)
     return ModelError(
-        f"none of {len(designs)} designs keeps all that is asked; the nearest has {at}: "
+        f"none of {evaluated} designs keeps all that is asked; the nearest, {at}: "
         f"{'; '.join(told)}. Ask for less, or widen the ranges of the variables",
         subject=task.robot.name,
     )
 
 
-def _worst_condition(task: Task, robot: Manipulator) -> str:
-    """Return which condition a machine misses most in the workspace."""
-    from pteron.design.design import Design
-
-    design = Design(task, robot)
+def _worst_condition(design: Design) -> str:
+    """Return which condition a machine misses most in the workspace, and where."""
+    task = design.task
     if task.spec.workspace is None:
-        poses = np.array([[*design.cube.center, *o[len(design.cube.center) :]] for o in task.orientations])
+        center = design.cube.center
+        poses = task.orientations.copy()
+        poses[:, : len(center)] = center
     else:
         poses = design.poses
-    rows = task.conditions.rows(design.geometry, poses, design.side)
-    rows = np.nan_to_num(rows, nan=0.0)
+    rows = np.nan_to_num(task.conditions.rows(design.geometry, poses, design.side))
     at, row = np.unravel_index(int(rows.argmin()), rows.shape)
     pose = ", ".join(f"{x:.4g}" for x in poses[at])
     return f"{task.conditions.names[row]}, at pose [{pose}]"

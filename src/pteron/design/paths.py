@@ -77,9 +77,7 @@ def places(robot: Manipulator, path: str) -> list[Place]:
     else:
         legs_named = [i for i in legs if key in geometric_keys(robot.legs[i - 1])]
     sign = -1 if minus else 1
-    return [
-        place for i in legs_named or legs for place in _in_leg(robot, path, i, key, part, sign)
-    ]
+    return [place for i in legs_named or legs for place in _in_leg(robot, path, i, key, part, sign)]
 
 
 def geometric_keys(leg: LegKind) -> list[str]:

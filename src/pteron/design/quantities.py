@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pteron.errors import shown
+from pteron.indices import INDICES, Index
 from pteron.manipulator import Manipulator
 
 if TYPE_CHECKING:
@@ -45,7 +46,9 @@ def _simple(unit: str, about: str, of: Callable[[Manipulator], float]) -> Quanti
 
 
 def _links(robot: Manipulator) -> float:
-    return float(sum(q.value[0] for leg in robot.legs for q in leg.quantities if q.role == "length"))
+    return float(
+        sum(q.value[0] for leg in robot.legs for q in leg.quantities if q.role == "length")
+    )
 
 
 def _moving_mass(robot: Manipulator) -> float:
@@ -126,15 +129,27 @@ _OWN = {
         _force,
     ),
     "drive_load": Quantity(
-        "", "greatest of these forces and speeds over what the file says a drive can do", _drive_load
+        "",
+        "greatest of these forces and speeds over what the file says a drive can do",
+        _drive_load,
     ),
 }
 
 
 @lru_cache(maxsize=1)
 def quantities() -> dict[str, Quantity]:
-    """Return the quantities by name: those of this page, and the least and greatest indices."""
-    return dict(_OWN)
+    """Return the quantities by name: those of this page, and the worst of each index."""
+    return _OWN | {name: _worst(index) for name, index in INDICES.items()}
+
+
+def _worst(index: Index) -> Quantity:
+    """Return the worst value of an index over the workspace."""
+    extreme, word = (np.min, "least") if index.better == "more" else (np.max, "greatest")
+    return Quantity(
+        index.unit,
+        f"{word} {index.title} in the workspace",
+        lambda design: float(extreme(design.values(index.name))),
+    )
 
 
 def known(name: str) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pteron.design.design import Design
-from pteron.design.exchange import Program, cube_samples, fixed_samples, improved
+from pteron.design.exchange import Program, Samples, cube_samples, fixed_samples, improved
 from pteron.design.quantities import quantities
 from pteron.design.task import ROUNDING, Task
 from pteron.design.variables import geometry_slopes, slopes_of
@@ -63,12 +63,19 @@ def refined(task: Task, values: Sequence[float], objective: int) -> list[float]:
         [*map(tuple, task.ranges.T.tolist()), *(moving if seeks else held)],
         tuple(slopes.bounds(objective, z0)),
     )
-    samples = [cube_samples(task.orientations, lengths, n if seeks else 1) for n in (_FIRST, _DENSE)]
-    if spec.workspace is not None:
-        fixed = fixed_samples(design.poses, lengths)
-        samples = [s.joined(fixed) if seeks else fixed for s in samples]
-    found: list[float] = improved(program, *samples, z0)[: len(start)].tolist()
+    first, dense = (_asked_at(design, lengths, count) for count in (_FIRST, _DENSE))
+    found: list[float] = improved(program, first, dense, z0)[: len(start)].tolist()
     return found
+
+
+def _asked_at(design: Design, lengths: int, count: int) -> Samples:
+    """Return poses of the workspace, of the cube, or of both, as the search asks for them."""
+    task = design.task
+    cube = cube_samples(task.orientations, lengths, count)
+    if task.spec.workspace is None:
+        return cube
+    fixed = fixed_samples(design.poses, lengths)
+    return fixed.joined(cube) if "cube" in task.asked else fixed
 
 
 @dataclass(frozen=True)
@@ -92,7 +99,9 @@ class _Slopes:
         alone = quantities()[name].of_machine
         if alone is None:
             return None
-        own = slopes_of(lambda v: alone(task.machine(v.tolist())), task.variables, self.start)
+        own = slopes_of(
+            lambda v: alone(task.machine(v.tolist())), task.variables, self.start.tolist()
+        )
         return np.append(own, np.zeros(tail))
 
     def bounds(self, objective: int, z0: Array) -> list[tuple[Array, float]]:

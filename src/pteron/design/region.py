@@ -21,7 +21,7 @@ def orientations_of(spec: Spec, freedom: int) -> Array:
 
 
 def workspace_poses(workspace: WorkspaceTable, angles: Array, samples: int | None = None) -> Array:
-    """Return poses (N, m) all over a workspace at orientations (A, m); with 2 samples its corners."""
+    """Return poses (N, m) over a workspace at orientations (A, m); with 2 samples its corners."""
     positions = _positions(workspace, samples or workspace.samples)
     found = np.repeat(angles, len(positions), axis=0)
     found[:, : positions.shape[1]] = np.tile(positions, (len(angles), 1))

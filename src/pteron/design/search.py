@@ -16,7 +16,6 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.stats import qmc  # type: ignore[import-untyped]
 
 from pteron.design.extras import Evolution
 from pteron.design.front import Front, front_of
@@ -126,8 +125,9 @@ def _generations(
 def first_designs(task: Task, count: int, seed: int) -> Array:
     """Return a Latin hypercube of designs (count, V), the first the machine to begin with."""
     low, high = task.ranges
-    sampler = qmc.LatinHypercube(d=len(low), rng=np.random.default_rng(seed))
-    designs: Array = low + sampler.random(count) * (high - low)
+    rng = np.random.default_rng(seed)
+    rows = rng.permuted(np.tile(np.arange(count)[:, None], len(low)), axis=0)
+    designs: Array = low + (rows + rng.random(rows.shape)) / count * (high - low)
     designs[0] = task.start
     return designs
 
@@ -150,8 +150,8 @@ def _promising(
         return []
     count, objectives = task.spec.search.refined, len(task.spec.objectives)
     jobs = []
-    spread = np.unique(np.linspace(0, len(front) - 1, count).round().astype(int)) if count else []
-    for k, at in enumerate(spread):
+    spread = np.linspace(0, len(front) - 1, count).round().astype(int)
+    for k, at in enumerate(np.unique(spread)):
         one = front.values[at], (number + k) % objectives
         if (key := (one[0].tobytes(), one[1])) not in used:
             used.add(key)
@@ -198,7 +198,7 @@ def _workers(count: int | None, scheduler: str | None) -> Iterator[str | None]:
     if count < 1:
         raise DataError(f"workers: {count} given, 1 or more expected")
     try:
-        from distributed import LocalCluster
+        import distributed
     except ImportError:
         raise ModelError(
             "other processes need dask.distributed, which is not installed; "
@@ -206,5 +206,6 @@ def _workers(count: int | None, scheduler: str | None) -> Iterator[str | None]:
         ) from None
     # One for all generations: a process compiles what it needs once.
     options: dict[str, Any] = {"threads_per_worker": 1, "dashboard_address": None}
-    with LocalCluster(n_workers=count, silence_logs=50, **options) as cluster:
+    local: Any = distributed.LocalCluster
+    with local(n_workers=count, silence_logs=50, **options) as cluster:
         yield str(cluster.scheduler_address)

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
-from pteron.bodies.tables import Count, Number, Table, Three, Two
+from pteron.bodies.tables import Count, Number, Table, Two
 from pteron.errors import DataError, shown
 from pteron.toml import read_toml, validated
 
@@ -172,14 +172,13 @@ class RequirementTable(Table):
             )
         return self
 
-
     def missed_by(self, value: float, failed: float) -> float:
         """Return by how much a value misses it, over the bound; `failed` where there is none."""
         if math.isnan(value):
             return failed
-        bounds = ((self.least, 1.0), (self.most, -1.0))
-        gaps = (s * (bound - value) / (abs(bound) or 1.0) for bound, s in bounds if bound is not None)
-        return max(0.0, *gaps)
+        missing = 0.0 if self.least is None else (self.least - value) / (abs(self.least) or 1.0)
+        beyond = 0.0 if self.most is None else (value - self.most) / (abs(self.most) or 1.0)
+        return max(0.0, missing, beyond)
 
     @property
     def words(self) -> str:
@@ -213,13 +212,13 @@ class Spec(Table):
     masses: Literal["per length", "kept"] = Field(
         "per length", description="what a link's inertia does when its length changes"
     )
-    variables: Annotated[list[VariableTable], Field(min_length=1)]
-    objectives: Annotated[list[ObjectiveTable], Field(min_length=1)]
-    requirements: list[RequirementTable] = []
+    variables: Annotated[tuple[VariableTable, ...], Field(min_length=1)]
+    objectives: Annotated[tuple[ObjectiveTable, ...], Field(min_length=1)]
+    requirements: tuple[RequirementTable, ...] = ()
     workspace: WorkspaceTable | None = None
-    floors: FloorsTable = FloorsTable()
-    motion: MotionTable = MotionTable()
-    search: SearchTable = SearchTable()
+    floors: FloorsTable = Field(default_factory=lambda: FloorsTable.model_validate({}))
+    motion: MotionTable = Field(default_factory=lambda: MotionTable.model_validate({}))
+    search: SearchTable = Field(default_factory=lambda: SearchTable.model_validate({}))
 
 
 def read_spec(path: str | Path) -> Spec:

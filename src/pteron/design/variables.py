@@ -97,9 +97,9 @@ def _variables(robot: Manipulator, table: VariableTable) -> list[Variable]:
         name = table.name or (table.moves[0].lstrip("-") if not table.each else "")
         if table.each:
             name = f"{table.name or group[0].key} of leg {group[0].leg}"
-        if table.by == "value" and any(place.key.endswith("length") for place in group):
-            if table.range[0] <= 0.0:
-                raise ModelError(f"range: {table.range[0]:g} m given, but a length is above 0")
+        is_length = table.by == "value" and any(place.role == "length" for place in group)
+        if is_length and table.range[0] <= 0.0:
+            raise ModelError(f"range: {table.range[0]:g} m given, but a length is above 0")
         found.append(Variable(name, tuple(group), table.by, *table.range, start))
     return found
 
@@ -137,9 +137,7 @@ def moved(
             held[place.key][part] = number
     for i, fields in changed.items():
         leg = legs[i - 1]
-        given = {
-            key: tuple(parts) if len(parts) > 1 else parts[0] for key, parts in fields.items()
-        }
+        given = {key: tuple(parts) if len(parts) > 1 else parts[0] for key, parts in fields.items()}
         other = replace(leg, **given)
         legs[i - 1] = with_stretched_bodies(leg, other) if stretch else other
     return replace(robot, legs=tuple(legs))
