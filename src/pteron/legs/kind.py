@@ -74,6 +74,7 @@ class ReachBound(NamedTuple):
 
     point: Vector
     line: Vector | None
+    """The way of a slider: it is within `radius` of point + q line too."""
     radius: float
 
 
@@ -225,6 +226,17 @@ class LegKind(ABC):
         return None
 
     @property
+    def held_bound(self) -> ReachBound | None:
+        """A bound on the platform points in reach within the limits of its joint."""
+        bound = self.reach_bound
+        if bound is None or bound.line is None or self.limits is None:
+            return bound
+        low, high = self.limits
+        way = 0.5 * (low + high)
+        x, y, z = (p + way * along for p, along in zip(bound.point, bound.line, strict=True))
+        return ReachBound((x, y, z), None, bound.radius + 0.5 * (high - low))
+
+    @property
     @abstractmethod
     def reach_text(self) -> str:
         """How far it reaches, as a clause for messages: "its links span 0.1 to 0.4 m"."""
@@ -268,6 +280,13 @@ class LegKind(ABC):
         The platform's axes are the columns (3, 3) of `turned`, and of `still` at phi = 0.
         """
         return []
+
+    def couple(self, motion: LegMotion) -> Expression | None:
+        """Return the couple (3, 1) that its rods pass on to the platform beside a force along them.
+
+        It is zero for a single rod; None for a leg whose chain of joints says what it passes on.
+        """
+        return None
 
     def doubts(self, axis: Vector | None) -> Iterator[str]:
         """Yield what is possible but unlikely in it, beside what is so in any leg.

@@ -22,7 +22,15 @@ from pteron.legs.cones import Cone
 from pteron.legs.keys import Key
 from pteron.legs.kind import Quantity
 from pteron.legs.leg import Joint, LegMotion, Passive, Sphere
-from pteron.legs.rods import ROD_KEYS, cones, free_axes, hinge_doubts, rod_body, universal_joints
+from pteron.legs.rods import (
+    ROD_KEYS,
+    cones,
+    couple,
+    free_axes,
+    hinge_doubts,
+    rod_body,
+    universal_joints,
+)
 from pteron.legs.slide import SLIDER_KEYS, SlideEquations, SlideLeg, SlideState
 
 
@@ -114,6 +122,9 @@ class PSS(SlideLeg):
 
     def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
         return cones(self, motion, ca.SX.eye(3), still, turned)
+
+    def couple(self, motion: LegMotion) -> Expression:
+        return couple(self, motion)
 
     def doubts(self, axis: Vector | None) -> Iterator[str]:
         return hinge_doubts(self, axis)

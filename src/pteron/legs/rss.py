@@ -23,7 +23,15 @@ from pteron.legs.cones import Cone
 from pteron.legs.crank import CRANK_KEYS, CrankEquations, CrankLeg, CrankState
 from pteron.legs.keys import Condition, Key
 from pteron.legs.leg import Joint, LegMotion, Passive, Sphere
-from pteron.legs.rods import ROD_KEYS, cones, free_axes, hinge_doubts, rod_body, universal_joints
+from pteron.legs.rods import (
+    ROD_KEYS,
+    cones,
+    couple,
+    free_axes,
+    hinge_doubts,
+    rod_body,
+    universal_joints,
+)
 
 
 def _check_bar(bar: Vector | None, direction: Vector) -> None:
@@ -121,6 +129,9 @@ class RSS(CrankLeg):
     def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
         crank = motion.bodies["u"]
         return cones(self, motion, ca.horzcat(crank.x, crank.y, crank.axes), still, turned)
+
+    def couple(self, motion: LegMotion) -> Expression:
+        return couple(self, motion)
 
     def doubts(self, axis: Vector | None) -> Iterator[str]:
         return hinge_doubts(self, axis)
