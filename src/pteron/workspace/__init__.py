@@ -3,30 +3,41 @@
 from pteron.kinematics.limits import LimitedJoint, limited_joints
 from pteron.workspace.conditions import Condition, conditions
 from pteron.workspace.home import home_pose
+from pteron.workspace.inscribed import Inscribed, largest_cube, largest_cylinder
 from pteron.workspace.paving import Paving, paving
+from pteron.workspace.proofs import Proof, prove
 from pteron.workspace.reach import BEYOND_LIMITS, REACHABLE, ReachSlice, reach_slice
+from pteron.workspace.regions import Box, Cylinder, Region
 from pteron.workspace.reserve import JointRanges, Reserve, joint_ranges, reserve
 from pteron.workspace.volume import ReachVolume, bounding_box, reach_volume
 
 __all__ = [
     "BEYOND_LIMITS",
+    "Box",
     "Condition",
+    "Cylinder",
+    "Inscribed",
+    "JointRanges",
+    "LimitedJoint",
     "Paving",
+    "Proof",
     "REACHABLE",
     "ReachSlice",
     "ReachVolume",
+    "Region",
     "Reserve",
-    "JointRanges",
-    "LimitedJoint",
     "bounding_box",
     "conditions",
     "home_pose",
+    "joint_ranges",
+    "largest_cube",
+    "largest_cylinder",
     "limited_joints",
     "paving",
+    "prove",
     "reach_slice",
     "reach_volume",
     "reserve",
-    "joint_ranges",
 ]
 
 
