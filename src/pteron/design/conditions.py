@@ -4,7 +4,7 @@ The rows are those of the machine's own functions in which the geometry is an in
 compilation serves a whole search. A row is 0 or more where its condition holds: first the squared
 type-I measure of every leg less its floor's square, finite also out of reach; then each joint's
 distance from its ends of way over half its way; passive joints' likewise; and the type-II measure,
-of one sign, less its floor.
+of one sign, less its floor, unless that is 0.
 """
 
 from __future__ import annotations
@@ -18,10 +18,6 @@ import numpy as np
 from pteron.kernels import TARGETS, Array, Kernel, Port, bare, general_program
 from pteron.kernels.c import compiler
 from pteron.manipulator import Manipulator
-
-_HELD = 1e-9
-"""Type-II measure that a pose must have where no floor is given: the actuators must hold it."""
-
 
 @dataclass(frozen=True)
 class Conditions:
@@ -90,8 +86,9 @@ def _built(robot: Manipulator, type_i: float, type_ii: float) -> Conditions:
         if not share.is_constant():
             rows.append(share)
             names.append(f"leg {i}: passive joints' limits")
-    rows.append(side * measure - max(type_ii, _HELD))
-    names.append("type-II measure")
+    if type_ii > 0.0:
+        rows.append(side * measure - type_ii)
+        names.append("type-II measure")
     stacked = ca.vertcat(*rows)
     slopes = [ca.jacobian(stacked, symbol) for symbol in (geometry, pose)]
     ports = (

@@ -31,11 +31,7 @@ def workspace_poses(workspace: WorkspaceTable, angles: Array, samples: int | Non
 def _positions(workspace: WorkspaceTable, count: int) -> Array:
     line = np.linspace(-1.0, 1.0, count)
     if workspace.shape != "cylinder":
-        if workspace.low is not None and workspace.high is not None:
-            low, high = np.array(workspace.low), np.array(workspace.high)
-        else:
-            middle, edge = np.array(workspace.center), workspace.edge or 0.0
-            low, high = middle - edge / 2.0, middle + edge / 2.0
+        low, high = (np.array(end) for end in workspace.ends)
         units = np.array(list(product(line, repeat=len(low))))
         return np.asarray((low + high) / 2.0 + units * (high - low) / 2.0)
     assert workspace.radius is not None  # the shape says so

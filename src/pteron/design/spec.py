@@ -103,6 +103,15 @@ class WorkspaceTable(Table):
         return "cube" if self.edge is not None else "cylinder"
 
     @property
+    def ends(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Least and greatest coordinates of a box or a cube, m."""
+        if self.low is not None and self.high is not None:
+            return self.low, self.high
+        half = (self.edge or 0.0) / 2.0
+        center = self.center or ()
+        return tuple(x - half for x in center), tuple(x + half for x in center)
+
+    @property
     def lengths(self) -> int:
         """Number of its coordinates."""
         return len(self.low or self.center or ())
@@ -111,8 +120,10 @@ class WorkspaceTable(Table):
 class FloorsTable(Table):
     """`[floors]`: what no pose of the workspace, or of the cube, may be below."""
 
-    type_i: Floor = Field(0.05, description="type-I measure of every leg")
-    type_ii: Floor = Field(0.0, description="type-II measure of the machine")
+    type_i: Floor = Field(0.05, description="type-I measure of every leg; 0: it need only reach")
+    type_ii: Floor = Field(
+        0.01, description="type-II measure of the machine; 0: it does not matter"
+    )
 
 
 class MotionTable(Table):
