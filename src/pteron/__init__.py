@@ -74,6 +74,7 @@ Leg = PRRR
 if TYPE_CHECKING:
     from pteron import (
         controllers,
+        design,
         environments,
         export,
         identification,
@@ -103,7 +104,7 @@ _LATER = {
     "export_st": "pteron.export",
 }
 _LATER_MODULES = (
-    *("controllers", "environments", "export", "identification", "indices"),
+    *("controllers", "design", "environments", "export", "identification", "indices"),
     *("motion", "plots", "report", "viewer", "workspace"),
 )
 """What would slow the start of those who do not use it (SymPy, SciPy, matplotlib, Gymnasium)."""
@@ -156,6 +157,7 @@ __all__ = [
     "compile",
     "controllers",
     "coriolis_matrix",
+    "design",
     "direct_kinematics",
     "drive_accelerations",
     "drive_forces",

@@ -3,7 +3,9 @@
 from pteron.design.changes import Change, geometry_changes, mass_changes, quantity_changes
 from pteron.design.design import Design
 from pteron.design.front import Front
+from pteron.design.proofs import ProvedCube, proved_cube, workspace_proofs
 from pteron.design.quantities import Quantity, quantities
+from pteron.design.report import Summary, Told
 from pteron.design.search import search
 from pteron.design.spec import Spec, read_spec
 from pteron.design.survey import survey
@@ -14,17 +16,22 @@ __all__ = [
     "Change",
     "Design",
     "Front",
+    "ProvedCube",
     "Quantity",
     "Spec",
+    "Summary",
     "Task",
+    "Told",
     "Variable",
     "geometry_changes",
     "mass_changes",
+    "proved_cube",
     "quantities",
     "quantity_changes",
     "read_spec",
     "search",
     "survey",
+    "workspace_proofs",
 ]
 
 

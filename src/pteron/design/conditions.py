@@ -19,6 +19,7 @@ from pteron.kernels import TARGETS, Array, Kernel, Port, bare, general_program
 from pteron.kernels.c import compiler
 from pteron.manipulator import Manipulator
 
+
 @dataclass(frozen=True)
 class Conditions:
     """The rows of one topology.

@@ -45,7 +45,7 @@ class ProvedCube:
     @property
     def words(self) -> str:
         """What is proved, in a sentence."""
-        center = ", ".join(f"{1000.0 * x + 0.0:.1f}" for x in self.center)
+        center = ", ".join(f"{round(1000.0 * x, 1) + 0.0:g}" for x in self.center)
         boxes = sum(proof.boxes for proof in self.proofs)
         return (
             f"proved: every position of the cube with edge {1000.0 * self.edge:.1f} mm about "
@@ -104,4 +104,4 @@ def _proved(design: Design, regions: list[Box]) -> tuple[Proof, ...] | None:
 
 def _whole(pose: Array, position: Array) -> tuple[float, ...]:
     """Return a position with the angle of a pose."""
-    return tuple([*position.tolist(), *pose[len(position) :].tolist()])
+    return (*position.tolist(), *pose[len(position) :].tolist())

@@ -49,7 +49,7 @@ def refined(task: Task, values: Sequence[float], objective: int) -> list[float]:
         return list(values)
     center, radius = search_ball(design.robot)
     lengths = len(center)
-    seeks = slopes.seeks_cube
+    seeks = task.seeks_cube
     cube = np.append(design.cube.center, design.cube.edge) if seeks else np.zeros(lengths + 1)
     held = [(float(z), float(z)) for z in cube]
     moving = [(float(c) - radius, float(c) + radius) for c in center] + [(0.0, 2.0 * radius)]
@@ -75,7 +75,7 @@ def _asked_at(design: Design, lengths: int, count: int) -> Samples:
     if task.spec.workspace is None:
         return cube
     fixed = fixed_samples(design.poses, lengths)
-    return fixed.joined(cube) if "cube" in task.asked else fixed
+    return fixed.joined(cube) if task.seeks_cube else fixed
 
 
 @dataclass(frozen=True)
@@ -85,11 +85,6 @@ class _Slopes:
     task: Task
     design: Design
     start: Array
-
-    @property
-    def seeks_cube(self) -> bool:
-        """Whether the cube's centre and edge are unknowns."""
-        return "cube" in self.task.asked or self.task.spec.workspace is None
 
     def of(self, name: str) -> Array | None:
         """Return a quantity's slopes (V + k + 1,), or None where it has none."""

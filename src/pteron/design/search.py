@@ -81,8 +81,7 @@ def search(
         If the folder holds another search, or cannot be written.
     """
     if seed is not None:
-        settings = spec.search.model_copy(update={"seed": seed})
-        spec = spec.model_copy(update={"search": settings})
+        spec = spec.with_seed(seed)
     task = Task.of(spec)
     with _place(folder) as kept, _workers(workers, scheduler) as address:
         return front_of(task, _generations(task, kept, address, progress))

@@ -231,6 +231,10 @@ class Spec(Table):
     motion: MotionTable = Field(default_factory=lambda: MotionTable.model_validate({}))
     search: SearchTable = Field(default_factory=lambda: SearchTable.model_validate({}))
 
+    def with_seed(self, seed: int) -> Spec:
+        """Return the same search with other chance."""
+        return self.model_copy(update={"search": self.search.model_copy(update={"seed": seed})})
+
 
 def read_spec(path: str | Path) -> Spec:
     """Read a search for a design from a TOML file.

@@ -102,6 +102,11 @@ class Task:
         return tuple(dict.fromkeys(given))
 
     @property
+    def seeks_cube(self) -> bool:
+        """Whether the largest cube of each design is looked for."""
+        return "cube" in self.asked or self.spec.workspace is None
+
+    @property
     def ranges(self) -> Array:
         """Least and greatest value of each variable, (2, V)."""
         return np.array([(v.low, v.high) for v in self.variables]).T
