@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
+from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -76,12 +77,10 @@ class Task:
     @property
     def plan(self) -> dict[str, str]:
         """What makes its results what they are: the spec, the machine, and Pteron's version."""
-        from pteron import __version__
-
         spec = self.spec.model_dump_json(exclude={"robot"})
         machine = text_of(self.robot)
         key = hashlib.sha256(f"{spec}\n{machine}".encode()).hexdigest()[:16]
-        return {"spec": spec, "robot": self.robot.name, "sha256": key, "pteron": __version__}
+        return {"spec": spec, "robot": self.robot.name, "sha256": key, "pteron": version("pteron")}
 
     @cached_property
     def conditions(self) -> Conditions:
