@@ -9,7 +9,7 @@ f has a kink, the interval of f' holds the slopes of both sides.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -71,10 +71,11 @@ class Bounded:
         elements = [k for nodes in graph.outputs[:-1] for k in nodes]
         nodes = [elements[r] for r in rows]
         least, most, defined, continuous = enclosed(graph, nodes, [low], [high], len(low))
+        moving = np.flatnonzero((low != high).any(axis=0)).tolist()
         for at, r in enumerate(rows):
             boxes = np.flatnonzero(continuous[:, at])
-            if len(boxes) and not occurs_once(graph, elements[r]):
-                slopes = graph.outputs[-1][r * size : (r + 1) * size]
+            if len(boxes) and not occurs_once(graph, elements[r], moving):
+                slopes = {i: graph.outputs[-1][r * size + i] for i in moving}
                 inner = _mean_value(graph, elements[r], slopes, low[boxes], high[boxes])
                 least[boxes, at] = np.fmax(least[boxes, at], inner.low)
                 most[boxes, at] = np.fmin(most[boxes, at], inner.high)
@@ -82,18 +83,18 @@ class Bounded:
 
 
 def _mean_value(
-    graph: Graph, node: int, slopes: Sequence[int], low: Array, high: Array
+    graph: Graph, node: int, slopes: Mapping[int, int], low: Array, high: Array
 ) -> Interval:
     """Return f(m) + f'(X) (X - m); NaN where f' may be undefined in a part of the box."""
     count, middle = len(low), 0.5 * (low + high)
     at, upper, *_ = (part[:, 0] for part in enclosed(graph, [node], [middle], [middle], count))
-    least, most, known, _ = enclosed(graph, slopes, [low], [high], count)
+    least, most, known, _ = enclosed(graph, list(slopes.values()), [low], [high], count)
     with np.errstate(all="ignore"):
         total = Interval(at, upper)
-        for i in range(low.shape[1]):
+        for k, i in enumerate(slopes):
             center = Interval(middle[:, i], middle[:, i])
             way = subtract(Interval(low[:, i], high[:, i]), center)
-            total = add(total, multiply(Interval(least[:, i], most[:, i]), way))
+            total = add(total, multiply(Interval(least[:, k], most[:, k]), way))
     useful = known.all(axis=1)
     return Interval(*(np.where(useful, bound, np.nan) for bound in total[:2]))
 

@@ -11,11 +11,12 @@ import casadi as ca
 
 from pteron.bodies.motion import Expression
 from pteron.equations import closing, control, drives, kinematics, lagrangian, regressor
-from pteron.equations.clearance import clearances
+from pteron.equations.clearance import clearances, least_clearances
 from pteron.equations.constraints import constraint_measure
 from pteron.equations.friction import passive_friction
 from pteron.equations.laws import LAWS
 from pteron.equations.machine import Machine
+from pteron.equations.room import rooms
 from pteron.equations.virtual_work import generalized_forces, inverse_dynamics
 
 Output = Expression | list[Expression] | tuple[Expression, tuple[int, ...]]
@@ -268,6 +269,9 @@ TABLE: dict[str, Entry] = {
     "direct_step": Entry(("joints", "pose"), _direct_step),
     "reach": Entry(_POSE, _reach),
     "passive_room": Entry(_POSE, _passive_room),
+    "room": Entry(
+        _POSE, lambda m, v: {"room": ca.vertcat(*(room.value for room in rooms(m, v["pose"])))}
+    ),
     "joint_points": Entry(
         _POSE, lambda m, v: {"points": kinematics.chain_points(_state(m, v))}, ("reach",)
     ),
@@ -277,6 +281,9 @@ TABLE: dict[str, Entry] = {
     "type_ii": Entry(_POSE, _type_ii),
     "clearances": Entry(
         _POSE, lambda m, v: {"distances": _stacked(clearances(m, v["pose"]))}, ("reach",)
+    ),
+    "least_clearances": Entry(
+        _POSE, lambda m, v: {"distances": _stacked(least_clearances(m, v["pose"]))}, ("reach",)
     ),
     "constraint": Entry(
         _POSE,

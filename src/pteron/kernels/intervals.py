@@ -12,7 +12,7 @@ What is enclosed is the real function of the graph: its constants are the floats
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -107,9 +107,7 @@ def enclosed(
     Only what the nodes depend on is computed.
     """
     needed = needed_by(graph, nodes)
-    columns = [
-        [np.ascontiguousarray(part.T) for part in bounds] for bounds in (lows, highs)
-    ]  # an input's element in all boxes lies in one piece
+    columns = [[list(map(_one_or_all, part.T)) for part in bounds] for bounds in (lows, highs)]
     low, high = np.empty((len(nodes), count)), np.empty((len(nodes), count))
     defined, continuous = (np.ones((len(nodes), count), bool) for _ in range(2))
     with np.errstate(all="ignore"):
@@ -129,8 +127,16 @@ def enclosed(
     return low.T, high.T, defined.T, continuous.T
 
 
+def _one_or_all(column: Array) -> Array:
+    """Return an element of an input in all boxes, or once where it is the same in all."""
+    return column[:1] if len(column) and (column == column[0]).all() else column.copy()
+
+
 def _walk(
-    graph: Graph, needed: Sequence[int], columns: Sequence[Sequence[Array]], part: slice
+    graph: Graph,
+    needed: Sequence[int],
+    columns: Sequence[Sequence[Sequence[Array]]],
+    part: slice,
 ) -> list[Interval | None]:
     values: list[Interval | None] = [None] * len(graph.nodes)
     for k in needed:
@@ -166,11 +172,21 @@ def needed_by(graph: Graph, nodes: Sequence[int]) -> list[int]:
     return sorted(wanted)
 
 
-def occurs_once(graph: Graph, node: int) -> bool:
-    """Say whether a node's natural interval is exact, but for rounding: no input occurs twice."""
+def occurs_once(graph: Graph, node: int, moving: Collection[int]) -> bool:
+    """Say whether a node's natural interval is exact, but for rounding: no input occurs twice.
+
+    Of the first input only the elements in `moving` are intervals; the others are numbers.
+    """
     uses: dict[int, int] = {}
+    fixed: set[int] = set()
     for k in needed_by(graph, [node]):
-        if graph.nodes[k].operation not in (INPUT, CONSTANT):
-            for i in set(graph.nodes[k].arguments):
-                uses[i] = uses.get(i, 0) + (graph.nodes[i].operation != CONSTANT)
+        operation, arguments = graph.nodes[k].operation, graph.nodes[k].arguments
+        if operation == INPUT:
+            still = arguments[1] not in moving
+        else:
+            still = fixed.issuperset(arguments)
+            for i in set(arguments) - fixed:
+                uses[i] = uses.get(i, 0) + 1
+        if still:
+            fixed.add(k)
     return max(uses.values(), default=0) <= 1

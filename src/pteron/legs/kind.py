@@ -74,6 +74,7 @@ class ReachBound(NamedTuple):
 
     point: Vector
     line: Vector | None
+    """The way of a slider: it is within `radius` of point + q line too."""
     radius: float
 
 
@@ -234,6 +235,17 @@ class LegKind(ABC):
     def reach_bound(self) -> ReachBound | None:
         """A bound on the platform points in reach; None where there is none."""
         return None
+
+    @property
+    def held_bound(self) -> ReachBound | None:
+        """A bound on the platform points in reach within the limits of its joint."""
+        bound = self.reach_bound
+        if bound is None or bound.line is None or self.limits is None:
+            return bound
+        low, high = self.limits
+        way = 0.5 * (low + high)
+        x, y, z = (p + way * along for p, along in zip(bound.point, bound.line, strict=True))
+        return ReachBound((x, y, z), None, bound.radius + 0.5 * (high - low))
 
     @property
     @abstractmethod
