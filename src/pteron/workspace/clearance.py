@@ -138,7 +138,7 @@ def interference(robot: RobotLike, radii: Thickness | None = None) -> tuple[Cond
     --------
     >>> from pteron.workspace import Box, conditions, interference, prove
     >>> given = (*conditions("five-bar"), *interference("five-bar", 0.005))
-    >>> prove("five-bar", Box((-0.01, 0.19), (0.01, 0.21)), given=given).holds
+    >>> prove("five-bar", Box((-0.01, 0.15), (0.01, 0.16)), given=given).holds
     True
     """
     robot = as_manipulator(robot)
