@@ -58,6 +58,7 @@ from pteron.kinematics import (
 from pteron.legs import PRR, PRRR, PSS, RRR, RSS, RUPU, Cone, Drive, Stribeck
 from pteron.manipulator import (
     Manipulator,
+    Radii,
     catalog,
     load,
     parameter_data,
@@ -148,6 +149,7 @@ __all__ = [
     "RRR",
     "RSS",
     "RUPU",
+    "Radii",
     "RodInertia",
     "SingularPose",
     "Stribeck",

@@ -50,6 +50,7 @@ FUNCTIONS = (
     "joint_rates",
     "joint_screws",
     "kinetic_energy",
+    "least_clearances",
     "link_jacobians",
     "link_vectors",
     "mass_matrix",

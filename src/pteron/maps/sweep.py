@@ -205,7 +205,7 @@ def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
             if found != here:
                 told = "none" if isinstance(found, BaseException) else found
                 raise PteronError(
-                    f"{where}: worker {worker} has Pteron {told}, {version('pteron')} expected; install "
+                    f"{where}: worker {worker} has Pteron {told}, {here} expected; install "
                     "the same there"
                 )
         yield client

@@ -17,6 +17,7 @@ from pteron.errors import DataError
 from pteron.kernels import Array, as_array, bounds, numeric
 from pteron.kinematics.architecture import is_singular_everywhere
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.workspace.regions import Box
 
 _SAMPLES = 4096
 _PAIRS = 64
@@ -64,7 +65,7 @@ class FreeRegion:
 
 
 def free_of_singularities(
-    robot: RobotLike, region: ArrayLike, *, floor: float = 0.0, most: int = 100_000
+    robot: RobotLike, region: Box | ArrayLike, *, floor: float = 0.0, most: int = 100_000
 ) -> FreeRegion:
     """Prove that a region of poses is free of type-II singularities, or return one that it holds.
 
@@ -72,7 +73,7 @@ def free_of_singularities(
     ----------
     robot : Manipulator, name or path
         The machine.
-    region : array, shape (2, m)
+    region : Box, or array of shape (2, m)
         The least and the greatest pose, m and rad; a coordinate may have one value.
     floor : float
         Least size of the type-II measure that is to be proved; a pose counts as singular only where
@@ -100,7 +101,8 @@ def free_of_singularities(
     (False, 1.570796327)
     """
     robot = as_manipulator(robot)
-    given = as_array(region, "region", (2, robot.freedom))
+    corners = region.box if isinstance(region, Box) else region
+    given = as_array(corners, "region", (2, robot.freedom))
     if given.ndim != 2 or not np.isfinite(given).all() or (given[0] > given[1]).any():
         raise DataError(
             f"region: {given.tolist()} given, the least and the greatest pose expected, finite"

@@ -240,10 +240,8 @@ def _moved(vanishing: _Vanishing, start: Array) -> Array | None:
     def distance(pose: Array) -> float:
         return float(np.linalg.norm(pose - start))
 
-    best = min([hits[0], *nearer], key=distance)
-    if best is hits[0]:
-        best = _narrowed(vanishing, start, best, lengths)
-    return best
+    best: Array = min([hits[0], *nearer], key=distance)
+    return _narrowed(vanishing, start, best, lengths) if best is hits[0] else best
 
 
 def _directions(lengths: int) -> Array:
