@@ -105,7 +105,11 @@ def test_an_angle_varies_over_its_turn_and_the_box_is_that_of_all_its_values():
         ({"x": 0.0, "y": 0.0, "z": -1.0}, {}, "nothing varies: leave one of x, y, z out"),
         ({"z": -1.0}, {"x": (1.0, 0.0)}, "x: from 1 to 0 given, an ascending range expected"),
         ({"z": -1.0}, {"z": (0.0, 1.0)}, "z: both held and given a range"),
-        ({"z": -1.0}, {"x": (0.0, 1.0, 1), "y": (0.0, 1.0)}, "x: 1 points given, at least 2 expected"),
+        (
+            {"z": -1.0},
+            {"x": (0.0, 1.0, 1), "y": (0.0, 1.0)},
+            "x: 1 points given, at least 2 expected",
+        ),
     ],
 )
 def test_a_grid_that_cannot_be_is_refused(delta, held, ranges, words):
