@@ -36,8 +36,11 @@ from pteron.errors import (
 )
 from pteron.kernels import compile
 from pteron.kinematics import (
+    Architecture,
     JointMotion,
+    architecture,
     assembly_mode,
+    constraint_measure,
     direct_kinematics,
     follow,
     inverse_kinematics,
@@ -122,6 +125,7 @@ def __getattr__(name: str) -> Any:
 
 
 __all__ = [
+    "Architecture",
     "Bar",
     "BaseParameters",
     "Cone",
@@ -147,6 +151,7 @@ __all__ = [
     "SingularPose",
     "Stribeck",
     "UnreachablePose",
+    "architecture",
     "assembly_mode",
     "base_parameters",
     "base_regressor",
@@ -154,6 +159,7 @@ __all__ = [
     "catalog",
     "cheapest_parameters",
     "compile",
+    "constraint_measure",
     "controllers",
     "coriolis_matrix",
     "direct_kinematics",

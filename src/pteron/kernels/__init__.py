@@ -1,19 +1,21 @@
-"""Expressions made executable: by CasADi's virtual machine, Numba, C, JAX, and in fractions.
+"""Expressions made executable: by CasADi, Numba, C and JAX, in fractions and in intervals.
 
 Batching, threads and caching live here and only here.
 """
 
+from pteron.kernels.bounds import Bounded, bounded, bounds
 from pteron.kernels.choice import numeric
 from pteron.kernels.fields import Field, NoSquareRoot, PrimeField, RationalField, evaluate
 from pteron.kernels.functions import FUNCTIONS, needs_of
 from pteron.kernels.graph import Graph, graph_of
+from pteron.kernels.intervals import Enclosure
+from pteron.kernels.kept import Program
 from pteron.kernels.kernel import Array, Kernel, Port, as_array, count_operations
 from pteron.kernels.programs import (
     LOADED,
     REDUCIBLE,
     SELECTED,
     Columns,
-    Program,
     bare,
     general_program,
     program,
@@ -38,7 +40,9 @@ __all__ = [
     "needs_of",
     "TARGETS",
     "Array",
+    "Bounded",
     "Columns",
+    "Enclosure",
     "Field",
     "Graph",
     "Kernel",
@@ -49,6 +53,8 @@ __all__ = [
     "RationalField",
     "as_array",
     "bare",
+    "bounded",
+    "bounds",
     "columns_of",
     "compile",
     "count_operations",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Literal
@@ -17,11 +17,15 @@ from pteron.equations import (
     indices,
     kinematics,
     lagrangian,
+    reactions,
     regressor,
 )
+from pteron.equations.clearance import clearances
+from pteron.equations.constraints import constraint_measure
 from pteron.equations.friction import passive_friction
 from pteron.equations.laws import LAWS
 from pteron.equations.machine import Machine
+from pteron.equations.room import rooms
 from pteron.equations.virtual_work import generalized_forces, inverse_dynamics
 
 Output = Expression | list[Expression] | tuple[Expression, tuple[int, ...]]
@@ -155,6 +159,39 @@ def _platform_motion(m: Machine, v: Symbols) -> Outputs:
     return {"velocity": velocity, "acceleration": acceleration}
 
 
+def _reactions(m: Machine, v: Symbols) -> Outputs:
+    found = reactions.equilibrium(m, _state(m, v), v["parameters"])
+    wrenches = [[ca.vertcat(at.force, at.moment) for at in leg.wrenches] for leg in found.legs]
+    points, passed = (
+        ca.vertcat(*(_padded(rows, max(map(len, columns))) for rows in columns))
+        for columns in ([leg.points for leg in found.legs], wrenches)
+    )
+    return {
+        "rows": (found.rows, found.rows.shape),
+        "right": found.right,
+        "presumed_rows": (found.presumed_rows, found.presumed_rows.shape),
+        "presumed_right": found.presumed_right,
+        "driven_rows": (found.driven_rows, found.driven_rows.shape),
+        "driven": found.driven,
+        "ends": _platform_points(m, v)["points"],
+        "points": (points, (m.freedom, points.shape[0] // m.freedom, 3)),
+        "passed": (passed, (m.freedom, passed.shape[0] // m.freedom, 6)),
+    }
+
+
+def _beams(m: Machine, v: Symbols) -> Outputs:
+    found = reactions.beams(m, _state(m, v))
+    *links, couples = found._asdict().items()
+    rows = ca.horzcat(*couples[1]).T
+    return {**dict(links), "couples": (rows, rows.shape)}
+
+
+def _padded(columns: Sequence[Expression], count: int) -> Expression:
+    """Return columns as rows (count, k), NaN where there are too few."""
+    rows = ca.horzcat(*columns).T
+    return ca.vertcat(rows, ca.SX.nan(count - rows.shape[0], rows.shape[1]))
+
+
 def _passive_friction(m: Machine, v: Symbols) -> Outputs:
     forces = passive_friction(m, _state(m, v))
     return {"forces": (forces, forces.shape)}
@@ -269,6 +306,11 @@ def _controlled(m: Machine, v: Symbols, *, what: str) -> Outputs:
     return {"forces": forces, "next_memory": ca.vertcat(*(kept[name] for name in memory))}
 
 
+def _stacked(column: Expression) -> tuple[Expression, tuple[int, ...]]:
+    """Return a column as a vector, also where it has one element or none."""
+    return column, column.shape[:1]
+
+
 _POSE, _RATE = ("pose",), ("pose", "velocity")
 _MOTION = ("pose", "velocity", "acceleration")
 _BENT: tuple[Need, ...] = ("reach", "type I")
@@ -288,6 +330,9 @@ TABLE: dict[str, Entry] = {
     "direct_step": Entry(("joints", "pose"), _direct_step),
     "reach": Entry(_POSE, _reach),
     "passive_room": Entry(_POSE, _passive_room),
+    "room": Entry(
+        _POSE, lambda m, v: {"room": ca.vertcat(*(room.value for room in rooms(m, v["pose"])))}
+    ),
     "standing": Entry(_POSE, _standing),
     "joint_points": Entry(
         _POSE, lambda m, v: {"points": kinematics.chain_points(_state(m, v))}, ("reach",)
@@ -296,6 +341,14 @@ TABLE: dict[str, Entry] = {
     "discriminants": Entry(_POSE, _discriminants),
     "squared_type_i": Entry(_POSE, _squared_type_i),
     "type_ii": Entry(_POSE, _type_ii),
+    "clearances": Entry(
+        _POSE, lambda m, v: {"distances": _stacked(clearances(m, v["pose"]))}, ("reach",)
+    ),
+    "constraint": Entry(
+        _POSE,
+        lambda m, v: {"constraint": constraint_measure(m, _state(m, v))},
+        ("reach",),
+    ),
     "jacobian": Entry(
         _POSE, lambda m, v: {"jacobian": kinematics.jacobian(_state(m, v))}, ("rows",)
     ),
@@ -310,6 +363,8 @@ TABLE: dict[str, Entry] = {
         ("pose", "joint_rates", "joint_accelerations"), _platform_motion, _HELD
     ),
     "passive_friction": Entry(_RATE, _passive_friction, _HELD),
+    "reactions": Entry((*_MOTION, "parameters"), _reactions, _HELD),
+    "beams": Entry(_POSE, _beams, _BENT),
     "inverse_dynamics": Entry((*_MOTION, "parameters"), _inverse_dynamics, _HELD),
     "forward_dynamics": Entry((*_RATE, "forces", "parameters"), _forward_dynamics, _BENT),
     "drive_forces": Entry(
@@ -358,8 +413,10 @@ TABLE: dict[str, Entry] = {
 FUNCTIONS = tuple(TABLE)
 """What `compile` accepts, beside the indices."""
 
-_DEFINED = ("condition", "condition_points", "speed_least", "speed_most", "turning_speed")
-_DEFINED += ("force_least", "turning_moment", "pressure_angle", "output_pressure_angle")
+_DEFINED = (
+    *("condition", "condition_points", "speed_least", "speed_most", "turning_speed"),
+    *("force_least", "turning_moment", "pressure_angle", "output_pressure_angle"),
+)
 """The indices of geometry that are defined at type-II singularities too, if only as infinite."""
 
 INDICES: dict[str, Entry] = {

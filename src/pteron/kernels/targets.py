@@ -15,10 +15,12 @@ from pteron.errors import ModelError
 from pteron.kernels.c import Compiled
 from pteron.kernels.fields import Exact
 from pteron.kernels.hoisting import hoisted
+from pteron.kernels.intervals import Boxed
 from pteron.kernels.jax import Traced
+from pteron.kernels.kept import Program
 from pteron.kernels.kernel import Array, Kernel
 from pteron.kernels.numba import Jitted
-from pteron.kernels.programs import Columns, Program, general_program, program, specialised
+from pteron.kernels.programs import Columns, general_program, program, specialised
 from pteron.kernels.vm import VirtualMachine
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator, parameters
 
@@ -28,6 +30,7 @@ TARGETS: dict[str, type[Kernel]] = {
     "c": Compiled,
     "jax": Traced,
     "exact": Exact,
+    "intervals": Boxed,
 }
 """The targets by name."""
 
@@ -42,7 +45,12 @@ FIXED: dict[str, Callable[[Manipulator], Array]] = {
 _TRANSPARENT = ("jax", "exact")
 """Targets whose numbers may be traced or fractions, and go into the code as they are given."""
 
-_DTYPES = {"vm": ("float64",), "numba": ("float64",), "exact": ("float64",)}
+_DTYPES = {
+    "vm": ("float64",),
+    "numba": ("float64",),
+    "exact": ("float64",),
+    "intervals": ("float64",),
+}
 
 
 @runtime_checkable
@@ -81,9 +89,10 @@ def compile(
     what : str
         A function's name: `"inverse_dynamics"`, `"jacobian"`, ...; `pteron.kernels.FUNCTIONS` has
         them all.
-    target : {"vm", "numba", "c", "jax", "exact"}
+    target : {"vm", "numba", "c", "jax", "exact", "intervals"}
         What executes it: CasADi's virtual machine, ready at once; Numba; the machine's C compiler,
-        fastest, from Python too; JAX, which differentiates and runs on accelerators; fractions.
+        fastest, from Python too; JAX, which differentiates and runs on accelerators; fractions;
+        intervals, which take boxes of states and give proved bounds.
     base : BaseParameters, optional
         For `"inverse_dynamics"`, `"drive_forces"`, `"feed_forward"`, `"joint_feed_forward"`:
         compute from these base parameters alone, in the cheapest form that they allow (see

@@ -18,10 +18,16 @@ from pteron.bodies.vectors import cross
 _ROUNDING = 1e-15
 
 
+def edges_of_reach(lu: Expression, ll: Expression, n2: Expression) -> tuple[Expression, Expression]:
+    """Return what is 0 where the links are stretched, and where folded; negative beyond."""
+    longest, shortest = lu + ll, lu - ll
+    return longest * longest - n2, n2 - shortest * shortest
+
+
 def squared_reach(lu: Expression, ll: Expression, n2: Expression) -> Expression:
     """Return Delta, the product under the radical of Eqs. (1) and (2), its four factors paired."""
-    longest, shortest = lu + ll, lu - ll
-    return (longest * longest - n2) * (n2 - shortest * shortest)
+    stretched, folded = edges_of_reach(lu, ll, n2)
+    return stretched * folded
 
 
 def quarter_turn(v: Expression) -> Expression:

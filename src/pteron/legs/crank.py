@@ -261,20 +261,55 @@ class CrankEquations(LegEquations):
     def reach(self, c: Expression) -> Reach:
         w = c - self.r
         u, _, quarter = self._triangle(w)
-        n, height = ca.sqrt(ca.dot(u, u)), self.height(w)
-        # The least and greatest distance of c from the crank's circle.
-        near, far = (ca.sqrt((n + side * self.lu) ** 2 + height**2) for side in (-1, 1))
+        near, far = (ca.sqrt(square) for square in self._distances(w))
         margin = ca.fmin(self.ll - near, far - self.ll)
-        return Reach(margin, quarter, (self.lu * self.ll) ** 2, n)
+        return Reach(margin, quarter, (self.lu * self.ll) ** 2, ca.sqrt(ca.dot(u, u)))
+
+    def _distances(self, w: Expression) -> tuple[Expression, Expression]:
+        """Return the squares of the least and greatest distance of c from the crank's circle."""
+        u, height = ca.mtimes(self.plane.T, w), self.height(w)
+        n = ca.sqrt(ca.dot(u, u))
+        return (n - self.lu) ** 2 + height**2, (n + self.lu) ** 2 + height**2
+
+    def edges(self, c: Expression) -> dict[str, Expression]:
+        near, far = self._distances(c - self.r)
+        longest = self.ll * self.ll
+        return {"stretched": longest - near, "folded": far - longest}
+
+    def within_limits(
+        self, c: Expression, q: Expression, low: float, high: float
+    ) -> dict[str, Expression]:
+        """Return on which side of the crank's directions at its limits it points, times n^2.
+
+        Without an angle, which jumps at half a turn. Limits more than that apart are one condition:
+        that the crank is not farther from their middle than they are.
+        """
+        w = c - self.r
+        u, h, quarter = self._triangle(w)
+        # n^2 l_u, without its division by n^2.
+        crank = h * u + (self.sigma * ca.sqrt(quarter)) * quarter_turn(u)
+        if high - low >= 2.0 * math.pi:
+            return {}
+        if high - low > math.pi:
+            along = ca.dot(crank, self._ahead(0.5 * (low + high)))
+            least = self.lu * math.cos(0.5 * (high - low))
+            return {"limits": along - least * ca.dot(u, u)}
+        return {
+            "least": ca.dot(crank, quarter_turn(self._ahead(low))),
+            "most": -ca.dot(crank, quarter_turn(self._ahead(high))),
+        }
+
+    def _ahead(self, q: Expression) -> Expression:
+        """Return where the crank points at an angle q, a unit vector (2, 1) of its plane."""
+        turn = q - self.middle
+        return ca.cos(turn) * self.zero + ca.sin(turn) * quarter_turn(self.zero)
 
     def lever(self, length: Expression) -> Expression:
         return self.lu
 
     def tip(self, q: Expression) -> Expression:
         """Return the crank's end at an angle q."""
-        turn = q - self.middle
-        ahead = ca.cos(turn) * self.zero + ca.sin(turn) * quarter_turn(self.zero)
-        return self.r + self.lu * ca.mtimes(self.plane, ahead)
+        return self.r + self.lu * ca.mtimes(self.plane, self._ahead(q))
 
     def needs(
         self,

@@ -190,6 +190,22 @@ class LegEquations(ABC):
         """
         return ca.SX(1)
 
+    def edges(self, c: Expression) -> dict[str, Expression]:
+        """Return, by name, what is not negative within each edge of its reach: smooth expressions.
+
+        The leg reaches c where none is negative. Named apart they say how it ends.
+        """
+        return {"reach": self.reach(c).discriminant}
+
+    def within_limits(
+        self, c: Expression, q: Expression, low: float, high: float
+    ) -> dict[str, Expression]:
+        """Return, by name, what is not negative within the limits of its joint, which is at q.
+
+        Of a pose in reach; it need not be a distance, so that it can be smooth.
+        """
+        return {"least": q - low, "most": high - q}
+
     @abstractmethod
     def locus(self, q: Expression) -> Locus:
         """Return where c may be while the actuated joint is at q."""

@@ -19,6 +19,7 @@ from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, P
 from pteron.bodies.vectors import Vector, dot, parallel, vertical
 from pteron.errors import ModelError
 from pteron.legs.circles import (
+    edges_of_reach,
     first_moment,
     links_from_triangle,
     perpendicular_to,
@@ -314,6 +315,11 @@ class PRRREquations(LegEquations):
         n, delta = ca.sqrt(ca.dot(u, u)), squared_reach(self.lu, self.ll, ca.dot(u, u))
         margin = ca.fmin(self.lu + self.ll - n, n - ca.fabs(self.lu - self.ll))
         return Reach(margin, delta, (2 * self.lu * self.ll) ** 2, n)
+
+    def edges(self, c: Expression) -> dict[str, Expression]:
+        u = ca.mtimes(self.across, c - self.r)
+        stretched, folded = edges_of_reach(self.lu, self.ll, ca.dot(u, u))
+        return {"stretched": stretched, "folded": folded}
 
     def locus(self, q: Expression) -> Plane:
         size = ca.fabs(q) + ca.dot(ca.fabs(self.d_bar), ca.fabs(self.r))

@@ -45,8 +45,10 @@ def text_of(robot: Manipulator) -> str:
     for name in ("slides", "limits", "bars", "geared"):
         if given := getattr(robot.platform, name):
             platform[name] = given
+    radii = {} if robot.radii is None else {"radii": asdict(robot.radii)}
     legs = [{k: v for k, v in leg_items(leg).items() if v is not None} for leg in robot.legs]
-    machine = {"name": robot.name, "gravity": robot.gravity, "platform": platform, "legs": legs}
+    machine = {"name": robot.name, "gravity": robot.gravity, **radii}
+    machine |= {"platform": platform, "legs": legs}
     return written(_plain(machine))
 
 

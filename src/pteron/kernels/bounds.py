@@ -1,0 +1,176 @@
+"""Bounds on a machine's functions in boxes of poses, by the better of two forms of intervals.
+
+The natural form (see `kernels.intervals`) errs by what falls with the box's width. The mean-value
+form f(m) + f'(X) (X - m), m being the box's middle, errs by what falls with its square: for every
+x in the box X there is an f'(y), y between m and x, of which f(x) - f(m) is the product with x - m.
+It is taken where f is proved to be defined and continuous in all of the box, and f' defined; where
+f has a kink, the interval of f' holds the slopes of both sides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pteron.errors import DataError, ModelError
+from pteron.kernels.graph import Graph, graph_of
+from pteron.kernels.interval_arithmetic import Interval, add, multiply, subtract
+from pteron.kernels.intervals import Enclosure, enclosed, occurs_once
+from pteron.kernels.kernel import Array, Port, as_array
+from pteron.kernels.programs import program
+from pteron.kernels.targets import FIXED
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+
+
+@dataclass(frozen=True)
+class Bounded:
+    """A function of poses with its gradient.
+
+    Parameters
+    ----------
+    function : casadi.Function
+        SX, of one input (m,).
+    outputs : tuple of Port
+        Names and shapes of its outputs.
+    """
+
+    function: ca.Function
+    outputs: tuple[Port, ...]
+
+    @cached_property
+    def _graph(self) -> Graph:
+        """Of the outputs, dense, and of all their elements' gradients, (m, R)."""
+        (given,) = self.function.sx_in()
+        outputs = [ca.densify(output) for output in self.function.call([given])]
+        elements = ca.vertcat(*map(ca.vec, outputs))
+        slopes = ca.densify(ca.jacobian(elements, given).T)
+        return graph_of(ca.Function("bounded", [given], ca.cse([*outputs, slopes])))
+
+    def rows(self, name: str) -> range:
+        """Return which elements, counted over all outputs, an output has."""
+        start = 0
+        for port in self.outputs:
+            if port.name == name:
+                return range(start, start + port.size)
+            start += port.size
+        raise KeyError(name)
+
+    def __call__(
+        self, low: Array, high: Array, rows: Sequence[int]
+    ) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Return low, high and defined (B, R) of elements, in boxes with corners (B, m).
+
+        low and high are NaN where the element is defined nowhere in the box.
+        """
+        graph, size = self._graph, low.shape[1]
+        elements = [k for nodes in graph.outputs[:-1] for k in nodes]
+        nodes = [elements[r] for r in rows]
+        least, most, defined, continuous = enclosed(graph, nodes, [low], [high], len(low))
+        moving = np.flatnonzero((low != high).any(axis=0)).tolist()
+        for at, r in enumerate(rows):
+            boxes = np.flatnonzero(continuous[:, at])
+            if len(boxes) and not occurs_once(graph, elements[r], moving):
+                slopes = {i: graph.outputs[-1][r * size + i] for i in moving}
+                inner = _mean_value(graph, elements[r], slopes, low[boxes], high[boxes])
+                least[boxes, at] = np.fmax(least[boxes, at], inner.low)
+                most[boxes, at] = np.fmin(most[boxes, at], inner.high)
+        return least, most, defined
+
+
+def _mean_value(
+    graph: Graph, node: int, slopes: Mapping[int, int], low: Array, high: Array
+) -> Interval:
+    """Return f(m) + f'(X) (X - m); NaN where f' may be undefined in a part of the box."""
+    count, middle = len(low), 0.5 * (low + high)
+    at, upper, *_ = (part[:, 0] for part in enclosed(graph, [node], [middle], [middle], count))
+    least, most, known, _ = enclosed(graph, list(slopes.values()), [low], [high], count)
+    with np.errstate(all="ignore"):
+        total = Interval(at, upper)
+        for k, i in enumerate(slopes):
+            center = Interval(middle[:, i], middle[:, i])
+            way = subtract(Interval(low[:, i], high[:, i]), center)
+            total = add(total, multiply(Interval(least[:, k], most[:, k]), way))
+    useful = known.all(axis=1)
+    return Interval(*(np.where(useful, bound, np.nan) for bound in total[:2]))
+
+
+def bounded(robot: RobotLike, what: str) -> Bounded:
+    """Return a function of a machine's poses, as its equations are written, for `bounds`.
+
+    Raises
+    ------
+    ModelError
+        If there is no such function, or it depends on more than the pose.
+    """
+    robot = as_manipulator(robot)
+    return _bounded(robot, what)
+
+
+@lru_cache(maxsize=256)
+def _bounded(robot: Manipulator, what: str) -> Bounded:
+    built = program(robot, what, plain=True)
+    others = [p.name for p in built.inputs if p.name != "pose" and p.name not in FIXED]
+    if others or built.inputs[0].name != "pose":
+        told = ", ".join(p.name for p in built.inputs)
+        raise ModelError(f"what: {what!r} depends on {told}; bounds are on functions of the pose")
+    pose = ca.SX.sym("pose", robot.freedom)
+    given = [
+        pose if port.name == "pose" else ca.SX(ca.DM(FIXED[port.name](robot)))
+        for port in built.inputs
+    ]
+    outputs = built.function.call(given)
+    return Bounded(ca.Function(what, [pose], outputs), built.outputs)
+
+
+def bounds(robot: RobotLike, what: str, boxes: ArrayLike) -> dict[str, Enclosure]:
+    """Return proved bounds on a function of the pose, in boxes of poses.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+    what : str
+        A function of the pose alone: `"type_ii"`, `"jacobian"`, ...; see
+        `pteron.kernels.FUNCTIONS`.
+    boxes : array, shape (..., 2, m)
+        Least and greatest pose of each box, m and rad.
+
+    Returns
+    -------
+    dict of str to Enclosure
+        By the outputs' names; the bounds have the shape (..., *output).
+
+    Raises
+    ------
+    ModelError
+        If there is no such function, or it depends on more than the pose.
+    DataError
+        If the boxes are none.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from pteron.kernels import bounds
+    >>> box = [[-0.01, -0.01, -0.01, -0.1], [0.01, 0.01, 0.01, 0.1]]
+    >>> found = bounds("quadrupteron", "type_ii", box)["type_ii"]
+    >>> found.low.round(2), found.high.round(2), found.defined
+    (array(-1.), array(-0.98), array(True))
+    """
+    function = bounded(robot, what)
+    given = as_array(boxes, "boxes", (2, function.function.size1_in(0)))
+    if not (given[..., 0, :] <= given[..., 1, :]).all():
+        raise DataError("boxes: a least value is above the greatest, or NaN")
+    lead, flat = given.shape[:-2], given.reshape(-1, *given.shape[-2:])
+    found = {}
+    for port in function.outputs:
+        low, high, defined = (
+            part.reshape(lead + port.shape)
+            for part in function(flat[:, 0], flat[:, 1], function.rows(port.name))
+        )
+        found[port.name] = Enclosure(low, high, defined)
+    return found

@@ -1,0 +1,192 @@
+"""Target `intervals`: bounds that are proved on what a function gives in boxes of its inputs.
+
+A box holds every state between two corners. The graph of a CasADi function is walked with NumPy
+arrays of intervals, one operation at a time for many boxes; why the bounds hold, rounding and all,
+and what is said where the function is undefined, stands in `kernels.interval_arithmetic`.
+
+This is the natural form: intervals in place of numbers. It is exact, but for rounding, where every
+input occurs once, and else too wide, as x - x is; `kernels.bounds` has a narrower one beside it.
+
+What is enclosed is the real function of the graph: its constants are the floats that they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pteron.errors import DataError
+from pteron.kernels import interval_arithmetic as arithmetic
+from pteron.kernels.graph import CONSTANT, INPUT, Graph, graph_of
+from pteron.kernels.interval_arithmetic import RULES, Interval, constant
+from pteron.kernels.kernel import Array, Kernel, as_array
+
+_CHUNK = 1 << 13
+"""Boxes at a time: what a step reads and writes stays in the processor's cache."""
+
+
+@dataclass(frozen=True)
+class Enclosure:
+    """Bounds on a function's output in each of the boxes (...).
+
+    Attributes
+    ----------
+    low, high : array, shape (..., *output)
+        Every value that it takes in the box, where it is defined, is between them; -inf and inf
+        where nothing is known, NaN where it is defined nowhere in the box.
+    defined : array of bool, shape (..., *output)
+        Whether it is proved to be defined in all of the box.
+    """
+
+    low: Array
+    high: Array
+    defined: NDArray[np.bool_]
+
+
+class Boxed(Kernel):
+    """A kernel of intervals, by natural extension.
+
+    It takes a box for each input that is not shared, shape (..., 2, *port.shape), least values
+    first, and returns an `Enclosure` for each output.
+    """
+
+    @property
+    def source(self) -> str:
+        """The instructions, one a line, as CasADi prints them."""
+        return str(self.function.str(True))
+
+    def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
+        given = self._by_name(values, fixed)
+        arrays = []
+        for port in self.ports:
+            shape = port.shape if port.shared else (2, *port.shape)
+            arrays.append(as_array(given[port.name], port.name, shape))
+        lead = np.broadcast_shapes(
+            *(
+                array.shape[: array.ndim - len(port.shape) - 1]
+                for array, port in zip(arrays, self.ports, strict=True)
+                if not port.shared
+            )
+        )
+        count = int(np.prod(lead))
+        lows, highs = [], []
+        for array, port in zip(arrays, self.ports, strict=True):
+            if port.shared:
+                lows.append(array.reshape(1, -1))
+                highs.append(lows[-1])
+                continue
+            whole = np.broadcast_to(array, (*lead, 2, *port.shape)).reshape(count, 2, -1)
+            if not (whole[:, 0] <= whole[:, 1]).all():
+                raise DataError(f"{port.name}: a box's least value is above its greatest, or NaN")
+            lows.append(whole[:, 0])
+            highs.append(whole[:, 1])
+        graph = graph_of(self.function)
+        found = enclosed(graph, [k for nodes in graph.outputs for k in nodes], lows, highs, count)
+        ends = np.cumsum([len(nodes) for nodes in graph.outputs])[:-1]
+        results = []
+        for port, *parts in zip(
+            self.outputs, *(np.split(part, ends, axis=1) for part in found[:3]), strict=True
+        ):
+            results.append(Enclosure(*(part.reshape(lead + port.shape) for part in parts)))
+        return results[0] if len(results) == 1 else tuple(results)
+
+
+def enclosed(
+    graph: Graph,
+    nodes: Sequence[int],
+    lows: Sequence[Array],
+    highs: Sequence[Array],
+    count: int,
+) -> tuple[Array, Array, NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return low, high, defined and continuous (B, N) of nodes, for inputs' bounds (B or 1, size).
+
+    Only what the nodes depend on is computed.
+    """
+    needed = needed_by(graph, nodes)
+    columns = [[list(map(_one_or_all, part.T)) for part in bounds] for bounds in (lows, highs)]
+    low, high = np.empty((len(nodes), count)), np.empty((len(nodes), count))
+    defined, continuous = (np.ones((len(nodes), count), bool) for _ in range(2))
+    with np.errstate(all="ignore"):
+        for start in range(0, count, _CHUNK):
+            part = slice(start, min(start + _CHUNK, count))
+            values = _walk(graph, needed, columns, part)
+            for row, k in enumerate(nodes):
+                value = values[k]
+                assert value is not None
+                low[row, part], high[row, part] = value.low, value.high
+                _mark(low[row, part], high[row, part], value)
+                if value.maybe is not None:
+                    defined[row, part] = ~value.maybe
+                if value.maybe is not None or value.jump is not None:
+                    jump = arithmetic.either(value.maybe, value.jump)
+                    continuous[row, part] = ~np.asarray(jump)
+    return low.T, high.T, defined.T, continuous.T
+
+
+def _one_or_all(column: Array) -> Array:
+    """Return an element of an input in all boxes, or once where it is the same in all."""
+    return column[:1] if len(column) and (column == column[0]).all() else column.copy()
+
+
+def _walk(
+    graph: Graph,
+    needed: Sequence[int],
+    columns: Sequence[Sequence[Sequence[Array]]],
+    part: slice,
+) -> list[Interval | None]:
+    values: list[Interval | None] = [None] * len(graph.nodes)
+    for k in needed:
+        node = graph.nodes[k]
+        if node.operation == INPUT:
+            port, element = node.arguments
+            rows = [side[port][element] for side in columns]
+            values[k] = Interval(*(row if len(row) == 1 else row[part] for row in rows))
+        elif node.operation == CONSTANT:
+            values[k] = constant(node.value)
+        elif node.operation == "mul" and node.arguments[0] == node.arguments[1]:
+            values[k] = arithmetic.square(values[node.arguments[0]])  # type: ignore[arg-type]
+        elif node.operation not in RULES:
+            raise DataError(f"operation {node.operation} has no rule for intervals")
+        else:
+            values[k] = RULES[node.operation](*(values[i] for i in node.arguments))
+    return values
+
+
+def _mark(low: Array, high: Array, value: Interval) -> None:
+    """Say in bounds (B,) where nothing is known, and where there is nothing to know."""
+    low[np.isnan(low)], high[np.isnan(high)] = -np.inf, np.inf
+    if value.never is not None:
+        low[value.never] = high[value.never] = np.nan
+
+
+def needed_by(graph: Graph, nodes: Sequence[int]) -> list[int]:
+    """Return the nodes that others depend on, themselves too, in order."""
+    wanted = set(nodes)
+    for k in range(max(nodes, default=-1), -1, -1):
+        if k in wanted and graph.nodes[k].operation != INPUT:
+            wanted.update(graph.nodes[k].arguments)
+    return sorted(wanted)
+
+
+def occurs_once(graph: Graph, node: int, moving: Collection[int]) -> bool:
+    """Say whether a node's natural interval is exact, but for rounding: no input occurs twice.
+
+    Of the first input only the elements in `moving` are intervals; the others are numbers.
+    """
+    uses: dict[int, int] = {}
+    fixed: set[int] = set()
+    for k in needed_by(graph, [node]):
+        operation, arguments = graph.nodes[k].operation, graph.nodes[k].arguments
+        if operation == INPUT:
+            still = arguments[1] not in moving
+        else:
+            still = fixed.issuperset(arguments)
+            for i in set(arguments) - fixed:
+                uses[i] = uses.get(i, 0) + 1
+        if still:
+            fixed.add(k)
+    return max(uses.values(), default=0) <= 1

@@ -1,0 +1,190 @@
+"""What a pose must keep to count: a list of conditions, each a compiled function above a floor.
+
+Pavings, proofs, boundaries and largest shapes all use the same list. What else a region must keep,
+as a distance between links, is one more condition: the name of a function of the table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.equations.machine import Machine
+from pteron.equations.room import Room, rooms
+from pteron.kernels import Array, bounded, numeric
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+
+
+@dataclass(frozen=True)
+class Condition:
+    """That an element of a compiled function's output is not below a floor.
+
+    Parameters
+    ----------
+    leg : int
+        Whose it is, from 1; 0 where it is no leg's.
+    cause : str
+        What ends there, as a clause: "stretched", "slider at its least", "singular (type II)".
+    what : str
+        The function of the pose; see `pteron.kernels.FUNCTIONS`.
+    output : str
+        Which of its outputs.
+    element : int
+        Which of that output's elements.
+    floor : float
+        What it must not be below.
+    sized : bool
+        Whether its size counts, without the sign.
+    """
+
+    leg: int
+    cause: str
+    what: str
+    output: str
+    element: int = 0
+    floor: float = 0.0
+    sized: bool = False
+
+    def __str__(self) -> str:
+        return f"leg {self.leg}: {self.cause}" if self.leg else self.cause
+
+
+_CAUSES = {
+    "reach": "at the edge of its reach",
+    "least": "{} at its least",
+    "most": "{} at its most",
+    "limits": "{} at a limit",
+}
+
+
+def _told(room: Room) -> str:
+    return _CAUSES.get(room.cause, room.cause).format(room.noun)
+
+
+def conditions(
+    robot: RobotLike, *, type_i: float = 0.0, type_ii: float = 0.0
+) -> tuple[Condition, ...]:
+    """Return what a pose must keep: every leg's reach, the limits of all joints, and two floors.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine, in its working mode.
+    type_i : float
+        Least type-I measure of every leg; 0: it need only reach.
+    type_ii : float
+        Least size of the type-II measure of the machine; 0: it does not matter.
+
+    Returns
+    -------
+    tuple of Condition
+        The edges of reach first.
+
+    Examples
+    --------
+    >>> from pteron.workspace import conditions
+    >>> [str(condition) for condition in conditions("tripteron-router")][::4]
+    ['leg 1: stretched', 'leg 3: stretched', 'leg 2: slider at its least']
+    """
+    robot = as_manipulator(robot)
+    pose = ca.SX.sym("pose", robot.freedom)
+    found = [
+        Condition(
+            room.leg, _CAUSES.get(room.cause, room.cause).format(room.noun), "room", "room", k
+        )
+        for k, room in enumerate(rooms(Machine.of(robot), pose))
+    ]
+    if type_i > 0.0:
+        found += [
+            Condition(i + 1, "near type I", "squared_type_i", "squares", i, type_i**2)
+            for i in range(len(robot.legs))
+        ]
+    if type_ii > 0.0:
+        found.append(Condition(0, "near type II", "type_ii", "type_ii", 0, type_ii, sized=True))
+    return tuple(found)
+
+
+def rooms_left(robot: Manipulator, given: Sequence[Condition], poses: Array) -> Array:
+    """Return by how much (..., C) poses keep conditions, by ordinary evaluation; NaN: undefined."""
+    found = []
+    results = {
+        what: dict(zip((port.name for port in kernel.outputs), kernel(poses), strict=True))
+        for what in dict.fromkeys(condition.what for condition in given)
+        for kernel in [numeric(robot, what)]
+    }
+    for condition in given:
+        value = results[condition.what][condition.output].reshape(*poses.shape[:-1], -1)
+        value = value[..., condition.element]
+        found.append((np.abs(value) if condition.sized else value) - condition.floor)
+    return np.stack(found, axis=-1)
+
+
+def kept(robot: Manipulator, given: Sequence[Condition], poses: Array) -> NDArray[np.bool_]:
+    """Return which poses (...) keep all conditions, by ordinary evaluation."""
+    return np.asarray((rooms_left(robot, given, poses) >= 0.0).all(axis=-1))
+
+
+class Judge:
+    """What intervals prove of boxes of poses, condition by condition.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    given : sequence of Condition
+        At most 64.
+    """
+
+    def __init__(self, robot: Manipulator, given: Sequence[Condition]) -> None:
+        self.given = tuple(given)
+        self.all = np.uint64((1 << len(self.given)) - 1)
+        self._rows = []
+        for condition in self.given:
+            function = bounded(robot, condition.what)
+            self._rows.append((function, function.rows(condition.output)[condition.element]))
+
+    def __call__(
+        self, low: Array, high: Array, open_: NDArray[np.uint64]
+    ) -> tuple[NDArray[np.bool_], NDArray[np.uint64]]:
+        """Return which boxes lie outside, and which conditions are still open, as bits.
+
+        Parameters
+        ----------
+        low, high : array, shape (B, m)
+            The boxes' corners.
+        open_ : array of uint64, shape (B,)
+            Bit c says that condition c is not proved yet; of the others nothing is asked.
+
+        Returns
+        -------
+        outside : array of bool, shape (B,)
+            Whether a condition is proved to fail in all of the box.
+        open_ : array of uint64, shape (B,)
+            What is not proved of a box; 0: it lies inside. Not looked at further where outside.
+        """
+        outside, open_ = np.zeros(len(low), bool), open_.copy()
+        for c, (condition, (function, row)) in enumerate(zip(self.given, self._rows, strict=True)):
+            bit = np.uint64(1 << c)
+            chosen = np.flatnonzero((open_ & bit != 0) & ~outside)
+            if not len(chosen):
+                continue
+            least, most, defined = (
+                part[:, 0] for part in function(low[chosen], high[chosen], [row])
+            )
+            if condition.sized:
+                least, most = np.maximum(np.maximum(least, -most), 0.0), np.maximum(-least, most)
+            # Undefined everywhere is NaN, which is not above the floor.
+            outside[chosen] = ~(most >= condition.floor)
+            open_[chosen[(least >= condition.floor) & defined]] &= ~bit
+        return outside, open_
+
+
+@lru_cache(maxsize=64)
+def judge(robot: Manipulator, given: tuple[Condition, ...]) -> Judge:
+    """Return what judges boxes of a machine's poses by these conditions."""
+    return Judge(robot, given)

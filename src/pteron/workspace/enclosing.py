@@ -1,0 +1,71 @@
+"""A box that is proved to hold every position in reach, from the bounds on the legs' reach."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pteron.errors import ModelError
+from pteron.kernels import Array
+from pteron.manipulator import Manipulator
+
+_WIDER = 1e-9
+"""Relative; far more than rounding."""
+
+_SINGULAR = 1e-9
+"""Share of the largest eigenvalue below which nothing bounds a direction."""
+
+
+def enclosing_box(robot: Manipulator, low: Array, high: Array) -> Array:
+    """Return a box (2, k) of positions P that holds all in reach for phi in an interval.
+
+    Each leg keeps its platform point within R_j of a point, or of its guide's line: |A_j (P - p_j)|
+    <= R_j. So sum |A_j (P - p_j)|^2 <= sum R_j^2, an ellipsoid, whose box is known in closed form.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    low, high : array, shape (m,)
+        Two poses; of them only phi counts.
+
+    Raises
+    ------
+    ModelError
+        If the reach has no end.
+    """
+    directions = robot.platform.directions
+    size = len(directions)
+    # The platform points at the middle of the interval, and how far they are from there at most.
+    middle = 0.5 * (low + high)
+    half = float(0.5 * (high - low)[-1]) if robot.platform.turns else 0.0
+    points = np.array([leg.platform_point for leg in robot.legs])
+    arms = robot.platform.arms(points, middle)
+    far = np.linalg.norm(points, axis=1) * half
+    normal, right, constant, square = np.zeros((size, size)), np.zeros(size), 0.0, 0.0
+    for leg, arm, slack in zip(robot.legs, arms, far, strict=True):
+        bound = leg.held_bound
+        if bound is None:
+            continue
+        at = directions @ (np.array(bound.point) - np.array(leg.fixed_offset) - arm)
+        across = np.eye(size)
+        if bound.line is not None:
+            line = directions @ np.array(bound.line)
+            if np.linalg.norm(line) > _SINGULAR:
+                line = line / np.linalg.norm(line)
+                across = across - np.outer(line, line)
+        normal += across
+        right += across @ at
+        constant += float(at @ across @ at)
+        square += (bound.radius + slack) ** 2
+    values = np.linalg.eigvalsh(normal)
+    if not len(robot.legs) or values[0] <= _SINGULAR * values[-1]:
+        raise ModelError(
+            "the reach has no end that is known: the guides let the platform move along them for "
+            "ever; give the legs limits, or say within which box",
+            subject=robot.name,
+        )
+    center = np.linalg.solve(normal, right)
+    left = square - (constant - float(center @ right))
+    reach = np.sqrt(max(left, 0.0) * np.diag(np.linalg.inv(normal)))
+    reach = reach * (1.0 + _WIDER) + _WIDER * (1.0 + np.abs(center))
+    return np.array([center - reach, center + reach])

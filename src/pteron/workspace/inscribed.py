@@ -1,0 +1,321 @@
+"""The largest cube and the largest cylinder in the workspace at one orientation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy import ndimage  # type: ignore[import-untyped]
+from scipy.optimize import linprog  # type: ignore[import-untyped]
+
+from pteron.errors import DataError, ModelError
+from pteron.kernels import Array
+from pteron.kinematics.evaluate import checked_one
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.shapes import PoseLike
+from pteron.workspace.conditions import Condition, conditions, kept, rooms_left
+from pteron.workspace.paving import paving
+from pteron.workspace.proofs import Proof, prove
+from pteron.workspace.regions import Box, Cylinder, Region
+
+_COARSE = 0.5
+"""Tolerance of the paving that says where to look."""
+
+_POINTS = 32
+"""Positions along the longest side of the lattice in which the search starts."""
+
+_STARTS = 3
+_STEPS = 40
+_SIZES = 33
+_EXCHANGES = 20
+_STEP = 1e-6
+"""m, of differences."""
+
+
+@dataclass(frozen=True)
+class Inscribed:
+    """A shape in the workspace, as large as was found.
+
+    Attributes
+    ----------
+    center : array, shape (m,)
+        The pose in its middle, m and rad.
+    size : float
+        Half the edge of a cube, or the radius of a cylinder, m.
+    region : Box or Cylinder
+        The shape.
+    proof : Proof or None
+        That all of it lies in the workspace; None where it was not asked for.
+    """
+
+    center: Array
+    size: float
+    region: Region
+    proof: Proof | None = field(repr=False)
+
+    @property
+    def edge(self) -> float:
+        """The edge of a cube, the diameter of a cylinder, m."""
+        return 2.0 * self.size
+
+
+def largest_cube(
+    robot: RobotLike,
+    pose: PoseLike,
+    *,
+    tolerance: float = 1e-3,
+    proved: bool = True,
+    given: tuple[Condition, ...] | None = None,
+) -> Inscribed:
+    """Return the largest cube in the workspace at the orientation of a pose, and its proof.
+
+    Its edges are along the pose's coordinates; in a plane it is a square. A search by ordinary
+    evaluation, from the best places of a lattice, finds it: no larger one is known, but that there
+    is none is not proved. That all of it lies in the workspace is.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine, in its working mode.
+    pose : array, shape (m,)
+        Gives the orientation, m and rad.
+    tolerance : float
+        By which share the cube may be smaller than the one that was found, so that it is proved.
+    proved : bool
+        Whether it is proved; else it is what the search found, so much smaller.
+    given : tuple of Condition, optional
+        What a pose must keep; by default `conditions(robot)`: reach and limits.
+
+    Returns
+    -------
+    Inscribed
+
+    Raises
+    ------
+    ModelError
+        If there is none: no position is in reach at this orientation, or next to none.
+
+    Examples
+    --------
+    >>> from pteron.workspace import largest_cube
+    >>> found = largest_cube("tripteron-router", [0.1, 0.1, 0.1])
+    >>> round(found.edge, 3), found.proof.holds
+    (0.2, True)
+    """
+    robot = as_manipulator(robot)
+    at = checked_one(robot, pose, "pose")
+    count = len(robot.platform.lengths)
+    corners = np.array(list(np.ndindex(*(5,) * count))) / 2.0 - 1.0
+    surface = corners[(np.abs(corners) == 1.0).any(axis=1)]
+
+    def region(center: Array, size: float) -> Region:
+        half = np.zeros(len(at))
+        half[:count] = size
+        return Box(tuple(center - half), tuple(center + half))
+
+    return _largest(robot, at, surface, region, tolerance, proved, given)
+
+
+def largest_cylinder(
+    robot: RobotLike,
+    pose: PoseLike,
+    *,
+    ratio: float = 1.0,
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0),
+    tolerance: float = 1e-3,
+    proved: bool = True,
+    given: tuple[Condition, ...] | None = None,
+) -> Inscribed:
+    """Return the largest cylinder of a shape in the workspace at an orientation, and its proof.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine, in its working mode; not a planar one.
+    pose : array, shape (m,)
+        Gives the orientation, m and rad.
+    ratio : float
+        Its height over its diameter.
+    axis : (float, float, float)
+        Its direction.
+    tolerance, proved, given
+        As for `largest_cube`.
+
+    Returns
+    -------
+    Inscribed
+
+    Raises
+    ------
+    ModelError
+        If there is none.
+    DataError
+        If the machine is planar, or the ratio not positive.
+    """
+    robot = as_manipulator(robot)
+    at = checked_one(robot, pose, "pose")
+    if robot.platform.planar:
+        raise DataError("robot: a planar machine has no cylinder in its workspace; ask for a cube")
+    if not ratio > 0.0:
+        raise DataError(f"ratio: {ratio!r} given, a number above 0 expected")
+    unit = np.array(Cylinder((0.0, 0.0, 0.0), 1.0, 1.0, axis).axis)
+    across = np.linalg.svd(unit[None])[2][1:]
+    turns = 2.0 * np.pi * np.arange(24) / 24
+    ring = np.cos(turns)[:, None] * across[0] + np.sin(turns)[:, None] * across[1]
+    heights = ratio * np.linspace(-1.0, 1.0, 5)
+    surface = [share * ring + h * unit for h in heights for share in (1.0, 0.5)]
+    surface.append(heights[:, None] * unit)
+
+    def region(center: Array, size: float) -> Region:
+        return Cylinder(tuple(center), size, 2.0 * ratio * size, axis)
+
+    return _largest(robot, at, np.concatenate(surface), region, tolerance, proved, given)
+
+
+def _largest(
+    robot: Manipulator,
+    at: Array,
+    template: Array,
+    region: Callable[[Array, float], Region],
+    tolerance: float,
+    proved: bool,
+    given: tuple[Condition, ...] | None,
+) -> Inscribed:
+    """Return the largest shape; of size 1 its points that matter are `template` (T, k)."""
+    asked = conditions(robot) if given is None else given
+    count = template.shape[1]
+
+    def whole(positions: Array) -> Array:
+        poses = np.broadcast_to(at, (*positions.shape[:-1], len(at))).copy()
+        poses[..., :count] = positions
+        return poses
+
+    search = _Search(lambda positions: rooms_left(robot, asked, whole(positions)), template)
+    places = _starts(robot, at, asked, whole)
+    center, size = max((search.improved(*place) for place in places), key=lambda found: found[1])
+    for _ in range(_EXCHANGES):
+        if size <= 0.0:
+            break
+        middle = whole(center)
+        shape = region(middle, (1.0 - tolerance) * size)
+        if not proved:
+            return Inscribed(middle, (1.0 - tolerance) * size, shape, None)
+        proof = prove(robot, shape, given=asked)
+        if proof.holds:
+            return Inscribed(middle, (1.0 - tolerance) * size, shape, proof)
+        if proof.counterexample is None:
+            size *= 1.0 - tolerance
+            continue
+        # A point that the template has not: from now on it counts.
+        missed = (proof.counterexample[:count] - center) / ((1.0 - tolerance) * size)
+        search.template = np.vstack([search.template, missed])
+        center, size = search.improved(center, search.size_at(center, size))
+    raise ModelError(
+        f"no shape of any size is found in the workspace at the orientation of pose {at.tolist()}",
+        subject=robot.name,
+    )
+
+
+def _starts(
+    robot: Manipulator,
+    at: Array,
+    asked: tuple[Condition, ...],
+    whole: Callable[[Array], Array],
+) -> list[tuple[Array, float]]:
+    """Return the centres of the largest cubes of a lattice, and half their edges."""
+    coarse = paving(robot, at, tolerance=_COARSE, given=asked)
+    boxes = np.concatenate([coarse.inner, coarse.boundary])
+    low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+    step = float((high - low).max()) / (_POINTS - 1)
+    sides = [np.arange(a, b + step, step) for a, b in zip(low, high, strict=True)]
+    lattice = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1)
+    inside = np.pad(kept(robot, asked, whole(lattice)), 1)
+    depth = ndimage.distance_transform_cdt(inside, metric="chessboard")
+    depth = depth[(slice(1, -1),) * depth.ndim].astype(float)
+    found: list[tuple[Array, float]] = []
+    for _ in range(_STARTS):
+        best = np.unravel_index(depth.argmax(), depth.shape)
+        if depth[best] <= 0.0:
+            break
+        found.append((lattice[best], 0.5 * step * float(depth[best])))
+        near = tuple(slice(max(i - int(depth[best]), 0), i + int(depth[best]) + 1) for i in best)
+        depth[near] = 0.0
+    if not found:
+        center = 0.5 * (coarse.inner[:, 0] + coarse.inner[:, 1])
+        widest = (coarse.inner[:, 1] - coarse.inner[:, 0]).min(axis=1)
+        found.append((center[widest.argmax()], 0.25 * float(widest.max())))
+    return found
+
+
+class _Search:
+    """A search for the centre at which a shape can be largest.
+
+    Where the shape's points keep all conditions, linear programs say which way the centre should
+    move so that it can grow; a step that does not help is halved.
+
+    Parameters
+    ----------
+    rooms : callable
+        Of positions (..., k): what is not negative inside, (..., C).
+    template : array, shape (T, k)
+        Points of the shape of size 1.
+    """
+
+    def __init__(self, rooms: Callable[[Array], Array], template: Array) -> None:
+        self.rooms, self.template = rooms, template
+
+    def size_at(self, center: Array, most: float) -> float:
+        """Return the largest size up to `most` up to which all of the shape's points are inside."""
+        low, high = 0.0, most
+        for _ in range(4):
+            sizes = np.linspace(low, high, _SIZES)
+            points = center + sizes[:, None, None] * self.template
+            good = (self.rooms(points) >= 0.0).all(axis=(1, 2))
+            first = _SIZES if good.all() else int((~good).argmax())
+            if first in (0, _SIZES):
+                return high if first else 0.0
+            low, high = sizes[first - 1], sizes[first]
+        return float(low)
+
+    def improved(self, center: Array, size: float) -> tuple[Array, float]:
+        """Return a centre, from one on, at which the shape is largest, and its size there."""
+        size = self.size_at(center, 2.0 * size)
+        trust = max(size, _STEP)
+        for _ in range(_STEPS):
+            moved, grown = self._step(center, size, trust)
+            reached = self.size_at(moved, max(grown, 2.0 * size))
+            if reached > size:
+                gain, center, size = reached - size, moved, reached
+                if gain < 1e-7 * size:
+                    break
+            else:
+                trust *= 0.35
+                if trust < 1e-6 * max(size, _STEP):
+                    break
+        return center, size
+
+    def _step(self, center: Array, size: float, trust: float) -> tuple[Array, float]:
+        """Return where a linear program would move the centre, and what size it hopes for."""
+        k = len(center)
+        points = center + size * self.template
+        values = self.rooms(points)
+        ways = _STEP * np.eye(k)
+        slopes = np.stack(
+            [(self.rooms(points + w) - self.rooms(points - w)) / (2.0 * _STEP) for w in ways], -1
+        )
+        lengths = np.linalg.norm(slopes, axis=-1)
+        near = np.isfinite(values) & np.isfinite(lengths) & (lengths > 0.0)
+        near &= values < 4.0 * trust * np.where(near, lengths, 1.0)
+        rows, columns = np.nonzero(near)
+        normals = slopes[rows, columns] / lengths[rows, columns][:, None]
+        grows = np.einsum("nk,nk->n", normals, self.template[rows])
+        found = linprog(
+            np.append(np.zeros(k), -1.0),
+            A_ub=-np.column_stack([normals, grows]),
+            b_ub=np.maximum(values[rows, columns] / lengths[rows, columns], 0.0),
+            bounds=[(-trust, trust)] * (k + 1),
+        )
+        if found.x is None:
+            return center, size
+        return center + found.x[:k], size + float(found.x[k])

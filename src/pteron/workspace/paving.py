@@ -1,0 +1,251 @@
+"""The workspace in boxes: some proved inside, some undecided, all the rest proved outside."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pteron.errors import DataError, ModelError
+from pteron.kernels import Array, as_array
+from pteron.kinematics.evaluate import checked_one
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.shapes import PoseLike
+from pteron.workspace.conditions import Condition, Judge, conditions, judge
+from pteron.workspace.enclosing import enclosing_box
+
+_SLICE = 1 << 16
+"""Boxes between two looks at whether the tolerance is met."""
+
+_FACE = 1e-6
+"""Share of the smallest box's side within which a pose counts as on its face."""
+
+_SMALLEST = 1e-18
+"""Volume below which boxes are not halved: there is nothing inside them."""
+
+
+@dataclass(frozen=True)
+class Paving:
+    """The workspace of a machine, at one orientation or over an interval of them, in boxes.
+
+    Attributes
+    ----------
+    robot : Manipulator
+        The machine, in its working mode.
+    conditions : tuple of Condition
+        What a pose must keep.
+    box : array, shape (2, m)
+        What is paved: least and greatest pose. Nothing is said of poses outside of it.
+    inner : array, shape (N, 2, k)
+        Boxes that are proved to lie inside: their corners, of the k coordinates that vary.
+    boundary : array, shape (M, 2, k)
+        Boxes of which that is not decided. Everything else in `box` is proved to lie outside.
+    causes : array of bool, shape (M, C)
+        Which conditions are undecided in each of them: they name the boundary.
+    axes : tuple of str
+        The coordinates that vary: ``("x", "y", "z")`` at one orientation in space.
+    inner_volume, outer_volume : float
+        The volume is proved to be between them.
+    unit : str
+        Of both: "m^3", "m^2", or with "rad" where phi varies.
+    complete : bool
+        Whether the tolerance was met before there were too many boxes.
+    """
+
+    robot: Manipulator = field(repr=False)
+    conditions: tuple[Condition, ...] = field(repr=False)
+    box: Array = field(repr=False)
+    inner: Array = field(repr=False)
+    boundary: Array = field(repr=False)
+    causes: NDArray[np.bool_] = field(repr=False)
+    axes: tuple[str, ...]
+    inner_volume: float
+    outer_volume: float
+    unit: str
+    complete: bool
+
+    @property
+    def gap(self) -> float:
+        """What is undecided, as a share of what is proved inside."""
+        undecided = self.outer_volume - self.inner_volume
+        return undecided / self.inner_volume if self.inner_volume else math.inf
+
+    def locate(self, poses: ArrayLike) -> NDArray[np.int8]:
+        """Return 1 for poses (..., m) that are proved inside, -1 outside, 0 where undecided.
+
+        Nothing is decided of poses outside of `box`, nor of those on the faces of boxes.
+        """
+        given = as_array(poses, "poses", (self.box.shape[1],))
+        flat = given.reshape(-1, self.box.shape[1])
+        moving = [self.robot.coordinates.index(axis) for axis in self.axes]
+        start, size = self.box[0, moving], (self.box[1] - self.box[0])[moving]
+        places = (flat[:, moving] - start) / size
+        found = np.full(len(flat), -1, np.int8)
+        finest = np.zeros(len(moving))
+        for boxes, value in ((self.boundary, 0), (self.inner, 1)):
+            depths = np.round(np.log2(size / (boxes[:, 1] - boxes[:, 0])))
+            finest = np.maximum(finest, depths.max(axis=0, initial=0.0))
+            for depth in np.unique(depths, axis=0):
+                lattice = boxes[(depths == depth).all(axis=1), 0]
+                cells = np.round((lattice - start) / size * 2.0**depth)
+                asked = np.flatnonzero(found < 0)
+                found[asked[_among(cells, np.floor(places[asked] * 2.0**depth), depth)]] = value
+        fine = places * 2.0**finest
+        on_face = (np.abs(fine - np.round(fine)) < _FACE).any(axis=1)
+        beyond = ((flat < self.box[0]) | (flat > self.box[1])).any(axis=1)
+        found[on_face | beyond] = 0
+        return found.reshape(given.shape[:-1])
+
+
+def _among(cells: Array, asked: Array, depth: Array) -> NDArray[np.bool_]:
+    """Return which of the cells (P, k) asked for are among cells (N, k) of a lattice."""
+    weights = np.cumprod(np.append(1.0, 2.0 ** depth[:-1] + 2.0))
+    keys = np.sort((cells + 1.0) @ weights)
+    wanted = np.clip(asked + 1.0, 0.0, 2.0**depth + 1.0) @ weights
+    at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+    return np.asarray(keys[at] == wanted)
+
+
+def paving(
+    robot: RobotLike,
+    pose: PoseLike,
+    *,
+    tolerance: float = 0.01,
+    within: ArrayLike | None = None,
+    given: tuple[Condition, ...] | None = None,
+    most: int = 6_000_000,
+) -> Paving:
+    """Return the workspace at the orientation of a pose, in boxes that are proved.
+
+    Boxes are halved until what is undecided is small enough beside what is inside. In each one
+    interval arithmetic decides (see `pteron.kernels.bounds`): all that is kept in all of the box is
+    not asked again of its halves.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine, in its working mode.
+    pose : array, shape (m,)
+        Gives the orientation, m and rad.
+    tolerance : float
+        Greatest undecided volume, as a share of the inner one.
+    within : array, shape (2, k) or (2, m), optional
+        Least and greatest position that are looked at; by default a box that is proved to hold the
+        whole workspace. With phi too, the workspace over an interval of orientations.
+    given : tuple of Condition, optional
+        What a pose must keep; by default `conditions(robot)`: reach and limits.
+    most : int
+        Undecided boxes at which it ends, whatever the tolerance.
+
+    Returns
+    -------
+    Paving
+
+    Raises
+    ------
+    ModelError
+        If no position is in reach at this orientation, or the reach has no end.
+    DataError
+        If the tolerance is not positive, or the box is none.
+
+    Examples
+    --------
+    >>> from pteron.workspace import paving
+    >>> found = paving("five-bar", [0.0, 0.3], tolerance=0.05)
+    >>> found.complete, found.inner_volume < found.outer_volume < 1.05 * found.inner_volume
+    (True, True)
+    """
+    robot = as_manipulator(robot)
+    at = checked_one(robot, pose, "pose")
+    if not tolerance > 0.0:
+        raise DataError(f"tolerance: {tolerance!r} given, a share above 0 expected")
+    box = region_box(robot, at, within)
+    asked = conditions(robot) if given is None else given
+    inner, boundary, open_, complete = _refined(judge(robot, asked), box, tolerance, most)
+    if not len(inner) and complete:
+        raise ModelError(
+            "no position is in reach of all legs, within the joints' limits, at the orientation of "
+            f"pose {at.tolist()}; this is proved",
+            subject=robot.name,
+        )
+    axes = tuple(robot.coordinates[i] for i in np.flatnonzero(box[0] < box[1]))
+    volumes = [math.fsum(np.prod(b[:, 1] - b[:, 0], axis=1)) for b in (inner, boundary)]
+    lengths = sum(axis != "phi" for axis in axes)
+    unit = f"m^{lengths}" + (" rad" if "phi" in axes else "")
+    bits = np.uint64(1) << np.arange(len(asked), dtype=np.uint64)
+    causes = (open_[:, None] & bits) != 0
+    return Paving(
+        robot, asked, box, inner, boundary, causes, axes, volumes[0], sum(volumes), unit, complete
+    )
+
+
+def region_box(robot: Manipulator, at: Array, within: ArrayLike | None) -> Array:
+    """Return least and greatest pose (2, m) of what is looked at."""
+    box = np.array([at, at])
+    count = len(robot.platform.lengths)
+    if within is None:
+        box[:, :count] = enclosing_box(robot, at, at)
+        return box
+    given = np.asarray(within, dtype=float)
+    if given.shape not in ((2, count), (2, len(at))) or not (given[0] <= given[1]).all():
+        raise DataError(
+            f"within: least and greatest position expected, shape (2, {count}) or, with phi, "
+            f"(2, {len(at)})"
+        )
+    box[:, : given.shape[1]] = given
+    return box
+
+
+def _refined(
+    judging: Judge, box: Array, tolerance: float, most: int
+) -> tuple[Array, Array, NDArray[np.uint64], bool]:
+    """Return inner and undecided boxes, what is open in the latter, and whether it is enough."""
+    moving = np.flatnonzero(box[0] < box[1])
+    found: list[Array] = []
+    left, open_ = box[None][:, :, moving], np.array([judging.all])
+    inside, undecided = 0.0, math.inf
+    first = True
+    while len(left):
+        halves = left if first else halved(left[:1])
+        each = float(np.prod(halves[0, 1] - halves[0, 0]))
+        undecided = each * len(left) * len(halves)
+        done, kept, kept_open = False, [], []
+        for start in range(0, len(left), _SLICE):
+            rest = slice(start + _SLICE, None)
+            part, still = left[start : start + _SLICE], open_[start : start + _SLICE]
+            if not first:
+                part, still = halved(part), np.repeat(still, 2)
+            outside, still = judging(*_whole(box, moving, part), still)
+            sure = (still == 0) & ~outside
+            found.append(part[sure])
+            kept.append(part[~sure & ~outside])
+            kept_open.append(still[~sure & ~outside])
+            inside += each * int(sure.sum())
+            undecided -= each * int((sure | outside).sum())
+            done = inside > 0.0 and undecided <= tolerance * inside
+            if done or sum(map(len, kept)) + len(left[rest]) > most:
+                left = np.concatenate([*kept, left[rest]])
+                return np.concatenate(found), left, np.concatenate([*kept_open, open_[rest]]), done
+        left, open_ = np.concatenate(kept), np.concatenate(kept_open)
+        first = False
+        if each < _SMALLEST:
+            return np.concatenate(found), left, open_, False
+    return np.concatenate(found), left, open_, True
+
+
+def _whole(box: Array, moving: NDArray[np.intp], boxes: Array) -> tuple[Array, Array]:
+    """Return the corners (B, m), each, of boxes (B, 2, k) of the coordinates that vary."""
+    low, high = (np.repeat(corner[None], len(boxes), axis=0) for corner in box)
+    low[:, moving], high[:, moving] = boxes[:, 0], boxes[:, 1]
+    return low, high
+
+
+def halved(boxes: Array) -> Array:
+    """Return both halves of boxes (N, 2, k) of one size, across their longest side."""
+    axis = int((boxes[0, 1] - boxes[0, 0]).argmax())
+    halves = np.repeat(boxes, 2, axis=0)
+    middle = 0.5 * (boxes[:, 0, axis] + boxes[:, 1, axis])
+    halves[0::2, 1, axis] = halves[1::2, 0, axis] = middle
+    return halves

@@ -1,0 +1,207 @@
+"""Proofs that a region of poses lies in the workspace, or a pose of it that does not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.errors import DataError
+from pteron.kernels import Array, numeric
+from pteron.kinematics.limits import limited_joints
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.workspace.conditions import Condition, Judge, conditions, judge, rooms_left
+from pteron.workspace.regions import Region
+
+_TRIED = 4096
+"""Undecided boxes whose middles and corners are tried as counterexamples, on each level."""
+
+_SLICE = 1 << 16
+
+_THINNEST = 1e-9
+"""Share of the region's sides below which a box is not halved."""
+
+
+@dataclass(frozen=True)
+class Proof:
+    """What is proved of a region.
+
+    Attributes
+    ----------
+    holds : bool or None
+        True: every pose of it keeps all conditions. False: `counterexample` does not. None: it is
+        not decided, as where the region touches the boundary.
+    robot : Manipulator
+        The machine.
+    region : Box or Cylinder
+        What was asked.
+    conditions : tuple of Condition
+        What its poses must keep.
+    counterexample : array, shape (m,), or None
+        A pose of the region that is proved not to keep all of them.
+    undecided : array, shape (2, m), or None
+        The smallest box that is not decided.
+    causes : tuple of Condition
+        What the counterexample fails, or what is not decided of that box.
+    boxes : int
+        How many boxes were looked at.
+    """
+
+    holds: bool | None
+    robot: Manipulator = field(repr=False)
+    region: Region
+    conditions: tuple[Condition, ...] = field(repr=False)
+    counterexample: Array | None = None
+    undecided: Array | None = None
+    causes: tuple[Condition, ...] = ()
+    boxes: int = 0
+
+    def __str__(self) -> str:
+        told = ", ".join(map(str, self.causes))
+        if self.holds:
+            return f"proved with {self.boxes} boxes: every pose keeps {len(self.conditions)} bounds"
+        if self.counterexample is not None:
+            return (
+                f"not so: pose {self.counterexample.round(6).tolist()} does not serve: {self.why}"
+            )
+        assert self.undecided is not None
+        low, high = (corner.round(6).tolist() for corner in self.undecided)
+        return f"not decided of poses from {low} to {high}: {told}; the region may touch that bound"
+
+    @property
+    def why(self) -> str:
+        """What the counterexample fails, by ordinary evaluation: which leg, and by how much."""
+        if self.counterexample is None:
+            return ""
+        margins = numeric(self.robot, "reach")(self.counterexample)[0]
+        joints = {(j.leg, j.noun): j for j in limited_joints(self.robot, self.counterexample)}
+        told = []
+        for condition in self.causes:
+            joint = joints.get((condition.leg, condition.cause.split(" at ")[0]))
+            text = str(condition)
+            if joint is not None:
+                text += f" ({joint.value:.4g} {joint.unit} of {joint.told_limits('{:g}'.format)})"
+            elif condition.leg and margins[condition.leg - 1] < 0.0:
+                text += f" (it misses the pose by {-margins[condition.leg - 1]:.3g} m)"
+            told.append(text)
+        return ", ".join(told)
+
+
+def prove(
+    robot: RobotLike,
+    region: Region,
+    *,
+    type_i: float = 0.0,
+    type_ii: float = 0.0,
+    given: tuple[Condition, ...] | None = None,
+    most: int = 1_000_000,
+) -> Proof:
+    """Prove that every pose of a region keeps reach, limits and floors, or show one that does not.
+
+    Interval arithmetic decides of a box as a whole; a box that it does not decide is halved. A
+    counterexample is a pose that fails by ordinary evaluation and by intervals.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine, in its working mode.
+    region : Box or Cylinder
+        Of poses.
+    type_i : float
+        Least type-I measure of every leg; 0: it need only reach.
+    type_ii : float
+        Least size of the type-II measure; 0: it does not matter.
+    given : tuple of Condition, optional
+        What a pose must keep in place of reach and limits; the floors come on top.
+    most : int
+        Undecided boxes at which it gives up.
+
+    Returns
+    -------
+    Proof
+
+    Raises
+    ------
+    DataError
+        If the region's poses have not the machine's coordinates.
+
+    Examples
+    --------
+    >>> from pteron.workspace import Box, prove
+    >>> cube = Box((-0.05, -0.05, -0.05, 0.0), (0.05, 0.05, 0.05, 0.0))
+    >>> prove("quadrupteron", cube, type_ii=0.9).holds
+    True
+    """
+    robot = as_manipulator(robot)
+    box = region.box
+    if box.shape[1] != robot.freedom:
+        names = ", ".join(robot.coordinates)
+        raise DataError(f"region: {box.shape[1]} coordinates given, {names} expected")
+    asked = conditions(robot, type_i=type_i, type_ii=type_ii)
+    if given is not None:
+        asked = (*given, *(c for c in asked if c.what != "room"))
+    judging = judge(robot, asked)
+    left, open_, seen = box[None], np.array([judging.all]), 0
+    least = _THINNEST * (box[1] - box[0])
+    while True:
+        parts, still = [], []
+        for start in range(0, len(left), _SLICE):
+            part, bits = left[start : start + _SLICE], open_[start : start + _SLICE]
+            meets = ~region.misses(part[:, 0], part[:, 1])
+            part, bits = part[meets], bits[meets]
+            seen += len(part)
+            outside, bits = judging(part[:, 0], part[:, 1], bits)
+            parts.append(part[outside | (bits != 0)])
+            still.append(bits[outside | (bits != 0)])
+        left, open_ = np.concatenate(parts), np.concatenate(still)
+        if not len(left):
+            return Proof(True, robot, region, asked, boxes=seen)
+        found = _counterexample(robot, judging, region, left)
+        if found is not None:
+            failed = tuple(
+                asked[c] for c in np.flatnonzero(~(rooms_left(robot, asked, found) >= 0.0))
+            )
+            return Proof(False, robot, region, asked, found, causes=failed, boxes=seen)
+        sides = left[:, 1] - left[:, 0]
+        if 2 * len(left) > most or (sides <= least).all():
+            smallest = int(np.prod(np.where(sides > 0.0, sides, 1.0), axis=1).argmin())
+            bits = int(open_[smallest])
+            causes = tuple(c for k, c in enumerate(asked) if bits >> k & 1)
+            return Proof(
+                None, robot, region, asked, None, left[smallest], causes=causes, boxes=seen
+            )
+        left, open_ = _halved(left, box[1] - box[0]), np.repeat(open_, 2)
+
+
+def _halved(boxes: Array, whole: Array) -> Array:
+    """Return both halves of boxes (N, 2, m), each across the side that is the largest of `whole`'s.
+
+    So coordinates of different units are halved alike.
+    """
+    shares = (boxes[:, 1] - boxes[:, 0]) / np.where(whole > 0.0, whole, 1.0)
+    axis, rows = shares.argmax(axis=1), np.arange(len(boxes))
+    middle = 0.5 * (boxes[rows, 0, axis] + boxes[rows, 1, axis])
+    halves = np.repeat(boxes, 2, axis=0)
+    halves[2 * rows, 1, axis] = halves[2 * rows + 1, 0, axis] = middle
+    return halves
+
+
+def _counterexample(
+    robot: Manipulator, judging: Judge, region: Region, boxes: Array
+) -> Array | None:
+    """Return a pose of the region that is proved to fail: a middle or a corner of boxes."""
+    tried = boxes[:: max(len(boxes) // _TRIED, 1)]
+    varies = np.flatnonzero((tried[:, 0] < tried[:, 1]).any(axis=0))
+    poses = [0.5 * (tried[:, 0] + tried[:, 1])]
+    for corner in np.ndindex(*(2,) * len(varies)):
+        pose = tried[:, 0].copy()
+        pose[:, varies] = np.stack(
+            [tried[:, side, axis] for side, axis in zip(corner, varies, strict=True)], axis=1
+        )
+        poses.append(pose)
+    every = np.concatenate(poses)
+    every = every[region.holds(every)]
+    failing = every[~(rooms_left(robot, judging.given, every) >= 0.0).all(axis=-1)]
+    proved: NDArray[np.bool_] = judging(failing, failing, np.full(len(failing), judging.all))[0]
+    return failing[proved.argmax()] if proved.any() else None

@@ -1,0 +1,153 @@
+"""Regions of poses that are asked to lie in a workspace: boxes and cylinders."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pteron.errors import DataError
+from pteron.kernels import Array
+
+_WIDER = 1e-12
+"""m, and relative: far more than the rounding of what is compared."""
+
+
+class Region(Protocol):
+    """A set of poses."""
+
+    @property
+    def box(self) -> Array:
+        """Least and greatest pose (2, m): the region lies between them."""
+
+    def holds(self, poses: Array) -> NDArray[np.bool_]:
+        """Return which poses (..., m) lie in it."""
+
+    def misses(self, low: Array, high: Array) -> NDArray[np.bool_]:
+        """Return which boxes with corners (B, m) surely have no pose of it."""
+
+
+@dataclass(frozen=True)
+class Box:
+    """All poses between two.
+
+    Parameters
+    ----------
+    low, high : sequence of float
+        Least and greatest value of each of the pose's coordinates, m and rad; where they are equal
+        it does not vary.
+    """
+
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        low, high = (_numbers(getattr(self, name), name) for name in ("low", "high"))
+        if len(low) != len(high) or any(a > b for a, b in zip(low, high, strict=True)):
+            raise DataError(
+                f"box: low {list(low)} must have as many numbers as high {list(high)}, none greater"
+            )
+        object.__setattr__(self, "low", low)
+        object.__setattr__(self, "high", high)
+
+    @classmethod
+    def around(cls, poses: ArrayLike, margin: ArrayLike = 0.0) -> Box:
+        """Return the least box that holds poses (..., m), such as those of a pick-and-place cycle.
+
+        With a margin (m,), or one for all coordinates, it is so much wider on each side.
+        """
+        given = np.asarray(poses, dtype=float)
+        if given.ndim < 1 or not given.size:
+            raise DataError("poses: none given, at least one expected")
+        flat = given.reshape(-1, given.shape[-1])
+        return cls(tuple(flat.min(axis=0) - margin), tuple(flat.max(axis=0) + margin))
+
+    @property
+    def box(self) -> Array:
+        """Least and greatest pose (2, m)."""
+        return np.array([self.low, self.high])
+
+    def holds(self, poses: Array) -> NDArray[np.bool_]:
+        """Return which poses (..., m) lie in it."""
+        return np.asarray(((self.low <= poses) & (poses <= self.high)).all(axis=-1))
+
+    def misses(self, low: Array, high: Array) -> NDArray[np.bool_]:
+        """Return which boxes with corners (B, m) surely have no pose of it."""
+        return np.asarray(((high < self.low) | (low > self.high)).any(axis=-1))
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """All positions of an upright or a tilted cylinder, at one orientation.
+
+    Parameters
+    ----------
+    center : sequence of float
+        The pose at its middle, m and rad; its angle, if it has one, holds throughout.
+    radius : float
+        m.
+    height : float
+        m.
+    axis : (float, float, float)
+        Its direction.
+    """
+
+    center: tuple[float, ...]
+    radius: float
+    height: float
+    axis: tuple[float, ...] = (0.0, 0.0, 1.0)
+
+    def __post_init__(self) -> None:
+        center, axis = (_numbers(getattr(self, name), name) for name in ("center", "axis"))
+        if len(center) < 3 or len(axis) != 3 or not any(axis):
+            raise DataError("cylinder: a pose with x, y and z is needed for center, and an axis")
+        if not (self.radius >= 0.0 and self.height >= 0.0):
+            raise DataError(
+                f"cylinder: radius {self.radius!r} and height {self.height!r} must not be negative"
+            )
+        length = float(np.linalg.norm(axis))
+        object.__setattr__(self, "center", center)
+        object.__setattr__(self, "axis", tuple(a / length for a in axis))
+
+    @property
+    def box(self) -> Array:
+        """Least and greatest pose (2, m)."""
+        along = np.array(self.axis)
+        half = 0.5 * self.height * np.abs(along)
+        half = half + self.radius * np.sqrt(np.maximum(1.0 - along * along, 0.0))
+        half = half * (1.0 + _WIDER) + _WIDER
+        box = np.array([self.center, self.center])
+        box[:, :3] += np.array([-half, half])
+        return box
+
+    def _places(self, poses: Array) -> tuple[Array, Array]:
+        """Return the way of positions (..., 3) from the middle, along the axis and across it."""
+        away, axis = poses[..., :3] - self.center[:3], np.array(self.axis)
+        along = away @ axis
+        return along, away - along[..., None] * axis
+
+    def holds(self, poses: Array) -> NDArray[np.bool_]:
+        """Return which poses (..., m) lie in it."""
+        along, across = self._places(poses)
+        inside = np.linalg.norm(across, axis=-1) <= self.radius
+        return np.asarray(inside & (np.abs(along) <= 0.5 * self.height))
+
+    def misses(self, low: Array, high: Array) -> NDArray[np.bool_]:
+        """Return which boxes with corners (B, m) surely have no pose of it."""
+        along, across = self._places(0.5 * (low + high))
+        half, axis = 0.5 * (high - low)[:, :3], np.array(self.axis)
+        slack = _WIDER * (1.0 + self.radius + self.height)
+        far = np.abs(along) - half @ np.abs(axis) > 0.5 * self.height + slack
+        # What of a box lies across the axis is so near to that of its middle, by components.
+        shadow = half @ np.abs(np.eye(3) - np.outer(axis, axis))
+        nearest = np.maximum(np.abs(across) - shadow, 0.0)
+        return np.asarray(far | (np.linalg.norm(nearest, axis=-1) > self.radius + slack))
+
+
+def _numbers(value: object, name: str) -> tuple[float, ...]:
+    array = np.asarray(value, dtype=float)
+    if array.ndim != 1 or not np.isfinite(array).all():
+        raise DataError(f"{name}: {value!r} given, a row of finite numbers expected")
+    return tuple(array.tolist())
