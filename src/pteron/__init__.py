@@ -77,6 +77,7 @@ Leg = PRRR
 if TYPE_CHECKING:
     from pteron import (
         controllers,
+        design,
         environments,
         export,
         identification,
@@ -106,7 +107,7 @@ _LATER = {
     "export_st": "pteron.export",
 }
 _LATER_MODULES = (
-    *("controllers", "environments", "export", "identification", "indices"),
+    *("controllers", "design", "environments", "export", "identification", "indices"),
     *("motion", "plots", "report", "viewer", "workspace"),
 )
 """What would slow the start of those who do not use it (SymPy, SciPy, matplotlib, Gymnasium)."""
@@ -162,6 +163,7 @@ __all__ = [
     "constraint_measure",
     "controllers",
     "coriolis_matrix",
+    "design",
     "direct_kinematics",
     "drive_accelerations",
     "drive_forces",
