@@ -15,6 +15,7 @@ import cycle
 import engines
 import keys
 import legs
+import maps
 import view_page
 from alike import alike
 
@@ -25,6 +26,7 @@ DRAWN: dict[str, Callable[[Path], None]] = {
     "cycle": cycle.draw,
     "engines": engines.draw,
     "legs": legs.draw,
+    "maps": maps.draw,
     "view_page": view_page.draw,
 }
 """What writes each group of pictures into a folder laid out as docs, by the script's name."""

@@ -83,6 +83,7 @@ if TYPE_CHECKING:
         export,
         identification,
         indices,
+        maps,
         motion,
         plots,
         report,
@@ -109,7 +110,7 @@ _LATER = {
 }
 _LATER_MODULES = (
     *("controllers", "design", "environments", "export", "identification", "indices"),
-    *("motion", "plots", "report", "viewer", "workspace"),
+    *("maps", "motion", "plots", "report", "viewer", "workspace"),
 )
 """What would slow the start of those who do not use it (SymPy, SciPy, matplotlib, Gymnasium)."""
 
@@ -189,6 +190,7 @@ __all__ = [
     "link_jacobians",
     "link_vectors",
     "load",
+    "maps",
     "mass_matrix",
     "motion",
     "parameter_data",
