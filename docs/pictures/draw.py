@@ -13,9 +13,9 @@ from tempfile import TemporaryDirectory
 import catalog
 import cycle
 import engines
+import index_maps
 import keys
 import legs
-import maps
 import view_page
 from alike import alike
 
@@ -26,7 +26,7 @@ DRAWN: dict[str, Callable[[Path], None]] = {
     "cycle": cycle.draw,
     "engines": engines.draw,
     "legs": legs.draw,
-    "maps": maps.draw,
+    "maps": index_maps.draw,
     "view_page": view_page.draw,
 }
 """What writes each group of pictures into a folder laid out as docs, by the script's name."""
