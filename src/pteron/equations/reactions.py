@@ -14,6 +14,7 @@ from typing import NamedTuple
 import casadi as ca
 
 from pteron.bodies.motion import Expression, Moments, needed_wrench
+from pteron.bodies.parameters import LEG_BODIES
 from pteron.bodies.vectors import Vector
 from pteron.equations.machine import Machine, State
 from pteron.legs.kind import LegKind
@@ -96,6 +97,37 @@ def equilibrium(machine: Machine, state: State, parameters: Expression) -> Equil
         tuple(legs),
         *wanted,
     )
+
+
+class Beams(NamedTuple):
+    """The links of the legs as beams, and what rods carry: NaN where a leg has none."""
+
+    starts: list[Expression]
+    """(2, 3) a leg: where its upper and its lower link begin."""
+    ways: list[Expression]
+    """(2, 3): from there along the link to its end."""
+    axes: list[Expression]
+    """(2, 3): about which a link bends in its leg's plane."""
+    couples: list[Expression]
+    """(3, 1): bar x rod, the couple of rods; zero of a single rod, NaN where the link is a beam."""
+
+
+def beams(machine: Machine, state: State) -> Beams:
+    """Return the links of a state's legs."""
+    found = Beams([], [], [], [])
+    for leg, motion in zip(machine.robot.legs, state.legs, strict=True):
+        rows = []
+        for letter, way in zip(LEG_BODIES[1:], motion.links, strict=True):
+            if way is None:
+                rows.append(ca.SX.nan(3, 3))
+                continue
+            joint = next(j for j in reversed(motion.chain) if j.body == letter)
+            rows.append(ca.horzcat(joint.point, way, joint.axis))
+        for k, part in enumerate(found[:3]):
+            part.append(ca.horzcat(*(row[:, k] for row in rows)).T)
+        couple = leg.couple(motion)
+        found.couples.append(ca.SX.nan(3, 1) if couple is None else couple)
+    return found
 
 
 def _leg_forces(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -11,13 +10,11 @@ from numpy.typing import ArrayLike
 
 from pteron.equations.machine import Machine
 from pteron.errors import DataError
+from pteron.indices.internal_forces import Equations, hold, inverse, moved, on_platform, times
 from pteron.kernels import Array, as_array
 from pteron.kinematics.evaluate import checked, evaluated
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import OnFailure, PoseLike
-
-_RANK = 1e-10
-"""Share of the largest singular value below which one counts as zero."""
 
 
 @dataclass(frozen=True)
@@ -130,11 +127,11 @@ def reactions(
     acting = rest if wrench is None else checked(robot, wrench, "wrench", on_failure)
     turning = np.zeros(3) if moment is None else as_array(moment, "moment", (3,))
     lead = np.broadcast_shapes(found[1].shape[:-1], acting.shape[:-1], turning.shape[:-1])
-    load = np.broadcast_to(_on_platform(robot, acting, turning), (*lead, 6))
+    load = np.broadcast_to(on_platform(robot, acting, turning), (*lead, 6))
     acting = np.broadcast_to(acting, (*lead, robot.freedom))
     axes = found[1].ndim - 1
     flat = (np.broadcast_to(a, lead + a.shape[axes:]).reshape(-1, *a.shape[axes:]) for a in found)
-    given = _Equations(*flat)
+    given = Equations(*flat)
     points, passed, actuators, redundancy, unheld = _solved(
         given, acting.reshape(-1, robot.freedom), load.reshape(-1, 6), by
     )
@@ -147,38 +144,12 @@ def reactions(
     )
 
 
-class _Equations(NamedTuple):
-    """What the kernel "reactions" returns, for B states; see `equations.reactions`."""
-
-    rows: Array
-    right: Array
-    presumed_rows: Array
-    presumed_right: Array
-    driven_rows: Array
-    driven: Array
-    ends: Array
-    points: Array
-    passed: Array
-
-
-def _on_platform(robot: Manipulator, wrench: Array, moment: Array) -> Array:
-    """Return the force and the moment at P (..., 6) of a wrench and of a moment beside it."""
-    count, platform = len(robot.platform.lengths), robot.platform
-    force = wrench[..., :count] @ platform.directions
-    turning = np.zeros(3)
-    if platform.turns and not platform.slides:
-        turning = wrench[..., -1:] * np.array(platform.axis)
-    force, whole = np.broadcast_arrays(force, turning + moment)
-    return np.concatenate([force, whole], axis=-1)
-
-
 def _solved(
-    given: _Equations, wrench: Array, load: Array, length: float
+    given: Equations, wrench: Array, load: Array, length: float
 ) -> tuple[Array, Array, Array, int, Array]:
     """Return points, what the joints pass on (B, n, j, 6), actuator forces, self-stresses, unheld.
 
-    First what must hold, then of that what is nearest to what the legs are presumed to hold, then
-    of that what has the least norm: each in what the last left free.
+    Of what self-stress leaves free that of the least norm is taken.
     """
     batch, n, joints, _ = given.passed.shape
     points, passed = given.points.copy(), np.full(given.passed.shape, np.nan)
@@ -187,57 +158,28 @@ def _solved(
     points[~good] = np.nan
     if not good.any():
         return points, passed, actuators, 0, unheld
-    g = _Equations(*(part[good] for part in given))
-    size = np.tile([1.0, 1.0, 1.0, length, length, length], n)
-    rows, presumed, driven = g.rows * size, g.presumed_rows * size, g.driven_rows * size
-    right, wanted = g.right.copy(), g.presumed_right.copy()
+    g = Equations(*(part[good] for part in given))
+    right, presumed = g.right.copy(), g.presumed_right.copy()
     right[:, :n] -= wrench[good]
-    wanted[:, :6] -= load[good]
-
-    back = _inverse(rows)
-    w = _times(back, right)
-    free = np.eye(6 * n) - back @ rows
-    back = _inverse(presumed @ free)
-    w += _times(back, wanted - _times(presumed, w))
-    missed = _times(presumed, w) - wanted
-    missed[:, 3:] /= length
-    free -= back @ presumed @ free
-    redundancy = round(float(np.trace(free[0])))
+    presumed[:, :6] -= load[good]
+    held = hold(g, right[..., None], presumed[..., None], length)
+    w, redundancy = held.forces[..., 0], held.redundancy
     there = np.isfinite(g.passed[..., 0])
-    spread = _spread(g.ends[:, :, None] - g.points) * size[:6]
+    spread = moved(g.ends[:, :, None] - g.points)
     both = np.zeros((len(w), n, joints, 6, n, 6))
     for i in range(n):
         both[:, i, :, :, i, :] = np.where(there[:, i, :, None, None], spread[:, i], 0.0)
     passing = both.reshape(len(w), -1, 6 * n)
     needed = np.where(there[..., None], g.passed, 0.0).reshape(len(w), -1)
-    per = np.tile([1.0, 1.0, 1.0, 1 / length, 1 / length, 1 / length], n * joints)
     if redundancy:
-        back = _inverse(per[:, None] * passing @ free)
-        w -= _times(free @ back, per * (_times(passing, w) + needed))
-    found = (_times(passing, w) + needed).reshape(-1, n, joints, 6)
+        per = np.tile([1.0, 1.0, 1.0, 1 / length, 1 / length, 1 / length], n * joints)
+        back = inverse(per[:, None] * passing @ held.free)
+        w = w - times(held.free @ back, per * (times(passing, w) + needed))
+    found = (times(passing, w) + needed).reshape(-1, n, joints, 6)
     passed[good] = np.where(there[..., None], found, np.nan)
-    actuators[good] = _times(driven, w) + g.driven
-    unheld[good] = np.linalg.norm(missed, axis=-1)
+    actuators[good] = times(g.driven_rows, w) + g.driven
+    unheld[good] = np.linalg.norm(held.missed[..., 0], axis=-1)
     return points, passed, actuators, redundancy, unheld
-
-
-def _spread(arms: Array) -> Array:
-    """Return rows (..., 6, 6): what a wrench at c is at points whose way to c is `arms`."""
-    found = np.zeros((*arms.shape[:-1], 6, 6))
-    found[...] = np.eye(6)
-    x, y, z = np.moveaxis(arms, -1, 0)
-    found[..., 3, 1], found[..., 3, 2] = -z, y
-    found[..., 4, 0], found[..., 4, 2] = z, -x
-    found[..., 5, 0], found[..., 5, 1] = -y, x
-    return found
-
-
-def _inverse(matrices: Array) -> Array:
-    return np.asarray(np.linalg.pinv(matrices, rcond=_RANK))
-
-
-def _times(matrices: Array, vectors: Array) -> Array:
-    return np.asarray((matrices @ vectors[..., None])[..., 0])
 
 
 def _names(robot: Manipulator) -> tuple[tuple[str, ...], ...]:

@@ -20,7 +20,7 @@ from pteron.equations import (
     reactions,
     regressor,
 )
-from pteron.equations.clearance import clearances
+from pteron.equations.clearance import clearances, least_clearances
 from pteron.equations.constraints import constraint_measure
 from pteron.equations.friction import passive_friction
 from pteron.equations.laws import LAWS
@@ -177,6 +177,13 @@ def _reactions(m: Machine, v: Symbols) -> Outputs:
         "points": (points, (m.freedom, points.shape[0] // m.freedom, 3)),
         "passed": (passed, (m.freedom, passed.shape[0] // m.freedom, 6)),
     }
+
+
+def _beams(m: Machine, v: Symbols) -> Outputs:
+    found = reactions.beams(m, _state(m, v))
+    *links, couples = found._asdict().items()
+    rows = ca.horzcat(*couples[1]).T
+    return {**dict(links), "couples": (rows, rows.shape)}
 
 
 def _padded(columns: Sequence[Expression], count: int) -> Expression:
@@ -337,6 +344,9 @@ TABLE: dict[str, Entry] = {
     "clearances": Entry(
         _POSE, lambda m, v: {"distances": _stacked(clearances(m, v["pose"]))}, ("reach",)
     ),
+    "least_clearances": Entry(
+        _POSE, lambda m, v: {"distances": _stacked(least_clearances(m, v["pose"]))}, ("reach",)
+    ),
     "constraint": Entry(
         _POSE,
         lambda m, v: {"constraint": constraint_measure(m, _state(m, v))},
@@ -357,6 +367,7 @@ TABLE: dict[str, Entry] = {
     ),
     "passive_friction": Entry(_RATE, _passive_friction, _HELD),
     "reactions": Entry((*_MOTION, "parameters"), _reactions, _HELD),
+    "beams": Entry(_POSE, _beams, _BENT),
     "inverse_dynamics": Entry((*_MOTION, "parameters"), _inverse_dynamics, _HELD),
     "forward_dynamics": Entry((*_RATE, "forces", "parameters"), _forward_dynamics, _BENT),
     "drive_forces": Entry(
