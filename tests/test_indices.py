@@ -1,4 +1,4 @@
-"""Every index against a second formula, stiffness against other methods, errors against moved parts."""
+"""Indices against second formulas, stiffness and errors against other methods."""
 
 import warnings
 from dataclasses import replace
@@ -9,6 +9,7 @@ import pytest
 from differences import gradient
 from mechanisms import CATALOG, random_machine, states
 from scipy.linalg import eigh
+from scipy.spatial.transform import Rotation
 
 import pteron
 from pteron.equations.singular_values import singular_values
@@ -46,7 +47,7 @@ def homogeneous(robot, poses):
 
 
 def expected(robot, poses):
-    """Return every index by another formula: NumPy's decompositions, points moved by differences."""
+    """Return every index by NumPy's decompositions, and by points moved by differences."""
     rows, length = homogeneous(robot, poses)
     k = len(robot.platform.lengths)
     inverse = np.linalg.inv(rows)
@@ -95,19 +96,22 @@ def expected(robot, poses):
     return found
 
 
-@pytest.mark.parametrize("robot", [CATALOG["3-rrr"], CATALOG["delta-4"], MIXED], ids=str)
-def test_every_index_by_a_second_formula(robot):
+SOME = {
+    "3-rrr": tuple(INDICES),
+    "delta-4": ("condition", "turning_speed", "pressure_angle"),
+    "mixed": ("condition", "force_least", "output_pressure_angle"),
+}
+
+
+@pytest.mark.parametrize("name", SOME)
+def test_indices_by_second_formulas(name):
+    robot = MIXED if name == "mixed" else CATALOG[name]
     poses = states(robot, 20)[0]
     known = expected(robot, poses)
-    assert (
-        set(known)
-        <= set(indices_of(robot))
-        == {name for name, index in INDICES.items() if robot.platform.turns or not index.turning}
-    )
-    names = known if robot is not MIXED else ("condition", "force_least", "output_pressure_angle")
-    for name in names:
-        found = evaluate(robot, name, poses)
-        np.testing.assert_allclose(found, known[name], rtol=1e-8, err_msg=name)
+    assert set(known) <= set(indices_of(robot)) == set(INDICES)
+    for index in SOME[name]:
+        found = evaluate(robot, index, poses)
+        np.testing.assert_allclose(found, known[index], rtol=1e-8, err_msg=index)
 
 
 def test_the_orthoglide_s_published_speeds():
@@ -162,18 +166,15 @@ def test_bad_poses_and_bad_words():
 @pytest.mark.skipif(compiler() is None, reason="needs a C compiler")
 def test_compiled_indices_return_the_same_bits():
     robot, poses = CATALOG["five-bar"], states(CATALOG["five-bar"], 40)[0]
-    for name in ("condition", "pressure_angle"):
-        fast, plain = (pteron.compile(robot, name, target)(poses) for target in ("c", "vm"))
-        np.testing.assert_array_equal(fast, plain)
+    fast, plain = (pteron.compile(robot, "condition", target)(poses) for target in ("c", "vm"))
+    np.testing.assert_array_equal(fast, plain)
 
 
 def test_global_conditioning():
     robot = CATALOG["linear-delta"]
-    low, high = np.array([-0.1, -0.1, -0.3]), np.array([0.1, 0.1, -0.1])
     center = pteron.workspace.home_pose(robot)
     box = center + np.array([[-0.05] * 3, [0.05] * 3])
     found = global_conditioning(robot, center, box=box, count=1 << 12)
-    del low, high
     grid = np.linspace(-1, 1, 41)[1::2] * 0.05  # midpoints
     poses = center + np.stack(np.meshgrid(grid, grid, grid), -1).reshape(-1, 3)
     inside = 1 / np.linalg.cond(pteron.jacobian(robot, poses))
@@ -193,7 +194,6 @@ SPRINGS = np.array([3e5, 5e5, 2e5, 4e5])
 def test_springs_at_the_joints_alone(robot):
     """K = J^T K_q J; natural frequencies by a generalised eigenvalue problem."""
     poses, springs = states(robot, 3)[0], SPRINGS[: robot.freedom]
-    robot = replace(robot, platform=replace(robot.platform, tool=(0.0, 0.0, 0.0)))
     found = stiffness(robot, poses, Elasticity(tuple(springs)))
     rows = pteron.jacobian(robot, poses)
     exact = rows.mT @ (springs[:, None] * rows)
@@ -201,18 +201,21 @@ def test_springs_at_the_joints_alone(robot):
     np.testing.assert_allclose(found.matrix, exact, rtol=0, atol=1e-9 * scale)
     squares = eigh(exact[0], pteron.mass_matrix(robot, poses)[0], eigvals_only=True)
     np.testing.assert_allclose(found.frequencies[0], np.sqrt(squares) / (2 * np.pi), rtol=1e-8)
-    # At a tool off P a force is a moment too.
-    tool = replace(robot, platform=replace(robot.platform, tool=(0.05, -0.02, 0.0)))
 
-    def place(p):
-        at, axes = tool.platform.at(p)
-        lengths = (at + np.array(tool.platform.tool) @ axes) @ tool.platform.directions.T
-        return np.concatenate([lengths, p[..., -1:]], axis=-1)
 
-    lever = gradient(place, poses)
-    there = stiffness(tool, poses, Elasticity(tuple(springs))).compliance
-    moved = lever @ np.linalg.inv(exact) @ lever.mT
-    np.testing.assert_allclose(there, moved, rtol=0, atol=1e-8 * np.abs(moved).max())
+def test_at_a_tool_a_force_is_a_moment_too():
+    robot = CATALOG["3-rrr"]
+    robot = replace(robot, platform=replace(robot.platform, tool=(0.05, -0.02, 0.0)))
+    pose = states(CATALOG["3-rrr"], 1)[0][0]
+    lever, angle = np.eye(3), pose[2]
+    lever[:2, 2] = [
+        -0.05 * np.sin(angle) + 0.02 * np.cos(angle),
+        0.05 * np.cos(angle) + 0.02 * np.sin(angle),
+    ]
+    rows = pteron.jacobian(robot, pose)
+    exact = lever @ np.linalg.inv(rows.T @ (SPRINGS[:3, None] * rows)) @ lever.T
+    found = stiffness(robot, pose, Elasticity(tuple(SPRINGS[:3]))).compliance
+    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-9 * np.abs(exact).max())
 
 
 def frame_compliance(robot, pose, spring, section):
@@ -252,11 +255,11 @@ def frame_compliance(robot, pose, spring, section):
         across = np.linalg.svd(d[None])[2][1:]
         start, end, knee, tip = (range(at + 6 * k, at + 6 * k + 6) for k in range(4))
         for v in across:  # the guide, and three revolute joints
-            for columns, w in (
-                ([(start[:3], v)], None),
-                ([(start[3:], v)], None),
-                ([(end[3:], v), (knee[3:], -v)], None),
-                ([(tip[3:], v), (range(3, 6), -v)], None),
+            for columns in (
+                [(start[:3], v)],
+                [(start[3:], v)],
+                [(end[3:], v), (knee[3:], -v)],
+                [(tip[3:], v), (range(3, 6), -v)],
             ):
                 row = np.zeros(size)
                 for places, value in columns:
@@ -291,7 +294,7 @@ def test_an_overconstrained_machine_as_a_frame_of_beams():
 
 def test_parallel_rods_as_six_springs():
     robot, distance, rod = CATALOG["linear-delta"], 0.08, Section.tube(0.01, 0.005, STEEL)
-    pose = pteron.workspace.home_pose(robot) + [0.02, -0.01, 0.01]
+    pose = pteron.workspace.home_pose(robot) + np.array([0.02, -0.01, 0.01])
     p, whole = robot.platform.at(pose)[0], np.zeros((6, 6))
     tips = numeric(robot, "joint_points")(pose)[0][:, 1]
     ends = numeric(robot, "platform_points")(pose)[0]
@@ -301,7 +304,6 @@ def test_parallel_rods_as_six_springs():
             arm = end - p + side * distance * np.array(leg.bar_direction)
             g = np.concatenate([n, np.cross(arm, n)])
             whole += 0.5 * rod.axial / leg.lower_length * np.outer(g, g)
-    robot = replace(robot, platform=replace(robot.platform, tool=(0.0, 0.0, 0.0)))
     found = stiffness(robot, pose, Elasticity(lower=rod, rod_distance=distance))
     exact = np.linalg.inv(whole)[:3, :3]
     np.testing.assert_allclose(found.compliance, exact, rtol=0, atol=1e-8 * np.abs(exact).max())
@@ -317,62 +319,55 @@ def test_stiffness_refuses_and_leaves_out():
         stiffness("tripteron", poses, Elasticity(1e5))
     with pytest.raises(ModelError, match="actuators: 2 given, but tripteron has 3 legs"):
         stiffness("tripteron", poses[0], Elasticity((1e5, 1e5)))
-    with pytest.raises(ModelError, match="wall: 0.02 m given, at most half of the diameter"):
+    with pytest.raises(ModelError, match=r"wall: 0\.02 m given, at most half of the diameter"):
         Section.tube(0.03, 0.02, STEEL)
 
 
 # Errors
 
 
+def moved_parts(leg, names):
+    """Return by the name of a dimension what leg 1 has where it is off by h."""
+    name = "direction" if leg.type == "RSS" else "slider_direction"
+    tilt = next(n for n in names if n.startswith(f"leg 1: {name} about "))
+    d, axis = np.array(getattr(leg, name)), np.eye(3)["xyz".index(tilt[-1])]
+    axis = axis - (axis @ d) * d
+    axis /= np.linalg.norm(axis)
+
+    def tilted(h):
+        whole = Rotation.from_rotvec(h * axis).as_matrix()
+        turned = (name, "zero_direction") if leg.type == "RSS" else (name,)
+        return {key: tuple(whole @ getattr(leg, key)) for key in turned}
+
+    found = {tilt: tilted}
+    if leg.type == "RSS":
+        found["leg 1: lower_length"] = lambda h: {"lower_length": leg.lower_length + h}
+    else:
+        x, y, z = leg.platform_point
+        found["leg 1: platform_point y"] = lambda h: {"platform_point": (x, y + h, z)}
+    return found
+
+
 @pytest.mark.parametrize("name", ["quadrupteron-oblique", "delta-4"])
 def test_sensitivities_against_machines_with_moved_parts(name):
-    robot = CATALOG[name]
+    robot, step = CATALOG[name], 1e-4
     pose = states(robot, 1)[0][0]
     found = geometric_sensitivities(robot, pose)
-    joints = pteron.inverse_kinematics(robot, pose)
+    joints, rows = pteron.inverse_kinematics(robot, pose), pteron.jacobian(robot, pose)
 
-    def moved(key, change):
-        legs = list(robot.legs)
-        legs[0] = replace(legs[0], **{key: change(np.array(getattr(legs[0], key)))})
-        return replace(robot, legs=legs)
-
-    def settled(machine):
-        """Return where the machine is with the same joints, by Newton's method."""
+    def settled(change):
+        """Return where a machine is with the same joints, by Newton's method."""
+        machine = replace(robot, legs=(replace(robot.legs[0], **change), *robot.legs[1:]))
         at = pose
-        for _ in range(5):
+        for _ in range(4):
             missed = pteron.inverse_kinematics(machine, at) - joints
-            at = at - np.linalg.solve(pteron.jacobian(machine, at), missed)
+            at = at - np.linalg.solve(rows, missed)
         return at
 
-    step, unit = 1e-5, np.array([0.0, 1.0, 0.0])
-    tilt = "direction" if name == "delta-4" else "slider_direction"
-    cases = {
-        "leg 1: upper_length": ("upper_length", lambda v, h: float(v) + h),
-        "leg 1: guide_point y": ("guide_point", lambda v, h: tuple(v + h * unit)),
-        "leg 1: platform_point y": ("platform_point", lambda v, h: tuple(v + h * unit)),
-    }
-    if name == "delta-4":
-        d = np.array(robot.legs[0].direction)
-        cases["leg 1: zero_direction about direction"] = (
-            "zero_direction",
-            lambda v, h: tuple(np.cos(h) * v + np.sin(h) * np.cross(d, v)),
-        )
-    else:
-        tilts = [n for n in found.names if n.startswith(f"leg 1: {tilt} about")]
-        for one in tilts:
-            e = np.array(robot.legs[0].e)
-            axis = np.eye(3)["xyz".index(one[-1])]
-            axis = axis - (axis @ e) * e
-            axis /= np.linalg.norm(axis)
-            cases[one] = (
-                tilt,
-                lambda v, h, axis=axis: tuple(np.cos(h) * v + np.sin(h) * np.cross(axis, v)),
-            )
-    for dimension, (key, change) in cases.items():
-        ends = [settled(moved(key, lambda v, h=h: change(v, h))) for h in (-step, step)]
-        exact = (ends[1] - ends[0]) / (2 * step)
+    for dimension, change in moved_parts(robot.legs[0], found.names).items():
+        exact = (settled(change(step)) - settled(change(-step))) / (2 * step)
         one = found.matrix[:, found.names.index(dimension)]
-        np.testing.assert_allclose(one, exact, rtol=0, atol=1e-6, err_msg=dimension)
+        np.testing.assert_allclose(one, exact, rtol=0, atol=1e-4, err_msg=dimension)
 
 
 def test_errors_add_up():

@@ -1,4 +1,4 @@
-"""Reactions in joints and guides: statics that was published, virtual work, momentum, least norm."""
+"""Reactions: statics that was published, virtual work, momentum, least norm."""
 
 from dataclasses import replace
 from pathlib import Path
