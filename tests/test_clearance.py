@@ -13,7 +13,7 @@ import pteron
 from pteron.equations.clearance import squared_distance
 from pteron.kernels import numeric
 from pteron.motion import joint_guides, joint_points
-from pteron.workspace import clearance, home_pose
+from pteron.workspace import Box, clearance, conditions, home_pose, interference, prove
 
 
 @pytest.fixture(scope="module")
@@ -143,3 +143,13 @@ def test_out_of_reach_is_nan_and_stays_in_its_row():
     np.testing.assert_array_equal(np.isnan(found).all(axis=-1), [False, True, False])
     np.testing.assert_array_equal(found[0], found[2])
     assert numeric(robot, "clearances")(poses)[0].shape == found.shape
+
+
+def test_a_region_is_proved_free_of_interference_or_a_pose_shown():
+    robot, region = CATALOG["five-bar"], Box((-0.01, 0.15), (0.01, 0.16))
+    proof = prove(robot, region, given=(*conditions(robot), *interference(robot, 0.01)))
+    assert proof.holds
+    proof = prove(robot, region, given=interference(robot, {"upper": 0.06}))
+    assert proof.holds is False
+    assert clearance(robot, proof.counterexample, {"upper": 0.06}).least < 0.0
+    assert "interference of upper links or cranks" in str(proof.causes[0])

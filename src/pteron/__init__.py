@@ -58,6 +58,7 @@ from pteron.kinematics import (
 from pteron.legs import PRR, PRRR, PSS, RRR, RSS, RUPU, Cone, Drive, Stribeck
 from pteron.manipulator import (
     Manipulator,
+    Radii,
     catalog,
     load,
     parameter_data,
@@ -77,10 +78,12 @@ Leg = PRRR
 if TYPE_CHECKING:
     from pteron import (
         controllers,
+        design,
         environments,
         export,
         identification,
         indices,
+        maps,
         motion,
         plots,
         report,
@@ -106,8 +109,8 @@ _LATER = {
     "export_st": "pteron.export",
 }
 _LATER_MODULES = (
-    *("controllers", "environments", "export", "identification", "indices"),
-    *("motion", "plots", "report", "viewer", "workspace"),
+    *("controllers", "design", "environments", "export", "identification", "indices"),
+    *("maps", "motion", "plots", "report", "viewer", "workspace"),
 )
 """What would slow the start of those who do not use it (SymPy, SciPy, matplotlib, Gymnasium)."""
 
@@ -147,6 +150,7 @@ __all__ = [
     "RRR",
     "RSS",
     "RUPU",
+    "Radii",
     "RodInertia",
     "SingularPose",
     "Stribeck",
@@ -162,6 +166,7 @@ __all__ = [
     "constraint_measure",
     "controllers",
     "coriolis_matrix",
+    "design",
     "direct_kinematics",
     "drive_accelerations",
     "drive_forces",
@@ -185,6 +190,7 @@ __all__ = [
     "link_jacobians",
     "link_vectors",
     "load",
+    "maps",
     "mass_matrix",
     "motion",
     "parameter_data",

@@ -16,6 +16,7 @@ from typer.core import TyperGroup
 from pteron.cli.arguments import Command, NumbersCommand, without_types
 from pteron.cli.base import base, table1
 from pteron.cli.cycle import cycle
+from pteron.cli.design import design
 from pteron.cli.excite import excite
 from pteron.cli.export import export
 from pteron.cli.film import film
@@ -264,6 +265,15 @@ _add(
     "pteron size delta --payload 1.0",
     "pteron size robot.toml --motors motors.csv --dwell 0.2 --out sizing",
     "pteron size quadrupteron --cycle motion.csv --out sizing.csv",
+)
+
+_DESIGN = "Design"
+_add(
+    _DESIGN,
+    design,
+    "pteron design search.toml --out best",
+    "pteron design search.toml --out best --seed 7 --workers 4",
+    "pteron design search.toml --out all --sweep 100000 --scheduler tcp://host:8786",
 )
 
 _LOG = "From a log to a controller"

@@ -197,7 +197,7 @@ def _checked_out(out: str | None) -> str:
 
 def _warnings(robot: Manipulator) -> list[str]:
     """Return what there is to say of the machine's geometry before anything else."""
-    from pteron.kinematics.singularities import is_singular_everywhere, singular_everywhere
+    from pteron.kinematics.architecture import is_singular_everywhere, singular_everywhere
 
     return [str(singular_everywhere(robot))] if is_singular_everywhere(robot) else []
 

@@ -15,8 +15,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import reduce
 from itertools import combinations
-from typing import Literal
+from typing import Literal, get_args
 
 import casadi as ca
 import numpy as np
@@ -65,18 +66,36 @@ def pairs(robot: Manipulator) -> list[tuple[Body, Body]]:
 
 def clearances(machine: Machine, pose: Expression) -> Expression:
     """Return the least distance of the centre lines of each of `pairs`, (K, 1), m."""
-    found = list(_segments(machine, machine.state(pose)))
-    squares = []
-    for (one, first), (other, second) in combinations(found, 2):
-        if _share_a_joint(machine.robot, one, other):
-            continue
-        least = None
-        for a in first:
-            for b in second:
-                square = squared_distance(a, b)
-                least = square if least is None else ca.fmin(least, square)
-        squares.append(least)
+    squares = [square for _, square in _squares(machine, pose)]
     return ca.sqrt(ca.vertcat(*squares)) if squares else ca.SX(0, 1)
+
+
+def meetings(robot: Manipulator) -> list[tuple[Kind, Kind]]:
+    """Return which kinds of bodies may meet, in the order of `least_clearances`."""
+    return list(dict.fromkeys(_kinds(*pair) for pair in pairs(robot)))
+
+
+def least_clearances(machine: Machine, pose: Expression) -> Expression:
+    """Return the least distance of centre lines over the pairs of the same kinds, (k, 1), m."""
+    found: dict[tuple[Kind, Kind], Expression] = {}
+    for pair, square in _squares(machine, pose):
+        kinds = _kinds(*pair)
+        found[kinds] = ca.fmin(found[kinds], square) if kinds in found else square
+    return ca.sqrt(ca.vertcat(*found.values())) if found else ca.SX(0, 1)
+
+
+def _kinds(a: Body, b: Body) -> tuple[Kind, Kind]:
+    one, other = sorted((a.kind, b.kind), key=get_args(Kind).index)
+    return one, other
+
+
+def _squares(machine: Machine, pose: Expression) -> Iterator[tuple[tuple[Body, Body], Expression]]:
+    """Yield the pairs of bodies and their least squared distance."""
+    found = list(_segments(machine, machine.state(pose)))
+    for (one, first), (other, second) in combinations(found, 2):
+        if not _share_a_joint(machine.robot, one, other):
+            squares = [squared_distance(a, b) for a in first for b in second]
+            yield (one, other), reduce(ca.fmin, squares)
 
 
 def squared_distance(first: Segment, second: Segment) -> Expression:

@@ -70,8 +70,9 @@ def standing(machine: Machine, pose: Expression) -> tuple[Expression, Expression
     """Return whether a pose serves, and the metres to the nearest end of what does.
 
     First 0 where it does, else the leg, from 1, that misses it by most, or -1 where all reach it
-    but a joint's limit forbids it. Then the least of the legs' margins and of the ways that legs
-    may move until a joint meets its limit, at most `FAR`; negative where the pose does not serve.
+    but a joint's limit forbids it. Then the least of the legs' margins and, where all reach it, of
+    the ways that they may move until a joint meets its limit, at most `FAR`; negative where the
+    pose does not serve.
     """
     found = reach(machine, pose)
     joints = ca.vertsplit(inverse_position(machine, pose))
@@ -84,11 +85,11 @@ def standing(machine: Machine, pose: Expression) -> tuple[Expression, Expression
         missed = ca.fmax(missed, at.discriminant < 0)
         room = ca.fmin(room, way)
         if leg.limits is not None:
-            # No coordinate where the leg does not reach; no way leads out of an angle's limits.
+            # No way leads out of an angle's limits.
             own = ca.fmin(joint - leg.limits[0], leg.limits[1] - joint) * leg.lever
             room = ca.fmin(room, ca.if_else(own < 0, own, FAR) if leg.follows_angle else own)
     status = ca.if_else(missed, worst, ca.if_else(room < 0, -1, 0))
-    return status, ca.fmin(least, room)
+    return status, ca.if_else(missed, least, ca.fmin(least, room))
 
 
 def direct_position(machine: Machine, joints: Expression, *, reached: bool = True) -> Expression:

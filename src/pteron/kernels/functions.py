@@ -20,7 +20,7 @@ from pteron.equations import (
     reactions,
     regressor,
 )
-from pteron.equations.clearance import clearances
+from pteron.equations.clearance import clearances, least_clearances
 from pteron.equations.constraints import constraint_measure
 from pteron.equations.friction import passive_friction
 from pteron.equations.laws import LAWS
@@ -343,6 +343,9 @@ TABLE: dict[str, Entry] = {
     "type_ii": Entry(_POSE, _type_ii),
     "clearances": Entry(
         _POSE, lambda m, v: {"distances": _stacked(clearances(m, v["pose"]))}, ("reach",)
+    ),
+    "least_clearances": Entry(
+        _POSE, lambda m, v: {"distances": _stacked(least_clearances(m, v["pose"]))}, ("reach",)
     ),
     "constraint": Entry(
         _POSE,

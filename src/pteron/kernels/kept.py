@@ -1,8 +1,8 @@
-"""Programs on disk, so that a second start does not build them: 1 ms in the place of 100.
+"""Programs and home poses on disk, so that a second start does not work them out again.
 
-A program is kept under a digest of the machine it is of, of what is asked, and of the source of all
-that builds it. A machine with a leg from outside this package, whose source is not known, is built
-at each start.
+1 ms in the place of 100 or more. What is kept lies under a digest of the machine it is of, of what
+is asked, and of the source of all that it depends on. A leg from outside this package, whose source
+is not known, is worked out at each start.
 """
 
 from __future__ import annotations
@@ -22,8 +22,11 @@ from pteron.kernels.kernel import Port
 
 _PACKAGE = Path(__file__).parent.parent
 
-_BUILDERS = ("bodies", "closures", "equations", "kernels", "legs", "manipulator", "platforms")
-"""The packages that a program's operations, and their order, depend on."""
+_SOURCES = (
+    *("bodies", "closures", "equations", "kernels", "kinematics", "legs", "manipulator"),
+    *("platforms", "workspace"),
+)
+"""The packages that what is kept depends on, to the last bit."""
 
 
 @dataclass(frozen=True)
@@ -38,16 +41,20 @@ class Program:
 
 def kept(key: tuple[Any, ...], build: Callable[[], Program]) -> Program:
     """Return the program of a key: the one on disk, or the one that is built, and kept then."""
-    told = _told(key)
-    if told is None:
-        return build()
-    name = cache.digest(told, _source(), ca.__version__)
-    text = cache.find_text(name)
+    name = name_of("program", *key)
+    text = None if name is None else cache.find_text(name)
     found = None if text is None else _read(text)
     if found is None:
         found = build()
-        cache.keep_text(name, _written(found))
+        if name is not None:
+            cache.keep_text(name, _written(found))
     return found
+
+
+def name_of(*key: Any) -> str | None:
+    """Return under which name the text of a key is kept, see `cache`; None where it cannot be."""
+    told = _told(key)
+    return None if told is None else cache.digest(told, _source(), ca.__version__)
 
 
 def _read(text: str) -> Program | None:
@@ -89,6 +96,6 @@ def _told(value: Any) -> str | None:
 @lru_cache(maxsize=1)
 def _source() -> str:
     total = hashlib.sha256()
-    for path in sorted(file for name in _BUILDERS for file in (_PACKAGE / name).rglob("*.py")):
+    for path in sorted(file for name in _SOURCES for file in (_PACKAGE / name).rglob("*.py")):
         total.update(path.read_bytes())
     return total.hexdigest()

@@ -1,9 +1,9 @@
 """A machine's geometry modulo a prime, as it is meant: decimals, and directions of unit length.
 
-A number of a file is the decimal that it prints as. A direction's components are square roots of
-simple fractions, such as 0.6 or sqrt(3) / 2, whose squares sum to one; other directions are not
-recognised. A root of a product is the product of the primes' roots, so that any choice of these is
-a conjugate of the geometry that is meant: what vanishes for one vanishes for all.
+A number of a file is the decimal that it prints as, to a picometre. A direction's components are
+square roots of simple fractions, such as 0.6 or sqrt(3) / 2, whose squares sum to one; other
+directions are not recognised. A root of a product is the product of the primes' roots, so that any
+choice of these is a conjugate of the geometry that is meant: what is zero for one is for all.
 """
 
 from __future__ import annotations
@@ -21,6 +21,9 @@ _SIMPLE = 1000
 """Largest denominator of a component's square."""
 
 _ROUNDING = 1e-14
+
+_DIGITS = 12
+"""Decimals of a number of a file, m or without unit."""
 
 
 def modular_geometry(robot: Manipulator, field: PrimeField) -> list[int] | None:
@@ -58,7 +61,7 @@ def modular_geometry(robot: Manipulator, field: PrimeField) -> list[int] | None:
 
 
 def _decimal(value: float) -> Fraction:
-    return Fraction(repr(float(value)))
+    return Fraction(repr(round(float(value), _DIGITS)))
 
 
 def _unit(vector: Sequence[float], field: PrimeField) -> list[int] | None:

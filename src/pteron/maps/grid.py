@@ -142,16 +142,17 @@ def pose_grid(
     robot : Manipulator, name or path
         The machine.
     held : mapping, optional
-        Coordinates that do not vary, with their values, m or rad. All others vary. With neither
-        `held` nor `ranges` the first two lengths vary and the others are held at `center`.
+        Coordinates that do not vary, with their values, m or rad. All others vary. Where it is left
+        out those in `ranges` vary, or else the first two lengths, and the others are held at
+        `center`.
     ranges : mapping, optional
         Least and greatest value of coordinates that vary, m or rad, and how many values if it is
-        not `points`. Other lengths vary over the bounding box of the reach, an angle over its
-        limits or else a whole turn.
+        not `points`. Other lengths that vary do so over the bounding box of the reach, an angle
+        over its limits or else a whole turn.
     points : int, optional
         How many values along each axis; by default 200 in a plane, 100 in three dimensions.
     center : array, shape (m,), optional
-        Gives what `held` does not, m and rad; by default the home pose.
+        Gives what is held where `held` is left out, m and rad; by default the home pose.
     rim : float
         Share of the bounding box by which lengths go beyond it on each side: pictures show where
         the reach ends.
@@ -178,9 +179,11 @@ def pose_grid(
     robot = as_manipulator(robot)
     fixed, spans = dict(held or {}), dict(ranges or {})
     _expect_coordinates(robot, fixed, spans)
-    pose = home_pose(robot) if center is None else checked_one(robot, center, "center").copy()
     names = robot.coordinates
+    pose = np.zeros(len(names))
     if held is None:
+        # What varies needs no more than where to begin to look for the reach.
+        pose = home_pose(robot) if center is None else checked_one(robot, center, "center").copy()
         varying = set(spans or [name for name in names if name in "xyz"][:2])
         fixed = {n: float(v) for n, v in zip(names, pose, strict=True) if n not in varying}
     for name, value in fixed.items():

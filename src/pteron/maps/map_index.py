@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from functools import lru_cache, partial
+from importlib.metadata import version
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Literal, get_args
@@ -146,9 +147,8 @@ def _folder() -> TemporaryDirectory[str]:
 
 
 def _plan(robot: Manipulator, engine: str) -> dict[str, Any]:
-    from pteron import __version__
 
-    return {"robot": text_of(robot), "engine": engine, "pteron": __version__}
+    return {"robot": text_of(robot), "engine": engine, "pteron": version("pteron")}
 
 
 def _computed(

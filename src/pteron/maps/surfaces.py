@@ -100,35 +100,39 @@ def surfaces(given: Map, name: str, levels: Sequence[float] | None = None) -> tu
         corners, triangles, *_ = measure(closed, 0.0)
         corners = np.clip(corners - 1.0, 0.0, np.array(values.shape) - 1.0)
         own = map_coordinates(whole, corners.T, order=1)
-        found.append(Surface(None, _placed(given, corners), triangles, own))
+        found.append(_surface(given, None, corners, triangles, own))
     for level in levels:
         if whole.min() < level < whole.max():
             with suppress(RuntimeError):  # no triangle between poses that serve
                 corners, triangles, *_ = measure(whole, level, mask=known)
                 own = np.full(len(corners), level)
-                found.append(Surface(level, _placed(given, corners), triangles, own))
+                found.append(_surface(given, level, corners, triangles, own))
     return tuple(found)
 
 
 def surface_bytes(given: Map, ending: str) -> bytes:
     """Return a file of the surfaces of a map's first index.
 
-    Its points carry the index, under its name and unit; its triangles `surface`, 0 for the reach's
-    and then one number for each level.
+    Its points carry the index, under its name and unit. In VTK's files its triangles carry
+    `surface`, 0 for the reach's, else the level's number from 1; STL holds no more than triangles.
     """
     _, meshio = checked_surfaces()
     index = given.indices[0]
     parts = surfaces(given, index.name)
     starts = np.cumsum([0, *(len(part.points) for part in parts)])
     triangles = [part.triangles + start for part, start in zip(parts, starts, strict=False)]
-    numbers = [0 if part.level is None else k for k, part in enumerate(parts, start=1)]
-    kinds = [np.full(len(one), k) for one, k in zip(triangles, numbers, strict=True)]
+    levels = sorted(part.level for part in parts if part.level is not None)
+    numbers = [0 if part.level is None else 1 + levels.index(part.level) for part in parts]
+    kinds = [np.full(len(one), k, np.int32) for one, k in zip(triangles, numbers, strict=True)]
     mesh = meshio.Mesh(
         np.concatenate([part.points for part in parts]),
-        [("triangle", np.concatenate(triangles))],
+        [("triangle", np.concatenate(triangles).astype(np.int32))],
     )
     if ending != ".stl":
-        mesh.point_data[headed(index)] = np.concatenate([part.values for part in parts])
+        # Names in these files have no blanks.
+        label = headed(index).replace(" [", "[").replace(" ", "_")
+        mesh.point_data[label] = np.concatenate([part.values for part in parts])
+    if ending.startswith(".vt"):
         mesh.cell_data["surface"] = [np.concatenate(kinds)]
     with TemporaryDirectory(prefix="pteron-surface-") as folder:
         made = Path(folder, f"surface{ending}")
@@ -154,8 +158,13 @@ def checked_surfaces() -> tuple[Any, Any]:
     return measure, meshio
 
 
-def _placed(given: Map, corners: Array) -> Array:
-    """Return points (P, 3) in m and rad from places in the grid."""
+def _surface(
+    given: Map, level: float | None, corners: Array, triangles: NDArray[Any], values: Array
+) -> Surface:
+    """Return a surface of places in the grid (P, 3), without the triangles that have no area."""
     axes = given.grid.axes
     steps = [(axis.greatest - axis.least) / (axis.count - 1) for axis in axes]
-    return np.asarray([axis.least for axis in axes] + corners * steps)
+    points = np.asarray([axis.least for axis in axes] + corners * steps)
+    a, b, c = np.moveaxis(corners[triangles], 1, 0)
+    flat = (np.cross(b - a, c - a) == 0.0).all(axis=-1)
+    return Surface(level, points, triangles[~flat].astype(np.int64), values)

@@ -15,6 +15,7 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack, contextmanager
 from functools import partial
+from importlib.metadata import version
 from itertools import islice
 from typing import Any, Protocol, TypeVar
 
@@ -199,11 +200,12 @@ def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
             raise PteronError(
                 f"{where}: has no workers; start some with: dask worker {scheduler}"
             ) from None
-        for worker, found in client.run(_version, on_error="return").items():
-            if found != _version():
+        here = version("pteron")
+        for worker, found in client.run(version, "pteron", on_error="return").items():
+            if found != here:
                 told = "none" if isinstance(found, BaseException) else found
                 raise PteronError(
-                    f"{where}: worker {worker} has Pteron {told}, {_version()} expected; install "
+                    f"{where}: worker {worker} has Pteron {told}, {here} expected; install "
                     "the same there"
                 )
         yield client
@@ -219,12 +221,6 @@ def _distributed() -> Any:
             'pip install "pteron[cluster]"'
         ) from None
     return distributed
-
-
-def _version() -> str:
-    from pteron import __version__
-
-    return __version__
 
 
 def cores() -> int:

@@ -1,7 +1,7 @@
 """Where a machine can work: its reserves, its home pose, its reach and its joints' ranges."""
 
 from pteron.kinematics.limits import LimitedJoint, limited_joints
-from pteron.workspace.clearance import Clearance, clearance
+from pteron.workspace.clearance import Clearance, clearance, interference
 from pteron.workspace.conditions import Condition, conditions
 from pteron.workspace.free_regions import FreeRegion, free_of_singularities
 from pteron.workspace.home import home_pose
@@ -20,9 +20,11 @@ __all__ = [
     "Clearance",
     "Condition",
     "Cylinder",
+    "FreeRegion",
     "Inscribed",
     "JointRanges",
     "LimitedJoint",
+    "NearestSingularity",
     "Paving",
     "Proof",
     "REACHABLE",
@@ -30,13 +32,12 @@ __all__ = [
     "ReachVolume",
     "Region",
     "Reserve",
-    "FreeRegion",
-    "NearestSingularity",
     "bounding_box",
     "clearance",
     "conditions",
     "free_of_singularities",
     "home_pose",
+    "interference",
     "joint_ranges",
     "largest_cube",
     "largest_cylinder",

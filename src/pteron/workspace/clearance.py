@@ -7,12 +7,20 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from pteron.equations.clearance import Body, pairs
+from pteron.equations.clearance import meetings, pairs
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import evaluated
 from pteron.manipulator import Manipulator, Radii, RobotLike, as_manipulator
 from pteron.shapes import OnFailure, PoseLike
+from pteron.workspace.conditions import Condition
+
+_PLURALS = {
+    "guide": "guides",
+    "upper": "upper links or cranks",
+    "lower": "last links",
+    "platform": "platform",
+}
 
 Thickness = Radii | Mapping[str, float] | float
 """Radii, some of them by name, or one for all bodies, m."""
@@ -100,17 +108,52 @@ def clearance(
     counted = pairs(robot)
     distances: Array = evaluated(robot, "clearances", on_failure, pose)
     names = tuple((a.name, b.name) for a, b in counted)
-    return Clearance(names, distances - touching(robot, radii))
-
-
-def touching(robot: Manipulator, radii: Thickness | None = None) -> Array:
-    """Return the distance (K,) of the centre lines of each pair at which the bodies touch, m."""
     given = _radii(robot, radii)
+    touching = [getattr(given, a.kind) + getattr(given, b.kind) for a, b in counted]
+    return Clearance(names, distances - np.array(touching))
 
-    def thick(body: Body) -> float:
-        return float(getattr(given, body.kind))
 
-    return np.array([thick(a) + thick(b) for a, b in pairs(robot)])
+def interference(robot: RobotLike, radii: Thickness | None = None) -> tuple[Condition, ...]:
+    """Return the conditions that no two bodies touch, for pavings, proofs and largest shapes.
+
+    There is one for each two kinds of bodies that may meet, such as cranks and rods.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+    radii : Radii, mapping or float, optional
+        As of `clearance`.
+
+    Returns
+    -------
+    tuple of Condition
+
+    Raises
+    ------
+    ModelError, DataError
+        As `clearance`.
+
+    Examples
+    --------
+    >>> from pteron.workspace import Box, conditions, interference, prove
+    >>> given = (*conditions("five-bar"), *interference("five-bar", 0.005))
+    >>> prove("five-bar", Box((-0.01, 0.15), (0.01, 0.16)), given=given).holds
+    True
+    """
+    robot = as_manipulator(robot)
+    given = _radii(robot, radii)
+    return tuple(
+        Condition(
+            0,
+            f"interference of {_PLURALS[a]} and {_PLURALS[b]}",
+            "least_clearances",
+            "distances",
+            k,
+            float(getattr(given, a) + getattr(given, b)),
+        )
+        for k, (a, b) in enumerate(meetings(robot))
+    )
 
 
 def _radii(robot: Manipulator, given: Thickness | None) -> Radii:

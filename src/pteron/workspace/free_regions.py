@@ -12,10 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pteron.equations.machine import closure_of
 from pteron.errors import DataError
 from pteron.kernels import Array, as_array, bounds, numeric
 from pteron.kinematics.architecture import is_singular_everywhere
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.workspace.regions import Box
 
 _SAMPLES = 4096
 _PAIRS = 64
@@ -63,7 +65,7 @@ class FreeRegion:
 
 
 def free_of_singularities(
-    robot: RobotLike, region: ArrayLike, *, floor: float = 0.0, most: int = 100_000
+    robot: RobotLike, region: Box | ArrayLike, *, floor: float = 0.0, most: int = 100_000
 ) -> FreeRegion:
     """Prove that a region of poses is free of type-II singularities, or return one that it holds.
 
@@ -71,7 +73,7 @@ def free_of_singularities(
     ----------
     robot : Manipulator, name or path
         The machine.
-    region : array, shape (2, m)
+    region : Box, or array of shape (2, m)
         The least and the greatest pose, m and rad; a coordinate may have one value.
     floor : float
         Least size of the type-II measure that is to be proved; a pose counts as singular only where
@@ -99,7 +101,8 @@ def free_of_singularities(
     (False, 1.570796327)
     """
     robot = as_manipulator(robot)
-    given = as_array(region, "region", (2, robot.freedom))
+    corners = region.box if isinstance(region, Box) else region
+    given = as_array(corners, "region", (2, robot.freedom))
     if given.ndim != 2 or not np.isfinite(given).all() or (given[0] > given[1]).any():
         raise DataError(
             f"region: {given.tolist()} given, the least and the greatest pose expected, finite"
@@ -109,6 +112,8 @@ def free_of_singularities(
     if found is not None:
         return _refuted(robot, found, 0)
     sizes = np.where(given[1] > given[0], given[1] - given[0], np.inf)
+    if closure_of(robot).orientation is not None:
+        sizes[:-1] = np.inf  # it depends on the angle alone
     boxes, looked, least = given[None], 0, np.inf
     while len(boxes):
         looked += len(boxes)
@@ -136,12 +141,11 @@ def _refuted(robot: Manipulator, pose: Array, looked: int) -> FreeRegion:
 
 
 def _halved(boxes: Array, sizes: Array) -> Array:
-    """Return each box cut in two across its longest side, as a share of the region's sides."""
-    widths = (boxes[:, 1] - boxes[:, 0]) / sizes
-    longest, rows = widths.argmax(axis=-1), np.arange(len(boxes))
-    middle = 0.5 * (boxes[rows, 0, longest] + boxes[rows, 1, longest])
+    """Return each box cut in two across its longest side, measured by sizes (m,)."""
+    longest = ((boxes[:, 1] - boxes[:, 0]) / sizes).argmax(axis=-1)
+    rows, middles = np.arange(len(boxes)), boxes.mean(axis=1)
     lower, upper = boxes.copy(), boxes.copy()
-    lower[rows, 1, longest] = upper[rows, 0, longest] = middle
+    lower[rows, 1, longest] = upper[rows, 0, longest] = middles[rows, longest]
     return np.concatenate([lower, upper])
 
 
@@ -155,7 +159,7 @@ def _in_reach(robot: Manipulator, poses: Array) -> Array:
 def _sampled(robot: Manipulator, region: Array) -> Array | None:
     """Return a singular pose between random ones of the region, where they have either sign."""
     rng = np.random.default_rng(0)
-    poses = rng.uniform(*region, (_SAMPLES, robot.freedom))
+    poses = rng.uniform(region[0], region[1], (_SAMPLES, robot.freedom))
     values = _in_reach(robot, poses)
     if is_singular_everywhere(robot) and (~np.isnan(values)).any():
         return np.asarray(poses[~np.isnan(values)][0])

@@ -28,7 +28,7 @@ _POINTS = 32
 _STARTS = 3
 _STEPS = 40
 _SIZES = 33
-_EXCHANGES = 20
+_EXCHANGES = 60
 _STEP = 1e-6
 """m, of differences."""
 
@@ -106,15 +106,17 @@ def largest_cube(
     robot = as_manipulator(robot)
     at = checked_one(robot, pose, "pose")
     count = len(robot.platform.lengths)
-    corners = np.array(list(np.ndindex(*(5,) * count))) / 2.0 - 1.0
-    surface = corners[(np.abs(corners) == 1.0).any(axis=1)]
+    template = np.array(list(np.ndindex(*(5,) * count))) / 2.0 - 1.0
 
     def region(center: Array, size: float) -> Region:
         half = np.zeros(len(at))
         half[:count] = size
         return Box(tuple(center - half), tuple(center + half))
 
-    return _largest(robot, at, surface, region, tolerance, proved, given)
+    def gauge(ways: Array) -> Array:
+        return np.asarray(np.abs(ways).max(axis=-1))
+
+    return _largest(robot, at, template, gauge, region, tolerance, proved, given)
 
 
 def largest_cylinder(
@@ -170,13 +172,20 @@ def largest_cylinder(
     def region(center: Array, size: float) -> Region:
         return Cylinder(tuple(center), size, 2.0 * ratio * size, axis)
 
-    return _largest(robot, at, np.concatenate(surface), region, tolerance, proved, given)
+    def gauge(ways: Array) -> Array:
+        along = ways @ unit
+        away = np.linalg.norm(ways - along[..., None] * unit, axis=-1)
+        return np.maximum(away, np.abs(along) / ratio)
+
+    template = np.concatenate(surface)
+    return _largest(robot, at, template, gauge, region, tolerance, proved, given)
 
 
 def _largest(
     robot: Manipulator,
     at: Array,
     template: Array,
+    gauge: Callable[[Array], Array],
     region: Callable[[Array, float], Region],
     tolerance: float,
     proved: bool,
@@ -191,26 +200,23 @@ def _largest(
         poses[..., :count] = positions
         return poses
 
-    search = _Search(lambda positions: rooms_left(robot, asked, whole(positions)), template)
-    places = _starts(robot, at, asked, whole)
-    center, size = max((search.improved(*place) for place in places), key=lambda found: found[1])
+    search = _Search(lambda p: rooms_left(robot, asked, whole(p)), template, gauge)
+    found = [search.improved(*place) for place in _starts(robot, at, asked, whole)]
     for _ in range(_EXCHANGES):
+        center, size = found.pop(max(range(len(found)), key=lambda k: found[k][1]))
         if size <= 0.0:
             break
-        middle = whole(center)
-        shape = region(middle, (1.0 - tolerance) * size)
-        if not proved:
-            return Inscribed(middle, (1.0 - tolerance) * size, shape, None)
-        proof = prove(robot, shape, given=asked)
-        if proof.holds:
-            return Inscribed(middle, (1.0 - tolerance) * size, shape, proof)
+        middle, least = whole(center), (1.0 - tolerance) * size
+        shape = region(middle, least)
+        proof = prove(robot, shape, given=asked) if proved else None
+        if proof is None or proof.holds:
+            return Inscribed(middle, least, shape, proof)
         if proof.counterexample is None:
-            size *= 1.0 - tolerance
-            continue
-        # A point that the template has not: from now on it counts.
-        missed = (proof.counterexample[:count] - center) / ((1.0 - tolerance) * size)
-        search.template = np.vstack([search.template, missed])
-        center, size = search.improved(center, search.size_at(center, size))
+            found.append((center, least))
+        else:
+            # A point that the template has not, perhaps in a gap between the sizes that were tried.
+            search.learn(proof.counterexample[:count], center)
+            found.append(search.improved(center, search.size_at(center, size)))
     raise ModelError(
         f"no shape of any size is found in the workspace at the orientation of pose {at.tolist()}",
         subject=robot.name,
@@ -260,14 +266,29 @@ class _Search:
         Of positions (..., k): what is not negative inside, (..., C).
     template : array, shape (T, k)
         Points of the shape of size 1.
+    gauge : callable
+        Of ways from the centre (..., k): the size of the shape that they end at, (...).
     """
 
-    def __init__(self, rooms: Callable[[Array], Array], template: Array) -> None:
-        self.rooms, self.template = rooms, template
+    def __init__(
+        self,
+        rooms: Callable[[Array], Array],
+        template: Array,
+        gauge: Callable[[Array], Array],
+    ) -> None:
+        self.rooms, self.template, self.gauge = rooms, template, gauge
+        self.outside = np.empty((0, template.shape[1]))
+        """Positions that are known not to be inside."""
+
+    def learn(self, position: Array, center: Array) -> None:
+        """Take note of a position that is not inside, found in a shape about a centre."""
+        way = position - center
+        self.outside = np.vstack([self.outside, position])
+        self.template = np.vstack([self.template, way / self.gauge(way)])
 
     def size_at(self, center: Array, most: float) -> float:
         """Return the largest size up to `most` up to which all of the shape's points are inside."""
-        low, high = 0.0, most
+        low, high = 0.0, float(self.gauge(self.outside - center).min(initial=most))
         for _ in range(4):
             sizes = np.linspace(low, high, _SIZES)
             points = center + sizes[:, None, None] * self.template

@@ -17,6 +17,7 @@ from typing import Literal
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from pteron.equations.machine import closure_of
 from pteron.kernels import Array, numeric, program
@@ -151,8 +152,8 @@ class _Vanishing:
     """Of type I, from 0."""
     kind: Kind
 
-    def __call__(self, poses: Array) -> tuple[Array, Array]:
-        """Return its values at poses (K, m), and which of them are in reach of the other legs."""
+    def __call__(self, poses: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Return its values at poses (..., m), and which of them are in reach of other legs."""
         squares = numeric(self.robot, "squared_type_i")(poses)[0]
         if self.leg is not None:
             others = np.delete(squares, self.leg, axis=-1)
@@ -185,9 +186,8 @@ def _changes(vanishing: _Vanishing, start: Array, way: Array, places: Array) -> 
 
     It is looked for between each two of `places` (S,).
     """
-    poses = start + places[:, None, None] * way
-    values, known = vanishing(poses)
-    negative, reached = values < 0.0, known
+    values, reached = vanishing(start + places[:, None, None] * way)
+    negative = values < 0.0
     changed = (negative[1:] != negative[:-1]) & reached[1:] & reached[:-1]
     rays = np.flatnonzero(changed.any(axis=0))
     first = changed[:, rays].argmax(axis=0)
@@ -240,10 +240,8 @@ def _moved(vanishing: _Vanishing, start: Array) -> Array | None:
     def distance(pose: Array) -> float:
         return float(np.linalg.norm(pose - start))
 
-    best = min([hits[0], *nearer], key=distance)
-    if best is hits[0]:
-        best = _narrowed(vanishing, start, best, lengths)
-    return best
+    best: Array = min([hits[0], *nearer], key=distance)
+    return _narrowed(vanishing, start, best, lengths) if best is hits[0] else best
 
 
 def _directions(lengths: int) -> Array:
@@ -275,18 +273,17 @@ def _projected(vanishing: _Vanishing, start: Array, hit: Array) -> Array | None:
         return float(vanishing(pose_of(x)[None])[0][0])
 
     def slope(x: Array) -> Array:
-        return scale * vanishing.slope(pose_of(x))[0][:lengths]
+        return np.asarray(scale * vanishing.slope(pose_of(x))[0][:lengths])
 
+    others = [i for i in range(vanishing.robot.freedom) if i != vanishing.leg]
     conditions: list[dict[str, str | Callable[[Array], object]]] = [
         {"type": "eq", "fun": value, "jac": slope},
         {
             "type": "ineq",
-            "fun": lambda x: vanishing.slope(pose_of(x))[1],
-            "jac": lambda x: scale * vanishing.slope(pose_of(x))[2][:, :lengths],
+            "fun": lambda x: vanishing.slope(pose_of(x))[1][others],
+            "jac": lambda x: scale * vanishing.slope(pose_of(x))[2][others, :lengths],
         },
     ]
-    if vanishing.leg is not None:
-        conditions = conditions[:1]
     with np.errstate(all="ignore"):
         run = minimize(
             lambda x: (0.5 * x @ x, x),
