@@ -15,12 +15,12 @@ demo: $(VENV)/.runtime
 
 # One thread of linear algebra a process: the tests share the cores among themselves.
 test: lint
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist worksteal
 
 # Under a minute on two cores: the numbers, the files and the messages, for the edit loop.
 quick: $(VENV)/.dev
 	$(BIN)/ruff check
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --quiet $(QUICK:%=tests/test_%.py)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist worksteal --quiet $(QUICK:%=tests/test_%.py)
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check

@@ -13,6 +13,7 @@ from tempfile import TemporaryDirectory
 import catalog
 import cycle
 import engines
+import index_maps
 import keys
 import legs
 import view_page
@@ -25,6 +26,7 @@ DRAWN: dict[str, Callable[[Path], None]] = {
     "cycle": cycle.draw,
     "engines": engines.draw,
     "legs": legs.draw,
+    "maps": index_maps.draw,
     "view_page": view_page.draw,
 }
 """What writes each group of pictures into a folder laid out as docs, by the script's name."""

@@ -78,9 +78,12 @@ Leg = PRRR
 if TYPE_CHECKING:
     from pteron import (
         controllers,
+        design,
         environments,
         export,
         identification,
+        indices,
+        maps,
         motion,
         plots,
         report,
@@ -106,8 +109,8 @@ _LATER = {
     "export_st": "pteron.export",
 }
 _LATER_MODULES = (
-    *("controllers", "environments", "export", "identification"),
-    *("motion", "plots", "report", "viewer", "workspace"),
+    *("controllers", "design", "environments", "export", "identification", "indices"),
+    *("maps", "motion", "plots", "report", "viewer", "workspace"),
 )
 """What would slow the start of those who do not use it (SymPy, SciPy, matplotlib, Gymnasium)."""
 
@@ -125,13 +128,13 @@ def __getattr__(name: str) -> Any:
 
 
 __all__ = [
+    "Architecture",
     "Bar",
     "BaseParameters",
     "Cone",
     "DataError",
     "Drive",
     "Geared",
-    "Architecture",
     "JointMotion",
     "Leg",
     "Manipulator",
@@ -160,9 +163,10 @@ __all__ = [
     "catalog",
     "cheapest_parameters",
     "compile",
-    "controllers",
     "constraint_measure",
+    "controllers",
     "coriolis_matrix",
+    "design",
     "direct_kinematics",
     "drive_accelerations",
     "drive_forces",
@@ -174,6 +178,7 @@ __all__ = [
     "forward_dynamics",
     "gravity_forces",
     "identification",
+    "indices",
     "inverse_dynamics",
     "inverse_kinematics",
     "is_singular_everywhere",
@@ -185,6 +190,7 @@ __all__ = [
     "link_jacobians",
     "link_vectors",
     "load",
+    "maps",
     "mass_matrix",
     "motion",
     "parameter_data",

@@ -292,6 +292,13 @@ class LegKind(ABC):
         """
         return []
 
+    def couple(self, motion: LegMotion) -> Expression | None:
+        """Return the couple (3, 1) that its rods pass on to the platform beside a force along them.
+
+        It is zero for a single rod; None for a leg whose chain of joints says what it passes on.
+        """
+        return None
+
     def doubts(self, axis: Vector | None) -> Iterator[str]:
         """Yield what is possible but unlikely in it, beside what is so in any leg.
 

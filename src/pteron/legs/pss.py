@@ -25,6 +25,7 @@ from pteron.legs.leg import Joint, LegMotion, Passive, Sphere
 from pteron.legs.rods import (
     ROD_KEYS,
     cones,
+    couple,
     couples,
     free_axes,
     hinge_doubts,
@@ -128,6 +129,9 @@ class PSS(SlideLeg):
 
     def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
         return cones(self, motion, ca.SX.eye(3), still, turned)
+
+    def couple(self, motion: LegMotion) -> Expression:
+        return couple(self, motion)
 
     def doubts(self, axis: Vector | None) -> Iterator[str]:
         return hinge_doubts(self, axis)

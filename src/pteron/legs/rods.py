@@ -79,6 +79,17 @@ def cones(
     ]
 
 
+def couple(leg: Any, motion: LegMotion) -> Expression:
+    """Return the couple of parallel rods, across their plane; zero for one.
+
+    Where the bar is not told it is taken along the leg's first passive joint.
+    """
+    if leg.rods == 1:
+        return ca.SX(3, 1)
+    bar = motion.chain[1].axis if leg.bar is None else ca.SX(list(leg.bar))
+    return ca.cross(bar, motion.links[1])
+
+
 def hinge_doubts(leg: Any, axis: Vector | None) -> Iterator[str]:
     """Yield it where parallel rods would keep their end of the platform from turning about an axis.
 

@@ -26,6 +26,7 @@ from pteron.legs.leg import Joint, LegMotion, Passive, Sphere
 from pteron.legs.rods import (
     ROD_KEYS,
     cones,
+    couple,
     couples,
     free_axes,
     hinge_doubts,
@@ -135,6 +136,9 @@ class RSS(CrankLeg):
     def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
         crank = motion.bodies["u"]
         return cones(self, motion, ca.horzcat(crank.x, crank.y, crank.axes), still, turned)
+
+    def couple(self, motion: LegMotion) -> Expression:
+        return couple(self, motion)
 
     def doubts(self, axis: Vector | None) -> Iterator[str]:
         return hinge_doubts(self, axis)

@@ -8,6 +8,7 @@ from typing import Any
 
 from pteron.atomic import write_text
 from pteron.manipulator.given import RobotLike, as_manipulator
+from pteron.manipulator.manipulator import Manipulator
 
 
 def save(robot: RobotLike, path: str | Path) -> Path:
@@ -30,10 +31,14 @@ def save(robot: RobotLike, path: str | Path) -> Path:
     OutputError
         If the file cannot be written.
     """
+    return write_text(path, text_of(as_manipulator(robot)))
+
+
+def text_of(robot: Manipulator) -> str:
+    """Return the text of a manipulator's file: machines that differ in anything differ in it."""
     from pteron.manipulator.tables import leg_items
     from pteron.manipulator.writing import written
 
-    robot = as_manipulator(robot)
     x, _, axis = robot.platform.frame
     platform: dict[str, Any] = {"motion": robot.platform.motion, "axis": axis, "x_axis": x}
     platform |= {"tool": robot.platform.tool, **asdict(robot.platform.inertia)}
@@ -44,7 +49,7 @@ def save(robot: RobotLike, path: str | Path) -> Path:
     legs = [{k: v for k, v in leg_items(leg).items() if v is not None} for leg in robot.legs]
     machine = {"name": robot.name, "gravity": robot.gravity, **radii}
     machine |= {"platform": platform, "legs": legs}
-    return write_text(path, written(_plain(machine)))
+    return written(_plain(machine))
 
 
 def _plain(value: Any) -> Any:
