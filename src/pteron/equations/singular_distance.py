@@ -26,13 +26,17 @@ def type_ii_distances(machine: Machine, pose: Expression) -> dict[str, Expressio
     measure = machine.closure.measure(state.platform, state.legs)
     slope = ca.gradient(measure, pose)
     lengths = machine.platform.directions.shape[1]
-    steep = ca.sqrt(ca.dot(slope[:lengths], slope[:lengths]) + _TINY)
-    found = {"metres": ca.fmin(ca.fabs(measure) / steep, FAR)}
+    found = {"metres": _first_order(measure, slope[:lengths], FAR)}
     if machine.closure.orientation is not None:
         a, b = machine.closure.orientation
         c, s = ca.cos(pose[-1]), ca.sin(pose[-1])
         found["radians"] = ca.atan2(ca.fabs(a * c + b * s), ca.fabs(b * c - a * s))
     elif lengths < machine.freedom:
-        turning = ca.sqrt(slope[-1] * slope[-1] + _TINY)
-        found["radians"] = ca.fmin(ca.fabs(measure) / turning, math.pi)
+        found["radians"] = _first_order(measure, slope[-1], math.pi)
     return found
+
+
+def _first_order(measure: Expression, slope: Expression, most: float) -> Expression:
+    """Return |mu| over its slope, which is made as steep as it is where the way is the longest."""
+    least = measure / most
+    return ca.fabs(measure) / ca.sqrt(ca.dot(slope, slope) + least * least + _TINY)
