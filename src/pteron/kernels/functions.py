@@ -342,9 +342,7 @@ TABLE: dict[str, Entry] = {
     "discriminants": Entry(_POSE, _discriminants),
     "squared_type_i": Entry(_POSE, _squared_type_i),
     "type_ii": Entry(_POSE, _type_ii),
-    "type_ii_distances": Entry(
-        _POSE, lambda m, v: dict(type_ii_distances(m, v["pose"])), _BENT
-    ),
+    "type_ii_distances": Entry(_POSE, lambda m, v: dict(type_ii_distances(m, v["pose"])), _BENT),
     "clearances": Entry(
         _POSE, lambda m, v: {"distances": _stacked(clearances(m, v["pose"]))}, ("reach",)
     ),
