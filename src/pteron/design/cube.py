@@ -50,8 +50,8 @@ def largest(
     """Return the largest cube whose poses all keep the conditions, at every orientation.
 
     A grid finds where it is and about how large; then its centre and edge are unknowns of a program
-    with exact slopes. At 13 points along each edge all conditions are kept, and so far as slopes tell
-    between them.
+    with exact slopes. At 13 points along each edge all conditions are kept, and so far as slopes
+    tell between them.
 
     Parameters
     ----------
