@@ -15,12 +15,12 @@ demo: $(VENV)/.runtime
 
 # One thread of linear algebra a process: the tests share the cores among themselves.
 test: lint
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist worksteal
 
 # Under a minute on two cores: the numbers, the files and the messages, for the edit loop.
 quick: $(VENV)/.dev
 	$(BIN)/ruff check
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --quiet $(QUICK:%=tests/test_%.py)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist worksteal --quiet $(QUICK:%=tests/test_%.py)
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check
@@ -36,7 +36,7 @@ bench: $(VENV)/.dev
 docs: $(VENV)/.docs
 	rm -rf docs/_build docs/gallery
 	$(BIN)/python docs/pictures/draw.py
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m sphinx -W --keep-going -n -q -d docs/_build/doctrees docs docs/_build/html
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m sphinx -j auto -W --keep-going -n -q -d docs/_build/doctrees docs docs/_build/html
 	$(BIN)/python docs/check_site.py docs/_build/html
 
 # The wheel in empty environments: every Python here, each extra alone and all; over half an hour.

@@ -38,6 +38,7 @@ _SCRIPTS = {
     "Certified workspaces": "certified.py",
     "The Gymnasium environment": "environment.py",
     "The viewer": "viewer.py",
+    "Maps of eight million poses": "maps.py",
     "From a log to a running machine": "identification/chain.py",
 }
 _PACKAGES = ("pteron", "numpy", "casadi", "numba", "jax", "pin", "mujoco")

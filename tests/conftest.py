@@ -4,6 +4,7 @@ Pages are tried in the Chromium of the machine; where there is none these tests 
 unless PTERON_BROWSER is set, which then names it.
 """
 
+import gc
 import os
 import shutil
 import signal
@@ -15,6 +16,9 @@ import pytest
 
 os.environ.setdefault("PTERON_CACHE", tempfile.mkdtemp(prefix="pteron-test-"))
 os.environ.setdefault("PTERON_KERNELS", "vm")
+
+# Graphs of equations are many small objects without cycles: looking for those takes a twentieth.
+gc.set_threshold(100_000, 50, 50)
 
 # What a shell starts in the background ignores Ctrl-C; the tests of interruption want it.
 signal.signal(signal.SIGINT, signal.default_int_handler)

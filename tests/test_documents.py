@@ -87,7 +87,7 @@ def commands(text):
     """Return the commands of the program that stand on lines of their own, without remarks."""
     text = re.sub(r"(?ms)^```(?!console).*?^```", "", text)
     lines = (line for line in _LINE.findall(text) if not line.startswith("pteron."))
-    return [line.split("  #")[0].rstrip().removeprefix(".venv/bin/") for line in lines]
+    return [re.split(r" +# ", line)[0].rstrip().removeprefix(".venv/bin/") for line in lines]
 
 
 @NAMES
@@ -104,9 +104,12 @@ def test_options_that_are_shown_exist(name):
 RUN = ("README.md", "docs/start/first-result.md", "docs/start/install.md")
 LEFT = {
     "excite": "searches for its motion; test_excitation_files.py",
+    "film": "test_films.py",
     "identify": "wants a log; test_walk.py",
+    "play": "wants a motion; test_pages.py",
     "report": "test_report.py",
     "simulate": "test_simulate_cli.py",
+    "view": "stays open until it is ended; test_viewer.py",
 }
 """Subcommands that are not run here, and where they are."""
 

@@ -7,7 +7,7 @@ import sys
 import textwrap
 import time
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 
@@ -20,9 +20,20 @@ from mechanisms import CATALOG, MECHANISMS, NEAREST, random_machine, relative_er
 import pteron
 from pteron.controllers import CONTROLLERS
 from pteron.errors import DataError, ModelError, OutputError
-from pteron.kernels import FUNCTIONS, SELECTED, TARGETS, NoSquareRoot, Port, numeric, program
+from pteron.kernels import (
+    FUNCTIONS,
+    SELECTED,
+    TARGETS,
+    NoSquareRoot,
+    Port,
+    cache,
+    numeric,
+    program,
+)
 from pteron.kernels.c import Code, compiler
 from pteron.kernels.choice import Adaptive, Tier
+from pteron.kernels.kept import kept
+from pteron.kernels.programs import bare
 
 ROBOT = CATALOG["quadrupteron"]
 DYNAMICS = "inverse_dynamics"
@@ -502,6 +513,11 @@ def fresh(tmp_path, monkeypatch):
     return tmp_path / "cache"
 
 
+def entries(folder):
+    """Return what is compiled; texts are kept beside it."""
+    return [path for path in folder.iterdir() if path.name != cache.TEXTS]
+
+
 def another():
     """Return a kernel of its own: those of `compile` have loaded their code."""
     built = program(ROBOT, "jacobian")
@@ -520,7 +536,7 @@ def assert_works():
 def test_a_second_start_compiles_nothing(fresh, monkeypatch):
     assert not another().code.is_cached()
     assert_works()
-    (folder,) = fresh.iterdir()
+    (folder,) = entries(fresh)
     assert fresh.stat().st_mode & 0o777 == folder.stat().st_mode & 0o777 == 0o700
     made = {path: path.stat().st_mtime_ns for path in folder.iterdir()}
     assert another().code.is_cached()
@@ -532,7 +548,7 @@ def test_a_second_start_compiles_nothing(fresh, monkeypatch):
 @pytest.mark.parametrize("manifest", ["kept", "gone", "", "{}", "[]", "3"])
 def test_a_damaged_entry_is_built_again(fresh, manifest):
     assert_works()
-    (folder,) = fresh.iterdir()
+    (folder,) = entries(fresh)
     (library,) = folder.glob("*.so")
     content = library.read_bytes()
     library.unlink()  # this process goes on using the file that it has loaded
@@ -545,7 +561,7 @@ def test_a_damaged_entry_is_built_again(fresh, manifest):
         (folder / "manifest.json").write_text(manifest)
     assert not another().code.is_cached()
     assert_works()
-    assert list(fresh.iterdir()) == [folder]
+    assert entries(fresh) == [folder]
     assert another().code.is_cached()
 
 
@@ -565,7 +581,7 @@ def test_a_folder_that_others_may_write_to_is_not_trusted(fresh, danger):
         fresh.chmod(0o770 if danger == "group" else 0o707)
     assert_works()
     assert library.read_bytes() == b"planted"
-    assert len(list(fresh.iterdir())) == 1
+    assert len(entries(fresh)) == 1
 
 
 @needs_compiler
@@ -584,7 +600,7 @@ def test_the_sweep_removes_what_a_killed_process_left_and_nothing_else(fresh, tm
         time.sleep(0.05)
     os.killpg(process.pid, signal.SIGKILL)
     process.wait()
-    (left,) = fresh.iterdir()
+    (left,) = entries(fresh)
     others = [fresh / ".config-old", fresh / ".pteron-work-notes", fresh / "c-mine"]
     day = time.time() - 24 * 3600
     for folder in others:
@@ -616,7 +632,7 @@ def test_processes_that_compile_at_once_do_not_meet(fresh):
     printed = {process.communicate()[0] for process in running}
     assert [process.returncode for process in running] == [0] * 3
     assert len(printed) == 1
-    assert len(list(fresh.iterdir())) == 1
+    assert len(entries(fresh)) == 1
 
 
 @needs_compiler
@@ -645,7 +661,46 @@ def test_a_full_disk_is_one_line(fresh):
     assert run.stdout.startswith(f"{fresh}: compiled code cannot be written (")
     assert run.stdout.endswith("name another folder in the environment variable PTERON_CACHE\n")
     assert issubclass(OutputError, pteron.PteronError)
-    assert list(fresh.iterdir()) == []
+    assert entries(fresh) == []
+
+
+@dataclass(frozen=True)
+class Foreign:
+    """What no source of the package tells of."""
+
+
+def test_a_second_start_builds_no_program(fresh):
+    built, keys = program(ROBOT, "jacobian"), []
+
+    def asked(*key):
+        def build():
+            keys.append(key)
+            return built
+
+        return kept(key, build)
+
+    one, close, foreign = (
+        (bare(ROBOT), 0.1),
+        (bare(ROBOT), np.nextafter(0.1, 1.0).item()),
+        Foreign(),
+    )
+    for key in (one, close, one, (foreign,), (foreign,)):
+        found = asked(*key)
+        assert (found.inputs, found.outputs) == (built.inputs, built.outputs)
+        assert found.function.str(True) == built.function.str(True)
+    assert keys == [one, close, (foreign,), (foreign,)]
+    for path in (fresh / cache.TEXTS).iterdir():
+        path.write_bytes(path.read_bytes()[:-1])
+    asked(*one)
+    assert keys[4:] == [one]
+
+
+def test_the_oldest_texts_give_way(fresh):
+    for k in range(9):
+        cache.keep_text(str(k), f"text {k}", most=4)
+    assert len([*(fresh / cache.TEXTS).iterdir()]) <= 4
+    assert cache.find_text("8") == "text 8"
+    assert cache.find_text("0") is None
 
 
 def test_the_numba_code_is_cached_too(fresh):

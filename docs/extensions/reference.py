@@ -28,7 +28,7 @@ TOPICS: dict[str, tuple[str, ...]] = {
     "Robots": (
         *("load", "save", "catalog", "Manipulator", "Platform", "Bar", "Geared", "turned"),
         *("PRRR", "PSS", "RSS", "RRR", "PRR", "RUPU", "Leg", "Cone", "Drive", "Stribeck"),
-        *("PlanarInertia", "RodInertia"),
+        *("PlanarInertia", "RodInertia", "Radii"),
     ),
     "Parameters": (
         *("parameters", "parameter_names", "parameter_units", "parameter_data", "Parameter"),
@@ -39,7 +39,8 @@ TOPICS: dict[str, tuple[str, ...]] = {
         *("inverse_kinematics", "direct_kinematics", "follow", "jacobian", "joint_rates"),
         *("joint_accelerations", "JointMotion", "joint_screws", "link_vectors", "link_jacobians"),
         *("working_mode", "working_modes", "assembly_mode", "singular_orientations"),
-        *("is_singular_everywhere", "random_poses"),
+        *("architecture", "Architecture", "is_singular_everywhere", "constraint_measure"),
+        "random_poses",
     ),
     "Dynamics": (
         *("inverse_dynamics", "forward_dynamics", "regressor", "drive_forces"),

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import catalog
 import cycle
 import engines
+import index_maps
 import keys
 import legs
 import view_page
@@ -25,6 +27,7 @@ DRAWN: dict[str, Callable[[Path], None]] = {
     "cycle": cycle.draw,
     "engines": engines.draw,
     "legs": legs.draw,
+    "index_maps": index_maps.draw,
     "view_page": view_page.draw,
 }
 """What writes each group of pictures into a folder laid out as docs, by the script's name."""
@@ -35,8 +38,9 @@ def main() -> None:
     keys.write(DOCS / "robot-file.md")
     with TemporaryDirectory() as name:
         folder = Path(name)
-        for draw in DRAWN.values():
-            draw(folder)
+        with ProcessPoolExecutor() as pool:
+            for drawn in [pool.submit(draw, folder) for draw in DRAWN.values()]:
+                drawn.result()
         for picture in sorted(path for path in folder.rglob("*") if path.is_file()):
             kept = DOCS / picture.relative_to(folder)
             if not alike(kept, picture):

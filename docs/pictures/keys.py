@@ -16,12 +16,14 @@ from pteron.manipulator.tables import (
     DriveTable,
     MachineTable,
     PlatformTable,
+    RadiiTable,
     StribeckTable,
     leg_table,
 )
 
 TABLES: dict[str, type[Table]] = {
     "the machine": MachineTable,
+    "radii": RadiiTable,
     "platform": PlatformTable,
     "bars": Bar,
     "geared": Geared,

@@ -36,8 +36,11 @@ from pteron.errors import (
 )
 from pteron.kernels import compile
 from pteron.kinematics import (
+    Architecture,
     JointMotion,
+    architecture,
     assembly_mode,
+    constraint_measure,
     direct_kinematics,
     follow,
     inverse_kinematics,
@@ -55,6 +58,7 @@ from pteron.kinematics import (
 from pteron.legs import PRR, PRRR, PSS, RRR, RSS, RUPU, Cone, Drive, Stribeck
 from pteron.manipulator import (
     Manipulator,
+    Radii,
     catalog,
     load,
     parameter_data,
@@ -74,9 +78,12 @@ Leg = PRRR
 if TYPE_CHECKING:
     from pteron import (
         controllers,
+        design,
         environments,
         export,
         identification,
+        indices,
+        maps,
         motion,
         plots,
         report,
@@ -102,8 +109,8 @@ _LATER = {
     "export_st": "pteron.export",
 }
 _LATER_MODULES = (
-    *("controllers", "environments", "export", "identification"),
-    *("motion", "plots", "report", "viewer", "workspace"),
+    *("controllers", "design", "environments", "export", "identification", "indices"),
+    *("maps", "motion", "plots", "report", "viewer", "workspace"),
 )
 """What would slow the start of those who do not use it (SymPy, SciPy, matplotlib, Gymnasium)."""
 
@@ -121,6 +128,7 @@ def __getattr__(name: str) -> Any:
 
 
 __all__ = [
+    "Architecture",
     "Bar",
     "BaseParameters",
     "Cone",
@@ -142,10 +150,12 @@ __all__ = [
     "RRR",
     "RSS",
     "RUPU",
+    "Radii",
     "RodInertia",
     "SingularPose",
     "Stribeck",
     "UnreachablePose",
+    "architecture",
     "assembly_mode",
     "base_parameters",
     "base_regressor",
@@ -153,8 +163,10 @@ __all__ = [
     "catalog",
     "cheapest_parameters",
     "compile",
+    "constraint_measure",
     "controllers",
     "coriolis_matrix",
+    "design",
     "direct_kinematics",
     "drive_accelerations",
     "drive_forces",
@@ -166,6 +178,7 @@ __all__ = [
     "forward_dynamics",
     "gravity_forces",
     "identification",
+    "indices",
     "inverse_dynamics",
     "inverse_kinematics",
     "is_singular_everywhere",
@@ -177,6 +190,7 @@ __all__ = [
     "link_jacobians",
     "link_vectors",
     "load",
+    "maps",
     "mass_matrix",
     "motion",
     "parameter_data",

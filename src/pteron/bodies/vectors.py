@@ -6,6 +6,9 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 from pteron.errors import ModelError
 
 Vector = tuple[float, float, float]
@@ -15,6 +18,9 @@ UNIT_TOLERANCE = 1e-6
 
 PARALLEL_TOLERANCE = 1e-9
 """Sine of the angle under which two unit vectors count as parallel."""
+
+_VANISHING = 1e-9
+"""Singular value of unit vectors below which they do not span another direction."""
 
 _ROUNDING = 4 * math.ulp(1.0)
 _UPRIGHT = 1e-15
@@ -144,3 +150,11 @@ def vertical(d: Vector, gravity: Vector) -> bool:
     """Say whether gravity has no part across a unit vector."""
     size = norm(gravity)
     return size == 0.0 or parallel(d, scaled(gravity, 1.0 / size))
+
+
+def complement(axes: ArrayLike) -> NDArray[np.float64]:
+    """Return rows that span what is perpendicular to given vectors."""
+    matrix = np.asarray(axes, dtype=float).reshape(-1, 3)
+    _, sizes, rows = np.linalg.svd(matrix) if len(matrix) else (None, np.zeros(0), np.eye(3))
+    spanning: NDArray[np.float64] = rows[int((sizes > _VANISHING).sum()) :]
+    return spanning

@@ -33,6 +33,19 @@ def functions(incomplete: str) -> list[str]:
     return [name for name in FUNCTIONS if name.startswith(incomplete)]
 
 
+def indices(ctx: Context, incomplete: str) -> list[str]:
+    """Return the indices of performance that the machine that was named has, and begin so."""
+    from pteron.indices import INDICES, indices_of
+    from pteron.manipulator import load
+
+    robot = ctx.params.get("robot") or next(iter(ctx.args), "")
+    try:
+        names = indices_of(load(robot))
+    except PteronError:
+        names = tuple(INDICES)
+    return [name for name in (*names, "margin") if name.startswith(incomplete)]
+
+
 def parameters(ctx: Context, incomplete: str) -> list[str]:
     """Return inertial parameters of the machine that was named; the last of a list is completed."""
     from pteron.manipulator import load, parameter_names

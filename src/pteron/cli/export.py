@@ -19,10 +19,12 @@ FUNCTIONS = (
     "adaptive",
     "adaptive_drives",
     "bias_forces",
+    "clearances",
     "closure_poses",
     "closure_rows",
     "computed_torque",
     "computed_torque_base",
+    "constraint",
     "coriolis_matrix",
     "direct_kinematics",
     "direct_step",
@@ -48,6 +50,7 @@ FUNCTIONS = (
     "joint_rates",
     "joint_screws",
     "kinetic_energy",
+    "least_clearances",
     "link_jacobians",
     "link_vectors",
     "mass_matrix",
@@ -65,6 +68,7 @@ FUNCTIONS = (
     "regressor",
     "squared_type_i",
     "type_ii",
+    "type_ii_distances",
 )
 """Written out: help is shown before CasADi is loaded. A test holds it against what there is."""
 

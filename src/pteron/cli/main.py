@@ -16,6 +16,7 @@ from typer.core import TyperGroup
 from pteron.cli.arguments import Command, NumbersCommand, without_types
 from pteron.cli.base import base, table1
 from pteron.cli.cycle import cycle
+from pteron.cli.design import design
 from pteron.cli.excite import excite
 from pteron.cli.export import export
 from pteron.cli.film import film
@@ -29,6 +30,7 @@ from pteron.cli.screen import complain, note
 from pteron.cli.simulate import simulate
 from pteron.cli.size import size
 from pteron.cli.view import view
+from pteron.cli.workspace import workspace
 from pteron.errors import PteronError
 
 _USER_ERROR = 2
@@ -197,6 +199,15 @@ _add(
     "pteron film robot.toml --cycle motion.csv --size 640x480 -o motion.gif",
 )
 
+_add(
+    _SEE,
+    workspace,
+    "pteron workspace delta",
+    "pteron workspace quadrupteron --index kappa --slice z=0,phi=0 --out kappa.png",
+    "pteron workspace quadrupteron --index condition --slice phi=0 --out condition.vtk",
+    "pteron workspace robot.toml --index kappa --slice z=0 --points 400 --out kappa.zarr",
+)
+
 _COMPUTE = "Compute"
 _add(
     _COMPUTE,
@@ -254,6 +265,15 @@ _add(
     "pteron size delta --payload 1.0",
     "pteron size robot.toml --motors motors.csv --dwell 0.2 --out sizing",
     "pteron size quadrupteron --cycle motion.csv --out sizing.csv",
+)
+
+_DESIGN = "Design"
+_add(
+    _DESIGN,
+    design,
+    "pteron design search.toml --out best",
+    "pteron design search.toml --out best --seed 7 --workers 4",
+    "pteron design search.toml --out all --sweep 100000 --scheduler tcp://host:8786",
 )
 
 _LOG = "From a log to a controller"

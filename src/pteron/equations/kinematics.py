@@ -66,6 +66,32 @@ def passive_room(machine: Machine, pose: Expression) -> tuple[Expression, Expres
     return ca.vertcat(*shares), ca.vertcat(*metres)
 
 
+def standing(machine: Machine, pose: Expression) -> tuple[Expression, Expression]:
+    """Return whether a pose serves, and the metres to the nearest end of what does.
+
+    First 0 where it does, else the leg, from 1, that misses it by most, or -1 where all reach it
+    but a joint's limit forbids it. Then the least of the legs' margins and, where all reach it, of
+    the ways that they may move until a joint meets its limit, at most `FAR`; negative where the
+    pose does not serve.
+    """
+    found = reach(machine, pose)
+    joints = ca.vertsplit(inverse_position(machine, pose))
+    passive = ca.vertsplit(passive_room(machine, pose)[1])
+    least, worst, missed, room = found[0].margin, ca.SX(1), ca.SX(0), ca.SX(FAR)
+    rows = zip(machine.robot.legs, found, joints, passive, strict=True)
+    for i, (leg, at, joint, way) in enumerate(rows, start=1):
+        worst = ca.if_else(at.margin < least, i, worst)
+        least = ca.fmin(least, at.margin)
+        missed = ca.fmax(missed, at.discriminant < 0)
+        room = ca.fmin(room, way)
+        if leg.limits is not None:
+            # No way leads out of an angle's limits.
+            own = ca.fmin(joint - leg.limits[0], leg.limits[1] - joint) * leg.lever
+            room = ca.fmin(room, ca.if_else(own < 0, own, FAR) if leg.follows_angle else own)
+    status = ca.if_else(missed, worst, ca.if_else(room < 0, -1, 0))
+    return status, ca.if_else(missed, least, ca.fmin(least, room))
+
+
 def direct_position(machine: Machine, joints: Expression, *, reached: bool = True) -> Expression:
     """Return every pose that the joint coordinates allow, as columns (m, k).
 

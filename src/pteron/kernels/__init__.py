@@ -9,13 +9,13 @@ from pteron.kernels.fields import Field, NoSquareRoot, PrimeField, RationalField
 from pteron.kernels.functions import FUNCTIONS, needs_of
 from pteron.kernels.graph import Graph, graph_of
 from pteron.kernels.intervals import Enclosure
+from pteron.kernels.kept import Program
 from pteron.kernels.kernel import Array, Kernel, Port, as_array, count_operations
 from pteron.kernels.programs import (
     LOADED,
     REDUCIBLE,
     SELECTED,
     Columns,
-    Program,
     bare,
     general_program,
     program,

@@ -1,8 +1,10 @@
-"""Compiled code on disk, so that a second start does not compile.
+"""Compiled code on disk, so that a second start does not compile; and texts that took a while.
 
 An entry is a folder of files under the user's cache directory, named by a digest of all that it
 was made of. It is built in a folder of its own and moved into place, so that two processes may
 build it at once; a manifest of digests tells a damaged one, which is then built again.
+
+A text is one file, which begins with its digest; so many of the latest are kept.
 
 What lies there is loaded and run. So a directory that belongs to somebody else, or that others may
 write to, is neither read nor written: a temporary one, gone with the process, takes its place.
@@ -19,6 +21,7 @@ import shutil
 import sys
 import tempfile
 import time
+import zlib
 from collections.abc import Callable
 from contextlib import suppress
 from functools import lru_cache
@@ -42,6 +45,12 @@ _MARK = ".made-by-pteron"
 
 _STALE = 3600.0
 """Seconds after which nobody works on a folder any more."""
+
+TEXTS = "texts"
+"""The folder of texts."""
+
+MOST = 3000
+"""Texts that are kept, of some 10 kB each."""
 
 
 def directory() -> Path:
@@ -115,6 +124,45 @@ def entry(name: str, file: str, build: Callable[[Path], None]) -> Path:
         shutil.rmtree(work, ignore_errors=True)
         raise
     return _moved(work, root / name, file) / file
+
+
+def find_text(name: str) -> str | None:
+    """Return a text that is kept and whole, or None."""
+    try:
+        data = (_root() / TEXTS / name).read_bytes()
+        if data[:32] == hashlib.sha256(data[32:]).digest():
+            return zlib.decompress(data[32:]).decode()
+    except (OSError, zlib.error, UnicodeDecodeError):
+        pass
+    return None
+
+
+def keep_text(name: str, text: str, most: int = MOST) -> None:
+    """Keep a text where the disk takes it; where there are too many, the oldest give way."""
+    data = zlib.compress(text.encode(), 1)
+    folder = _root() / TEXTS
+    with suppress(OSError):
+        folder.mkdir(mode=0o700, exist_ok=True)
+        with tempfile.NamedTemporaryFile(prefix=_WORK, dir=folder, delete=False) as file:
+            work = Path(file.name)
+            try:
+                file.write(hashlib.sha256(data).digest() + data)
+                file.close()
+                work.replace(folder / name)
+            finally:
+                work.unlink(missing_ok=True)
+        kept = list(os.scandir(folder))
+        if len(kept) > most:
+            for old in sorted(kept, key=_age)[: len(kept) - 3 * most // 4]:
+                Path(old).unlink(missing_ok=True)
+
+
+def _age(found: os.DirEntry[str]) -> float:
+    """Return when a file was written; what another process removed meanwhile counts as oldest."""
+    try:
+        return found.stat().st_mtime
+    except OSError:
+        return 0.0
 
 
 def _root() -> Path:

@@ -54,10 +54,22 @@ def _known(robot: RobotLike, what: str, columns: Columns | None, wrench: bool) -
         # Nothing is kept under a name: what its file says may change. A call with a machine, whose
         # kernel is known, never comes here, so that it pays nothing for this.
         raise TypeError
+    kernel = guarded(robot, what, VirtualMachine, columns, wrench=wrench)
+    return Adaptive(kernel, _tier(bare(robot), what, columns, wrench))
+
+
+def guarded(
+    robot: Manipulator,
+    what: str,
+    kind: type[Kernel],
+    columns: Columns | None = None,
+    *,
+    wrench: bool = False,
+) -> Kernel:
+    """Return a kernel whose last output is `status`: 1 where the others count, else 0."""
     built = program(robot, what, columns, wrench=wrench, guarded=True)
     fixed = {p.name: FIXED[p.name](robot) for p in built.inputs if p.name in FIXED}
-    kernel = VirtualMachine(built.name, built.function, built.inputs, built.outputs, fixed)
-    return Adaptive(kernel, _tier(bare(robot), what, columns, wrench))
+    return kind(built.name, built.function, built.inputs, built.outputs, fixed)
 
 
 @lru_cache(maxsize=512)
@@ -83,6 +95,17 @@ class Tier:
         self.code = code
         self.ready = False
         self._patience = patience
+
+    def fetch(self, *, at_any_cost: bool) -> None:
+        """Have the code ready when this returns, if it is on disk or `at_any_cost`.
+
+        For who is about to ask for millions of states, and would rather wait once.
+        """
+        if self.ready or os.environ.get(VARIABLE) == "vm" or compiler() is None:
+            return
+        if at_any_cost or self.code.is_cached():
+            _AT_WORK.acquire()
+            self._fetch()
 
     def missed(self, seconds: float) -> None:
         """Take note that the virtual machine worked so long in its place."""

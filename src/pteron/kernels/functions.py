@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Literal
@@ -10,11 +10,23 @@ from typing import Any, Literal
 import casadi as ca
 
 from pteron.bodies.motion import Expression
-from pteron.equations import closing, control, drives, kinematics, lagrangian, regressor
+from pteron.equations import (
+    closing,
+    control,
+    drives,
+    indices,
+    kinematics,
+    lagrangian,
+    reactions,
+    regressor,
+)
+from pteron.equations.clearance import clearances, least_clearances
+from pteron.equations.constraints import constraint_measure
 from pteron.equations.friction import passive_friction
 from pteron.equations.laws import LAWS
 from pteron.equations.machine import Machine
 from pteron.equations.room import rooms
+from pteron.equations.singular_distance import type_ii_distances
 from pteron.equations.virtual_work import generalized_forces, inverse_dynamics
 
 Output = Expression | list[Expression] | tuple[Expression, tuple[int, ...]]
@@ -97,6 +109,11 @@ def _passive_room(m: Machine, v: Symbols) -> Outputs:
     return {"shares": shares, "metres": metres}
 
 
+def _standing(m: Machine, v: Symbols) -> Outputs:
+    status, margin = kinematics.standing(m, v["pose"])
+    return {"standing": status, "margin": margin}
+
+
 def _platform_points(m: Machine, v: Symbols) -> Outputs:
     points = m.platform.motion(v["pose"], *[ca.SX.zeros(m.freedom)] * 2).points
     return {"points": ca.vertcat(*(point.position.T for point in points))}
@@ -143,6 +160,39 @@ def _platform_motion(m: Machine, v: Symbols) -> Outputs:
     return {"velocity": velocity, "acceleration": acceleration}
 
 
+def _reactions(m: Machine, v: Symbols) -> Outputs:
+    found = reactions.equilibrium(m, _state(m, v), v["parameters"])
+    wrenches = [[ca.vertcat(at.force, at.moment) for at in leg.wrenches] for leg in found.legs]
+    points, passed = (
+        ca.vertcat(*(_padded(rows, max(map(len, columns))) for rows in columns))
+        for columns in ([leg.points for leg in found.legs], wrenches)
+    )
+    return {
+        "rows": (found.rows, found.rows.shape),
+        "right": found.right,
+        "presumed_rows": (found.presumed_rows, found.presumed_rows.shape),
+        "presumed_right": found.presumed_right,
+        "driven_rows": (found.driven_rows, found.driven_rows.shape),
+        "driven": found.driven,
+        "ends": _platform_points(m, v)["points"],
+        "points": (points, (m.freedom, points.shape[0] // m.freedom, 3)),
+        "passed": (passed, (m.freedom, passed.shape[0] // m.freedom, 6)),
+    }
+
+
+def _beams(m: Machine, v: Symbols) -> Outputs:
+    found = reactions.beams(m, _state(m, v))
+    *links, couples = found._asdict().items()
+    rows = ca.horzcat(*couples[1]).T
+    return {**dict(links), "couples": (rows, rows.shape)}
+
+
+def _padded(columns: Sequence[Expression], count: int) -> Expression:
+    """Return columns as rows (count, k), NaN where there are too few."""
+    rows = ca.horzcat(*columns).T
+    return ca.vertcat(rows, ca.SX.nan(count - rows.shape[0], rows.shape[1]))
+
+
 def _passive_friction(m: Machine, v: Symbols) -> Outputs:
     forces = passive_friction(m, _state(m, v))
     return {"forces": (forces, forces.shape)}
@@ -187,6 +237,20 @@ def _drive_accelerations(m: Machine, v: Symbols) -> Outputs:
     given = v["pose"], v["velocity"], v["forces"], v["parameters"], wrench
     acceleration = drives.drive_accelerations(m, *given, drives.Drives.of(v["drives"]))
     return {"acceleration": acceleration}
+
+
+def _homogeneous_jacobian(m: Machine, v: Symbols) -> Outputs:
+    found = indices.homogeneous(m, _state(m, v))
+    return {"jacobian": found.matrix, "length": found.length}
+
+
+def _geometric_index(m: Machine, v: Symbols, *, what: str) -> Outputs:
+    return {"value": indices.OF_GEOMETRY[what](m, _state(m, v))}
+
+
+def _kappa(m: Machine, v: Symbols) -> Outputs:
+    mass = lagrangian.mass_matrix(m, v["pose"], v["parameters"])
+    return {"value": indices.kappa(m, _state(m, v), mass)}
 
 
 def _coriolis_matrix(m: Machine, v: Symbols) -> Outputs:
@@ -243,6 +307,11 @@ def _controlled(m: Machine, v: Symbols, *, what: str) -> Outputs:
     return {"forces": forces, "next_memory": ca.vertcat(*(kept[name] for name in memory))}
 
 
+def _stacked(column: Expression) -> tuple[Expression, tuple[int, ...]]:
+    """Return a column as a vector, also where it has one element or none."""
+    return column, column.shape[:1]
+
+
 _POSE, _RATE = ("pose",), ("pose", "velocity")
 _MOTION = ("pose", "velocity", "acceleration")
 _BENT: tuple[Need, ...] = ("reach", "type I")
@@ -265,6 +334,7 @@ TABLE: dict[str, Entry] = {
     "room": Entry(
         _POSE, lambda m, v: {"room": ca.vertcat(*(room.value for room in rooms(m, v["pose"])))}
     ),
+    "standing": Entry(_POSE, _standing),
     "joint_points": Entry(
         _POSE, lambda m, v: {"points": kinematics.chain_points(_state(m, v))}, ("reach",)
     ),
@@ -272,9 +342,22 @@ TABLE: dict[str, Entry] = {
     "discriminants": Entry(_POSE, _discriminants),
     "squared_type_i": Entry(_POSE, _squared_type_i),
     "type_ii": Entry(_POSE, _type_ii),
+    "type_ii_distances": Entry(_POSE, lambda m, v: dict(type_ii_distances(m, v["pose"])), _BENT),
+    "clearances": Entry(
+        _POSE, lambda m, v: {"distances": _stacked(clearances(m, v["pose"]))}, ("reach",)
+    ),
+    "least_clearances": Entry(
+        _POSE, lambda m, v: {"distances": _stacked(least_clearances(m, v["pose"]))}, ("reach",)
+    ),
+    "constraint": Entry(
+        _POSE,
+        lambda m, v: {"constraint": constraint_measure(m, _state(m, v))},
+        ("reach",),
+    ),
     "jacobian": Entry(
         _POSE, lambda m, v: {"jacobian": kinematics.jacobian(_state(m, v))}, ("rows",)
     ),
+    "homogeneous_jacobian": Entry(_POSE, _homogeneous_jacobian, ("rows",)),
     "link_jacobians": Entry(_POSE, _link_jacobians, _BENT),
     "joint_screws": Entry(
         _POSE, lambda m, v: {"screws": [s.T for s in kinematics.joint_screws(_state(m, v))]}, _BENT
@@ -285,6 +368,8 @@ TABLE: dict[str, Entry] = {
         ("pose", "joint_rates", "joint_accelerations"), _platform_motion, _HELD
     ),
     "passive_friction": Entry(_RATE, _passive_friction, _HELD),
+    "reactions": Entry((*_MOTION, "parameters"), _reactions, _HELD),
+    "beams": Entry(_POSE, _beams, _BENT),
     "inverse_dynamics": Entry((*_MOTION, "parameters"), _inverse_dynamics, _HELD),
     "forward_dynamics": Entry((*_RATE, "forces", "parameters"), _forward_dynamics, _BENT),
     "drive_forces": Entry(
@@ -331,7 +416,26 @@ TABLE: dict[str, Entry] = {
 }
 
 FUNCTIONS = tuple(TABLE)
-"""What `compile` accepts."""
+"""What `compile` accepts, beside the indices."""
+
+_DEFINED = (
+    *("condition", "condition_points", "speed_least", "speed_most", "turning_speed"),
+    *("force_least", "turning_moment", "pressure_angle", "output_pressure_angle"),
+)
+"""The indices of geometry that are defined at type-II singularities too, if only as infinite."""
+
+INDICES: dict[str, Entry] = {
+    **{
+        what: Entry(
+            _POSE, partial(_geometric_index, what=what), _BENT if what in _DEFINED else _HELD
+        )
+        for what in indices.OF_GEOMETRY
+    },
+    "kappa": Entry((*_POSE, "parameters"), _kappa, _BENT),
+}
+"""The indices of performance, each one number for a pose: `pteron.indices` says what they mean."""
+
+TABLE |= INDICES
 
 
 def needs_of(what: str) -> tuple[Need, ...]:

@@ -8,7 +8,7 @@ import casadi as ca
 
 from pteron.bodies.motion import Expression
 from pteron.kernels.graph import Node, expression, function_like, graph_of
-from pteron.kernels.programs import Program
+from pteron.kernels.kept import Program
 
 
 def hoisted(program: Program, name: str) -> tuple[Program, ca.Function]:

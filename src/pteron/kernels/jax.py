@@ -20,7 +20,14 @@ from pteron.kernels.graph import graph_of
 from pteron.kernels.kernel import Kernel, unmasked
 from pteron.kernels.named_columns import by_name
 
-_PRINTED = PYTHON | {"select": "where({0}, {1}, 0.0)"}
+_TRUTHS = ("less", "less_equal", "equal", "unequal", "not", "and", "or")
+"""Operations whose values are numbers in an expression; JAX's truth values add up as truths."""
+
+_PRINTED = (
+    PYTHON
+    | {"select": "where({0}, {1}, 0.0)"}
+    | {operation: f"where({PYTHON[operation]}, 1.0, 0.0)" for operation in _TRUTHS}
+)
 
 
 class Traced(Kernel):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from dataclasses import replace
+from functools import lru_cache, partial
 from typing import Any
 
 import casadi as ca
@@ -16,6 +16,7 @@ from pteron.equations.drives import Drives
 from pteron.equations.machine import Machine
 from pteron.errors import ModelError
 from pteron.kernels.functions import FUNCTIONS, TABLE, TYPE_I, TYPE_II, Entry, Output, Symbols
+from pteron.kernels.kept import Program, kept
 from pteron.kernels.kernel import Port, count_operations
 from pteron.kernels.passes import optimised
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -45,16 +46,6 @@ _SHARED = ("geometry", "gains", "parameters", "base_parameters", "drives")
 
 Columns = tuple[tuple[int, ...], ...]
 """For each column of a base regressor, the inertial parameters whose columns it adds up."""
-
-
-@dataclass(frozen=True)
-class Program:
-    """A named CasADi function of one state, with its ports."""
-
-    name: str
-    function: ca.Function
-    inputs: tuple[Port, ...]
-    outputs: tuple[Port, ...]
 
 
 def program(
@@ -87,7 +78,7 @@ def program(
         raise ModelError(f"base: {what!r} has no use for it; it goes with {useful}")
     if what not in LOADED and wrench:
         raise ModelError(f"wrench: {what!r} has no use for it; it goes with {', '.join(LOADED)}")
-    return _built(bare(robot), what, columns, wrench, guarded, plain)
+    return _known(bare(robot), what, columns, wrench, guarded, plain)
 
 
 def specialised(given: Program, values: dict[str, NDArray[np.float64]]) -> Program:
@@ -130,10 +121,14 @@ def _bare(robot: Manipulator) -> Manipulator:
         for leg in robot.legs
     )
     platform = robot.platform.with_joined(plain(robot.platform.joined))
-    return replace(robot, name="any", legs=legs, platform=platform)
+    return replace(robot, name="any", legs=legs, platform=platform, radii=None)
 
 
 @lru_cache(maxsize=512)
+def _known(*asked: Any) -> Program:
+    return kept(asked, partial(_built, *asked))
+
+
 def _built(
     robot: Manipulator,
     what: str,
@@ -179,6 +174,10 @@ def general_program(robot: RobotLike, what: str) -> Program:
 
 @lru_cache(maxsize=64)
 def _general(robot: Manipulator, what: str) -> Program:
+    return kept(("general", robot, what), partial(_generally_built, robot, what))
+
+
+def _generally_built(robot: Manipulator, what: str) -> Program:
     machine, vector = Machine.symbols(robot)
     # Exact arithmetic wants the equations as they stand.
     return _program(machine, what, vector, plain=True)

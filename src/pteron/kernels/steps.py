@@ -23,8 +23,9 @@ from pteron.kernels.choice import VARIABLE
 from pteron.kernels.code import module_values
 from pteron.kernels.exponential import straight
 from pteron.kernels.graph import graph_of
+from pteron.kernels.kept import Program
 from pteron.kernels.kernel import Array, ArrayKernel, Port
-from pteron.kernels.programs import Program, bare, program
+from pteron.kernels.programs import bare, program
 from pteron.kernels.targets import FIXED
 from pteron.kernels.vm import VirtualMachine
 from pteron.manipulator import Manipulator

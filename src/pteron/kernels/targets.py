@@ -17,9 +17,10 @@ from pteron.kernels.fields import Exact
 from pteron.kernels.hoisting import hoisted
 from pteron.kernels.intervals import Boxed
 from pteron.kernels.jax import Traced
+from pteron.kernels.kept import Program
 from pteron.kernels.kernel import Array, Kernel
 from pteron.kernels.numba import Jitted
-from pteron.kernels.programs import Columns, Program, general_program, program, specialised
+from pteron.kernels.programs import Columns, general_program, program, specialised
 from pteron.kernels.vm import VirtualMachine
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator, parameters
 

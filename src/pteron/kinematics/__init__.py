@@ -1,5 +1,7 @@
 """Kinematics in numbers: batched, validated, documented."""
 
+from pteron.kinematics.architecture import Architecture, architecture, is_singular_everywhere
+from pteron.kinematics.constraints import constraint_measure
 from pteron.kinematics.direct import (
     assembly_mode,
     assembly_modes,
@@ -17,12 +19,15 @@ from pteron.kinematics.position import (
     link_vectors,
 )
 from pteron.kinematics.sampling import random_poses
-from pteron.kinematics.singularities import is_singular_everywhere, singular_orientations
+from pteron.kinematics.singularities import singular_orientations
 
 __all__ = [
+    "Architecture",
+    "architecture",
     "JointMotion",
     "assembly_mode",
     "assembly_modes",
+    "constraint_measure",
     "direct_kinematics",
     "follow",
     "inverse_kinematics",

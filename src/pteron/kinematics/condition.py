@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pteron.kernels import Array
+from pteron.kinematics.evaluate import evaluated
 from pteron.kinematics.position import jacobian
 from pteron.manipulator import Manipulator
 
@@ -39,13 +40,8 @@ def jacobian_at(robot: Manipulator, pose: Array) -> JacobianAtPose:
         If a leg is stretched or folded (type I).
     """
     matrix = jacobian(robot, pose)
-    held = [leg.platform_point[:2] for leg in robot.legs if not leg.follows_angle]
-    radius = float(np.sqrt((np.array(held) ** 2).sum(axis=-1).mean()))
-    unit = radius or 1.0
-    levers = [
-        unit / abs(row[-1]) if leg.follows_angle else leg.lever
-        for leg, row in zip(robot.legs, matrix, strict=True)
-    ]
-    columns = [unit if name == "phi" else 1.0 for name in robot.coordinates]
-    condition = float(np.linalg.cond(matrix * np.array(levers)[:, None] / columns))
-    return JacobianAtPose(matrix, radius or None if robot.platform.turns else None, condition)
+    found: tuple[Array, Array] = evaluated(robot, "homogeneous_jacobian", "raise", pose)
+    plain, length = found
+    turning = [leg.platform_point[:2] for leg in robot.legs if not leg.follows_angle]
+    radius = float(length) if robot.platform.turns and np.any(turning) else None
+    return JacobianAtPose(matrix, radius, float(np.linalg.cond(plain)))

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from pteron.equations.machine import closure_of
 from pteron.errors import UnreachablePose
 from pteron.kernels import Array
+from pteron.kinematics.architecture import is_singular_everywhere, singular_everywhere
 from pteron.kinematics.assembly import every_pose, in_order, within_a_turn
 from pteron.kinematics.evaluate import checked, evaluated, place, unchecked
-from pteron.kinematics.singularities import is_singular_everywhere, singular_everywhere
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.manipulator.variants import with_elbows
 from pteron.shapes import JointsLike, OnFailure, PerJoint, PoseLike, Poses

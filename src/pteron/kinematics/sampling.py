@@ -109,17 +109,17 @@ def _drawn(
         poses[:, :lengths] = 0.5 * (low + high) + 0.5 * (high - low) * poses[:, :lengths]
         poses[:, lengths:] *= np.pi
         _, measures, _, _ = numeric(robot, "reach")(poses)
-        good = (measures >= type_i).all(axis=-1)
+        poses = poses[(measures >= type_i).all(axis=-1)]
         if type_ii:
             # Of a machine that is singular everywhere the measure is 0: all poses count.
             measure = np.abs(numeric(robot, "type_ii")(poses)[0])
-            good &= (measure >= type_ii) | ~(measure > 0.0).any()
-        reached += int(good.sum())
-        seen = seen if len(seen) >= _SEEN else np.concatenate([seen, poses[good]])
+            poses = poses[(measure >= type_ii) | ~(measure > 0.0).any()]
+        reached += len(poses)
+        seen = seen if len(seen) >= _SEEN else np.concatenate([seen, poses])
         if limits:
-            good &= (numeric(robot, "passive_room")(poses)[0] >= 0.0).all(axis=-1)
-        found.append(poses[good])
-        total += int(good.sum())
+            poses = poses[(numeric(robot, "passive_room")(poses)[0] >= 0.0).all(axis=-1)]
+        found.append(poses)
+        total += len(poses)
         if total >= count:
             return np.concatenate(found)
     if reached >= count:

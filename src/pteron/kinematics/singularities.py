@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pteron.equations.machine import closure_of
-from pteron.errors import DataError, ModelError, SingularPose
+from pteron.errors import DataError, SingularPose
 from pteron.kernels import Array, as_array, numeric
+from pteron.kinematics.architecture import is_singular_everywhere, singular_everywhere
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _VANISHING = 1e-10
-_SAMPLES = 64
 
 _DRAWN = 4096
 """Random poses among which the best type-II measure is sought."""
@@ -35,38 +35,6 @@ _HALVINGS = 50
 
 _ZERO = 1e-9
 """The measure where its sign changes, but for rounding."""
-
-
-def is_singular_everywhere(robot: RobotLike) -> bool:
-    """Say whether det J vanishes at every pose.
-
-    So it does, for one, where the rows of all legs lie in a plane, and for P-R-R-R layouts with
-    fourfold symmetry about k.
-
-    Parameters
-    ----------
-    robot : Manipulator, name or path
-        The machine.
-
-    Returns
-    -------
-    bool
-    """
-    return _is_singular_everywhere(as_manipulator(robot))
-
-
-@lru_cache(maxsize=256)
-def _is_singular_everywhere(robot: Manipulator) -> bool:
-    known = closure_of(robot).vanishes()
-    if known is not None:
-        return known
-    from pteron.kinematics.sampling import random_poses
-
-    try:
-        poses = random_poses(robot, _SAMPLES, type_i=1e-3, type_ii=0.0)
-    except ModelError:
-        return False  # nowhere in reach, which is told where a pose is used
-    return bool((np.abs(numeric(robot, "type_ii")(poses)[0]) <= _VANISHING).all())
 
 
 @lru_cache(maxsize=64)
@@ -187,15 +155,3 @@ def _sign_changes(robot: Manipulator, position: Array) -> Array:
 def _wrapped(angles: Array) -> Array:
     """Return angles in (-pi, pi]."""
     return np.asarray(np.pi - (np.pi - angles) % (2.0 * np.pi))
-
-
-def singular_everywhere(robot: Manipulator, index: tuple[int, ...] = ()) -> SingularPose:
-    """Return what is said of such a machine, here and where a pose of it is used."""
-    return SingularPose(
-        "singular at every pose (type II): with the actuators held still the platform can move; "
-        "change a leg's direction or platform point",
-        kind="II",
-        measure=0.0,
-        index=index,
-        subject=robot.name,
-    )

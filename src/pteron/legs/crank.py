@@ -304,6 +304,9 @@ class CrankEquations(LegEquations):
         turn = q - self.middle
         return ca.cos(turn) * self.zero + ca.sin(turn) * quarter_turn(self.zero)
 
+    def lever(self, length: Expression) -> Expression:
+        return self.lu
+
     def tip(self, q: Expression) -> Expression:
         """Return the crank's end at an angle q."""
         return self.r + self.lu * ca.mtimes(self.plane, self._ahead(q))

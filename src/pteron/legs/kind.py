@@ -14,7 +14,7 @@ import casadi as ca
 from pteron.bodies.inertia import Inertia, PointMass
 from pteron.bodies.motion import Expression
 from pteron.bodies.parameters import LEG_BODIES
-from pteron.bodies.vectors import Vector
+from pteron.bodies.vectors import Vector, complement
 from pteron.errors import ModelError
 from pteron.legs.drive import Drive
 from pteron.legs.keys import COMMON, Condition, Key, KeyRole, sound_fields
@@ -190,6 +190,14 @@ class LegKind(ABC):
         `axis` is k of a platform that turns about it, or None.
         """
 
+    def couples(self, motion: LegMotion, axis: Vector | None) -> Sequence[Expression] | None:
+        """Return the couples (3, 1), of length 1 or less, that it holds whatever its joints do.
+
+        They keep the part of the platform that it carries from turning; each vanishes where it does
+        so no longer. `axis` is as in `free_axes`. None where the file does not tell.
+        """
+        return [ca.SX(row) for row in complement(self.free_axes(axis))]
+
     @property
     def plane_normal(self) -> Vector | None:
         """The normal of the plane in which a planar leg keeps its platform point; else None."""
@@ -211,6 +219,9 @@ class LegKind(ABC):
         Pictures show such rods as two.
         """
         return None
+
+    bar_length: float | None = None
+    """How far its parallel rods are apart, m, where the file says so."""
 
     @property
     def lever(self) -> float:
@@ -280,6 +291,13 @@ class LegKind(ABC):
         The platform's axes are the columns (3, 3) of `turned`, and of `still` at phi = 0.
         """
         return []
+
+    def couple(self, motion: LegMotion) -> Expression | None:
+        """Return the couple (3, 1) that its rods pass on to the platform beside a force along them.
+
+        It is zero for a single rod; None for a leg whose chain of joints says what it passes on.
+        """
+        return None
 
     def doubts(self, axis: Vector | None) -> Iterator[str]:
         """Yield what is possible but unlikely in it, beside what is so in any leg.

@@ -183,6 +183,13 @@ class LegEquations(ABC):
     def reach(self, c: Expression) -> Reach:
         """Return whether the leg reaches c."""
 
+    def lever(self, length: Expression) -> Expression:
+        """Return the metres that a unit of its joint counts for; 1 for a slider.
+
+        `length` is what a radian of the platform counts for.
+        """
+        return ca.SX(1)
+
     def edges(self, c: Expression) -> dict[str, Expression]:
         """Return, by name, what is not negative within each edge of its reach: smooth expressions.
 

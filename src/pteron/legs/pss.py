@@ -22,7 +22,16 @@ from pteron.legs.cones import Cone
 from pteron.legs.keys import Key
 from pteron.legs.kind import Quantity
 from pteron.legs.leg import Joint, LegMotion, Passive, Sphere
-from pteron.legs.rods import ROD_KEYS, cones, free_axes, hinge_doubts, rod_body, universal_joints
+from pteron.legs.rods import (
+    ROD_KEYS,
+    cones,
+    couple,
+    couples,
+    free_axes,
+    hinge_doubts,
+    rod_body,
+    universal_joints,
+)
 from pteron.legs.slide import SLIDER_KEYS, SlideEquations, SlideLeg, SlideState
 
 
@@ -60,6 +69,8 @@ class PSS(SlideLeg):
     tip_cone, platform_cone : Cone, optional
         Where the ball joints at the rod's ends let it point: at the slider in the base frame, at
         the platform in the platform's, which for parallel rods is that at phi = 0.
+    bar_length : float, optional
+        How far parallel rods are apart, m.
     """
 
     lower: RodInertia
@@ -67,6 +78,7 @@ class PSS(SlideLeg):
     bar_direction: Vector | None = None
     tip_cone: Cone | None = None
     platform_cone: Cone | None = None
+    bar_length: float | None = None
 
     type = "PSS"
     names: ClassVar = {"p": "slider", "l": "rod"}
@@ -112,8 +124,14 @@ class PSS(SlideLeg):
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return free_axes(self.rods, self.bar_direction, axis)
 
+    def couples(self, motion: LegMotion, axis: Vector | None) -> Sequence[Expression] | None:
+        return couples(self, motion)
+
     def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
         return cones(self, motion, ca.SX.eye(3), still, turned)
+
+    def couple(self, motion: LegMotion) -> Expression:
+        return couple(self, motion)
 
     def doubts(self, axis: Vector | None) -> Iterator[str]:
         return hinge_doubts(self, axis)

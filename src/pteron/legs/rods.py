@@ -18,6 +18,12 @@ ROD_KEYS: dict[str, Key] = {
     "rods": Key(
         "count", "parallel rods, which keep their bars parallel; lower is their sum", default=2
     ),
+    "bar_length": Key(
+        "length",
+        "how far parallel rods are apart, m: clearances then take them for two",
+        default=None,
+        example=0.08,
+    ),
     "platform_cone": Key(
         "cone",
         "how far the rod may lean at the platform; axis in the platform frame, at phi = 0 for "
@@ -41,6 +47,20 @@ def free_axes(rods: int, bar: Vector | None, axis: Vector | None) -> tuple[Vecto
     return tuple(v for v in (bar, axis) if v is not None)
 
 
+def couples(leg: Any, motion: LegMotion) -> list[Expression] | None:
+    """Return the couple about bar x rod that parallel rods hold: both push along themselves.
+
+    Its length is the sine between bar and rod: it is lost where the parallelogram is flat. What
+    turns the bar about the rods they do not hold. None where the bar is not told.
+    """
+    if leg.rods == 1:
+        return []
+    rod = motion.links[1]
+    if leg.bar is None or rod is None:
+        return None
+    return [ca.cross(ca.SX(list(leg.bar)), rod) / leg.lower_length]
+
+
 def cones(
     leg: Any, motion: LegMotion, tip: Expression, still: Expression, turned: Expression
 ) -> list[Passive]:
@@ -57,6 +77,17 @@ def cones(
         *within_cone("rod at its tip", leg.tip_cone, tip, rod, length),
         *within_cone("rod at the platform", leg.platform_cone, socket, -rod, length),
     ]
+
+
+def couple(leg: Any, motion: LegMotion) -> Expression:
+    """Return the couple of parallel rods, across their plane; zero for one.
+
+    Where the bar is not told it is taken along the leg's first passive joint.
+    """
+    if leg.rods == 1:
+        return ca.SX(3, 1)
+    bar = motion.chain[1].axis if leg.bar is None else ca.SX(list(leg.bar))
+    return ca.cross(bar, motion.links[1])
 
 
 def hinge_doubts(leg: Any, axis: Vector | None) -> Iterator[str]:

@@ -23,7 +23,16 @@ from pteron.legs.cones import Cone
 from pteron.legs.crank import CRANK_KEYS, CrankEquations, CrankLeg, CrankState
 from pteron.legs.keys import Condition, Key
 from pteron.legs.leg import Joint, LegMotion, Passive, Sphere
-from pteron.legs.rods import ROD_KEYS, cones, free_axes, hinge_doubts, rod_body, universal_joints
+from pteron.legs.rods import (
+    ROD_KEYS,
+    cones,
+    couple,
+    couples,
+    free_axes,
+    hinge_doubts,
+    rod_body,
+    universal_joints,
+)
 
 
 def _check_bar(bar: Vector | None, direction: Vector) -> None:
@@ -73,6 +82,8 @@ class RSS(CrankLeg):
     tip_cone, platform_cone : Cone, optional
         Where the ball joints at the rod's ends let it point: at the crank's end in the crank's
         frame, at the platform in the platform's, which for parallel rods is that at phi = 0.
+    bar_length : float, optional
+        How far parallel rods are apart, m.
     """
 
     lower: RodInertia
@@ -80,6 +91,7 @@ class RSS(CrankLeg):
     bar_direction: Vector | None = None
     tip_cone: Cone | None = None
     platform_cone: Cone | None = None
+    bar_length: float | None = None
 
     type = "RSS"
     names: ClassVar = {"u": "crank", "l": "rod"}
@@ -118,9 +130,15 @@ class RSS(CrankLeg):
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return free_axes(self.rods, self.direction, axis)
 
+    def couples(self, motion: LegMotion, axis: Vector | None) -> Sequence[Expression] | None:
+        return couples(self, motion)
+
     def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
         crank = motion.bodies["u"]
         return cones(self, motion, ca.horzcat(crank.x, crank.y, crank.axes), still, turned)
+
+    def couple(self, motion: LegMotion) -> Expression:
+        return couple(self, motion)
 
     def doubts(self, axis: Vector | None) -> Iterator[str]:
         return hinge_doubts(self, axis)

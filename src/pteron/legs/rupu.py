@@ -289,6 +289,9 @@ class RUPUEquations(LegEquations):
         length = ca.sqrt(square)
         return Reach(length, square, square, length)
 
+    def lever(self, length: Expression) -> Expression:
+        return length / ca.fabs(self.ratio)
+
     def locus(self, q: Expression) -> Turned:
         return Turned(q / self.ratio)
 

@@ -10,12 +10,14 @@ from pteron.manipulator.parameters import (
     parameters,
     with_parameters,
 )
+from pteron.manipulator.radii import Radii
 from pteron.manipulator.saving import save
 from pteron.manipulator.variants import turned, working_modes
 
 __all__ = [
     "STANDARD_GRAVITY",
     "Manipulator",
+    "Radii",
     "RobotLike",
     "as_manipulator",
     "catalog",

@@ -16,6 +16,7 @@ from pteron.errors import ModelError, shown
 from pteron.legs import KINDS, LegKind
 from pteron.legs.circles import perpendicular_to
 from pteron.manipulator.manipulator import Manipulator, faults_of
+from pteron.manipulator.radii import Radii
 from pteron.platforms import Bar, Geared, Platform
 from pteron.toml import fault_lines, parsed_toml, told, toml_bytes
 
@@ -122,6 +123,7 @@ def _machine(document: dict[str, Any], source: str) -> Manipulator:
     machine = reading.table(MachineTable, document, "")
     table = machine.platform or reading.rest(PlatformTable, document.get("platform"))
     platform = table and reading.platform(table)
+    radii = machine.radii and reading.built("radii.", lambda: Radii(**machine.radii.model_dump()))
     given = document.get("legs")
     legs = given if isinstance(given, list) else []
     built: list[Any] = [reading.leg(i, leg) for i, leg in enumerate(legs, start=1)]
@@ -131,7 +133,7 @@ def _machine(document: dict[str, Any], source: str) -> Manipulator:
         known = built if machine.legs is not None else [None] * len(platform.coordinates)
         reading.faults += faults_of(name, platform, known)
         if not reading.faults:
-            return Manipulator(name, platform, tuple(built), machine.gravity)
+            return Manipulator(name, platform, tuple(built), machine.gravity, radii)
     subject = shown(source, bare=True, longest=1000)
     raise ModelError(told(reading.faults), subject=subject, faults=reading.faults)
 

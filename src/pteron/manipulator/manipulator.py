@@ -9,16 +9,14 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from pteron.bodies.vectors import Vector, parallel, vector
+from pteron.bodies.vectors import Vector, complement, parallel, vector
 from pteron.errors import ModelError
 from pteron.legs import LegKind
+from pteron.manipulator.radii import Radii
 from pteron.platforms import Platform
 from pteron.toml import told
-
-_VANISHING = 1e-9
-"""Singular value of unit vectors below which they do not span another direction."""
 
 _COINCIDENT = 1e-9
 """m between points that are taken for one."""
@@ -43,6 +41,8 @@ class Manipulator:
         Of any kind in `pteron.legs`, in the order of the joint coordinates.
     gravity : vector
         Acceleration of gravity in the base frame, m/s^2.
+    radii : Radii, optional
+        How thick its bodies are, for `pteron.workspace.clearance`.
 
     Raises
     ------
@@ -55,6 +55,7 @@ class Manipulator:
     platform: Platform
     legs: tuple[LegKind, ...]
     gravity: Vector = STANDARD_GRAVITY
+    radii: Radii | None = None
 
     def __hash__(self) -> int:
         """Hash once: the public functions look machines up at every call."""
@@ -62,7 +63,7 @@ class Manipulator:
 
     @cached_property
     def _hash(self) -> int:
-        return hash((self.name, self.platform, self.legs, self.gravity))
+        return hash((self.name, self.platform, self.legs, self.gravity, self.radii))
 
     def __getstate__(self) -> dict[str, Any]:
         # Texts hash differently in every process.
@@ -189,8 +190,8 @@ def _loose(platform: Platform, legs: list[LegKind]) -> list[str]:
         return [f"legs: none keeps a {platform.motion} platform in its plane; give it a planar leg"]
     axis = platform.axis if platform.turns and not platform.slides else None
     # What one leg withholds is perpendicular to the axes about which it lets the platform turn.
-    withheld = [_complement(leg.free_axes(axis)) for leg in legs]
-    free = _complement(np.vstack([*withheld, *([axis] if axis else [])]))
+    withheld = [complement(leg.free_axes(axis)) for leg in legs]
+    free = complement(np.vstack([*withheld, *([axis] if axis else [])]))
     if not len(free):
         return []
     if platform.motion == "2T":
@@ -231,11 +232,3 @@ def _in_plane(platform: Platform, leg: LegKind) -> NDArray[np.float64]:
     """Return where a leg's platform point is in the platform's plane, from P, at phi = 0."""
     point = np.array(platform.frame).T @ leg.platform_point + leg.fixed_offset
     return platform.directions @ point
-
-
-def _complement(axes: ArrayLike) -> NDArray[np.float64]:
-    """Return rows that span what is perpendicular to given vectors."""
-    matrix = np.asarray(axes, dtype=float).reshape(-1, 3)
-    _, sizes, rows = np.linalg.svd(matrix) if len(matrix) else (None, np.zeros(0), np.eye(3))
-    complement: NDArray[np.float64] = rows[int((sizes > _VANISHING).sum()) :]
-    return complement

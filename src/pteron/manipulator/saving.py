@@ -8,6 +8,7 @@ from typing import Any
 
 from pteron.atomic import write_text
 from pteron.manipulator.given import RobotLike, as_manipulator
+from pteron.manipulator.manipulator import Manipulator
 
 
 def save(robot: RobotLike, path: str | Path) -> Path:
@@ -30,19 +31,25 @@ def save(robot: RobotLike, path: str | Path) -> Path:
     OutputError
         If the file cannot be written.
     """
+    return write_text(path, text_of(as_manipulator(robot)))
+
+
+def text_of(robot: Manipulator) -> str:
+    """Return the text of a manipulator's file: machines that differ in anything differ in it."""
     from pteron.manipulator.tables import leg_items
     from pteron.manipulator.writing import written
 
-    robot = as_manipulator(robot)
     x, _, axis = robot.platform.frame
     platform: dict[str, Any] = {"motion": robot.platform.motion, "axis": axis, "x_axis": x}
     platform |= {"tool": robot.platform.tool, **asdict(robot.platform.inertia)}
     for name in ("slides", "limits", "bars", "geared"):
         if given := getattr(robot.platform, name):
             platform[name] = given
+    radii = {} if robot.radii is None else {"radii": asdict(robot.radii)}
     legs = [{k: v for k, v in leg_items(leg).items() if v is not None} for leg in robot.legs]
-    machine = {"name": robot.name, "gravity": robot.gravity, "platform": platform, "legs": legs}
-    return write_text(path, written(_plain(machine)))
+    machine = {"name": robot.name, "gravity": robot.gravity, **radii}
+    machine |= {"platform": platform, "legs": legs}
+    return written(_plain(machine))
 
 
 def _plain(value: Any) -> Any:

@@ -145,12 +145,26 @@ class PlatformTable(PlanarBody, _Motion):
     )
 
 
+class RadiiTable(Table):
+    """`radii`: how thick the bodies are, as capsules round their centre lines."""
+
+    guide: Number = Field(0.0, description="of a slider's guide, m")
+    upper: Number = Field(0.0, description="of an upper link or a crank, m")
+    lower: Number = Field(0.0, description="of a last link or each rod, m")
+    platform: Number = Field(0.0, description="of the platform's arms, m")
+
+
 class MachineTable(Table):
     """The whole file; each of `legs` is read by its own kind."""
 
     name: str = Field(description="what the machine is called")
     gravity: Three = Field(
         STANDARD_GRAVITY, description="acceleration of gravity in the base frame, m/s^2"
+    )
+    radii: RadiiTable | None = Field(
+        None,
+        description="how thick the bodies are round their centre lines, m: for clearances",
+        examples=[{"guide": 0.01, "upper": 0.01, "lower": 0.008, "platform": 0.01}],
     )
     platform: PlatformTable = Field(description="what the legs carry")
     legs: list[Any] = Field(description="one table for each freedom of the platform")

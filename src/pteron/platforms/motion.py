@@ -21,6 +21,7 @@ from pteron.bodies.motion import (
     PointMotion,
     mass_matrix,
     mass_moment,
+    needed_wrench,
     wrench_matrix,
 )
 
@@ -90,6 +91,12 @@ class PlatformEquations(ABC):
     @abstractmethod
     def needs(self, motion: PlatformMotion, gravity: Expression, inertia: Moments) -> Expression:
         """Return the wrench (m, K) that the platform itself needs at P, -F_e."""
+
+    def needed_wrench(
+        self, motion: PlatformMotion, gravity: Expression, inertia: Moments
+    ) -> tuple[Expression, Expression]:
+        """Return the force and the moment about P, each (3, K), that the platform needs."""
+        return needed_wrench(motion.body, inertia, gravity)
 
     def wrench_matrix(self, motion: PlatformMotion, gravity: Expression) -> Expression:
         """Return Om_e (m, 4) of Eq. (15): what acts on it, per unit of each of its parameters."""

@@ -65,6 +65,15 @@ class Sliding(PlatformEquations):
         force = ca.mtimes(a_g, inertia.m) + h * growth
         return ca.vertcat(force, ca.mtimes(a_g.T, h) + growth * inertia.i)
 
+    def needed_wrench(
+        self, motion: PlatformMotion, gravity: Expression, inertia: Moments
+    ) -> tuple[Expression, Expression]:
+        """Return what it needs, but for the spin of the tool, which I does not tell from slides."""
+        assert motion.angle is not None
+        h, a_g = self._moment(inertia), motion.body.acceleration - gravity
+        force = ca.mtimes(a_g, inertia.m) + h * motion.angle.acceleration
+        return force, ca.cross(h * motion.angle.angle, a_g)
+
     def wrench_matrix(self, motion: PlatformMotion, gravity: Expression) -> Expression:
         return -self.needs(motion, gravity, Moments(*ca.vertsplit(ca.SX.eye(4))))
 

@@ -20,6 +20,8 @@ from pteron.plots.courses import joints_figure, trajectory_figure
 from pteron.plots.drives import Ability, force_speed_figure, power_figure
 from pteron.plots.films import Film, film
 from pteron.plots.forces import forces_figure, regularity_figure
+from pteron.plots.front import front_figure
+from pteron.plots.index_maps import map_figure, map_film
 from pteron.plots.machine import draw, poses_figure, robot_figure
 from pteron.plots.maps import condition_figure, singularities_figure
 from pteron.plots.printing import WIDTHS, resized, save_figure
@@ -43,9 +45,12 @@ __all__ = [
     "film",
     "force_speed_figure",
     "forces_figure",
+    "front_figure",
     "grid_step",
     "histogram_figure",
     "joints_figure",
+    "map_figure",
+    "map_film",
     "measure_figure",
     "operations_figure",
     "parameters_figure",

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import lru_cache
 from typing import Literal, get_args
 
 from pteron.bodies.parameters import Parameter
 from pteron.errors import ModelError
-from pteron.manipulator import RobotLike, as_manipulator
+from pteron.kernels import bare
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.reduction.exact import exact_grouping
 from pteron.reduction.grouping import Grouping
 from pteron.reduction.numerical import qr_grouping, svd_grouping
@@ -16,6 +19,8 @@ from pteron.reduction.sharing import Sharing, default_order, leg_groups, share
 from pteron.reduction.transfers import transfers
 
 Method = Literal["exact", "svd", "qr"]
+
+Groups = tuple[tuple[int, ...], ...]
 
 _NUMERICAL: dict[str, Callable[..., Grouping]] = {"svd": svd_grouping, "qr": qr_grouping}
 
@@ -79,13 +84,13 @@ def base_parameters(
     robot = as_manipulator(robot)
     if method not in get_args(Method):
         raise ModelError(f"method: {method!r} is not one of {', '.join(get_args(Method))}")
-    columns, sharing = share(robot, leg_groups(robot, shared))
+    groups = tuple(leg_groups(robot, shared))
+    columns, sharing = share(robot, groups)
     order = _order(columns, keep)
     by_mass = transfers(robot, columns)
-    if method == "exact":
-        grouping = exact_grouping(robot, columns, order, sharing, by_mass, seed)
-    else:
-        grouping = _NUMERICAL[method](robot, order, sharing, seed)
+    # Neither bodies nor drives matter; a refusal tells the name.
+    layout = replace(bare(robot), name=robot.name)
+    grouping = _grouping(layout, method, tuple(order), groups, seed)
     names = [column.name for column in columns]
     lost = [name for name in keep or () if names.index(name) not in grouping.kept]
     if lost:
@@ -94,6 +99,18 @@ def base_parameters(
             "before; leave it out"
         )
     return BaseParameters.of(robot, columns, sharing, tuple(by_mass), grouping)
+
+
+@lru_cache(maxsize=256)
+def _grouping(
+    layout: Manipulator, method: Method, order: tuple[int, ...], groups: Groups, seed: int
+) -> Grouping:
+    """Return the grouping of a machine's columns, in an order of preference."""
+    columns, sharing = share(layout, groups)
+    if method == "exact":
+        by_mass = transfers(layout, columns)
+        return exact_grouping(layout, columns, order, sharing, by_mass, seed)
+    return _NUMERICAL[method](layout, order, sharing, seed)
 
 
 def _order(columns: Sequence[Parameter], keep: Sequence[str] | None) -> list[int]:

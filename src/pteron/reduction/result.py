@@ -81,7 +81,7 @@ class BaseParameters:
             selection=sharing[:, list(grouping.kept)],
             transfers=transfers,
             certificate=grouping.certificate,
-            shares=grouping.given,
+            shares={column: dict(terms) for column, terms in grouping.given.items()},
         )
 
     def __repr__(self) -> str:

@@ -42,7 +42,9 @@ def leg_groups(robot: Manipulator, shared: Sharing) -> list[tuple[int, ...]]:
     return sorted([*groups, *single])
 
 
-def share(robot: Manipulator, groups: list[tuple[int, ...]]) -> tuple[tuple[Parameter, ...], Array]:
+def share(
+    robot: Manipulator, groups: Sequence[tuple[int, ...]]
+) -> tuple[tuple[Parameter, ...], Array]:
     """Return the columns, and the matrix (N, columns) that adds parameters into them."""
     everything = parameter_data(robot)
     columns = parameter_data(robot, groups)

@@ -1,12 +1,15 @@
 """Where a machine can work: its reserves, its home pose, its reach and its joints' ranges."""
 
 from pteron.kinematics.limits import LimitedJoint, limited_joints
+from pteron.workspace.clearance import Clearance, clearance, interference
 from pteron.workspace.components import Component, Components, components
 from pteron.workspace.conditions import Condition, conditions
 from pteron.workspace.cube_bound import cube_bound
+from pteron.workspace.free_regions import FreeRegion, free_of_singularities
 from pteron.workspace.home import home_pose
 from pteron.workspace.inscribed import Inscribed, largest_cube, largest_cylinder
 from pteron.workspace.modes import Contact, mode_contacts, mode_pavings
+from pteron.workspace.nearest import NearestSingularity, nearest_singularities
 from pteron.workspace.orientations import VolumesOverAngles, over_angles
 from pteron.workspace.paving import Paving, paving
 from pteron.workspace.proofs import Proof, prove
@@ -19,14 +22,17 @@ from pteron.workspace.volume import ReachVolume, bounding_box, reach_volume
 __all__ = [
     "BEYOND_LIMITS",
     "Box",
+    "Clearance",
     "Component",
     "Components",
     "Condition",
     "Contact",
     "Cylinder",
+    "FreeRegion",
     "Inscribed",
     "JointRanges",
     "LimitedJoint",
+    "NearestSingularity",
     "Paving",
     "Proof",
     "Quadrature",
@@ -37,14 +43,18 @@ __all__ = [
     "Reserve",
     "VolumesOverAngles",
     "bounding_box",
-    "components",
+    "clearance",
     "conditions",
+    "free_of_singularities",
+    "components",
     "cube_bound",
     "home_pose",
+    "interference",
     "joint_ranges",
     "largest_cube",
     "largest_cylinder",
     "limited_joints",
+    "nearest_singularities",
     "mode_contacts",
     "mode_pavings",
     "over_angles",

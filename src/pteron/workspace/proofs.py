@@ -173,10 +173,10 @@ def prove(
             return Proof(
                 None, robot, region, asked, None, left[smallest], causes=causes, boxes=seen
             )
-        left, open_ = _halved(left, box[1] - box[0]), np.repeat(open_, 2)
+        left, open_ = halved_each(left, box[1] - box[0]), np.repeat(open_, 2)
 
 
-def _halved(boxes: Array, whole: Array) -> Array:
+def halved_each(boxes: Array, whole: Array) -> Array:
     """Return both halves of boxes (N, 2, m), each across the side that is the largest of `whole`'s.
 
     So coordinates of different units are halved alike.

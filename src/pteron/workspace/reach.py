@@ -13,7 +13,6 @@ from pteron.kernels import Array, numeric
 from pteron.kinematics.evaluate import checked_one
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike
-from pteron.workspace.reserve import room_to_limits
 from pteron.workspace.volume import bounding_box
 
 REACHABLE = 0
@@ -133,11 +132,6 @@ def reach_slice(
     poses[..., i] = first
     poses[..., j] = second[:, None]
 
-    leg_margins, measures, _, _ = numeric(robot, "reach")(poses)
-    missed = np.isnan(measures).any(axis=-1)
-    room = room_to_limits(robot, poses).min(axis=-1)
-    status = np.where(
-        missed, leg_margins.argmin(axis=-1) + 1, np.where(room < 0.0, BEYOND_LIMITS, REACHABLE)
-    )
-    margin = np.fmin(leg_margins.min(axis=-1), room)
-    return ReachSlice(plane, pose, first, second, status, margin, leg_margins)
+    leg_margins = numeric(robot, "reach")(poses)[0]
+    status, margin, _ = numeric(robot, "standing")(poses)
+    return ReachSlice(plane, pose, first, second, status.astype(int), margin, leg_margins)

@@ -17,7 +17,7 @@ from pteron.equations.machine import Machine, closure_of
 from pteron.errors import DataError, PteronError, SingularPose, UnreachablePose
 from pteron.kernels import Array, numeric
 from pteron.kernels.functions import TYPE_I, TYPE_II
-from pteron.kinematics.singularities import is_singular_everywhere, singular_everywhere
+from pteron.kinematics.architecture import is_singular_everywhere, singular_everywhere
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.demand import told_pose

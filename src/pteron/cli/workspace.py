@@ -1,0 +1,453 @@
+"""`pteron workspace`: where a machine reaches, and how good it is there, as maps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from difflib import get_close_matches
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import rich.table
+from typer import Option
+
+from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
+from pteron.cli.completion import indices
+from pteron.cli.screen import (
+    is_terminal,
+    note,
+    plain,
+    show,
+    show_json,
+    spinner,
+    stages,
+    table,
+    write,
+)
+from pteron.errors import DataError, ModelError, OutputError
+
+if TYPE_CHECKING:
+    from pteron.manipulator import Manipulator
+    from pteron.maps import Grid, Map
+    from pteron.workspace import ReachVolume
+
+_PICTURES = (".png", ".svg", ".pdf")
+_FILMS = (".mp4", ".gif")
+_DATA = (".csv", ".parquet", ".npz", ".zarr")
+_SURFACES = (".vtk", ".vtu", ".ply", ".stl")
+
+_RIM = 0.04
+"""Share of the reach's width that pictures show around it."""
+
+_FRAMES = 61
+_FILM_POINTS = 120
+
+_DPI = 200.0
+
+_ALIKE = 1e-9
+"""Relative differences that count as none."""
+
+_INDEX = Option(
+    "--index",
+    help="What to map, such as kappa or condition; may be given several times.",
+    metavar="INDEX",
+    autocompletion=indices,
+    show_default="the distance to the end of the reach",
+)
+
+
+def workspace(
+    robot: Robot,
+    index: Annotated[list[str] | None, _INDEX] = None,
+    slice_: Annotated[
+        str | None,
+        option(
+            "slice",
+            "What is held, and what ranges: z=0,phi=0 or z=0,phi=-1:1; m and rad. The rest varies.",
+            "NAME=VALUE,...",
+            show_default="the plane through the home pose",
+        ),
+    ] = None,
+    points: Annotated[
+        int | None,
+        option(
+            "points",
+            "Along each coordinate that varies.",
+            show_default="200 in a plane, 100 in space",
+        ),
+    ] = None,
+    out: Annotated[
+        str | None,
+        option(
+            "out",
+            "A picture (.png .svg .pdf), data (.csv .parquet .npz .zarr), surfaces (.vtk .vtu .ply "
+            ".stl) or a film (.mp4 .gif).",
+            "FILE",
+        ),
+    ] = None,
+    engine: Annotated[
+        Literal["auto", "jax"], option("engine", "What computes: jax takes an accelerator.")
+    ] = "auto",
+    workers: Annotated[
+        int | None, option("workers", "Processes of this computer that share the work.")
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        option("scheduler", "A Dask cluster that does the work, tcp://host:8786.", "ADDRESS"),
+    ] = None,
+    elbows: Elbows = None,
+    json: Json = False,
+) -> None:
+    """Map the workspace: where the machine reaches, what ends it, and how good it is there.
+
+    An index of performance is mapped over the poses of a grid; with none, the distance to the end
+    of the reach. A machine that is singular everywhere is told so before anything else. Pictures
+    hatch what is out of reach, and bright is better; lengths are in mm, angles in degrees.
+
+    Coordinates that --slice does not name vary over the reach. Surfaces are for three that vary, a
+    film goes through the last of three.
+
+    A .zarr grows chunk by chunk: the same command after an interruption goes on with what is left.
+    A cluster's workers write to it, so they must reach it by the same path.
+    """
+    machine = load_robot(robot, elbows)
+    from pteron.maps import map_index
+
+    names = _checked_indices(machine, index or [])
+    ending = _checked_out(out)
+    if ending in (*_FILMS, *_SURFACES) and len(names) > 1:
+        raise DataError(f"--index: {len(names)} given, and {out} shows one; give one")
+    if scheduler is not None and ending != ".zarr":
+        raise DataError(
+            "--scheduler: the workers write to a store that all reach; give it with --out, such as "
+            "--out map.zarr"
+        )
+    warnings = _warnings(machine)
+    for text in warnings:
+        note(f"Warning: {text}")
+    with spinner(f"The reach of {machine.name}"):
+        grid = _grid(machine, slice_, points, ending)
+        volume = _volume(machine, grid)
+    for text in (outside := _outside(grid, volume)):
+        note(f"Warning: {text}")
+    task = f"Mapping {machine.name}"
+    with stages(task, 1) as tell:
+        found = map_index(
+            machine,
+            names,
+            grid,
+            engine=engine,
+            out=out if ending in (*_DATA, *_SURFACES) else None,
+            scheduler=scheduler,
+            workers=workers,
+            progress=lambda done, total: tell(task, done, total),
+        )
+    if out is not None and ending in (*_PICTURES, *_FILMS):
+        _draw(found, out, ending)
+    data = _data(found, volume, [*warnings, *outside], out)
+    if json:
+        show_json(data)
+    elif is_terminal():
+        _show(found, volume, data)
+    else:
+        write(_rows(data).write_csv())
+    if out is not None and not json:
+        line = f"Written: {plain(out)}"
+        show(line) if is_terminal() else note(line)
+
+
+def _checked_indices(robot: Manipulator, names: list[str]) -> tuple[str, ...]:
+    from pteron.indices import INDICES, indices_of
+    from pteron.maps.map import MARGIN
+
+    known = (*indices_of(robot), MARGIN.name)
+    for name in names:
+        if name in known:
+            continue
+        if name in INDICES:
+            raise DataError(
+                f"--index: {name} is about turning, which {robot.name} does not; it has "
+                f"{', '.join(known)}"
+            )
+        close = get_close_matches(name, known, 1)
+        hint = f"did you mean {close[0]}? " if close else ""
+        raise DataError(f"--index: {name!r} is not known; {hint}there are {', '.join(known)}")
+    return tuple(dict.fromkeys(names)) or (MARGIN.name,)
+
+
+def _checked_out(out: str | None) -> str:
+    """Return the ending of a file after a check, before the work begins, that it can be written."""
+    if out is None:
+        return ""
+    target, ending = Path(out), Path(out).suffix.lower()
+    if ending in _FILMS:
+        from pteron.plots.films import checked_film
+
+        checked_film(out)
+    elif ending in (*_DATA, *_SURFACES):
+        from pteron.maps.files import checked_map_file
+
+        checked_map_file(out)
+    elif ending not in _PICTURES:
+        every = " ".join((*_PICTURES, *_DATA, *_SURFACES, *_FILMS))
+        raise OutputError(f"{out}: {ending or 'no'} ending; give one of {every}")
+    elif target.is_dir():
+        raise OutputError(f"{out}: is a folder; name a file in it")
+    elif not target.parent.is_dir():
+        raise OutputError(f"{out}: there is no folder {target.parent}; make it first")
+    return ending
+
+
+def _warnings(robot: Manipulator) -> list[str]:
+    """Return what there is to say of the machine's geometry before anything else."""
+    from pteron.kinematics.architecture import is_singular_everywhere, singular_everywhere
+
+    return [str(singular_everywhere(robot))] if is_singular_everywhere(robot) else []
+
+
+def _grid(robot: Manipulator, text: str | None, points: int | None, ending: str) -> Grid:
+    """Return the poses, by what is asked for and what the file can hold."""
+    from pteron.maps import pose_grid
+
+    names = robot.coordinates
+    held, ranges = _parsed(text)
+    if ending in _FILMS:
+        points = points or _FILM_POINTS
+        last = "phi" if "phi" in names else names[-1]
+        if text is None:
+            from pteron.workspace import home_pose
+
+            home = dict(zip(names, home_pose(robot).tolist(), strict=True))
+            held = {name: home[name] for name in names if name not in ("x", "y", last)}
+    elif ending in _SURFACES and text is None and len(names) > 3:
+        held = {"phi": _home_angle(robot)}
+    fixed = held if text is not None or ending in (*_FILMS, *_SURFACES) else None
+    grid = pose_grid(robot, fixed, ranges, points=points, rim=_RIM if ending else 0.0)
+    count = len(grid.axes)
+    told = ", ".join(axis.name for axis in grid.axes)
+    if ending in (*_FILMS, *_SURFACES) and count != 3:
+        what = "a film goes through the last of" if ending in _FILMS else "surfaces need"
+        raise DataError(f"--out: {what} three coordinates that vary, and here there vary {told}")
+    if ending in _PICTURES and count > 3:
+        raise DataError(f"--out: a picture shows three coordinates, and here there vary {told}")
+    if ending in _FILMS and points and not any(len(span) > 2 for span in ranges.values()):
+        return _with_frames(grid)
+    return grid
+
+
+def _home_angle(robot: Manipulator) -> float:
+    from pteron.workspace import home_pose
+
+    return float(home_pose(robot)[-1])
+
+
+def _with_frames(grid: Grid) -> Grid:
+    """Return a grid with as many values of the last coordinate as a film has frames."""
+    from dataclasses import replace
+
+    *axes, last = grid.axes
+    return replace(grid, axes=(*axes, replace(last, count=_FRAMES)))
+
+
+def _parsed(text: str | None) -> tuple[dict[str, float], dict[str, tuple[float, ...]]]:
+    """Return what is held, and what ranges, in a text such as ``z=0,phi=-1:1``."""
+    held: dict[str, float] = {}
+    ranges: dict[str, tuple[float, ...]] = {}
+    for part in (text or "").replace(" ", "").split(",") if text is not None else []:
+        name, equals, values = part.partition("=")
+        numbers = values.split(":")
+        try:
+            given = tuple(float(number) for number in numbers)
+        except ValueError:
+            given = ()
+        if not name or not equals or not 1 <= len(given) <= 3:
+            raise DataError(
+                f"--slice: {part!r} given; NAME=VALUE or NAME=LEAST:GREATEST[:COUNT] expected, in "
+                "m and rad without the unit, such as z=0,phi=0"
+            )
+        if name in held or name in ranges:
+            raise DataError(f"--slice: {name} given twice")
+        if len(given) == 1:
+            held[name] = given[0]
+        else:
+            ranges[name] = given
+    return held, ranges
+
+
+def _volume(robot: Manipulator, grid: Grid) -> ReachVolume | None:
+    """Return the reach at the grid's orientation; None where that varies, or nothing is in it."""
+    from pteron.workspace import reach_volume
+
+    if any(axis.name == "phi" for axis in grid.axes):
+        return None
+    try:
+        return reach_volume(robot, grid.pose)
+    except ModelError:
+        return None
+
+
+def _outside(grid: Grid, volume: ReachVolume | None) -> list[str]:
+    """Return which lengths are held where nothing is in reach."""
+    if volume is None:
+        return []
+    spans = zip((n for n in grid.coordinates if n != "phi"), *volume.box.tolist(), strict=True)
+    return [
+        f"nothing is in reach at {_told(name, grid.held[name])}: {name} goes from {low:.4g} to "
+        f"{high:.4g} m at this orientation"
+        for name, low, high in spans
+        if name in grid.held and not low <= grid.held[name] <= high
+    ]
+
+
+def _draw(found: Map, out: str, ending: str) -> None:
+    from pteron.plots import map_figure, map_film, save_figure
+
+    if ending in _PICTURES:
+        with spinner(f"Drawing {found.robot}"):
+            save_figure(map_figure(found), out, dpi=_DPI)
+        return
+    task = f"Filming {found.robot}"
+    with stages(task, 1) as tell:
+        map_film(
+            found,
+            next(iter(found.values)),
+            out,
+            progress=lambda done, total: tell(task, done, total),
+        )
+
+
+def _data(
+    found: Map, volume: ReachVolume | None, warnings: list[str], out: str | None
+) -> dict[str, Any]:
+    grid = found.grid
+    return {
+        "robot": found.robot,
+        "held": grid.held,
+        "varies": [
+            {
+                "name": axis.name,
+                "unit": axis.unit,
+                "least": axis.least,
+                "greatest": axis.greatest,
+                "count": axis.count,
+            }
+            for axis in grid.axes
+        ],
+        "poses": grid.size,
+        "in_reach": found.share,
+        "causes": found.causes,
+        "reach": None
+        if volume is None
+        else {
+            "box": volume.box.tolist(),
+            "volume": volume.volume,
+            "standard_error": volume.standard_error,
+            "unit": volume.unit,
+        },
+        "indices": [_index_data(found, index.name) for index in found.indices],
+        "warnings": warnings,
+        **({"files": [out]} if out is not None else {}),
+    }
+
+
+def _index_data(found: Map, name: str) -> dict[str, Any]:
+    from pteron.maps.map import ALL
+
+    index = ALL[name]
+    about = {"index": name, "title": index.title, "unit": index.unit, "better": index.better}
+    try:
+        summary = found.summary(name)
+    except DataError:
+        keys = ("best", "best_pose", "worst", "worst_pose", "mean", "median")
+        return {
+            **about,
+            **dict.fromkeys(keys),
+            "poses": 0,
+            "undetermined": int(found.reachable.sum()),
+        }
+    return {
+        **about,
+        "best": summary.best,
+        "best_pose": summary.best_pose.tolist(),
+        "worst": summary.worst,
+        "worst_pose": summary.worst_pose.tolist(),
+        "mean": summary.mean,
+        "median": summary.median,
+        "poses": summary.count,
+        "undetermined": summary.infinite,
+    }
+
+
+def _rows(data: Mapping[str, Any]) -> Any:
+    """Return a table of the indices, a row each."""
+    import polars as pl
+
+    coordinates = [*data["held"], *(axis["name"] for axis in data["varies"])]
+    names = [name for name in ("x", "y", "z", "phi") if name in coordinates]
+    rows = []
+    for one in data["indices"]:
+        row = {key: one[key] for key in ("index", "unit", "best", "worst", "mean", "median")}
+        for side in ("best", "worst"):
+            pose = one[f"{side}_pose"] or [None] * len(names)
+            row |= {f"{side}_{name}": value for name, value in zip(names, pose, strict=True)}
+        rows.append(row)
+    return pl.DataFrame(rows, infer_schema_length=None)
+
+
+def _show(found: Map, volume: ReachVolume | None, data: Mapping[str, Any]) -> None:
+    """Print for a person: the reach, what ends it, and each index."""
+    held = ", ".join(_told(name, value) for name, value in found.grid.held.items())
+    lines: list[str | rich.table.Table] = [
+        f"[bold]{plain(found.robot)}[/bold]{f' at {held}' if held else ''}"
+    ]
+    if volume is not None:
+        names = [name for name in found.grid.coordinates if name != "phi"]
+        spans = ", ".join(
+            f"{name} {low:.4g} to {high:.4g} m"
+            for name, low, high in zip(names, *volume.box.tolist(), strict=True)
+        )
+        noun = "area" if volume.unit == "m^2" else "volume"
+        angle = found.grid.held.get("phi")
+        where = "" if angle is None else f" at {_told('phi', angle)}"
+        lines.append(
+            f"Reach{where}: {spans}; {noun} {volume.volume:.4g} {volume.unit} "
+            f"(standard error {volume.standard_error:.1g})"
+        )
+    varying = ", ".join(
+        f"{axis.name} {axis.least:.4g} to {axis.greatest:.4g} {axis.unit}"
+        for axis in found.grid.axes
+    )
+    lines.append(f"Map: {varying}: {found.grid.size} poses, {_percent(found.share)} in reach")
+    if found.causes:
+        told = sorted(found.causes.items(), key=lambda pair: -pair[1])
+        lines.append("; ".join(f"{_percent(share)} {text}" for text, share in told))
+    made = table("index", "", "value", "where", numbers=("value",))
+    for one in data["indices"]:
+        unit = f" ({one['unit']})" if one["unit"] else ""
+        named = plain(f"{one['index']}{unit}")
+        if one["best"] is None:
+            made.add_row(named, "", "-", "determined at no pose in reach")
+            continue
+        if abs(one["best"] - one["worst"]) <= _ALIKE * abs(one["best"]):
+            made.add_row(named, "", f"{one['best']:.4g}", "everywhere in reach")
+        else:
+            for side in ("best", "worst"):
+                pose = " ".join(f"{value + 0.0:.4g}" for value in one[f"{side}_pose"])
+                made.add_row(named if side == "best" else "", side, f"{one[side]:.4g}", pose)
+            for side in ("mean", "median"):
+                made.add_row("", side, f"{one[side]:.4g}", "")
+        if one["undetermined"]:
+            share = one["undetermined"] / found.grid.size
+            made.add_row("", "singular", "-", f"{_percent(share)} of the poses")
+    made.caption = f"Where: {' '.join(found.grid.coordinates)}, m" + (
+        " and rad" if "phi" in found.grid.coordinates else ""
+    )
+    show(*lines, made)
+
+
+def _told(name: str, value: float) -> str:
+    return f"{name} = {value + 0.0:.4g} {'rad' if name == 'phi' else 'm'}"
+
+
+def _percent(share: float) -> str:
+    """Return a share in percent; what is little is not shown as nothing."""
+    return "under 0.1 %" if 0.0 < share < 1e-3 else f"{100.0 * share:.3g} %"

@@ -1,0 +1,39 @@
+"""Which dimensions are best: searches over a machine's geometry, with proofs of what they find."""
+
+from pteron.design.changes import Change, geometry_changes, mass_changes, quantity_changes
+from pteron.design.design import Design
+from pteron.design.front import Front
+from pteron.design.proofs import ProvedCube, proved_cube, workspace_proofs
+from pteron.design.quantities import Quantity, quantities
+from pteron.design.report import Summary, Told
+from pteron.design.search import search
+from pteron.design.spec import Spec, read_spec
+from pteron.design.survey import survey
+from pteron.design.task import Task
+from pteron.design.variables import Variable
+
+__all__ = [
+    "Change",
+    "Design",
+    "Front",
+    "ProvedCube",
+    "Quantity",
+    "Spec",
+    "Summary",
+    "Task",
+    "Told",
+    "Variable",
+    "geometry_changes",
+    "mass_changes",
+    "proved_cube",
+    "quantities",
+    "quantity_changes",
+    "read_spec",
+    "search",
+    "survey",
+    "workspace_proofs",
+]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

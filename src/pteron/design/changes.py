@@ -1,0 +1,111 @@
+"""What a design changes against the machine that a search began with, in words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pteron.design.design import Design
+from pteron.design.task import Task
+from pteron.manipulator import Manipulator
+from pteron.manipulator.manipulator import told_legs
+
+_NONE = 1e-9
+"""A change that is smaller, m or none, is none."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """One number before and after.
+
+    Attributes
+    ----------
+    what : str
+        Which number.
+    before, after : float
+        Its values.
+    unit : str
+        Of both; empty where they have none.
+    """
+
+    what: str
+    before: float
+    after: float
+    unit: str
+
+    @property
+    def words(self) -> str:
+        """The change as a clause: "upper length of legs 2 and 4: 154 mm, now 246 mm (+60 %)"."""
+        return f"{self.what}: {self.told(self.before)}, now {self.told(self.after)} ({self.by})"
+
+    @property
+    def by(self) -> str:
+        """By how much: as a share, or as a difference where a share says nothing."""
+        if self.before > _NONE and self.after > 0.0:
+            return f"{100.0 * (self.after / self.before - 1.0):+.1f} %"
+        return (
+            f"{'+' if self.after > self.before else '-'}{self.told(abs(self.after - self.before))}"
+        )
+
+    def told(self, value: float) -> str:
+        """Return a value with its unit; lengths in millimetres."""
+        if self.unit == "m":
+            return f"{1000.0 * value:.1f} mm"
+        return f"{value:.4g} {self.unit}".rstrip()
+
+
+def geometry_changes(task: Task, robot: Manipulator) -> list[Change]:
+    """Return what of the geometry is another in a design; legs that change alike as one."""
+    found: dict[tuple[str, float, float, str], list[int]] = {}
+    for variable in task.variables:
+        for place in variable.places:
+            before, after = place.read(task.robot), place.read(robot)
+            if abs(after - before) > _NONE:
+                part = "" if place.part is None else f" {'xyz'[place.part]}"
+                what = f"{place.key.replace('_', ' ')}{part}"
+                unit = "m" if place.role in ("length", "point") else ""
+                key = what, round(before, 9), round(after, 9), unit
+                found.setdefault(key, []).append(place.leg)
+    return [
+        Change(f"{what} of {told_legs(legs)}", before, after, unit)
+        for (what, before, after, unit), legs in found.items()
+    ]
+
+
+def mass_changes(task: Task, robot: Manipulator) -> list[Change]:
+    """Return which bodies have another mass; legs that change alike as one."""
+    found: dict[tuple[str, float, float], list[int]] = {}
+    for i, (leg, other) in enumerate(zip(task.robot.legs, robot.legs, strict=True), start=1):
+        for (letter, body), new in zip(leg.bodies.items(), other.bodies.values(), strict=True):
+            before, after = body.values[0], new.values[0]
+            if abs(after - before) > _NONE:
+                found.setdefault((leg.names[letter], before, round(after, 9)), []).append(i)
+    return [
+        Change(f"mass of {name} of {told_legs(legs)}", before, after, "kg")
+        for (name, before, after), legs in found.items()
+    ]
+
+
+def quantity_changes(design: Design) -> list[Change]:
+    """Return the quantities that were asked for, of the machine to begin with and of a design."""
+    task = design.task
+    return [
+        Change(name, task.first.quantity(name), design.quantity(name), task.unit(name))
+        for name in task.asked
+    ]
+
+
+def stroke_words(design: Design) -> list[str]:
+    """Return how much of its way each joint uses in the workspace, or in the cube."""
+    low, high = design.joints.min(axis=0), design.joints.max(axis=0)
+    lines = []
+    for i, (leg, a, b) in enumerate(zip(design.robot.legs, low, high, strict=True), start=1):
+        unit, scale = ("mm", 1000.0) if leg.joint.unit == "m" else ("rad", 1.0)
+        limits = (
+            ", which has no limits"
+            if leg.limits is None
+            else f" of its limits {scale * leg.limits[0]:.4g} to {scale * leg.limits[1]:.4g} {unit}"
+        )
+        lines.append(
+            f"{leg.joint.noun} of leg {i}: {scale * a:.1f} to {scale * b:.1f} {unit}{limits}"
+        )
+    return lines

@@ -1,0 +1,66 @@
+"""What the search asks of pymoo, which is an extra: a generation, and which designs are best."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.errors import ModelError
+from pteron.kernels import Array
+
+_MISSING = 'a search needs pymoo, which is not installed; pip install "pteron[design]"'
+
+
+def non_dominated(costs: Array) -> NDArray[np.int_]:
+    """Return which rows (N, M) of costs no other row betters in every one, in their order."""
+    try:
+        from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
+    except ImportError:
+        raise ModelError(_MISSING) from None
+    found = NonDominatedSorting().do(costs, only_non_dominated_front=True)
+    return np.sort(np.asarray(found, dtype=int))
+
+
+class Evolution:
+    """NSGA-II (Deb et al., IEEE Trans. Evolutionary Computation 6(2), 2002), as pymoo has it.
+
+    Parameters
+    ----------
+    first : array, shape (P, V)
+        The first generation, each variable from 0 to 1.
+    objectives, constraints : int
+        How many: what is minimised, and what must be 0 or less.
+    seed : int
+        Of all chance: the same seed asks for the same designs where it is told the same.
+    """
+
+    def __init__(self, first: Array, objectives: int, constraints: int, seed: int) -> None:
+        try:
+            from pymoo.algorithms.moo.nsga2 import NSGA2
+            from pymoo.core.problem import Problem
+        except ImportError:
+            raise ModelError(_MISSING) from None
+        self._problem = Problem(
+            n_var=first.shape[1], n_obj=objectives, n_ieq_constr=constraints, xl=0.0, xu=1.0
+        )
+        self._algorithm: Any = NSGA2(pop_size=len(first), sampling=first)
+        # The loop that asks decides when to end.
+        self._algorithm.setup(self._problem, termination=("n_gen", 1 << 30), seed=seed)
+        self._asked: Any = None
+
+    def ask(self) -> Array:
+        """Return the designs (P, V) of the next generation."""
+        self._asked = self._algorithm.ask()
+        return np.array(self._asked.get("X"), dtype=float)
+
+    def tell(self, designs: Array, costs: Array, misses: Array) -> None:
+        """Take designs with their costs (N, M) and misses (N, C); the asked ones come first."""
+        from pymoo.core.evaluator import Evaluator
+        from pymoo.core.population import Population
+        from pymoo.problems.static import StaticProblem
+
+        whole = Population.merge(self._asked, Population.new("X", designs[len(self._asked) :]))
+        Evaluator().eval(StaticProblem(self._problem, F=costs, G=misses), whole)
+        self._algorithm.tell(infills=whole)

@@ -1,0 +1,195 @@
+"""The front of a search: the designs that no other one betters in every objective."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pteron.design.design import Design
+from pteron.design.task import Task
+from pteron.errors import ModelError
+from pteron.kernels import Array
+from pteron.manipulator import Manipulator
+
+if TYPE_CHECKING:
+    import polars as pl
+
+_MISSES = "misses "
+
+
+@dataclass(frozen=True, repr=False)
+class Front:
+    """The best designs that a search has found.
+
+    Attributes
+    ----------
+    task : Task
+        What was asked.
+    table : polars.DataFrame
+        A row for each design of the front: its variables, the quantities asked for, and what it
+        misses, which is nothing; the best of the first objective comes first.
+    evaluated : int
+        How many designs it was found among.
+    kept : int
+        How many of them keep all that is asked.
+    """
+
+    task: Task
+    table: pl.DataFrame
+    evaluated: int
+    kept: int
+
+    def __repr__(self) -> str:
+        """Return the front in a line."""
+        return (
+            f"<Front of {self.task.robot.name!r}: {len(self.table)} designs of {self.evaluated} "
+            "evaluated>"
+        )
+
+    def __len__(self) -> int:
+        """Return the number of its designs."""
+        return len(self.table)
+
+    @cached_property
+    def values(self) -> Array:
+        """The variables (K, V)."""
+        return np.asarray(self.table.select([v.name for v in self.task.variables]).to_numpy())
+
+    @cached_property
+    def objectives(self) -> Array:
+        """The objectives (K, M), in their units."""
+        names = [o.quantity for o in self.task.spec.objectives]
+        return np.asarray(self.table.select(names).to_numpy())
+
+    def robot(self, index: int) -> Manipulator:
+        """Return the machine of one of its designs."""
+        return self.task.machine(self.values[index].tolist())
+
+    @cached_property
+    def chosen(self) -> dict[str, int]:
+        """Which designs are told of: the best in each objective, and the compromise.
+
+        The compromise is nearest to the best of all objectives at once, each measured by its range
+        over the front; of one objective there is none.
+        """
+        signs = np.array([o.sign for o in self.task.spec.objectives])
+        costs = self.objectives * signs
+        found = {
+            f"best-{o.quantity}": int(costs[:, k].argmin())
+            for k, o in enumerate(self.task.spec.objectives)
+        }
+        spans = np.ptp(costs, axis=0)
+        shares = (costs - costs.min(axis=0)) / np.where(spans > 0.0, spans, 1.0)
+        if len(signs) > 1:
+            found["compromise"] = int(np.linalg.norm(shares, axis=1).argmin())
+        return found
+
+    @property
+    def headings(self) -> dict[str, str]:
+        """What the table's columns are called with their units."""
+        found = {}
+        for v in self.task.variables:
+            found[v.name] = f"{v.name} ({v.unit})" if v.unit else v.name
+        for name in self.task.asked:
+            unit = self.task.unit(name)
+            found[name] = f"{name} ({unit})" if unit else name
+        return found
+
+
+def front_of(task: Task, designs: pl.DataFrame) -> Front:
+    """Return the front of designs that were evaluated.
+
+    Raises
+    ------
+    ModelError
+        If none of them keeps all that is asked; the message says what is missed by least, and how.
+    """
+    return front_of_parts(task, [designs])
+
+
+def front_of_parts(task: Task, parts: Iterable[pl.DataFrame]) -> Front:
+    """Return the front of designs that come in parts, of which only the front so far is held.
+
+    Raises
+    ------
+    ModelError
+        As `front_of`.
+    """
+    import polars as pl
+
+    best: pl.DataFrame | None = None
+    nearest: pl.DataFrame | None = None
+    evaluated = kept = 0
+    for part in parts:
+        missed = _missed(part)
+        good = part.filter(missed == 0.0)
+        evaluated, kept = evaluated + len(part), kept + len(good)
+        if len(good):
+            best = _foremost(task, good if best is None else pl.concat([best, good]))
+        elif best is None:
+            near = part[[int(missed.argmin())]]
+            both = near if nearest is None else pl.concat([nearest, near])
+            nearest = both[[int(_missed(both).argmin())]]
+    if best is None:
+        assert nearest is not None  # there is at least one design
+        raise _impossible(task, nearest, evaluated)
+    return Front(task, best, evaluated, kept)
+
+
+def _missed(designs: pl.DataFrame) -> Array:
+    """Return how much each design misses, all in all."""
+    names = [name for name in designs.columns if name.startswith(_MISSES)]
+    return np.asarray(designs.select(names).to_numpy().sum(axis=1))
+
+
+def _foremost(task: Task, good: pl.DataFrame) -> pl.DataFrame:
+    """Return the rows that no other betters, each once, in the order of the objectives."""
+    from pteron.design.extras import non_dominated
+
+    signs = np.array([o.sign for o in task.spec.objectives])
+    costs = good.select([o.quantity for o in task.spec.objectives]).to_numpy() * signs
+    costs = np.where(np.isfinite(costs), costs, np.inf)
+    best = non_dominated(costs)
+    best = best[np.lexsort(costs[best].T[::-1])]
+    apart = np.append(True, (np.diff(costs[best], axis=0) != 0.0).any(axis=1))
+    found: pl.DataFrame = good[best[apart]]
+    return found
+
+
+def _impossible(task: Task, nearest: pl.DataFrame, evaluated: int) -> ModelError:
+    """Return what is said where no design keeps all that is asked."""
+    row = nearest.row(0, named=True)
+    told = []
+    for name in (name for name in nearest.columns if name.startswith(_MISSES) and row[name] > 0.0):
+        if name == f"{_MISSES}workspace":
+            machine = task.machine([row[v.name] for v in task.variables])
+            what = "the workspace" if task.spec.workspace else "a cube"
+            told.append(f"{what} is not kept ({_worst_condition(Design(task, machine))})")
+        else:
+            asked = task.spec.requirements[int(name.split()[1]) - 1]
+            told.append(f"{asked.words} is missed, with {row[asked.quantity]:.4g}")
+    at = ", ".join(f"{v.name} = {row[v.name]:.4g}" for v in task.variables)
+    return ModelError(
+        f"none of {evaluated} designs keeps all that is asked; the nearest, {at}: "
+        f"{'; '.join(told)}. Ask for less, or widen the ranges of the variables",
+        subject=task.robot.name,
+    )
+
+
+def _worst_condition(design: Design) -> str:
+    """Return which condition a machine misses most in the workspace, and where."""
+    task = design.task
+    if task.spec.workspace is None:
+        center = design.cube.center
+        poses = task.orientations.copy()
+        poses[:, : len(center)] = center
+    else:
+        poses = design.poses
+    rows = np.nan_to_num(task.conditions.rows(design.geometry, poses, design.side))
+    at, row = np.unravel_index(int(rows.argmin()), rows.shape)
+    pose = ", ".join(f"{x:.4g}" for x in poses[at])
+    return f"{task.conditions.names[row]}, at pose [{pose}]"

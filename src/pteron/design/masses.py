@@ -1,0 +1,54 @@
+"""What a link's inertia does when its length changes.
+
+A link of another length is taken for one of the same section, drawn out along its own x: mass and
+the centre's distance along x grow with the length, and what lies across x keeps its place. So the
+moment of inertia grows with the length's third power, as a slender rod's does, but for the share
+of the centre's distance across x, which grows with the mass. Sliders, platform and drives are kept.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pteron.legs import LegKind
+
+
+def with_stretched_bodies(before: LegKind, after: LegKind) -> LegKind:
+    """Return a leg with the inertia that its links have at their new lengths.
+
+    Parameters
+    ----------
+    before : leg
+        With the inertia that its links have at their old lengths.
+    after : leg
+        The same with other lengths, and still the old inertia.
+
+    Returns
+    -------
+    leg
+    """
+    bodies = dict(after.bodies)
+    for letter, (_, low, high, _) in after.extents.items():
+        _, old_low, old_high, _ = before.extents[letter]
+        bodies[letter] = stretched(bodies[letter], (high - low) / (old_high - old_low))
+    return after.with_bodies(bodies)
+
+
+def stretched(body: Any, factor: float) -> Any:
+    """Return the inertia of a link drawn out along x by a factor, its section kept.
+
+    Examples
+    --------
+    >>> from pteron import RodInertia
+    >>> stretched(RodInertia.of_body(1.0, [-0.5], 1.0 / 3.0), 2.0).values
+    (2.0, -2.0, 2.6666666666666665)
+    """
+    values = dict(zip(body.kinds, body.values, strict=True))
+    across = values.get("mgy", 0.0) ** 2 / values["m"]
+    drawn = {
+        "m": values["m"] * factor,
+        "mgx": values["mgx"] * factor**2,
+        "mgy": values.get("mgy", 0.0) * factor,
+        "I": (values["I"] - across) * factor**3 + across * factor,
+    }
+    return type(body).of_values([drawn[kind] for kind in body.kinds])

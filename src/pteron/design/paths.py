@@ -1,0 +1,114 @@
+"""Paths to a machine's geometric numbers, as a search names them: "legs[1,3].guide_point.x"."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+from pteron.errors import ModelError, shown
+from pteron.legs import LegKind
+from pteron.manipulator import Manipulator
+
+_WRITTEN = re.compile(r"(-?)legs(?:\[([\d\s,]*)\])?\.(\w+)(?:\.(\w+))?")
+_GEOMETRIC = ("point", "direction", "length", "number")
+_SHAPE = 'a path such as "legs.upper_length" or "legs[1,3].guide_point.x"'
+
+
+@dataclass(frozen=True)
+class Place:
+    """One number of one leg.
+
+    Attributes
+    ----------
+    leg : int
+        From 1.
+    key : str
+        Its key in the robot's file.
+    part : int or None
+        Which component of a vector; None of a number that is none.
+    sign : int
+        1, or -1 where the path has a minus before it.
+    role : str
+        What the key holds: "point", "direction", "length" or "number".
+    """
+
+    leg: int
+    key: str
+    part: int | None
+    sign: int
+    role: str
+
+    @property
+    def path(self) -> str:
+        """The path to it."""
+        part = "" if self.part is None else f".{'xyz'[self.part]}"
+        return f"legs[{self.leg}].{self.key}{part}"
+
+    def read(self, robot: Manipulator) -> float:
+        """Return the number as it is in a machine."""
+        value = getattr(robot.legs[self.leg - 1], self.key)
+        return float(value if self.part is None else value[self.part])
+
+
+def places(robot: Manipulator, path: str) -> list[Place]:
+    """Return the numbers that a path names.
+
+    Raises
+    ------
+    ModelError
+        If the machine has none of that name; the message names those it has.
+    """
+    found = _WRITTEN.fullmatch(path.strip())
+    if found is None:
+        raise ModelError(f"{shown(path)} is not {_SHAPE}")
+    minus, numbers, key, part = found.groups()
+    legs = range(1, robot.freedom + 1)
+    if numbers is not None:
+        named = [int(word) for word in numbers.split(",") if word.strip()]
+        if wrong := [str(i) for i in named if i not in legs]:
+            raise ModelError(
+                f"{shown(path)}: no leg {', '.join(wrong)}; {robot.name} has legs 1 to {legs[-1]}"
+            )
+        if not named:
+            raise ModelError(f"{shown(path)}: names no leg; write legs[1] or legs")
+        legs_named = named
+    else:
+        legs_named = [i for i in legs if key in geometric_keys(robot.legs[i - 1])]
+    sign = -1 if minus else 1
+    return [place for i in legs_named or legs for place in _in_leg(robot, path, i, key, part, sign)]
+
+
+def geometric_keys(leg: LegKind) -> list[str]:
+    """Return the keys of a leg that hold geometric numbers."""
+    return [
+        name
+        for name, key in leg.every_key().items()
+        if key.role in _GEOMETRIC and getattr(leg, name) is not None
+    ]
+
+
+def _in_leg(
+    robot: Manipulator, path: str, i: int, key: str, part: str | None, sign: int
+) -> Iterator[Place]:
+    leg = robot.legs[i - 1]
+    known = geometric_keys(leg)
+    if key not in known:
+        close = get_close_matches(key, known, n=1)
+        guess = f'; did you mean "{close[0]}"?' if close else ""
+        raise ModelError(
+            f"{shown(path)}: leg {i}, a {leg.type}, has no number {key}; it has "
+            f"{', '.join(known)}{guess}"
+        )
+    role = leg.every_key()[key].role
+    scalar = role in ("length", "number")
+    if scalar and part is not None:
+        raise ModelError(f"{shown(path)}: {key} is one number; leave out .{part}")
+    if part is not None and part not in ("x", "y", "z"):
+        raise ModelError(f"{shown(path)}: .{part} is none of .x, .y and .z")
+    if scalar:
+        yield Place(i, key, None, sign, role)
+    else:
+        for k in range(3) if part is None else ["xyz".index(part)]:
+            yield Place(i, key, k, sign, role)

@@ -1,0 +1,168 @@
+"""What a design is judged by: a table of quantities, each with its unit and what it means."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pteron.errors import shown
+from pteron.indices import INDICES, Index
+from pteron.manipulator import Manipulator
+
+if TYPE_CHECKING:
+    from pteron.design.design import Design
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One number that says something of a design.
+
+    Attributes
+    ----------
+    unit : str
+        Empty where it has none.
+    about : str
+        What it is, in a line.
+    of : callable
+        Takes a `Design`; NaN where there is none.
+    of_machine : callable or None
+        The same from the machine alone, where its poses do not matter: then searches can follow its
+        slope.
+    """
+
+    unit: str
+    about: str
+    of: Callable[[Design], float]
+    of_machine: Callable[[Manipulator], float] | None = None
+
+
+def _simple(unit: str, about: str, of: Callable[[Manipulator], float]) -> Quantity:
+    return Quantity(unit, about, lambda design: of(design.robot), of)
+
+
+def _links(robot: Manipulator) -> float:
+    return float(
+        sum(q.value[0] for leg in robot.legs for q in leg.quantities if q.role == "length")
+    )
+
+
+def _moving_mass(robot: Manipulator) -> float:
+    legs = sum(body.values[0] for leg in robot.legs for body in leg.bodies.values())
+    carried = sum(bar.mass for bar in robot.platform.bars)
+    return float(legs + robot.platform.inertia.mass + carried)
+
+
+def _size(design: Design) -> float:
+    points = design.values("joint_points")
+    points = points.reshape(-1, 3)
+    points = points[np.isfinite(points).all(axis=-1)]
+    if not len(points):
+        return float("nan")
+    return float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
+
+
+def _type_i(design: Design) -> float:
+    squares = design.values("squared_type_i")
+    least = float(squares.min())
+    return float(np.sqrt(least)) if least >= 0.0 else float("nan")
+
+
+def _type_ii(design: Design) -> float:
+    measures = design.values("type_ii")
+    crossed = measures.min() < 0.0 < measures.max()
+    return 0.0 if crossed else float(np.abs(measures).min())
+
+
+def _stroke(design: Design) -> float:
+    joints = design.joints
+    return float(((joints.max(axis=0) - joints.min(axis=0)) / design.start_strokes).max())
+
+
+def _speed(design: Design) -> float:
+    return float(np.abs(design.drive_motion.rates).max())
+
+
+def _force(design: Design) -> float:
+    return float(np.abs(design.drive_motion.forces).max())
+
+
+def _drive_load(design: Design) -> float:
+    """Return the greatest share of what drives can do, force or speed."""
+    found, shares = design.drive_motion, [0.0]
+    for i, leg in enumerate(design.robot.legs):
+        drive = leg.drive
+        if drive is not None and drive.max_force is not None:
+            shares.append(float(np.abs(found.forces[:, i]).max()) / drive.max_force)
+        if drive is not None and drive.max_speed is not None:
+            shares.append(float(np.abs(found.rates[:, i]).max()) / drive.max_speed)
+    return max(shares)
+
+
+_OWN = {
+    "cube": Quantity(
+        "m", "edge of the largest cube that keeps the floors and limits", lambda d: d.cube.edge
+    ),
+    "links": _simple("m", "sum of the links' lengths", _links),
+    "moving_mass": _simple("kg", "mass of all that moves", _moving_mass),
+    "size": Quantity(
+        "m", "diagonal of the box that holds all joints at the poses of the workspace", _size
+    ),
+    "type_i": Quantity("", "least type-I measure of a leg in the workspace", _type_i),
+    "type_ii": Quantity("", "least type-II measure in the workspace", _type_ii),
+    "stroke": Quantity(
+        "",
+        "greatest way of a joint in the workspace, over the width of its limits or, without them, "
+        "over its way in the machine to begin with",
+        _stroke,
+    ),
+    "speed": Quantity(
+        "m/s or rad/s", "greatest speed of a joint, at [motion] speed along each axis", _speed
+    ),
+    "force": Quantity(
+        "N or N m",
+        "greatest force of a drive at the workspace's corners, at [motion] speed and acceleration",
+        _force,
+    ),
+    "drive_load": Quantity(
+        "",
+        "greatest of these forces and speeds over what the file says a drive can do",
+        _drive_load,
+    ),
+}
+
+
+@lru_cache(maxsize=1)
+def quantities() -> dict[str, Quantity]:
+    """Return the quantities by name: those of this page, and the worst of each index."""
+    return _OWN | {name: _worst(index) for name, index in INDICES.items()}
+
+
+def _worst(index: Index) -> Quantity:
+    """Return the worst value of an index over the workspace."""
+    extreme, word = (np.min, "least") if index.better == "more" else (np.max, "greatest")
+    return Quantity(
+        index.unit,
+        f"{word} {index.title} in the workspace",
+        lambda design: float(extreme(design.values(index.name))),
+    )
+
+
+def known(name: str) -> str:
+    """Return the name of a quantity.
+
+    Raises
+    ------
+    ValueError
+        If there is none of that name; the message names those there are.
+    """
+    names = quantities()
+    if name in names:
+        return name
+    close = get_close_matches(name, names, n=1)
+    guess = f'; did you mean "{close[0]}"?' if close else ""
+    raise ValueError(f"{shown(name)} is no quantity: {', '.join(names)}{guess}")

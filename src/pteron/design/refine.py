@@ -1,0 +1,118 @@
+"""A design made better by gradients: one objective, while the others and what is asked are held."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pteron.design.design import Design
+from pteron.design.exchange import LATTICE, Program, Samples, cube_samples, fixed_samples, improved
+from pteron.design.quantities import quantities
+from pteron.design.task import ROUNDING, Task
+from pteron.design.variables import geometry_slopes, slopes_of
+from pteron.errors import ModelError
+from pteron.kernels import Array
+from pteron.kinematics.sampling import search_ball
+
+_FIRST = 5
+"""Points along a cube's edge at which its conditions are asked at first."""
+
+
+def refined(task: Task, values: Sequence[float], objective: int) -> list[float]:
+    """Return a design with a better objective, or the same where none is found.
+
+    Its unknowns are the variables together with the cube's centre and edge. Quantities of the
+    machine alone are held to first order, those of its poses are not: whoever asks evaluates the
+    design again.
+
+    Parameters
+    ----------
+    task : Task
+        The search.
+    values : sequence of float
+        The variables' values, of a design that keeps what is asked.
+    objective : int
+        Which of the objectives.
+    """
+    spec, start = task.spec, np.array(values)
+    asked = spec.objectives[objective]
+    try:
+        design = Design(task, task.machine(values))
+        slopes = _Slopes(task, design, start)
+        wanted = slopes.of(asked.quantity)
+        if wanted is None or not wanted.any() or design.reserve < -ROUNDING:
+            return list(values)
+        geometry = geometry_slopes(task.robot, task.variables, values)
+    except ModelError:  # at the end of what can be made
+        return list(values)
+    center, radius = search_ball(design.robot)
+    lengths = len(center)
+    seeks = task.seeks_cube
+    cube = np.append(design.cube.center, design.cube.edge) if seeks else np.zeros(lengths + 1)
+    held = [(float(z), float(z)) for z in cube]
+    moving = [(float(c) - radius, float(c) + radius) for c in center] + [(0.0, 2.0 * radius)]
+    z0 = np.append(start, cube)
+    program = Program(
+        task.conditions,
+        design.cube.side if seeks else design.side,
+        design.geometry,
+        geometry,
+        asked.sign * wanted,
+        [*map(tuple, task.ranges.T.tolist()), *(moving if seeks else held)],
+        task.orientations if seeks else task.orientations[:0],
+        tuple(slopes.bounds(objective, z0)),
+    )
+    first, dense = (_asked_at(design, lengths, count) for count in (_FIRST, LATTICE))
+    found: list[float] = improved(program, first, dense, z0)[: len(start)].tolist()
+    return found
+
+
+def _asked_at(design: Design, lengths: int, count: int) -> Samples:
+    """Return poses of the workspace, of the cube, or of both, as the search asks for them."""
+    task = design.task
+    cube = cube_samples(task.orientations, lengths, count)
+    if task.spec.workspace is None:
+        return cube
+    fixed = fixed_samples(design.poses, lengths)
+    return fixed.joined(cube) if task.seeks_cube else fixed
+
+
+@dataclass(frozen=True)
+class _Slopes:
+    """How quantities follow the unknowns, to first order, about one design."""
+
+    task: Task
+    design: Design
+    start: Array
+
+    def of(self, name: str) -> Array | None:
+        """Return a quantity's slopes (V + k + 1,), or None where it has none."""
+        task, tail = self.task, len(self.task.robot.platform.lengths) + 1
+        if name == "cube":
+            return np.append(np.zeros(len(self.start) + tail - 1), 1.0)
+        alone = quantities()[name].of_machine
+        if alone is None:
+            return None
+        own = slopes_of(
+            lambda v: alone(task.machine(v.tolist())), task.variables, self.start.tolist()
+        )
+        return np.append(own, np.zeros(tail))
+
+    def bounds(self, objective: int, z0: Array) -> list[tuple[Array, float]]:
+        """Return what holds the other objectives, and what is asked of quantities with slopes."""
+        found = []
+        for k, one in enumerate(self.task.spec.objectives):
+            row = self.of(one.quantity)
+            if k != objective and row is not None:
+                found.append((-one.sign * row, float(-one.sign * row @ z0)))
+        for asked in self.task.spec.requirements:
+            row = self.of(asked.quantity)
+            if row is None:
+                continue
+            now = self.design.quantity(asked.quantity)
+            for bound, side in ((asked.least, 1.0), (asked.most, -1.0)):
+                if bound is not None:
+                    found.append((side * row, float(side * (row @ z0 + bound - now))))
+        return found

@@ -1,0 +1,213 @@
+"""`search`: generations of designs, the best of them improved by gradients, until the front stands.
+
+Each generation is a sweep of its own (`pteron.maps.sweep`) into a folder of its own. A run that was
+ended asks the same designs again, finds those that were finished in the folder, and goes on: it
+ends in the same front as one that was not.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pteron.design.extras import Evolution
+from pteron.design.front import Front, front_of
+from pteron.design.refine import refined
+from pteron.design.spec import Spec
+from pteron.design.task import FAILED, Task
+from pteron.errors import DataError, ModelError
+from pteron.kernels import Array
+from pteron.maps import TableStore, sweep
+
+if TYPE_CHECKING:
+    import polars as pl
+
+_CHUNK = 4
+"""Designs that one worker takes at a time."""
+
+Progress = Callable[[int, int, float | None], None]
+"""Is told the generation, how many there are, and the best of the first objective so far."""
+
+
+def search(
+    spec: Spec,
+    *,
+    folder: str | Path | None = None,
+    seed: int | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: Progress | None = None,
+) -> Front:
+    """Search for the best designs of a machine.
+
+    The first generation is a Latin hypercube with the machine to begin with; NSGA-II makes the
+    others, and the best designs of each are improved by gradients. The same spec and seed give the
+    same front, whoever computes it and however often the run was ended meanwhile.
+
+    Parameters
+    ----------
+    spec : Spec
+        What is asked; see `read_spec`.
+    folder : str or Path, optional
+        Where what is evaluated is kept; the same call goes on where it was ended.
+    seed : int, optional
+        Of all chance, in place of the spec's.
+    workers : int, optional
+        Processes of this computer that do the work; by default this one does.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers do the work; they must reach the folder.
+    progress : callable, optional
+        Is told how far the search is after each generation.
+
+    Returns
+    -------
+    Front
+
+    Raises
+    ------
+    DataError
+        If the spec does not suit its machine.
+    ModelError
+        If no design keeps all that is asked: what is missed by least is told; or if an extra is not
+        installed.
+    OutputError
+        If the folder holds another search, or cannot be written.
+    """
+    if seed is not None:
+        spec = spec.with_seed(seed)
+    task = Task.of(spec)
+    with _place(folder) as kept, _workers(workers, scheduler) as address:
+        return front_of(task, _generations(task, kept, address, progress))
+
+
+def _generations(
+    task: Task, folder: Path, scheduler: str | None, progress: Progress | None
+) -> pl.DataFrame:
+    """Return all designs that were evaluated."""
+    import polars as pl
+
+    settings = task.spec.search
+    low, high = task.ranges
+    evolution = Evolution(
+        (first_designs(task, settings.population, settings.seed) - low) / (high - low),
+        len(task.spec.objectives),
+        1 + len(task.spec.requirements),
+        settings.seed,
+    )
+    tables: list[pl.DataFrame] = []
+    used: set[tuple[bytes, int]] = set()
+    for number in range(1, settings.generations + 1):
+        designs = low + evolution.ask() * (high - low)
+        jobs = [(values, -1) for values in designs.tolist()]
+        if tables:
+            jobs += _promising(task, pl.concat(tables), number, used)
+        plan = {**task.plan, "generation": number, "designs": _digest(designs)}
+        store = TableStore(folder / f"{number:04d}", plan)
+        chunks = [jobs[k : k + _CHUNK] for k in range(0, len(jobs), _CHUNK)]
+        sweep(partial(worked, task), chunks, store, scheduler=scheduler)
+        tables.append(store.scan().collect())
+        found = tables[-1]
+        values = np.asarray(found.select([v.name for v in task.variables]).to_numpy())
+        evolution.tell((values - low) / (high - low), *_costs(task, found))
+        if progress is not None:
+            progress(number, settings.generations, _best(task, pl.concat(tables)))
+    return pl.concat(tables)
+
+
+def first_designs(task: Task, count: int, seed: int) -> Array:
+    """Return a Latin hypercube of designs (count, V), the first the machine to begin with."""
+    low, high = task.ranges
+    rng = np.random.default_rng(seed)
+    rows = rng.permuted(np.tile(np.arange(count)[:, None], len(low)), axis=0)
+    designs: Array = low + (rows + rng.random(rows.shape)) / count * (high - low)
+    designs[0] = task.start
+    return designs
+
+
+def worked(task: Task, jobs: list[tuple[list[float], int]]) -> pl.DataFrame:
+    """Return the rows of designs; one whose number is an objective is improved in it first."""
+    import polars as pl
+
+    designs = [values if k < 0 else refined(task, values, k) for values, k in jobs]
+    return pl.DataFrame(task.table(np.array(designs)))
+
+
+def _promising(
+    task: Task, designs: pl.DataFrame, number: int, used: set[tuple[bytes, int]]
+) -> list[tuple[list[float], int]]:
+    """Return designs of the front so far to improve, spread over it, each in one objective."""
+    try:
+        front = front_of(task, designs)
+    except ModelError:
+        return []
+    settings, objectives = task.spec.search, len(task.spec.objectives)
+    count = settings.refined
+    if number == settings.generations and count:
+        count = settings.population  # the last word on the whole front
+    jobs = []
+    spread = np.linspace(0, len(front) - 1, count).round().astype(int)
+    for k, at in enumerate(np.unique(spread)):
+        one = front.values[at], (number + k) % objectives
+        if (key := (one[0].tobytes(), one[1])) not in used:
+            used.add(key)
+            jobs.append((one[0].tolist(), one[1]))
+    return jobs
+
+
+def _costs(task: Task, found: pl.DataFrame) -> tuple[Array, Array]:
+    """Return what is minimised (N, M), and what must not be above zero (N, C)."""
+    signs = np.array([o.sign for o in task.spec.objectives])
+    costs = found.select([o.quantity for o in task.spec.objectives]).to_numpy() * signs
+    misses = found.select([c for c in found.columns if c.startswith("misses ")]).to_numpy()
+    return np.where(np.isfinite(costs), costs, FAILED), misses
+
+
+def _best(task: Task, designs: pl.DataFrame) -> float | None:
+    try:
+        return float(front_of(task, designs).objectives[0, 0])
+    except ModelError:
+        return None
+
+
+def _digest(designs: Array) -> str:
+    return hashlib.sha256(np.ascontiguousarray(designs).tobytes()).hexdigest()[:16]
+
+
+@contextmanager
+def _place(folder: str | Path | None) -> Iterator[Path]:
+    if folder is not None:
+        yield Path(folder)
+        return
+    with TemporaryDirectory(prefix="pteron-design-") as temporary:
+        yield Path(temporary)
+
+
+@contextmanager
+def _workers(count: int | None, scheduler: str | None) -> Iterator[str | None]:
+    """Yield the address of a scheduler; of one with workers of this computer where asked for."""
+    if count is not None and scheduler is not None:
+        raise DataError("workers and scheduler given; a scheduler has its own workers: give one")
+    if count is None:
+        yield scheduler
+        return
+    if count < 1:
+        raise DataError(f"workers: {count} given, 1 or more expected")
+    try:
+        import distributed
+    except ImportError:
+        raise ModelError(
+            "other processes need dask.distributed, which is not installed; "
+            'pip install "pteron[cluster]"'
+        ) from None
+    # One for all generations: a process compiles what it needs once.
+    options: dict[str, Any] = {"threads_per_worker": 1, "dashboard_address": None}
+    local: Any = distributed.LocalCluster
+    with local(n_workers=count, silence_logs=50, **options) as cluster:
+        yield str(cluster.scheduler_address)

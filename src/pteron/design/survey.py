@@ -1,0 +1,120 @@
+"""`survey`: any number of designs spread evenly over the variables' ranges, streamed to Parquet."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.stats import qmc  # type: ignore[import-untyped]
+
+from pteron.design.front import Front, front_of_parts
+from pteron.design.spec import Spec
+from pteron.design.task import Task
+from pteron.errors import DataError
+from pteron.kernels import Array
+from pteron.maps import TableStore, sweep
+
+if TYPE_CHECKING:
+    import polars as pl
+
+_CHUNK = 256
+"""Designs that one worker takes at a time, and rows of a file."""
+
+
+def survey(
+    spec: Spec,
+    count: int,
+    folder: str | Path,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Front:
+    """Evaluate many designs, and return the front of them.
+
+    They are the points of Sobol's sequence, moved by a vector that the spec's seed gives: they
+    cover the ranges more evenly than random ones, and more of them go on where fewer ended.
+
+    Parameters
+    ----------
+    spec : Spec
+        What is asked; see `read_spec`.
+    count : int
+        How many designs.
+    folder : str or Path
+        Where a Parquet file for every 256 designs is written; a run that was ended goes on.
+    workers : int, optional
+        Processes of this computer that do the work; by default this one does.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers do the work; they must reach the folder.
+    progress : callable, optional
+        Is told how many chunks are finished, and of how many.
+
+    Returns
+    -------
+    Front
+
+    Raises
+    ------
+    DataError
+        If the spec does not suit its machine, or the count is not above zero.
+    ModelError
+        If no design keeps all that is asked, or an extra is not installed.
+    OutputError
+        If the folder holds another survey, or cannot be written.
+    """
+    if count < 1:
+        raise DataError(f"count: {count} given, 1 or more expected")
+    task = Task.of(spec)
+    store = TableStore(folder, {**task.plan, "survey": _CHUNK})
+    chunks = _Chunks(count)
+    sweep(
+        partial(surveyed, task),
+        chunks,
+        store,
+        scheduler=scheduler,
+        workers=workers,
+        progress=progress,
+    )
+    return front_of_parts(task, _parts(store, len(chunks)))
+
+
+class _Chunks(Sequence[tuple[int, int]]):
+    """First designs and numbers of designs of the chunks, worked out when they are asked for."""
+
+    def __init__(self, designs: int) -> None:
+        self._length = -(-designs // _CHUNK)
+
+    def __len__(self) -> int:
+        return self._length
+
+    def __getitem__(self, k: object) -> tuple[int, int]:  # type: ignore[override]
+        assert isinstance(k, int)  # a sweep asks for one at a time
+        if not 0 <= k < len(self):
+            raise IndexError(k)
+        return k * _CHUNK, _CHUNK
+
+
+def surveyed(task: Task, chunk: tuple[int, int]) -> pl.DataFrame:
+    """Return the rows of one chunk of designs."""
+    import polars as pl
+
+    return pl.DataFrame(task.table(survey_designs(task, *chunk)))
+
+
+def survey_designs(task: Task, first: int, count: int) -> Array:
+    """Return so many designs (count, V) of the survey's sequence from one on."""
+    low, high = task.ranges
+    sequence = qmc.Sobol(len(low), scramble=False)
+    sequence.fast_forward(first)
+    shift = np.random.default_rng(task.spec.search.seed).random(len(low))
+    return np.asarray(low + (sequence.random(count) + shift) % 1.0 * (high - low))
+
+
+def _parts(store: TableStore, count: int) -> Iterable[pl.DataFrame]:
+    whole = store.scan()
+    for k in range(count):
+        yield whole.slice(k * _CHUNK, _CHUNK).collect()

@@ -1,0 +1,201 @@
+"""A search with what every design of it shares: the machine to begin with, its variables."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from pteron.design.conditions import Conditions, conditions_of
+from pteron.design.design import Design
+from pteron.design.quantities import quantities
+from pteron.design.region import orientations_of
+from pteron.design.spec import Spec
+from pteron.design.variables import Variable, moved, variables_of
+from pteron.errors import DataError, ModelError
+from pteron.indices import INDICES
+from pteron.kernels import Array, Kernel, compile
+from pteron.manipulator import Manipulator, load
+from pteron.manipulator.saving import text_of
+from pteron.toml import told
+
+FAILED = 1e6
+"""How much a requirement is missed by a design that is no machine, or has no such quantity."""
+
+ROUNDING = 1e-9
+"""A condition that is missed by no more is kept."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """A search, checked against the machine that it begins with.
+
+    Attributes
+    ----------
+    spec : Spec
+        What is asked.
+    robot : Manipulator
+        The machine to begin with.
+    variables : tuple of Variable
+        What may change.
+    """
+
+    spec: Spec
+    robot: Manipulator
+    variables: tuple[Variable, ...]
+
+    @classmethod
+    def of(cls, spec: Spec) -> Task:
+        """Return the task of a search.
+
+        Raises
+        ------
+        ModelError
+            If there is no such machine.
+        DataError
+            If the search does not suit the machine; all that is wrong is told.
+        """
+        robot = load(spec.robot)
+        faults = list(_misfits(spec, robot))
+        variables: tuple[Variable, ...] = ()
+        try:
+            variables = variables_of(robot, spec.variables)
+        except ModelError as error:
+            faults = [*error.faults, *faults]
+        if faults:
+            raise DataError(told(faults), subject=spec.source)
+        return cls(spec, robot, variables)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # It crosses to other processes, which compile for themselves.
+        return {one.name: getattr(self, one.name) for one in fields(self)}
+
+    @property
+    def plan(self) -> dict[str, str]:
+        """What makes its results what they are: the spec, the machine, and Pteron's version."""
+        spec = self.spec.model_dump_json(exclude={"robot"})
+        machine = text_of(self.robot)
+        key = hashlib.sha256(f"{spec}\n{machine}".encode()).hexdigest()[:16]
+        return {"spec": spec, "robot": self.robot.name, "sha256": key, "pteron": version("pteron")}
+
+    @cached_property
+    def conditions(self) -> Conditions:
+        """What must hold at every pose."""
+        floors = self.spec.floors
+        return conditions_of(self.robot, floors.type_i, floors.type_ii)
+
+    @cached_property
+    def orientations(self) -> Array:
+        """Poses (A, m) whose angles are those that the search asks for."""
+        return orientations_of(self.spec, self.robot.freedom)
+
+    @property
+    def asked(self) -> tuple[str, ...]:
+        """The quantities that objectives and requirements name, each once."""
+        spec = self.spec
+        given = [*(o.quantity for o in spec.objectives), *(r.quantity for r in spec.requirements)]
+        return tuple(dict.fromkeys(given))
+
+    @property
+    def seeks_cube(self) -> bool:
+        """Whether the largest cube of each design is looked for."""
+        return "cube" in self.asked or self.spec.workspace is None
+
+    @property
+    def ranges(self) -> Array:
+        """Least and greatest value of each variable, (2, V)."""
+        return np.array([(v.low, v.high) for v in self.variables]).T
+
+    @property
+    def start(self) -> Array:
+        """The variables' values in the machine to begin with (V,), moved into their ranges."""
+        return np.clip([v.start for v in self.variables], *self.ranges)
+
+    @cached_property
+    def first(self) -> Design:
+        """The machine to begin with, as it is."""
+        return Design(self, self.robot)
+
+    def unit(self, name: str) -> str:
+        """Return the unit of a quantity, for this machine's joints."""
+        joint = self.robot.legs[0].joint
+        return {"force": joint.force_unit, "speed": f"{joint.unit}/s"}.get(
+            name, quantities()[name].unit
+        )
+
+    def function(self, what: str) -> Kernel:
+        """Return a function of the machines' topology, whose geometry a call gives."""
+        return compile(self.robot, what, grade="general")
+
+    def machine(self, values: Sequence[float]) -> Manipulator:
+        """Return the machine of a design.
+
+        Raises
+        ------
+        ModelError
+            If there can be none.
+        """
+        stretch = self.spec.masses == "per length"
+        return moved(self.robot, self.variables, values, stretch=stretch)
+
+    def evaluated(self, values: Sequence[float]) -> dict[str, float]:
+        """Return what a design is worth, as a row of a table: quantities, and what it misses.
+
+        "misses workspace" is how far the least condition is below 0, and "misses 1 links" how far
+        the first requirement, of `links`, is missed over its bound; 0 where it is kept.
+        """
+        try:
+            design = Design(self, self.machine(values))
+            found = {name: design.quantity(name) for name in self.asked}
+            reserve = design.reserve
+        except ModelError:
+            found, reserve = dict.fromkeys(self.asked, float("nan")), -FAILED
+        misses = {"misses workspace": 0.0 if reserve >= -ROUNDING else -reserve}
+        for k, one in enumerate(self.spec.requirements, start=1):
+            misses[f"misses {k} {one.quantity}"] = one.missed_by(found[one.quantity], FAILED)
+        return found | misses
+
+    def table(self, values: Array) -> dict[str, list[float]]:
+        """Return the columns of a table of designs (N, V): variables, then what they are worth."""
+        rows = [self.evaluated(row) for row in values.tolist()]
+        found = {v.name: values[:, k].tolist() for k, v in enumerate(self.variables)}
+        return found | {name: [row[name] for row in rows] for name in rows[0]}
+
+
+def _misfits(spec: Spec, robot: Manipulator) -> Iterator[str]:
+    """Yield in what a search does not suit its machine."""
+    if spec.pose is not None and len(spec.pose) != robot.freedom:
+        yield f"pose: {len(spec.pose)} numbers given, {' '.join(robot.coordinates)} expected"
+    if spec.angles is not None and "phi" not in robot.coordinates:
+        yield f"angles: given, but the platform of {robot.name} does not turn; leave it out"
+    lengths = robot.platform.lengths
+    if spec.workspace is not None and spec.workspace.lengths != len(lengths):
+        yield (
+            f"workspace: {spec.workspace.lengths} coordinates given, {' '.join(lengths)} of "
+            f"{robot.name} expected"
+        )
+    elif spec.workspace is not None and spec.workspace.shape == "cylinder" and len(lengths) < 3:
+        yield f"workspace: a cylinder given, but {robot.name} moves in a plane; give a box"
+    asked = {o.quantity for o in spec.objectives} | {r.quantity for r in spec.requirements}
+    units = {leg.joint.force_unit for leg in robot.legs}
+    for name in sorted(asked & {"force", "speed"}):
+        if len(units) > 1:
+            yield (
+                f"{name}: the joints of {robot.name} have unlike units; ask for drive_load, whose "
+                "limits the machine's file gives"
+            )
+    for name in sorted(asked & INDICES.keys()):
+        if INDICES[name].turning and not robot.platform.turns:
+            yield f"{name}: about turning, but the platform of {robot.name} does not turn"
+    drives = [leg.drive for leg in robot.legs if leg.drive is not None]
+    if "drive_load" in asked and not any(d.max_force or d.max_speed for d in drives):
+        yield f"drive_load: no drive of {robot.name} has max_force or max_speed; ask for force"
+    named = [o.quantity for o in spec.objectives]
+    for name in sorted({name for name in named if named.count(name) > 1}):
+        yield f"objectives: {name} given more than once"
+    assert asked <= quantities().keys()  # the spec has checked them

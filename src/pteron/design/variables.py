@@ -1,0 +1,169 @@
+"""Variables of a search: numbers of a machine's geometry that move as one, within a range."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from pteron.design.masses import with_stretched_bodies
+from pteron.design.paths import Place, places
+from pteron.design.spec import VariableTable
+from pteron.equations.machine import numbers
+from pteron.errors import ModelError
+from pteron.kernels import Array
+from pteron.manipulator import Manipulator
+from pteron.toml import told
+
+_STEP = 1e-6
+"""Share of a range over which the geometry's change is measured."""
+
+
+@dataclass(frozen=True)
+class Variable:
+    """Numbers that move as one.
+
+    Attributes
+    ----------
+    name : str
+        What tables call it.
+    places : tuple of Place
+        The numbers.
+    by : {"value", "factor", "offset"}
+        Whether they get the value itself, their start times it, or their start and it.
+    low, high : float
+        Its range.
+    start : float
+        Its value in the machine to begin with; the mean where several numbers differ.
+    """
+
+    name: str
+    places: tuple[Place, ...]
+    by: Literal["value", "factor", "offset"]
+    low: float
+    high: float
+    start: float
+
+    @property
+    def unit(self) -> str:
+        """Of its value: m of lengths and points; none of factors, directions and plain numbers."""
+        scale = {"length", "point"} & {place.role for place in self.places}
+        return "m" if scale and self.by != "factor" else ""
+
+    def number(self, place: Place, start: float, value: float) -> float:
+        """Return what one of the numbers becomes; `start` is what it was."""
+        if self.by == "factor":
+            return start * value
+        return place.sign * value + (start if self.by == "offset" else 0.0)
+
+
+def variables_of(robot: Manipulator, tables: Sequence[VariableTable]) -> tuple[Variable, ...]:
+    """Return the variables of a search that begins with a machine.
+
+    Raises
+    ------
+    ModelError
+        With all that is wrong with them.
+    """
+    found: list[Variable] = []
+    faults: list[str] = []
+    for i, table in enumerate(tables, start=1):
+        try:
+            found += _variables(robot, table)
+        except ModelError as error:
+            faults += [f"variables, item {i}: {fault}" for fault in error.faults]
+    taken: dict[tuple[int, str, int | None], str] = {}
+    for variable in found:
+        for place in variable.places:
+            key = place.leg, place.key, place.part
+            if key in taken:
+                faults.append(f"{place.path}: moved by {taken[key]} and by {variable.name}")
+            taken[key] = variable.name
+    if faults:
+        raise ModelError(told(faults), faults=faults)
+    return tuple(found)
+
+
+def _variables(robot: Manipulator, table: VariableTable) -> list[Variable]:
+    named = [place for path in table.moves for place in places(robot, path)]
+    legs = sorted({place.leg for place in named})
+    groups = [[p for p in named if p.leg == leg] for leg in legs] if table.each else [named]
+    found = []
+    for group in groups:
+        starts = [place.sign * place.read(robot) for place in group]
+        start = {"factor": 1.0, "offset": 0.0}.get(table.by, float(np.mean(starts)))
+        name = table.name or (table.moves[0].lstrip("-") if not table.each else "")
+        if table.each:
+            name = f"{table.name or group[0].key} of leg {group[0].leg}"
+        is_length = table.by == "value" and any(place.role == "length" for place in group)
+        if is_length and table.range[0] <= 0.0:
+            raise ModelError(f"range: {table.range[0]:g} m given, but a length is above 0")
+        found.append(Variable(name, tuple(group), table.by, *table.range, start))
+    return found
+
+
+def moved(
+    robot: Manipulator, variables: Sequence[Variable], values: Sequence[float], *, stretch: bool
+) -> Manipulator:
+    """Return a machine with its variables at other values.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine to begin with.
+    variables : sequence of Variable
+        Its variables.
+    values : sequence of float
+        Theirs.
+    stretch : bool
+        Whether links of another length have another inertia.
+
+    Raises
+    ------
+    ModelError
+        If there can be no such machine.
+    """
+    legs = list(robot.legs)
+    changed: dict[int, dict[str, list[float]]] = {}
+    for variable, value in zip(variables, values, strict=True):
+        for place in variable.places:
+            held = changed.setdefault(place.leg, {})
+            if place.key not in held:
+                held[place.key] = np.atleast_1d(getattr(legs[place.leg - 1], place.key)).tolist()
+            part = place.part or 0
+            number = variable.number(place, place.read(robot), float(value))
+            held[place.key][part] = number
+    for i, fields in changed.items():
+        leg = legs[i - 1]
+        given = {key: tuple(parts) if len(parts) > 1 else parts[0] for key, parts in fields.items()}
+        other = replace(leg, **given)
+        legs[i - 1] = with_stretched_bodies(leg, other) if stretch else other
+    return replace(robot, legs=tuple(legs))
+
+
+def geometry_slopes(
+    robot: Manipulator, variables: Sequence[Variable], values: Sequence[float]
+) -> Array:
+    """Return d geometry / d values (G, V): how `equations.machine.numbers` follow the variables.
+
+    Lengths and points are linear in them, so that a difference is exact but for rounding.
+    """
+
+    def geometry(values: Array) -> Array:
+        return np.array(numbers(moved(robot, variables, values.tolist(), stretch=False)))
+
+    return slopes_of(geometry, variables, values).T
+
+
+def slopes_of(
+    function: Callable[[Array], Any], variables: Sequence[Variable], values: Sequence[float]
+) -> Array:
+    """Return the derivatives (V, ...) of a function of the variables, by central differences."""
+    found = []
+    for k, variable in enumerate(variables):
+        step = _STEP * (variable.high - variable.low) * np.eye(len(variables))[k]
+        low, high = (function(np.asarray(values) + side * step) for side in (-1.0, 1.0))
+        found.append((np.asarray(high) - low) / (2.0 * step[k]))
+    return np.array(found)

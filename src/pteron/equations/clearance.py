@@ -1,0 +1,218 @@
+"""How far a machine's bodies are from each other: least distances of their centre lines.
+
+A body is one straight segment or more: a leg's links and rods, a slider's guide within its limits,
+the platform as arms from P to its points. Two bodies that share a joint are left out, and so are
+guides from each other, which do not move.
+
+The squared distance of two segments is a convex quadratic over the unit square of the places s and
+t on them. Its least value is at its stationary point, where that is inside, else on one of the four
+edges, where one segment's end is nearest to the other. All five are places on the segments, so that
+the least of them is the distance and none needs a branch; for parallel segments the stationary
+point may be any, and an edge is as near.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import reduce
+from itertools import combinations
+from typing import Literal, get_args
+
+import casadi as ca
+import numpy as np
+
+from pteron.bodies.motion import Expression
+from pteron.equations.machine import Machine, State
+from pteron.legs import LegKind
+from pteron.legs.leg import LegMotion
+from pteron.manipulator import Manipulator
+
+Segment = tuple[Expression, Expression]
+"""Both ends, (3, 1)."""
+
+Kind = Literal["guide", "upper", "lower", "platform"]
+
+_COINCIDENT = 1e-9
+"""m between points, or guides, that are one."""
+
+_TINY = 1e-24
+"""m^2, or a squared sine: what a square is at least where it divides."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """A body that may meet others: what it is, and of which leg, from 1; 0 for the platform."""
+
+    kind: Kind
+    leg: int
+    name: str
+
+
+def bodies(robot: Manipulator) -> list[Body]:
+    """Return the bodies of a machine: of each leg guide, upper link and last link, then platform.
+
+    A guide without limits has no ends, and is left out.
+    """
+    machine = Machine.of(robot)
+    state = machine.state(ca.SX.sym("pose", machine.freedom))
+    return [body for body, _ in _segments(machine, state)]
+
+
+def pairs(robot: Manipulator) -> list[tuple[Body, Body]]:
+    """Return the pairs of bodies whose distance counts, in the order of `clearances`."""
+    return [pair for pair in combinations(bodies(robot), 2) if not _share_a_joint(robot, *pair)]
+
+
+def clearances(machine: Machine, pose: Expression) -> Expression:
+    """Return the least distance of the centre lines of each of `pairs`, (K, 1), m."""
+    squares = [square for _, square in _squares(machine, pose)]
+    return ca.sqrt(ca.vertcat(*squares)) if squares else ca.SX(0, 1)
+
+
+def meetings(robot: Manipulator) -> list[tuple[Kind, Kind]]:
+    """Return which kinds of bodies may meet, in the order of `least_clearances`."""
+    return list(dict.fromkeys(_kinds(*pair) for pair in pairs(robot)))
+
+
+def least_clearances(machine: Machine, pose: Expression) -> Expression:
+    """Return the least distance of centre lines over the pairs of the same kinds, (k, 1), m."""
+    found: dict[tuple[Kind, Kind], Expression] = {}
+    for pair, square in _squares(machine, pose):
+        kinds = _kinds(*pair)
+        found[kinds] = ca.fmin(found[kinds], square) if kinds in found else square
+    return ca.sqrt(ca.vertcat(*found.values())) if found else ca.SX(0, 1)
+
+
+def _kinds(a: Body, b: Body) -> tuple[Kind, Kind]:
+    one, other = sorted((a.kind, b.kind), key=get_args(Kind).index)
+    return one, other
+
+
+def _squares(machine: Machine, pose: Expression) -> Iterator[tuple[tuple[Body, Body], Expression]]:
+    """Yield the pairs of bodies and their least squared distance."""
+    found = list(_segments(machine, machine.state(pose)))
+    for (one, first), (other, second) in combinations(found, 2):
+        if not _share_a_joint(machine.robot, one, other):
+            squares = [squared_distance(a, b) for a in first for b in second]
+            yield (one, other), reduce(ca.fmin, squares)
+
+
+def squared_distance(first: Segment, second: Segment) -> Expression:
+    """Return the least squared distance of two segments, which may be points, m^2."""
+    (p, p_end), (q, q_end) = first, second
+    u, v, w = p_end - p, q_end - q, p - q
+    uu, vv, uv = ca.dot(u, u), ca.dot(v, v), ca.dot(u, v)
+    uw, vw = ca.dot(u, w), ca.dot(v, w)
+    along_u, along_v = ca.fmax(uu, _TINY), ca.fmax(vv, _TINY)
+
+    def square(s: Expression, t: Expression) -> Expression:
+        apart = w + s * u - t * v
+        return ca.dot(apart, apart)
+
+    across = ca.fmax(uu * vv - uv * uv, _TINY * along_u * along_v)
+    s = _within_one((uv * vw - vv * uw) / across)
+    found = square(s, _within_one((s * uv + vw) / along_v))
+    for end in (0.0, 1.0):
+        t = _within_one((end * uv + vw) / along_v)
+        s = _within_one((end * uv - uw) / along_u)
+        found = ca.fmin(found, ca.fmin(square(ca.SX(end), t), square(s, ca.SX(end))))
+    return found
+
+
+def _within_one(share: Expression) -> Expression:
+    return ca.fmin(ca.fmax(share, 0), 1)
+
+
+def _segments(machine: Machine, state: State) -> Iterator[tuple[Body, list[Segment]]]:
+    robot = machine.robot
+    for i, (leg, motion) in enumerate(zip(robot.legs, state.legs, strict=True), start=1):
+        yield from _of_leg(i, leg, motion, state.platform.points[i - 1].position)
+    arms = list(_arms(machine, state))
+    if arms:
+        yield Body("platform", 0, "platform"), arms
+
+
+def _of_leg(
+    i: int, leg: LegKind, motion: LegMotion, c: Expression
+) -> Iterator[tuple[Body, list[Segment]]]:
+    if motion.chain[0].kind == "P" and leg.limits is not None:
+        r, e = ca.SX(list(leg.guide_point)), ca.SX(list(leg.joint_axis))
+        low, high = leg.limits
+        yield Body("guide", i, f"leg {i} guide"), [(r + low * e, r + high * e)]
+    upper, lower = motion.links
+    if upper is not None:
+        start = motion.bodies["u"].position
+        yield Body("upper", i, f"leg {i} {leg.names['u']}"), [(start, start + upper)]
+    if lower is not None:
+        half = _half_bar(leg)
+        sides = [half, -half] if half is not None else [ca.SX(3, 1)]
+        name = leg.names["l"] + ("s" if half is not None else "")
+        yield Body("lower", i, f"leg {i} {name}"), [(c - lower + h, c + h) for h in sides]
+
+
+def _half_bar(leg: LegKind) -> Expression | None:
+    """Return half the bar between parallel rods; None where they are one line."""
+    if leg.bar is None or leg.bar_length is None:
+        return None
+    return ca.SX([0.5 * leg.bar_length * v for v in leg.bar])
+
+
+def _arms(machine: Machine, state: State) -> Iterator[Segment]:
+    """Yield the platform's arms from P to its points, by the hinges of parts that do not turn."""
+    robot, p = machine.robot, state.platform.body.position
+    seen = set()
+    for leg, point in zip(robot.legs, state.platform.points, strict=True):
+        hinge = point.position - ca.SX(list(leg.fixed_offset))
+        ends = [p, hinge, point.position]
+        offsets = [leg.platform_point, leg.fixed_offset]
+        if not robot.platform.turns:
+            total = tuple(a + b for a, b in zip(*offsets, strict=True))
+            ends, offsets = [p, point.position], [total]
+        for k, offset in enumerate(offsets):
+            key = tuple(offsets[: k + 1])
+            if max(map(abs, offset)) > _COINCIDENT and key not in seen:
+                seen.add(key)
+                yield ends[k], ends[k + 1]
+
+
+def _share_a_joint(robot: Manipulator, a: Body, b: Body) -> bool:
+    """Say whether two bodies share a joint, are of one guide, or are both fixed."""
+    if a.kind == b.kind == "guide":
+        return True
+    if "platform" in (a.kind, b.kind):
+        return "lower" in (a.kind, b.kind)
+    if a.leg == b.leg:
+        return {a.kind, b.kind} != {"guide", "lower"} or not _has_upper(robot.legs[a.leg - 1])
+    if a.kind == b.kind == "lower":
+        return _at_one_point(robot, a.leg, b.leg)
+    guide, other = (a, b) if a.kind == "guide" else (b, a)
+    return guide.kind == "guide" and _first(robot, other) and _one_line(robot, guide.leg, other.leg)
+
+
+def _has_upper(leg: LegKind) -> bool:
+    return "u" in leg.names
+
+
+def _first(robot: Manipulator, body: Body) -> bool:
+    """Say whether a link is the one that begins at the slider."""
+    return body.kind == "upper" or not _has_upper(robot.legs[body.leg - 1])
+
+
+def _at_one_point(robot: Manipulator, i: int, j: int) -> bool:
+    one, other = (
+        np.array([*leg.platform_point, *leg.fixed_offset])
+        for leg in (robot.legs[i - 1], robot.legs[j - 1])
+    )
+    return bool(np.abs(one - other).max() <= _COINCIDENT)
+
+
+def _one_line(robot: Manipulator, i: int, j: int) -> bool:
+    """Say whether two guides lie on one line, as of sliders on one rail."""
+    one, other = robot.legs[i - 1], robot.legs[j - 1]
+    along = np.array(one.joint_axis)
+    apart = np.array(other.guide_point) - np.array(one.guide_point)
+    if "p" not in one.bodies or "p" not in other.bodies:
+        return False
+    across = np.cross(along, apart), np.cross(along, other.joint_axis)
+    return bool(max(np.abs(v).max() for v in across) <= _COINCIDENT)

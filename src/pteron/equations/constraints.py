@@ -1,0 +1,80 @@
+"""What keeps the platform from turning otherwise than it should: the couples that the legs hold.
+
+A leg that lets what it carries turn about some axes only holds couples across these, whether its
+joint is held or not. Where the legs' couples no longer span the turns that the platform must not
+make, it is free to make them: a constraint singularity (Zlatanov, Bonev and Gosselin, "Constraint
+singularities of parallel mechanisms", ICRA 2002).
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from pteron.bodies.motion import Expression
+from pteron.bodies.vectors import Vector
+from pteron.closures.determinants import determinant
+from pteron.equations.machine import Machine, State
+
+_ACROSS = 1e-9
+
+
+def constraint_rows(machine: Machine, state: State) -> Expression | None:
+    """Return the couples (K, u) over the turns that they must hold; None where one is not told.
+
+    The columns are the turns of the platform: all three where it does not turn, those across its
+    axis k where it does or where the machine is planar. Then come the turns about k of its parts
+    that do not turn with it, such as the side bars of an H4, on which legs' couples about k act.
+    """
+    robot = machine.robot
+    turns = robot.platform.turns and not robot.platform.slides
+    x0, y0, k = machine.platform.frame
+    across = turns or robot.platform.planar
+    axis = robot.platform.axis if turns else None
+    columns = ca.horzcat(x0, y0) if across else ca.SX.eye(3)
+    couples: list[Expression] = []
+    parts: list[Vector | None] = []
+    for leg, motion in zip(robot.legs, state.legs, strict=True):
+        held = leg.couples(motion, axis)
+        if held is None:
+            return None
+        couples += held
+        parts += [leg.platform_point if turns and _along(m, k) else None for m in held]
+    # A part on which one couple acts yields to it.
+    alone = [i for i, part in enumerate(parts) if part is not None and parts.count(part) == 1]
+    couples = [m for i, m in enumerate(couples) if i not in alone]
+    parts = [part for i, part in enumerate(parts) if i not in alone]
+    if not couples:
+        return ca.SX(0, columns.shape[1])
+    rows = ca.mtimes(ca.horzcat(*couples).T, columns)
+    for one in dict.fromkeys(part for part in parts if part is not None):
+        own = [ca.dot(m, k) if part == one else 0 for m, part in zip(couples, parts, strict=True)]
+        rows = ca.horzcat(rows, ca.vertcat(*own))
+    return rows
+
+
+def _along(couple: Expression, axis: Expression) -> bool:
+    """Say whether a couple may act along the axis."""
+    share = ca.dot(couple, axis)
+    return not share.is_constant() or abs(float(share)) > _ACROSS
+
+
+def constraint_measure(machine: Machine, state: State) -> Expression:
+    """Return the constraint measure: 1 in size at best, 0 at a constraint singularity.
+
+    It is the volume that the couples span, each of length 1 or less, over the largest: det R of as
+    many couples as turns, with its sign, else the root of det R^T R.
+    """
+    rows = constraint_rows(machine, state)
+    if rows is None:
+        return ca.SX.nan()
+    count, turns = rows.shape
+    if count < turns:
+        return ca.SX(0)
+    if count == turns:
+        return _determinant(rows)
+    volume = ca.fmax(_determinant(ca.mtimes(rows.T, rows)), 0)
+    return ca.sqrt(volume) / (count / turns) ** (0.5 * turns)
+
+
+def _determinant(m: Expression) -> Expression:
+    return determinant(m) if m.shape[0] <= 4 else ca.det(m)

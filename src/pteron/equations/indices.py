@@ -1,0 +1,263 @@
+"""How good a machine is at a pose: indices of performance, each one number.
+
+Most read the homogeneous Jacobian, in which no unit is mixed with another: joint rates are speeds
+in m/s, of a slider or of a crank's end, and the platform's turning counts as the speed at a
+length L from P. What each index means, with its source, is in `pteron.indices`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import reduce
+from itertools import product
+from typing import NamedTuple
+
+import casadi as ca
+
+from pteron.bodies.motion import Expression
+from pteron.closures.closure import plain_rows
+from pteron.closures.determinants import adjugate
+from pteron.equations import kinematics
+from pteron.equations.machine import Machine, State
+from pteron.equations.singular_values import largest, singular_values, smallest
+
+
+class Homogeneous(NamedTuple):
+    """The Jacobian without units, and the length by which turning is measured, m."""
+
+    matrix: Expression
+    length: Expression
+
+
+def lever_arms(machine: Machine, state: State) -> list[Expression]:
+    """Return k x s (3, 1) of the platform points that legs hold: how they move per radian."""
+    pairs = zip(machine.robot.legs, state.platform.matrices, strict=True)
+    return [matrix[:3, -1] for leg, matrix in pairs if not leg.follows_angle]
+
+
+def homogeneous(machine: Machine, state: State) -> Homogeneous:
+    """Return J with a crank's row times its length and the angle's column over the length L.
+
+    L is the root mean square distance of the platform points, as far as they turn, from the axis
+    through P; 1 m where none of them does. The joint of a leg that follows the angle counts as that
+    angle times L: its gear does not count.
+    """
+    if "phi" not in machine.platform.coordinates:
+        return Homogeneous(_measured(machine, kinematics.jacobian(state), ca.SX(1)), ca.SX(1))
+    arms = lever_arms(machine, state)
+    length = _root_or_one(sum(ca.dot(arm, arm) for arm in arms) / len(arms))
+    rows = _measured(machine, kinematics.jacobian(state), length)
+    rows[:, -1] = rows[:, -1] / length
+    return Homogeneous(rows, length)
+
+
+def by_points(machine: Machine, state: State) -> Expression:
+    """Return the Jacobian in terms of the platform points' velocities, all of them alike.
+
+    With V = S x' these velocities and S^T S = n R^T R it is J R^-1: that of the points' centroid,
+    with their root mean square distance from it for L. No length and no point P is chosen.
+    """
+    if "phi" not in machine.platform.coordinates:
+        return homogeneous(machine, state).matrix
+    arms = lever_arms(machine, state)
+    center = sum(arms) / len(arms)
+    apart = [arm - center for arm in arms]
+    length = _root_or_one(sum(ca.dot(arm, arm) for arm in apart) / len(arms))
+    rows = _measured(machine, kinematics.jacobian(state), length)
+    # What the turning about the centroid asks of the joints.
+    moved = ca.mtimes(rows[:, :-1], ca.mtimes(machine.platform.directions.T, center))
+    rows[:, -1] = (rows[:, -1] - moved) / length
+    return rows
+
+
+def _measured(machine: Machine, jacobian: Expression, length: Expression) -> Expression:
+    """Return the Jacobian with its joints in metres."""
+    levers = [leg.lever(length) for leg in machine.legs]
+    rows = zip(levers, ca.vertsplit(jacobian), strict=True)
+    return ca.vertcat(*(lever * row for lever, row in rows))
+
+
+def _root_or_one(square: Expression) -> Expression:
+    return ca.sqrt(square + (square == 0))
+
+
+def condition(machine: Machine, state: State) -> Expression:
+    """Return the condition number of the homogeneous Jacobian."""
+    return _ratio(homogeneous(machine, state).matrix)
+
+
+def condition_points(machine: Machine, state: State) -> Expression:
+    """Return that of the Jacobian in terms of the platform points' velocities."""
+    return _ratio(by_points(machine, state))
+
+
+def _ratio(matrix: Expression) -> Expression:
+    values = singular_values(matrix)
+    return largest(values) / smallest(values)
+
+
+def manipulability(machine: Machine, state: State) -> Expression:
+    """Return |det J|^-1 of the homogeneous Jacobian: Yoshikawa's volume of the velocities."""
+    rows = homogeneous(machine, state).matrix
+    return 1 / ca.fabs(ca.mtimes(rows[0, :], adjugate(rows)[:, 0]))
+
+
+def speed_least(machine: Machine, state: State) -> Expression:
+    """Return 1 / sigma_max of J's columns of lengths: |q'| = 1, phi' = 0, the worst direction."""
+    return 1 / largest(singular_values(_lengths(machine, homogeneous(machine, state).matrix)))
+
+
+def speed_most(machine: Machine, state: State) -> Expression:
+    """Return 1 / sigma_min of them: the best direction."""
+    return 1 / smallest(singular_values(_lengths(machine, homogeneous(machine, state).matrix)))
+
+
+def turning_speed(machine: Machine, state: State) -> Expression:
+    """Return phi' at |q'| = 1 while P rests, rad/s per m/s."""
+    rows, length = homogeneous(machine, state)
+    return 1 / (length * ca.norm_2(rows[:, -1]))
+
+
+def force_least(machine: Machine, state: State) -> Expression:
+    """Return 1 / sigma_max of (J^-1)'s rows of lengths: |F| = 1, no moment, the worst direction."""
+    across, volume = _inverse(homogeneous(machine, state).matrix)
+    return ca.fabs(volume) / largest(singular_values(_lengths(machine, across.T)))
+
+
+def force_most(machine: Machine, state: State) -> Expression:
+    """Return 1 / sigma_min of them: the best direction."""
+    across, volume = _inverse(homogeneous(machine, state).matrix)
+    return ca.fabs(volume) / smallest(singular_values(_lengths(machine, across.T)))
+
+
+def turning_moment(machine: Machine, state: State) -> Expression:
+    """Return the moment about k held at |F| = 1 without a force at P, N m per N."""
+    rows, length = homogeneous(machine, state)
+    across, volume = _inverse(rows)
+    return length * ca.fabs(volume) / ca.norm_2(across[-1, :])
+
+
+def error(machine: Machine, state: State) -> Expression:
+    """Return the norm of (J^-1)'s rows of lengths: errors of the joints add up as squares."""
+    across, volume = _inverse(homogeneous(machine, state).matrix)
+    return ca.norm_fro(_lengths(machine, across.T)) / ca.fabs(volume)
+
+
+def error_worst(machine: Machine, state: State) -> Expression:
+    """Return the longest sum of their columns with any signs: the joints' errors conspire."""
+    across, volume = _inverse(homogeneous(machine, state).matrix)
+    return _conspiring(_lengths(machine, across.T).T) / ca.fabs(volume)
+
+
+def turning_error(machine: Machine, state: State) -> Expression:
+    """Return the same of the platform's angle, rad/m: the errors add up as squares."""
+    rows, length = homogeneous(machine, state)
+    across, volume = _inverse(rows)
+    return ca.norm_2(across[-1, :].T) / (length * ca.fabs(volume))
+
+
+def turning_error_worst(machine: Machine, state: State) -> Expression:
+    """Return the same of the platform's angle, rad/m, where the errors conspire."""
+    rows, length = homogeneous(machine, state)
+    across, volume = _inverse(rows)
+    return ca.sum2(ca.fabs(across[-1, :])) / (length * ca.fabs(volume))
+
+
+def _conspiring(columns: Expression) -> Expression:
+    """Return the greatest |sum of +- columns|: at a corner, as a norm is convex."""
+    first, *rest = ca.horzsplit(columns)
+    sums = (
+        first + sum(sign * column for sign, column in zip(signs, rest, strict=True))
+        for signs in product((1, -1), repeat=len(rest))
+    )
+    return ca.sqrt(reduce(ca.fmax, (ca.dot(total, total) for total in sums)))
+
+
+def _lengths(machine: Machine, rows: Expression) -> Expression:
+    """Return the columns of the pose's lengths."""
+    return rows[:, : machine.platform.directions.shape[1]]
+
+
+def _inverse(rows: Expression) -> tuple[Expression, Expression]:
+    """Return the adjugate and the determinant, whose quotient is the inverse."""
+    across = adjugate(rows)
+    return across, ca.mtimes(rows[0, :], across[:, 0])
+
+
+def pressure_angle(machine: Machine, state: State) -> Expression:
+    """Return the greatest angle between a leg's force and the motion of its joint, rad.
+
+    The force that a leg passes on acts along its dq/dc; the joint moves along its axis or, a
+    crank's end, across it.
+    """
+    angles = [ca.SX(0)]
+    for leg in state.legs:
+        if leg.row[:3].is_zero():
+            continue  # it passes on a moment alone
+        joint, after = leg.chain[:2]
+        way = joint.axis
+        if joint.kind == "R":
+            way = ca.cross(joint.axis, after.point - joint.point)
+        angles.append(_between(leg.row[:3].T, way))
+    return reduce(ca.fmax, angles)
+
+
+def output_pressure_angle(machine: Machine, state: State) -> Expression:
+    """Return the greatest angle between a leg's force and its point's motion, rad.
+
+    It is the motion while the other joints are held: that of a column of J^-1.
+    """
+    across, angles = adjugate(plain_rows(state.platform, state.legs)), [ca.SX(0)]
+    for i, (leg, matrix) in enumerate(zip(state.legs, state.platform.matrices, strict=True)):
+        if not leg.row[:3].is_zero():
+            angles.append(_between(leg.row[:3].T, ca.mtimes(matrix[:3, :], across[:, i])))
+    return reduce(ca.fmax, angles)
+
+
+def _between(u: Expression, v: Expression) -> Expression:
+    """Return the angle between two lines, in [0, pi/2]; pi/2 where one has no direction."""
+    cross = ca.cross(u, v)
+    along, apart = ca.fabs(ca.dot(u, v)), ca.sqrt(ca.dot(cross, cross))
+    return ca.atan2(apart + (along == 0), along)
+
+
+def kappa(machine: Machine, state: State, mass: Expression) -> Expression:
+    """Return the condition number of the mass matrix, turning measured by L as in the Jacobian."""
+    counts = ca.SX.ones(machine.freedom)
+    if "phi" in machine.platform.coordinates:
+        counts[-1] = homogeneous(machine, state).length
+    values = singular_values(_root(mass / ca.mtimes(counts, counts.T)))
+    ratio = largest(values) / smallest(values)
+    return ratio * ratio
+
+
+def _root(matrix: Expression) -> Expression:
+    """Return lower L with L L^T a positive definite matrix (Cholesky)."""
+    n = matrix.shape[0]
+    lower = ca.SX(n, n)
+    for j in range(n):
+        lower[j, j] = ca.sqrt(matrix[j, j] - sum(lower[j, k] ** 2 for k in range(j)))
+        for i in range(j + 1, n):
+            rest = sum(lower[i, k] * lower[j, k] for k in range(j))
+            lower[i, j] = (matrix[i, j] - rest) / lower[j, j]
+    return lower
+
+
+OF_GEOMETRY: dict[str, Callable[[Machine, State], Expression]] = {
+    "condition": condition,
+    "condition_points": condition_points,
+    "manipulability": manipulability,
+    "speed_least": speed_least,
+    "speed_most": speed_most,
+    "turning_speed": turning_speed,
+    "force_least": force_least,
+    "force_most": force_most,
+    "turning_moment": turning_moment,
+    "pressure_angle": pressure_angle,
+    "output_pressure_angle": output_pressure_angle,
+    "error": error,
+    "error_worst": error_worst,
+    "turning_error": turning_error,
+    "turning_error_worst": turning_error_worst,
+}
+"""The indices that depend on the geometry alone, by name."""

@@ -1,0 +1,62 @@
+"""Singular values of small matrices of expressions, without a branch: one-sided Jacobi.
+
+Each rotation makes two columns perpendicular; after some sweeps over all pairs all of them are, and
+their lengths are the singular values. Small ones keep their digits better than by eigenvalues of
+A^T A, whose squares lose half of them, and equal ones are nothing special: there is no quotient
+that could be 0/0. A fixed number of sweeps is straight-line code, which a compiler vectorises.
+
+M. R. Hestenes, Journal of SIAM 6 (1958) 51-90; J. Demmel, K. Veselic, SIAM Journal on Matrix
+Analysis and Applications 13 (1992) 1204-1245.
+"""
+
+from __future__ import annotations
+
+from functools import reduce
+from itertools import combinations
+
+import casadi as ca
+
+from pteron.bodies.motion import Expression
+
+_SWEEPS = {1: 0, 2: 1, 3: 4, 4: 5}
+"""By the number of columns: what brings random and graded matrices to rounding."""
+
+_TINY = 1e-300
+"""Beside it nothing counts that is not zero: it keeps 0/0 out."""
+
+
+def singular_values(matrix: Expression) -> list[Expression]:
+    """Return the singular values of a matrix (k, n), n <= k, in no order.
+
+    One with more columns than rows is turned: it has as many as the smaller of its sizes.
+    """
+    if matrix.shape[1] > matrix.shape[0]:
+        matrix = matrix.T
+    columns = ca.horzsplit(ca.densify(matrix))
+    for _ in range(_SWEEPS[len(columns)]):
+        for i, j in combinations(range(len(columns)), 2):
+            columns[i], columns[j] = _perpendicular(columns[i], columns[j])
+    return [ca.sqrt(ca.dot(column, column)) for column in columns]
+
+
+def _perpendicular(u: Expression, v: Expression) -> tuple[Expression, Expression]:
+    """Return two columns turned, by 45 degrees at most, until they are perpendicular.
+
+    tan(2 angle) = 2 u.v / (u.u - v.v), of which the smaller angle is taken.
+    """
+    apart, across = ca.dot(u, u) - ca.dot(v, v), 2 * ca.dot(u, v)
+    whole = ca.fabs(apart) + ca.sqrt(apart * apart + across * across) + _TINY
+    tangent = across / whole * (1 - 2 * (apart < 0))
+    cosine = 1 / ca.sqrt(1 + tangent * tangent)
+    sine = tangent * cosine
+    return cosine * u + sine * v, cosine * v - sine * u
+
+
+def largest(values: list[Expression]) -> Expression:
+    """Return the largest of some values."""
+    return reduce(ca.fmax, values)
+
+
+def smallest(values: list[Expression]) -> Expression:
+    """Return the smallest of some values."""
+    return reduce(ca.fmin, values)

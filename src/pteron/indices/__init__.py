@@ -1,0 +1,37 @@
+"""How good a machine is at a pose: indices of performance, stiffness, errors and reactions."""
+
+from pteron.indices.elasticity import ALUMINIUM, STEEL, Elasticity, Material, Section
+from pteron.indices.errors import PoseError, Tolerances, pose_error
+from pteron.indices.evaluate import evaluate
+from pteron.indices.global_conditioning import GlobalConditioning, global_conditioning
+from pteron.indices.index import INDICES, Index, indices_of
+from pteron.indices.reactions import Reactions, reactions
+from pteron.indices.sensitivities import Sensitivities, geometric_sensitivities
+from pteron.indices.stiffness import Stiffness, stiffness
+
+__all__ = [
+    "ALUMINIUM",
+    "INDICES",
+    "STEEL",
+    "Elasticity",
+    "GlobalConditioning",
+    "Index",
+    "Material",
+    "PoseError",
+    "Reactions",
+    "Section",
+    "Sensitivities",
+    "Stiffness",
+    "Tolerances",
+    "evaluate",
+    "geometric_sensitivities",
+    "global_conditioning",
+    "indices_of",
+    "pose_error",
+    "reactions",
+    "stiffness",
+]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,156 @@
+"""What gives way in a machine: actuators as springs, links as beams."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from pteron.bodies.vectors import number
+from pteron.errors import ModelError
+from pteron.manipulator import Manipulator
+
+
+def _positive(name: str, value: Any) -> float:
+    """Return a number above zero; infinite stands for rigid."""
+    found = math.inf if value == math.inf else number(value, name)
+    if not found > 0.0:
+        raise ModelError(f"{name}: {found:g} given, a number above 0 expected")
+    return found
+
+
+@dataclass(frozen=True)
+class Material:
+    """An elastic material.
+
+    Parameters
+    ----------
+    young : float
+        E, Pa.
+    shear : float
+        G, Pa.
+    """
+
+    young: float
+    shear: float
+
+    def __post_init__(self) -> None:
+        for name in ("young", "shear"):
+            object.__setattr__(self, name, _positive(name, getattr(self, name)))
+
+
+STEEL = Material(210e9, 81e9)
+ALUMINIUM = Material(70e9, 26e9)
+
+
+@dataclass(frozen=True)
+class Section:
+    """The cross-section of a link, as stiffnesses; infinite where it does not give way.
+
+    Of parallel rods it is the sum of both.
+
+    Parameters
+    ----------
+    axial : float
+        E A, N.
+    bending : float
+        E I in the leg's plane, about its revolute axes, N m^2.
+    sideways : float
+        E I out of the leg's plane, N m^2.
+    torsion : float
+        G J, N m^2.
+    """
+
+    axial: float
+    bending: float = math.inf
+    sideways: float = math.inf
+    torsion: float = math.inf
+
+    def __post_init__(self) -> None:
+        for name in ("axial", "bending", "sideways", "torsion"):
+            object.__setattr__(self, name, _positive(name, getattr(self, name)))
+
+    @classmethod
+    def tube(cls, diameter: float, wall: float, material: Material) -> Section:
+        """Return the section of a round tube, of an outer diameter and a wall, m.
+
+        A rod is a tube whose wall is half its diameter.
+        """
+        outer, inner = _hollow("diameter", diameter, wall)
+        area, second = (math.pi / d * (outer**p - inner**p) for d, p in ((4, 2), (64, 4)))
+        e_i = material.young * second
+        return cls(material.young * area, e_i, e_i, 2 * material.shear * second)
+
+    @classmethod
+    def square_tube(cls, side: float, wall: float, material: Material) -> Section:
+        """Return the section of a thin-walled square tube, of an outer side and a wall, m.
+
+        Its torsion is Bredt's, J = t (a - t)^3: for walls that are thin beside the side.
+        """
+        outer, inner = _hollow("side", side, wall)
+        e_i = material.young * (outer**4 - inner**4) / 12
+        torsion = material.shear * wall * (outer - wall) ** 3
+        return cls(material.young * (outer**2 - inner**2), e_i, e_i, torsion)
+
+
+def _hollow(name: str, outer: float, wall: float) -> tuple[float, float]:
+    """Return the outer and the inner size of a tube."""
+    outer, wall = _positive(name, outer), _positive("wall", wall)
+    if 2 * wall > outer:
+        raise ModelError(f"wall: {wall:g} m given, at most half of the {name}, {outer / 2:g} m")
+    return outer, outer - 2 * wall
+
+
+@dataclass(frozen=True)
+class Elasticity:
+    """What of a machine gives way.
+
+    Parameters
+    ----------
+    actuators : float or sequence of float
+        Stiffness of each actuator at its joint, held by its controller, N/m or N m/rad: one for
+        all, or one a leg; infinite where it does not give way.
+    upper, lower : Section or sequence of Section or None
+        Of the upper links or cranks, and of the lower links or rods: one for all, or one a leg;
+        None where they do not give way.
+    rod_distance : float, optional
+        Between the two rods of a pair, m; without it their couple meets no elasticity.
+    """
+
+    actuators: float | tuple[float, ...] = math.inf
+    upper: Section | tuple[Section | None, ...] | None = None
+    lower: Section | tuple[Section | None, ...] | None = None
+    rod_distance: float | None = None
+
+    def __post_init__(self) -> None:
+        given = self.actuators
+        several = (given,) if isinstance(given, int | float) else tuple(given)
+        found = tuple(_positive("actuators", value) for value in several)
+        object.__setattr__(self, "actuators", found if len(found) > 1 else found[0])
+        for name in ("upper", "lower"):
+            value = getattr(self, name)
+            if value is not None and not isinstance(value, Section):
+                object.__setattr__(self, name, tuple(value))
+        if self.rod_distance is not None:
+            object.__setattr__(self, "rod_distance", _positive("rod_distance", self.rod_distance))
+
+    def of_legs(
+        self, robot: Manipulator
+    ) -> tuple[tuple[float, ...], tuple[tuple[Section | None, Section | None], ...]]:
+        """Return the actuators' stiffness and the sections of both links, for each leg."""
+        actuators, upper, lower = (
+            self._each(robot, name) for name in ("actuators", "upper", "lower")
+        )
+        return actuators, tuple(zip(upper, lower, strict=True))
+
+    def _each(self, robot: Manipulator, name: str) -> tuple[Any, ...]:
+        given = getattr(self, name)
+        if not isinstance(given, tuple):
+            return (given,) * robot.freedom
+        if len(given) != robot.freedom:
+            raise ModelError(
+                f"{name}: {len(given)} given, but {robot.name} has {robot.freedom} legs; give one "
+                "for all, or one a leg",
+                subject=robot.name,
+            )
+        return given

@@ -1,0 +1,146 @@
+"""Errors of the pose from errors of the joints, backlash and tolerances of the dimensions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pteron.errors import DataError
+from pteron.indices.sensitivities import at_tool, geometric_sensitivities
+from pteron.kernels import Array
+from pteron.kinematics.evaluate import checked, evaluated
+from pteron.manipulator import RobotLike, as_manipulator
+from pteron.shapes import Numbers, OnFailure, PerCoordinate, PoseLike
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """What is uncertain in a machine: each number is +- from its nominal value, or a deviation.
+
+    Parameters
+    ----------
+    joints : float or sequence of float
+        Errors of the joints, m or rad: one for all, or one a leg.
+    backlash : float or sequence of float
+        The whole play of a drive at its joint, m or rad; half of it counts to either side.
+    point, length, angle : float
+        Of every dimension of that role, m and rad; see `geometric_sensitivities`.
+    named : mapping of str to float
+        Of dimensions by their names, in place of these.
+    """
+
+    joints: float | Sequence[float] = 0.0
+    backlash: float | Sequence[float] = 0.0
+    point: float = 0.0
+    length: float = 0.0
+    angle: float = 0.0
+    named: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class PoseError:
+    """Errors of the tool's pose.
+
+    Attributes
+    ----------
+    worst : array, shape (..., m)
+        The most that each coordinate may be off, m and rad: the sum of all sizes.
+    deviation : array, shape (..., m)
+        Its standard deviation, where tolerances are those of independent errors: the root of the
+        sum of their squares.
+    position : array, shape (...)
+        Standard deviation of the position as a whole, m.
+    names : tuple of str
+        What the errors come from: the joints by their names, then dimensions.
+    parts : array, shape (..., m, p)
+        What each of them gives to first order; the sign is that of a positive error.
+    """
+
+    worst: PerCoordinate
+    deviation: PerCoordinate
+    position: Numbers
+    names: tuple[str, ...]
+    parts: Array
+
+
+def pose_error(
+    robot: RobotLike, pose: PoseLike, tolerances: Tolerances, *, on_failure: OnFailure = "raise"
+) -> PoseError:
+    """Return the errors of the tool's pose, to first order: dx = J^-1 (dq - (dq/dg) dg).
+
+    J.-P. Merlet, Journal of Mechanical Design 128 (2006) 199-206.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+    pose : array, shape (..., m)
+        The poses, m and rad.
+    tolerances : Tolerances
+        What is uncertain.
+    on_failure : {"raise", "nan"}
+        Whether a pose that fails raises, or gives NaN.
+
+    Returns
+    -------
+    PoseError
+
+    Raises
+    ------
+    DataError
+        If a tolerance is negative, of another number of legs, or of no such name.
+    UnreachablePose
+        If a leg does not reach a pose.
+    SingularPose
+        If a leg is stretched or folded (type I), or the actuators do not hold the platform
+        (type II).
+
+    Examples
+    --------
+    >>> from pteron.indices import Tolerances, pose_error
+    >>> found = pose_error("orthoglide", [0.0, 0.0, 0.0], Tolerances(joints=1e-5, length=2e-5))
+    >>> (found.worst * 1e6).round(3)
+    array([30., 30., 30.])
+    """
+    robot = as_manipulator(robot)
+    poses = checked(robot, pose, "pose", on_failure)
+    known = geometric_sensitivities(robot, poses, on_failure=on_failure)
+    rows: Array = evaluated(robot, "jacobian", on_failure, poses)
+    good = np.isfinite(known.matrix).all(axis=(-2, -1))
+    back = np.full(rows.shape, np.nan)
+    back[good] = np.linalg.inv(rows[good])
+    joints = _each(tolerances.joints, "joints", robot.freedom)
+    joints = joints + 0.5 * _each(tolerances.backlash, "backlash", robot.freedom)
+    unknown = sorted(set(tolerances.named) - set(known.names))
+    if unknown:
+        raise DataError(
+            f"named: {robot.name} has no dimension {unknown[0]!r}; "
+            f"geometric_sensitivities(robot, pose).names has them: {known.names[0]!r}, ..."
+        )
+    sizes = [
+        tolerances.named.get(name, getattr(tolerances, role))
+        for name, role in zip(known.names, known.roles, strict=True)
+    ]
+    whole = np.concatenate([joints, _each(sizes, "tolerances", len(sizes))])
+    parts = np.concatenate([at_tool(robot, poses, back), known.tool], axis=-1) * whole
+    deviation = np.sqrt((parts**2).sum(axis=-1))
+    lengths = len(robot.platform.lengths)
+    return PoseError(
+        np.abs(parts).sum(axis=-1),
+        deviation,
+        np.asarray(np.linalg.norm(deviation[..., :lengths], axis=-1)),
+        (*robot.joint_names, *known.names),
+        parts,
+    )
+
+
+def _each(given: float | Sequence[float], name: str, count: int) -> Array:
+    """Return numbers of zero or more, one for all or `count`."""
+    found = np.asarray(given, dtype=float)
+    if found.shape not in ((), (count,)):
+        raise DataError(f"{name}: {found.shape} given, one number or {count} expected")
+    if not (found >= 0.0).all():
+        raise DataError(f"{name}: {found.min():g} given, 0 or more expected")
+    return np.broadcast_to(found, (count,))

@@ -1,0 +1,130 @@
+"""The global conditioning index: how well conditioned a machine is over its reach."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.stats import qmc  # type: ignore[import-untyped]
+
+from pteron.errors import DataError, ModelError
+from pteron.indices.evaluate import evaluate
+from pteron.kernels import as_array, numeric
+from pteron.kinematics.evaluate import checked_one
+from pteron.manipulator import RobotLike, as_manipulator
+from pteron.shapes import PoseLike
+from pteron.workspace import bounding_box
+from pteron.workspace.reserve import room_to_limits
+
+_GROUPS = 16
+"""Independent scrambled sequences, whose spread is the standard error."""
+
+
+@dataclass(frozen=True)
+class GlobalConditioning:
+    """The mean of 1 / kappa over poses in reach.
+
+    Attributes
+    ----------
+    value : float
+        In (0, 1]; 1 where the machine is isotropic everywhere.
+    standard_error : float
+        Of it.
+    share : float
+        Of the box that is in reach, within the joints' limits.
+    count : int
+        Number of poses in the box that the estimate rests on.
+    """
+
+    value: float
+    standard_error: float
+    share: float
+    count: int
+
+
+def global_conditioning(
+    robot: RobotLike,
+    pose: PoseLike,
+    *,
+    box: ArrayLike | None = None,
+    points: bool = False,
+    count: int = 1 << 16,
+    seed: int = 0,
+) -> GlobalConditioning:
+    """Return the global conditioning index: the integral of 1 / kappa over that of 1.
+
+    C. Gosselin, J. Angeles, Journal of Mechanical Design 113 (1991) 220-226. The integrals are
+    over the poses in reach within the joints' limits, by scrambled Sobol points.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+    pose : array, shape (m,)
+        Gives the orientation, m and rad: all positions in reach at this orientation count.
+    box : array, shape (2, m), optional
+        Least and greatest pose; in place of that, all poses in reach in this box count.
+    points : bool
+        Whether kappa is that of `condition_points` instead of `condition`.
+    count : int
+        Number of poses, rounded up to 16 times a power of two.
+    seed : int
+        Of the random numbers.
+
+    Returns
+    -------
+    GlobalConditioning
+
+    Raises
+    ------
+    ModelError
+        If no pose is in reach.
+    DataError
+        If the box has a side of no length, or there are no samples.
+
+    Examples
+    --------
+    >>> from pteron.indices import global_conditioning
+    >>> global_conditioning("tripteron", [0.0, 0.0, 0.0], count=1024).value
+    1.0
+    """
+    robot = as_manipulator(robot)
+    if count < 1:
+        raise DataError(f"count: {count} given, at least 1 expected")
+    given = checked_one(robot, pose, "pose")
+    if box is None:
+        low, high = np.array([given, given])
+        sides = bounding_box(robot, given)
+        low[: sides.shape[1]], high[: sides.shape[1]] = sides
+        free = np.arange(robot.freedom) < sides.shape[1]
+    else:
+        low, high = as_array(box, "box", (2, robot.freedom))
+        free = high > low
+        if not (np.isfinite(high - low).all() and free.any() and (high >= low).all()):
+            raise DataError("box: [least, greatest] of every coordinate expected, finite")
+    name = "condition_points" if points else "condition"
+    power = max(int(np.ceil(np.log2(count / _GROUPS))), 0)
+    sums = []
+    for generator in np.random.default_rng(seed).spawn(_GROUPS):
+        unit = qmc.Sobol(int(free.sum()), rng=generator).random_base2(power)
+        poses = np.tile(low, (len(unit), 1))
+        poses[:, free] += unit * (high - low)[free]
+        margin = numeric(robot, "reach")(poses)[0]
+        inside = np.minimum(margin, room_to_limits(robot, poses)).min(axis=-1) >= 0.0
+        # At the very edge of reach the index is not defined, and 1 / kappa is 0.
+        values = np.nan_to_num(1.0 / np.asarray(evaluate(robot, name, poses[inside])))
+        sums.append((values.sum(), inside.sum()))
+    total, number = np.array(sums, dtype=float).T
+    if not number.any():
+        raise ModelError(
+            "no pose that was tried is in reach within the joints' limits; move or widen the box, "
+            "or give more samples",
+            subject=robot.name,
+        )
+    value = float(total.sum() / number.sum())
+    error = float(np.sqrt(_GROUPS / (_GROUPS - 1) * ((total - value * number) ** 2).sum()))
+    whole = _GROUPS << power
+    return GlobalConditioning(
+        value, error / float(number.sum()), float(number.sum()) / whole, whole
+    )

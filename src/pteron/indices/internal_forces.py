@@ -1,0 +1,96 @@
+"""The equations of internal forces, solved for many states: reactions and stiffness share them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pteron.kernels import Array
+from pteron.manipulator import Manipulator
+
+_RANK = 1e-10
+"""Share of the largest singular value below which one counts as zero."""
+
+
+class Equations(NamedTuple):
+    """What the kernel "reactions" returns, for B states; see `equations.reactions`."""
+
+    rows: Array
+    right: Array
+    presumed_rows: Array
+    presumed_right: Array
+    driven_rows: Array
+    driven: Array
+    ends: Array
+    points: Array
+    passed: Array
+
+
+class Held(NamedTuple):
+    """The internal forces that hold K loads, as far as statics determines them."""
+
+    forces: Array
+    """(B, 6 n, K): a force and a moment of each leg on the platform."""
+    free: Array
+    """(B, 6 n, 6 n): what maps anything to a self-stress, and self-stresses to themselves, for
+    moments over the length."""
+    missed: Array
+    """(B, S, K): what the legs cannot hold, moments over the length."""
+    redundancy: int
+    """The number of self-stresses."""
+
+
+def hold(given: Equations, right: Array, presumed: Array, length: float) -> Held:
+    """Return what holds loads: right sides (B, R, K) and (B, S, K).
+
+    First what must hold; of that what is nearest to what the legs are presumed to hold. The length
+    makes moments comparable with forces where a rank is decided.
+    """
+    count = given.rows.shape[-1]
+    size = np.tile([1.0, 1.0, 1.0, length, length, length], count // 6)
+    rows, more = given.rows * size, given.presumed_rows * size
+    # Moments of the platform are forces over the length, too.
+    per = np.ones(more.shape[-2])
+    per[3:] = 1.0 / length
+    more, presumed = per[:, None] * more, per[:, None] * presumed
+    back = inverse(rows)
+    w = back @ right
+    free = np.eye(count) - back @ rows
+    back = inverse(more @ free)
+    w = w + free @ back @ (presumed - more @ w)
+    free = free - back @ more @ free
+    redundancy = int(np.rint(np.trace(free, axis1=-2, axis2=-1).max()))
+    return Held(size[:, None] * w, size[:, None] * free, more @ w - presumed, redundancy)
+
+
+def on_platform(robot: Manipulator, wrench: Array, moment: Array) -> Array:
+    """Return the force and the moment at P (..., 6) of a wrench and of a moment beside it."""
+    count, platform = len(robot.platform.lengths), robot.platform
+    force = wrench[..., :count] @ platform.directions
+    turning = np.zeros(3)
+    if platform.turns and not platform.slides:
+        turning = wrench[..., -1:] * np.array(platform.axis)
+    force, whole = np.broadcast_arrays(force, turning + moment)
+    return np.concatenate([force, whole], axis=-1)
+
+
+def moved(arms: Array) -> Array:
+    """Return rows (..., 6, 6): what a wrench at c is at points whose way to c is `arms`."""
+    found = np.zeros((*arms.shape[:-1], 6, 6))
+    found[...] = np.eye(6)
+    x, y, z = np.moveaxis(arms, -1, 0)
+    found[..., 3, 1], found[..., 3, 2] = -z, y
+    found[..., 4, 0], found[..., 4, 2] = z, -x
+    found[..., 5, 0], found[..., 5, 1] = -y, x
+    return found
+
+
+def inverse(matrices: Array) -> Array:
+    """Return the pseudo-inverse of matrices, those of small singular values left out."""
+    return np.asarray(np.linalg.pinv(matrices, rcond=_RANK))
+
+
+def times(matrices: Array, vectors: Array) -> Array:
+    """Return products of matrices and vectors."""
+    return np.asarray((matrices @ vectors[..., None])[..., 0])

@@ -1,0 +1,189 @@
+"""Reactions in joints and guides: what every joint passes on, at rest or in motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pteron.equations.machine import Machine
+from pteron.errors import DataError
+from pteron.indices.internal_forces import Equations, hold, inverse, moved, on_platform, times
+from pteron.kernels import Array, as_array
+from pteron.kinematics.evaluate import checked, evaluated
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.shapes import OnFailure, PoseLike
+
+
+@dataclass(frozen=True)
+class Reactions:
+    """What the joints of the legs pass on: on the side of the platform, from that of the base.
+
+    Attributes
+    ----------
+    names : tuple of tuple of str
+        For each leg its joints from the base to the platform: P0, R1, R2, R3, R4 of a P-R-R-R leg,
+        whose first joint is its guide.
+    points : array, shape (..., n, j, 3)
+        Where, m, in the base frame: of a guide where its slider is; NaN for a joint that a leg has
+        not, here and in what follows.
+    forces, moments : array, shape (..., n, j, 3)
+        N, and N m about that point, in the base frame. What an actuator gives is among them.
+    actuators : array, shape (..., n)
+        What the actuators give, N or N m: that of `inverse_dynamics`.
+    redundancy : int
+        How many self-stresses the machine has: sets of reactions that balance each other. Where it
+        is not 0 the reactions are not unique, and those are returned whose norm is the least.
+    length : float
+        By which moments are divided in that norm, m.
+    unheld : array, shape (...)
+        What of the load the legs, as they are modelled, cannot hold, N: moments that would tilt
+        the platform count over `length`. It is 0 where they hold all of it.
+    """
+
+    names: tuple[tuple[str, ...], ...]
+    points: Array
+    forces: Array
+    moments: Array
+    actuators: Array
+    redundancy: int
+    length: float
+    unheld: Array
+
+    @property
+    def unique(self) -> bool:
+        """Whether statics alone determine the reactions."""
+        return self.redundancy == 0
+
+
+def reactions(
+    robot: RobotLike,
+    pose: PoseLike,
+    velocity: PoseLike | None = None,
+    acceleration: PoseLike | None = None,
+    wrench: PoseLike | None = None,
+    *,
+    moment: ArrayLike | None = None,
+    length: float | None = None,
+    on_failure: OnFailure = "raise",
+) -> Reactions:
+    """Return the forces and moments in all joints and guides, by Newton and Euler.
+
+    Bodies are flat: their centres of mass are in the plane of their joints, as the inertial
+    parameters say no more. Parallel rods are one rod that passes on a force along it and a couple
+    across the plane of the rods. Where a machine is overconstrained the reactions of least norm are
+    returned, the root of the sum over all joints of |force|^2 + |moment / length|^2; which part of
+    them is certain the links' stiffness decides, not statics: `redundancy` says so.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+    pose : array, shape (..., m)
+        The poses, m and rad.
+    velocity, acceleration : array, shape (..., m), optional
+        The platform's motion; at rest by default.
+    wrench : array, shape (..., m), optional
+        What acts on the platform at P: a force in N and, where it turns, a moment about k in N m.
+    moment : array, shape (..., 3), optional
+        A moment on the platform beside it, in the base frame, N m; what of it turns the platform
+        belongs in `wrench`.
+    length : float, optional
+        What moments are divided by in the norm, m; the legs' mean size by default.
+    on_failure : {"raise", "nan"}
+        Whether a pose that fails raises, or gives NaN.
+
+    Returns
+    -------
+    Reactions
+
+    Raises
+    ------
+    DataError
+        If the length is not above 0.
+    UnreachablePose
+        If a leg does not reach a pose.
+    SingularPose
+        If a leg is stretched or folded (type I), or the actuators do not hold the platform
+        (type II).
+
+    Examples
+    --------
+    >>> from pteron.indices import reactions
+    >>> found = reactions("tripteron-router", [0.0, 0.0, 0.0], wrench=[80.0, 80.0, -120.0])
+    >>> found.names[0], found.redundancy, found.actuators.round(3)
+    (('P0', 'R1', 'R2', 'R3'), 3, array([-80.912, -80.912, 157.886]))
+    """
+    robot = as_manipulator(robot)
+    size = float(np.mean([leg.size for leg in robot.legs]))
+    by = size if length is None else float(length)
+    if not by > 0.0:
+        raise DataError(f"length: {by:g} m given, a number above 0 expected")
+    rest = np.zeros(robot.freedom)
+    motion = [rest if part is None else part for part in (velocity, acceleration)]
+    found: tuple[Array, ...] = evaluated(robot, "reactions", on_failure, pose, *motion)
+    acting = rest if wrench is None else checked(robot, wrench, "wrench", on_failure)
+    turning = np.zeros(3) if moment is None else as_array(moment, "moment", (3,))
+    lead = np.broadcast_shapes(found[1].shape[:-1], acting.shape[:-1], turning.shape[:-1])
+    load = np.broadcast_to(on_platform(robot, acting, turning), (*lead, 6))
+    acting = np.broadcast_to(acting, (*lead, robot.freedom))
+    axes = found[1].ndim - 1
+    flat = (np.broadcast_to(a, lead + a.shape[axes:]).reshape(-1, *a.shape[axes:]) for a in found)
+    given = Equations(*flat)
+    points, passed, actuators, redundancy, unheld = _solved(
+        given, acting.reshape(-1, robot.freedom), load.reshape(-1, 6), by
+    )
+    points, passed, actuators, unheld = (
+        a.reshape((*lead, *a.shape[1:])) for a in (points, passed, actuators, unheld)
+    )
+    names = _names(robot)
+    return Reactions(
+        names, points, passed[..., :3], passed[..., 3:], actuators, redundancy, by, unheld
+    )
+
+
+def _solved(
+    given: Equations, wrench: Array, load: Array, length: float
+) -> tuple[Array, Array, Array, int, Array]:
+    """Return points, what the joints pass on (B, n, j, 6), actuator forces, self-stresses, unheld.
+
+    Of what self-stress leaves free that of the least norm is taken.
+    """
+    batch, n, joints, _ = given.passed.shape
+    points, passed = given.points.copy(), np.full(given.passed.shape, np.nan)
+    actuators, unheld = np.full((batch, n), np.nan), np.full(batch, np.nan)
+    good = np.isfinite(given.rows).all(axis=(-2, -1)) & np.isfinite(wrench).all(axis=-1)
+    points[~good] = np.nan
+    if not good.any():
+        return points, passed, actuators, 0, unheld
+    g = Equations(*(part[good] for part in given))
+    right, presumed = g.right.copy(), g.presumed_right.copy()
+    right[:, :n] -= wrench[good]
+    presumed[:, :6] -= load[good]
+    held = hold(g, right[..., None], presumed[..., None], length)
+    w, redundancy = held.forces[..., 0], held.redundancy
+    there = np.isfinite(g.passed[..., 0])
+    spread = moved(g.ends[:, :, None] - g.points)
+    both = np.zeros((len(w), n, joints, 6, n, 6))
+    for i in range(n):
+        both[:, i, :, :, i, :] = np.where(there[:, i, :, None, None], spread[:, i], 0.0)
+    passing = both.reshape(len(w), -1, 6 * n)
+    needed = np.where(there[..., None], g.passed, 0.0).reshape(len(w), -1)
+    if redundancy:
+        per = np.tile([1.0, 1.0, 1.0, 1 / length, 1 / length, 1 / length], n * joints)
+        back = inverse(per[:, None] * passing @ held.free)
+        w = w - times(held.free @ back, per * (times(passing, w) + needed))
+    found = (times(passing, w) + needed).reshape(-1, n, joints, 6)
+    passed[good] = np.where(there[..., None], found, np.nan)
+    actuators[good] = times(g.driven_rows, w) + g.driven
+    unheld[good] = np.linalg.norm(held.missed[..., 0], axis=-1)
+    return points, passed, actuators, redundancy, unheld
+
+
+def _names(robot: Manipulator) -> tuple[tuple[str, ...], ...]:
+    """Return the joints' names, of the paper: P0 and R1 to R4."""
+    machine = Machine.of(robot)
+    legs = machine.state(ca.SX.zeros(robot.freedom)).legs
+    return tuple(tuple(f"{joint.kind}{k}" for k, joint in enumerate(leg.chain)) for leg in legs)

@@ -1,0 +1,201 @@
+"""By how much the pose changes with each dimension of a machine, its joints where they are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+
+import casadi as ca
+import numpy as np
+
+from pteron.bodies.vectors import Vector, cross, dot
+from pteron.equations.machine import numbers
+from pteron.kernels import Array, bare, general_program
+from pteron.kinematics.evaluate import checked, evaluated
+from pteron.legs.kind import LegKind
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.shapes import OnFailure, PoseLike
+
+_UPRIGHT = 1e-9
+"""Cosine of the angle below which two directions count as perpendicular."""
+
+
+@dataclass(frozen=True)
+class Sensitivities:
+    """How the pose changes with a machine's dimensions.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of the dimensions: "leg 1: upper_length", "leg 1: guide_point x", "leg 2: direction about
+        y".
+    roles : tuple of {"point", "length", "angle"}
+        What each one is.
+    units : tuple of str
+        m or rad of each; of what slides on a platform m/rad.
+    matrix : array, shape (..., m, p)
+        d pose / d dimension at P.
+    tool : array, shape (..., m, p)
+        The same of the tool's centre point.
+    """
+
+    names: tuple[str, ...]
+    roles: tuple[str, ...]
+    units: tuple[str, ...]
+    matrix: Array
+    tool: Array
+
+
+def geometric_sensitivities(
+    robot: RobotLike, pose: PoseLike, *, on_failure: OnFailure = "raise"
+) -> Sensitivities:
+    """Return the derivatives of the pose by every dimension, while the joints are held.
+
+    The joint coordinates are q(x, g), g the dimensions; held, J dx + (dq/dg) dg = 0. A direction
+    has two angles by which it may be tilted, about axes of the base frame made perpendicular to it;
+    what the leg has at right angles to it is tilted with it, and may be turned about it. Angles out
+    of a planar machine's plane and between axes that a leg has parallel are not among them: they
+    would strain the machine or tilt its platform, which a pose does not tell.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+    pose : array, shape (..., m)
+        The poses, m and rad.
+    on_failure : {"raise", "nan"}
+        Whether a pose that fails raises, or gives NaN.
+
+    Returns
+    -------
+    Sensitivities
+
+    Raises
+    ------
+    UnreachablePose
+        If a leg does not reach a pose.
+    SingularPose
+        If a leg is stretched or folded (type I), or the actuators do not hold the platform
+        (type II).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from pteron.indices import geometric_sensitivities
+    >>> found = geometric_sensitivities("orthoglide", [0.0, 0.0, 0.0])
+    >>> longer = found.names.index("leg 1: lower_length")
+    >>> np.abs(found.matrix[:, longer]).round(6)
+    array([1., 0., 0.])
+    """
+    robot = as_manipulator(robot)
+    poses = checked(robot, pose, "pose", on_failure)
+    held: Array = evaluated(robot, "manipulability", on_failure, poses)
+    rows: Array = evaluated(robot, "jacobian", on_failure, poses)
+    dimensions = list(_dimensions(robot))
+    names, roles, units, ways = zip(*dimensions, strict=True)
+    flat = poses.reshape(-1, robot.freedom)
+    good = np.isfinite(np.reshape(held, -1))
+    found = np.full((len(flat), robot.freedom, len(names)), np.nan)
+    if good.any():
+        slopes = _slopes(bare(robot))
+        geometry = np.tile(np.array(numbers(robot))[:, None], (1, int(good.sum())))
+        values = np.array(slopes.map(geometry.shape[1])(geometry, flat[good].T))
+        by_geometry = values.reshape(robot.freedom, -1, len(geometry)).swapaxes(0, 1)
+        square = rows.reshape(-1, robot.freedom, robot.freedom)[good]
+        found[good] = -np.linalg.solve(square, by_geometry @ np.array(ways).T)
+    matrix = found.reshape((*poses.shape[:-1], *found.shape[1:]))
+    return Sensitivities(names, roles, units, matrix, at_tool(robot, poses, matrix))
+
+
+@lru_cache(maxsize=64)
+def _slopes(robot: Manipulator) -> ca.Function:
+    """Return dq/dg (n, g) as a function of the geometry and a pose."""
+    function = general_program(robot, "joint_coordinates").function
+    geometry, pose = function.sx_in()
+    joints = function(geometry, pose)
+    return ca.Function("slopes", [geometry, pose], [ca.densify(ca.jacobian(joints, geometry))])
+
+
+def tool_arm(robot: Manipulator, poses: Array) -> Array:
+    """Return the way (..., 3) from P to the tool's centre point, base frame."""
+    _, axes = robot.platform.at(poses)
+    return np.asarray(np.array(robot.platform.tool) @ axes)
+
+
+def at_tool(robot: Manipulator, poses: Array, errors: Array) -> Array:
+    """Return changes of the pose (..., m, K) as the tool's centre point sees them."""
+    if not robot.platform.turns or not any(robot.platform.tool):
+        return errors
+    platform = robot.platform
+    lever = np.cross(np.array(platform.axis), tool_arm(robot, poses)) @ platform.directions.T
+    found = errors.copy()
+    found[..., :-1, :] += lever[..., :, None] * errors[..., -1:, :]
+    return found
+
+
+_Dimension = tuple[str, str, str, Array]
+
+
+def _dimensions(robot: Manipulator) -> Iterator[_Dimension]:
+    """Yield name, role, unit and d geometry of every dimension; `numbers` has the order."""
+    size, start = len(numbers(robot)), 0
+    per_radian = "m/rad" if robot.platform.slides else "m"
+    for i, leg in enumerate(robot.legs, start=1):
+        places: dict[str, int] = {}
+        for quantity in leg.quantities:
+            places[quantity.name] = start
+            start += len(quantity.value)
+        for name in ("platform_point", "fixed_offset"):
+            places[name] = start
+            start += 3
+        for name, role, changes in _of_leg(leg):
+            way = np.zeros(size)
+            for key, change in changes.items():
+                way[places[key] : places[key] + len(change)] = change
+            unit = "rad" if role == "angle" else "m"
+            if name.startswith("platform_point"):
+                unit = per_radian
+            yield f"leg {i}: {name}", role, unit, way
+
+
+def _of_leg(leg: LegKind) -> Iterator[tuple[str, str, dict[str, tuple[float, ...]]]]:
+    """Yield name, role and what changes by a unit, of every dimension of a leg."""
+    units = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+    for quantity in leg.quantities:
+        if quantity.role == "length":
+            yield quantity.name, "length", {quantity.name: (1.0,)}
+    points = [q.name for q in leg.quantities if q.role == "point"] + ["platform_point"]
+    points += ["fixed_offset"] if any(leg.fixed_offset) else []
+    for name in points:
+        for letter, unit in units.items():
+            yield f"{name} {letter}", "point", {name: unit}
+    vectors: dict[str, Vector] = {
+        q.name: (float(q.value[0]), float(q.value[1]), float(q.value[2]))
+        for q in leg.quantities
+        if q.role in ("direction", "normal")
+    }
+    first, *others = (q.name for q in leg.quantities if q.role == "direction")
+    carried = [name for name, v in vectors.items() if abs(dot(v, vectors[first])) < _UPRIGHT]
+    if leg.plane_normal is None:
+        yield from _tilts(first, [first, *carried], vectors)
+    for name in others:
+        if name in carried:
+            turned = cross(vectors[first], vectors[name])
+            yield f"{name} about {first}", "angle", {name: turned}
+        else:
+            yield from _tilts(name, [name], vectors)
+
+
+def _tilts(
+    name: str, moved: list[str], vectors: dict[str, Vector]
+) -> Iterator[tuple[str, str, dict[str, tuple[float, ...]]]]:
+    """Yield the two tilts of a direction, about the base axes that are least along it."""
+    v = np.array(vectors[name])
+    for k in sorted(np.argsort(np.abs(v), kind="stable")[:2]):
+        axis = np.eye(3)[k] - v[k] * v
+        if np.linalg.norm(axis) == 0.0:
+            continue
+        axis /= np.linalg.norm(axis)
+        changes = {key: tuple(float(x) for x in np.cross(axis, vectors[key])) for key in moved}
+        yield f"{name} about {'xyz'[k]}", "angle", changes

@@ -1,0 +1,270 @@
+"""Stiffness at the tool, from what gives way in the actuators and the links."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pteron.dynamics import mass_matrix
+from pteron.errors import DataError
+from pteron.indices.elasticity import Elasticity, Section
+from pteron.indices.internal_forces import Equations, hold, moved, on_platform
+from pteron.indices.sensitivities import tool_arm
+from pteron.kernels import Array, as_array
+from pteron.kinematics.evaluate import checked, evaluated
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.shapes import Matrices, Numbers, OnFailure, PerCoordinate, PoseLike
+
+_GAUSS = 0.5 - 0.5 / np.sqrt(3.0), 0.5 + 0.5 / np.sqrt(3.0)
+"""Where along a beam its energy is taken, which is a square of what is linear there: exact."""
+
+_NOTHING = 1e-12
+"""Share of the whole compliance below which a self-stress meets none."""
+
+
+@dataclass(frozen=True)
+class Stiffness:
+    """How a machine gives way under a load at its tool, while the actuators hold their joints.
+
+    Attributes
+    ----------
+    compliance : array, shape (..., m, m)
+        C: how the tool's pose changes per unit of a wrench on it: m/N, rad/N and rad/(N m).
+    frequencies : array, shape (..., m)
+        Natural frequencies of the bodies' masses, in platform coordinates, on these springs, Hz,
+        ascending; infinite where nothing gives way.
+    lengths : int
+        How many of the pose's coordinates, the first ones, are lengths.
+    """
+
+    compliance: Matrices
+    frequencies: PerCoordinate
+    lengths: int
+
+    @property
+    def matrix(self) -> Matrices:
+        """K, the inverse of the compliance."""
+        return np.linalg.inv(self.compliance)
+
+    @property
+    def least(self) -> Numbers:
+        """Force over the way that the tool gives in the worst direction, N/m, without a moment."""
+        with np.errstate(divide="ignore"):
+            return np.asarray(1.0 / self._along_axes[..., -1])
+
+    @property
+    def most(self) -> Numbers:
+        """The same in the best direction."""
+        with np.errstate(divide="ignore"):
+            return np.asarray(1.0 / np.maximum(self._along_axes[..., 0], 0.0))
+
+    @property
+    def _along_axes(self) -> Array:
+        k = self.lengths
+        part = self.compliance[..., :k, :k]
+        known = np.isfinite(part).all(axis=(-2, -1))
+        found = np.linalg.eigvalsh(np.where(known[..., None, None], part, 0.0))
+        return np.asarray(np.where(known[..., None], found, np.nan))
+
+    def along(self, direction: ArrayLike) -> Numbers:
+        """Return force over the way that the tool gives along a direction (..., k), N/m.
+
+        Raises
+        ------
+        DataError
+            If it has not as many numbers as the pose has lengths, or no length.
+        """
+        u = as_array(direction, "direction", (self.lengths,))
+        size = np.linalg.norm(u, axis=-1, keepdims=True)
+        if not (size > 0.0).all():
+            raise DataError("direction: a zero vector given, one with a direction expected")
+        u = u / size
+        k = self.lengths
+        with np.errstate(divide="ignore"):
+            return np.asarray(
+                1.0 / np.einsum("...i,...ij,...j", u, self.compliance[..., :k, :k], u)
+            )
+
+
+def stiffness(
+    robot: RobotLike,
+    pose: PoseLike,
+    elasticity: Elasticity,
+    *,
+    on_failure: OnFailure = "raise",
+) -> Stiffness:
+    """Return the stiffness at the tool from actuators and links that give way.
+
+    By Castigliano: C = X^T W X, W being the energy of the internal forces w, and X those of unit
+    loads. Actuators are springs at their joints (C. Gosselin, IEEE Transactions on Robotics and
+    Automation 6 (1990) 377-382: K = J^T K_q J where nothing else gives way), links slender beams
+    with tension, bending and torsion, rods tension alone with, where their distance is given, the
+    couple of a pair (the virtual joints of A. Pashkevich, D. Chablat and P. Wenger, Mechanism and
+    Machine Theory 44 (2009) 966-982, summed up along a link). Of an overconstrained machine the
+    self-stress is that of the least energy. Joints, guides and the platform are rigid, preloads
+    are left out.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+    pose : array, shape (..., m)
+        The poses, m and rad.
+    elasticity : Elasticity
+        What gives way.
+    on_failure : {"raise", "nan"}
+        Whether a pose that fails raises, or gives NaN.
+
+    Returns
+    -------
+    Stiffness
+
+    Raises
+    ------
+    ModelError
+        If the elasticity is of another number of legs.
+    UnreachablePose
+        If a leg does not reach a pose.
+    SingularPose
+        If a leg is stretched or folded (type I), or the actuators do not hold the platform
+        (type II).
+
+    Examples
+    --------
+    >>> from pteron.indices import ALUMINIUM, Elasticity, Section, stiffness
+    >>> tube = Section.square_tube(0.06, 0.004, ALUMINIUM)
+    >>> found = stiffness("tripteron", [0.0, 0.0, 0.0], Elasticity(1e6, upper=tube, lower=tube))
+    >>> found.compliance.shape, bool(found.least < 1e6)
+    ((3, 3), True)
+    """
+    robot = as_manipulator(robot)
+    rest = np.zeros(robot.freedom)
+    poses = checked(robot, pose, "pose", on_failure)
+    found: tuple[Array, ...] = evaluated(robot, "reactions", on_failure, poses, rest, rest)
+    links: tuple[Array, ...] = evaluated(robot, "beams", on_failure, poses)
+    mass: Array = mass_matrix(robot, poses, on_failure=on_failure)
+    lead, m = poses.shape[:-1], robot.freedom
+    parts = [a.reshape(-1, *a.shape[len(lead) :]) for a in (*found, *links, mass, poses)]
+    good: Array = np.asarray(np.isfinite(parts[0]).all(axis=(-2, -1)))
+    compliance, frequencies = np.full((len(good), m, m), np.nan), np.full((len(good), m), np.nan)
+    if good.any():
+        *known, masses, at = (part[good] for part in parts)
+        given = Equations(*known[: len(found)])
+        energy = _energy(robot, elasticity, given, known[len(found) :])
+        at_p = _compliance(robot, given, energy, np.zeros((len(at), 3)))
+        compliance[good] = at_p
+        frequencies[good] = _frequencies(at_p, masses)
+        if any(robot.platform.tool):
+            compliance[good] = _compliance(robot, given, energy, tool_arm(robot, at))
+    return Stiffness(
+        compliance.reshape(*lead, m, m),
+        frequencies.reshape((*lead, m)),
+        len(robot.platform.lengths),
+    )
+
+
+def _compliance(robot: Manipulator, given: Equations, energy: Array, arm: Array) -> Array:
+    """Return C (B, m, m) at a point, whose way from P is `arm` (B, 3)."""
+    batch, m = len(arm), robot.freedom
+    wrench = np.broadcast_to(np.eye(m), (batch, m, m)).copy()  # a row for each unit load
+    force = on_platform(robot, wrench, np.zeros(3))[..., :3]
+    moment = np.cross(arm[:, None], force)
+    if robot.platform.turns:
+        axis = np.array(robot.platform.axis)
+        wrench[..., -1] += moment @ axis
+        # `on_platform` has the part about the axis from the wrench.
+        moment = moment - (moment @ axis)[..., None] * axis
+    load = on_platform(robot, wrench, moment)
+    right = np.zeros((batch, given.rows.shape[-2], m))
+    presumed = np.zeros((batch, given.presumed_rows.shape[-2], m))
+    right[:, :m], presumed[:, :6] = -wrench.mT, -load.mT
+    held = hold(given, right, presumed, float(np.mean([leg.size for leg in robot.legs])))
+    w, free = held.forces, held.free
+    if held.redundancy:  # the self-stress of the least energy
+        values, vectors = np.linalg.eigh(free.mT @ energy @ free)
+        counts = values > _NOTHING * np.trace(energy, axis1=-2, axis2=-1)[:, None]
+        back = vectors @ (vectors / np.where(counts, values, np.inf)[:, None]).mT
+        w = w - free @ back @ (free.mT @ energy @ w)
+    found = w.mT @ energy @ w
+    return np.asarray(0.5 * (found + found.mT))
+
+
+def _energy(
+    robot: Manipulator, elasticity: Elasticity, given: Equations, links: list[Array]
+) -> Array:
+    """Return W (B, 6 n, 6 n): twice the energy of internal forces w is w^T W w."""
+    springs, sections = elasticity.of_legs(robot)
+    starts, ways, axes, couples = links
+    n, batch = robot.freedom, len(starts)
+    rows = given.driven_rows
+    found = rows.mT @ (rows / np.array(springs)[:, None])
+    for i in range(n):
+        block = np.zeros((batch, 6, 6))
+        rods = bool(np.isfinite(couples[:, i]).all())
+        for k, section in enumerate(sections[i]):
+            if section is None or np.isnan(ways[:, i, k]).any():
+                continue
+            if rods and k == 1:
+                block += _rods(section, ways[:, i, k], couples[:, i], elasticity.rod_distance)
+            else:
+                arms = given.ends[:, i] - starts[:, i, k]
+                block += _beam(section, arms, ways[:, i, k], axes[:, i, k])
+        found[:, 6 * i : 6 * i + 6, 6 * i : 6 * i + 6] += block
+    return np.asarray(found)
+
+
+def _rods(section: Section, way: Array, couple: Array, distance: float | None) -> Array:
+    """Return the energy (B, 6, 6) of a rod, or of a pair whose couple pulls one and pushes one."""
+    length = np.linalg.norm(way, axis=-1)
+    n = way / length[:, None]
+    found = np.zeros((len(way), 6, 6))
+    found[:, :3, :3] = _square(n) * (length / section.axial)[:, None, None]
+    if distance is not None and couple.any():
+        # The couple is |bar x n| times their distance, times half the difference of their forces.
+        size = np.linalg.norm(couple, axis=-1)
+        unit = couple / size[:, None]
+        apart = distance * size / length
+        found[:, 3:, 3:] = _square(unit) * (4 * length / (section.axial * apart**2))[:, None, None]
+    return found
+
+
+def _beam(section: Section, arm: Array, way: Array, axis: Array) -> Array:
+    """Return the energy (B, 6, 6) of a beam, for the wrench at c, where `arm` leads from its start.
+
+    It bends in its leg's plane about `axis`.
+    """
+    length = np.linalg.norm(way, axis=-1)
+    x = way / length[:, None]
+    z = axis - (axis * x).sum(axis=-1, keepdims=True) * x
+    size = np.linalg.norm(z, axis=-1, keepdims=True)
+    # A shaft's axis is along it: it has no plane, and any direction will do.
+    other = np.cross(x, np.eye(3)[np.abs(x).argmin(axis=-1)])
+    z = np.where(size > 1e-6, z, other)
+    z = z / np.linalg.norm(z, axis=-1, keepdims=True)
+    y = np.cross(z, x)
+    found = np.zeros((len(way), 6, 6))
+    for share in _GAUSS:
+        at = moved(arm - share * way)
+        for v, part, rigidity in (
+            (x, slice(3), section.axial),
+            (x, slice(3, 6), section.torsion),
+            (y, slice(3, 6), section.sideways),
+            (z, slice(3, 6), section.bending),
+        ):
+            row = np.einsum("bi,bij->bj", v, at[:, part])
+            found += _square(row) * (0.5 * length / rigidity)[:, None, None]
+    return found
+
+
+def _square(rows: Array) -> Array:
+    return np.asarray(rows[:, :, None] * rows[:, None, :])
+
+
+def _frequencies(compliance: Array, mass: Array) -> Array:
+    """Return natural frequencies (B, m), Hz: of M x'' + C^-1 x = 0."""
+    lower = np.linalg.cholesky(mass)
+    squares = np.linalg.eigvalsh(lower.mT @ compliance @ lower)[:, ::-1]
+    with np.errstate(divide="ignore"):
+        return np.asarray(1.0 / (2 * np.pi * np.sqrt(np.maximum(squares, 0.0))))

@@ -1,0 +1,261 @@
+"""Layouts that are singular everywhere: found before anything else is asked, and told why.
+
+det J of a layout vanishes at every pose, or at none but some. One pose at which it does not is
+proof of the latter. Of the former there are three degrees: exact arithmetic, for a geometry that
+is meant in simple numbers; the closed form A cos(phi) + B sin(phi) of P-R-R-R legs, to rounding;
+or many poses.
+"""
+
+from __future__ import annotations
+
+import random
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+
+from pteron.equations.machine import closure_of
+from pteron.errors import ModelError, SingularPose
+from pteron.kernels import Array, NoSquareRoot, PrimeField, evaluate, general_program, numeric
+from pteron.kinematics.recognised import modular_geometry
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+
+_VANISHING = 1e-10
+"""A type-II measure, or a singular value over the largest, that is none but for rounding."""
+
+_SAMPLES = 64
+
+_PRIMES = (2305843009213690799, 2305843009213689479, 2305843009213688159, 2305843009213684559)
+"""Modulo which 2, 3 and 5 are squares, and -1 is none."""
+
+_ATTEMPTS = 400
+_ZEROS = 3
+"""Zeros at random states modulo a prime of 61 bits: by chance once in 10^40 or so."""
+
+Proof = Literal["closed form", "exact arithmetic", "numerical", "one pose"]
+
+
+@dataclass(frozen=True)
+class Architecture:
+    """What a machine's layout is, wherever its platform is.
+
+    Attributes
+    ----------
+    singular : bool
+        Whether every pose is singular (type II): with the actuators held still the platform can
+        move.
+    reason : str
+        Why, in words; empty where it is not.
+    proof : {"one pose", "exact arithmetic", "closed form", "numerical"}
+        How it is known. "one pose": it is not singular, as one pose shows. "exact arithmetic": det
+        J is zero in exact numbers, at random states modulo primes. "closed form": the coefficients
+        of det J vanish but for rounding. "numerical": det J does at many poses.
+    type_ii : float
+        The largest type-II measure, in size, of the poses that were looked at.
+    holds : bool or None
+        Whether the legs' constraints hold the platform's orientation in some pose, joints held or
+        not; None where the machine's file does not tell the bars of its parallel rods.
+    constraint : float
+        The largest constraint measure of these poses; see `constraint_measure`. NaN where `holds`
+        is None.
+    """
+
+    singular: bool
+    reason: str
+    proof: Proof
+    type_ii: float
+    holds: bool | None
+    constraint: float
+
+
+def architecture(robot: RobotLike) -> Architecture:
+    """Return whether a layout is singular everywhere, with the reason and how that is known.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+
+    Returns
+    -------
+    Architecture
+
+    Examples
+    --------
+    >>> import pteron
+    >>> found = pteron.architecture("quadrupteron")
+    >>> found.singular, found.proof
+    (False, 'one pose')
+    """
+    return _architecture(as_manipulator(robot))
+
+
+@lru_cache(maxsize=256)
+def _architecture(robot: Manipulator) -> Architecture:
+    poses = _poses(robot)
+    measures = np.abs(numeric(robot, "type_ii")(poses)[0])
+    constraints = np.abs(numeric(robot, "constraint")(poses)[0])
+    most, constraint = (float(v.max(initial=0.0)) for v in (measures, constraints))
+    holds = None if np.isnan(constraint) else constraint > _VANISHING
+    singular = is_singular_everywhere(robot)
+    if not singular:
+        return Architecture(False, "", "one pose", most, holds, constraint)
+    proof: Proof = "numerical" if closure_of(robot).vanishes() is None else "closed form"
+    if _vanishes_exactly(robot):
+        proof = "exact arithmetic"
+    return Architecture(True, _reason(robot), proof, most, holds, constraint)
+
+
+def is_singular_everywhere(robot: RobotLike) -> bool:
+    """Say whether det J vanishes at every pose; `architecture` says why.
+
+    So it does, for one, where the rows of all legs lie in a plane, and for P-R-R-R layouts with
+    fourfold symmetry about k.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+
+    Returns
+    -------
+    bool
+    """
+    return _is_singular_everywhere(as_manipulator(robot))
+
+
+@lru_cache(maxsize=256)
+def _is_singular_everywhere(robot: Manipulator) -> bool:
+    known = closure_of(robot).vanishes()
+    if known is not None:
+        return known
+    poses = _poses(robot)
+    if not len(poses):
+        return False  # nowhere in reach, which is told where a pose is used
+    return bool((np.abs(numeric(robot, "type_ii")(poses)[0]) <= _VANISHING).all())
+
+
+@lru_cache(maxsize=64)
+def _poses(robot: Manipulator) -> Array:
+    """Return some poses in reach, singular (type II) or not; none where none is found."""
+    from pteron.kinematics.sampling import random_poses
+
+    try:
+        return random_poses(robot, _SAMPLES, type_i=1e-3, type_ii=0.0)
+    except ModelError:
+        return np.empty((0, robot.freedom))
+
+
+def _vanishes_exactly(robot: Manipulator) -> bool:
+    """Say whether the type-II measure is zero at random states modulo primes."""
+    measure = general_program(robot, "type_ii").function
+    rng = random.Random(0)
+    for prime in _PRIMES:
+        field, zeros = PrimeField(prime), 0
+        try:
+            vector = modular_geometry(robot, field)
+        except NoSquareRoot:
+            continue
+        if vector is None:
+            return False
+        for _ in range(_ATTEMPTS):
+            pose = [rng.randrange(prime) for _ in range(robot.freedom)]
+            try:
+                value = evaluate(measure, field, [vector, pose])[0][0]
+            except (NoSquareRoot, ZeroDivisionError):
+                continue
+            if value:
+                return False
+            zeros += 1
+            if zeros == _ZEROS:
+                return True
+    return False
+
+
+def _reason(robot: Manipulator) -> str:
+    """Return why a layout is singular everywhere: the simplest cause that holds in all poses."""
+    poses = _poses(robot)
+    if not len(poses):
+        poses = np.zeros((1, robot.freedom))
+    platform, lengths = robot.platform, len(robot.platform.lengths)
+    jacobian = numeric(robot, "jacobian")(poses)[0]
+    forces = jacobian[..., :lengths]
+    if lengths == 3 and (axis := _always_free(forces)) is not None:
+        return (
+            f"the legs' rows all lie across {_told(axis)}, along which no actuator holds the "
+            "platform"
+        )
+    if platform.turns and not platform.slides:
+        points = np.array([leg.platform_point for leg in robot.legs])[:, :2]
+        size = max(np.abs([leg.platform_point for leg in robot.legs]).max(), 1e-9)
+        if np.ptp(points, axis=0).max() <= 1e-9 * size:
+            return (
+                "all platform points lie on one line along the platform's axis, about which no "
+                "force then has a moment"
+            )
+    if closure_of(robot).orientation is not None and _has_fourfold_symmetry(robot, forces[0]):
+        return (
+            "the layout has fourfold symmetry about the platform's axis, for which A = B = 0 in "
+            "det J ~ A cos(phi) + B sin(phi)"
+        )
+    legs = _dependent_legs(jacobian)
+    if len(legs) < robot.freedom:
+        *rest, last = map(str, legs)
+        return f"the rows of legs {', '.join(rest)} and {last} of J depend on each other"
+    if (axis := _always_free(jacobian)) is not None and lengths < robot.freedom:
+        moved = ", ".join(f"{v:.3g}" for v in axis + 0.0)
+        names = ", ".join(robot.column_names["velocity"])
+        return f"no actuator withholds the platform's motion ({names}) = ({moved})"
+    if closure_of(robot).orientation is not None:
+        return "A = B = 0 in det J ~ A cos(phi) + B sin(phi)"
+    return "det J vanishes at every pose that was looked at"
+
+
+def _always_free(rows: Array) -> Array | None:
+    """Return the direction (m,) that rows (K, n, m) are perpendicular to at all poses, if any."""
+    sizes = np.linalg.norm(rows, axis=-1, keepdims=True)
+    stacked = (rows / np.where(sizes > 0.0, sizes, 1.0)).reshape(-1, rows.shape[-1])
+    _, values, axes = np.linalg.svd(stacked)
+    if len(values) == rows.shape[-1] and values[-1] > _VANISHING * values[0]:
+        return None
+    axis = axes[-1] * np.sign(axes[-1][np.abs(axes[-1]).argmax()])
+    return np.where(np.abs(axis) < 1e-9, 0.0, axis)
+
+
+def _told(axis: Array) -> list[float]:
+    return [round(float(v), 3) + 0.0 for v in axis]
+
+
+def _dependent_legs(rows: Array) -> list[int]:
+    """Return the legs, from 1, whose rows (K, n, m) depend on each other at all poses."""
+    _, _, axes = np.linalg.svd(np.swapaxes(rows, -1, -2))
+    weights = np.abs(axes[:, -1, :]).max(axis=0)
+    return [i for i, weight in enumerate(weights, start=1) if weight > 1e-8]
+
+
+def _has_fourfold_symmetry(robot: Manipulator, bars: Array) -> bool:
+    """Say whether a quarter turn about k takes each leg's row (n, 3) and point to another's."""
+    x0, y0, k = (np.array(axis) for axis in robot.platform.frame)
+    quarter = np.outer(y0, x0) - np.outer(x0, y0) + np.outer(k, k)
+    points = np.array([leg.platform_point[:2] for leg in robot.legs])
+    lines = np.array([np.outer(bar, bar) for bar in bars])
+    turned = quarter @ lines @ quarter.T
+    moved = points @ np.array([[0.0, 1.0], [-1.0, 0.0]])
+    sizes = np.abs(lines).max(), max(np.abs(points).max(), 1e-300)
+    same = (np.abs(turned[:, None] - lines).max(axis=(-2, -1)) <= 1e-9 * sizes[0]) & (
+        np.abs(moved[:, None] - points).max(axis=-1) <= 1e-9 * sizes[1]
+    )
+    return bool(same.any(axis=1).all())
+
+
+def singular_everywhere(robot: Manipulator, index: tuple[int, ...] = ()) -> SingularPose:
+    """Return what is said of such a machine, here and where a pose of it is used."""
+    return SingularPose(
+        f"singular at every pose (type II): {architecture(robot).reason}; with the actuators held "
+        "still the platform can move; change a leg's direction or platform point",
+        kind="II",
+        measure=0.0,
+        index=index,
+        subject=robot.name,
+    )

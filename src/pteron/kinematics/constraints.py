@@ -1,0 +1,52 @@
+"""How well the legs' constraints hold the platform's orientation."""
+
+from __future__ import annotations
+
+from pteron.kernels import Array
+from pteron.kinematics.evaluate import evaluated
+from pteron.manipulator import RobotLike, as_manipulator
+from pteron.shapes import Numbers, OnFailure, PoseLike
+
+
+def constraint_measure(
+    robot: RobotLike, pose: PoseLike, *, on_failure: OnFailure = "raise"
+) -> Numbers:
+    """Return the constraint measure: 0 where the platform may turn otherwise than it should.
+
+    Each leg holds couples, whatever its joint does: a P-R-R-R leg across its revolute axes, a pair
+    of parallel rods about bar x rod. The measure is the volume that they span, each of length 1 or
+    less, over the largest. It depends on the pose where rods are parallel pairs; of legs with
+    revolute joints alone it is the layout's.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+    pose : array, shape (..., m)
+        The poses, m and rad.
+    on_failure : {"raise", "nan"}
+        What happens to a pose out of reach.
+
+    Returns
+    -------
+    array, shape (...)
+        In [-1, 1], without unit; NaN where a file does not tell the bars of parallel rods.
+
+    Raises
+    ------
+    UnreachablePose
+        If a leg does not reach a pose.
+
+    References
+    ----------
+    Zlatanov, Bonev and Gosselin, "Constraint singularities of parallel mechanisms", ICRA 2002.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> float(pteron.constraint_measure("tripteron", [0.0, 0.0, 0.0]).round(9))
+    1.0
+    """
+    robot = as_manipulator(robot)
+    found: Array = evaluated(robot, "constraint", on_failure, pose)
+    return found

@@ -1,0 +1,50 @@
+"""How thick a machine's bodies are: the capsules round their centre lines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+from pteron.bodies.vectors import number
+from pteron.errors import ModelError
+from pteron.toml import told
+
+
+@dataclass(frozen=True)
+class Radii:
+    """The radii of the capsules round the bodies' centre lines, m; 0 for the lines themselves.
+
+    Parameters
+    ----------
+    guide : float
+        Of a slider's guide.
+    upper : float
+        Of an upper link or a crank.
+    lower : float
+        Of a last link or each rod.
+    platform : float
+        Of the platform's arms.
+
+    Raises
+    ------
+    ModelError
+        If one is negative, or not a finite number.
+    """
+
+    guide: float = 0.0
+    upper: float = 0.0
+    lower: float = 0.0
+    platform: float = 0.0
+
+    def __post_init__(self) -> None:
+        faults: list[str] = []
+        for field in fields(self):
+            try:
+                value = number(getattr(self, field.name), field.name)
+                if value < 0.0:
+                    raise ModelError(f"{field.name}: {value:g} m is negative; give 0 or more")
+            except ModelError as error:
+                faults += error.faults
+            else:
+                object.__setattr__(self, field.name, value)
+        if faults:
+            raise ModelError(told(faults), faults=faults)

@@ -1,0 +1,34 @@
+"""Work on many poses, or many designs: in chunks, here or on a cluster, and never twice.
+
+A map says what indices of performance are over a grid of poses, and which of them serve; a sweep is
+the same for any function.
+"""
+
+from pteron.maps.files import load_map, save_map
+from pteron.maps.grid import Axis, Grid, pose_grid
+from pteron.maps.map import Map, Summary
+from pteron.maps.map_index import map_index
+from pteron.maps.surfaces import Surface, surfaces
+from pteron.maps.sweep import Store, cores, sweep
+from pteron.maps.table_store import TableStore
+
+__all__ = [
+    "Axis",
+    "Grid",
+    "Map",
+    "Store",
+    "Summary",
+    "Surface",
+    "TableStore",
+    "cores",
+    "load_map",
+    "map_index",
+    "pose_grid",
+    "save_map",
+    "surfaces",
+    "sweep",
+]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

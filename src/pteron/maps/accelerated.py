@@ -1,0 +1,78 @@
+"""The same map through JAX: one function of the axes' values, compiled once for all chunks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from pteron.errors import ModelError
+from pteron.kernels import Array
+from pteron.kernels.choice import guarded
+from pteron.kernels.jax import Traced
+from pteron.manipulator import Manipulator
+from pteron.maps.grid import Grid, Region
+from pteron.maps.map import MARGIN
+
+
+def accelerated(
+    robot: Manipulator, names: tuple[str, ...], grid: Grid, region: Region
+) -> dict[str, Array]:
+    """Return the indices of a part of a grid, and `status`, computed by JAX where it runs.
+
+    Raises
+    ------
+    ModelError
+        If JAX is not installed.
+    """
+    places = tuple(grid.coordinates.index(axis.name) for axis in grid.axes)
+    function = _function(robot, names, places, grid.chunk)
+    # A chunk at the grid's rim is filled up: another shape would be compiled anew.
+    values = [
+        np.pad(own, (0, side - len(own)), mode="edge")
+        for own, side in (
+            (axis.values[part], side)
+            for axis, part, side in zip(grid.axes, region, grid.chunk, strict=True)
+        )
+    ]
+    found = function(np.array(grid.pose), *values)
+    kept = tuple(slice(0, part.stop - part.start) for part in region)
+    return {name: np.asarray(own)[kept] for name, own in found.items()}
+
+
+@lru_cache(maxsize=16)
+def _function(
+    robot: Manipulator, names: tuple[str, ...], places: tuple[int, ...], shape: tuple[int, ...]
+) -> Callable[..., dict[str, Any]]:
+    """Return what takes a pose and the values along each axis, and returns the indices."""
+    try:
+        import jax
+        from jax import numpy as jnp
+    except ImportError:
+        raise ModelError(
+            'engine: "jax" needs JAX, which is not installed; pip install "pteron[jax]"'
+        ) from None
+    jax.config.update("jax_enable_x64", True)
+    kernels = {
+        name: guarded(robot, name, Traced) for name in ("standing", *names) if name != MARGIN.name
+    }
+
+    def evaluate(pose: Any, *values: Any) -> dict[str, Any]:
+        columns = [jnp.broadcast_to(own, shape) for own in pose]
+        for k, (place, own) in enumerate(zip(places, values, strict=True)):
+            columns[place] = jnp.broadcast_to(
+                own.reshape((-1,) + (1,) * (len(shape) - 1 - k)), shape
+            )
+        poses = jnp.stack(columns, axis=-1)
+        status, margin, _ = kernels["standing"](poses)
+        found = {"status": status, MARGIN.name: margin}
+        for name in names:
+            if name != MARGIN.name:
+                value, serves = kernels[name](poses)
+                found[name] = jnp.where(serves > 0.0, value, jnp.nan)
+        return {name: found[name] for name in (*names, "status")}
+
+    compiled: Callable[..., dict[str, Any]] = jax.jit(evaluate)
+    return compiled

@@ -1,0 +1,250 @@
+"""Grids of poses: which coordinates vary, from where to where, and what the others are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from math import pi, prod
+
+import numpy as np
+
+from pteron.errors import DataError, ModelError
+from pteron.kernels import Array
+from pteron.kinematics.evaluate import checked_one
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.shapes import PoseLike
+from pteron.workspace import bounding_box, home_pose
+from pteron.workspace.doubts import value_doubts
+
+_POINTS = {1: 400, 2: 200, 3: 100, 4: 40}
+"""Along each axis, by how many there are: about as much as a picture shows."""
+
+_TURNS = 5
+"""Orientations of which the bounding boxes are taken together, where the angle varies."""
+
+_CHUNK = 1 << 17
+"""Poses of a chunk at most: a second's work or less, and a megabyte of each index."""
+
+Region = tuple[slice, ...]
+"""A part of a grid: from where to where along each of its axes."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A coordinate that varies, in equal steps.
+
+    Attributes
+    ----------
+    name : str
+        ``x``, ``y``, ``z`` or ``phi``.
+    least, greatest : float
+        The first and the last value, m or rad.
+    count : int
+        How many values there are.
+    """
+
+    name: str
+    least: float
+    greatest: float
+    count: int
+
+    @property
+    def values(self) -> Array:
+        """The values, shape (count,), m or rad."""
+        return np.linspace(self.least, self.greatest, self.count)
+
+    @property
+    def unit(self) -> str:
+        """Of the values: ``m`` or ``rad``."""
+        return "rad" if self.name == "phi" else "m"
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Poses of which some coordinates vary and the others are held.
+
+    Attributes
+    ----------
+    coordinates : tuple of str
+        All coordinates of a pose, in order.
+    pose : tuple of float
+        A pose with the values that are held, m and rad; at the places of those that vary it has the
+        middle.
+    axes : tuple of Axis
+        The coordinates that vary, in the order of the pose; one array axis each.
+    """
+
+    coordinates: tuple[str, ...]
+    pose: tuple[float, ...]
+    axes: tuple[Axis, ...]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """How many values each axis has."""
+        return tuple(axis.count for axis in self.axes)
+
+    @property
+    def size(self) -> int:
+        """How many poses there are."""
+        return prod(self.shape)
+
+    @property
+    def held(self) -> dict[str, float]:
+        """The coordinates that do not vary, with their values, m or rad."""
+        varying = {axis.name for axis in self.axes}
+        pairs = zip(self.coordinates, self.pose, strict=True)
+        return {name: value for name, value in pairs if name not in varying}
+
+    @cached_property
+    def chunk(self) -> tuple[int, ...]:
+        """The shape of a chunk: the longest side is halved until there are few enough poses."""
+        sides = list(self.shape)
+        while prod(sides) > _CHUNK:
+            longest = sides.index(max(sides))
+            sides[longest] = -(-sides[longest] // 2)
+        return tuple(sides)
+
+    def regions(self) -> list[Region]:
+        """Return the chunks, in an order that depends on the grid's shape alone."""
+        cuts = [
+            [slice(i, min(i + side, count)) for i in range(0, count, side)]
+            for side, count in zip(self.chunk, self.shape, strict=True)
+        ]
+        return list(product(*cuts))
+
+    def poses(self, region: Region = ()) -> Array:
+        """Return the poses (..., m) of the grid, or of a part of it, m and rad."""
+        parts = region or (slice(None),) * len(self.axes)
+        values = [axis.values[part] for axis, part in zip(self.axes, parts, strict=True)]
+        found = np.empty((*map(len, values), len(self.pose)))
+        found[...] = self.pose
+        for k, (axis, own) in enumerate(zip(self.axes, values, strict=True)):
+            lead = (-1,) + (1,) * (len(values) - 1 - k)
+            found[..., self.coordinates.index(axis.name)] = own.reshape(lead)
+        return found
+
+
+def pose_grid(
+    robot: RobotLike,
+    held: Mapping[str, float] | None = None,
+    ranges: Mapping[str, tuple[float, ...]] | None = None,
+    *,
+    points: int | None = None,
+    center: PoseLike | None = None,
+    rim: float = 0.0,
+) -> Grid:
+    """Return a grid of a machine's poses.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+    held : mapping, optional
+        Coordinates that do not vary, with their values, m or rad. All others vary. Where it is left
+        out those in `ranges` vary, or else the first two lengths, and the others are held at
+        `center`.
+    ranges : mapping, optional
+        Least and greatest value of coordinates that vary, m or rad, and how many values if it is
+        not `points`. Other lengths that vary do so over the bounding box of the reach, an angle
+        over its limits or else a whole turn.
+    points : int, optional
+        How many values along each axis; by default 200 in a plane, 100 in three dimensions.
+    center : array, shape (m,), optional
+        Gives what is held where `held` is left out, m and rad; by default the home pose.
+    rim : float
+        Share of the bounding box by which lengths go beyond it on each side: pictures show where
+        the reach ends.
+
+    Returns
+    -------
+    Grid
+
+    Raises
+    ------
+    DataError
+        If a coordinate is unknown, nothing varies, or a value is no sensible length or angle.
+    ModelError
+        If a range is left to the reach and no position is in reach at this orientation.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.maps import pose_grid
+    >>> grid = pose_grid(pteron.load("quadrupteron"), {"z": 0.0, "phi": 0.0}, points=50)
+    >>> grid.shape, [axis.name for axis in grid.axes], grid.held
+    ((50, 50), ['x', 'y'], {'z': 0.0, 'phi': 0.0})
+    """
+    robot = as_manipulator(robot)
+    fixed, spans = dict(held or {}), dict(ranges or {})
+    _expect_coordinates(robot, fixed, spans)
+    names = robot.coordinates
+    pose = np.zeros(len(names))
+    if held is None:
+        # What varies needs no more than where to begin to look for the reach.
+        pose = home_pose(robot) if center is None else checked_one(robot, center, "center").copy()
+        varying = set(spans or [name for name in names if name in "xyz"][:2])
+        fixed = {n: float(v) for n, v in zip(names, pose, strict=True) if n not in varying}
+    for name, value in fixed.items():
+        pose[names.index(name)] = value
+    varying_names = [name for name in names if name not in fixed]
+    if not varying_names:
+        raise DataError(f"nothing varies: leave one of {', '.join(names)} out of what is held")
+    count = _POINTS[len(varying_names)] if points is None else points
+    free = [name for name in varying_names if name not in spans]
+    if "phi" in free:
+        limits = robot.platform.limits
+        spans["phi"] = (-pi, pi) if limits is None else limits
+    lengths = [name for name in free if name != "phi"]
+    if lengths:
+        box = _box(robot, pose, spans.get("phi"))
+        box += rim * np.array([-1.0, 1.0])[:, None] * np.ptp(box, axis=0)
+        spans |= {name: tuple(box[:, names.index(name)].tolist()) for name in lengths}
+    axes = []
+    for name in varying_names:
+        least, greatest, *own = spans[name]
+        number = int(own[0]) if own else count
+        if number < 2:
+            raise DataError(f"{name}: {number} points given, at least 2 expected")
+        axes.append(Axis(name, float(least), float(greatest), number))
+        pose[names.index(name)] = 0.5 * (least + greatest)
+    return Grid(names, tuple(pose.tolist()), tuple(axes))
+
+
+def _box(robot: Manipulator, pose: Array, angles: tuple[float, ...] | None) -> Array:
+    """Return the box (2, k) of the reach at a pose's orientation, or at angles between two."""
+    if angles is None:
+        return bounding_box(robot, pose)
+    boxes = []
+    for angle in np.linspace(angles[0], angles[1], _TURNS):
+        try:
+            boxes.append(bounding_box(robot, [*pose[:-1], angle]))
+        except ModelError as error:
+            nowhere = error
+    if not boxes:
+        raise nowhere
+    return np.array([np.min(boxes, axis=(0, 1)), np.max(boxes, axis=(0, 1))])
+
+
+def _expect_coordinates(
+    robot: Manipulator, held: Mapping[str, float], ranges: Mapping[str, tuple[float, ...]]
+) -> None:
+    """Refuse coordinates that the machine has not, and values that are none or in another unit."""
+    names = robot.coordinates
+    for name in (*held, *ranges):
+        if name not in names:
+            raise DataError(
+                f"{name}: is no coordinate of {robot.name}, whose poses have {', '.join(names)}"
+            )
+        if name in held and name in ranges:
+            raise DataError(f"{name}: both held and given a range; choose one")
+    for name, values in {**{n: (v,) for n, v in held.items()}, **ranges}.items():
+        if not np.isfinite(values).all():
+            raise DataError(f"{name}: a finite number expected")
+        if len(values) > 1 and not values[0] < values[1]:
+            raise DataError(
+                f"{name}: from {values[0]:g} to {values[1]:g} given, an ascending range expected"
+            )
+        for doubt in value_doubts(robot, [name], np.array([values[:2]])):
+            raise DataError(doubt)

@@ -1,0 +1,194 @@
+"""A map: what indices of performance are over a grid of poses, and which of the poses serve."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.errors import DataError
+from pteron.indices import INDICES, Index
+from pteron.kernels import Array
+from pteron.maps.grid import Grid
+from pteron.workspace import BEYOND_LIMITS, REACHABLE
+
+if TYPE_CHECKING:
+    import polars as pl
+
+MARGIN = Index(
+    "margin",
+    "distance to the end of the reach",
+    r"\min_i \min(d_i, l_i)",
+    "the legs' closed forms",
+    "m",
+    "more",
+)
+"""What a map has where no other index is asked for; negative where a pose does not serve."""
+
+ALL = {MARGIN.name: MARGIN, **INDICES}
+"""Whatever a map may hold, by name."""
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What an index is over the poses of a map that serve.
+
+    Attributes
+    ----------
+    name, unit : str
+        Of the index.
+    best, worst : float
+        Which is the greatest and which the least depends on the index.
+    best_pose, worst_pose : array, shape (m,)
+        Where, m and rad.
+    mean, median : float
+        Over the poses where it is a finite number.
+    count : int
+        How many these are.
+    infinite : int
+        At how many poses that serve it is none: they are singular, or next to it.
+    """
+
+    name: str
+    unit: str
+    best: float
+    best_pose: Array
+    worst: float
+    worst_pose: Array
+    mean: float
+    median: float
+    count: int
+    infinite: int
+
+
+@dataclass(frozen=True)
+class Map:
+    """Indices over a grid of poses.
+
+    Attributes
+    ----------
+    robot : str
+        The machine's name.
+    grid : Grid
+        The poses.
+    values : mapping of str to array, shape grid.shape
+        What each index is, in its `units`; NaN where the pose is out of reach, or the index is not
+        determined. ``margin`` is determined everywhere.
+    status : array of int, shape grid.shape
+        `REACHABLE`, 0; `BEYOND_LIMITS`, -1; or the leg, from 1, that misses the pose by most.
+    """
+
+    robot: str
+    grid: Grid
+    values: Mapping[str, Array]
+    status: NDArray[np.int8]
+
+    def __repr__(self) -> str:
+        sides = " x ".join(f"{axis.name} {axis.count}" for axis in self.grid.axes)
+        return f"<Map of {self.robot!r}: {', '.join(self.values)} over {sides}>"
+
+    @property
+    def indices(self) -> tuple[Index, ...]:
+        """What its values mean, in their order."""
+        return tuple(ALL[name] for name in self.values)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The unit of each index; empty for a plain number."""
+        return {index.name: index.unit for index in self.indices}
+
+    @property
+    def reachable(self) -> NDArray[np.bool_]:
+        """Which poses serve, shape grid.shape."""
+        return np.asarray(self.status == REACHABLE)
+
+    @property
+    def share(self) -> float:
+        """The share of the poses that serve."""
+        return float(self.reachable.mean())
+
+    @property
+    def causes(self) -> dict[str, float]:
+        """Why poses do not serve, and the share of all for which each is the cause."""
+        codes, counts = np.unique(self.status, return_counts=True)
+        shares = zip(codes.tolist(), (counts / self.status.size).tolist(), strict=True)
+        return {cause(code): share for code, share in shares if code != REACHABLE}
+
+    def summary(self, name: str) -> Summary:
+        """Return the best, the worst and the mean of an index over the poses that serve.
+
+        Raises
+        ------
+        DataError
+            If the map has no such index, or it is determined at no pose that serves.
+        """
+        if name not in self.values:
+            raise DataError(f"{name}: is not in this map; it has {', '.join(self.values)}")
+        index, values, serves = ALL[name], self.values[name], self.reachable
+        known = serves & np.isfinite(values)
+        if not known.any():
+            raise DataError(f"{name}: determined at no pose of this map that serves")
+        sign = 1.0 if index.better == "more" else -1.0
+        low, high = (
+            int(np.argmin(np.where(known, side * sign * values, np.inf))) for side in (1.0, -1.0)
+        )
+        chosen = values[known]
+        return Summary(
+            name,
+            index.unit,
+            float(values.flat[high]),
+            self._pose(high),
+            float(values.flat[low]),
+            self._pose(low),
+            float(chosen.mean()),
+            float(np.median(chosen)),
+            len(chosen),
+            int(serves.sum()) - len(chosen),
+        )
+
+    def _pose(self, place: int) -> Array:
+        region = tuple(
+            slice(int(i), int(i) + 1) for i in np.unravel_index(place, self.status.shape)
+        )
+        return self.grid.poses(region).reshape(-1)
+
+    def table(self) -> pl.DataFrame:
+        """Return one row a pose: its coordinates, the indices, and `status`.
+
+        The names of columns have units in brackets, as tables are read here.
+        """
+        import polars as pl
+
+        poses = self.grid.poses().reshape(-1, len(self.grid.coordinates))
+        columns = {
+            f"{name} [{'rad' if name == 'phi' else 'm'}]": poses[:, k]
+            for k, name in enumerate(self.grid.coordinates)
+        }
+        columns |= {headed(index): self.values[index.name].ravel() for index in self.indices}
+        frame = pl.DataFrame(columns | {"status": self.status.ravel()})
+        return frame.with_columns(pl.col(pl.Float64).fill_nan(None))
+
+    def at(self, name: str, value: float) -> Map:
+        """Return the map at the value of a coordinate that is nearest to one, m or rad."""
+        k = [axis.name for axis in self.grid.axes].index(name)
+        axes = list(self.grid.axes)
+        steps = axes.pop(k).values
+        i = int(np.abs(steps - value).argmin())
+        pose = list(self.grid.pose)
+        pose[self.grid.coordinates.index(name)] = float(steps[i])
+        values = {index: np.take(own, i, axis=k) for index, own in self.values.items()}
+        grid = Grid(self.grid.coordinates, tuple(pose), tuple(axes))
+        return Map(self.robot, grid, values, np.take(self.status, i, axis=k))
+
+
+def headed(index: Index) -> str:
+    """Return the heading of an index's column."""
+    return f"{index.name} [{index.unit}]" if index.unit else index.name
+
+
+def cause(status: int) -> str:
+    """Return what a status that is not `REACHABLE` says."""
+    return "beyond a joint's limit" if status == BEYOND_LIMITS else f"out of reach of leg {status}"

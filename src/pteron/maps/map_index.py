@@ -1,0 +1,180 @@
+"""Indices over a grid of poses: computed chunk by chunk, by whom and into what one asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from functools import lru_cache, partial
+from importlib.metadata import version
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from pteron.errors import DataError
+from pteron.indices.index import expect_index
+from pteron.kernels import Array, numeric
+from pteron.kinematics.evaluate import evaluated
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.manipulator.saving import text_of
+from pteron.maps.accelerated import accelerated
+from pteron.maps.files import checked_map_file, save_map
+from pteron.maps.grid import Grid, Region, pose_grid
+from pteron.maps.map import MARGIN, Map
+from pteron.maps.stores import MapStore, MemoryStore
+from pteron.maps.surfaces import ENDINGS as SURFACES
+from pteron.maps.sweep import cores, sweep
+
+Engine = Literal["auto", "jax"]
+
+_BLOCK = 1 << 14
+"""Poses in one call of a kernel: what it reads and writes stays in the processor's cache."""
+
+_MANY = 1 << 18
+"""Poses for which it pays to wait for the compiler."""
+
+
+def map_index(
+    robot: RobotLike,
+    index: str | Sequence[str] = (),
+    grid: Grid | None = None,
+    *,
+    engine: Engine = "auto",
+    out: str | Path | None = None,
+    scheduler: str | None = None,
+    workers: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Map:
+    """Return what indices of performance are over a grid of poses, and which of the poses serve.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+    index : str or sequence of str
+        Names of indices, as `pteron.indices.INDICES` has them, or ``"margin"``, the distance to the
+        end of the reach, m, which is there too where none is named.
+    grid : Grid, optional
+        The poses; by default those of `pose_grid(robot)`.
+    engine : {"auto", "jax"}
+        What computes: this processor's compiled kernels, or JAX, on the accelerator if it finds
+        one. They agree to rounding.
+    out : str or Path, optional
+        A file or a Zarr store, as `save_map` has them. What is computed streams to a ``.zarr``
+        chunk by chunk: after an interruption the same call goes on with what is left.
+    scheduler, workers
+        As `sweep` has them; by default this process does the work, in a thread a processor.
+    progress : callable, optional
+        Is told how many chunks are finished, and of how many.
+
+    Returns
+    -------
+    Map
+        The same bits, whoever has computed it.
+
+    Raises
+    ------
+    DataError
+        If an index or the engine is unknown.
+    ModelError
+        If a library is missing: the message names the extra.
+    OutputError
+        If `out` cannot be written, or holds the map of another machine, index or grid.
+    PteronError
+        As `sweep` raises.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.maps import map_index, pose_grid
+    >>> robot = pteron.load("quadrupteron")
+    >>> found = map_index(robot, "condition", pose_grid(robot, {"z": 0.0, "phi": 0.0}, points=41))
+    >>> found, round(found.summary("condition").best, 3)
+    (<Map of 'quadrupteron': condition over x 41 x y 41>, 2.414)
+    """
+    robot = as_manipulator(robot)
+    names = checked_indices(robot, index)
+    if engine not in get_args(Engine):
+        raise DataError(f"engine: {engine!r} given, one of {', '.join(get_args(Engine))} expected")
+    target = None if out is None else checked_map_file(out)
+    poses = pose_grid(robot) if grid is None else grid
+    if poses.coordinates != robot.coordinates:
+        raise DataError(
+            f"grid: of poses ({', '.join(poses.coordinates)}), while those of {robot.name} are "
+            f"({', '.join(robot.coordinates)})"
+        )
+    if target is not None and target.suffix.lower() in SURFACES:
+        names = tuple(dict.fromkeys((*names, MARGIN.name)))  # whose zero is the reach's surface
+    streams = target is not None and target.suffix.lower() == ".zarr"
+    here = scheduler is None and workers is None
+    with ExitStack() as opened:
+        store: MapStore | MemoryStore
+        if streams or not here:
+            place = target if streams else Path(opened.enter_context(_folder()), "map.zarr")
+            assert place is not None
+            store = MapStore.of(place, robot.name, poses, names, _plan(robot, engine))
+        else:
+            store = MemoryStore(poses, names)
+        if engine == "auto":
+            prepare(robot, names, poses.size)  # once, for all processes
+        sweep(
+            partial(_computed, robot, names, poses, engine),
+            poses.regions(),
+            store,
+            scheduler=scheduler,
+            workers=workers,
+            threads=1 if engine == "jax" else cores(),
+            progress=progress,
+        )
+        found = store.map(robot.name)
+    if target is not None and not streams:
+        save_map(found, target)
+    return found
+
+
+def checked_indices(robot: Manipulator, index: str | Sequence[str]) -> tuple[str, ...]:
+    """Return the names of indices after a check that the machine has them; `margin` if none."""
+    names = (index,) if isinstance(index, str) else tuple(dict.fromkeys(index))
+    for name in names:
+        if name != MARGIN.name:
+            expect_index(robot, name)
+    return names or (MARGIN.name,)
+
+
+def _folder() -> TemporaryDirectory[str]:
+    return TemporaryDirectory(prefix="pteron-map-")
+
+
+def _plan(robot: Manipulator, engine: str) -> dict[str, Any]:
+
+    return {"robot": text_of(robot), "engine": engine, "pteron": version("pteron")}
+
+
+def _computed(
+    robot: Manipulator, names: tuple[str, ...], grid: Grid, engine: str, region: Region
+) -> dict[str, Array]:
+    """Return the indices of a part of a grid, and `status`."""
+    if engine == "jax":
+        return accelerated(robot, names, grid, region)
+    prepare(robot, names, grid.size)
+    poses = grid.poses(region)
+    rows = poses.reshape(-1, poses.shape[-1])
+    found = {name: np.empty(len(rows)) for name in (*names, "status")}
+    for start in range(0, len(rows), _BLOCK):
+        part = slice(start, start + _BLOCK)
+        status, margin, _ = numeric(robot, "standing")(rows[part])
+        found["status"][part] = status
+        for name in names:
+            found[name][part] = (
+                margin if name == MARGIN.name else evaluated(robot, name, "nan", rows[part])
+            )
+    return {name: values.reshape(poses.shape[:-1]) for name, values in found.items()}
+
+
+@lru_cache(maxsize=64)
+def prepare(robot: Manipulator, names: tuple[str, ...], poses: int) -> None:
+    """Have the kernels ready: compiled where so many poses are worth it."""
+    for name in ("standing", *names):
+        if name != MARGIN.name:
+            numeric(robot, name).tier.fetch(at_any_cost=poses >= _MANY)

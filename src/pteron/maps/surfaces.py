@@ -1,0 +1,170 @@
+"""Surfaces of a map in three axes: the reach's, and those of equal value, for files that are drawn.
+
+The triangles are those of marching cubes (T. Lewiner et al., Journal of Graphics Tools 8(2) (2003)
+1-15), between poses that serve; the reach's surface is where its margin is zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt, map_coordinates  # type: ignore[import-untyped]
+
+from pteron.errors import DataError, ModelError
+from pteron.kernels import Array
+from pteron.maps.map import MARGIN, Map, headed
+
+ENDINGS = (".vtk", ".vtu", ".ply", ".stl")
+"""Of the files that hold surfaces; what a surface's value is, STL does not say."""
+
+_SHARES = (0.25, 0.5, 0.75)
+"""By default surfaces part the poses that serve, by their value, at these shares."""
+
+_BEYOND = 1e-9
+"""Metres: outside of the grid nothing is in reach, so that the reach's surface is closed."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A surface in three coordinates.
+
+    Attributes
+    ----------
+    level : float or None
+        The value that the index has all over it, in its unit; None on the surface of the reach.
+    points : array, shape (P, 3)
+        The map's axes in their order, m or rad.
+    triangles : array of int, shape (T, 3)
+        The numbers of their corners.
+    values : array, shape (P,)
+        What the index is at the points.
+    """
+
+    level: float | None
+    points: Array
+    triangles: NDArray[np.int64]
+    values: Array
+
+
+def surfaces(given: Map, name: str, levels: Sequence[float] | None = None) -> tuple[Surface, ...]:
+    """Return the surface of the reach, if the map has its margin, and those of equal value.
+
+    Parameters
+    ----------
+    given : Map
+        Over three axes.
+    name : str
+        The index.
+    levels : sequence of float, optional
+        Values, in the index's unit; by default those which 25, 50 and 75 % of the poses that serve
+        keep below, and none of ``margin``.
+
+    Returns
+    -------
+    tuple of Surface
+        Those that there are: where no two neighbours that serve are to both sides of a level, it
+        has none.
+
+    Raises
+    ------
+    DataError
+        If the map has not three axes or no such index, or it is determined at no pose that serves.
+    ModelError
+        If scikit-image is not installed.
+    """
+    measure = checked_surfaces()[0].marching_cubes
+    if len(given.grid.axes) != 3:
+        varying = ", ".join(axis.name for axis in given.grid.axes)
+        raise DataError(
+            f"surfaces need a map over three coordinates, and here there vary {varying}"
+        )
+    given.summary(name)  # or says that there is none
+    values, serves = given.values[name], given.reachable
+    known = serves & np.isfinite(values)
+    if levels is None:
+        shares = () if name == MARGIN.name else _SHARES
+        levels = np.unique(np.quantile(values[known], shares)).tolist()
+    # What is not determined has its nearest neighbour's value, so that interpolation stays finite.
+    nearest = distance_transform_edt(~known, return_distances=False, return_indices=True)
+    whole = values[tuple(nearest)]
+    found = []
+    if MARGIN.name in given.values:
+        closed = np.pad(given.values[MARGIN.name], 1, constant_values=-_BEYOND)
+        corners, triangles, *_ = measure(closed, 0.0)
+        corners = np.clip(corners - 1.0, 0.0, np.array(values.shape) - 1.0)
+        own = map_coordinates(whole, corners.T, order=1)
+        found.append(_surface(given, None, corners, triangles, own))
+    for level in levels:
+        if whole.min() < level < whole.max():
+            with suppress(RuntimeError):  # no triangle between poses that serve
+                corners, triangles, *_ = measure(whole, level, mask=known)
+                own = np.full(len(corners), level)
+                found.append(_surface(given, level, corners, triangles, own))
+    return tuple(found)
+
+
+def surface_bytes(given: Map, ending: str) -> bytes:
+    """Return a file of the surfaces of a map's first index.
+
+    Its points carry the index, under its name and unit. In VTK's files its triangles carry
+    `surface`, 0 for the reach's, else the level's number from 1; STL holds no more than triangles.
+    """
+    _, meshio = checked_surfaces()
+    index = given.indices[0]
+    parts = surfaces(given, index.name)
+    starts = np.cumsum([0, *(len(part.points) for part in parts)])
+    triangles = [part.triangles + start for part, start in zip(parts, starts, strict=False)]
+    levels = sorted(part.level for part in parts if part.level is not None)
+    numbers = [0 if part.level is None else 1 + levels.index(part.level) for part in parts]
+    kinds = [np.full(len(one), k, np.int32) for one, k in zip(triangles, numbers, strict=True)]
+    mesh = meshio.Mesh(
+        np.concatenate([part.points for part in parts]),
+        [("triangle", np.concatenate(triangles).astype(np.int32))],
+    )
+    if ending != ".stl":
+        # Names in these files have no blanks.
+        label = headed(index).replace(" [", "[").replace(" ", "_")
+        mesh.point_data[label] = np.concatenate([part.values for part in parts])
+    if ending.startswith(".vt"):
+        mesh.cell_data["surface"] = [np.concatenate(kinds)]
+    with TemporaryDirectory(prefix="pteron-surface-") as folder:
+        made = Path(folder, f"surface{ending}")
+        meshio.write(made, mesh, binary=True)
+        return made.read_bytes()
+
+
+def checked_surfaces() -> tuple[Any, Any]:
+    """Return the modules that find surfaces and write their files.
+
+    Raises
+    ------
+    ModelError
+        If one is not installed.
+    """
+    try:
+        import meshio
+        from skimage import measure
+    except ImportError as error:
+        raise ModelError(
+            f'surfaces need {error.name}, which is not installed; pip install "pteron[surfaces]"'
+        ) from None
+    return measure, meshio
+
+
+def _surface(
+    given: Map, level: float | None, corners: Array, triangles: NDArray[Any], values: Array
+) -> Surface:
+    """Return a surface of places in the grid (P, 3), without the triangles that have no area."""
+    axes = given.grid.axes
+    steps = [(axis.greatest - axis.least) / (axis.count - 1) for axis in axes]
+    points = np.asarray([axis.least for axis in axes] + corners * steps)
+    a, b, c = np.moveaxis(corners[triangles], 1, 0)
+    flat = (np.cross(b - a, c - a) == 0.0).all(axis=-1)
+    return Surface(level, points, triangles[~flat].astype(np.int64), values)

@@ -1,0 +1,230 @@
+"""The same work on many chunks: here, in processes of this computer, or on a cluster.
+
+Chunks are numbered by a plan that depends on nothing but what is asked for. What a chunk gives is
+written, whole or not at all, by whoever has computed it. So a worker or a client that is killed
+loses what it was at and nothing else, a chunk that is computed twice is written twice alike, and
+the result does not depend on who computed what. Who computes a chunk, and again after a worker is
+gone, is `dask.distributed`'s business.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Callable, Collection, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import ExitStack, contextmanager
+from functools import partial
+from importlib.metadata import version
+from itertools import islice
+from typing import Any, Protocol, TypeVar
+
+from pteron.errors import DataError, ModelError, PteronError
+
+_Chunk = TypeVar("_Chunk")
+_Result = TypeVar("_Result")
+_Written = TypeVar("_Written", contravariant=True)
+
+_WAIT = 10.0
+"""Seconds after which a scheduler, or its first worker, is taken for absent."""
+
+_AHEAD = 4
+"""Chunks for each thread that a cluster is given at once; a sweep may have millions."""
+
+
+class Store(Protocol[_Written]):
+    """Where a sweep's results go. It crosses to other processes, and they must reach its place."""
+
+    def finished(self) -> Collection[int]:
+        """Return the numbers of the chunks that are written."""
+
+    def write(self, number: int, result: _Written) -> None:
+        """Write what a chunk gave: when it returns the chunk is finished, before it is not."""
+
+
+def sweep(
+    function: Callable[[_Chunk], _Result],
+    chunks: Sequence[_Chunk],
+    store: Store[_Result],
+    *,
+    scheduler: str | None = None,
+    workers: int | None = None,
+    threads: int = 1,
+    progress: Callable[[int, int], None] | None = None,
+) -> int:
+    """Compute the chunks that a store has not yet, and write what each gives to the store.
+
+    A sweep that was ended, by whatever, is resumed by the same call.
+
+    Parameters
+    ----------
+    function : callable
+        Takes a chunk and returns what the store writes. For other processes it must be found by
+        its module and name, as a function of a module is, or a `functools.partial` of one.
+    chunks : sequence
+        What there is to compute, in the plan's order; the k-th is the store's number k.
+    store : Store
+        Where the results go, such as a `TableStore`.
+    scheduler : str, optional
+        The address of a Dask scheduler, such as ``tcp://host:8786``, whose workers do the work.
+        They reach the store by the same path as this process does.
+    workers : int, optional
+        Processes of this computer that do the work; by default this process does it. A script that
+        asks for them does so under ``if __name__ == "__main__":``, as Python's `multiprocessing`
+        wants it.
+    threads : int
+        How many share the work in this process, for functions that leave Python's lock to others.
+        The first chunk is computed alone: what it builds, the others share.
+    progress : callable, optional
+        Is told how many chunks are finished, and of how many, at first and after each.
+
+    Returns
+    -------
+    int
+        How many chunks were computed: none where the store had them all.
+
+    Raises
+    ------
+    DataError
+        If `scheduler` and `workers` are both given, or there are no workers or threads.
+    ModelError
+        If `dask.distributed` is not installed: ``pip install "pteron[cluster]"``.
+    PteronError
+        If the scheduler does not answer, has no workers, or those have another version of Pteron;
+        if a chunk ends one worker after another. What the function raises comes as it is.
+    """
+    if scheduler is not None and workers is not None:
+        raise DataError("scheduler and workers given; a scheduler has its own workers: give one")
+    for name, count in (("workers", workers), ("threads", threads)):
+        if count is not None and count < 1:
+            raise DataError(f"{name}: {count} given, 1 or more expected")
+    done = set(store.finished())
+    left = [k for k in range(len(chunks)) if k not in done]
+    tell = progress or (lambda *_: None)
+    tell(len(chunks) - len(left), len(chunks))
+    if not left:
+        return 0
+    tasks = ((k, chunks[k]) for k in left)
+    task = partial(_computed, function, store)
+    finished = (
+        _here(task, tasks, threads)
+        if scheduler is None and workers is None
+        else _elsewhere(task, tasks, scheduler, workers)
+    )
+    for count, _ in enumerate(finished, start=len(chunks) - len(left) + 1):
+        tell(count, len(chunks))
+    return len(left)
+
+
+def _computed(
+    function: Callable[[_Chunk], _Result], store: Store[_Result], number: int, chunk: _Chunk
+) -> None:
+    store.write(number, function(chunk))
+
+
+def _here(
+    task: Callable[[int, Any], None], tasks: Iterator[tuple[int, Any]], threads: int
+) -> Iterator[None]:
+    """Do the tasks in this process; yield after each."""
+    for one in islice(tasks, 1 if threads > 1 else None):
+        task(*one)
+        yield
+    with ThreadPoolExecutor(threads) as pool:
+        pending = {pool.submit(task, *one) for one in islice(tasks, _AHEAD * threads)}
+        try:
+            while pending:
+                ready, pending = wait(pending, return_when=FIRST_COMPLETED)
+                for future in ready:
+                    yield future.result()
+                pending |= {pool.submit(task, *one) for one in islice(tasks, len(ready))}
+        finally:
+            for future in pending:
+                future.cancel()
+
+
+def _elsewhere(
+    task: Callable[[int, Any], None],
+    tasks: Iterator[tuple[int, Any]],
+    scheduler: str | None,
+    workers: int | None,
+) -> Iterator[None]:
+    """Do the tasks in other processes; yield after each."""
+    distributed = _distributed()
+
+    def submitted(one: tuple[int, Any]) -> Future[None]:
+        # Each is a task of its own: that its result is none does not mean it is not needed.
+        future: Future[None] = client.submit(task, *one, pure=False)
+        return future
+
+    with _client(scheduler, workers) as client:
+        ahead = _AHEAD * max(1, sum(client.nthreads().values()))
+        pending = distributed.as_completed([submitted(one) for one in islice(tasks, ahead)])
+        for future in pending:
+            try:
+                yield future.result()
+            except distributed.KilledWorker as error:
+                raise PteronError(
+                    f"a chunk has ended {error.allowed_failures + 1} workers one after another: do "
+                    "they have enough memory? What is finished is kept: run it again"
+                ) from None
+            for one in islice(tasks, 1):
+                pending.add(submitted(one))
+
+
+@contextmanager
+def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
+    """Yield a client of a cluster that answers and has Pteron as it is here."""
+    distributed = _distributed()
+    with ExitStack() as opened:
+        if scheduler is None:
+            # One thread each: its kernels then share no lock with another's.
+            cluster = distributed.LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                dashboard_address=None,
+                silence_logs=logging.CRITICAL,
+            )
+            address, where = opened.enter_context(cluster), "local workers"
+        else:
+            address, where = scheduler, f"scheduler {scheduler}"
+        try:
+            client = opened.enter_context(distributed.Client(address, timeout=_WAIT))
+        except (OSError, ValueError, TypeError) as error:
+            raise PteronError(
+                f"{where}: does not answer ({str(error).splitlines()[0]}); start one with: "
+                "dask scheduler"
+            ) from None
+        try:
+            client.wait_for_workers(1, timeout=_WAIT)
+        except TimeoutError:
+            raise PteronError(
+                f"{where}: has no workers; start some with: dask worker {scheduler}"
+            ) from None
+        here = version("pteron")
+        for worker, found in client.run(version, "pteron", on_error="return").items():
+            if found != here:
+                told = "none" if isinstance(found, BaseException) else found
+                raise PteronError(
+                    f"{where}: worker {worker} has Pteron {told}, {here} expected; install "
+                    "the same there"
+                )
+        yield client
+
+
+def _distributed() -> Any:
+    """Return `dask.distributed`, whose functions have no types."""
+    try:
+        import distributed
+    except ImportError:
+        raise ModelError(
+            "other processes need dask.distributed, which is not installed; "
+            'pip install "pteron[cluster]"'
+        ) from None
+    return distributed
+
+
+def cores() -> int:
+    """Return how many processors this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

@@ -1,0 +1,111 @@
+"""The front of a design search: what each objective costs in the others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.gridspec import GridSpec
+from numpy.typing import ArrayLike
+
+from pteron.errors import DataError
+from pteron.plots.canvas import INK, LEG_COLORS, PAPER, blank, legend, plain_axes, spot
+
+_WIDE, _TALL = 5.4, 3.5
+_PANEL = 2.4
+"""Inches of the figure, and of each further panel's height."""
+
+_MARKS = ("D", "s", "^", "v", "P")
+
+
+def front_figure(
+    objectives: ArrayLike,
+    names: Sequence[str],
+    units: Sequence[str],
+    *,
+    start: ArrayLike | None = None,
+    chosen: Mapping[str, int] | None = None,
+) -> Figure:
+    """Return the front: the first objective over each of the others.
+
+    Parameters
+    ----------
+    objectives : array, shape (K, M)
+        Of each design; with one objective alone it is drawn over the designs' numbers.
+    names, units : sequence of str
+        Of the objectives; lengths are shown in mm.
+    start : array, shape (M,), optional
+        The machine to begin with.
+    chosen : mapping of str to int, optional
+        Designs to point out, by what they are called.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    DataError
+        If the shapes do not fit together.
+
+    Examples
+    --------
+    >>> from pteron.plots import front_figure
+    >>> figure = front_figure([[0.2, 1.4], [0.3, 1.9]], ["cube", "links"], ["m", "m"])
+    >>> [axes.get_ylabel() for axes in figure.axes]
+    ['cube (mm)']
+    """
+    values = np.asarray(objectives, dtype=float)
+    if values.ndim != 2 or values.shape[1] != len(names) or len(units) != len(names):
+        raise DataError(
+            f"objectives: shape {values.shape} given, (K, {len(names)}) expected, with a unit each"
+        )
+    begun = None if start is None else np.asarray(start, dtype=float)
+    if begun is not None and begun.shape != values.shape[1:]:
+        raise DataError(f"start: shape {begun.shape} given, ({len(names)},) expected")
+    scales = np.array([1000.0 if unit == "m" else 1.0 for unit in units])
+    labels = [_label(name, unit) for name, unit in zip(names, units, strict=True)]
+    values = values * scales
+    begun = None if begun is None else begun * scales
+    if values.shape[1] == 1:
+        values = np.column_stack([values, np.arange(1, len(values) + 1)])
+        labels.append("design of the front")
+        begun = None
+    others = values.shape[1] - 1
+    figure = blank(_WIDE, _TALL + _PANEL * (others - 1))
+    grid = GridSpec(others, 1, figure=figure)
+    for k in range(1, others + 1):
+        axes = plain_axes(figure, labels[k], labels[0])
+        axes.set_subplotspec(grid[k - 1])
+        order = np.argsort(values[:, k])
+        axes.plot(
+            values[order, k],
+            values[order, 0],
+            color=LEG_COLORS[0],
+            marker="o",
+            markersize=4.5,
+            linewidth=0.8,
+            linestyle="-" if others == 1 else "none",
+            label="designs of the front" if k == 1 else None,
+        )
+        for mark, (name, at) in zip(_MARKS, (chosen or {}).items(), strict=False):
+            told = name.replace("-", " ") if k == 1 else None
+            spot(
+                *(axes, values[at, k], values[at, 0], LEG_COLORS[1], PAPER, 8.0),
+                marker=mark,
+                label=told,
+                zorder=5,
+            )
+        if begun is not None and np.isfinite(begun[[0, k]]).all():
+            told = "to begin with" if k == 1 else None
+            spot(axes, begun[k], begun[0], INK, PAPER, 11.0, marker="*", label=told, zorder=6)
+        axes.margins(0.08)
+    legend(figure, 3)
+    return figure
+
+
+def _label(name: str, unit: str) -> str:
+    unit = "mm" if unit == "m" else unit
+    said = name.replace("_", " ")
+    return f"{said} ({unit})" if unit else said

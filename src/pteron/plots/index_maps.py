@@ -1,0 +1,423 @@
+"""Maps of indices over poses: coloured where a pose serves, hatched where it does not, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm, Normalize, to_hex, to_rgb
+from matplotlib.figure import Figure
+from matplotlib.gridspec import GridSpec
+from matplotlib.patches import Patch
+from matplotlib.ticker import LogLocator, NullFormatter
+from matplotlib.transforms import Bbox
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt  # type: ignore[import-untyped]
+
+from pteron.atomic import write_bytes
+from pteron.errors import DataError
+from pteron.kernels import Array
+from pteron.maps import Axis, Map, Summary
+from pteron.maps.map import ALL, MARGIN, cause
+from pteron.plots.canvas import (
+    FONT_SIZE,
+    GRID,
+    INK,
+    LEG_COLORS,
+    MUTED,
+    PAPER,
+    blank,
+    plain_axes,
+    spot,
+)
+from pteron.plots.encoders import ENCODERS
+from pteron.plots.films import Film, checked_film
+from pteron.workspace import BEYOND_LIMITS, REACHABLE
+
+_WIDTH = 5.0
+"""Inches: what is written stays legible on a phone."""
+
+_SCALES = {"m": (1e3, "mm"), "rad": (180.0 / np.pi, "degrees")}
+"""What people read in place of m and rad."""
+
+_HATCHES = {BEYOND_LIMITS: "....", 1: "////", 2: "\\\\\\\\", 3: "xxxx", 4: "----"}
+_WIDE = 20.0
+"""From that ratio of the greatest value to the middle one on, colours go by the logarithm."""
+
+_ALIKE = 1e-6
+"""Relative differences that are none to see."""
+
+_TINY = 1e-12
+
+_LAST = 99.0
+"""Percent of the values that have a colour of their own where a few are far off."""
+
+_BELOW = 4.5
+"""Sizes of a letter from the axes to the legend: the scale's numbers and its name stand there."""
+
+_FPS = 10.0
+_DPI = 160
+
+
+def map_figure(given: Map, *names: str) -> Figure:
+    """Return the picture of a map: a panel for each index, one below the other.
+
+    Over one coordinate it is a curve, over two a plane. Over three it is the three planes through
+    the pose that is deepest among those that serve. Colours are for the colour-blind too (cividis),
+    and the bright ones are always the better ones. Lengths are in mm, angles in degrees.
+
+    Parameters
+    ----------
+    given : Map
+        Over one to three coordinates.
+    *names : str
+        Its indices; by default all.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    DataError
+        If it has more coordinates, or not such an index.
+
+    Examples
+    --------
+    >>> from pteron.maps import map_index, pose_grid
+    >>> from pteron.plots import map_figure
+    >>> grid = pose_grid("delta", {"z": -0.9}, points=31)
+    >>> figure = map_figure(map_index("delta", "condition", grid))
+    """
+    chosen = names or tuple(given.values)
+    for name in chosen:
+        if name not in given.values:
+            raise DataError(f"{name}: is not in this map; it has {', '.join(given.values)}")
+    planes = _planes(given)
+    scales = {name: _normalised(given, name) for name in chosen}
+    panels = [(plane, name) for name in chosen for plane in planes]
+    return _drawn(panels, scales, {})
+
+
+def map_film(
+    given: Map,
+    name: str,
+    path: str | Path,
+    *,
+    fps: float = _FPS,
+    progress: Callable[[int, int], None] | None = None,
+) -> Film:
+    """Write a film that goes through the last coordinate of a map over three.
+
+    Its colours mean the same in all frames.
+
+    Parameters
+    ----------
+    given : Map
+        Over three coordinates.
+    name : str
+        The index.
+    path : str or Path
+        The file: .mp4 or .gif.
+    fps : float
+        Frames, that is values of the last coordinate, a second.
+    progress : callable, optional
+        Is told how many frames are done, and of how many.
+
+    Returns
+    -------
+    Film
+
+    Raises
+    ------
+    DataError
+        If the map has not three coordinates, or not such an index.
+    OutputError
+        If the file cannot be written, or its ending is neither .mp4 nor .gif.
+    PteronError
+        If the encoder of MP4 files is not there: ``pip install 'pteron[film]'`` brings it.
+    """
+    target = checked_film(path)
+    if len(given.grid.axes) != 3 or name not in given.values:
+        raise DataError("a film needs a map over three coordinates, and an index that is in it")
+    last, scales = given.grid.axes[-1], {name: _normalised(given, name)}
+    encoder = ENCODERS[target.suffix.lower()]
+    rate = encoder.rate(fps)
+    values = last.values.tolist()
+    figure = _drawn([(given.at(last.name, values[0]), name)], scales, given.causes)
+    size = _even(figure)
+    figure.draw_without_rendering()
+    places = [axes.get_position() for axes in figure.axes]
+    with TemporaryDirectory(prefix="pteron-film-") as folder:
+        made = Path(folder, f"film{target.suffix.lower()}")
+        with closing(encoder.writer(made, size, rate)) as writer:
+            for done, value in enumerate(values, start=1):
+                figure = _drawn([(given.at(last.name, value), name)], scales, given.causes)
+                writer.add(_picture(figure, size, places))
+                if progress is not None:
+                    progress(done, len(values))
+        write_bytes(target, made.read_bytes())
+    return Film(target, last.count, rate, 1.0, size)
+
+
+def _even(figure: Figure) -> tuple[int, int]:
+    """Return a figure's width and height, pixels, made even, as films want them."""
+    width, height = (2 * round(_DPI * float(side) / 2.0) for side in figure.get_size_inches())
+    figure.set_dpi(_DPI)
+    figure.set_size_inches(width / _DPI, height / _DPI)
+    return width, height
+
+
+def _picture(figure: Figure, size: tuple[int, int], places: Sequence[Bbox]) -> NDArray[np.uint8]:
+    """Return the picture (height, width, 3) of a figure, its axes in the same places as ever."""
+    figure.set_layout_engine("none")
+    figure.set_dpi(_DPI)
+    figure.set_size_inches(size[0] / _DPI, size[1] / _DPI)
+    for axes, place in zip(figure.axes, places, strict=True):
+        axes.set_position(place)
+    canvas: Any = figure.canvas
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())[..., :3]
+
+
+def _planes(given: Map) -> list[Map]:
+    """Return the map itself, or of one over three coordinates the planes through its middle."""
+    axes = given.grid.axes
+    if len(axes) < 3:
+        return [given]
+    if len(axes) > 3:
+        raise DataError(
+            f"{', '.join(axis.name for axis in axes)} vary: a picture shows three coordinates; "
+            "hold the others"
+        )
+    depth = distance_transform_edt(np.pad(given.reachable, 1))[1:-1, 1:-1, 1:-1]
+    middle = np.unravel_index(int(depth.argmax()), depth.shape)
+    places = [axis.values[i] for axis, i in zip(axes, middle, strict=True)]
+    return [
+        given.at(axis.name, float(place))
+        for axis, place in zip(reversed(axes), reversed(places), strict=True)
+    ]
+
+
+def _normalised(given: Map, name: str) -> Normalize:
+    """Return how the values of an index become colours."""
+    factor = _SCALES.get(ALL[name].unit, (1.0, ""))[0]
+    known = factor * given.values[name][given.reachable & np.isfinite(given.values[name])]
+    if not len(known):
+        return Normalize(0.0, 1.0)
+    low, high = float(known.min()), float(known.max())
+    if high - low <= _ALIKE * max(abs(low), abs(high)):
+        return Normalize(0.9 * low, 1.1 * low + _TINY)
+    middle, last = np.percentile(known, [50.0, _LAST]).tolist()
+    if low > 0.0 and high > _WIDE * middle:
+        return LogNorm(low, last if last > low else high)
+    return Normalize(low, last if ALL[name].better == "less" and high > 3.0 * last else high)
+
+
+def _drawn(
+    panels: Sequence[tuple[Map, str]], scales: Mapping[str, Normalize], causes: Mapping[str, Any]
+) -> Figure:
+    """Return a figure of panels, whose legends have these causes too, there or not."""
+    heights = [_height(plane) for plane, _ in panels]
+    figure = blank(_WIDTH, sum(heights))
+    grid = GridSpec(len(panels), 1, figure=figure, height_ratios=heights)
+    for k, (plane, name) in enumerate(panels):
+        labels = [_label(axis) for axis in plane.grid.axes]
+        axes = plain_axes(figure, labels[0], labels[1] if len(labels) > 1 else _named(name))
+        axes.set_subplotspec(grid[k])
+        axes.set_title(_title(plane), fontsize=FONT_SIZE, color=INK, loc="left")
+        if len(labels) == 1:
+            _curve(axes, plane, name)
+        else:
+            _plane(figure, axes, plane, name, scales[name], causes)
+    return figure
+
+
+def _height(plane: Map) -> float:
+    """Return the inches of a panel with its titles, scale and legend."""
+    if len(plane.grid.axes) < 2:
+        return 3.2
+    first, second = plane.grid.axes
+    if first.unit != second.unit:
+        return 4.4
+    shape = (second.greatest - second.least) / (first.greatest - first.least)
+    return min(max(1.35 + 3.6 * shape, 2.4), 6.5)
+
+
+def _plane(
+    figure: Figure,
+    axes: Axes,
+    plane: Map,
+    name: str,
+    scale: Normalize,
+    causes: Mapping[str, Any],
+) -> None:
+    """Draw an index over two coordinates."""
+    axes.grid(visible=False)
+    first, second = (_shown(axis) for axis in plane.grid.axes)
+    factor = _SCALES.get(ALL[name].unit, (1.0, ""))[0]
+    values = factor * np.ma.masked_invalid(plane.values[name].T)
+    drawn = np.ma.masked_where(plane.status.T != REACHABLE, values)
+    better = ALL[name].better == "more"
+    mesh = axes.pcolormesh(
+        first,
+        second,
+        drawn,
+        norm=scale,
+        cmap="cividis" if better else "cividis_r",
+        shading="nearest",
+        rasterized=True,
+    )
+    handles = _hatched(axes, plane, name, causes)
+    if drawn.count():
+        _best(axes, plane, name, handles)
+    bar = figure.colorbar(mesh, ax=axes, fraction=0.05, pad=0.02, extend=_extended(drawn, scale))
+    told = "bright is better"
+    if drawn.count() and _alike(summary := plane.summary(name)):
+        bar.set_ticks([factor * summary.best], labels=[f"{factor * summary.best:.4g}"])
+        told = "the same everywhere here"
+    elif isinstance(scale, LogNorm):
+        bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        bar.ax.yaxis.set_major_formatter("{x:g}")
+        bar.ax.yaxis.set_minor_formatter(NullFormatter())
+    bar.set_label(f"{_named(name)}\n{told}", fontsize=FONT_SIZE, color=INK)
+    bar.ax.tick_params(labelsize=FONT_SIZE - 1.0, colors=INK, color=MUTED)
+    outline: Any = bar.outline
+    outline.set_visible(False)
+    axes.set(xlim=(first[0], first[-1]), ylim=(second[0], second[-1]))
+    if plane.grid.axes[0].unit == plane.grid.axes[1].unit:
+        axes.set_aspect("equal")
+    if handles:
+        axes.legend(
+            handles=handles,
+            loc="upper center",
+            bbox_to_anchor=(0.5, 0.0),
+            borderaxespad=_BELOW,
+            ncols=2,
+            frameon=False,
+            fontsize=FONT_SIZE - 1.0,
+            labelcolor=INK,
+        )
+
+
+def _extended(drawn: Any, scale: Normalize) -> str:
+    """Return at which ends of its colours a picture has values beyond."""
+    low, high = float(scale.vmin or 0.0), float(scale.vmax or 0.0)
+    slack = _ALIKE * (high - low)
+    under = drawn.count() > 0 and float(drawn.min()) < low - slack
+    over = drawn.count() > 0 and float(drawn.max()) > high + slack
+    return ("both" if over else "min") if under else ("max" if over else "neither")
+
+
+def _hatched(axes: Axes, plane: Map, name: str, causes: Mapping[str, Any]) -> list[Any]:
+    """Draw where poses do not serve, and return what stands for it in the legend."""
+    first, second = (_shown(axis) for axis in plane.grid.axes)
+    status, told = plane.status.T, name == MARGIN.name
+    handles: dict[str, Any] = {}
+    for code in (BEYOND_LIMITS, *range(1, len(_HATCHES))):
+        here = status == code
+        if not here.any() and cause(code) not in causes:
+            continue
+        known = told or code == BEYOND_LIMITS
+        face = _light(LEG_COLORS[code - 1]) if told and code != BEYOND_LIMITS else GRID
+        hatch = _HATCHES[code if known else 1]
+        if here.any():
+            region = axes.contourf(
+                *(first, second, here.astype(float)),
+                levels=[0.5, 1.5],
+                colors=[face],
+                hatches=[hatch],
+            )
+            region.set(edgecolor=MUTED, linewidth=0.0)
+        label = cause(code) if known else "out of reach"
+        handles[label] = Patch(facecolor=face, edgecolor=MUTED, hatch=hatch, label=label, lw=0.0)
+    undetermined = (status == REACHABLE) & ~np.isfinite(plane.values[name].T)
+    if undetermined.any():
+        axes.contourf(*(first, second, undetermined.astype(float)), levels=[0.5, 1.5], colors=[INK])
+        label = "singular: not determined"
+        handles[label] = Patch(facecolor=INK, label=label, lw=0.0)
+    serves = (status == REACHABLE).astype(float)
+    if 0.0 == serves.min() < serves.max():
+        axes.contour(first, second, serves, levels=[0.5], colors=[MUTED], linewidths=0.8)
+    return list(handles.values())
+
+
+def _best(axes: Axes, plane: Map, name: str, handles: list[Any]) -> None:
+    """Mark the best pose of a plane, unless all are alike."""
+    found = plane.summary(name)
+    if _alike(found):
+        return
+    factor = _SCALES.get(found.unit, (1.0, ""))[0]
+    at = [
+        _SCALES[axis.unit][0] * found.best_pose[plane.grid.coordinates.index(axis.name)]
+        for axis in plane.grid.axes
+    ]
+    label = f"best here: {factor * found.best:.4g} {_unit(name)}".rstrip()
+    spot(axes, at[0], at[1], PAPER, INK, 6.0, zorder=5, label=label)
+    handles.append(axes.lines[-1])
+
+
+def _alike(found: Summary) -> bool:
+    return abs(found.best - found.worst) <= _ALIKE * abs(found.best)
+
+
+def _curve(axes: Axes, given: Map, name: str) -> None:
+    """Draw an index over one coordinate."""
+    place = _shown(given.grid.axes[0])
+    factor = _SCALES.get(ALL[name].unit, (1.0, ""))[0]
+    serves = given.reachable
+    axes.plot(place, np.where(serves, factor * given.values[name], np.nan), color=INK)
+    axes.set(xlim=(place[0], place[-1]))
+    if not serves.all():
+        axes.fill_between(
+            place,
+            *(0.0, 1.0),
+            where=(~serves).tolist(),
+            transform=axes.get_xaxis_transform(),
+            facecolor=GRID,
+            edgecolor=MUTED,
+            hatch="////",
+            linewidth=0.0,
+            label="out of reach or beyond a joint's limit",
+        )
+        axes.legend(frameon=False, fontsize=FONT_SIZE - 1.0, labelcolor=INK)
+
+
+def _light(color: str) -> str:
+    """Return a colour mixed with white."""
+    red, green, blue = (0.75 + 0.25 * part for part in to_rgb(color))
+    return to_hex((red, green, blue))
+
+
+def _shown(axis: Axis) -> Array:
+    return _SCALES[axis.unit][0] * axis.values
+
+
+def _label(axis: Axis) -> str:
+    return f"{'φ' if axis.name == 'phi' else axis.name} ({_SCALES[axis.unit][1]})"
+
+
+def _named(name: str) -> str:
+    unit = _unit(name)
+    return f"{ALL[name].title} ({unit})" if unit else ALL[name].title
+
+
+def _unit(name: str) -> str:
+    """Return the unit in which an index is shown."""
+    return _SCALES.get(ALL[name].unit, (1.0, ALL[name].unit))[1]
+
+
+def _title(given: Map) -> str:
+    """Return the machine's name, and the coordinates that are held."""
+    units = {name: "rad" if name == "phi" else "m" for name in given.grid.held}
+    held = [
+        f"{'φ' if name == 'phi' else name} = {_SCALES[units[name]][0] * value + 0.0:.4g}"
+        f"{'°' if name == 'phi' else ' mm'}"
+        for name, value in given.grid.held.items()
+    ]
+    return "  ".join([given.robot, *held])

@@ -1,0 +1,201 @@
+"""Regions of poses proved to be free of type-II singularities, in interval arithmetic.
+
+A region is cut into boxes until the type-II measure, whose bounds in a box are proved, has one sign
+in each. A pose at which it vanishes is sought by ordinary evaluation: between poses of either sign,
+and from boxes that are left by Newton's steps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pteron.equations.machine import closure_of
+from pteron.errors import DataError
+from pteron.kernels import Array, as_array, bounds, numeric
+from pteron.kinematics.architecture import is_singular_everywhere
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.workspace.regions import Box
+
+_SAMPLES = 4096
+_PAIRS = 64
+"""Pairs of poses of either sign between which a singular pose is sought."""
+
+_HALVINGS = 60
+_STEPS = 12
+"""Newton's steps towards a singular pose from the middle of a box."""
+
+_STARTS = 32
+"""Boxes from whose middles a singular pose is sought, between two rounds."""
+
+_SINGULAR = 1e-10
+"""The measure of a pose that counts as singular."""
+
+_DIFFERENCE = 1e-6
+"""m or rad, for the measure's slope."""
+
+
+@dataclass(frozen=True)
+class FreeRegion:
+    """Whether a region of poses is free of type-II singularities.
+
+    Attributes
+    ----------
+    free : bool or None
+        True: proved, for every pose of the region that is in reach. False: `pose` is singular.
+        None: neither was found within the number of boxes.
+    pose : array, shape (m,), or None
+        A singular pose in the region.
+    measure : float
+        What the type-II measure is in size: its proved floor where the region is free, that of
+        `pose` where it is not; 0 where it is undecided.
+    boxes : int
+        How many boxes were looked at.
+    undecided : array, shape (K, 2, m)
+        The boxes that are left, least and greatest pose of each; none where it is decided.
+    """
+
+    free: bool | None
+    pose: Array | None
+    measure: float
+    boxes: int
+    undecided: Array
+
+
+def free_of_singularities(
+    robot: RobotLike, region: Box | ArrayLike, *, floor: float = 0.0, most: int = 100_000
+) -> FreeRegion:
+    """Prove that a region of poses is free of type-II singularities, or return one that it holds.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+    region : Box, or array of shape (2, m)
+        The least and the greatest pose, m and rad; a coordinate may have one value.
+    floor : float
+        Least size of the type-II measure that is to be proved; a pose counts as singular only where
+        the measure vanishes.
+    most : int
+        Boxes after which it is given up.
+
+    Returns
+    -------
+    FreeRegion
+
+    Raises
+    ------
+    DataError
+        If the region is none.
+
+    Examples
+    --------
+    >>> from pteron.workspace import free_of_singularities
+    >>> low, high = [-0.03, -0.03, -0.03, -1.2], [0.03, 0.03, 0.03, 1.2]
+    >>> free_of_singularities("quadrupteron", [low, high]).free
+    True
+    >>> found = free_of_singularities("quadrupteron", [low, [0.03, 0.03, 0.03, 2.0]])
+    >>> found.free, round(float(found.pose[3]), 9)
+    (False, 1.570796327)
+    """
+    robot = as_manipulator(robot)
+    corners = region.box if isinstance(region, Box) else region
+    given = as_array(corners, "region", (2, robot.freedom))
+    if given.ndim != 2 or not np.isfinite(given).all() or (given[0] > given[1]).any():
+        raise DataError(
+            f"region: {given.tolist()} given, the least and the greatest pose expected, finite"
+        )
+    none = np.empty((0, 2, robot.freedom))
+    found = _sampled(robot, given)
+    if found is not None:
+        return _refuted(robot, found, 0)
+    sizes = np.where(given[1] > given[0], given[1] - given[0], np.inf)
+    if closure_of(robot).orientation is not None:
+        sizes[:-1] = np.inf  # it depends on the angle alone
+    boxes, looked, least = given[None], 0, np.inf
+    while len(boxes):
+        looked += len(boxes)
+        measure = bounds(robot, "type_ii", boxes)["type_ii"]
+        away = (measure.low > floor) | (measure.high < -floor)
+        reach = bounds(robot, "squared_type_i", boxes)["squares"].high
+        nowhere = np.isnan(measure.low) | (reach < 0.0).any(axis=-1)
+        size = np.where(measure.low > 0.0, measure.low, -measure.high)
+        least = float(np.min(size[away], initial=least))
+        boxes = boxes[~(away | nowhere)]
+        if not len(boxes):
+            break
+        found = _stepped(robot, given, boxes)
+        if found is not None:
+            return _refuted(robot, found, looked)
+        if looked + 2 * len(boxes) > most:
+            return FreeRegion(None, None, 0.0, looked, boxes)
+        boxes = _halved(boxes, sizes)
+    return FreeRegion(True, None, least if np.isfinite(least) else 0.0, looked, none)
+
+
+def _refuted(robot: Manipulator, pose: Array, looked: int) -> FreeRegion:
+    measure = abs(float(numeric(robot, "type_ii")(pose)[0]))
+    return FreeRegion(False, pose, measure, looked, np.empty((0, 2, robot.freedom)))
+
+
+def _halved(boxes: Array, sizes: Array) -> Array:
+    """Return each box cut in two across its longest side, measured by sizes (m,)."""
+    longest = ((boxes[:, 1] - boxes[:, 0]) / sizes).argmax(axis=-1)
+    rows, middles = np.arange(len(boxes)), boxes.mean(axis=1)
+    lower, upper = boxes.copy(), boxes.copy()
+    lower[rows, 1, longest] = upper[rows, 0, longest] = middles[rows, longest]
+    return np.concatenate([lower, upper])
+
+
+def _in_reach(robot: Manipulator, poses: Array) -> Array:
+    """Return the type-II measure of poses (..., m), NaN out of reach."""
+    values = numeric(robot, "type_ii")(poses)[0]
+    reached = (numeric(robot, "squared_type_i")(poses)[0] >= 0.0).all(axis=-1)
+    return np.where(reached, values, np.nan)
+
+
+def _sampled(robot: Manipulator, region: Array) -> Array | None:
+    """Return a singular pose between random ones of the region, where they have either sign."""
+    rng = np.random.default_rng(0)
+    poses = rng.uniform(region[0], region[1], (_SAMPLES, robot.freedom))
+    values = _in_reach(robot, poses)
+    if is_singular_everywhere(robot) and (~np.isnan(values)).any():
+        return np.asarray(poses[~np.isnan(values)][0])
+    order = np.argsort(np.abs(values))
+    one, other = (poses[order[side[order]]][:_PAIRS] for side in (values < 0.0, values > 0.0))
+    count = min(len(one), len(other))
+    if not count:
+        return None
+    low, high = one[:count], other[:count]
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        below = (_in_reach(robot, middle) < 0.0)[:, None]
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    return _singular(robot, low)
+
+
+def _stepped(robot: Manipulator, region: Array, boxes: Array) -> Array | None:
+    """Return a singular pose of the region to which Newton's steps lead from boxes' middles."""
+    chosen = boxes[np.linspace(0, len(boxes) - 1, min(len(boxes), _STARTS)).astype(int)]
+    poses = chosen.mean(axis=1)
+    shifts = _DIFFERENCE * np.eye(robot.freedom)
+    free = region[1] > region[0]
+    for _ in range(_STEPS):
+        ahead, behind = (_in_reach(robot, poses[:, None] + side * shifts) for side in (1.0, -1.0))
+        slopes = np.where(free, (ahead - behind) / (2.0 * _DIFFERENCE), 0.0)
+        squares = (slopes * slopes).sum(axis=-1)
+        steps = _in_reach(robot, poses) / np.where(squares > 0.0, squares, np.inf)
+        moved = np.clip(poses - steps[:, None] * slopes, *region)
+        poses = np.where(np.isfinite(moved).all(axis=-1, keepdims=True), moved, poses)
+    return _singular(robot, poses)
+
+
+def _singular(robot: Manipulator, poses: Array) -> Array | None:
+    """Return the pose of a batch at which the measure is least, if it vanishes there."""
+    sizes = np.abs(_in_reach(robot, poses))
+    if np.isnan(sizes).all():
+        return None
+    best = int(np.nanargmin(sizes))
+    return np.asarray(poses[best]) if sizes[best] <= _SINGULAR else None

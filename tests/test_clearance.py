@@ -1,0 +1,155 @@
+"""Interference: the distance of segments, and of a machine's bodies."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import casadi as ca
+import numpy as np
+import pytest
+from mechanisms import CATALOG, random_machine
+from scipy.optimize import minimize
+
+import pteron
+from pteron.equations.clearance import squared_distance
+from pteron.kernels import numeric
+from pteron.motion import joint_guides, joint_points
+from pteron.workspace import Box, clearance, conditions, home_pose, interference, prove
+
+
+@pytest.fixture(scope="module")
+def distance():
+    ends = [ca.SX.sym(f"p{i}", 3) for i in range(4)]
+    square = squared_distance((ends[0], ends[1]), (ends[2], ends[3]))
+    function = ca.Function("distance", ends, [ca.sqrt(square)])
+    return lambda given: np.array(function(*np.moveaxis(given, 1, 0).swapaxes(-1, -2))).ravel()
+
+
+def random_segments(count):
+    """Return pairs of segments (K, 4, 3), among them parallel, collinear, crossing ones, points."""
+    rng = np.random.default_rng(0)
+    given = rng.normal(size=(count, 4, 3))
+    parallel = given[: count // 4]
+    parallel[:, 3] = parallel[:, 2] + rng.normal(size=(len(parallel), 1)) * (
+        parallel[:, 1] - parallel[:, 0]
+    )
+    parallel[::3, 2:] -= (parallel[:, 2] - parallel[:, 0])[::3, None]  # collinear
+    given[-10:, 1] = given[-10:, 0]
+    given[-5:, 3] = given[-5:, 2]
+    return given
+
+
+def test_segments_are_as_far_apart_as_a_search_over_both_finds(distance):
+    given = random_segments(120)
+    for (p, p_end, q, q_end), found in zip(given, distance(given), strict=True):
+
+        def square(at, p=p, u=p_end - p, q=q, v=q_end - q):
+            return ((p + at[0] * u - q - at[1] * v) ** 2).sum()
+
+        starts = [(0.5, 0.5), (0.0, 0.0), (1.0, 1.0)]
+        runs = [minimize(square, s, bounds=[(0, 1)] * 2, tol=1e-14) for s in starts]
+        least = np.sqrt(min(run.fun for run in runs))
+        assert found == pytest.approx(least, abs=2e-7)
+        assert found <= least + 1e-12
+
+
+def test_capsules_are_as_far_apart_as_mujoco_says(distance):
+    mujoco = pytest.importorskip("mujoco")
+    given = random_segments(60)[:50]
+    size = np.linalg.norm(given[:, 1] - given[:, 0], axis=-1)
+    given = given[size > 0.1]
+    for four in given:
+        texts = (" ".join(map(repr, ends.ravel().tolist())) for ends in (four[:2], four[2:]))
+        geoms = "".join(
+            f'<body><geom type="capsule" size="0.03" fromto="{text}"/></body>' for text in texts
+        )
+        model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{geoms}</worldbody></mujoco>")
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        told = mujoco.mj_geomDistance(model, data, 0, 1, 100.0, None)
+        assert distance(four[None])[0] - 0.06 == pytest.approx(told, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["delta", "h4", "quadrupteron", "linear-delta", "3-rrr"])
+def test_bodies_are_where_they_are_drawn(name, distance):
+    """The pictures' lines, cut into bodies here, have the same least distances."""
+    robot = CATALOG[name]
+    poses = pteron.random_poses(robot, 3, seed=1, type_ii=0.0)
+    found = clearance(robot, poses)
+    for k, pose in enumerate(poses):
+        points = joint_points(robot, pose)
+        bodies = {"platform": []}
+        for i, (line, guide) in enumerate(
+            zip(points.links, joint_guides(robot, pose), strict=True), start=1
+        ):
+            names = robot.legs[i - 1].names
+            links = [names[letter] for letter in "ul" if letter in names]
+            for link, ends in zip(links, pairwise(line), strict=True):
+                bodies[f"leg {i} {link}"] = [ends]
+            if guide.slides:
+                bodies[f"leg {i} guide"] = [guide.path]
+        for part in points.parts:
+            bodies["platform"] += [(part.hub, corner) for corner in part.corners]
+        for (one, other), value in zip(found.pairs, found.distances[k], strict=True):
+            pairs = np.array([[*a, *b] for a in bodies[one] for b in bodies[other]])
+            assert value == pytest.approx(distance(pairs).min(), abs=1e-12), (one, other)
+
+
+def test_bodies_with_a_common_joint_are_left_out():
+    pairs = clearance("five-bar", home_pose("five-bar")).pairs
+    assert pairs == (
+        ("leg 1 crank", "leg 2 crank"),
+        ("leg 1 crank", "leg 2 lower link"),
+        ("leg 1 lower link", "leg 2 crank"),
+    )
+
+
+def test_thickness_is_taken_off(tmp_path):
+    robot, pose = CATALOG["delta"], [0.0, 0.0, -0.9]
+    lines = clearance(robot, pose)
+    thick = clearance(robot, pose, {"upper": 0.02, "platform": 0.01})
+    taken = dict(zip(lines.pairs, lines.distances - thick.distances, strict=True))
+    assert taken["leg 1 crank", "leg 2 crank"] == pytest.approx(0.04)
+    assert taken["leg 1 crank", "platform"] == pytest.approx(0.03)
+    assert taken["leg 1 rod", "leg 2 rod"] == pytest.approx(0.0)
+    own = replace(robot, radii=pteron.manipulator.Radii(upper=0.02, platform=0.01))
+    assert pteron.load(pteron.save(own, tmp_path / "thick.toml")) == own
+    np.testing.assert_array_equal(clearance(own, pose).distances, thick.distances)
+    assert thick.least == thick.distances.min()
+    with pytest.raises(pteron.ModelError, match="upper: -1 m is negative"):
+        clearance(robot, pose, {"upper": -1.0})
+    with pytest.raises(pteron.DataError, match="'rods' is not one of guide, upper, lower"):
+        clearance(robot, pose, {"rods": 1.0})
+
+
+def test_rods_of_known_bars_are_two(tmp_path):
+    robot = CATALOG["delta"]
+    wide = replace(robot, legs=tuple(replace(leg, bar_length=0.08) for leg in robot.legs))
+    assert pteron.load(pteron.save(wide, tmp_path / "wide.toml")) == wide
+    pose = [0.02, 0.01, -0.9]
+    one, two = clearance(robot, pose), clearance(wide, pose)
+    rods = [k for k, pair in enumerate(two.pairs) if "rods" in pair[0] + pair[1]]
+    assert rods
+    assert (two.distances[rods] < one.distances[rods]).all()
+    assert (two.distances[rods] > one.distances[rods] - 0.081).all()
+
+
+def test_out_of_reach_is_nan_and_stays_in_its_row():
+    robot = random_machine(1, "PRSS")
+    poses = np.zeros((3, 4))
+    poses[1, 0] = 9.0
+    with pytest.raises(pteron.UnreachablePose, match=r"pose\[1\]"):
+        clearance(robot, poses)
+    found = clearance(robot, poses, on_failure="nan").distances
+    np.testing.assert_array_equal(np.isnan(found).all(axis=-1), [False, True, False])
+    np.testing.assert_array_equal(found[0], found[2])
+    assert numeric(robot, "clearances")(poses)[0].shape == found.shape
+
+
+def test_a_region_is_proved_free_of_interference_or_a_pose_shown():
+    robot, region = CATALOG["five-bar"], Box((-0.01, 0.15), (0.01, 0.16))
+    proof = prove(robot, region, given=(*conditions(robot), *interference(robot, 0.01)))
+    assert proof.holds
+    proof = prove(robot, region, given=interference(robot, {"upper": 0.06}))
+    assert proof.holds is False
+    assert clearance(robot, proof.counterexample, {"upper": 0.06}).least < 0.0
+    assert "interference of upper links or cranks" in str(proof.causes[0])

@@ -1,0 +1,264 @@
+"""Singularities: layouts that are singular everywhere, orientations, constraints, the nearest."""
+
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+from mechanisms import CATALOG, random_machine, unit
+from scipy.spatial.transform import Rotation
+
+import pteron
+from pteron.equations.machine import Machine, numbers
+from pteron.kernels import numeric
+from pteron.workspace import free_of_singularities, nearest_singularities
+
+
+def layout(directions, points):
+    """Return a Quadrupteron with these directions and platform points, both (4, 3)."""
+    legs = tuple(
+        replace(leg, direction=d, slider_direction=None, platform_point=s)
+        for leg, d, s in zip(CATALOG["quadrupteron"].legs, directions, points, strict=True)
+    )
+    return replace(CATALOG["quadrupteron"], legs=legs)
+
+
+def fourfold(direction, point):
+    """Return a layout with fourfold symmetry about k."""
+    turns = [Rotation.from_rotvec([0.0, 0.0, 0.5 * np.pi * i]).as_matrix() for i in range(4)]
+    return layout([t @ direction for t in turns], [t @ point for t in turns])
+
+
+def test_fourfold_symmetry_is_refused_with_the_reason():
+    robot = fourfold(np.array([0.0, 0.6, 0.8]), np.array([0.05, 0.0, 0.0]))
+    found = pteron.architecture(robot)
+    assert found.singular
+    assert found.proof == "exact arithmetic"
+    assert "fourfold symmetry" in found.reason
+    with pytest.raises(pteron.SingularPose, match="the layout has fourfold symmetry"):
+        pteron.inverse_dynamics(robot, *np.zeros((3, 4)))
+    rng = np.random.default_rng(0)
+    found = pteron.architecture(fourfold(unit(rng), rng.uniform(-0.06, 0.06, 3)))
+    assert (found.singular, found.proof) == (True, "closed form")
+    assert "fourfold symmetry" in found.reason
+    bent = replace(robot.legs[0], platform_point=(0.0501, 0.0, 0.0))
+    found = pteron.architecture(replace(robot, legs=(bent, *robot.legs[1:])))
+    assert (found.singular, found.reason, found.proof) == (False, "", "one pose")
+
+
+POINTS = np.array([[0.04, 0.0, 0.0], [0.0, 0.05, 0.0], [-0.04, 0.01, 0.0], [0.0, -0.04, 0.02]])
+
+
+@pytest.mark.parametrize(
+    ("robot", "reason", "proof"),
+    [
+        (
+            layout([[1, 0, 0], [0, 1, 0], [0.6, 0.8, 0], [0, 1, 0]], POINTS),
+            "rows all lie across [0.0, 0.0, 1.0]",
+            "exact arithmetic",
+        ),
+        (
+            layout([[0, 0, 1], [0, 1, 0], [1, 0, 0], [0, 1, 0]], 0.0 * POINTS),
+            "platform points lie on one line",
+            "closed form",
+        ),
+        (
+            layout([[0, 0, 1], [0, 1, 0], [0, 0, 1], [1, 0, 0]], POINTS),
+            "rows of legs 1 and 3 of J depend",
+            "exact arithmetic",
+        ),
+        (
+            replace(
+                CATALOG["3-rrr"],
+                legs=tuple(
+                    replace(leg, platform_point=(0.1, 0.0, 0.0)) for leg in CATALOG["3-rrr"].legs
+                ),
+            ),
+            "platform points lie on one line",
+            "numerical",
+        ),
+    ],
+    ids=["plane", "points", "legs", "planar"],
+)
+def test_other_layouts_are_refused_with_the_reason(robot, reason, proof):
+    found = pteron.architecture(robot)
+    assert found.singular
+    assert found.proof == proof
+    assert found.type_ii < 1e-10
+    assert reason in found.reason
+
+
+def test_singular_orientations_are_the_roots_of_det_j_for_1000_layouts():
+    rng = np.random.default_rng(1)
+    d = rng.normal(size=(1000, 4, 3))
+    d /= np.linalg.norm(d, axis=-1, keepdims=True)
+    s = rng.uniform(-0.06, 0.06, (1000, 4, 3))
+    # The closed form as it is compiled, for all layouts in one call.
+    robot = CATALOG["quadrupteron"]
+    machine, vector = Machine.symbols(robot)
+    coefficients = ca.Function("coefficients", [vector], [ca.vertcat(*machine.closure.orientation)])
+    given = np.tile(numbers(robot), (1000, 1))
+    legs = given[:, :-12].reshape(1000, 4, -1)
+    assert legs.shape[-1] == 21
+    legs[..., 3:6] = legs[..., 6:9] = d
+    legs[..., -6:-3] = s
+    a, b = np.array(coefficients(given.T))
+    one = np.arctan2(b, a) + 0.5 * np.pi
+    found = np.sort(np.pi - (np.pi - np.array([one, one - np.pi])) % (2.0 * np.pi), axis=0).T
+    for k in range(0, 1000, 100):
+        angles = pteron.singular_orientations(layout(d[k], s[k]))
+        np.testing.assert_allclose(angles, found[k], atol=1e-9)
+
+    def determinant(phi):
+        """det [d, d . (k x R s)], (1000, ...) at angles (1000, ...)."""
+        c, n = np.cos(phi)[..., None], np.sin(phi)[..., None]
+        x, y = (s[:, None, :, i] for i in (0, 1))
+        levers = d[:, None, :, 1] * (x * c - y * n) - d[:, None, :, 0] * (x * n + y * c)
+        rows = np.broadcast_to(d[:, None], (*levers.shape, 3))
+        return np.linalg.det(np.concatenate([rows, levers[..., None]], axis=-1))
+
+    grid = np.linspace(-np.pi, np.pi, 90, endpoint=False) + np.zeros((1000, 1))
+    values = determinant(grid)
+    size = np.abs(values).max(axis=1, keepdims=True)
+    assert np.abs(determinant(found) / size).max() < 1e-10
+    # Two roots found, and two in all: as many as changes of sign.
+    changes = np.signbit(values) != np.signbit(np.roll(values, 1, axis=1))
+    assert (changes.sum(axis=1) == 2).all()
+
+
+def rods_determinant(robot, pose):
+    """Return det of the wrenches of all single rods on the platform and its parts, joints held."""
+    p, axes = robot.platform.at(pose)
+    links, points = (numeric(robot, w)(pose) for w in ("link_vectors", "platform_points"))
+    k = np.array(robot.platform.axis)
+    hinges = [tuple(leg.platform_point) for leg in robot.legs]
+    parts = list(dict.fromkeys(hinges)) if robot.platform.turns else []
+    rows = []
+    for leg, rod, c, hinge in zip(robot.legs, links[1], points[0], hinges, strict=True):
+        b = rod / np.linalg.norm(rod)
+        for side in (0.05, -0.05):
+            end = c + side * np.array(leg.bar)
+            about = [0.0] * len(parts)
+            if parts:
+                pin = p + np.array(hinge) @ axes
+                about[parts.index(hinge)] = b @ np.cross(k, end - pin)
+            rows.append([*b, *np.cross(end - p, b), *about])
+    return np.linalg.det(rows)
+
+
+@pytest.mark.parametrize("name", ["delta", "orthoglide", "h4"])
+def test_the_single_rods_hold_what_type_ii_and_constraint_measures_say(name):
+    """With joints held the rods' wrenches vanish where either does, and are their product."""
+    robot = CATALOG[name]
+    poses = pteron.random_poses(robot, 8, seed=2, type_ii=0.02)
+    product = numeric(robot, "type_ii")(poses)[0] * pteron.constraint_measure(robot, poses)
+    rods = [rods_determinant(robot, pose) for pose in poses]
+    share = np.array(rods) / product
+    np.testing.assert_allclose(share, share[0], rtol=1e-9)
+
+
+def test_constraints_of_revolute_joints_are_the_layouts():
+    for name in ("tripteron-oblique", "quadrupteron-oblique"):
+        robot = CATALOG[name]
+        found = pteron.constraint_measure(robot, pteron.random_poses(robot, 5))
+        assert np.ptp(found) < 1e-14
+        assert found[0] > 0.5
+    random = random_machine(0, "PRSS")
+    assert pteron.architecture(random).holds is None, "bars that are not told"
+    loose = random_machine(0, "RRRR")
+    assert pteron.architecture(loose).holds is False, "bars that turn on hinges of their own"
+
+
+@pytest.mark.parametrize("name", ["five-bar", "3-rrr", "delta", "tripteron-oblique"])
+def test_no_sampled_singular_pose_is_nearer_than_the_nearest(name):
+    robot = CATALOG[name]
+    pose = pteron.random_poses(robot, 3, seed=3, type_ii=0.05 if name != "five-bar" else 0.3)[2]
+    found = [one for one in nearest_singularities(robot, pose) if one.by == "translation"]
+    assert [one.distance for one in found] == sorted(one.distance for one in found)
+    lengths = len(robot.platform.lengths)
+    for one in found:
+        assert abs(one.measure) <= 1e-10
+        assert one.distance == pytest.approx(np.linalg.norm((one.pose - pose)[:lengths]))
+        np.testing.assert_array_equal(one.pose[lengths:], pose[lengths:])
+
+        def vanishing(poses, one=one):
+            squares = numeric(robot, "squared_type_i")(poses)[0]
+            if one.kind == "I":
+                others = np.delete(squares, one.leg - 1, axis=-1)
+                return np.where((others >= 0).all(axis=-1), squares[..., one.leg - 1], np.nan)
+            what = {"II": "type_ii", "constraint": "constraint"}[one.kind]
+            return np.where((squares >= 0).all(axis=-1), numeric(robot, what)(poses)[0], np.nan)
+
+        rng = np.random.default_rng(4)
+        around = rng.normal(size=(20000, lengths))
+        around /= np.linalg.norm(around, axis=-1, keepdims=True)
+        around *= one.distance * (1.0 - 1e-6) * rng.random((20000, 1)) ** (1.0 / lengths)
+        poses = pose + np.pad(around, ((0, 0), (0, robot.freedom - lengths)))
+        values = vanishing(poses) * vanishing(pose)
+        assert (values[~np.isnan(values)] > 0.0).all()
+
+
+def test_distances_in_closed_form_are_met():
+    robot, pose = CATALOG["quadrupteron"], np.array([0.01, 0.0, 0.02, 0.3])
+    found = nearest_singularities(robot, pose)
+    (turn,) = [one for one in found if one.kind == "II"]
+    assert (turn.by, turn.unit) == ("rotation", "rad")
+    assert turn.distance == pytest.approx(0.5 * np.pi - 0.3, abs=1e-12)
+    # Its guides are along the axes, so that the reach margin is the distance.
+    margin = numeric(robot, "reach")(pose)[0]
+    moved = {one.leg: one.distance for one in found if one.by == "translation"}
+    np.testing.assert_allclose([moved[i] for i in range(1, 5)], margin, rtol=1e-9)
+    three = CATALOG["3-rrr"]
+    pose = pteron.workspace.home_pose(three)
+    turns = [one for one in nearest_singularities(three, pose) if one.by == "rotation"]
+    (turn,) = [one for one in turns if one.kind == "II"]
+    angles = pteron.singular_orientations(three, pose[:2])
+    assert np.abs(angles - pose[2]).min() == pytest.approx(turn.distance, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["3-rrr", "delta", "quadrupteron-oblique"])
+def test_distances_to_first_order_meet_those_that_are_found(name):
+    robot = CATALOG[name]
+    pose = pteron.random_poses(robot, 3, seed=3, type_ii=0.05)[2]
+    for one in nearest_singularities(robot, pose):
+        if one.kind == "II":
+            near = one.pose + 1e-4 * (pose - one.pose)
+            metres, *radians, _ = numeric(robot, "type_ii_distances")(near)
+            found = metres if one.by == "translation" else radians[0]
+            assert found == pytest.approx(1e-4 * one.distance, rel=1e-3)
+
+
+def test_regions_are_free_up_to_the_singular_orientation():
+    robot = CATALOG["quadrupteron-oblique"]
+    first = pteron.singular_orientations(robot)
+    edge = first[first > 0.0].min()
+    low, high = np.full((2, 4), 0.01) * [[-1.0], [1.0]]
+    low[3], high[3] = 0.0, edge - 1e-3
+    found = free_of_singularities(robot, [low, high])
+    assert found.free
+    poses = np.random.default_rng(0).uniform(low, high, (1000, 4))
+    assert np.abs(numeric(robot, "type_ii")(poses)[0]).min() >= found.measure > 0.0
+    high[3] = edge + 1e-3
+    reached = numeric(robot, "reach")(np.array([0.0, 0.0, 0.0, edge]))[0]
+    if (reached > 0.02).all():
+        found = free_of_singularities(robot, [low, high])
+        assert found.free is False
+        assert found.pose[3] == pytest.approx(edge, abs=1e-9)
+
+
+def test_a_region_is_free_or_holds_the_pose_that_is_returned():
+    robot = CATALOG["3-prr"]
+    home = np.array(pteron.workspace.home_pose(robot))
+    size = np.array([0.04, 0.04, 0.3])
+    near = free_of_singularities(robot, [home - size, home + size])
+    assert near.free
+    assert near.measure > 0.0
+    far = np.array([home - 3 * size, home + 3 * size])
+    found = free_of_singularities(robot, far)
+    assert found.free is False
+    assert ((far[0] <= found.pose) & (found.pose <= far[1])).all()
+    assert abs(np.linalg.det(pteron.jacobian(robot, found.pose))) < 1e-8
+    undecided = free_of_singularities(robot, far, most=1)
+    assert undecided.free in (False, None)
+    with pytest.raises(pteron.DataError, match="the least and the greatest pose expected"):
+        free_of_singularities(robot, far[::-1])
