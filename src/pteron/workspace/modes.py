@@ -105,9 +105,11 @@ def _contact(
     for _ in range(_ROUNDS):
         low, high = one.corners(boxes)
         # Where an edge may be met; not only on the boundary, since links of one length fold inside.
-        near = np.array([own.bounds(k, low, high)[0] <= 0.0 for k in edges]).any(axis=0)
+        least = np.array([own.bounds(k, low, high)[0] for k in edges])
+        near = np.flatnonzero((least <= 0.0).any(axis=0))
         for judging in (own, theirs):
-            near[near] = ~judging(low[near], high[near], np.full(near.sum(), judging.all))[0]
+            outside, _ = judging(low[near], high[near], np.full(len(near), judging.all))
+            near = near[~outside]
         boxes, low, high = boxes[near], low[near], high[near]
         if not len(boxes):
             return Contact(elbows, leg, "", None, True)
