@@ -52,6 +52,14 @@ CODE: dict[str, tuple[str, ...]] = {
     # Singularities.
     "T1": ("pteron.closures.closure.Closure.measure",),
     "T2": ("pteron.closures.constant_rows.ConstantRows", "pteron.singular_orientations"),
+    # Indices, reactions, stiffness, errors.
+    "G1": (f"{_E}.indices.homogeneous", f"{_E}.singular_values.singular_values"),
+    "G2": (f"{_E}.indices.by_points",),
+    "G3": ("pteron.indices.global_conditioning",),
+    "G4": (f"{_E}.indices.pressure_angle", f"{_E}.indices.output_pressure_angle"),
+    "G5": (f"{_E}.reactions.equilibrium", "pteron.indices.reactions"),
+    "G6": ("pteron.indices.stiffness",),
+    "G7": ("pteron.indices.geometric_sensitivities", "pteron.indices.pose_error"),
     # Drives, control, identification.
     "D1": (f"{_E}.drives.drive_forces", f"{_E}.drives.friction"),
     "D2": (f"{_E}.drives.drive_accelerations",),

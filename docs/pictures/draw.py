@@ -27,7 +27,7 @@ DRAWN: dict[str, Callable[[Path], None]] = {
     "cycle": cycle.draw,
     "engines": engines.draw,
     "legs": legs.draw,
-    "maps": index_maps.draw,
+    "index_maps": index_maps.draw,
     "view_page": view_page.draw,
 }
 """What writes each group of pictures into a folder laid out as docs, by the script's name."""

@@ -54,7 +54,7 @@ _LISTED = (
         "condition of the Jacobian",
         r"\kappa(\bar J) = \sigma_{\max}(\bar J) / \sigma_{\min}(\bar J)",
         "J. K. Salisbury, J. J. Craig, The International Journal of Robotics Research 1(1) (1982) "
-        "4-17; J. Angeles, the same 11(3) (1992) 188-201 (characteristic length)",
+        "4-17; J. Angeles, the same 11(3) (1992) 196-201 (characteristic length)",
         "",
         "less",
     ),

@@ -1,0 +1,105 @@
+"""Reactions: statics that was published, virtual work, momentum, least norm."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+from differences import OFFSETS
+from mechanisms import CATALOG, random_machine, states
+
+import pteron
+from pteron.errors import DataError, UnreachablePose
+from pteron.indices import reactions
+
+ROUTER = Path(__file__).parent / "data" / "router_reactions.csv"
+
+
+def test_the_published_router():
+    """All of its numbers, also those that the least norm chooses."""
+    table = pl.read_csv(ROUTER, comment_prefix="#")
+    poses = table.select("x", "y", "z").to_numpy()[::12] * 1e-3
+    found = reactions("tripteron-router", poses, wrench=[80.0, 80.0, -120.0])
+    printed = table.drop("x", "y", "z", "leg", "joint").to_numpy().astype(float)
+    printed = printed.reshape(4, 3, 4, 5)
+    np.testing.assert_allclose(found.forces, printed[..., :3], rtol=0, atol=6e-6)
+    for leg, across in enumerate(([1, 2], [0, 2], [0, 1])):
+        moments = found.moments[:, leg] * 1e3
+        np.testing.assert_allclose(moments[..., across], printed[:, leg, :, 3:], rtol=0, atol=6e-4)
+        np.testing.assert_allclose(moments[..., leg], 0.0, atol=1e-6)
+    assert found.redundancy == 3
+    assert found.names[0] == ("P0", "R1", "R2", "R3")
+
+
+RANDOM = ("PRSU", "SSSSI", "CCC")
+
+
+@pytest.mark.parametrize("name", [*CATALOG, *RANDOM])
+def test_actuators_give_what_virtual_work_says(name):
+    robot = random_machine(0, name) if name in RANDOM else CATALOG[name]
+    motion = states(robot, 3)
+    wrench = np.linspace(-30.0, 40.0, robot.freedom)
+    found = reactions(robot, *motion, wrench)
+    expected = pteron.inverse_dynamics(robot, *motion, wrench)
+    scale = np.abs(expected).max()
+    np.testing.assert_allclose(found.actuators, expected, rtol=0, atol=1e-11 * scale)
+    if name not in RANDOM:
+        assert (found.unheld < 1e-8 * scale).all()
+        planar, stiff = robot.platform.planar, name.startswith(("quad", "trip"))
+        assert found.redundancy == (3 * (robot.freedom - 1) if planar else 3 * stiff)
+
+
+def test_what_the_base_gives_changes_the_momentum():
+    """The sum of what guides and cranks pass on is that of m (a - g), found by differences."""
+    robot = random_machine(0, "PRSU")
+    pose, velocity, acceleration = (part[0] for part in states(robot, 1))
+    step = 2e-4
+    t = (OFFSETS * step)[:, None]
+    way = pose + t * velocity + 0.5 * t * t * acceleration
+    moments = []
+    for axis in np.eye(3):  # the sum of m r along each axis, as a potential energy
+        weighed = replace(robot, gravity=tuple(-axis))
+        found, here = (pteron.potential_energy(weighed, p) for p in (way, pose))
+        second = np.array([-1 / 560, 8 / 315, -1 / 5, 8 / 5])
+        moments.append((second @ (found[:4] + found[:3:-1]) - 205 / 72 * here) / step**2)
+    mass = sum(body.mass for leg in robot.legs for body in leg.bodies.values())
+    mass += robot.platform.joined.mass
+    needed = np.array(moments) - mass * np.array(robot.gravity)
+    wrench = np.array([3.0, -4.0, 5.0, 0.2])
+    found = reactions(robot, pose, velocity, acceleration, wrench)
+    total = found.forces[:, 0].sum(axis=0) + wrench[:3]
+    np.testing.assert_allclose(total, needed, rtol=0, atol=1e-5 * np.abs(needed).max())
+
+
+def test_least_norm_and_what_is_no_load():
+    pose = states(CATALOG["3-prr"], 3)[0]
+    lengths = 0.05, 0.5
+    found = [reactions("3-prr", pose, length=length) for length in lengths]
+
+    def norm(one, length):
+        return np.sqrt((one.forces**2).sum((1, 2, 3)) + (one.moments**2).sum((1, 2, 3)) / length**2)
+
+    assert (norm(found[0], lengths[0]) < norm(found[1], lengths[0])).all()
+    assert (norm(found[1], lengths[1]) < norm(found[0], lengths[1])).all()
+    assert not found[0].unique
+    # A moment that would tilt the platform goes into the joints, not into the actuators.
+    tilted = reactions("3-prr", pose, moment=np.cross([0.0, 0.0, 1.0], [2.0, -3.0, 0.0]))
+    np.testing.assert_allclose(tilted.actuators, found[0].actuators, rtol=0, atol=1e-9)
+    assert np.abs(tilted.moments - found[0].moments).max() > 0.5
+
+
+def test_bad_poses_and_bad_words():
+    pose = np.array([[0.0, 0.0, 0.0], [9.0, 0.0, 0.0], [0.01, 0.0, 0.0]])
+    found = reactions("tripteron", pose, on_failure="nan")
+    one = reactions("tripteron", pose[2])
+    assert np.isnan(found.forces[1]).all()
+    assert np.isnan(found.actuators[1]).all()
+    np.testing.assert_array_equal(found.moments[2], one.moments)
+    with pytest.raises(UnreachablePose, match=r"pose\[1\]"):
+        reactions("tripteron", pose)
+    with pytest.raises(DataError, match="length: 0 m given"):
+        reactions("tripteron", pose[0], length=0.0)
+    # What no leg holds is told: hinges on bars of single legs leave this platform free to tilt.
+    free = random_machine(0, "PRSU")
+    assert reactions(free, states(free, 1)[0][0]).unheld > 0.01
