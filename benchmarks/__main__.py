@@ -35,6 +35,7 @@ _SCRIPTS = {
     "Simulation": "simulation.py",
     "Energy": "energy.py",
     "Exported FMUs": "fmu.py",
+    "Certified workspaces": "certified.py",
     "The Gymnasium environment": "environment.py",
     "The viewer": "viewer.py",
     "Maps of eight million poses": "maps.py",

@@ -56,7 +56,7 @@ suppress_warnings = ["config.cache"]
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath", "html_image"]
 myst_heading_anchors = 3
 myst_dmath_double_inline = True
-nb_execution_mode = "cache"
+nb_execution_mode = "force"
 nb_execution_timeout = 600
 nb_execution_raise_on_error = True
 nb_merge_streams = True
@@ -100,6 +100,7 @@ if GALLERY.is_dir() and find_spec("sphinx_gallery") is not None:
         "download_all_examples": False,
         "remove_config_comments": True,
         "write_computation_times": False,
+        "parallel": True,  # as many as Sphinx has processes
         "show_memory": False,
         "show_signature": False,
         "capture_repr": ("_repr_html_",),
@@ -118,3 +119,5 @@ def leave_out(app: Sphinx, page: str, source: list[str]) -> None:
 def setup(app: Sphinx) -> None:
     """Tell Sphinx."""
     app.connect("source-read", leave_out)
+    # It copies files when all is built, and does not say that pages may be read in parallel.
+    app.extensions["sphinx-mathjax-offline"].parallel_read_safe = True

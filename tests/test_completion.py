@@ -15,6 +15,7 @@ LINES = {
     "pteron check robots/d": ["robots/drawn.toml"],
     "pteron base no-such-rob": [],
     "pteron export delta --function inverse_d": ["inverse_dynamics", "inverse_dynamics_base"],
+    "pteron workspace delta --index manip": ["manipulability"],
     "pteron base delta --keep I_u1,m_u": ["I_u1,m_u1", "I_u1,m_u2", "I_u1,m_u3"],
 }
 """What is typed, the cursor behind it, and what the shell proposes."""

@@ -216,6 +216,18 @@ def test_distances_in_closed_form_are_met():
     assert np.abs(angles - pose[2]).min() == pytest.approx(turn.distance, abs=1e-9)
 
 
+@pytest.mark.parametrize("name", ["3-rrr", "delta", "quadrupteron-oblique"])
+def test_distances_to_first_order_meet_those_that_are_found(name):
+    robot = CATALOG[name]
+    pose = pteron.random_poses(robot, 3, seed=3, type_ii=0.05)[2]
+    for one in nearest_singularities(robot, pose):
+        if one.kind == "II":
+            near = one.pose + 1e-4 * (pose - one.pose)
+            metres, *radians, _ = numeric(robot, "type_ii_distances")(near)
+            found = metres if one.by == "translation" else radians[0]
+            assert found == pytest.approx(1e-4 * one.distance, rel=1e-3)
+
+
 def test_regions_are_free_up_to_the_singular_orientation():
     robot = CATALOG["quadrupteron-oblique"]
     first = pteron.singular_orientations(robot)

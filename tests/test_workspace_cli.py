@@ -93,6 +93,7 @@ def test_where_nothing_is_in_reach_it_is_said_why():
     [
         ("--index kapa", "--index: 'kapa' is not known; did you mean kappa? there are condition"),
         ("--index turning_speed", "turning_speed is about turning, which five-bar does not"),
+        ("--index kappa --index condition --out a.gif", "--index: 2 given, and a.gif shows one"),
         ("--slice z=0", "z: is no coordinate of five-bar, whose poses have x, y"),
         ("--slice x:0", "--slice: 'x:0' given; NAME=VALUE or NAME=LEAST:GREATEST[:COUNT]"),
         ("--slice x=100mm", "in m and rad without the unit"),

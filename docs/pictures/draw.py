@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -37,8 +38,9 @@ def main() -> None:
     keys.write(DOCS / "robot-file.md")
     with TemporaryDirectory() as name:
         folder = Path(name)
-        for draw in DRAWN.values():
-            draw(folder)
+        with ProcessPoolExecutor() as pool:
+            for drawn in [pool.submit(draw, folder) for draw in DRAWN.values()]:
+                drawn.result()
         for picture in sorted(path for path in folder.rglob("*") if path.is_file()):
             kept = DOCS / picture.relative_to(folder)
             if not alike(kept, picture):

@@ -135,7 +135,6 @@ def _write(summary: Summary, folder: Path) -> list[Path]:
 
 
 def _figure(summary: Summary) -> Figure:
-    from pteron.design import quantities
     from pteron.plots import front_figure
 
     front = summary.front
@@ -143,7 +142,7 @@ def _figure(summary: Summary) -> Figure:
     return front_figure(
         front.objectives,
         names,
-        [quantities()[name].unit for name in names],
+        [front.task.unit(name) for name in names],
         start=[front.task.first.quantity(name) for name in names],
         chosen=front.chosen,
     )

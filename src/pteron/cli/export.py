@@ -68,6 +68,7 @@ FUNCTIONS = (
     "regressor",
     "squared_type_i",
     "type_ii",
+    "type_ii_distances",
 )
 """Written out: help is shown before CasADi is loaded. A test holds it against what there is."""
 

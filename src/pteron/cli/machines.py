@@ -19,6 +19,11 @@ if TYPE_CHECKING:
     from pteron.legs import LegKind
     from pteron.manipulator import Manipulator
 
+_LOOSE = (
+    "legs: parallel rods whose bars turn on hinges of their own leave the platform free to tilt in "
+    "every pose (constraint singularity): do legs share their hinges?"
+)
+
 _FAULTY = 2
 
 
@@ -127,10 +132,15 @@ def check(
 
 
 def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
-    from pteron.kinematics import singular_orientations
+    from pteron.kinematics import architecture, singular_orientations
+    from pteron.kinematics.architecture import singular_everywhere
     from pteron.workspace import home_pose, limited_joints, reserve
     from pteron.workspace.drive_doubts import load_doubts
 
+    layout = architecture(robot)
+    if layout.singular:
+        raise singular_everywhere(robot)
+    loose = () if layout.holds is not False else (_LOOSE,)
     home = home_pose(robot)
     position = home[: len(robot.platform.lengths)]
     return {
@@ -143,7 +153,8 @@ def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
         "home_pose": home.tolist(),
         "home_reserve": float(reserve(robot, home).smallest),
         "limited_joints": [asdict(joint) for joint in limited_joints(robot, home)],
-        "doubts": [*unlikely, *load_doubts(robot, home)],
+        "holds_orientation": layout.holds,
+        "doubts": [*unlikely, *loose, *load_doubts(robot, home)],
     }
 
 

@@ -114,6 +114,8 @@ def workspace(
 
     names = _checked_indices(machine, index or [])
     ending = _checked_out(out)
+    if ending in (*_FILMS, *_SURFACES) and len(names) > 1:
+        raise DataError(f"--index: {len(names)} given, and {out} shows one; give one")
     if scheduler is not None and ending != ".zarr":
         raise DataError(
             "--scheduler: the workers write to a store that all reach; give it with --out, such as "

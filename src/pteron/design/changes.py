@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pteron.design.design import Design
-from pteron.design.quantities import quantities
 from pteron.design.task import Task
 from pteron.manipulator import Manipulator
 from pteron.manipulator.manipulator import told_legs
@@ -73,12 +72,16 @@ def geometry_changes(task: Task, robot: Manipulator) -> list[Change]:
 
 
 def mass_changes(task: Task, robot: Manipulator) -> list[Change]:
-    """Return which bodies have another mass."""
+    """Return which bodies have another mass; legs that change alike as one."""
+    found: dict[tuple[str, float, float], list[int]] = {}
+    for i, (leg, other) in enumerate(zip(task.robot.legs, robot.legs, strict=True), start=1):
+        for (letter, body), new in zip(leg.bodies.items(), other.bodies.values(), strict=True):
+            before, after = body.values[0], new.values[0]
+            if abs(after - before) > _NONE:
+                found.setdefault((leg.names[letter], before, round(after, 9)), []).append(i)
     return [
-        Change(f"mass of {leg.names[letter]} of leg {i}", body.values[0], new.values[0], "kg")
-        for i, (leg, other) in enumerate(zip(task.robot.legs, robot.legs, strict=True), start=1)
-        for (letter, body), new in zip(leg.bodies.items(), other.bodies.values(), strict=True)
-        if abs(new.values[0] - body.values[0]) > _NONE
+        Change(f"mass of {name} of {told_legs(legs)}", before, after, "kg")
+        for (name, before, after), legs in found.items()
     ]
 
 
@@ -86,7 +89,7 @@ def quantity_changes(design: Design) -> list[Change]:
     """Return the quantities that were asked for, of the machine to begin with and of a design."""
     task = design.task
     return [
-        Change(name, task.first.quantity(name), design.quantity(name), quantities()[name].unit)
+        Change(name, task.first.quantity(name), design.quantity(name), task.unit(name))
         for name in task.asked
     ]
 

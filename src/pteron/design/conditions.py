@@ -30,12 +30,15 @@ class Conditions:
         What each row says, in words.
     values : Kernel
         Poses (..., m) and a sign (1,) of the type-II measure to rows (..., R).
+    pose_slopes : Kernel
+        The same to rows (..., R) and d rows / d pose (..., R, m).
     slopes : Kernel
         The same to rows (..., R), d rows / d geometry (..., R, G) and d rows / d pose (..., R, m).
     """
 
     names: tuple[str, ...]
     values: Kernel
+    pose_slopes: Kernel
     slopes: Kernel
 
     def rows(self, geometry: Array, poses: Array, side: float) -> Array:
@@ -112,5 +115,6 @@ def _built(robot: Manipulator, type_i: float, type_ii: float) -> Conditions:
     return Conditions(
         tuple(names),
         kernel(fast, "design_rows", stacked),
+        kernel("vm", "design_pose_slopes", stacked, slopes[1]),
         kernel("vm", "design_slopes", stacked, *slopes),
     )

@@ -8,17 +8,18 @@ import numpy as np
 from scipy.ndimage import distance_transform_cdt  # type: ignore[import-untyped]
 
 from pteron.design.conditions import Conditions
-from pteron.design.exchange import Program, Samples, cube_samples, improved
+from pteron.design.exchange import LATTICE, Program, Samples, cube_samples, improved
+from pteron.design.holes import holes
 from pteron.kernels import Array
 
 _COARSE = 25
 """Steps along the longest side of a grid."""
 
-_CHECKED = 13
-"""Points along each edge at which a cube is looked at."""
-
 _FIRST = 5
 _HALVINGS = 30
+
+_UNKNOWN = -1e-6
+"""What stands for a row that is NaN, or fails between two points."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,8 @@ def largest(
     """Return the largest cube whose poses all keep the conditions, at every orientation.
 
     A grid finds where it is and about how large; then its centre and edge are unknowns of a program
-    with exact slopes. At 13 points along each edge all conditions are kept.
+    with exact slopes. At 13 points along each edge all conditions are kept, and so far as slopes
+    tell between them.
 
     Parameters
     ----------
@@ -75,8 +77,9 @@ def largest(
         np.zeros((len(geometry), 0)),
         np.append(np.zeros(lengths), -1.0),
         [(float(c) - size, float(c) + size) for c in best.center] + [(0.0, 2.0 * size)],
+        orientations,
     )
-    samples, dense = (cube_samples(orientations, lengths, n) for n in (_FIRST, _CHECKED))
+    samples, dense = (cube_samples(orientations, lengths, n) for n in (_FIRST, LATTICE))
     z = improved(program, samples, dense, _shrunk(program, dense, best))
     return Cube(z[:-1], float(z[-1]), best.side, _least(program.rows(dense, z, z)))
 
@@ -89,8 +92,9 @@ def _shrunk(program: Program, dense: Samples, cube: Cube) -> Array:
         return np.append(cube.center, share * cube.edge)
 
     for _ in range(_HALVINGS):
-        if _least(program.rows(dense, unknowns(share), unknowns(share))) >= 0.0:
-            return unknowns(share)
+        z = unknowns(share)
+        if _least(program.rows(dense, z, z)) >= 0.0 and not len(program.between(z, z).inside):
+            return z
         share *= 0.8
     return unknowns(0.0)
 
@@ -124,8 +128,11 @@ def _from_grid(
             poses[..., :lengths] = grid
             rows = conditions.rows(geometry, poses, side)
             # A row that is NaN fails, though not as clearly as one that says by how much.
-            rows = np.where(np.isnan(rows), -1e-6, rows)
+            rows = np.where(np.isnan(rows), _UNKNOWN, rows)
             least = np.minimum(least, rows.min(axis=-1))
+            for place in holes(conditions, geometry, side, orientation, axes, rows):
+                nearby = tuple(np.rint((place - low) / step).astype(int))
+                least[nearby] = min(least[nearby], _UNKNOWN)
         inside = least >= 0.0
         at = np.unravel_index(int(least.argmax()), least.shape)
         if not inside.any():

@@ -16,6 +16,7 @@ import numpy as np
 from scipy.optimize import minimize  # type: ignore[import-untyped]
 
 from pteron.design.conditions import Conditions
+from pteron.design.holes import holes
 from pteron.kernels import Array
 
 _PER_ROW = 3
@@ -35,6 +36,11 @@ _GAIN = 1e-5
 """A smaller gain, over the objective, ends the rounds."""
 
 _HALVINGS = 12
+_SHORTER = 8
+"""How often a way that leads over what fails between the points is cut."""
+
+LATTICE = 13
+"""Points along each edge of a cube at which it is looked at."""
 
 _OPTIONS = {"maxiter": 60, "ftol": 1e-10}
 
@@ -105,6 +111,8 @@ class Program:
         What is minimised is its product with the unknowns.
     bounds : list of (float, float)
         Of each unknown.
+    orientations : array, shape (A, m)
+        Of the cube; none where none is sought.
     above : tuple of (array, float)
         Each: a row (V + k + 1,) whose product with the unknowns is at least a number.
     """
@@ -115,14 +123,37 @@ class Program:
     slopes: Array
     objective: Array
     bounds: list[tuple[float, float]]
+    orientations: Array
     above: tuple[tuple[Array, float], ...] = ()
+
+    def geometry_at(self, z: Array, z0: Array) -> Array:
+        """Return the geometry (G,) at unknowns z; its start belongs to z0."""
+        return self.geometry + self.slopes @ (z - z0)[: self.slopes.shape[1]]
 
     def rows(self, samples: Samples, z: Array, z0: Array) -> Array:
         """Return the rows (N, R) at unknowns z; the geometry's start belongs to z0."""
-        count, lengths = self.slopes.shape[1], samples.units.shape[1]
-        geometry = self.geometry + self.slopes @ (z - z0)[:count]
-        poses = samples.at(z[count : count + lengths], z[-1])
-        return self.conditions.rows(geometry, poses, self.side)
+        poses = samples.at(z[self.slopes.shape[1] : -1], z[-1])
+        return self.conditions.rows(self.geometry_at(z, z0), poses, self.side)
+
+    def between(self, z: Array, z0: Array) -> Samples:
+        """Return points of the cube that fail between those of a lattice that do not."""
+        center, half = z[self.slopes.shape[1] : -1], 0.5 * z[-1]
+        lengths = len(center)
+        line, geometry = np.linspace(-1.0, 1.0, LATTICE), self.geometry_at(z, z0)
+        found = fixed_samples(np.empty((0, self.orientations.shape[1])), lengths)
+        if half <= 0.0:
+            return found
+        axes = [middle + half * line for middle in center]
+        for orientation in self.orientations:
+            samples = cube_samples(orientation[None], lengths, LATTICE)
+            rows = self.conditions.rows(geometry, samples.at(center, z[-1]), self.side)
+            lattice = rows.reshape(*(LATTICE,) * lengths, -1)
+            places = holes(self.conditions, geometry, self.side, orientation, axes, lattice)
+            poses = np.tile(orientation, (len(places), 1))
+            poses[:, :lengths] = 0.0
+            units = (places - center) / half
+            found = found.joined(Samples(poses, units, np.ones(len(places))))
+        return found
 
 
 def improved(program: Program, samples: Samples, dense: Samples, z0: Array) -> Array:
@@ -155,6 +186,13 @@ def improved(program: Program, samples: Samples, dense: Samples, z0: Array) -> A
         values = program.rows(everywhere, z, z0)
         pairs |= _worst(values)
         way = _feasible_way(program, everywhere, good, z, z0)
+        missed = program.between(good + way * (z - good), z0)
+        if len(missed.inside):
+            known = len(everywhere.inside)
+            everywhere = everywhere.joined(missed)
+            failing = program.rows(missed, good + way * (z - good), z0).argmin(axis=1)
+            pairs |= {(known + i, int(row)) for i, row in enumerate(failing)}
+            way = _whole_way(program, everywhere, good, z, z0, way)
         gain = float(program.objective @ (good - z))
         good = good + way * (z - good)
         share = min(2.0 * share, 1.0) if way > _MOST_OF_IT else 0.5 * share
@@ -183,6 +221,18 @@ def _feasible_way(
         middle = 0.5 * (low + high)
         low, high = (middle, high) if kept(middle) else (low, middle)
     return low
+
+
+def _whole_way(
+    program: Program, samples: Samples, good: Array, z: Array, origin: Array, way: float
+) -> float:
+    """Return the same where it is looked at between the samples too; `way` is too far."""
+    for _ in range(_SHORTER):
+        way *= 0.6
+        at = good + way * (z - good)
+        if _kept(program.rows(samples, at, origin)) and not len(program.between(at, origin).inside):
+            return way
+    return 0.0
 
 
 def _worst(values: Array) -> set[tuple[int, int]]:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pteron.design.design import Design
-from pteron.design.quantities import quantities
 from pteron.design.task import Task
 from pteron.errors import ModelError
 from pteron.kernels import Array
@@ -96,7 +95,7 @@ class Front:
         for v in self.task.variables:
             found[v.name] = f"{v.name} ({v.unit})" if v.unit else v.name
         for name in self.task.asked:
-            unit = quantities()[name].unit
+            unit = self.task.unit(name)
             found[name] = f"{name} ({unit})" if unit else name
         return found
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pteron.design.design import Design
-from pteron.design.exchange import Program, Samples, cube_samples, fixed_samples, improved
+from pteron.design.exchange import LATTICE, Program, Samples, cube_samples, fixed_samples, improved
 from pteron.design.quantities import quantities
 from pteron.design.task import ROUNDING, Task
 from pteron.design.variables import geometry_slopes, slopes_of
@@ -16,8 +16,8 @@ from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kinematics.sampling import search_ball
 
-_FIRST, _DENSE = 5, 13
-"""Points along a cube's edge, at first and where a solution is looked at."""
+_FIRST = 5
+"""Points along a cube's edge at which its conditions are asked at first."""
 
 
 def refined(task: Task, values: Sequence[float], objective: int) -> list[float]:
@@ -61,9 +61,10 @@ def refined(task: Task, values: Sequence[float], objective: int) -> list[float]:
         geometry,
         asked.sign * wanted,
         [*map(tuple, task.ranges.T.tolist()), *(moving if seeks else held)],
+        task.orientations if seeks else task.orientations[:0],
         tuple(slopes.bounds(objective, z0)),
     )
-    first, dense = (_asked_at(design, lengths, count) for count in (_FIRST, _DENSE))
+    first, dense = (_asked_at(design, lengths, count) for count in (_FIRST, LATTICE))
     found: list[float] = improved(program, first, dense, z0)[: len(start)].tolist()
     return found
 

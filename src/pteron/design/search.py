@@ -147,7 +147,10 @@ def _promising(
         front = front_of(task, designs)
     except ModelError:
         return []
-    count, objectives = task.spec.search.refined, len(task.spec.objectives)
+    settings, objectives = task.spec.search, len(task.spec.objectives)
+    count = settings.refined
+    if number == settings.generations and count:
+        count = settings.population  # the last word on the whole front
     jobs = []
     spread = np.linspace(0, len(front) - 1, count).round().astype(int)
     for k, at in enumerate(np.unique(spread)):

@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, field_validator, model_validator
+from pydantic import BeforeValidator, Field, PrivateAttr, field_validator, model_validator
 
 from pteron.bodies.tables import Count, Number, Table, Two
 from pteron.errors import DataError, shown
@@ -223,13 +223,20 @@ class Spec(Table):
     masses: Literal["per length", "kept"] = Field(
         "per length", description="what a link's inertia does when its length changes"
     )
-    variables: Annotated[tuple[VariableTable, ...], Field(min_length=1)]
-    objectives: Annotated[tuple[ObjectiveTable, ...], Field(min_length=1)]
-    requirements: tuple[RequirementTable, ...] = ()
+    variables: Annotated[list[VariableTable], Field(min_length=1)]
+    objectives: Annotated[list[ObjectiveTable], Field(min_length=1)]
+    requirements: list[RequirementTable] = Field(default_factory=list)
     workspace: WorkspaceTable | None = None
     floors: FloorsTable = Field(default_factory=lambda: FloorsTable.model_validate({}))
     motion: MotionTable = Field(default_factory=lambda: MotionTable.model_validate({}))
     search: SearchTable = Field(default_factory=lambda: SearchTable.model_validate({}))
+
+    _source: str = PrivateAttr("")
+
+    @property
+    def source(self) -> str:
+        """The file that it was read from; empty where it was not."""
+        return self._source
 
     def with_seed(self, seed: int) -> Spec:
         """Return the same search with other chance."""
@@ -258,4 +265,6 @@ def read_spec(path: str | Path) -> Spec:
     source = shown(str(path), bare=True, longest=1000)
     spec = validated(Spec, read_toml(path, DataError, _ABSENT), source, DataError)
     beside = Path(path).parent / spec.robot
-    return spec.model_copy(update={"robot": str(beside)}) if beside.is_file() else spec
+    found = spec.model_copy(update={"robot": str(beside)} if beside.is_file() else {})
+    found._source = source
+    return found

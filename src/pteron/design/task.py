@@ -18,6 +18,7 @@ from pteron.design.region import orientations_of
 from pteron.design.spec import Spec
 from pteron.design.variables import Variable, moved, variables_of
 from pteron.errors import DataError, ModelError
+from pteron.indices import INDICES
 from pteron.kernels import Array, Kernel, compile
 from pteron.manipulator import Manipulator, load
 from pteron.manipulator.saving import text_of
@@ -67,7 +68,7 @@ class Task:
         except ModelError as error:
             faults = [*error.faults, *faults]
         if faults:
-            raise DataError(told(faults))
+            raise DataError(told(faults), subject=spec.source)
         return cls(spec, robot, variables)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -119,6 +120,13 @@ class Task:
     def first(self) -> Design:
         """The machine to begin with, as it is."""
         return Design(self, self.robot)
+
+    def unit(self, name: str) -> str:
+        """Return the unit of a quantity, for this machine's joints."""
+        joint = self.robot.legs[0].joint
+        return {"force": joint.force_unit, "speed": f"{joint.unit}/s"}.get(
+            name, quantities()[name].unit
+        )
 
     def function(self, what: str) -> Kernel:
         """Return a function of the machines' topology, whose geometry a call gives."""
@@ -181,6 +189,9 @@ def _misfits(spec: Spec, robot: Manipulator) -> Iterator[str]:
                 f"{name}: the joints of {robot.name} have unlike units; ask for drive_load, whose "
                 "limits the machine's file gives"
             )
+    for name in sorted(asked & INDICES.keys()):
+        if INDICES[name].turning and not robot.platform.turns:
+            yield f"{name}: about turning, but the platform of {robot.name} does not turn"
     drives = [leg.drive for leg in robot.legs if leg.drive is not None]
     if "drive_load" in asked and not any(d.max_force or d.max_speed for d in drives):
         yield f"drive_load: no drive of {robot.name} has max_force or max_speed; ask for force"

@@ -168,9 +168,9 @@ def bounds(robot: RobotLike, what: str, boxes: ArrayLike) -> dict[str, Enclosure
     lead, flat = given.shape[:-2], given.reshape(-1, *given.shape[-2:])
     found = {}
     for port in function.outputs:
-        low, high, defined = (
-            part.reshape(lead + port.shape)
-            for part in function(flat[:, 0], flat[:, 1], function.rows(port.name))
+        low, high, defined = function(flat[:, 0], flat[:, 1], function.rows(port.name))
+        shape = lead + port.shape
+        found[port.name] = Enclosure(
+            low.reshape(shape), high.reshape(shape), defined.reshape(shape)
         )
-        found[port.name] = Enclosure(low, high, defined)
     return found

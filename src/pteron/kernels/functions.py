@@ -26,6 +26,7 @@ from pteron.equations.friction import passive_friction
 from pteron.equations.laws import LAWS
 from pteron.equations.machine import Machine
 from pteron.equations.room import rooms
+from pteron.equations.singular_distance import type_ii_distances
 from pteron.equations.virtual_work import generalized_forces, inverse_dynamics
 
 Output = Expression | list[Expression] | tuple[Expression, tuple[int, ...]]
@@ -341,6 +342,7 @@ TABLE: dict[str, Entry] = {
     "discriminants": Entry(_POSE, _discriminants),
     "squared_type_i": Entry(_POSE, _squared_type_i),
     "type_ii": Entry(_POSE, _type_ii),
+    "type_ii_distances": Entry(_POSE, lambda m, v: dict(type_ii_distances(m, v["pose"])), _BENT),
     "clearances": Entry(
         _POSE, lambda m, v: {"distances": _stacked(clearances(m, v["pose"]))}, ("reach",)
     ),

@@ -149,9 +149,9 @@ def divide(a: Interval, b: Interval) -> Interval:
     inverse = Interval(_well_below(low), _well_above(high))
     maybe, never, jump = _marks(a, b)
     nowhere = (b.low == 0.0) & (b.high == 0.0)
-    found = multiply(a, inverse)
-    marks = either(maybe, zero), either(never, nowhere), either(jump, zero)
-    return Interval(found.low, found.high, *map(np.atleast_1d, marks))
+    low, high, *_ = multiply(Interval(a.low, a.high), inverse)
+    part, none = np.atleast_1d(zero), np.atleast_1d(nowhere)
+    return Interval(low, high, either(maybe, part), either(never, none), either(jump, part))
 
 
 def root(a: Interval) -> Interval:

@@ -107,7 +107,7 @@ def enclosed(
     Only what the nodes depend on is computed.
     """
     needed = needed_by(graph, nodes)
-    columns = [[list(map(_one_or_all, part.T)) for part in bounds] for bounds in (lows, highs)]
+    columns = list(zip(*(_columns(*both) for both in zip(lows, highs, strict=True)), strict=True))
     low, high = np.empty((len(nodes), count)), np.empty((len(nodes), count))
     defined, continuous = (np.ones((len(nodes), count), bool) for _ in range(2))
     with np.errstate(all="ignore"):
@@ -127,9 +127,14 @@ def enclosed(
     return low.T, high.T, defined.T, continuous.T
 
 
-def _one_or_all(column: Array) -> Array:
-    """Return an element of an input in all boxes, or once where it is the same in all."""
-    return column[:1] if len(column) and (column == column[0]).all() else column.copy()
+def _columns(low: Array, high: Array) -> tuple[list[Array], list[Array]]:
+    """Return the elements of an input in all boxes, or once where they are the same in all."""
+    lows, highs = [], []
+    for a, b in zip(low.T, high.T, strict=True):
+        alike = len(a) > 0 and bool((a == a[0]).all() and (b == b[0]).all())
+        lows.append(a[:1] if alike else a.copy())
+        highs.append(b[:1] if alike else b.copy())
+    return lows, highs
 
 
 def _walk(
@@ -143,8 +148,8 @@ def _walk(
         node = graph.nodes[k]
         if node.operation == INPUT:
             port, element = node.arguments
-            rows = [side[port][element] for side in columns]
-            values[k] = Interval(*(row if len(row) == 1 else row[part] for row in rows))
+            low, high = (side[port][element] for side in columns)
+            values[k] = Interval(low, high) if len(low) == 1 else Interval(low[part], high[part])
         elif node.operation == CONSTANT:
             values[k] = constant(node.value)
         elif node.operation == "mul" and node.arguments[0] == node.arguments[1]:

@@ -2,13 +2,18 @@
 
 from pteron.kinematics.limits import LimitedJoint, limited_joints
 from pteron.workspace.clearance import Clearance, clearance, interference
+from pteron.workspace.components import Component, Components, components
 from pteron.workspace.conditions import Condition, conditions
+from pteron.workspace.cube_bound import cube_bound
 from pteron.workspace.free_regions import FreeRegion, free_of_singularities
 from pteron.workspace.home import home_pose
 from pteron.workspace.inscribed import Inscribed, largest_cube, largest_cylinder
+from pteron.workspace.modes import Contact, mode_contacts, mode_pavings
 from pteron.workspace.nearest import NearestSingularity, nearest_singularities
+from pteron.workspace.orientations import VolumesOverAngles, over_angles
 from pteron.workspace.paving import Paving, paving
 from pteron.workspace.proofs import Proof, prove
+from pteron.workspace.quadrature import Quadrature, quadrature_volume
 from pteron.workspace.reach import BEYOND_LIMITS, REACHABLE, ReachSlice, reach_slice
 from pteron.workspace.regions import Box, Cylinder, Region
 from pteron.workspace.reserve import JointRanges, Reserve, joint_ranges, reserve
@@ -18,7 +23,10 @@ __all__ = [
     "BEYOND_LIMITS",
     "Box",
     "Clearance",
+    "Component",
+    "Components",
     "Condition",
+    "Contact",
     "Cylinder",
     "FreeRegion",
     "Inscribed",
@@ -27,15 +35,19 @@ __all__ = [
     "NearestSingularity",
     "Paving",
     "Proof",
+    "Quadrature",
     "REACHABLE",
     "ReachSlice",
     "ReachVolume",
     "Region",
     "Reserve",
+    "VolumesOverAngles",
     "bounding_box",
     "clearance",
     "conditions",
     "free_of_singularities",
+    "components",
+    "cube_bound",
     "home_pose",
     "interference",
     "joint_ranges",
@@ -43,8 +55,12 @@ __all__ = [
     "largest_cylinder",
     "limited_joints",
     "nearest_singularities",
+    "mode_contacts",
+    "mode_pavings",
+    "over_angles",
     "paving",
     "prove",
+    "quadrature_volume",
     "reach_slice",
     "reach_volume",
     "reserve",

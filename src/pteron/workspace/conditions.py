@@ -62,6 +62,10 @@ _CAUSES = {
 }
 
 
+EDGES = ("stretched", "folded", _CAUSES["reach"])
+"""The causes that are edges of a leg's reach, where its elbow may change its side."""
+
+
 def _told(room: Room) -> str:
     return _CAUSES.get(room.cause, room.cause).format(room.noun)
 
@@ -118,8 +122,11 @@ def rooms_left(robot: Manipulator, given: Sequence[Condition], poses: Array) -> 
         for kernel in [numeric(robot, what)]
     }
     for condition in given:
-        value = results[condition.what][condition.output].reshape(*poses.shape[:-1], -1)
-        value = value[..., condition.element]
+        value = results[condition.what][condition.output]
+        lead = poses.ndim - 1
+        if value.ndim > lead:
+            size = int(np.prod(value.shape[lead:]))
+            value = value.reshape(*value.shape[:lead], size)[..., condition.element]
         found.append((np.abs(value) if condition.sized else value) - condition.floor)
     return np.stack(found, axis=-1)
 
@@ -168,20 +175,36 @@ class Judge:
             What is not proved of a box; 0: it lies inside. Not looked at further where outside.
         """
         outside, open_ = np.zeros(len(low), bool), open_.copy()
-        for c, (condition, (function, row)) in enumerate(zip(self.given, self._rows, strict=True)):
+        for c, condition in enumerate(self.given):
             bit = np.uint64(1 << c)
             chosen = np.flatnonzero((open_ & bit != 0) & ~outside)
             if not len(chosen):
                 continue
-            least, most, defined = (
-                part[:, 0] for part in function(low[chosen], high[chosen], [row])
-            )
-            if condition.sized:
-                least, most = np.maximum(np.maximum(least, -most), 0.0), np.maximum(-least, most)
+            least, most, defined = self.bounds(c, low[chosen], high[chosen])
             # Undefined everywhere is NaN, which is not above the floor.
             outside[chosen] = ~(most >= condition.floor)
             open_[chosen[(least >= condition.floor) & defined]] &= ~bit
         return outside, open_
+
+    def undecided(self, low: Array, high: Array) -> NDArray[np.bool_]:
+        """Return which conditions (B, C) may fail in a part of a box where they are defined.
+
+        A limit is not undefined by itself, but out of reach: it is the reach that ends there.
+        """
+        found = np.empty((len(low), len(self.given)), bool)
+        for c, condition in enumerate(self.given):
+            found[:, c] = ~(self.bounds(c, low, high)[0] >= condition.floor)
+        return found
+
+    def bounds(self, c: int, low: Array, high: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Return least, greatest (B,) value of what condition c bounds, and where it is defined."""
+        function, row = self._rows[c]
+        found = function(low, high, [row])
+        least, most, defined = found[0][:, 0], found[1][:, 0], found[2][:, 0]
+        if self.given[c].sized:
+            size = np.maximum(np.maximum(least, np.negative(most)), 0.0)
+            least, most = size, np.maximum(np.negative(least), most)
+        return least, most, defined
 
 
 @lru_cache(maxsize=64)

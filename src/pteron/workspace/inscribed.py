@@ -175,7 +175,7 @@ def largest_cylinder(
     def gauge(ways: Array) -> Array:
         along = ways @ unit
         away = np.linalg.norm(ways - along[..., None] * unit, axis=-1)
-        return np.maximum(away, np.abs(along) / ratio)
+        return np.asarray(np.maximum(away, np.abs(along) / ratio))
 
     template = np.concatenate(surface)
     return _largest(robot, at, template, gauge, region, tolerance, proved, given)
@@ -202,7 +202,7 @@ def _largest(
 
     search = _Search(lambda p: rooms_left(robot, asked, whole(p)), template, gauge)
     found = [search.improved(*place) for place in _starts(robot, at, asked, whole)]
-    for _ in range(_EXCHANGES):
+    for _ in range(_EXCHANGES if found else 0):
         center, size = found.pop(max(range(len(found)), key=lambda k: found[k][1]))
         if size <= 0.0:
             break
@@ -231,6 +231,8 @@ def _starts(
 ) -> list[tuple[Array, float]]:
     """Return the centres of the largest cubes of a lattice, and half their edges."""
     coarse = paving(robot, at, tolerance=_COARSE, given=asked)
+    if not len(coarse.inner):
+        return []
     boxes = np.concatenate([coarse.inner, coarse.boundary])
     low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
     step = float((high - low).max()) / (_POINTS - 1)
@@ -247,7 +249,7 @@ def _starts(
         found.append((lattice[best], 0.5 * step * float(depth[best])))
         near = tuple(slice(max(i - int(depth[best]), 0), i + int(depth[best]) + 1) for i in best)
         depth[near] = 0.0
-    if not found:
+    if not found:  # thinner than the lattice
         center = 0.5 * (coarse.inner[:, 0] + coarse.inner[:, 1])
         widest = (coarse.inner[:, 1] - coarse.inner[:, 0]).min(axis=1)
         found.append((center[widest.argmax()], 0.25 * float(widest.max())))

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pteron.errors import DataError, ModelError
+from pteron.errors import DataError
 from pteron.kernels import Array, as_array
 from pteron.kinematics.evaluate import checked_one
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -42,8 +43,6 @@ class Paving:
         Boxes that are proved to lie inside: their corners, of the k coordinates that vary.
     boundary : array, shape (M, 2, k)
         Boxes of which that is not decided. Everything else in `box` is proved to lie outside.
-    causes : array of bool, shape (M, C)
-        Which conditions are undecided in each of them: they name the boundary.
     axes : tuple of str
         The coordinates that vary: ``("x", "y", "z")`` at one orientation in space.
     inner_volume, outer_volume : float
@@ -59,7 +58,6 @@ class Paving:
     box: Array = field(repr=False)
     inner: Array = field(repr=False)
     boundary: Array = field(repr=False)
-    causes: NDArray[np.bool_] = field(repr=False)
     axes: tuple[str, ...]
     inner_volume: float
     outer_volume: float
@@ -70,7 +68,31 @@ class Paving:
     def gap(self) -> float:
         """What is undecided, as a share of what is proved inside."""
         undecided = self.outer_volume - self.inner_volume
+        if not undecided:
+            return 0.0
         return undecided / self.inner_volume if self.inner_volume else math.inf
+
+    @cached_property
+    def causes(self) -> NDArray[np.bool_]:
+        """Which conditions (M, C) are undecided in each box of the boundary: they name it."""
+        judging, parts = judge(self.robot, self.conditions), []
+        for start in range(0, len(self.boundary), _SLICE):
+            low, high = self.corners(self.boundary[start : start + _SLICE])
+            parts.append(judging.undecided(low, high))
+        return np.concatenate([np.empty((0, len(self.conditions)), bool), *parts])
+
+    def corners(self, boxes: Array) -> tuple[Array, Array]:
+        """Return least and greatest poses (B, m), each, of boxes (B, 2, k)."""
+        return _whole(self.box, np.flatnonzero(self.box[0] < self.box[1]), boxes)
+
+    def boundary_of(self, condition: Condition) -> Array:
+        """Return the boxes (B, 2, k) of the boundary in which a condition is all that is undecided.
+
+        Where several are, edges meet.
+        """
+        alone = self.causes.sum(axis=1) == 1
+        chosen = alone & self.causes[:, self.conditions.index(condition)]
+        return np.asarray(self.boundary[chosen])
 
     def locate(self, poses: ArrayLike) -> NDArray[np.int8]:
         """Return 1 for poses (..., m) that are proved inside, -1 outside, 0 where undecided.
@@ -142,11 +164,12 @@ def paving(
     Returns
     -------
     Paving
+        Its volumes are 0 where it is proved that no position serves.
 
     Raises
     ------
     ModelError
-        If no position is in reach at this orientation, or the reach has no end.
+        If the reach has no end.
     DataError
         If the tolerance is not positive, or the box is none.
 
@@ -163,21 +186,13 @@ def paving(
         raise DataError(f"tolerance: {tolerance!r} given, a share above 0 expected")
     box = region_box(robot, at, within)
     asked = conditions(robot) if given is None else given
-    inner, boundary, open_, complete = _refined(judge(robot, asked), box, tolerance, most)
-    if not len(inner) and complete:
-        raise ModelError(
-            "no position is in reach of all legs, within the joints' limits, at the orientation of "
-            f"pose {at.tolist()}; this is proved",
-            subject=robot.name,
-        )
+    inner, boundary, complete = _refined(judge(robot, asked), box, tolerance, most)
     axes = tuple(robot.coordinates[i] for i in np.flatnonzero(box[0] < box[1]))
     volumes = [math.fsum(np.prod(b[:, 1] - b[:, 0], axis=1)) for b in (inner, boundary)]
     lengths = sum(axis != "phi" for axis in axes)
     unit = f"m^{lengths}" + (" rad" if "phi" in axes else "")
-    bits = np.uint64(1) << np.arange(len(asked), dtype=np.uint64)
-    causes = (open_[:, None] & bits) != 0
     return Paving(
-        robot, asked, box, inner, boundary, causes, axes, volumes[0], sum(volumes), unit, complete
+        robot, asked, box, inner, boundary, axes, volumes[0], sum(volumes), unit, complete
     )
 
 
@@ -198,10 +213,8 @@ def region_box(robot: Manipulator, at: Array, within: ArrayLike | None) -> Array
     return box
 
 
-def _refined(
-    judging: Judge, box: Array, tolerance: float, most: int
-) -> tuple[Array, Array, NDArray[np.uint64], bool]:
-    """Return inner and undecided boxes, what is open in the latter, and whether it is enough."""
+def _refined(judging: Judge, box: Array, tolerance: float, most: int) -> tuple[Array, Array, bool]:
+    """Return inner and undecided boxes, and whether the tolerance is met."""
     moving = np.flatnonzero(box[0] < box[1])
     found: list[Array] = []
     left, open_ = box[None][:, :, moving], np.array([judging.all])
@@ -226,13 +239,12 @@ def _refined(
             undecided -= each * int((sure | outside).sum())
             done = inside > 0.0 and undecided <= tolerance * inside
             if done or sum(map(len, kept)) + len(left[rest]) > most:
-                left = np.concatenate([*kept, left[rest]])
-                return np.concatenate(found), left, np.concatenate([*kept_open, open_[rest]]), done
+                return np.concatenate(found), np.concatenate([*kept, left[rest]]), done
         left, open_ = np.concatenate(kept), np.concatenate(kept_open)
         first = False
         if each < _SMALLEST:
-            return np.concatenate(found), left, open_, False
-    return np.concatenate(found), left, open_, True
+            return np.concatenate(found), left, False
+    return np.concatenate(found), left, True
 
 
 def _whole(box: Array, moving: NDArray[np.intp], boxes: Array) -> tuple[Array, Array]:

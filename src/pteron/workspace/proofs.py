@@ -166,8 +166,7 @@ def prove(
         sides = left[:, 1] - left[:, 0]
         if 2 * len(left) > most or (sides <= least).all():
             smallest = int(np.prod(np.where(sides > 0.0, sides, 1.0), axis=1).argmin())
-            bits = int(open_[smallest])
-            causes = tuple(c for k, c in enumerate(asked) if bits >> k & 1)
+            causes = tuple(c for k, c in enumerate(asked) if int(open_[smallest]) >> k & 1)
             return Proof(
                 None, robot, region, asked, None, left[smallest], causes=causes, boxes=seen
             )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +15,7 @@ _WIDER = 1e-12
 """m, and relative: far more than the rounding of what is compared."""
 
 
+@runtime_checkable
 class Region(Protocol):
     """A set of poses."""
 

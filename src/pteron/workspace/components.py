@@ -1,0 +1,177 @@
+"""Of which connected parts a workspace consists, and which are proved to be apart."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage  # type: ignore[import-untyped]
+
+from pteron.kernels import Array
+from pteron.workspace.paving import Paving
+
+_CELLS = 1 << 22
+"""Of the lattice in which parts are sought."""
+
+
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class Component:
+    """A part of the workspace in which a way leads from any pose to any other.
+
+    Attributes
+    ----------
+    volume : float
+        What of it is proved inside, in the paving's unit.
+    pose : array, shape (m,)
+        The middle of a box of it, far from its edge.
+    box : array, shape (2, k)
+        What bounds its proved part.
+    group : int
+        Parts of different groups are proved to be apart; of two of one group it is not decided.
+    """
+
+    volume: float
+    pose: Array
+    box: Array
+    group: int
+
+
+@dataclass(frozen=True)
+class Components:
+    """The parts of a workspace.
+
+    Attributes
+    ----------
+    parts : tuple of Component
+        The largest first.
+    groups : int
+        At least so many of them are apart, which is proved.
+    connected : bool or None
+        True: there is one part. False: at least two are proved to be apart. None: not decided.
+    share : float
+        How much of what is proved inside the parts hold: where the paving's smallest boxes are
+        finer than the lattice in which parts are sought, some of it is in none.
+    """
+
+    parts: tuple[Component, ...] = field(repr=False)
+    groups: int
+    connected: bool | None
+    share: float
+
+
+def components(paving: Paving, *, smallest: float = 0.0) -> Components:
+    """Return the connected parts of a paved workspace.
+
+    Boxes that are proved inside and touch are connected. Where no chain of boxes that are inside or
+    undecided leads from one to another there is no way between them.
+
+    Parameters
+    ----------
+    paving : Paving
+        The workspace; over phi too, if it was paved so. phi and phi + 2 pi count as different.
+    smallest : float
+        Parts of less volume than this share of the whole are left out of `parts`.
+
+    Returns
+    -------
+    Components
+
+    Examples
+    --------
+    >>> from pteron.workspace import components, paving
+    >>> components(paving("tripteron", [0.0, 0.0, 0.0], tolerance=0.3)).connected
+    True
+    """
+    if not len(paving.inner):
+        return Components((), 0, None, 0.0)
+    start, size, inside, possible = lattice(paving)
+    around = np.ones((3,) * inside.ndim)
+    labels, count = ndimage.label(inside, around)
+    groups, _ = ndimage.label(possible, around)
+    moving = [paving.robot.coordinates.index(axis) for axis in paving.axes]
+    depth = ndimage.distance_transform_cdt(np.pad(inside, 1), metric="chessboard")
+    depth = depth[(slice(1, -1),) * inside.ndim]
+    each, whole = float(np.prod(size)), paving.inner_volume
+    found = []
+    volumes = np.bincount(labels.ravel(), minlength=count + 1) * each
+    for label, where in enumerate(ndimage.find_objects(labels), start=1):
+        own = labels[where] == label
+        if volumes[label] < smallest * whole:
+            continue
+        low = np.array([part.start for part in where])
+        high = np.array([part.stop for part in where])
+        cell = low + np.unravel_index((depth[where] * own).argmax(), own.shape)
+        pose = paving.box[0].copy()
+        pose[moving] = start + (cell + 0.5) * size
+        group = int(groups[tuple(cell)])
+        box = np.array([start + low * size, start + high * size])
+        found.append(Component(float(volumes[label]), pose, box, group))
+    found.sort(key=lambda part: -part.volume)
+    apart = len({part.group for part in found})
+    connected = True if len(found) == 1 else False if apart > 1 else None
+    share = sum(part.volume for part in found) / whole
+    return Components(tuple(found), apart, connected, share)
+
+
+class Lattice(NamedTuple):
+    """Equal cells over what is not proved outside."""
+
+    start: Array
+    """(k,): the least corner of the first cell."""
+    size: Array
+    """(k,): of a cell."""
+    inside: NDArray[np.bool_]
+    """Which cells are proved inside."""
+    possible: NDArray[np.bool_]
+    """Which cells may have poses inside."""
+
+
+def lattice(paving: Paving, most: int = _CELLS) -> Lattice:
+    """Return a paving as a lattice, as fine as the smallest boxes, or as so many cells allow."""
+    moving = [paving.robot.coordinates.index(axis) for axis in paving.axes]
+    start, whole = paving.box[0, moving], (paving.box[1] - paving.box[0])[moving]
+    depths, places = [], []
+    for boxes in (paving.inner, paving.boundary):
+        depth = np.round(np.log2(whole / (boxes[:, 1] - boxes[:, 0]))).astype(np.int64)
+        depths.append(depth)
+        places.append(np.round((boxes[:, 0] - start) / whole * 2.0**depth).astype(np.int64))
+    finest = np.concatenate(depths).max(axis=0, initial=0)
+    every = np.concatenate([paving.inner, paving.boundary])
+    low, high = (every[:, 0].min(axis=0) - start) / whole, (every[:, 1].max(axis=0) - start) / whole
+    while np.prod(np.ceil((high - low) * 2.0**finest) + 1.0) > most:
+        finest[finest.argmax()] -= 1
+    first = np.floor(low * 2.0**finest + _ROUNDING).astype(np.int64)
+    shape = np.ceil(high * 2.0**finest - _ROUNDING).astype(np.int64) - first
+    inner, undecided = (
+        _filled(*boxes, finest, first, tuple(shape)) for boxes in zip(depths, places, strict=True)
+    )
+    size = whole / 2.0**finest
+    full = inner > 1.0 - _ROUNDING
+    return Lattice(start + first * size, size, full, inner + undecided > 0.0)
+
+
+def _filled(
+    depths: NDArray[np.int64],
+    places: NDArray[np.int64],
+    finest: NDArray[np.int64],
+    first: NDArray[np.int64],
+    shape: tuple[int, ...],
+) -> Array:
+    """Return which share of each cell boxes fill, given by how often each side was halved."""
+    found = np.zeros(int(np.prod(shape)))
+    strides = np.cumprod(np.append(1, shape[:0:-1]))[::-1]
+    for depth in np.unique(depths, axis=0):
+        chosen = places[(depths == depth).all(axis=1)]
+        wide = 2 ** np.maximum(finest - depth, 0)
+        corner = ((chosen >> np.maximum(depth - finest, 0)) * wide - first) @ strides
+        within = np.array(list(np.ndindex(*wide))) @ strides
+        cells = (corner[:, None] + within).ravel()
+        found += 0.5 ** float(np.maximum(depth - finest, 0).sum()) * np.bincount(
+            cells, minlength=len(found)
+        )
+    return found.reshape(shape)

@@ -1,0 +1,132 @@
+"""Which working modes' workspaces meet: where a leg can change the side of its elbow."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from pteron.kernels import Array
+from pteron.kinematics.evaluate import checked_one
+from pteron.manipulator import RobotLike, as_manipulator, working_modes
+from pteron.shapes import PoseLike
+from pteron.workspace.conditions import EDGES, Judge, judge, rooms_left
+from pteron.workspace.paving import Paving, paving
+
+_HALVINGS = 50
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Whether a machine can go over from one working mode to another through a type-I singularity.
+
+    Attributes
+    ----------
+    elbows : pair of tuple of int
+        The two modes, which differ in one leg.
+    leg : int
+        That leg, from 1: it is stretched or folded where they meet.
+    cause : str
+        How it stands there; empty where they do not meet.
+    pose : array, shape (m,), or None
+        A pose at which they meet, but for rounding.
+    proved : bool
+        Whether it is proved that they meet, or that they do not.
+    """
+
+    elbows: tuple[tuple[int, ...], tuple[int, ...]]
+    leg: int
+    cause: str
+    pose: Array | None
+    proved: bool
+
+
+def mode_pavings(
+    robot: RobotLike, pose: PoseLike, *, tolerance: float = 0.2
+) -> dict[tuple[int, ...], Paving]:
+    """Return the paving of every working mode at the orientation of a pose, by the legs' elbows.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+    pose : array, shape (m,)
+        Gives the orientation, m and rad.
+    tolerance : float
+        As for `paving`.
+
+    Returns
+    -------
+    dict of tuple of int to Paving
+    """
+    robot = as_manipulator(robot)
+    at = checked_one(robot, pose, "pose")
+    return {
+        tuple(leg.elbow for leg in mode.legs): paving(mode, at, tolerance=tolerance)
+        for mode in working_modes(robot)
+    }
+
+
+def mode_contacts(pavings: dict[tuple[int, ...], Paving]) -> tuple[Contact, ...]:
+    """Return, for each two modes that differ in one leg, whether their workspaces meet.
+
+    They meet where that leg is at the edge of its reach and all else is kept in both. In a box in
+    which nothing but this edge is undecided, and beyond which two corners lie on either side of it,
+    there is such a pose. Where no box may hold one they do not meet at this orientation.
+
+    Parameters
+    ----------
+    pavings : dict
+        Of `mode_pavings`.
+
+    Returns
+    -------
+    tuple of Contact
+    """
+    found = []
+    for one, other in combinations(pavings, 2):
+        differs = [i for i, (a, b) in enumerate(zip(one, other, strict=True)) if a != b]
+        if len(differs) == 1:
+            found.append(_contact(pavings[one], pavings[other], (one, other), differs[0] + 1))
+    return tuple(found)
+
+
+def _contact(
+    one: Paving, other: Paving, elbows: tuple[tuple[int, ...], tuple[int, ...]], leg: int
+) -> Contact:
+    own, theirs = (judge(side.robot, side.conditions) for side in (one, other))
+    edges = [k for k, c in enumerate(one.conditions) if c.leg == leg and c.cause in EDGES]
+    boxes = np.concatenate([one.inner, one.boundary])
+    low, high = one.corners(boxes)
+    # Where an edge may be met; not only on the boundary, since links of one length fold inside.
+    near = np.array([own.bounds(k, low, high)[0] <= 0.0 for k in edges]).any(axis=0)
+    low, high = low[near], high[near]
+    outside, _ = theirs(low, high, np.full(len(low), theirs.all))
+    low, high = low[~outside], high[~outside]
+    if not len(low):
+        return Contact(elbows, leg, "", None, True)
+    causes = own.undecided(low, high) | theirs.undecided(low, high)
+    for k in edges:
+        alone = causes[:, k] & (causes.sum(axis=1) == 1)
+        pose = _crossing(one, own, k, low[alone], high[alone])
+        if pose is not None:
+            return Contact(elbows, leg, one.conditions[k].cause, pose, True)
+    return Contact(elbows, leg, "", None, False)
+
+
+def _crossing(one: Paving, own: Judge, k: int, low: Array, high: Array) -> Array | None:
+    """Return a pose on an edge, of boxes of which a corner is proved inside it, and one beyond."""
+    corners = np.array(list(np.ndindex(*(2,) * low.shape[1])))
+    for a, b in zip(low, high, strict=True):
+        poses = np.where(corners == 1, b, a)
+        least, most, _ = own.bounds(k, poses, poses)
+        if not ((least > 0.0).any() and (most < 0.0).any()):
+            continue
+        inside, beyond = poses[least.argmax()], poses[most.argmin()]
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (inside + beyond)
+            serves = rooms_left(one.robot, one.conditions, middle)[k] >= 0.0
+            inside, beyond = (middle, beyond) if serves else (inside, middle)
+        return np.asarray(inside)
+    return None

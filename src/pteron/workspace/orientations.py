@@ -1,0 +1,99 @@
+"""How the workspace depends on the platform's angle, and on the working mode."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pteron.errors import DataError, ModelError
+from pteron.kernels import Array
+from pteron.kinematics.evaluate import checked_one
+from pteron.manipulator import RobotLike, as_manipulator, working_modes
+from pteron.shapes import PoseLike
+from pteron.workspace.paving import paving
+
+
+@dataclass(frozen=True)
+class VolumesOverAngles:
+    """The volume of the workspace at each of several orientations, in each of several modes.
+
+    Attributes
+    ----------
+    angles : array, shape (A,)
+        phi, rad.
+    elbows : tuple of tuple of int
+        The modes, S of them: each leg's elbow.
+    inner, outer : array, shape (S, A)
+        The volume is proved to be between them; 0 where nothing is in reach.
+    unit : {"m^3", "m^2"}
+        Of both.
+    """
+
+    angles: Array
+    elbows: tuple[tuple[int, ...], ...]
+    inner: Array
+    outer: Array
+    unit: str
+
+
+def over_angles(
+    robot: RobotLike,
+    pose: PoseLike,
+    angles: ArrayLike,
+    *,
+    tolerance: float = 0.1,
+    modes: bool = False,
+) -> VolumesOverAngles:
+    """Return proved bounds on the volume of the workspace at several orientations.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine, whose platform turns.
+    pose : array, shape (m,)
+        Any pose; its angle does not matter.
+    angles : array, shape (A,)
+        phi, rad.
+    tolerance : float
+        Greatest gap between the bounds, as a share of the inner one.
+    modes : bool
+        Whether every working mode is asked, or the machine's own alone.
+
+    Returns
+    -------
+    VolumesOverAngles
+
+    Raises
+    ------
+    ModelError
+        If the platform does not turn, or the reach has no end.
+    DataError
+        If the angles are no row of finite numbers.
+
+    Examples
+    --------
+    >>> from pteron.workspace import over_angles
+    >>> found = over_angles("3-prr", [0.0, 0.0, 0.0], [0.0, 0.5], tolerance=0.2)
+    >>> found.inner.shape, found.unit
+    ((1, 2), 'm^2')
+    """
+    robot = as_manipulator(robot)
+    at = checked_one(robot, pose, "pose")
+    if not robot.platform.turns:
+        raise ModelError("the platform does not turn: it has one orientation", subject=robot.name)
+    given = np.asarray(angles, dtype=float)
+    if given.ndim != 1 or not len(given) or not np.isfinite(given).all():
+        raise DataError("angles: a row of finite numbers expected, rad")
+    machines = working_modes(robot) if modes else (robot,)
+    pavings = [
+        [paving(machine, [*at[:-1], phi], tolerance=tolerance) for phi in given.tolist()]
+        for machine in machines
+    ]
+    inner, outer = (
+        np.array([[getattr(one, name) for one in row] for row in pavings])
+        for name in ("inner_volume", "outer_volume")
+    )
+    elbows = tuple(tuple(leg.elbow for leg in machine.legs) for machine in machines)
+    return VolumesOverAngles(given, elbows, inner, outer, pavings[0][0].unit)
