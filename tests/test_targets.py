@@ -736,7 +736,7 @@ def test_a_compiler_that_fails_is_one_line(fresh, monkeypatch, command, message)
     monkeypatch.setenv("CC", command)
     with pytest.raises(ModelError, match=message):
         another()(POSE)
-    assert not list(fresh.glob("*"))
+    assert not entries(fresh)
 
 
 # The policy of the public functions.
