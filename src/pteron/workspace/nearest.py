@@ -22,7 +22,11 @@ from numpy.typing import NDArray
 from pteron.equations.machine import closure_of
 from pteron.kernels import Array, numeric, program
 from pteron.kinematics import inverse_kinematics, singular_orientations
-from pteron.kinematics.architecture import is_singular_everywhere, singular_everywhere
+from pteron.kinematics.architecture import (
+    architecture,
+    is_singular_everywhere,
+    singular_everywhere,
+)
 from pteron.kinematics.evaluate import checked_one
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -102,7 +106,8 @@ def nearest_singularities(robot: RobotLike, pose: PoseLike) -> tuple[NearestSing
     Returns
     -------
     tuple of NearestSingularity
-        Those by translation first, the nearest first. A kind of which none is found is left out.
+        Those by translation first, the nearest first. A kind of which none is found is left out,
+        and constraint singularities where every pose is one, or bars are not told.
 
     Raises
     ------
@@ -125,12 +130,13 @@ def nearest_singularities(robot: RobotLike, pose: PoseLike) -> tuple[NearestSing
     if is_singular_everywhere(robot):
         raise singular_everywhere(robot)
     inverse_kinematics(robot, at)
+    kinds: list[tuple[Kind, int]] = [("I", i) for i in range(1, robot.freedom + 1)]
+    kinds += [("II", 0), ("constraint", 0)] if architecture(robot).holds else [("II", 0)]
     found = []
     for by in ("translation", "rotation")[: 1 + ("phi" in robot.coordinates)]:
         search = _turned if by == "rotation" else _moved
-        kinds: list[tuple[Kind, int]] = [("I", i) for i in range(1, robot.freedom + 1)]
         several: list[NearestSingularity] = []
-        for kind, leg in (*kinds, ("II", 0), ("constraint", 0)):
+        for kind, leg in kinds:
             vanishing = _Vanishing(robot, leg - 1 if kind == "I" else None, kind)
             place = search(vanishing, at)
             if place is not None:
