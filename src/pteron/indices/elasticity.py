@@ -101,6 +101,10 @@ def _hollow(name: str, outer: float, wall: float) -> tuple[float, float]:
     return outer, outer - 2 * wall
 
 
+Springs = tuple[tuple[float, ...], tuple[tuple[Section | None, Section | None], ...]]
+"""The actuators' stiffness, and the sections of the upper and the lower link, of every leg."""
+
+
 @dataclass(frozen=True)
 class Elasticity:
     """What of a machine gives way.
@@ -134,9 +138,7 @@ class Elasticity:
         if self.rod_distance is not None:
             object.__setattr__(self, "rod_distance", _positive("rod_distance", self.rod_distance))
 
-    def of_legs(
-        self, robot: Manipulator
-    ) -> tuple[tuple[float, ...], tuple[tuple[Section | None, Section | None], ...]]:
+    def of_legs(self, robot: Manipulator) -> Springs:
         """Return the actuators' stiffness and the sections of both links, for each leg."""
         actuators, upper, lower = (
             self._each(robot, name) for name in ("actuators", "upper", "lower")

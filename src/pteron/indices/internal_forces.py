@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -39,6 +40,16 @@ class Held(NamedTuple):
     """(B, S, K): what the legs cannot hold, moments over the length."""
     redundancy: int
     """The number of self-stresses."""
+
+
+_BLOCK = 1024
+"""States whose matrices are in memory at once: some 40 kB each."""
+
+
+def blocks(parts: Sequence[Array]) -> Iterator[list[Array]]:
+    """Yield arrays (B, ...) in blocks of states, one at least."""
+    for start in range(0, max(len(parts[0]), 1), _BLOCK):
+        yield [part[start : start + _BLOCK] for part in parts]
 
 
 def hold(given: Equations, right: Array, presumed: Array, length: float) -> Held:

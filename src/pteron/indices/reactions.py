@@ -10,7 +10,15 @@ from numpy.typing import ArrayLike
 
 from pteron.equations.machine import Machine
 from pteron.errors import DataError
-from pteron.indices.internal_forces import Equations, hold, inverse, moved, on_platform, times
+from pteron.indices.internal_forces import (
+    Equations,
+    blocks,
+    hold,
+    inverse,
+    moved,
+    on_platform,
+    times,
+)
 from pteron.kernels import Array, as_array
 from pteron.kinematics.evaluate import checked, evaluated
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -122,43 +130,61 @@ def reactions(
     if not by > 0.0:
         raise DataError(f"length: {by:g} m given, a number above 0 expected")
     rest = np.zeros(robot.freedom)
-    motion = [rest if part is None else part for part in (velocity, acceleration)]
-    found: tuple[Array, ...] = evaluated(robot, "reactions", on_failure, pose, *motion)
-    acting = rest if wrench is None else checked(robot, wrench, "wrench", on_failure)
-    turning = np.zeros(3) if moment is None else as_array(moment, "moment", (3,))
-    lead = np.broadcast_shapes(found[1].shape[:-1], acting.shape[:-1], turning.shape[:-1])
-    load = np.broadcast_to(on_platform(robot, acting, turning), (*lead, 6))
-    acting = np.broadcast_to(acting, (*lead, robot.freedom))
-    axes = found[1].ndim - 1
-    flat = (np.broadcast_to(a, lead + a.shape[axes:]).reshape(-1, *a.shape[axes:]) for a in found)
-    given = Equations(*flat)
-    points, passed, actuators, redundancy, unheld = _solved(
-        given, acting.reshape(-1, robot.freedom), load.reshape(-1, 6), by
-    )
+    given = {"pose": pose, "velocity": velocity, "acceleration": acceleration, "wrench": wrench}
+    states = [
+        rest if part is None else checked(robot, part, name, on_failure)
+        for name, part in given.items()
+    ]
+    states.append(np.zeros(3) if moment is None else as_array(moment, "moment", (3,)))
+    # What cannot be served is told of the whole batch.
+    evaluated(robot, "inverse_dynamics", on_failure, *states[:3])
+    lead = np.broadcast_shapes(*(part.shape[:-1] for part in states))
+    flat = [
+        np.broadcast_to(part, (*lead, part.shape[-1])).reshape(-1, part.shape[-1])
+        for part in states
+    ]
+    parts = [_solved(robot, by, *block) for block in blocks(flat)]
     points, passed, actuators, unheld = (
-        a.reshape((*lead, *a.shape[1:])) for a in (points, passed, actuators, unheld)
+        np.concatenate(part).reshape((*lead, *part[0].shape[1:]))
+        for part in list(zip(*parts, strict=True))[:4]
     )
-    names = _names(robot)
     return Reactions(
-        names, points, passed[..., :3], passed[..., 3:], actuators, redundancy, by, unheld
+        _names(robot),
+        points,
+        passed[..., :3],
+        passed[..., 3:],
+        actuators,
+        max(part[4] for part in parts),
+        by,
+        unheld,
     )
 
 
 def _solved(
-    given: Equations, wrench: Array, load: Array, length: float
-) -> tuple[Array, Array, Array, int, Array]:
-    """Return points, what the joints pass on (B, n, j, 6), actuator forces, self-stresses, unheld.
+    robot: Manipulator,
+    length: float,
+    pose: Array,
+    velocity: Array,
+    acceleration: Array,
+    wrench: Array,
+    moment: Array,
+) -> tuple[Array, Array, Array, Array, int]:
+    """Return points, what the joints pass on (B, n, j, 6), actuator forces, unheld, self-stresses.
 
     Of what self-stress leaves free that of the least norm is taken.
     """
-    batch, n, joints, _ = given.passed.shape
-    points, passed = given.points.copy(), np.full(given.passed.shape, np.nan)
+    state = pose, velocity, acceleration
+    found = Equations(*evaluated(robot, "reactions", "nan", *state))
+    batch, n, joints, _ = found.passed.shape
+    points, passed = found.points.copy(), np.full(found.passed.shape, np.nan)
     actuators, unheld = np.full((batch, n), np.nan), np.full(batch, np.nan)
-    good = np.isfinite(given.rows).all(axis=(-2, -1)) & np.isfinite(wrench).all(axis=-1)
+    good = np.isfinite(found.rows).all(axis=(-2, -1))
+    good &= np.isfinite(wrench).all(axis=-1) & np.isfinite(moment).all(axis=-1)
     points[~good] = np.nan
     if not good.any():
-        return points, passed, actuators, 0, unheld
-    g = Equations(*(part[good] for part in given))
+        return points, passed, actuators, unheld, 0
+    g = Equations(*(part[good] for part in found))
+    load = on_platform(robot, wrench, moment)
     right, presumed = g.right.copy(), g.presumed_right.copy()
     right[:, :n] -= wrench[good]
     presumed[:, :6] -= load[good]
@@ -175,11 +201,11 @@ def _solved(
         per = np.tile([1.0, 1.0, 1.0, 1 / length, 1 / length, 1 / length], n * joints)
         back = inverse(per[:, None] * passing @ held.free)
         w = w - times(held.free @ back, per * (times(passing, w) + needed))
-    found = (times(passing, w) + needed).reshape(-1, n, joints, 6)
-    passed[good] = np.where(there[..., None], found, np.nan)
+    whole = (times(passing, w) + needed).reshape(-1, n, joints, 6)
+    passed[good] = np.where(there[..., None], whole, np.nan)
     actuators[good] = times(g.driven_rows, w) + g.driven
     unheld[good] = np.linalg.norm(held.missed[..., 0], axis=-1)
-    return points, passed, actuators, redundancy, unheld
+    return points, passed, actuators, unheld, redundancy
 
 
 def _names(robot: Manipulator) -> tuple[tuple[str, ...], ...]:

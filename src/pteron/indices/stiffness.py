@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 
 from pteron.dynamics import mass_matrix
 from pteron.errors import DataError
-from pteron.indices.elasticity import Elasticity, Section
-from pteron.indices.internal_forces import Equations, hold, moved, on_platform
+from pteron.indices.elasticity import Elasticity, Section, Springs
+from pteron.indices.internal_forces import Equations, blocks, hold, moved, on_platform
 from pteron.indices.sensitivities import tool_arm
 from pteron.kernels import Array, as_array
 from pteron.kinematics.evaluate import checked, evaluated
@@ -103,8 +103,8 @@ def stiffness(
     with tension, bending and torsion, rods tension alone with, where their distance is given, the
     couple of a pair (the virtual joints of A. Pashkevich, D. Chablat and P. Wenger, Mechanism and
     Machine Theory 44 (2009) 966-982, summed up along a link). Of an overconstrained machine the
-    self-stress is that of the least energy. Joints, guides and the platform are rigid, preloads
-    are left out.
+    self-stress is that of the least energy. Joints, guides and the platform are rigid; preloads
+    are left out, and so is what legs that leave the platform free to tilt cannot hold.
 
     Parameters
     ----------
@@ -140,29 +140,39 @@ def stiffness(
     ((3, 3), True)
     """
     robot = as_manipulator(robot)
-    rest = np.zeros(robot.freedom)
     poses = checked(robot, pose, "pose", on_failure)
-    found: tuple[Array, ...] = evaluated(robot, "reactions", on_failure, poses, rest, rest)
-    links: tuple[Array, ...] = evaluated(robot, "beams", on_failure, poses)
-    mass: Array = mass_matrix(robot, poses, on_failure=on_failure)
-    lead, m = poses.shape[:-1], robot.freedom
-    parts = [a.reshape(-1, *a.shape[len(lead) :]) for a in (*found, *links, mass, poses)]
-    good: Array = np.asarray(np.isfinite(parts[0]).all(axis=(-2, -1)))
-    compliance, frequencies = np.full((len(good), m, m), np.nan), np.full((len(good), m), np.nan)
-    if good.any():
-        *known, masses, at = (part[good] for part in parts)
-        given = Equations(*known[: len(found)])
-        energy = _energy(robot, elasticity, given, known[len(found) :])
-        at_p = _compliance(robot, given, energy, np.zeros((len(at), 3)))
-        compliance[good] = at_p
-        frequencies[good] = _frequencies(at_p, masses)
-        if any(robot.platform.tool):
-            compliance[good] = _compliance(robot, given, energy, tool_arm(robot, at))
-    return Stiffness(
-        compliance.reshape(*lead, m, m),
-        frequencies.reshape((*lead, m)),
-        len(robot.platform.lengths),
+    # What cannot be served is told of the whole batch.
+    evaluated(robot, "manipulability", on_failure, poses)
+    parts = [
+        _of_block(robot, elasticity, block)
+        for (block,) in blocks([poses.reshape(-1, robot.freedom)])
+    ]
+    compliance, frequencies = (
+        np.concatenate(part).reshape((*poses.shape[:-1], *part[0].shape[1:]))
+        for part in zip(*parts, strict=True)
     )
+    return Stiffness(compliance, frequencies, len(robot.platform.lengths))
+
+
+def _of_block(robot: Manipulator, elasticity: Elasticity, poses: Array) -> tuple[Array, Array]:
+    """Return the compliance at the tool (B, m, m) and the frequencies (B, m)."""
+    batch, m = poses.shape
+    rest = np.zeros(m)
+    equations: tuple[Array, ...] = evaluated(robot, "reactions", "nan", poses, rest, rest)
+    links: tuple[Array, ...] = evaluated(robot, "beams", "nan", poses)
+    mass: Array = mass_matrix(robot, poses, on_failure="nan")
+    compliance, frequencies = np.full((batch, m, m), np.nan), np.full((batch, m), np.nan)
+    good = np.asarray(np.isfinite(equations[0]).all(axis=(-2, -1)))
+    if good.any():
+        given = Equations(*(part[good] for part in equations))
+        beams = [part[good] for part in links]
+        energy = _energy(elasticity.of_legs(robot), elasticity.rod_distance, given, beams)
+        at_p = _compliance(robot, given, energy, np.zeros((len(energy), 3)))
+        compliance[good], frequencies[good] = at_p, _frequencies(at_p, mass[good])
+        if any(robot.platform.tool):
+            arm = tool_arm(robot, poses[good])
+            compliance[good] = _compliance(robot, given, energy, arm)
+    return compliance, frequencies
 
 
 def _compliance(robot: Manipulator, given: Equations, energy: Array, arm: Array) -> Array:
@@ -192,14 +202,14 @@ def _compliance(robot: Manipulator, given: Equations, energy: Array, arm: Array)
 
 
 def _energy(
-    robot: Manipulator, elasticity: Elasticity, given: Equations, links: list[Array]
+    springs: Springs, rod_distance: float | None, given: Equations, links: list[Array]
 ) -> Array:
     """Return W (B, 6 n, 6 n): twice the energy of internal forces w is w^T W w."""
-    springs, sections = elasticity.of_legs(robot)
+    actuators, sections = springs
     starts, ways, axes, couples = links
-    n, batch = robot.freedom, len(starts)
+    batch, n = couples.shape[:2]
     rows = given.driven_rows
-    found = rows.mT @ (rows / np.array(springs)[:, None])
+    found = rows.mT @ (rows / np.array(actuators)[:, None])
     for i in range(n):
         block = np.zeros((batch, 6, 6))
         rods = bool(np.isfinite(couples[:, i]).all())
@@ -207,7 +217,7 @@ def _energy(
             if section is None or np.isnan(ways[:, i, k]).any():
                 continue
             if rods and k == 1:
-                block += _rods(section, ways[:, i, k], couples[:, i], elasticity.rod_distance)
+                block += _rods(section, ways[:, i, k], couples[:, i], rod_distance)
             else:
                 arms = given.ends[:, i] - starts[:, i, k]
                 block += _beam(section, arms, ways[:, i, k], axes[:, i, k])

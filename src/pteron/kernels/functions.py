@@ -357,7 +357,6 @@ TABLE: dict[str, Entry] = {
     "jacobian": Entry(
         _POSE, lambda m, v: {"jacobian": kinematics.jacobian(_state(m, v))}, ("rows",)
     ),
-    "homogeneous_jacobian": Entry(_POSE, _homogeneous_jacobian, ("rows",)),
     "link_jacobians": Entry(_POSE, _link_jacobians, _BENT),
     "joint_screws": Entry(
         _POSE, lambda m, v: {"screws": [s.T for s in kinematics.joint_screws(_state(m, v))]}, _BENT
@@ -368,8 +367,6 @@ TABLE: dict[str, Entry] = {
         ("pose", "joint_rates", "joint_accelerations"), _platform_motion, _HELD
     ),
     "passive_friction": Entry(_RATE, _passive_friction, _HELD),
-    "reactions": Entry((*_MOTION, "parameters"), _reactions, _HELD),
-    "beams": Entry(_POSE, _beams, _BENT),
     "inverse_dynamics": Entry((*_MOTION, "parameters"), _inverse_dynamics, _HELD),
     "forward_dynamics": Entry((*_RATE, "forces", "parameters"), _forward_dynamics, _BENT),
     "drive_forces": Entry(
@@ -416,7 +413,7 @@ TABLE: dict[str, Entry] = {
 }
 
 FUNCTIONS = tuple(TABLE)
-"""What `compile` accepts, beside the indices."""
+"""What `compile` accepts, beside the indices and what they are made of."""
 
 _DEFINED = (
     *("condition", "condition_points", "speed_least", "speed_most", "turning_speed"),
@@ -435,7 +432,11 @@ INDICES: dict[str, Entry] = {
 }
 """The indices of performance, each one number for a pose: `pteron.indices` says what they mean."""
 
-TABLE |= INDICES
+TABLE |= INDICES | {
+    "homogeneous_jacobian": Entry(_POSE, _homogeneous_jacobian, ("rows",)),
+    "reactions": Entry((*_MOTION, "parameters"), _reactions, _HELD),
+    "beams": Entry(_POSE, _beams, _BENT),
+}
 
 
 def needs_of(what: str) -> tuple[Need, ...]:
