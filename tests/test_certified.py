@@ -264,7 +264,7 @@ def test_a_region_is_proved_or_a_pose_is_shown():
     most = abs(numeric(QUADRUPTERON, "type_ii")(np.zeros(4))[0])
     good = prove(QUADRUPTERON, cube, type_i=0.5, type_ii=most * np.cos(0.41))
     assert good.holds
-    assert str(good).startswith("proved with ")
+    assert str(good).startswith("proved: every pose keeps ")
     bad = prove(QUADRUPTERON, cube, type_ii=most * np.cos(0.39))
     assert bad.holds is False
     assert abs(bad.counterexample[3]) > 0.39

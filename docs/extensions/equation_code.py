@@ -52,6 +52,10 @@ CODE: dict[str, tuple[str, ...]] = {
     # Singularities.
     "T1": ("pteron.closures.closure.Closure.measure",),
     "T2": ("pteron.closures.constant_rows.ConstantRows", "pteron.singular_orientations"),
+    "T3": (f"{_E}.constraints.constraint_rows", f"{_E}.constraints.constraint_measure"),
+    # Clearances.
+    "C1": (f"{_E}.clearance.squared_distance",),
+    "C2": (f"{_E}.clearance.squared_distance",),
     # Indices, reactions, stiffness, errors.
     "G1": (f"{_E}.indices.homogeneous", f"{_E}.singular_values.singular_values"),
     "G2": (f"{_E}.indices.by_points",),

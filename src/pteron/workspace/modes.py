@@ -13,8 +13,12 @@ from pteron.manipulator import RobotLike, as_manipulator, working_modes
 from pteron.shapes import PoseLike
 from pteron.workspace.conditions import EDGES, Judge, judge, rooms_left
 from pteron.workspace.paving import Paving, paving
+from pteron.workspace.proofs import halved_each
 
 _HALVINGS = 50
+_ROUNDS = 30
+_MOST = 200_000
+"""Boxes about an edge in which a contact is sought."""
 
 
 @dataclass(frozen=True)
@@ -98,20 +102,26 @@ def _contact(
     own, theirs = (judge(side.robot, side.conditions) for side in (one, other))
     edges = [k for k, c in enumerate(one.conditions) if c.leg == leg and c.cause in EDGES]
     boxes = np.concatenate([one.inner, one.boundary])
-    low, high = one.corners(boxes)
-    # Where an edge may be met; not only on the boundary, since links of one length fold inside.
-    near = np.array([own.bounds(k, low, high)[0] <= 0.0 for k in edges]).any(axis=0)
-    low, high = low[near], high[near]
-    outside, _ = theirs(low, high, np.full(len(low), theirs.all))
-    low, high = low[~outside], high[~outside]
-    if not len(low):
-        return Contact(elbows, leg, "", None, True)
-    causes = own.undecided(low, high) | theirs.undecided(low, high)
-    for k in edges:
-        alone = causes[:, k] & (causes.sum(axis=1) == 1)
-        pose = _crossing(one, own, k, low[alone], high[alone])
-        if pose is not None:
-            return Contact(elbows, leg, one.conditions[k].cause, pose, True)
+    for _ in range(_ROUNDS):
+        low, high = one.corners(boxes)
+        # Where an edge may be met; not only on the boundary, since links of one length fold inside.
+        least = np.array([own.bounds(k, low, high)[0] for k in edges])
+        near = np.flatnonzero((least <= 0.0).any(axis=0))
+        for judging in (own, theirs):
+            outside, _ = judging(low[near], high[near], np.full(len(near), judging.all))
+            near = near[~outside]
+        boxes, low, high = boxes[near], low[near], high[near]
+        if not len(boxes):
+            return Contact(elbows, leg, "", None, True)
+        causes = own.undecided(low, high) | theirs.undecided(low, high)
+        for k in edges:
+            alone = causes[:, k] & (causes.sum(axis=1) == 1)
+            pose = _crossing(one, own, k, low[alone], high[alone])
+            if pose is not None:
+                return Contact(elbows, leg, one.conditions[k].cause, pose, True)
+        if 2 * len(boxes) > _MOST:
+            break
+        boxes = halved_each(boxes, boxes[0, 1] - boxes[0, 0])
     return Contact(elbows, leg, "", None, False)
 
 

@@ -22,7 +22,11 @@ from numpy.typing import NDArray
 from pteron.equations.machine import closure_of
 from pteron.kernels import Array, numeric, program
 from pteron.kinematics import inverse_kinematics, singular_orientations
-from pteron.kinematics.architecture import is_singular_everywhere, singular_everywhere
+from pteron.kinematics.architecture import (
+    architecture,
+    is_singular_everywhere,
+    singular_everywhere,
+)
 from pteron.kinematics.evaluate import checked_one
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -50,6 +54,9 @@ _SINGULAR = 1e-10
 _TINY = 1e-300
 
 Kind = Literal["I", "II", "constraint"]
+
+_WHAT = {"I": "squared_type_i", "II": "type_ii", "constraint": "constraint"}
+"""The function that vanishes, by kind."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +109,8 @@ def nearest_singularities(robot: RobotLike, pose: PoseLike) -> tuple[NearestSing
     Returns
     -------
     tuple of NearestSingularity
-        Those by translation first, the nearest first. A kind of which none is found is left out.
+        Those by translation first, the nearest first. A kind of which none is found is left out,
+        and constraint singularities where every pose is one, or bars are not told.
 
     Raises
     ------
@@ -125,12 +133,13 @@ def nearest_singularities(robot: RobotLike, pose: PoseLike) -> tuple[NearestSing
     if is_singular_everywhere(robot):
         raise singular_everywhere(robot)
     inverse_kinematics(robot, at)
+    kinds: list[tuple[Kind, int]] = [("I", i) for i in range(1, robot.freedom + 1)]
+    kinds += [("II", 0), ("constraint", 0)] if architecture(robot).holds else [("II", 0)]
     found = []
     for by in ("translation", "rotation")[: 1 + ("phi" in robot.coordinates)]:
         search = _turned if by == "rotation" else _moved
-        kinds: list[tuple[Kind, int]] = [("I", i) for i in range(1, robot.freedom + 1)]
         several: list[NearestSingularity] = []
-        for kind, leg in (*kinds, ("II", 0), ("constraint", 0)):
+        for kind, leg in kinds:
             vanishing = _Vanishing(robot, leg - 1 if kind == "I" else None, kind)
             place = search(vanishing, at)
             if place is not None:
@@ -155,12 +164,17 @@ class _Vanishing:
     def __call__(self, poses: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Return its values at poses (..., m), and which of them are in reach of other legs."""
         squares = numeric(self.robot, "squared_type_i")(poses)[0]
-        if self.leg is not None:
-            others = np.delete(squares, self.leg, axis=-1)
-            return squares[..., self.leg], (others >= -_EDGE).all(axis=-1)
-        what = "type_ii" if self.kind == "II" else "constraint"
-        values = numeric(self.robot, what)(poses)[0]
-        return values, (squares >= 0.0).all(axis=-1) & np.isfinite(values)
+        values = (
+            squares if self.leg is not None else numeric(self.robot, _WHAT[self.kind])(poses)[0]
+        )
+        return self.among(squares, values)
+
+    def among(self, squares: Array, values: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Return the same of the squares of all type-I measures and of a measure's values."""
+        if self.leg is None:
+            return values, np.asarray((squares >= 0.0).all(axis=-1) & np.isfinite(values))
+        others = np.delete(squares, self.leg, axis=-1)
+        return squares[..., self.leg], np.asarray((others >= -_EDGE).all(axis=-1))
 
     def slope(self, pose: Array) -> tuple[Array, Array, Array]:
         """Return its gradient, the squares of all type-I measures, and their gradients (n, m)."""
@@ -181,12 +195,18 @@ def _smooth(robot: Manipulator) -> ca.Function:
     return ca.Function("smooth", [pose], ca.cse([values, ca.jacobian(values, pose)]))
 
 
-def _changes(vanishing: _Vanishing, start: Array, way: Array, places: Array) -> Array:
+def _changes(
+    vanishing: _Vanishing,
+    start: Array,
+    way: Array,
+    places: Array,
+    known: tuple[Array, NDArray[np.bool_]] | None = None,
+) -> Array:
     """Return the least share (R,) of ways (R, m) from a start at which the sign changes, or inf.
 
-    It is looked for between each two of `places` (S,).
+    It is looked for between each two of `places` (S,), where the function may be known.
     """
-    values, reached = vanishing(start + places[:, None, None] * way)
+    values, reached = known or vanishing(start + places[:, None, None] * way)
     negative = values < 0.0
     changed = (negative[1:] != negative[:-1]) & reached[1:] & reached[:-1]
     rays = np.flatnonzero(changed.any(axis=0))
@@ -224,13 +244,12 @@ def _moved(vanishing: _Vanishing, start: Array) -> Array | None:
     """Return the nearest pose at which the function vanishes, moved only."""
     if np.abs(vanishing(start[None])[0][0]) <= _SINGULAR:
         return start
-    lengths = len(vanishing.robot.platform.lengths)
-    center, radius = search_ball(vanishing.robot)
-    far = float(np.linalg.norm(start[:lengths] - center)) + radius
-    rays = np.zeros((_RAYS, len(start)))
-    rays[:, :lengths] = far * _directions(lengths)
-    places = np.linspace(0.0, 1.0, _STEPS + 1) ** 1.5
-    shares = _changes(vanishing, start, rays, places)
+    robot, lengths = vanishing.robot, len(vanishing.robot.platform.lengths)
+    rays, places = _rays(robot, tuple(start.tolist()))
+    squares, values = (
+        _on_rays(robot, tuple(start.tolist()), _WHAT[kind]) for kind in ("I", vanishing.kind)
+    )
+    shares = _changes(vanishing, start, rays, places, vanishing.among(squares, values))
     order = np.argsort(shares, kind="stable")[:_STARTS]
     hits = [start + shares[i] * rays[i] for i in order if np.isfinite(shares[i])]
     if not hits:
@@ -242,6 +261,23 @@ def _moved(vanishing: _Vanishing, start: Array) -> Array | None:
 
     best: Array = min([hits[0], *nearer], key=distance)
     return _narrowed(vanishing, start, best, lengths) if best is hits[0] else best
+
+
+def _rays(robot: Manipulator, start: tuple[float, ...]) -> tuple[Array, Array]:
+    """Return rays (R, m) from a start to beyond all that is in reach, and shares (S,) of them."""
+    lengths = len(robot.platform.lengths)
+    center, radius = search_ball(robot)
+    far = float(np.linalg.norm(np.array(start[:lengths]) - center)) + radius
+    rays = np.zeros((_RAYS, len(start)))
+    rays[:, :lengths] = far * _directions(lengths)
+    return rays, np.linspace(0.0, 1.0, _STEPS + 1) ** 1.5
+
+
+@lru_cache(maxsize=4)
+def _on_rays(robot: Manipulator, start: tuple[float, ...], what: str) -> Array:
+    """Return a function at all places on all rays."""
+    rays, places = _rays(robot, start)
+    return np.asarray(numeric(robot, what)(np.array(start) + places[:, None, None] * rays)[0])
 
 
 def _directions(lengths: int) -> Array:

@@ -94,6 +94,20 @@ class Paving:
         chosen = alone & self.causes[:, self.conditions.index(condition)]
         return np.asarray(self.boundary[chosen])
 
+    @cached_property
+    def _cells(self) -> list[tuple[int, Array, Array]]:
+        """What boxes of one size say, how often each of their sides was halved, and their keys."""
+        moving = np.flatnonzero(self.box[0] < self.box[1])
+        start, size = self.box[0, moving], (self.box[1] - self.box[0])[moving]
+        found = []
+        for boxes, value in ((self.inner, 1), (self.boundary, 0)):
+            depths = np.round(np.log2(size / (boxes[:, 1] - boxes[:, 0])))
+            for depth in np.unique(depths, axis=0):
+                least = boxes[(depths == depth).all(axis=1), 0]
+                cells = np.round((least - start) / size * 2.0**depth)
+                found.append((value, depth, np.sort(_keys(cells, depth))))
+        return found
+
     def locate(self, poses: ArrayLike) -> NDArray[np.int8]:
         """Return 1 for poses (..., m) that are proved inside, -1 outside, 0 where undecided.
 
@@ -106,14 +120,12 @@ class Paving:
         places = (flat[:, moving] - start) / size
         found = np.full(len(flat), -1, np.int8)
         finest = np.zeros(len(moving))
-        for boxes, value in ((self.boundary, 0), (self.inner, 1)):
-            depths = np.round(np.log2(size / (boxes[:, 1] - boxes[:, 0])))
-            finest = np.maximum(finest, depths.max(axis=0, initial=0.0))
-            for depth in np.unique(depths, axis=0):
-                lattice = boxes[(depths == depth).all(axis=1), 0]
-                cells = np.round((lattice - start) / size * 2.0**depth)
-                asked = np.flatnonzero(found < 0)
-                found[asked[_among(cells, np.floor(places[asked] * 2.0**depth), depth)]] = value
+        for value, depth, keys in self._cells:
+            asked = np.flatnonzero(found < 0)
+            wanted = _keys(np.floor(places[asked] * 2.0**depth), depth)
+            at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+            found[asked[keys[at] == wanted]] = value
+            finest = np.maximum(finest, depth)
         fine = places * 2.0**finest
         on_face = (np.abs(fine - np.round(fine)) < _FACE).any(axis=1)
         beyond = ((flat < self.box[0]) | (flat > self.box[1])).any(axis=1)
@@ -121,13 +133,10 @@ class Paving:
         return found.reshape(given.shape[:-1])
 
 
-def _among(cells: Array, asked: Array, depth: Array) -> NDArray[np.bool_]:
-    """Return which of the cells (P, k) asked for are among cells (N, k) of a lattice."""
+def _keys(cells: Array, depth: Array) -> Array:
+    """Return a number for each cell (P, k) of a lattice; what is beyond it has no cell's number."""
     weights = np.cumprod(np.append(1.0, 2.0 ** depth[:-1] + 2.0))
-    keys = np.sort((cells + 1.0) @ weights)
-    wanted = np.clip(asked + 1.0, 0.0, 2.0**depth + 1.0) @ weights
-    at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-    return np.asarray(keys[at] == wanted)
+    return np.asarray(np.clip(cells + 1.0, 0.0, 2.0**depth + 1.0) @ weights)
 
 
 def paving(

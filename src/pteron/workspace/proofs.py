@@ -60,7 +60,7 @@ class Proof:
     def __str__(self) -> str:
         told = ", ".join(map(str, self.causes))
         if self.holds:
-            return f"proved with {self.boxes} boxes: every pose keeps {len(self.conditions)} bounds"
+            return f"proved: every pose keeps {len(self.conditions)} bounds (boxes: {self.boxes})"
         if self.counterexample is not None:
             return (
                 f"not so: pose {self.counterexample.round(6).tolist()} does not serve: {self.why}"
@@ -77,11 +77,14 @@ class Proof:
         margins = numeric(self.robot, "reach")(self.counterexample)[0]
         joints = {(j.leg, j.noun): j for j in limited_joints(self.robot, self.counterexample)}
         told = []
-        for condition in self.causes:
+        left = rooms_left(self.robot, self.causes, self.counterexample)
+        for condition, room in zip(self.causes, left.tolist(), strict=True):
             joint = joints.get((condition.leg, condition.cause.split(" at ")[0]))
             text = str(condition)
             if joint is not None:
                 text += f" ({joint.value:.4g} {joint.unit} of {joint.told_limits('{:g}'.format)})"
+            elif condition.floor:
+                text += f" ({room + condition.floor:.4g}, at least {condition.floor:.4g} asked)"
             elif condition.leg and margins[condition.leg - 1] < 0.0:
                 text += f" (it misses the pose by {-margins[condition.leg - 1]:.3g} m)"
             told.append(text)
@@ -130,7 +133,7 @@ def prove(
     --------
     >>> from pteron.workspace import Box, prove
     >>> cube = Box((-0.05, -0.05, -0.05, 0.0), (0.05, 0.05, 0.05, 0.0))
-    >>> prove("quadrupteron", cube, type_ii=0.9).holds
+    >>> prove("quadrupteron", cube, type_ii=0.6).holds
     True
     """
     robot = as_manipulator(robot)
@@ -170,10 +173,10 @@ def prove(
             return Proof(
                 None, robot, region, asked, None, left[smallest], causes=causes, boxes=seen
             )
-        left, open_ = _halved(left, box[1] - box[0]), np.repeat(open_, 2)
+        left, open_ = halved_each(left, box[1] - box[0]), np.repeat(open_, 2)
 
 
-def _halved(boxes: Array, whole: Array) -> Array:
+def halved_each(boxes: Array, whole: Array) -> Array:
     """Return both halves of boxes (N, 2, m), each across the side that is the largest of `whole`'s.
 
     So coordinates of different units are halved alike.

@@ -120,10 +120,11 @@ def scaled_to_reach(
         least = least_reserve(robot, middle)
     scale, best = 0, None
     for across, up in moves(robot, direction, _DIRECTIONS):
-        fits = _largest(robot, Cycle(robot.platform, middle, across, up, turn, 1.0), least)
-        if best is None or fits > _WORTH * scale:
-            scale, best = fits, across
-    if best is None or scale == 0:
+        cycle = Cycle(robot.platform, middle, across, up, turn, 1.0)
+        larger = _largest(robot, cycle, least, int(_WORTH * scale) + 1)
+        if larger:
+            scale, best = larger, across
+    if best is None:
         inverse_kinematics(robot, middle)  # says which leg misses the pose, and by how much
         raise ModelError(
             f"no pick-and-place cycle about pose {middle.tolist()} keeps a reserve of {least:g} to "
@@ -133,29 +134,34 @@ def scaled_to_reach(
     return scale / _STEPS, best
 
 
-def _largest(robot: Manipulator, cycle: Cycle, least: float) -> int:
-    """Return the largest scale that fits, in thousandths; 0 if none does."""
+def _largest(robot: Manipulator, cycle: Cycle, least: float, wanted: int) -> int:
+    """Return the largest scale that fits, in thousandths; 0 if it is less than is wanted."""
     way = np.linspace(0.0, 0.5, _SAMPLES)
 
     def fits(thousandths: int) -> bool:
         return _keeps(robot, replace(cycle, scale=thousandths / _STEPS).at(way)[0], least)
 
+    if wanted > _STEPS or not fits(wanted):
+        return 0
     if fits(_STEPS):
         return _STEPS
-    return _STEPS - bisect_left(range(_STEPS), True, lo=1, key=lambda less: fits(_STEPS - less))
+    most = range(_STEPS - wanted)
+    return _STEPS - bisect_left(most, True, lo=1, key=lambda less: fits(_STEPS - less))
 
 
 def _keeps(robot: Manipulator, poses: Array, least: float) -> bool:
     """Say whether all poses keep the reserves and the joints' limits."""
     type_i = numeric(robot, "reach")(poses)[1]
-    good = (type_i >= least + _DIP).all()  # NaN, out of reach, compares false
+    if not (type_i >= least + _DIP).all():  # NaN, out of reach, compares false
+        return False
     if closure_of(robot).vanishes() is not False or robot.platform.turns:
         type_ii = np.abs(numeric(robot, "type_ii")(poses)[0]) / best_type_ii(robot)
-        good &= (type_ii >= least + _DIP).all()
+        if not (type_ii >= least + _DIP).all():
+            return False
     joints = numeric(robot, "joint_coordinates")(poses)[0]
     for leg, q in zip(robot.legs, joints.T, strict=True):
         if leg.limits is not None:
             low, high = leg.limits
-            good &= bool(q.min() >= low + _DIP and q.max() <= high - _DIP)
-    good &= bool((numeric(robot, "passive_room")(poses)[1] >= _DIP).all())
-    return bool(good)
+            if not (q.min() >= low + _DIP and q.max() <= high - _DIP):
+                return False
+    return bool((numeric(robot, "passive_room")(poses)[1] >= _DIP).all())
