@@ -116,9 +116,9 @@ def meaning(robot: Manipulator, port: Port, output: Output) -> str:
         "type_ii": "type-II measure: 0 at a singularity",
         "type_i": "type-I measure of each leg: 0 where it is stretched or folded, 1 at best",
         "margin": "from each leg to the edge of its reach, m; negative beyond it",
-        "standing": "0 where the pose serves, -1 beyond a joint's limit, else the leg, from 1, that "
-        "misses it by most",
-        "way": "to the nearest end of a leg's reach, or of what limits leave it, m; negative beyond",
+        "standing": "0 where the pose serves, -1 beyond a joint's limit, else the leg, from 1, "
+        "that misses it by most",
+        "way": "to the nearest end of a leg's reach or of its limits, m; negative beyond it",
     }
     name = port.name.removesuffix("_out")
     return told_meaning(robot, output) if name == NAMES[output] != "forces" else texts.get(name, "")
