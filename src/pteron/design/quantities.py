@@ -13,6 +13,7 @@ import numpy as np
 from pteron.errors import shown
 from pteron.indices import INDICES, Index
 from pteron.manipulator import Manipulator
+from pteron.workspace import clearance
 
 if TYPE_CHECKING:
     from pteron.design.design import Design
@@ -78,6 +79,11 @@ def _type_ii(design: Design) -> float:
     return 0.0 if crossed else float(np.abs(measures).min())
 
 
+def _clearance(design: Design) -> float:
+    distances = clearance(design.robot, design.poses, on_failure="nan").distances
+    return float(distances.min(initial=np.inf))
+
+
 def _stroke(design: Design) -> float:
     joints = design.joints
     return float(((joints.max(axis=0) - joints.min(axis=0)) / design.start_strokes).max())
@@ -114,6 +120,9 @@ _OWN = {
     ),
     "type_i": Quantity("", "least type-I measure of a leg in the workspace", _type_i),
     "type_ii": Quantity("", "least type-II measure in the workspace", _type_ii),
+    "clearance": Quantity(
+        "m", "least distance of two bodies in the workspace, with the file's radii", _clearance
+    ),
     "stroke": Quantity(
         "",
         "greatest way of a joint in the workspace, over the width of its limits or, without them, "

@@ -14,6 +14,9 @@ from pteron.toml import read_toml, validated
 
 _ABSENT = "no such file; it should describe a search for a design"
 
+_ROUNDING = 1e-9
+"""A bound that is missed by a smaller share is kept."""
+
 Positive = Annotated[Number, Field(gt=0.0)]
 Floor = Annotated[Number, Field(ge=0.0, lt=1.0)]
 
@@ -189,7 +192,8 @@ class RequirementTable(Table):
             return failed
         missing = 0.0 if self.least is None else (self.least - value) / (abs(self.least) or 1.0)
         beyond = 0.0 if self.most is None else (value - self.most) / (abs(self.most) or 1.0)
-        return max(0.0, missing, beyond)
+        gap = max(missing, beyond)
+        return gap if gap > _ROUNDING else 0.0
 
     @property
     def words(self) -> str:

@@ -109,7 +109,8 @@ def survey_designs(task: Task, first: int, count: int) -> Array:
     """Return so many designs (count, V) of the survey's sequence from one on."""
     low, high = task.ranges
     sequence = qmc.Sobol(len(low), scramble=False)
-    sequence.fast_forward(first)
+    if first:
+        sequence.fast_forward(first)
     shift = np.random.default_rng(task.spec.search.seed).random(len(low))
     return np.asarray(low + (sequence.random(count) + shift) % 1.0 * (high - low))
 

@@ -1,0 +1,269 @@
+"""Searches for a design: what they ask, what they find, what is proved of it, and going on."""
+
+import shutil
+
+import numpy as np
+import polars as pl
+import pytest
+
+import pteron
+from pteron.design import (
+    Design,
+    Spec,
+    Summary,
+    Task,
+    proved_cube,
+    read_spec,
+    search,
+    survey,
+)
+from pteron.design.masses import stretched
+from pteron.design.paths import places
+from pteron.design.variables import geometry_slopes
+from pteron.equations.machine import numbers
+from pteron.errors import DataError, ModelError, OutputError
+from pteron.indices import evaluate
+from pteron.workspace import conditions, largest_cube
+from pteron.workspace.conditions import kept
+
+LENGTHS = [
+    {"moves": "legs.upper_length", "range": (0.1, 0.35), "each": True},
+    {"moves": "legs.lower_length", "range": (0.1, 0.35), "each": True},
+    {
+        "name": "guides",
+        "moves": ("-legs[2].guide_point.x", "legs[4].guide_point.x"),
+        "range": (0.15, 0.4),
+    },
+]
+
+
+def spec_of(**given):
+    usual = {
+        "robot": "quadrupteron",
+        "variables": LENGTHS,
+        "objectives": [{"maximise": "cube"}, {"minimise": "links"}],
+        "requirements": [{"quantity": "links", "most": 1.39}, {"quantity": "stroke", "most": 1.0}],
+        "search": {"population": 4, "generations": 2, "refined": 2},
+    }
+    return Spec.model_validate(usual | given)
+
+
+@pytest.fixture(scope="module")
+def task():
+    return Task.of(spec_of())
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    """A small search, and the folder of what it has evaluated."""
+    folder = tmp_path_factory.mktemp("search") / "generations"
+    return search(spec_of(), folder=folder), folder
+
+
+def test_a_path_names_numbers_of_the_file():
+    robot = pteron.load("quadrupteron")
+    assert [p.path for p in places(robot, "legs.upper_length")][3] == "legs[4].upper_length"
+    (one,) = places(robot, "-legs[2].guide_point.x")
+    assert (one.sign, one.part, one.read(robot)) == (-1, 0, -0.26)
+    assert len(places(robot, "legs[1,3].platform_point")) == 6
+
+
+@pytest.mark.parametrize("name", pteron.catalog())
+def test_every_machine_has_variables_and_keeps_its_start(name):
+    robot = pteron.load(name)
+    tables = [
+        {"moves": "legs.platform_point", "by": "factor", "range": (0.9, 1.1)},
+        {"moves": "legs.guide_point.x", "by": "offset", "range": (-0.1, 0.1)},
+    ]
+    one = Task.of(spec_of(robot=name, variables=tables, requirements=[]))
+    assert one.machine([1.0, 0.0]) == robot
+    other = one.machine([1.05, 0.02])
+    np.testing.assert_allclose(other.legs[0].guide_point[0], robot.legs[0].guide_point[0] + 0.02)
+    change = geometry_slopes(robot, one.variables, [1.0, 0.0]) @ [0.05, 0.02]
+    np.testing.assert_allclose(numbers(other), numbers(robot) + change, atol=1e-9)
+
+
+def test_a_stretched_link_is_that_of_a_longer_bar():
+    """A bar of one section, its axis off the link's: mass per length, distance and width kept."""
+
+    def bar(length, density=1.3, off=0.02):
+        mass = density * length
+        inertia = mass * (length**2 / 3.0 + off**2)
+        return pteron.PlanarInertia.of_body(mass, (length / 2.0, off), inertia)
+
+    np.testing.assert_allclose(stretched(bar(0.2), 1.7).values, bar(0.34).values)
+
+
+def test_slopes_of_the_conditions_are_those_of_differences(task):
+    geometry, side = task.first.geometry, np.array([1.0])
+    poses = pteron.random_poses("quadrupteron", 3, type_i=0.2)
+    _, by_geometry, by_pose = task.conditions.derivatives(geometry, poses, 1.0)
+    way, step = np.random.default_rng(0).normal(size=len(geometry)), 1e-6
+    ends = [task.conditions.rows(geometry + s * step * way, poses, 1.0) for s in (1.0, -1.0)]
+    np.testing.assert_allclose(by_geometry @ way, (ends[0] - ends[1]) / (2 * step), atol=1e-7)
+    np.testing.assert_allclose(
+        by_pose, task.conditions.pose_slopes(poses, geometry=geometry, side=side)[1]
+    )
+    moved = poses + step * np.array([0.3, -0.5, 0.7, 0.2])
+    change = task.conditions.rows(geometry, moved, 1.0) - task.conditions.rows(geometry, poses, 1.0)
+    np.testing.assert_allclose(by_pose @ (moved - poses)[0], change, atol=1e-10)
+
+
+def test_quantities_are_those_of_the_public_functions(task):
+    values = task.ranges.mean(axis=0)
+    design = Design(task, task.machine(values.tolist()))
+    robot, poses = design.robot, design.poses
+    assert design.quantity("condition") == pytest.approx(evaluate(robot, "condition", poses).max())
+    assert design.quantity("kappa") == pytest.approx(evaluate(robot, "kappa", poses).max())
+    corners = design.cube.center + design.cube.edge * (np.array([[0, 0, 0], [1, 1, 1]]) - 0.5)
+    corners = np.column_stack([corners, [0.0, 0.0]])
+    forces = pteron.drive_forces(robot, corners, [0, 1.0, 0, 0], [-10.0, 0, 0, 0])
+    assert design.quantity("force") >= np.abs(forces).max() * (1 - 1e-9)
+    masses = [p for p in pteron.parameter_data(robot) if p.kind == "m"]
+    total = sum(
+        v
+        for p, v in zip(pteron.parameter_data(robot), pteron.parameters(robot), strict=True)
+        if p in masses
+    )
+    assert design.quantity("moving_mass") == pytest.approx(total)
+
+
+@pytest.mark.parametrize("name", ["five-bar"])
+def test_the_cube_is_that_of_the_proved_search(name):
+    """Another search, by linear programs over another lattice, finds none that is larger."""
+    robot = pteron.load(name)
+    lengths = [{"moves": "legs.upper_length", "by": "factor", "range": (0.9, 1.1)}]
+    floors = {"type_i": 0.0, "type_ii": 0.0}
+    asked = spec_of(robot=name, variables=lengths, floors=floors, requirements=[])
+    cube = Task.of(asked).first.cube
+    known = largest_cube(robot, np.zeros(robot.freedom), proved=False)
+    assert cube.edge == pytest.approx(known.edge, rel=0.005)
+
+
+def test_a_tube_between_the_points_is_no_part_of_the_cube():
+    """The Tripteron's links are equally long: they fold, unreachable, onto a line through it."""
+    asked = spec_of(robot="tripteron", variables=LENGTHS[:1], requirements=[])
+    design = Task.of(asked).first
+    cube = proved_cube(design)
+    assert cube is not None
+    assert cube.edge > 0.99 * design.cube.edge
+    rng = np.random.default_rng(0)
+    poses = cube.center + cube.edge * rng.uniform(-0.5, 0.5, (20_000, 3))
+    floors = conditions(design.robot, type_i=0.05, type_ii=0.01)
+    assert kept(design.robot, floors, poses).all()
+
+
+def test_a_search_finds_a_larger_proved_cube_with_links_no_longer(found):
+    front, _ = found
+    start = proved_cube(front.task.first)
+    best = Design(front.task, front.robot(0))
+    cube = proved_cube(best)
+    assert cube.edge > 1.3 * start.edge
+    assert best.quantity("links") <= 1.39 + 1e-9
+    limits = [leg.limits for leg in best.robot.legs]
+    assert limits == [leg.limits for leg in front.task.robot.legs]
+    poses = best.poses
+    assert (np.abs(pteron.inverse_kinematics(best.robot, poses)) <= 0.3).all()
+
+
+def test_no_design_of_the_front_betters_another(found):
+    costs = found[0].objectives * [-1.0, 1.0]
+    for one in costs:
+        assert not ((costs <= one).all(axis=1) & (costs < one).any(axis=1)).any()
+
+
+def test_a_search_that_was_ended_goes_on_to_the_same_front(found, tmp_path):
+    front, folder = found
+    again = tmp_path / "generations"
+    shutil.copytree(folder, again)
+    for chunk in sorted(again.glob("*/0*.parquet"))[2:]:
+        chunk.unlink()
+    assert search(spec_of(), folder=again).table.equals(front.table)
+    with pytest.raises(OutputError, match=r"holds"):
+        search(spec_of(), folder=again, seed=1)
+
+
+def test_what_changed_is_told_in_words(found):
+    summary = Summary(found[0])
+    page = summary.page()
+    assert "| cube | 167.2 mm |" in page
+    assert "cube proved: every position of the cube with edge" in page
+    assert "slider of leg 1:" in page
+    best = summary.chosen[0]
+    lengths = [c for c in best.changes if c.what.startswith("upper length")]
+    assert lengths
+    assert all(" mm, now " in change.words for change in lengths)
+
+
+def workspace_spec(**given):
+    variables = [
+        {"moves": f"legs.{key}_length", "range": (0.1, 0.35)} for key in ("upper", "lower")
+    ]
+    usual = {
+        "variables": variables,
+        "workspace": {"low": (-0.05, -0.05, -0.05), "high": (0.05, 0.05, 0.05)},
+        "angles": (-0.2, 0.2),
+        "objectives": [{"minimise": "links"}],
+        "requirements": [],
+    }
+    return spec_of(**usual | given)
+
+
+def test_a_survey_streams_and_goes_on(tmp_path):
+    front = survey(workspace_spec(), 500, tmp_path / "survey")
+    assert front.evaluated == 512
+    table = pl.read_parquet(tmp_path / "survey" / "*.parquet")
+    good = table.filter(pl.col("misses workspace") == 0.0)
+    assert front.table["links"][0] == good["links"].min()
+    (tmp_path / "survey" / "00000001.parquet").unlink()
+    again = survey(workspace_spec(), 500, tmp_path / "survey")
+    assert again.table.equals(front.table)
+    design = Summary(front).chosen[0]
+    assert [proof.holds for proof in design.workspace] == [True, True]
+
+
+def test_what_cannot_be_is_told_with_what_comes_nearest():
+    wide = {"center": (0.0, 0.0, 0.0), "edge": 0.9}
+    asked = workspace_spec(workspace=wide, requirements=[{"quantity": "links", "most": 0.9}])
+    pattern = r"none of 8 designs .* the workspace is not kept \(leg \d: .* links at most 0.9 is"
+    with pytest.raises(ModelError, match=pattern):
+        search(asked)
+
+
+FAULTS = {
+    "range = [0.3, 0.1]": r"variables, item 1: range: \[0.3, 0.1\] given, whose range is empty",
+    'range = [0.1, 0.3]\ncolour = "red"': r"variables, item 1: colour: unknown key",
+    "range = [-0.1, 0.3]": r"variables, item 1: range: -0.1 m given, but a length is above 0",
+}
+MORE = {
+    "": r"objectives: missing",
+    '[[objectives]]\nmaximise = "cub"': r"'cub' is no quantity: .*did you mean \"cube\"\?",
+    '[[objectives]]\nmaximise = "cube"\nminimise = "links"': r"either maximise or minimise",
+    '[[objectives]]\nminimise = "drive_load"': r"no drive of quadrupteron has max_force",
+    '[[objectives]]\nminimise = "links"\n[workspace]\nlow = [0, 0, 0]\nedge = 1': r"a box has low",
+    '[[objectives]]\nminimise = "links"\n[workspace]\ncenter = [0, 0]\nedge = 0.1': r"x y z of qua",
+}
+
+
+@pytest.mark.parametrize(
+    ("body", "pattern"),
+    [
+        *((f'{text}\n[[objectives]]\nmaximise = "cube"', why) for text, why in FAULTS.items()),
+        *((f"range = [0.1, 0.3]\n{text}", pattern) for text, pattern in MORE.items()),
+    ],
+)
+def test_faults_of_a_spec_are_told(tmp_path, body, pattern):
+    path = tmp_path / "spec.toml"
+    path.write_text(f'robot = "quadrupteron"\n[[variables]]\nmoves = "legs.upper_length"\n{body}\n')
+    with pytest.raises(DataError, match=pattern) as told:
+        Task.of(read_spec(path))
+    assert str(told.value).startswith(f"{path}: ")
+
+
+def test_all_faults_of_variables_are_told_at_once():
+    moves = ["legs.uper_length", "legs[7].upper_length", "legs.guide_point.w", "upper_length"]
+    variables = [{"moves": one, "range": (0.1, 0.2)} for one in moves]
+    with pytest.raises(DataError, match=r"4 faults") as told:
+        Task.of(spec_of(variables=variables))
+    for text in ('did you mean "upper_length"?', "no leg 7", ".w is none of", "is not a path"):
+        assert text in str(told.value)
