@@ -1,10 +1,12 @@
 """Searches for a design: what they ask, what they find, what is proved of it, and going on."""
 
+import json
 import shutil
 
 import numpy as np
 import polars as pl
 import pytest
+from test_cli import done, refused
 
 import pteron
 from pteron.design import (
@@ -267,3 +269,30 @@ def test_all_faults_of_variables_are_told_at_once():
         Task.of(spec_of(variables=variables))
     for text in ('did you mean "upper_length"?', "no leg 7", ".w is none of", "is not a path"):
         assert text in str(told.value)
+
+
+def test_the_command_writes_what_it_finds(tmp_path):
+    """Planar, so that it is quick; and the same command again reads what was evaluated."""
+    spec = tmp_path / "spec.toml"
+    spec.write_text(
+        'robot = "five-bar"\n'
+        '[[variables]]\nmoves = "legs.lower_length"\nby = "factor"\nrange = [0.7, 1.3]\n'
+        "[workspace]\nlow = [-0.02, 0.01]\nhigh = [0.02, 0.05]\n"
+        '[[objectives]]\nminimise = "links"\n[[objectives]]\nminimise = "condition"\n'
+        "[search]\npopulation = 6\ngenerations = 2\nrefined = 1\n"
+    )
+    folder = tmp_path / "found"
+    line = f"design {spec} --out {folder} --json"
+    data = json.loads(done(line))
+    names = ["best-links.toml", "best-condition.toml", "compromise.toml"]
+    for name in ("front.csv", "front.parquet", "front.png", "report.md", "design.json", *names):
+        assert (folder / name).stat().st_size > 100
+    rows = pl.read_csv(folder / "front.csv")
+    assert rows.columns == ["legs.lower_length", "links (m)", "condition"]
+    best = pteron.load(folder / "best-links.toml")
+    assert best.name == "five-bar-best-links"
+    chosen = next(one for name, one in data["chosen"].items() if "best-links" in name)
+    assert chosen["workspace_proved"] == [True]
+    assert chosen["links"] == pytest.approx(rows["links (m)"].min())
+    assert json.loads(done(line)) == data
+    assert "--sweep: needs --out" in refused(f"design {spec} --sweep 10")

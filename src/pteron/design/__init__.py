@@ -1,6 +1,6 @@
 """Which dimensions are best: searches over a machine's geometry, with proofs of what they find."""
 
-from pteron.design.changes import Change, geometry_changes, mass_changes, quantity_changes
+from pteron.design.changes import Change
 from pteron.design.design import Design
 from pteron.design.front import Front
 from pteron.design.proofs import ProvedCube, proved_cube, workspace_proofs
@@ -23,11 +23,8 @@ __all__ = [
     "Task",
     "Told",
     "Variable",
-    "geometry_changes",
-    "mass_changes",
     "proved_cube",
     "quantities",
-    "quantity_changes",
     "read_spec",
     "search",
     "survey",

@@ -13,7 +13,7 @@ from pteron.manipulator import Manipulator
 
 _WRITTEN = re.compile(r"(-?)legs(?:\[([\d\s,]*)\])?\.(\w+)(?:\.(\w+))?")
 _GEOMETRIC = ("point", "direction", "length", "number")
-_SHAPE = 'a path such as "legs.upper_length" or "legs[1,3].guide_point.x"'
+_SHAPE = 'a path such as "legs.platform_point" or "legs[1,3].guide_point.x"'
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,7 @@ class VariableTable(Table):
     """`[[variables]]`: numbers of the robot's file that move as one."""
 
     moves: Annotated[tuple[str, ...], BeforeValidator(_listed), Field(min_length=1)] = Field(
-        description='paths such as "legs[1,3].upper_length" or "-legs[2].guide_point.x"'
+        description='paths such as "legs[1,3].platform_point" or "-legs[2].guide_point.x"'
     )
     range: Two = Field(description="least and greatest value")
     by: Literal["value", "factor", "offset"] = Field(
