@@ -241,7 +241,7 @@ def test_a_reach_without_end_is_refused_and_nowhere_is_proved():
     far = [[1.0, 1.0, 1.0, 0.0], [1.1, 1.1, 1.1, 1.0]]
     none = paving(QUADRUPTERON, np.zeros(4), within=far)
     assert (none.outer_volume, none.unit, none.gap, none.complete) == (0.0, "m^3 rad", 0.0, True)
-    for wrong in ({"tolerance": 0.0}, {"within": [[1.0], [0.0]]}):
+    for wrong in ({"tolerance": 0.0}, {"within": [[1.0], [0.0]]}, {"given": ()}):
         with pytest.raises(DataError):
             paving(QUADRUPTERON, np.zeros(4), **wrong)
 

@@ -201,6 +201,15 @@ def test_springs_at_the_joints_alone(robot):
     np.testing.assert_allclose(found.matrix, exact, rtol=0, atol=1e-9 * scale)
     squares = eigh(exact[0], pteron.mass_matrix(robot, poses)[0], eigvals_only=True)
     np.testing.assert_allclose(found.frequencies[0], np.sqrt(squares) / (2 * np.pi), rtol=1e-8)
+    # Where direct kinematics, by Newton's method, has the platform as the loaded springs give way.
+    pose, load = poses[0], 0.2 * np.linspace(1.0, -1.0, robot.freedom)
+    given = pteron.inverse_kinematics(robot, pose) + np.linalg.solve(rows[0].T, load) / springs
+    at = pose
+    for _ in range(4):
+        missed = pteron.inverse_kinematics(robot, at) - given
+        at = at - np.linalg.solve(rows[0], missed)
+    way = found.compliance[0] @ load
+    np.testing.assert_allclose(at - pose, way, rtol=0, atol=1e-4 * np.abs(way).max())
 
 
 def test_at_a_tool_a_force_is_a_moment_too():

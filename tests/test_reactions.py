@@ -28,6 +28,10 @@ def test_the_published_router():
         moments = found.moments[:, leg] * 1e3
         np.testing.assert_allclose(moments[..., across], printed[:, leg, :, 3:], rtol=0, atol=6e-4)
         np.testing.assert_allclose(moments[..., leg], 0.0, atol=1e-6)
+    # Its self-stresses are moments alone, so that their unit does not matter: N mm, say.
+    other = reactions("tripteron-router", poses, wrench=[80.0, 80.0, -120.0], length=1e-3)
+    np.testing.assert_allclose(other.forces, found.forces, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(other.moments, found.moments, rtol=0, atol=1e-8)
     assert found.redundancy == 3
     assert found.names[0] == ("P0", "R1", "R2", "R3")
 

@@ -59,11 +59,14 @@ CODE: dict[str, tuple[str, ...]] = {
     # Indices, reactions, stiffness, errors.
     "G1": (f"{_E}.indices.homogeneous", f"{_E}.singular_values.singular_values"),
     "G2": (f"{_E}.indices.by_points",),
-    "G3": ("pteron.indices.global_conditioning",),
+    "G3": ("pteron.indices.global_conditioning.global_conditioning",),
     "G4": (f"{_E}.indices.pressure_angle", f"{_E}.indices.output_pressure_angle"),
-    "G5": (f"{_E}.reactions.equilibrium", "pteron.indices.reactions"),
-    "G6": ("pteron.indices.stiffness",),
-    "G7": ("pteron.indices.geometric_sensitivities", "pteron.indices.pose_error"),
+    "G5": (f"{_E}.reactions.equilibrium", "pteron.indices.reactions.reactions"),
+    "G6": ("pteron.indices.stiffness.stiffness",),
+    "G7": (
+        *("pteron.indices.sensitivities.geometric_sensitivities",),
+        "pteron.indices.errors.pose_error",
+    ),
     # Drives, control, identification.
     "D1": (f"{_E}.drives.drive_forces", f"{_E}.drives.friction"),
     "D2": (f"{_E}.drives.drive_accelerations",),

@@ -66,7 +66,9 @@ FUNCTIONS = (
     "potential_energy",
     "reach",
     "regressor",
+    "room",
     "squared_type_i",
+    "standing",
     "type_ii",
     "type_ii_distances",
 )

@@ -59,13 +59,14 @@ def by_points(machine: Machine, state: State) -> Expression:
     """
     if "phi" not in machine.platform.coordinates:
         return homogeneous(machine, state).matrix
-    arms = lever_arms(machine, state)
-    center = sum(arms) / len(arms)
-    apart = [arm - center for arm in arms]
+    first, *_ = arms = lever_arms(machine, state)
+    # From the first one, so that points that coincide do so to the last bit.
+    offset = sum(arm - first for arm in arms) / len(arms)
+    apart = [arm - first - offset for arm in arms]
     length = _root_or_one(sum(ca.dot(arm, arm) for arm in apart) / len(arms))
     rows = _measured(machine, kinematics.jacobian(state), length)
     # What the turning about the centroid asks of the joints.
-    moved = ca.mtimes(rows[:, :-1], ca.mtimes(machine.platform.directions.T, center))
+    moved = ca.mtimes(rows[:, :-1], ca.mtimes(machine.platform.directions.T, first + offset))
     rows[:, -1] = (rows[:, -1] - moved) / length
     return rows
 

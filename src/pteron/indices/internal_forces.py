@@ -33,13 +33,11 @@ class Held(NamedTuple):
 
     forces: Array
     """(B, 6 n, K): a force and a moment of each leg on the platform."""
-    free: Array
-    """(B, 6 n, 6 n): what maps anything to a self-stress, and self-stresses to themselves, for
-    moments over the length."""
+    stresses: Array
+    """(B, 6 n, r): self-stresses, at right angles with moments over the size; zero where a state
+    has fewer than others."""
     missed: Array
-    """(B, S, K): what the legs cannot hold, moments over the length."""
-    redundancy: int
-    """The number of self-stresses."""
+    """(B, S, K): what the legs cannot hold, moments over the size."""
 
 
 _BLOCK = 1024
@@ -52,11 +50,15 @@ def blocks(parts: Sequence[Array]) -> Iterator[list[Array]]:
         yield [part[start : start + _BLOCK] for part in parts]
 
 
-def hold(given: Equations, right: Array, presumed: Array, length: float) -> Held:
-    """Return what holds loads: right sides (B, R, K) and (B, S, K).
+def size_of(robot: Manipulator) -> float:
+    """Return the length that makes moments comparable with forces where a rank is decided, m."""
+    return float(np.mean([leg.size for leg in robot.legs]))
 
-    First what must hold; of that what is nearest to what the legs are presumed to hold. The length
-    makes moments comparable with forces where a rank is decided.
+
+def hold(given: Equations, right: Array, presumed: Array, length: float) -> Held:
+    """Return what holds loads: right sides (B, R, K) and (B, S, K), `length` being the size.
+
+    First what must hold; of that what is nearest to what the legs are presumed to hold.
     """
     count = given.rows.shape[-1]
     size = np.tile([1.0, 1.0, 1.0, length, length, length], count // 6)
@@ -66,13 +68,21 @@ def hold(given: Equations, right: Array, presumed: Array, length: float) -> Held
     per[3:] = 1.0 / length
     more, presumed = per[:, None] * more, per[:, None] * presumed
     back = inverse(rows)
-    w = back @ right
-    free = np.eye(count) - back @ rows
-    back = inverse(more @ free)
+    w, free = back @ right, _range(np.eye(count) - back @ rows)
+    left = more @ free
+    back = inverse(left)
     w = w + free @ back @ (presumed - more @ w)
-    free = free - back @ more @ free
-    redundancy = int(np.rint(np.trace(free, axis1=-2, axis2=-1).max()))
-    return Held(size[:, None] * w, size[:, None] * free, more @ w - presumed, redundancy)
+    stresses = _range(free @ (np.eye(free.shape[-1]) - back @ left))
+    return Held(size[:, None] * w, size[:, None] * stresses, more @ w - presumed)
+
+
+def _range(projectors: Array) -> Array:
+    """Return columns (B, n, r) at right angles that span what products of projections reach."""
+    columns, sizes, _ = np.linalg.svd(projectors)
+    counts = sizes > 0.5  # each is 0 or 1, but for rounding
+    return np.asarray(
+        (columns[..., : sizes.shape[-1]] * counts[:, None])[..., : counts.sum(-1).max()]
+    )
 
 
 def on_platform(robot: Manipulator, wrench: Array, moment: Array) -> Array:

@@ -17,6 +17,7 @@ from pteron.indices.internal_forces import (
     inverse,
     moved,
     on_platform,
+    size_of,
     times,
 )
 from pteron.kernels import Array, as_array
@@ -48,7 +49,7 @@ class Reactions:
         By which moments are divided in that norm, m.
     unheld : array, shape (...)
         What of the load the legs, as they are modelled, cannot hold, N: moments that would tilt
-        the platform count over `length`. It is 0 where they hold all of it.
+        the platform count over the legs' mean size. It is 0 where they hold all of it.
     """
 
     names: tuple[tuple[str, ...], ...]
@@ -125,8 +126,7 @@ def reactions(
     (('P0', 'R1', 'R2', 'R3'), 3, array([-80.912, -80.912, 157.886]))
     """
     robot = as_manipulator(robot)
-    size = float(np.mean([leg.size for leg in robot.legs]))
-    by = size if length is None else float(length)
+    by = size_of(robot) if length is None else float(length)
     if not by > 0.0:
         raise DataError(f"length: {by:g} m given, a number above 0 expected")
     rest = np.zeros(robot.freedom)
@@ -188,8 +188,8 @@ def _solved(
     right, presumed = g.right.copy(), g.presumed_right.copy()
     right[:, :n] -= wrench[good]
     presumed[:, :6] -= load[good]
-    held = hold(g, right[..., None], presumed[..., None], length)
-    w, redundancy = held.forces[..., 0], held.redundancy
+    held = hold(g, right[..., None], presumed[..., None], size_of(robot))
+    w, redundancy = held.forces[..., 0], held.stresses.shape[-1]
     there = np.isfinite(g.passed[..., 0])
     spread = moved(g.ends[:, :, None] - g.points)
     both = np.zeros((len(w), n, joints, 6, n, 6))
@@ -199,8 +199,8 @@ def _solved(
     needed = np.where(there[..., None], g.passed, 0.0).reshape(len(w), -1)
     if redundancy:
         per = np.tile([1.0, 1.0, 1.0, 1 / length, 1 / length, 1 / length], n * joints)
-        back = inverse(per[:, None] * passing @ held.free)
-        w = w - times(held.free @ back, per * (times(passing, w) + needed))
+        back = inverse(per[:, None] * (passing @ held.stresses))
+        w = w - times(held.stresses @ back, per * (times(passing, w) + needed))
     whole = (times(passing, w) + needed).reshape(-1, n, joints, 6)
     passed[good] = np.where(there[..., None], whole, np.nan)
     actuators[good] = times(g.driven_rows, w) + g.driven

@@ -110,8 +110,8 @@ def _passive_room(m: Machine, v: Symbols) -> Outputs:
 
 
 def _standing(m: Machine, v: Symbols) -> Outputs:
-    status, margin = kinematics.standing(m, v["pose"])
-    return {"standing": status, "margin": margin}
+    status, way = kinematics.standing(m, v["pose"])
+    return {"standing": status, "way": way}
 
 
 def _platform_points(m: Machine, v: Symbols) -> Outputs:

@@ -28,6 +28,9 @@ _Written = TypeVar("_Written", contravariant=True)
 _WAIT = 10.0
 """Seconds after which a scheduler, or its first worker, is taken for absent."""
 
+_START = 300.0
+"""Seconds in which processes of a computer that has much else to do are started."""
+
 _AHEAD = 4
 """Chunks for each thread that a cluster is given at once; a sweep may have millions."""
 
@@ -187,15 +190,16 @@ def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
             address, where = opened.enter_context(cluster), "local workers"
         else:
             address, where = scheduler, f"scheduler {scheduler}"
+        limit = _START if scheduler is None else _WAIT
         try:
-            client = opened.enter_context(distributed.Client(address, timeout=_WAIT))
+            client = opened.enter_context(distributed.Client(address, timeout=limit))
         except (OSError, ValueError, TypeError) as error:
             raise PteronError(
                 f"{where}: does not answer ({str(error).splitlines()[0]}); start one with: "
                 "dask scheduler"
             ) from None
         try:
-            client.wait_for_workers(1, timeout=_WAIT)
+            client.wait_for_workers(1, timeout=limit)
         except TimeoutError:
             raise PteronError(
                 f"{where}: has no workers; start some with: dask worker {scheduler}"

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from pteron.equations.machine import Machine
 from pteron.equations.room import Room, rooms
+from pteron.errors import DataError
 from pteron.kernels import Array, bounded, numeric
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
@@ -53,6 +54,9 @@ class Condition:
     def __str__(self) -> str:
         return f"leg {self.leg}: {self.cause}" if self.leg else self.cause
 
+
+_MOST = 64
+"""Conditions in a list: one bit each."""
 
 _CAUSES = {
     "reach": "at the edge of its reach",
@@ -145,10 +149,17 @@ class Judge:
         The machine.
     given : sequence of Condition
         At most 64.
+
+    Raises
+    ------
+    DataError
+        If there are more, or none.
     """
 
     def __init__(self, robot: Manipulator, given: Sequence[Condition]) -> None:
         self.given = tuple(given)
+        if not 0 < len(self.given) <= _MOST:
+            raise DataError(f"given: {len(self.given)} conditions, 1 to {_MOST} expected")
         self.all = np.uint64((1 << len(self.given)) - 1)
         self._rows = []
         for condition in self.given:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from scipy import ndimage  # type: ignore[import-untyped]
-from scipy.optimize import linprog  # type: ignore[import-untyped]
 
 from pteron.errors import DataError, ModelError
 from pteron.kernels import Array
@@ -15,6 +14,7 @@ from pteron.kinematics.evaluate import checked_one
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike
 from pteron.workspace.conditions import Condition, conditions, kept, rooms_left
+from pteron.workspace.growth import Growth
 from pteron.workspace.paving import paving
 from pteron.workspace.proofs import Proof, prove
 from pteron.workspace.regions import Box, Cylinder, Region
@@ -26,11 +26,7 @@ _POINTS = 32
 """Positions along the longest side of the lattice in which the search starts."""
 
 _STARTS = 3
-_STEPS = 40
-_SIZES = 33
 _EXCHANGES = 60
-_STEP = 1e-6
-"""m, of differences."""
 
 
 @dataclass(frozen=True)
@@ -200,7 +196,7 @@ def _largest(
         poses[..., :count] = positions
         return poses
 
-    search = _Search(lambda p: rooms_left(robot, asked, whole(p)), template, gauge)
+    search = Growth(lambda p: rooms_left(robot, asked, whole(p)), template, gauge)
     found = [search.improved(*place) for place in _starts(robot, at, asked, whole)]
     for _ in range(_EXCHANGES if found else 0):
         center, size = found.pop(max(range(len(found)), key=lambda k: found[k][1]))
@@ -254,91 +250,3 @@ def _starts(
         widest = (coarse.inner[:, 1] - coarse.inner[:, 0]).min(axis=1)
         found.append((center[widest.argmax()], 0.25 * float(widest.max())))
     return found
-
-
-class _Search:
-    """A search for the centre at which a shape can be largest.
-
-    Where the shape's points keep all conditions, linear programs say which way the centre should
-    move so that it can grow; a step that does not help is halved.
-
-    Parameters
-    ----------
-    rooms : callable
-        Of positions (..., k): what is not negative inside, (..., C).
-    template : array, shape (T, k)
-        Points of the shape of size 1.
-    gauge : callable
-        Of ways from the centre (..., k): the size of the shape that they end at, (...).
-    """
-
-    def __init__(
-        self,
-        rooms: Callable[[Array], Array],
-        template: Array,
-        gauge: Callable[[Array], Array],
-    ) -> None:
-        self.rooms, self.template, self.gauge = rooms, template, gauge
-        self.outside = np.empty((0, template.shape[1]))
-        """Positions that are known not to be inside."""
-
-    def learn(self, position: Array, center: Array) -> None:
-        """Take note of a position that is not inside, found in a shape about a centre."""
-        way = position - center
-        self.outside = np.vstack([self.outside, position])
-        self.template = np.vstack([self.template, way / self.gauge(way)])
-
-    def size_at(self, center: Array, most: float) -> float:
-        """Return the largest size up to `most` up to which all of the shape's points are inside."""
-        low, high = 0.0, float(self.gauge(self.outside - center).min(initial=most))
-        for _ in range(4):
-            sizes = np.linspace(low, high, _SIZES)
-            points = center + sizes[:, None, None] * self.template
-            good = (self.rooms(points) >= 0.0).all(axis=(1, 2))
-            first = _SIZES if good.all() else int((~good).argmax())
-            if first in (0, _SIZES):
-                return high if first else 0.0
-            low, high = sizes[first - 1], sizes[first]
-        return float(low)
-
-    def improved(self, center: Array, size: float) -> tuple[Array, float]:
-        """Return a centre, from one on, at which the shape is largest, and its size there."""
-        size = self.size_at(center, 2.0 * size)
-        trust = max(size, _STEP)
-        for _ in range(_STEPS):
-            moved, grown = self._step(center, size, trust)
-            reached = self.size_at(moved, max(grown, 2.0 * size))
-            if reached > size:
-                gain, center, size = reached - size, moved, reached
-                if gain < 1e-7 * size:
-                    break
-            else:
-                trust *= 0.35
-                if trust < 1e-6 * max(size, _STEP):
-                    break
-        return center, size
-
-    def _step(self, center: Array, size: float, trust: float) -> tuple[Array, float]:
-        """Return where a linear program would move the centre, and what size it hopes for."""
-        k = len(center)
-        points = center + size * self.template
-        values = self.rooms(points)
-        ways = _STEP * np.eye(k)
-        slopes = np.stack(
-            [(self.rooms(points + w) - self.rooms(points - w)) / (2.0 * _STEP) for w in ways], -1
-        )
-        lengths = np.linalg.norm(slopes, axis=-1)
-        near = np.isfinite(values) & np.isfinite(lengths) & (lengths > 0.0)
-        near &= values < 4.0 * trust * np.where(near, lengths, 1.0)
-        rows, columns = np.nonzero(near)
-        normals = slopes[rows, columns] / lengths[rows, columns][:, None]
-        grows = np.einsum("nk,nk->n", normals, self.template[rows])
-        found = linprog(
-            np.append(np.zeros(k), -1.0),
-            A_ub=-np.column_stack([normals, grows]),
-            b_ub=np.maximum(values[rows, columns] / lengths[rows, columns], 0.0),
-            bounds=[(-trust, trust)] * (k + 1),
-        )
-        if found.x is None:
-            return center, size
-        return center + found.x[:k], size + float(found.x[k])

@@ -55,6 +55,9 @@ _TINY = 1e-300
 
 Kind = Literal["I", "II", "constraint"]
 
+_WHAT = {"I": "squared_type_i", "II": "type_ii", "constraint": "constraint"}
+"""The function that vanishes, by kind."""
+
 
 @dataclass(frozen=True)
 class NearestSingularity:
@@ -161,12 +164,17 @@ class _Vanishing:
     def __call__(self, poses: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Return its values at poses (..., m), and which of them are in reach of other legs."""
         squares = numeric(self.robot, "squared_type_i")(poses)[0]
-        if self.leg is not None:
-            others = np.delete(squares, self.leg, axis=-1)
-            return squares[..., self.leg], (others >= -_EDGE).all(axis=-1)
-        what = "type_ii" if self.kind == "II" else "constraint"
-        values = numeric(self.robot, what)(poses)[0]
-        return values, (squares >= 0.0).all(axis=-1) & np.isfinite(values)
+        values = (
+            squares if self.leg is not None else numeric(self.robot, _WHAT[self.kind])(poses)[0]
+        )
+        return self.among(squares, values)
+
+    def among(self, squares: Array, values: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Return the same of the squares of all type-I measures and of a measure's values."""
+        if self.leg is None:
+            return values, np.asarray((squares >= 0.0).all(axis=-1) & np.isfinite(values))
+        others = np.delete(squares, self.leg, axis=-1)
+        return squares[..., self.leg], np.asarray((others >= -_EDGE).all(axis=-1))
 
     def slope(self, pose: Array) -> tuple[Array, Array, Array]:
         """Return its gradient, the squares of all type-I measures, and their gradients (n, m)."""
@@ -187,12 +195,18 @@ def _smooth(robot: Manipulator) -> ca.Function:
     return ca.Function("smooth", [pose], ca.cse([values, ca.jacobian(values, pose)]))
 
 
-def _changes(vanishing: _Vanishing, start: Array, way: Array, places: Array) -> Array:
+def _changes(
+    vanishing: _Vanishing,
+    start: Array,
+    way: Array,
+    places: Array,
+    known: tuple[Array, NDArray[np.bool_]] | None = None,
+) -> Array:
     """Return the least share (R,) of ways (R, m) from a start at which the sign changes, or inf.
 
-    It is looked for between each two of `places` (S,).
+    It is looked for between each two of `places` (S,), where the function may be known.
     """
-    values, reached = vanishing(start + places[:, None, None] * way)
+    values, reached = known or vanishing(start + places[:, None, None] * way)
     negative = values < 0.0
     changed = (negative[1:] != negative[:-1]) & reached[1:] & reached[:-1]
     rays = np.flatnonzero(changed.any(axis=0))
@@ -230,13 +244,12 @@ def _moved(vanishing: _Vanishing, start: Array) -> Array | None:
     """Return the nearest pose at which the function vanishes, moved only."""
     if np.abs(vanishing(start[None])[0][0]) <= _SINGULAR:
         return start
-    lengths = len(vanishing.robot.platform.lengths)
-    center, radius = search_ball(vanishing.robot)
-    far = float(np.linalg.norm(start[:lengths] - center)) + radius
-    rays = np.zeros((_RAYS, len(start)))
-    rays[:, :lengths] = far * _directions(lengths)
-    places = np.linspace(0.0, 1.0, _STEPS + 1) ** 1.5
-    shares = _changes(vanishing, start, rays, places)
+    robot, lengths = vanishing.robot, len(vanishing.robot.platform.lengths)
+    rays, places = _rays(robot, tuple(start.tolist()))
+    squares, values = (
+        _on_rays(robot, tuple(start.tolist()), _WHAT[kind]) for kind in ("I", vanishing.kind)
+    )
+    shares = _changes(vanishing, start, rays, places, vanishing.among(squares, values))
     order = np.argsort(shares, kind="stable")[:_STARTS]
     hits = [start + shares[i] * rays[i] for i in order if np.isfinite(shares[i])]
     if not hits:
@@ -248,6 +261,23 @@ def _moved(vanishing: _Vanishing, start: Array) -> Array | None:
 
     best: Array = min([hits[0], *nearer], key=distance)
     return _narrowed(vanishing, start, best, lengths) if best is hits[0] else best
+
+
+def _rays(robot: Manipulator, start: tuple[float, ...]) -> tuple[Array, Array]:
+    """Return rays (R, m) from a start to beyond all that is in reach, and shares (S,) of them."""
+    lengths = len(robot.platform.lengths)
+    center, radius = search_ball(robot)
+    far = float(np.linalg.norm(np.array(start[:lengths]) - center)) + radius
+    rays = np.zeros((_RAYS, len(start)))
+    rays[:, :lengths] = far * _directions(lengths)
+    return rays, np.linspace(0.0, 1.0, _STEPS + 1) ** 1.5
+
+
+@lru_cache(maxsize=4)
+def _on_rays(robot: Manipulator, start: tuple[float, ...], what: str) -> Array:
+    """Return a function at all places on all rays."""
+    rays, places = _rays(robot, start)
+    return np.asarray(numeric(robot, what)(np.array(start) + places[:, None, None] * rays)[0])
 
 
 def _directions(lengths: int) -> Array:
