@@ -153,8 +153,6 @@ ALLOWED = {
     ("viewer/", "an elbow"): "the working mode",
     ("workspace/modes.py", "an elbow"): "the working modes",
     ("workspace/orientations.py", "an elbow"): "the working modes",
-    ("design/paths.py", "lengths of links"): "an example of a path, in a message",
-    ("design/spec.py", "lengths of links"): "an example of a path, for the file's keys",
     ("kinematics/direct.py", "an elbow"): "the working mode that a pose is in",
     ("kinematics/evaluate.py", "an elbow"): "the kind of a singularity, in its message",
     ("reduction/configurations.py", "an elbow"): "the side that a leg says it closed on",
