@@ -125,7 +125,7 @@ def beams(machine: Machine, state: State) -> Beams:
             rows.append(ca.horzcat(joint.point, way, joint.axis))
         for k, part in enumerate(found[:3]):
             part.append(ca.horzcat(*(row[:, k] for row in rows)).T)
-        couple = leg.couple(motion)
+        couple = leg.rod_couple(motion)
         found.couples.append(ca.SX.nan(3, 1) if couple is None else couple)
     return found
 
@@ -187,7 +187,7 @@ def _released(leg: LegKind, motion: LegMotion, found: LegForces, last: bool) -> 
     With `last` that of the last joint is left out: a hinge on the platform's axis, which legs may
     share, or what is geared to the first.
     """
-    couple = leg.couple(motion)
+    couple = leg.rod_couple(motion)
     if couple is None:
         return [_along(motion, found, k) for k in range(1, len(motion.chain) - last)]
     # Rods: what is no force along them is their couple, the same at both of their ends.

@@ -292,7 +292,7 @@ class LegKind(ABC):
         """
         return []
 
-    def couple(self, motion: LegMotion) -> Expression | None:
+    def rod_couple(self, motion: LegMotion) -> Expression | None:
         """Return the couple (3, 1) that its rods pass on to the platform beside a force along them.
 
         It is zero for a single rod; None for a leg whose chain of joints says what it passes on.

@@ -25,11 +25,11 @@ from pteron.legs.leg import Joint, LegMotion, Passive, Sphere
 from pteron.legs.rods import (
     ROD_KEYS,
     cones,
-    couple,
     couples,
     free_axes,
     hinge_doubts,
     rod_body,
+    rod_couple,
     universal_joints,
 )
 from pteron.legs.slide import SLIDER_KEYS, SlideEquations, SlideLeg, SlideState
@@ -130,8 +130,8 @@ class PSS(SlideLeg):
     def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
         return cones(self, motion, ca.SX.eye(3), still, turned)
 
-    def couple(self, motion: LegMotion) -> Expression:
-        return couple(self, motion)
+    def rod_couple(self, motion: LegMotion) -> Expression:
+        return rod_couple(self, motion)
 
     def doubts(self, axis: Vector | None) -> Iterator[str]:
         return hinge_doubts(self, axis)

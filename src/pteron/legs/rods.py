@@ -55,10 +55,9 @@ def couples(leg: Any, motion: LegMotion) -> list[Expression] | None:
     """
     if leg.rods == 1:
         return []
-    rod = motion.links[1]
-    if leg.bar is None or rod is None:
+    if leg.bar is None:
         return None
-    return [ca.cross(ca.SX(list(leg.bar)), rod) / leg.lower_length]
+    return [rod_couple(leg, motion) / leg.lower_length]
 
 
 def cones(
@@ -79,7 +78,7 @@ def cones(
     ]
 
 
-def couple(leg: Any, motion: LegMotion) -> Expression:
+def rod_couple(leg: Any, motion: LegMotion) -> Expression:
     """Return the couple of parallel rods, across their plane; zero for one.
 
     Where the bar is not told it is taken along the leg's first passive joint.

@@ -26,11 +26,11 @@ from pteron.legs.leg import Joint, LegMotion, Passive, Sphere
 from pteron.legs.rods import (
     ROD_KEYS,
     cones,
-    couple,
     couples,
     free_axes,
     hinge_doubts,
     rod_body,
+    rod_couple,
     universal_joints,
 )
 
@@ -137,8 +137,8 @@ class RSS(CrankLeg):
         crank = motion.bodies["u"]
         return cones(self, motion, ca.horzcat(crank.x, crank.y, crank.axes), still, turned)
 
-    def couple(self, motion: LegMotion) -> Expression:
-        return couple(self, motion)
+    def rod_couple(self, motion: LegMotion) -> Expression:
+        return rod_couple(self, motion)
 
     def doubts(self, axis: Vector | None) -> Iterator[str]:
         return hinge_doubts(self, axis)
