@@ -60,14 +60,15 @@ class Proof:
     def __str__(self) -> str:
         told = ", ".join(map(str, self.causes))
         if self.holds:
-            return f"proved: every pose keeps {len(self.conditions)} bounds (boxes: {self.boxes})"
+            count = len(self.conditions)
+            return f"proved: every pose keeps all {count} conditions (boxes: {self.boxes})"
         if self.counterexample is not None:
             return (
                 f"not so: pose {self.counterexample.round(6).tolist()} does not serve: {self.why}"
             )
         assert self.undecided is not None
         low, high = (corner.round(6).tolist() for corner in self.undecided)
-        return f"not decided of poses from {low} to {high}: {told}; the region may touch that bound"
+        return f"not decided of poses from {low} to {high}: {told}; the region may touch that edge"
 
     @property
     def why(self) -> str:
