@@ -71,29 +71,34 @@ class Proofs:
             if value is not None and not (value > 0.0 or (value == 0.0 and name != "tolerance")):
                 raise DataError(f"--{name}: {value:g} given, a number {least} expected")
 
-    def deliver(self, robot: Manipulator, slice_: str | None, *, as_json: bool) -> None:
+    def deliver(
+        self, robot: Manipulator, slice_: str | None, warnings: list[str], *, as_json: bool
+    ) -> None:
         """Prove it, and print what is proved; exit with 1 if a box is not."""
         if self.prove is None:
-            self._certify(robot, slice_, as_json)
+            self._certify(robot, _orientation(robot, slice_), warnings, as_json)
             return
         from pteron.workspace import prove
 
         region = _region(robot, self.prove)
+        for text in warnings:
+            note(f"Warning: {text}")
         with spinner(f"Proving a region for {robot.name}"):
             found = prove(
                 robot, region, type_i=self.floors["type_i"], type_ii=self.floors["type_ii"]
             )
         if as_json:
-            show_json(_proof(found, self.floors))
+            show_json(_proof(found, self.floors) | {"warnings": warnings})
         else:
             show(f"[bold]{plain(robot.name)}[/bold]: {_spans(robot, region)}", plain(str(found)))
         if not found.holds:
             raise Exit(_NOT_PROVED)
 
-    def _certify(self, robot: Manipulator, slice_: str | None, as_json: bool) -> None:
+    def _certify(self, robot: Manipulator, pose: Array, warnings: list[str], as_json: bool) -> None:
         from pteron.workspace import conditions, largest_cube, paving
 
-        pose = _orientation(robot, slice_)
+        for text in warnings:
+            note(f"Warning: {text}")
         tolerance = TOLERANCE if self.tolerance is None else self.tolerance
         asked = conditions(robot, **self.floors)
         with spinner(f"Proving the workspace of {robot.name}"):
@@ -106,7 +111,8 @@ class Proofs:
         if not found.complete:
             note(f"Warning: the gap is not {percent(tolerance)}: there were too many boxes")
         if as_json:
-            show_json(_certified(robot, pose, self.floors, found, shares, cube))
+            data = _certified(robot, pose, self.floors, found, shares, cube)
+            show_json(data | {"warnings": warnings})
         else:
             _show(robot, pose, self.floors, found, shares, cube)
 
@@ -120,6 +126,8 @@ def _expect_none(given: Mapping[str, object], what: str) -> None:
 
 def _orientation(robot: Manipulator, slice_: str | None) -> Array:
     """Return a pose at the orientation that is asked for, or else at that of the home pose."""
+    import numpy as np
+
     from pteron.maps.grid import expect_coordinates
     from pteron.workspace import home_pose
 
@@ -127,10 +135,7 @@ def _orientation(robot: Manipulator, slice_: str | None) -> Array:
     expect_coordinates(robot, held, ranges)
     if set(held) - {"phi"} or ranges:
         raise DataError("--slice: with --certify only phi=VALUE, the orientation, is expected")
-    pose = home_pose(robot)
-    if held:
-        pose[-1] = held["phi"]
-    return pose
+    return np.array([0.0] * (robot.freedom - 1) + [held["phi"]]) if held else home_pose(robot)
 
 
 def _region(robot: Manipulator, text: str) -> Box:

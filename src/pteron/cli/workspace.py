@@ -150,9 +150,7 @@ def workspace(
     machine = load_robot(robot, elbows)
     warnings = _warnings(machine)
     if proofs.asked:
-        for text in warnings:
-            note(f"Warning: {text}")
-        proofs.deliver(machine, slice_, as_json=json)
+        proofs.deliver(machine, slice_, warnings, as_json=json)
         return
     from pteron.maps import map_index
 
@@ -165,10 +163,11 @@ def workspace(
             "--scheduler: the workers write to a store that all reach; give it with --out, such as "
             "--out map.zarr"
         )
+    with spinner(f"The reach of {machine.name}"):
+        grid = _grid(machine, slice_, points, ending)
     for text in warnings:
         note(f"Warning: {text}")
     with spinner(f"The reach of {machine.name}"):
-        grid = _grid(machine, slice_, points, ending)
         volume = _volume(machine, grid)
     for text in (outside := _outside(grid, volume)):
         note(f"Warning: {text}")
