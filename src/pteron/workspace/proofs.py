@@ -128,7 +128,7 @@ def prove(
     Raises
     ------
     DataError
-        If the region's poses have not the machine's coordinates.
+        If the region is none, its poses have not the machine's coordinates, or a floor is negative.
 
     Examples
     --------
@@ -138,6 +138,8 @@ def prove(
     True
     """
     robot = as_manipulator(robot)
+    if not isinstance(region, Region):
+        raise DataError(f"region: {type(region).__name__} given, a Box or a Cylinder expected")
     box = region.box
     if box.shape[1] != robot.freedom:
         names = ", ".join(robot.coordinates)
