@@ -282,7 +282,7 @@ def test_a_region_that_touches_the_boundary_is_not_decided():
     assert found.holds is None
     assert found.undecided[1, 0] == 0.1
     assert [str(c) for c in found.causes] == ["leg 1: slider at its most"]
-    assert "the region may touch that bound" in str(found)
+    assert "the region may touch that edge" in str(found)
 
 
 def test_cylinders_are_proved_too():
