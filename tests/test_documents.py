@@ -103,12 +103,14 @@ def test_options_that_are_shown_exist(name):
 
 RUN = ("README.md", "docs/start/first-result.md", "docs/start/install.md")
 LEFT = {
+    "design": "test_design.py",
     "excite": "searches for its motion; test_excitation_files.py",
     "film": "test_films.py",
     "identify": "wants a log; test_walk.py",
     "play": "wants a motion; test_pages.py",
     "report": "test_report.py",
     "simulate": "test_simulate_cli.py",
+    "workspace": "test_workspace_cli.py",
     "view": "stays open until it is ended; test_viewer.py",
 }
 """Subcommands that are not run here, and where they are."""

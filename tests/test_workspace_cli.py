@@ -15,6 +15,7 @@ from pteron.cli import screen
 from pteron.cli import workspace as command
 from pteron.indices import evaluate
 from pteron.maps import load_map
+from pteron.workspace import conditions
 
 SLICE = "--slice x=-0.1:0.1,y=0.05:0.17 --points 9"
 """Of a five-bar: next to nothing to compute."""
@@ -88,9 +89,37 @@ def test_where_nothing_is_in_reach_it_is_said_why():
     assert result.exit_code == 0
 
 
+def test_certify_tells_what_is_proved_of_the_workspace():
+    data = json.loads(done("workspace five-bar --certify --tolerance 0.2 --json"))
+    assert 0.0 < data["inner"] < data["outer"] < 1.2 * data["inner"]
+    assert data["gap"] == pytest.approx(data["outer"] / data["inner"] - 1.0)
+    assert data["cube"]["edge"] ** 2 < data["inner"]
+    assert set(data["boundary"]) <= set(map(str, conditions("five-bar")))
+    assert sum(data["boundary"].values()) <= 1.0 + 1e-12
+
+
+def test_prove_ends_with_0_only_if_it_is_proved():
+    proved = done("workspace five-bar --prove x=-0.01:0.01,y=0.14:0.15 --type-ii 0.1")
+    assert "proved: every pose keeps all 9 conditions" in proved
+    result = run("workspace five-bar --prove x=-0.01:0.01,y=0.14:0.25 --json")
+    data = json.loads(result.stdout)
+    assert (result.exit_code, data["proved"]) == (1, False)
+    with pytest.raises(pteron.UnreachablePose):
+        pteron.inverse_kinematics("five-bar", data["pose"])
+    assert "stretched (it misses the pose by" in data["why"]
+
+
 @pytest.mark.parametrize(
     ("asked", "words"),
     [
+        ("--prove x=0:1", "--prove: no y; a region says all of x, y"),
+        ("--prove x=0:0.1:9,y=0.1", "a proof is of all poses between"),
+        ("--prove x=0,y=100", "y up to 100: are these mm?"),
+        ("--prove x=0,y=0.1 --tolerance 0.1", "--tolerance: does not go with --prove"),
+        ("--certify --index kappa", "--index: does not go with --certify"),
+        ("--certify --slice x=0", "only phi=VALUE"),
+        ("--certify --tolerance 0", "--tolerance: 0 given, a number above 0 expected"),
+        ("--type-ii 0.1", "--type-ii: does not go with a map"),
         ("--index kapa", "--index: 'kapa' is not known; did you mean kappa? there are condition"),
         ("--index turning_speed", "turning_speed is about turning, which five-bar does not"),
         ("--index kappa --index condition --out a.gif", "--index: 2 given, and a.gif shows one"),

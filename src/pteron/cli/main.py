@@ -206,6 +206,8 @@ _add(
     "pteron workspace quadrupteron --index kappa --slice z=0,phi=0 --out kappa.png",
     "pteron workspace quadrupteron --index condition --slice phi=0 --out condition.vtk",
     "pteron workspace robot.toml --index kappa --slice z=0 --points 400 --out kappa.zarr",
+    "pteron workspace delta --certify",
+    "pteron workspace delta --prove x=-0.2:0.2,y=-0.2:0.2,z=-1.0:-0.8",
 )
 
 _COMPUTE = "Compute"

@@ -103,6 +103,11 @@ def table(*columns: str, numbers: tuple[str, ...] = (), caption: str | None = No
     return made
 
 
+def percent(share: float) -> str:
+    """Return a share in percent; what is little is not shown as nothing."""
+    return "under 0.1 %" if 0.0 < share < 1e-3 else f"{100.0 * share:.3g} %"
+
+
 def note(message: str) -> None:
     """Print a line on standard error."""
     echo(_visible(message), err=True)

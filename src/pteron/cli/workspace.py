@@ -11,10 +11,13 @@ import rich.table
 from typer import Option
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
+from pteron.cli.certify import TOLERANCE, Proofs
 from pteron.cli.completion import indices
+from pteron.cli.pose_ranges import pose_ranges, pose_text
 from pteron.cli.screen import (
     is_terminal,
     note,
+    percent,
     plain,
     show,
     show_json,
@@ -94,6 +97,33 @@ def workspace(
         str | None,
         option("scheduler", "A Dask cluster that does the work, tcp://host:8786.", "ADDRESS"),
     ] = None,
+    certify: Annotated[
+        bool,
+        option("certify", "Prove how large the workspace is, what ends it, and a cube in it."),
+    ] = False,
+    prove: Annotated[
+        str | None,
+        option(
+            "prove",
+            "Prove that all poses of a box serve: x=-0.05:0.05,y=0:0.1,z=0; m and rad.",
+            "NAME=LEAST:GREATEST,...",
+        ),
+    ] = None,
+    tolerance: Annotated[
+        float | None,
+        option(
+            "tolerance",
+            "With --certify: greatest undecided share.",
+            "SHARE",
+            show_default=f"{TOLERANCE:g}",
+        ),
+    ] = None,
+    type_i: Annotated[
+        float | None, option("type-i", "With a proof: least type-I measure of every leg.", "FLOOR")
+    ] = None,
+    type_ii: Annotated[
+        float | None, option("type-ii", "With a proof: least type-II measure.", "FLOOR")
+    ] = None,
     elbows: Elbows = None,
     json: Json = False,
 ) -> None:
@@ -106,10 +136,22 @@ def workspace(
     Coordinates that --slice does not name vary over the reach. Surfaces are for three that vary, a
     film goes through the last of three.
 
+    With --certify or --prove nothing is mapped: intervals prove, rounding and all, how large the
+    workspace is at an orientation (--slice phi=VALUE), or that every pose of a box is in reach and
+    within limits. Where that is not so, a pose and the reason are shown, and the exit code is 1.
+
     A .zarr grows chunk by chunk: the same command after an interruption goes on with what is left.
     A cluster's workers write to it, so they must reach it by the same path.
     """
+    proofs = Proofs(certify, prove, tolerance, type_i, type_ii)
+    maps = {"index": index, "points": points, "out": out, "workers": workers}
+    other = {"scheduler": scheduler, "engine": None if engine == "auto" else engine}
+    proofs.check({**maps, **other}, slice_)
     machine = load_robot(robot, elbows)
+    warnings = _warnings(machine)
+    if proofs.asked:
+        proofs.deliver(machine, slice_, warnings, as_json=json)
+        return
     from pteron.maps import map_index
 
     names = _checked_indices(machine, index or [])
@@ -121,11 +163,11 @@ def workspace(
             "--scheduler: the workers write to a store that all reach; give it with --out, such as "
             "--out map.zarr"
         )
-    warnings = _warnings(machine)
+    with spinner(f"The reach of {machine.name}"):
+        grid = _grid(machine, slice_, points, ending)
     for text in warnings:
         note(f"Warning: {text}")
     with spinner(f"The reach of {machine.name}"):
-        grid = _grid(machine, slice_, points, ending)
         volume = _volume(machine, grid)
     for text in (outside := _outside(grid, volume)):
         note(f"Warning: {text}")
@@ -209,7 +251,7 @@ def _grid(robot: Manipulator, text: str | None, points: int | None, ending: str)
     from pteron.maps import pose_grid
 
     names = robot.coordinates
-    held, ranges = _parsed(text)
+    held, ranges = pose_ranges(text, "--slice")
     if ending in _FILMS:
         points = points or _FILM_POINTS
         last = "phi" if "phi" in names else names[-1]
@@ -248,31 +290,6 @@ def _with_frames(grid: Grid) -> Grid:
     return replace(grid, axes=(*axes, replace(last, count=_FRAMES)))
 
 
-def _parsed(text: str | None) -> tuple[dict[str, float], dict[str, tuple[float, ...]]]:
-    """Return what is held, and what ranges, in a text such as ``z=0,phi=-1:1``."""
-    held: dict[str, float] = {}
-    ranges: dict[str, tuple[float, ...]] = {}
-    for part in (text or "").replace(" ", "").split(",") if text is not None else []:
-        name, equals, values = part.partition("=")
-        numbers = values.split(":")
-        try:
-            given = tuple(float(number) for number in numbers)
-        except ValueError:
-            given = ()
-        if not name or not equals or not 1 <= len(given) <= 3:
-            raise DataError(
-                f"--slice: {part!r} given; NAME=VALUE or NAME=LEAST:GREATEST[:COUNT] expected, in "
-                "m and rad without the unit, such as z=0,phi=0"
-            )
-        if name in held or name in ranges:
-            raise DataError(f"--slice: {name} given twice")
-        if len(given) == 1:
-            held[name] = given[0]
-        else:
-            ranges[name] = given
-    return held, ranges
-
-
 def _volume(robot: Manipulator, grid: Grid) -> ReachVolume | None:
     """Return the reach at the grid's orientation; None where that varies, or nothing is in it."""
     from pteron.workspace import reach_volume
@@ -291,7 +308,7 @@ def _outside(grid: Grid, volume: ReachVolume | None) -> list[str]:
         return []
     spans = zip((n for n in grid.coordinates if n != "phi"), *volume.box.tolist(), strict=True)
     return [
-        f"nothing is in reach at {_told(name, grid.held[name])}: {name} goes from {low:.4g} to "
+        f"nothing is in reach at {pose_text(name, grid.held[name])}: {name} goes from {low:.4g} to "
         f"{high:.4g} m at this orientation"
         for name, low, high in spans
         if name in grid.held and not low <= grid.held[name] <= high
@@ -395,7 +412,7 @@ def _rows(data: Mapping[str, Any]) -> Any:
 
 def _show(found: Map, volume: ReachVolume | None, data: Mapping[str, Any]) -> None:
     """Print for a person: the reach, what ends it, and each index."""
-    held = ", ".join(_told(name, value) for name, value in found.grid.held.items())
+    held = ", ".join(pose_text(name, value) for name, value in found.grid.held.items())
     lines: list[str | rich.table.Table] = [
         f"[bold]{plain(found.robot)}[/bold]{f' at {held}' if held else ''}"
     ]
@@ -407,7 +424,7 @@ def _show(found: Map, volume: ReachVolume | None, data: Mapping[str, Any]) -> No
         )
         noun = "area" if volume.unit == "m^2" else "volume"
         angle = found.grid.held.get("phi")
-        where = "" if angle is None else f" at {_told('phi', angle)}"
+        where = "" if angle is None else f" at {pose_text('phi', angle)}"
         lines.append(
             f"Reach{where}: {spans}; {noun} {volume.volume:.4g} {volume.unit} "
             f"(standard error {volume.standard_error:.1g})"
@@ -416,10 +433,10 @@ def _show(found: Map, volume: ReachVolume | None, data: Mapping[str, Any]) -> No
         f"{axis.name} {axis.least:.4g} to {axis.greatest:.4g} {axis.unit}"
         for axis in found.grid.axes
     )
-    lines.append(f"Map: {varying}: {found.grid.size} poses, {_percent(found.share)} in reach")
+    lines.append(f"Map: {varying}: {found.grid.size} poses, {percent(found.share)} in reach")
     if found.causes:
         told = sorted(found.causes.items(), key=lambda pair: -pair[1])
-        lines.append("; ".join(f"{_percent(share)} {text}" for text, share in told))
+        lines.append("; ".join(f"{percent(share)} {text}" for text, share in told))
     made = table("index", "", "value", "where", numbers=("value",))
     for one in data["indices"]:
         unit = f" ({one['unit']})" if one["unit"] else ""
@@ -437,17 +454,8 @@ def _show(found: Map, volume: ReachVolume | None, data: Mapping[str, Any]) -> No
                 made.add_row("", side, f"{one[side]:.4g}", "")
         if one["undetermined"]:
             share = one["undetermined"] / found.grid.size
-            made.add_row("", "singular", "-", f"{_percent(share)} of the poses")
+            made.add_row("", "singular", "-", f"{percent(share)} of the poses")
     made.caption = f"Where: {' '.join(found.grid.coordinates)}, m" + (
         " and rad" if "phi" in found.grid.coordinates else ""
     )
     show(*lines, made)
-
-
-def _told(name: str, value: float) -> str:
-    return f"{name} = {value + 0.0:.4g} {'rad' if name == 'phi' else 'm'}"
-
-
-def _percent(share: float) -> str:
-    """Return a share in percent; what is little is not shown as nothing."""
-    return "under 0.1 %" if 0.0 < share < 1e-3 else f"{100.0 * share:.3g} %"

@@ -41,7 +41,8 @@ class Change:
     def by(self) -> str:
         """By how much: as a share, or as a difference where a share says nothing."""
         if self.before > _NONE and self.after > 0.0:
-            return f"{100.0 * (self.after / self.before - 1.0):+.1f} %"
+            text = f"{100.0 * (self.after / self.before - 1.0):+.1f} %"
+            return "none" if float(text[:-2]) == 0.0 else text
         return (
             f"{'+' if self.after > self.before else '-'}{self.told(abs(self.after - self.before))}"
         )

@@ -178,7 +178,7 @@ def pose_grid(
     """
     robot = as_manipulator(robot)
     fixed, spans = dict(held or {}), dict(ranges or {})
-    _expect_coordinates(robot, fixed, spans)
+    expect_coordinates(robot, fixed, spans)
     names = robot.coordinates
     pose = np.zeros(len(names))
     if held is None:
@@ -227,7 +227,7 @@ def _box(robot: Manipulator, pose: Array, angles: tuple[float, ...] | None) -> A
     return np.array([np.min(boxes, axis=(0, 1)), np.max(boxes, axis=(0, 1))])
 
 
-def _expect_coordinates(
+def expect_coordinates(
     robot: Manipulator, held: Mapping[str, float], ranges: Mapping[str, tuple[float, ...]]
 ) -> None:
     """Refuse coordinates that the machine has not, and values that are none or in another unit."""

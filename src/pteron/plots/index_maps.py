@@ -68,7 +68,8 @@ def map_figure(given: Map, *names: str) -> Figure:
     """Return the picture of a map: a panel for each index, one below the other.
 
     Over one coordinate it is a curve, over two a plane. Over three it is the three planes through
-    the pose that is deepest among those that serve. Colours are for the colour-blind too (cividis),
+    the pose that is deepest among those that serve, one below the other, and the indices stand side
+    by side. Colours are for the colour-blind too (cividis),
     and the bright ones are always the better ones. Lengths are in mm, angles in degrees.
 
     Parameters
@@ -100,8 +101,8 @@ def map_figure(given: Map, *names: str) -> Figure:
             raise DataError(f"{name}: is not in this map; it has {', '.join(given.values)}")
     planes = _planes(given)
     scales = {name: _normalised(given, name) for name in chosen}
-    panels = [(plane, name) for name in chosen for plane in planes]
-    return _drawn(panels, scales, {})
+    panels = [(plane, name) for plane in planes for name in chosen]
+    return _drawn(panels, scales, {}, len(chosen) if len(planes) > 1 else 1)
 
 
 def map_film(
@@ -220,16 +221,19 @@ def _normalised(given: Map, name: str) -> Normalize:
 
 
 def _drawn(
-    panels: Sequence[tuple[Map, str]], scales: Mapping[str, Normalize], causes: Mapping[str, Any]
+    panels: Sequence[tuple[Map, str]],
+    scales: Mapping[str, Normalize],
+    causes: Mapping[str, Any],
+    columns: int = 1,
 ) -> Figure:
     """Return a figure of panels, whose legends have these causes too, there or not."""
-    heights = [_height(plane) for plane, _ in panels]
-    figure = blank(_WIDTH, sum(heights))
-    grid = GridSpec(len(panels), 1, figure=figure, height_ratios=heights)
+    heights = [_height(plane) for plane, _ in panels[::columns]]
+    figure = blank(columns * _WIDTH, sum(heights))
+    grid = GridSpec(len(heights), columns, figure=figure, height_ratios=heights)
     for k, (plane, name) in enumerate(panels):
         labels = [_label(axis) for axis in plane.grid.axes]
         axes = plain_axes(figure, labels[0], labels[1] if len(labels) > 1 else _named(name))
-        axes.set_subplotspec(grid[k])
+        axes.set_subplotspec(grid[divmod(k, columns)])
         axes.set_title(_title(plane), fontsize=FONT_SIZE, color=INK, loc="left")
         if len(labels) == 1:
             _curve(axes, plane, name)
@@ -358,7 +362,7 @@ def _best(axes: Axes, plane: Map, name: str, handles: list[Any]) -> None:
         for axis in plane.grid.axes
     ]
     label = f"best here: {factor * found.best:.4g} {_unit(name)}".rstrip()
-    spot(axes, at[0], at[1], PAPER, INK, 6.0, zorder=5, label=label)
+    spot(axes, at[0], at[1], PAPER, INK, 6.0, zorder=5, label=label, clip_on=False)
     handles.append(axes.lines[-1])
 
 

@@ -6,6 +6,7 @@ as a distance between links, is one more condition: the name of a function of th
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -93,6 +94,11 @@ def conditions(
     tuple of Condition
         The edges of reach first.
 
+    Raises
+    ------
+    DataError
+        If a floor is negative or not finite.
+
     Examples
     --------
     >>> from pteron.workspace import conditions
@@ -100,6 +106,9 @@ def conditions(
     ['leg 1: stretched', 'leg 3: stretched', 'leg 2: slider at its least']
     """
     robot = as_manipulator(robot)
+    for name, floor in (("type_i", type_i), ("type_ii", type_ii)):
+        if not 0.0 <= floor < math.inf:
+            raise DataError(f"{name}: {floor!r} given, a floor of 0 or more expected")
     pose = ca.SX.sym("pose", robot.freedom)
     found = [
         Condition(

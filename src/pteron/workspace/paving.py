@@ -95,6 +95,17 @@ class Paving:
         return np.asarray(self.boundary[chosen])
 
     @cached_property
+    def boundary_shares(self) -> dict[str, float]:
+        """What ends the workspace: shares of the boundary's boxes where one condition alone does.
+
+        Conditions that end it nowhere are left out, the greatest share comes first. What is left of
+        1 are boxes in which several are undecided: edges meet there, or boxes are large.
+        """
+        alone = self.causes[self.causes.sum(axis=1) == 1].sum(axis=0) / max(len(self.causes), 1)
+        shares = {str(c): float(s) for c, s in zip(self.conditions, alone, strict=True) if s}
+        return dict(sorted(shares.items(), key=lambda pair: -pair[1]))
+
+    @cached_property
     def _cells(self) -> list[tuple[int, Array, Array]]:
         """What boxes of one size say, how often each of their sides was halved, and their keys."""
         moving = np.flatnonzero(self.box[0] < self.box[1])

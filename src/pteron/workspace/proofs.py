@@ -60,14 +60,15 @@ class Proof:
     def __str__(self) -> str:
         told = ", ".join(map(str, self.causes))
         if self.holds:
-            return f"proved: every pose keeps {len(self.conditions)} bounds (boxes: {self.boxes})"
+            count = len(self.conditions)
+            return f"proved: every pose keeps all {count} conditions (boxes: {self.boxes})"
         if self.counterexample is not None:
             return (
                 f"not so: pose {self.counterexample.round(6).tolist()} does not serve: {self.why}"
             )
         assert self.undecided is not None
         low, high = (corner.round(6).tolist() for corner in self.undecided)
-        return f"not decided of poses from {low} to {high}: {told}; the region may touch that bound"
+        return f"not decided of poses from {low} to {high}: {told}; the region may touch that edge"
 
     @property
     def why(self) -> str:
@@ -127,8 +128,8 @@ def prove(
     Raises
     ------
     DataError
-        If the region's poses have not the machine's coordinates, or it is a cylinder and the
-        machine is planar.
+        If the region is none, its poses have not the machine's coordinates, it is a cylinder and
+        the machine is planar, or a floor is negative.
 
     Examples
     --------
@@ -138,6 +139,8 @@ def prove(
     True
     """
     robot = as_manipulator(robot)
+    if not isinstance(region, Region):
+        raise DataError(f"region: {type(region).__name__} given, a Box or a Cylinder expected")
     box = region.box
     if box.shape[1] != robot.freedom:
         names = ", ".join(robot.coordinates)

@@ -1,0 +1,249 @@
+"""`pteron workspace --certify` and `--prove`: what is proved of a workspace, by intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from typer import Exit
+
+from pteron.cli.pose_ranges import pose_ranges, pose_text
+from pteron.cli.screen import note, percent, plain, show, show_json, spinner, table
+from pteron.errors import DataError, ModelError
+
+if TYPE_CHECKING:
+    from pteron.kernels import Array
+    from pteron.manipulator import Manipulator
+    from pteron.workspace import Box, Inscribed, Paving, Proof
+
+_NOT_PROVED = 1
+"""Exit code where a region is not proved."""
+
+TOLERANCE = 0.05
+"""Greatest undecided share of a volume, if no other is asked for: some seconds."""
+
+
+@dataclass(frozen=True)
+class Proofs:
+    """What is asked to be proved.
+
+    Parameters
+    ----------
+    certify : bool
+        The whole workspace at an orientation.
+    prove : str or None
+        A box of poses.
+    tolerance : float or None
+        Greatest undecided share of the whole.
+    type_i, type_ii : float or None
+        Least singularity measures; None where they do not matter.
+    """
+
+    certify: bool
+    prove: str | None
+    tolerance: float | None
+    type_i: float | None
+    type_ii: float | None
+
+    @property
+    def asked(self) -> bool:
+        """Whether there is anything to prove."""
+        return self.certify or self.prove is not None
+
+    @property
+    def floors(self) -> dict[str, float]:
+        """The least measures, 0 where they do not matter."""
+        return {"type_i": self.type_i or 0.0, "type_ii": self.type_ii or 0.0}
+
+    def check(self, maps: Mapping[str, object], slice_: str | None) -> None:
+        """Refuse options that do nothing beside others, and numbers that are none."""
+        own = {"tolerance": self.tolerance, "type-i": self.type_i, "type-ii": self.type_ii}
+        if self.prove is not None:
+            _expect_none({**maps, "slice": slice_, "certify": self.certify or None}, "--prove")
+            _expect_none({"tolerance": self.tolerance}, "--prove, but with --certify")
+        elif self.certify:
+            _expect_none(maps, "--certify")
+        else:
+            _expect_none(own, "a map, but with --certify or --prove")
+        for name, value in own.items():
+            least = "above 0" if name == "tolerance" else "of 0 or more"
+            if value is not None and not (value > 0.0 or (value == 0.0 and name != "tolerance")):
+                raise DataError(f"--{name}: {value:g} given, a number {least} expected")
+
+    def deliver(
+        self, robot: Manipulator, slice_: str | None, warnings: list[str], *, as_json: bool
+    ) -> None:
+        """Prove it, and print what is proved; exit with 1 if a box is not."""
+        if self.prove is None:
+            self._certify(robot, _orientation(robot, slice_), warnings, as_json)
+            return
+        from pteron.workspace import prove
+
+        region = _region(robot, self.prove)
+        for text in warnings:
+            note(f"Warning: {text}")
+        with spinner(f"Proving a region for {robot.name}"):
+            found = prove(
+                robot, region, type_i=self.floors["type_i"], type_ii=self.floors["type_ii"]
+            )
+        if as_json:
+            show_json(_proof(found, self.floors) | {"warnings": warnings})
+        else:
+            show(f"[bold]{plain(robot.name)}[/bold]: {_spans(robot, region)}", plain(str(found)))
+        if not found.holds:
+            raise Exit(_NOT_PROVED)
+
+    def _certify(self, robot: Manipulator, pose: Array, warnings: list[str], as_json: bool) -> None:
+        from pteron.workspace import conditions, largest_cube, paving
+
+        for text in warnings:
+            note(f"Warning: {text}")
+        tolerance = TOLERANCE if self.tolerance is None else self.tolerance
+        asked = conditions(robot, **self.floors)
+        with spinner(f"Proving the workspace of {robot.name}"):
+            found = paving(robot, pose, tolerance=tolerance, given=asked)
+            shares = found.boundary_shares
+            try:
+                cube = largest_cube(robot, pose, given=asked)
+            except ModelError:
+                cube = None
+        if not found.complete:
+            note(f"Warning: the gap is not {percent(tolerance)}: there were too many boxes")
+        if as_json:
+            data = _certified(robot, pose, self.floors, found, shares, cube)
+            show_json(data | {"warnings": warnings})
+        else:
+            _show(robot, pose, self.floors, found, shares, cube)
+
+
+def _expect_none(given: Mapping[str, object], what: str) -> None:
+    """Refuse options that do nothing beside another."""
+    for name, value in given.items():
+        if value is not None and value != []:
+            raise DataError(f"--{name}: does not go with {what}")
+
+
+def _orientation(robot: Manipulator, slice_: str | None) -> Array:
+    """Return a pose at the orientation that is asked for, or else at that of the home pose."""
+    import numpy as np
+
+    from pteron.maps.grid import expect_coordinates
+    from pteron.workspace import home_pose
+
+    held, ranges = pose_ranges(slice_, "--slice")
+    expect_coordinates(robot, held, ranges)
+    if set(held) - {"phi"} or ranges:
+        raise DataError("--slice: with --certify only phi=VALUE, the orientation, is expected")
+    return np.array([0.0] * (robot.freedom - 1) + [held["phi"]]) if held else home_pose(robot)
+
+
+def _region(robot: Manipulator, text: str) -> Box:
+    from pteron.maps.grid import expect_coordinates
+    from pteron.workspace import Box
+
+    held, ranges = pose_ranges(text, "--prove")
+    expect_coordinates(robot, held, ranges)
+    spans = ranges | {name: (value, value) for name, value in held.items()}
+    every = ", ".join(robot.coordinates)
+    missing = [name for name in robot.coordinates if name not in spans]
+    if missing:
+        raise DataError(f"--prove: no {', '.join(missing)}; a region says all of {every}")
+    if any(len(span) > 2 for span in spans.values()):
+        raise DataError("--prove: NAME=LEAST:GREATEST expected; a proof is of all poses between")
+    ordered = [spans[name] for name in robot.coordinates]
+    return Box(tuple(span[0] for span in ordered), tuple(span[1] for span in ordered))
+
+
+def _certified(
+    robot: Manipulator,
+    pose: Array,
+    floors: dict[str, float],
+    found: Paving,
+    shares: dict[str, float],
+    cube: Inscribed | None,
+) -> dict[str, Any]:
+    angle = {"phi": float(pose[-1])} if robot.platform.turns else {}
+    return {
+        "robot": robot.name,
+        "held": angle,
+        "floors": floors,
+        "inner": found.inner_volume,
+        "outer": found.outer_volume,
+        "unit": found.unit,
+        "gap": found.gap if found.inner_volume else None,
+        "complete": found.complete,
+        "boxes": {"inner": len(found.inner), "undecided": len(found.boundary)},
+        "boundary": shares,
+        "cube": None
+        if cube is None
+        else {"edge": cube.edge, "center": cube.center.tolist(), "proved": True},
+    }
+
+
+def _proof(found: Proof, floors: dict[str, float]) -> dict[str, Any]:
+    pose, undecided = found.counterexample, found.undecided
+    low, high = found.region.box.tolist()
+    return {
+        "robot": found.robot.name,
+        "region": dict(zip(found.robot.coordinates, zip(low, high, strict=True), strict=True)),
+        "floors": floors,
+        "proved": found.holds,
+        "pose": None if pose is None else pose.tolist(),
+        "undecided": None if undecided is None else undecided.tolist(),
+        "causes": [str(condition) for condition in found.causes],
+        "why": found.why or None,
+        "conditions": [str(condition) for condition in found.conditions],
+        "boxes": found.boxes,
+    }
+
+
+def _show(
+    robot: Manipulator,
+    pose: Array,
+    floors: dict[str, float],
+    found: Paving,
+    shares: dict[str, float],
+    cube: Inscribed | None,
+) -> None:
+    where = f" at {pose_text('phi', pose[-1])}" if robot.platform.turns else ""
+    kept = [f"{name} {value:g}" for name, value in floors.items() if value]
+    noun = "area" if found.unit == "m^2" else "volume"
+    shape = "square" if robot.platform.planar else "cube"
+    show(
+        f"[bold]{plain(robot.name)}[/bold]{where}"
+        + (f", with floors {', '.join(kept)}" if kept else ""),
+    )
+    if not found.outer_volume:
+        show("Proved: no position serves.")
+        return
+    show(
+        f"Proved {noun}: {found.inner_volume:.5g} to {found.outer_volume:.5g} {found.unit}, "
+        f"gap {percent(found.gap)} ({len(found.inner)} boxes inside, "
+        f"{len(found.boundary)} undecided)"
+    )
+    if cube is None:
+        show(f"No {shape} of any size was found in it.")
+    else:
+        told = ", ".join(
+            pose_text(name, value)
+            for name, value in zip(robot.coordinates, cube.center.round(6).tolist(), strict=True)
+            if name != "phi"
+        )
+        show(f"Largest {shape} that was found, proved: edge {cube.edge:.4g} m about {told}")
+    made = table("what ends it", "share of the boundary", numbers=("share of the boundary",))
+    for cause, share in shares.items():
+        made.add_row(plain(cause), percent(share))
+    rest = 1.0 - sum(shares.values())
+    if rest > 0.0:
+        made.add_row("several, not told apart", percent(rest))
+    show(made)
+
+
+def _spans(robot: Manipulator, region: Box) -> str:
+    return ", ".join(
+        pose_text(name, low)
+        if low == high
+        else f"{name} {low + 0.0:.4g} to {high + 0.0:.4g} {'rad' if name == 'phi' else 'm'}"
+        for name, low, high in zip(robot.coordinates, region.low, region.high, strict=True)
+    )
