@@ -19,6 +19,7 @@ from pteron.indices import (
     INDICES,
     STEEL,
     Elasticity,
+    Material,
     Section,
     Tolerances,
     evaluate,
@@ -299,6 +300,38 @@ def test_an_overconstrained_machine_as_a_frame_of_beams():
         scale = np.abs(exact).max()
         np.testing.assert_allclose(found.compliance, exact, rtol=0, atol=1e-6 * scale)
         assert found.least <= found.along([1.0, 2.0, 3.0]) <= found.most
+
+
+def test_a_published_tripteron():
+    """Colours of deflection maps under 1 kN, by matrix structural analysis (MOstanin on GitHub).
+
+    Tripteron-stiffness, figures maps/scatter_MSA_*.svg: 12 equal steps of the colour bar, at
+    z = 0.9 m and y = 0.1 to 0.9 m; the code of IEEE Xplore's document 9290208.
+    """
+    plain = CATALOG["tripteron"]
+    points = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
+    changes = {"platform_point": (0.0, 0.0, 0.0), "upper_length": 0.75, "lower_length": 0.75}
+    legs = tuple(
+        replace(leg, guide_point=point, direction=tuple(axis), elbow=-1, limits=None, **changes)
+        for leg, point, axis in zip(plain.legs, points, np.eye(3), strict=True)
+    )
+    rod = Section.tube(0.15, 0.075, Material(70e9, 25.5e9))
+    y = np.linspace(0.1, 0.9, 9)
+    poses = np.stack([np.stack([np.full(9, x), y, np.full(9, 0.9)], -1) for x in (0.8, 0.9)])
+    elasticity = Elasticity(1e6, upper=rod, lower=rod)
+    found = stiffness(replace(plain, legs=legs), poses, elasticity).compliance
+    along_x = [11, 10, 9, 8, 8, 7, 7, 6, 6]
+    for load, ends, steps in (
+        ([1e3, 0.0, 0.0], (1.1e-3, 1.4e-3), [along_x, along_x]),
+        (
+            [0.0, 0.0, 1e3],
+            (1.1e-3, 1.4e-3),
+            [[5, 5, 5, 6, 6, 7, 8, 8, 9], [6, 6, 6, 7, 7, 8, 9, 9, 10]],
+        ),
+        ([1e3, 1e3, 1e3], (2.0e-3, 2.6e-3), [[7] * 9, [8] * 9]),
+    ):
+        way = np.linalg.norm(found @ load, axis=-1)
+        np.testing.assert_array_equal((12 * (way - ends[0]) / np.ptp(ends)).astype(int), steps)
 
 
 def test_parallel_rods_as_six_springs():

@@ -68,7 +68,6 @@ FUNCTIONS = (
     "regressor",
     "room",
     "squared_type_i",
-    "standing",
     "type_ii",
     "type_ii_distances",
 )

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pteron.design.extras import Evolution
+from pteron.design.extras import Evolution, one_thread
 from pteron.design.front import Front, front_of
 from pteron.design.refine import refined
 from pteron.design.spec import Spec
@@ -135,8 +135,9 @@ def worked(task: Task, jobs: list[tuple[list[float], int]]) -> pl.DataFrame:
     """Return the rows of designs; one whose number is an objective is improved in it first."""
     import polars as pl
 
-    designs = [values if k < 0 else refined(task, values, k) for values, k in jobs]
-    return pl.DataFrame(task.table(np.array(designs)))
+    with one_thread():
+        designs = [values if k < 0 else refined(task, values, k) for values, k in jobs]
+        return pl.DataFrame(task.table(np.array(designs)))
 
 
 def _promising(

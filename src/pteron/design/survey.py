@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import qmc  # type: ignore[import-untyped]
 
+from pteron.design.extras import one_thread
 from pteron.design.front import Front, front_of_parts
 from pteron.design.spec import Spec
 from pteron.design.task import Task
@@ -102,7 +103,8 @@ def surveyed(task: Task, chunk: tuple[int, int]) -> pl.DataFrame:
     """Return the rows of one chunk of designs."""
     import polars as pl
 
-    return pl.DataFrame(task.table(survey_designs(task, *chunk)))
+    with one_thread():
+        return pl.DataFrame(task.table(survey_designs(task, *chunk)))
 
 
 def survey_designs(task: Task, first: int, count: int) -> Array:

@@ -77,19 +77,21 @@ def standing(machine: Machine, pose: Expression) -> tuple[Expression, Expression
     found = reach(machine, pose)
     joints = ca.vertsplit(inverse_position(machine, pose))
     passive = ca.vertsplit(passive_room(machine, pose)[1])
-    least, worst, missed, room = found[0].margin, ca.SX(1), ca.SX(0), ca.SX(FAR)
+    least, worst, room = found[0].margin, ca.SX(1), ca.SX(FAR)
     rows = zip(machine.robot.legs, found, joints, passive, strict=True)
     for i, (leg, at, joint, way) in enumerate(rows, start=1):
         worst = ca.if_else(at.margin < least, i, worst)
         least = ca.fmin(least, at.margin)
-        missed = ca.fmax(missed, at.discriminant < 0)
         room = ca.fmin(room, way)
         if leg.limits is not None:
             # No way leads out of an angle's limits.
             own = ca.fmin(joint - leg.limits[0], leg.limits[1] - joint) * leg.lever
             room = ca.fmin(room, ca.if_else(own < 0, own, FAR) if leg.follows_angle else own)
-    status = ca.if_else(missed, worst, ca.if_else(room < 0, -1, 0))
-    return status, ca.if_else(missed, least, ca.fmin(least, room))
+    status, nearest = ca.if_else(room < 0, -1, 0), ca.fmin(least, room)
+    for at in found:
+        status = ca.if_else(at.discriminant < 0, worst, status)
+        nearest = ca.if_else(at.discriminant < 0, least, nearest)
+    return status, nearest
 
 
 def direct_position(machine: Machine, joints: Expression, *, reached: bool = True) -> Expression:

@@ -18,7 +18,6 @@ SUMMARIES = {
     "direct_step": "The pose of the joint coordinates next to a given one, such as the last one "
     "of a motion, by Newton's method; NaN where it does not converge, or comes to another side of "
     "the singularities.",
-    "standing": "Whether a pose serves: in reach of all legs, within the limits of the joints.",
     "jacobian": "Jacobian: joint rates = J velocity.",
     "inverse_dynamics": "Actuator forces of a motion, from the inertial parameters; no friction.",
     "forward_dynamics": "Acceleration of the platform under actuator forces; no friction.",
@@ -116,9 +115,6 @@ def meaning(robot: Manipulator, port: Port, output: Output) -> str:
         "type_ii": "type-II measure: 0 at a singularity",
         "type_i": "type-I measure of each leg: 0 where it is stretched or folded, 1 at best",
         "margin": "from each leg to the edge of its reach, m; negative beyond it",
-        "standing": "0 where the pose serves, -1 beyond a joint's limit, else the leg, from 1, "
-        "that misses it by most",
-        "way": "to the nearest end of a leg's reach or of its limits, m; negative beyond it",
     }
     name = port.name.removesuffix("_out")
     return told_meaning(robot, output) if name == NAMES[output] != "forces" else texts.get(name, "")

@@ -334,7 +334,6 @@ TABLE: dict[str, Entry] = {
     "room": Entry(
         _POSE, lambda m, v: {"room": ca.vertcat(*(room.value for room in rooms(m, v["pose"])))}
     ),
-    "standing": Entry(_POSE, _standing),
     "joint_points": Entry(
         _POSE, lambda m, v: {"points": kinematics.chain_points(_state(m, v))}, ("reach",)
     ),
@@ -436,6 +435,7 @@ TABLE |= INDICES | {
     "homogeneous_jacobian": Entry(_POSE, _homogeneous_jacobian, ("rows",)),
     "reactions": Entry((*_MOTION, "parameters"), _reactions, _HELD),
     "beams": Entry(_POSE, _beams, _BENT),
+    "standing": Entry(_POSE, _standing),
 }
 
 
