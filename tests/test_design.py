@@ -235,6 +235,7 @@ def test_what_cannot_be_is_told_with_what_comes_nearest():
 FAULTS = {
     "range = [0.3, 0.1]": r"variables, item 1: range: \[0.3, 0.1\] given, whose range is empty",
     'range = [0.1, 0.3]\ncolour = "red"': r"variables, item 1: colour: unknown key",
+    "range = [100, 300]": r"variables, item 1: range: \[100.0, 300.0\] m given: are these mm\?",
     "range = [-0.1, 0.3]": r"variables, item 1: range: -0.1 m given, but a length is above 0",
 }
 MORE = {
@@ -243,6 +244,9 @@ MORE = {
     '[[objectives]]\nmaximise = "cube"\nminimise = "links"': r"either maximise or minimise",
     '[[objectives]]\nminimise = "drive_load"': r"no drive of quadrupteron has max_force",
     '[[objectives]]\nminimise = "links"\n[workspace]\nlow = [0, 0, 0]\nedge = 1': r"a box has low",
+    '[[objectives]]\nminimise = "links"\n[workspace]\nlow = [0, 0, 0]\nhigh = [90, 90, 90]': (
+        r"workspace: x, y, z up to 90: are these mm\?"
+    ),
     '[[objectives]]\nminimise = "links"\n[workspace]\ncenter = [0, 0]\nedge = 0.1': r"x y z of qua",
 }
 

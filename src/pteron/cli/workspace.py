@@ -51,7 +51,7 @@ _ALIKE = 1e-9
 
 _INDEX = Option(
     "--index",
-    help="What to map, such as kappa or condition; may be given several times.",
+    help="What to map: condition, kappa, pressure_angle, ...; may be given several times.",
     metavar="INDEX",
     autocompletion=indices,
     show_default="the distance to the end of the reach",

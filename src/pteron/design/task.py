@@ -14,7 +14,7 @@ import numpy as np
 from pteron.design.conditions import Conditions, conditions_of
 from pteron.design.design import Design
 from pteron.design.quantities import quantities
-from pteron.design.region import orientations_of
+from pteron.design.region import orientations_of, workspace_poses
 from pteron.design.spec import Spec
 from pteron.design.variables import Variable, moved, variables_of
 from pteron.errors import DataError, ModelError
@@ -23,6 +23,7 @@ from pteron.kernels import Array, Kernel, compile
 from pteron.manipulator import Manipulator, load
 from pteron.manipulator.saving import text_of
 from pteron.toml import told
+from pteron.workspace.doubts import value_doubts
 
 FAILED = 1e6
 """How much a requirement is missed by a design that is no machine, or has no such quantity."""
@@ -181,6 +182,12 @@ def _misfits(spec: Spec, robot: Manipulator) -> Iterator[str]:
         )
     elif spec.workspace is not None and spec.workspace.shape == "cylinder" and len(lengths) < 3:
         yield f"workspace: a cylinder given, but {robot.name} moves in a plane; give a box"
+    elif spec.workspace is not None:
+        corners = workspace_poses(spec.workspace, np.zeros((1, robot.freedom)), samples=2)
+        for doubt in value_doubts(robot, robot.coordinates, corners):
+            yield f"workspace: {doubt}"
+    for doubt in value_doubts(robot, ["phi"], np.array(spec.angles or ())[:, None]):
+        yield f"angles: {doubt}"
     asked = {o.quantity for o in spec.objectives} | {r.quantity for r in spec.requirements}
     units = {leg.joint.force_unit for leg in robot.legs}
     for name in sorted(asked & {"force", "speed"}):

@@ -16,6 +16,7 @@ from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.toml import told
+from pteron.workspace.doubts import unlikely_length
 
 _STEP = 1e-6
 """Share of a range over which the geometry's change is measured."""
@@ -100,7 +101,10 @@ def _variables(robot: Manipulator, table: VariableTable) -> list[Variable]:
         is_length = table.by == "value" and any(place.role == "length" for place in group)
         if is_length and table.range[0] <= 0.0:
             raise ModelError(f"range: {table.range[0]:g} m given, but a length is above 0")
-        found.append(Variable(name, tuple(group), table.by, *table.range, start))
+        variable = Variable(name, tuple(group), table.by, *table.range, start)
+        if variable.unit == "m" and max(map(abs, table.range)) > unlikely_length(robot):
+            raise ModelError(f"range: {list(table.range)} m given: are these mm? m are expected")
+        found.append(variable)
     return found
 
 

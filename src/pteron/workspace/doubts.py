@@ -181,6 +181,13 @@ def _spread(platform: Platform, radius: float) -> Iterator[str]:
             )
 
 
+def unlikely_length(robot: Manipulator) -> float:
+    """Return the size from which on a length of a pose or a part is rather one in mm, m."""
+    return 10.0 * max(
+        hypot(*leg.guide_point) + leg.size + hypot(*leg.platform_point) for leg in robot.legs
+    )
+
+
 def value_doubts(robot: Manipulator, columns: Sequence[str], values: Array) -> tuple[str, ...]:
     """Return what is unlikely in poses or joint coordinates, one line each.
 
@@ -197,9 +204,6 @@ def value_doubts(robot: Manipulator, columns: Sequence[str], values: Array) -> t
     -------
     tuple of str
     """
-    size = max(
-        hypot(*leg.guide_point) + leg.size + hypot(*leg.platform_point) for leg in robot.legs
-    )
     units = {"phi": "rad"} | {
         f"{leg.joint.coordinate}{i}": leg.joint.unit for i, leg in enumerate(robot.legs, start=1)
     }
@@ -207,7 +211,7 @@ def value_doubts(robot: Manipulator, columns: Sequence[str], values: Array) -> t
     angles = [k for k, name in enumerate(columns) if units.get(name) == "rad"]
     found = []
     for chosen, far, question in (
-        (lengths, 10.0 * size, "are these mm? m are expected"),
+        (lengths, unlikely_length(robot), "are these mm? m are expected"),
         (angles, 2.0 * np.pi, "are these degrees? rad are expected"),
     ):
         largest = float(np.nanmax(np.abs(values[..., chosen]), initial=0.0))
