@@ -71,7 +71,8 @@ POINTS = np.array([[0.04, 0.0, 0.0], [0.0, 0.05, 0.0], [-0.04, 0.01, 0.0], [0.0,
             replace(
                 CATALOG["3-rrr"],
                 legs=tuple(
-                    replace(leg, platform_point=(0.1, 0.0, 0.0)) for leg in CATALOG["3-rrr"].legs
+                    replace(leg, platform_point=(x, 0.0, 0.0))  # one point, but for rounding
+                    for leg, x in zip(CATALOG["3-rrr"].legs, (0.3, 0.1 + 0.2, 0.3), strict=True)
                 ),
             ),
             "platform points lie on one line",

@@ -99,6 +99,8 @@ def _architecture(robot: Manipulator) -> Architecture:
     most, constraint = (float(v.max(initial=0.0)) for v in (measures, constraints))
     holds = None if np.isnan(constraint) else constraint > _VANISHING
     singular = is_singular_everywhere(robot)
+    if singular and _points_are_in_line(robot):
+        most = 0.0  # of rounding's size, and no more
     if not singular:
         return Architecture(False, "", "one pose", most, holds, constraint)
     proof: Proof = "numerical" if closure_of(robot).vanishes() is None else "closed form"
@@ -130,6 +132,8 @@ def _is_singular_everywhere(robot: Manipulator) -> bool:
     known = closure_of(robot).vanishes()
     if known is not None:
         return known
+    if _points_are_in_line(robot):
+        return True
     poses = _poses(robot)
     if not len(poses):
         return False  # nowhere in reach, which is told where a pose is used
@@ -178,7 +182,7 @@ def _reason(robot: Manipulator) -> str:
     poses = _poses(robot)
     if not len(poses):
         poses = np.zeros((1, robot.freedom))
-    platform, lengths = robot.platform, len(robot.platform.lengths)
+    lengths = len(robot.platform.lengths)
     jacobian = numeric(robot, "jacobian")(poses)[0]
     forces = jacobian[..., :lengths]
     if lengths == 3 and (axis := _always_free(forces)) is not None:
@@ -186,14 +190,11 @@ def _reason(robot: Manipulator) -> str:
             f"the legs' rows all lie across {_told(axis)}, along which no actuator holds the "
             "platform"
         )
-    if platform.turns and not platform.slides:
-        points = np.array([leg.platform_point for leg in robot.legs])[:, :2]
-        size = max(np.abs([leg.platform_point for leg in robot.legs]).max(), 1e-9)
-        if np.ptp(points, axis=0).max() <= 1e-9 * size:
-            return (
-                "all platform points lie on one line along the platform's axis, about which no "
-                "force then has a moment"
-            )
+    if _points_are_in_line(robot):
+        return (
+            "all platform points lie on one line along the platform's axis, about which no "
+            "force then has a moment"
+        )
     if closure_of(robot).orientation is not None and _has_fourfold_symmetry(robot, forces[0]):
         return (
             "the layout has fourfold symmetry about the platform's axis, for which A = B = 0 in "
@@ -210,6 +211,20 @@ def _reason(robot: Manipulator) -> str:
     if closure_of(robot).orientation is not None:
         return "A = B = 0 in det J ~ A cos(phi) + B sin(phi)"
     return "det J vanishes at every pose that was looked at"
+
+
+def _points_are_in_line(robot: Manipulator) -> bool:
+    """Say whether the platform turns about an axis through all its points, but for rounding.
+
+    The type-II measure does not tell: it counts lengths by the size of the platform.
+    """
+    if not robot.platform.turns or robot.platform.slides:
+        return False
+    if any(leg.follows_angle for leg in robot.legs):
+        return False
+    points = np.array([leg.platform_point for leg in robot.legs])
+    size = max(float(np.abs(points).max()), 1e-9)
+    return bool(np.ptp(points[:, :2], axis=0).max() <= 1e-9 * size)
 
 
 def _always_free(rows: Array) -> Array | None:
