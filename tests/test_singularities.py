@@ -238,6 +238,10 @@ def test_regions_are_free_up_to_the_singular_orientation():
         found = free_of_singularities(robot, [low, high])
         assert found.free is False
         assert found.pose[3] == pytest.approx(edge, abs=1e-9)
+    for end in ([0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, np.pi / 2]):  # singular but for rounding
+        assert (
+            free_of_singularities("quadrupteron", [end, [0.0, 0.0, 0.0, np.pi / 2]]).free is False
+        )
 
 
 def test_a_region_is_free_or_holds_the_pose_that_is_returned():

@@ -86,7 +86,9 @@ def _mean_value(
     graph: Graph, node: int, slopes: Mapping[int, int], low: Array, high: Array
 ) -> Interval:
     """Return f(m) + f'(X) (X - m); NaN where f' may be undefined in a part of the box."""
-    count, middle = len(low), 0.5 * (low + high)
+    count = len(low)
+    with np.errstate(all="ignore"):  # of boxes without an end
+        middle = 0.5 * low + 0.5 * high
     at, upper, *_ = (part[:, 0] for part in enclosed(graph, [node], [middle], [middle], count))
     least, most, known, _ = enclosed(graph, list(slopes.values()), [low], [high], count)
     with np.errstate(all="ignore"):

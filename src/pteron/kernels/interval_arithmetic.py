@@ -138,7 +138,7 @@ def square(a: Interval) -> Interval:
 
 def divide(a: Interval, b: Interval) -> Interval:
     """Return a / b where b is not zero."""
-    zero = (b.low <= 0.0) & (b.high >= 0.0)
+    zero = np.logical_not((b.low > 0.0) | (b.high < 0.0))
     if not np.any(zero):
         quotients = [x / y for x in a[:2] for y in b[:2]]
         least, most = _least(quotients), _most(quotients)
@@ -158,7 +158,8 @@ def root(a: Interval) -> Interval:
     """Return the square root of a where a is not negative."""
     low = np.sqrt(np.maximum(a.low, 0.0))
     high = np.sqrt(np.maximum(a.high, 0.0))
-    part, none = np.atleast_1d(a.low < 0.0), np.atleast_1d(a.high < 0.0)
+    # Of a bound that is NaN nothing is known.
+    part, none = ~np.atleast_1d(a.low >= 0.0), np.atleast_1d(a.high < 0.0)
     maybe = either(a.maybe, part if part.any() else None)
     never = either(a.never, none if none.any() else None)
     return Interval(np.maximum(_below(low), 0.0), _above(high), maybe, never, a.jump)

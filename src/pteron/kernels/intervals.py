@@ -165,7 +165,8 @@ def _mark(low: Array, high: Array, value: Interval) -> None:
     """Say in bounds (B,) where nothing is known, and where there is nothing to know."""
     low[np.isnan(low)], high[np.isnan(high)] = -np.inf, np.inf
     if value.never is not None:
-        low[value.never] = high[value.never] = np.nan
+        never = np.broadcast_to(value.never, low.shape)
+        low[never] = high[never] = np.nan
 
 
 def needed_by(graph: Graph, nodes: Sequence[int]) -> list[int]:

@@ -76,8 +76,8 @@ def free_of_singularities(
     region : Box, or array of shape (2, m)
         The least and the greatest pose, m and rad; a coordinate may have one value.
     floor : float
-        Least size of the type-II measure that is to be proved; a pose counts as singular only where
-        the measure vanishes.
+        Least size of the type-II measure that is to be proved, 1e-10 at least; a pose counts as
+        singular only where the measure vanishes, to that size.
     most : int
         Boxes after which it is given up.
 
@@ -115,10 +115,11 @@ def free_of_singularities(
     if closure_of(robot).orientation is not None:
         sizes[:-1] = np.inf  # it depends on the angle alone
     boxes, looked, least = given[None], 0, np.inf
+    nearest = max(floor, _SINGULAR)  # no float is a root of cos: an end of the region may be one
     while len(boxes):
         looked += len(boxes)
         measure = bounds(robot, "type_ii", boxes)["type_ii"]
-        away = (measure.low > floor) | (measure.high < -floor)
+        away = (measure.low > nearest) | (measure.high < -nearest)
         reach = bounds(robot, "squared_type_i", boxes)["squares"].high
         nowhere = np.isnan(measure.low) | (reach < 0.0).any(axis=-1)
         size = np.where(measure.low > 0.0, measure.low, -measure.high)

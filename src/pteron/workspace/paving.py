@@ -224,10 +224,11 @@ def region_box(robot: Manipulator, at: Array, within: ArrayLike | None) -> Array
         box[:, :count] = enclosing_box(robot, at, at)
         return box
     given = np.asarray(within, dtype=float)
-    if given.shape not in ((2, count), (2, len(at))) or not (given[0] <= given[1]).all():
+    shapes = (2, count), (2, len(at))
+    if given.shape not in shapes or not (np.isfinite(given) & (given[0] <= given[1])).all():
         raise DataError(
-            f"within: least and greatest position expected, shape (2, {count}) or, with phi, "
-            f"(2, {len(at)})"
+            f"within: least and greatest position expected, finite, shape (2, {count}) or, with "
+            f"phi, (2, {len(at)})"
         )
     box[:, : given.shape[1]] = given
     return box

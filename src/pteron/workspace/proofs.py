@@ -12,7 +12,7 @@ from pteron.kernels import Array, numeric
 from pteron.kinematics.limits import limited_joints
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.workspace.conditions import Condition, Judge, conditions, judge, rooms_left
-from pteron.workspace.regions import Region
+from pteron.workspace.regions import Cylinder, Region
 
 _TRIED = 4096
 """Undecided boxes whose middles and corners are tried as counterexamples, on each level."""
@@ -128,7 +128,8 @@ def prove(
     Raises
     ------
     DataError
-        If the region is none, its poses have not the machine's coordinates, or a floor is negative.
+        If the region is none, its poses have not the machine's coordinates, it is a cylinder and
+        the machine is planar, or a floor is negative.
 
     Examples
     --------
@@ -144,6 +145,8 @@ def prove(
     if box.shape[1] != robot.freedom:
         names = ", ".join(robot.coordinates)
         raise DataError(f"region: {box.shape[1]} coordinates given, {names} expected")
+    if isinstance(region, Cylinder) and robot.platform.planar:
+        raise DataError("region: a planar machine has no cylinder in its workspace; give a box")
     asked = conditions(robot, type_i=type_i, type_ii=type_ii)
     if given is not None:
         asked = (*given, *(c for c in asked if c.what != "room"))
@@ -165,9 +168,11 @@ def prove(
             return Proof(True, robot, region, asked, boxes=seen)
         found = _counterexample(robot, judging, region, left)
         if found is not None:
-            failed = tuple(
-                asked[c] for c in np.flatnonzero(~(rooms_left(robot, asked, found) >= 0.0))
-            )
+            left_there = rooms_left(robot, asked, found)
+            # Out of reach limits are undefined: it is the reach that is told.
+            fails = left_there < 0.0
+            fails = fails if fails.any() else np.isnan(left_there)
+            failed = tuple(asked[c] for c in np.flatnonzero(fails))
             return Proof(False, robot, region, asked, found, causes=failed, boxes=seen)
         sides = left[:, 1] - left[:, 0]
         if 2 * len(left) > most or (sides <= least).all():
@@ -201,9 +206,7 @@ def _counterexample(
     poses = [0.5 * (tried[:, 0] + tried[:, 1])]
     for corner in np.ndindex(*(2,) * len(varies)):
         pose = tried[:, 0].copy()
-        pose[:, varies] = np.stack(
-            [tried[:, side, axis] for side, axis in zip(corner, varies, strict=True)], axis=1
-        )
+        pose[:, varies] = tried[:, corner, varies]
         poses.append(pose)
     every = np.concatenate(poses)
     every = every[region.holds(every)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -50,6 +51,8 @@ class Box:
             raise DataError(
                 f"box: low {list(low)} must have as many numbers as high {list(high)}, none greater"
             )
+        if math.inf in (b - a for a, b in zip(low, high, strict=True)):
+            raise DataError(f"box: from {list(low)} to {list(high)} is too far for a float")
         object.__setattr__(self, "low", low)
         object.__setattr__(self, "high", high)
 
@@ -104,9 +107,10 @@ class Cylinder:
         center, axis = (_numbers(getattr(self, name), name) for name in ("center", "axis"))
         if len(center) < 3 or len(axis) != 3 or not any(axis):
             raise DataError("cylinder: a pose with x, y and z is needed for center, and an axis")
-        if not (self.radius >= 0.0 and self.height >= 0.0):
+        if not (0.0 <= self.radius < math.inf and 0.0 <= self.height < math.inf):
             raise DataError(
-                f"cylinder: radius {self.radius!r} and height {self.height!r} must not be negative"
+                f"cylinder: radius {self.radius!r} and height {self.height!r} must be finite, and "
+                "not negative"
             )
         length = float(np.linalg.norm(axis))
         object.__setattr__(self, "center", center)
