@@ -23,6 +23,10 @@ _NOT_PROVED = 1
 TOLERANCE = 0.05
 """Greatest undecided share of a volume, if no other is asked for: some seconds."""
 
+_MAY_BE_SINGULAR = (
+    "Reach and limits count; poses may be singular. --type-ii FLOOR leaves out those that are near."
+)
+
 
 @dataclass(frozen=True)
 class Proofs:
@@ -91,6 +95,8 @@ class Proofs:
             show_json(_proof(found, self.floors) | {"warnings": warnings})
         else:
             show(f"[bold]{plain(robot.name)}[/bold]: {_spans(robot, region)}", plain(str(found)))
+            if found.holds and not self.type_ii:
+                show(_MAY_BE_SINGULAR)
         if not found.holds:
             raise Exit(_NOT_PROVED)
 
@@ -238,6 +244,8 @@ def _show(
     if rest > 0.0:
         made.add_row("several, not told apart", percent(rest))
     show(made)
+    if not floors["type_ii"]:
+        show(_MAY_BE_SINGULAR)
 
 
 def _spans(robot: Manipulator, region: Box) -> str:
