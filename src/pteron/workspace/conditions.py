@@ -111,9 +111,7 @@ def conditions(
             raise DataError(f"{name}: {floor!r} given, a floor of 0 or more expected")
     pose = ca.SX.sym("pose", robot.freedom)
     found = [
-        Condition(
-            room.leg, _CAUSES.get(room.cause, room.cause).format(room.noun), "room", "room", k
-        )
+        Condition(room.leg, _told(room), "room", "room", k)
         for k, room in enumerate(rooms(Machine.of(robot), pose))
     ]
     if type_i > 0.0:
