@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
@@ -148,6 +150,9 @@ def _ffmpeg() -> Any:
     try:
         import imageio_ffmpeg  # type: ignore[import-untyped]
 
+        if "jax" in sys.modules:
+            # It would fork to keep Ctrl-C from FFmpeg; with JAX's threads that may hang for ever.
+            os.environ.setdefault("IMAGEIO_FFMPEG_NO_PREVENT_SIGINT", "1")
         imageio_ffmpeg.get_ffmpeg_exe()
     except (ImportError, RuntimeError) as error:
         raise PteronError(
