@@ -36,7 +36,7 @@ bench: $(VENV)/.dev
 docs: $(VENV)/.docs
 	rm -rf docs/_build docs/gallery
 	$(BIN)/python docs/pictures/draw.py
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m sphinx -j auto -W --keep-going -n -q -d docs/_build/doctrees docs docs/_build/html
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m sphinx -W --keep-going -n -q -d docs/_build/doctrees docs docs/_build/html
 	$(BIN)/python docs/check_site.py docs/_build/html
 
 # The wheel in empty environments: every Python here, each extra alone and all; over half an hour.

@@ -38,7 +38,7 @@ extensions = [
 ]
 exclude_patterns = ["_build", "pictures", "extensions", "gallery/*.ipynb", "gallery/*.py"]
 nitpicky = True
-nitpick_ignore_regex = [("py:(obj|class)", "(?s:.*)"), ("py:exc", r"\w+Error")]
+nitpick_ignore_regex = [("py:(obj|class)", "(?s:.*)"), ("py:exc", r"\w+Error|NoSquareRoot")]
 """A word in backticks, or a type, is a link where it is a public name, and else a word."""
 
 # Pages.
@@ -100,7 +100,6 @@ if GALLERY.is_dir() and find_spec("sphinx_gallery") is not None:
         "download_all_examples": False,
         "remove_config_comments": True,
         "write_computation_times": False,
-        "parallel": True,  # as many as Sphinx has processes
         "show_memory": False,
         "show_signature": False,
         "capture_repr": ("_repr_html_",),
@@ -119,5 +118,3 @@ def leave_out(app: Sphinx, page: str, source: list[str]) -> None:
 def setup(app: Sphinx) -> None:
     """Tell Sphinx."""
     app.connect("source-read", leave_out)
-    # It copies files when all is built, and does not say that pages may be read in parallel.
-    app.extensions["sphinx-mathjax-offline"].parallel_read_safe = True

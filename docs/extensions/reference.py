@@ -64,6 +64,7 @@ INSIDE = {
     "closures": "How the legs' rows make up the Jacobian, and back.",
     "platforms": "One file for each kind of platform.",
     "bodies": "Vectors, inertia, parameters, and a body in motion.",
+    "indices": "How good a pose is: the parts of `pteron.indices`.",
     "reduction": "Which parameters count: the parts of `pteron.reduction`.",
     "kinematics": "Numbers: what stands behind the functions of kinematics.",
 }
