@@ -59,10 +59,10 @@ CODE: dict[str, tuple[str, ...]] = {
     # Indices, reactions, stiffness, errors.
     "G1": (f"{_E}.indices.homogeneous", f"{_E}.singular_values.singular_values"),
     "G2": (f"{_E}.indices.by_points",),
-    "G3": ("pteron.indices.global_conditioning.global_conditioning",),
+    "G3": ("pteron.indices.conditioning.global_conditioning",),
     "G4": (f"{_E}.indices.pressure_angle", f"{_E}.indices.output_pressure_angle"),
-    "G5": (f"{_E}.reactions.equilibrium", "pteron.indices.reactions.reactions"),
-    "G6": ("pteron.indices.stiffness.stiffness",),
+    "G5": (f"{_E}.reactions.equilibrium", "pteron.indices.joint_reactions.reactions"),
+    "G6": ("pteron.indices.compliance.stiffness",),
     "G7": (
         *("pteron.indices.sensitivities.geometric_sensitivities",),
         "pteron.indices.errors.pose_error",

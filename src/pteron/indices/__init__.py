@@ -1,13 +1,13 @@
 """How good a machine is at a pose: indices of performance, stiffness, errors and reactions."""
 
+from pteron.indices.compliance import Stiffness, stiffness
+from pteron.indices.conditioning import GlobalConditioning, global_conditioning
 from pteron.indices.elasticity import ALUMINIUM, STEEL, Elasticity, Material, Section
 from pteron.indices.errors import PoseError, Tolerances, pose_error
-from pteron.indices.evaluate import evaluate
-from pteron.indices.global_conditioning import GlobalConditioning, global_conditioning
+from pteron.indices.evaluation import evaluate
 from pteron.indices.index import INDICES, Index, indices_of
-from pteron.indices.reactions import Reactions, reactions
+from pteron.indices.joint_reactions import Reactions, reactions
 from pteron.indices.sensitivities import Sensitivities, geometric_sensitivities
-from pteron.indices.stiffness import Stiffness, stiffness
 
 __all__ = [
     "ALUMINIUM",

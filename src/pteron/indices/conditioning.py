@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from scipy.stats import qmc  # type: ignore[import-untyped]
 
 from pteron.errors import DataError, ModelError
-from pteron.indices.evaluate import evaluate
+from pteron.indices.evaluation import evaluate
 from pteron.kernels import as_array, numeric
 from pteron.kinematics.evaluate import checked_one
 from pteron.manipulator import RobotLike, as_manipulator
