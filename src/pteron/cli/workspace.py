@@ -2,28 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-import rich.table
 from typer import Option
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
 from pteron.cli.certify import TOLERANCE, Proofs
 from pteron.cli.completion import indices
+from pteron.cli.map_summary import map_data, map_rows, show_map
 from pteron.cli.pose_ranges import pose_ranges, pose_text
 from pteron.cli.screen import (
     is_terminal,
     note,
-    percent,
     plain,
     show,
     show_json,
     spinner,
     stages,
-    table,
     write,
 )
 from pteron.errors import DataError, ModelError, OutputError
@@ -45,9 +42,6 @@ _FRAMES = 61
 _FILM_POINTS = 120
 
 _DPI = 200.0
-
-_ALIKE = 1e-9
-"""Relative differences that count as none."""
 
 _INDEX = Option(
     "--index",
@@ -185,13 +179,13 @@ def workspace(
         )
     if out is not None and ending in (*_PICTURES, *_FILMS):
         _draw(found, out, ending)
-    data = _data(found, volume, [*warnings, *outside], out)
+    data = map_data(found, volume, [*warnings, *outside], out)
     if json:
         show_json(data)
     elif is_terminal():
-        _show(found, volume, data)
+        show_map(found, volume, data)
     else:
-        write(_rows(data).write_csv())
+        write(map_rows(data).write_csv())
     if out is not None and not json:
         line = f"Written: {plain(out)}"
         show(line) if is_terminal() else note(line)
@@ -330,132 +324,3 @@ def _draw(found: Map, out: str, ending: str) -> None:
             out,
             progress=lambda done, total: tell(task, done, total),
         )
-
-
-def _data(
-    found: Map, volume: ReachVolume | None, warnings: list[str], out: str | None
-) -> dict[str, Any]:
-    grid = found.grid
-    return {
-        "robot": found.robot,
-        "held": grid.held,
-        "varies": [
-            {
-                "name": axis.name,
-                "unit": axis.unit,
-                "least": axis.least,
-                "greatest": axis.greatest,
-                "count": axis.count,
-            }
-            for axis in grid.axes
-        ],
-        "poses": grid.size,
-        "in_reach": found.share,
-        "causes": found.causes,
-        "reach": None
-        if volume is None
-        else {
-            "box": volume.box.tolist(),
-            "volume": volume.volume,
-            "standard_error": volume.standard_error,
-            "unit": volume.unit,
-        },
-        "indices": [_index_data(found, index.name) for index in found.indices],
-        "warnings": warnings,
-        **({"files": [out]} if out is not None else {}),
-    }
-
-
-def _index_data(found: Map, name: str) -> dict[str, Any]:
-    from pteron.maps.map import ALL
-
-    index = ALL[name]
-    about = {"index": name, "title": index.title, "unit": index.unit, "better": index.better}
-    try:
-        summary = found.summary(name)
-    except DataError:
-        keys = ("best", "best_pose", "worst", "worst_pose", "mean", "median")
-        return {
-            **about,
-            **dict.fromkeys(keys),
-            "poses": 0,
-            "undetermined": int(found.reachable.sum()),
-        }
-    return {
-        **about,
-        "best": summary.best,
-        "best_pose": summary.best_pose.tolist(),
-        "worst": summary.worst,
-        "worst_pose": summary.worst_pose.tolist(),
-        "mean": summary.mean,
-        "median": summary.median,
-        "poses": summary.count,
-        "undetermined": summary.infinite,
-    }
-
-
-def _rows(data: Mapping[str, Any]) -> Any:
-    """Return a table of the indices, a row each."""
-    import polars as pl
-
-    coordinates = [*data["held"], *(axis["name"] for axis in data["varies"])]
-    names = [name for name in ("x", "y", "z", "phi") if name in coordinates]
-    rows = []
-    for one in data["indices"]:
-        row = {key: one[key] for key in ("index", "unit", "best", "worst", "mean", "median")}
-        for side in ("best", "worst"):
-            pose = one[f"{side}_pose"] or [None] * len(names)
-            row |= {f"{side}_{name}": value for name, value in zip(names, pose, strict=True)}
-        rows.append(row)
-    return pl.DataFrame(rows, infer_schema_length=None)
-
-
-def _show(found: Map, volume: ReachVolume | None, data: Mapping[str, Any]) -> None:
-    """Print for a person: the reach, what ends it, and each index."""
-    held = ", ".join(pose_text(name, value) for name, value in found.grid.held.items())
-    lines: list[str | rich.table.Table] = [
-        f"[bold]{plain(found.robot)}[/bold]{f' at {held}' if held else ''}"
-    ]
-    if volume is not None:
-        names = [name for name in found.grid.coordinates if name != "phi"]
-        spans = ", ".join(
-            f"{name} {low:.4g} to {high:.4g} m"
-            for name, low, high in zip(names, *volume.box.tolist(), strict=True)
-        )
-        noun = "area" if volume.unit == "m^2" else "volume"
-        angle = found.grid.held.get("phi")
-        where = "" if angle is None else f" at {pose_text('phi', angle)}"
-        lines.append(
-            f"Reach{where}: {spans}; {noun} {volume.volume:.4g} {volume.unit} "
-            f"(standard error {volume.standard_error:.1g})"
-        )
-    varying = ", ".join(
-        f"{axis.name} {axis.least:.4g} to {axis.greatest:.4g} {axis.unit}"
-        for axis in found.grid.axes
-    )
-    lines.append(f"Map: {varying}: {found.grid.size} poses, {percent(found.share)} in reach")
-    if found.causes:
-        told = sorted(found.causes.items(), key=lambda pair: -pair[1])
-        lines.append("; ".join(f"{percent(share)} {text}" for text, share in told))
-    made = table("index", "", "value", "where", numbers=("value",))
-    for one in data["indices"]:
-        unit = f" ({one['unit']})" if one["unit"] else ""
-        named = plain(f"{one['index']}{unit}")
-        if one["best"] is None:
-            made.add_row(named, "", "-", "determined at no pose in reach")
-            continue
-        if abs(one["best"] - one["worst"]) <= _ALIKE * abs(one["best"]):
-            made.add_row(named, "", f"{one['best']:.4g}", "everywhere in reach")
-        else:
-            for side in ("best", "worst"):
-                pose = " ".join(f"{value + 0.0:.4g}" for value in one[f"{side}_pose"])
-                made.add_row(named if side == "best" else "", side, f"{one[side]:.4g}", pose)
-            for side in ("mean", "median"):
-                made.add_row("", side, f"{one[side]:.4g}", "")
-        if one["undetermined"]:
-            share = one["undetermined"] / found.grid.size
-            made.add_row("", "singular", "-", f"{percent(share)} of the poses")
-    made.caption = f"Where: {' '.join(found.grid.coordinates)}, m" + (
-        " and rad" if "phi" in found.grid.coordinates else ""
-    )
-    show(*lines, made)
