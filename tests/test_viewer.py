@@ -4,9 +4,14 @@ import re
 import socket
 import subprocess
 import sys
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import replace
+from http.client import HTTPConnection
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from importlib import metadata
 from itertools import pairwise
+from threading import Thread
+from urllib.parse import urlsplit
 
 import numpy as np
 import polars as pl
@@ -22,6 +27,7 @@ from pteron.report.typeset import fixed
 from pteron.viewer import view
 from pteron.viewer.boundary import allowed
 from pteron.viewer.files import motion_of_file
+from pteron.viewer.guard import is_here
 from pteron.viewer.readings import readings
 from pteron.viewer.readout import readout
 from pteron.viewer.server import free_port
@@ -308,6 +314,65 @@ def test_hosts_and_ports_are_checked():
             free_port(host, port)
 
 
+@pytest.fixture(scope="module")
+def local():
+    with view(pteron.load("five-bar"), port=0) as found:
+        yield found
+
+
+def answer(viewer, host, origin=None, upgrade=True):
+    """The status of the answer to a request with such headers."""
+    headers = {"Host": host} if origin is None else {"Host": host, "Origin": origin}
+    if upgrade:
+        headers |= {
+            **{"Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Version": "13"},
+            "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==",
+        }
+    address = urlsplit(viewer.url)
+    connection = HTTPConnection(address.hostname, address.port, timeout=20)
+    with closing(connection):
+        connection.request("GET", "/", headers=headers)
+        return connection.getresponse().status
+
+
+@pytest.mark.parametrize("upgrade", [False, True])
+def test_names_of_other_machines_and_pages_of_other_servers_are_refused(local, upgrade):
+    port = local.port
+    good = 101 if upgrade else 200
+    for name in ("127.0.0.1", "localhost", "LOCALHOST", "[::1]", "127.0.0.9"):
+        here = f"{name}:{port}"
+        assert answer(local, here, upgrade=upgrade) == good
+        assert answer(local, here, f"http://{here}", upgrade) == good
+    # What forwards a port gives both another.
+    assert answer(local, "localhost:9000", "http://localhost:9000", upgrade) == good
+    for name in ("evil.example", "localhost.evil.example", "127.0.0.1.evil.example", "evil"):
+        host = f"{name}:{port}"
+        assert answer(local, host, upgrade=upgrade) == 403
+        assert answer(local, host, f"http://{host}", upgrade) == 403
+    for origin in ("http://evil.example", f"http://localhost:{port + 1}", "null", "file://", ""):
+        assert answer(local, f"localhost:{port}", origin, upgrade) == 403
+
+
+def test_who_serves_to_the_network_has_names_unknown_here_but_no_foreign_pages():
+    with view(pteron.load("five-bar"), port=0, host="0.0.0.0") as wide:
+        host = f"lab.example:{wide.port}"
+        assert answer(wide, host) == 101
+        assert answer(wide, host, f"http://{host}") == 101
+        assert answer(wide, host, "http://evil.example") == 403
+
+
+@pytest.mark.parametrize(
+    ("host", "here"),
+    [
+        *(("127.0.0.1", True), ("localhost", True), ("::1", True), ("127.1.2.3", True)),
+        *(("0.0.0.0", False), ("::", False), ("", False), ("::1234", False)),
+        *(("192.0.2.1", False), ("127.evil.invalid", False)),
+    ],
+)
+def test_hosts_that_only_this_machine_reaches(host, here):
+    assert is_here(host) == here
+
+
 # In a real browser.
 
 
@@ -515,6 +580,66 @@ def test_a_malformed_log_is_a_message_and_a_good_one_plays(page, viewer, tmp_pat
     # What the box shows comes back from the server, later than `uncheck` would wait.
     page.get_by_role("checkbox", name="play").click()
     said(page, "at rest")
+
+
+OPENS = """url => new Promise(done => {
+    const socket = new WebSocket(url, 'viser-v' + VERSION);
+    socket.onmessage = () => done('read');
+    socket.onerror = () => done('refused');
+})"""
+
+
+@contextmanager
+def other_server():
+    """A server of somebody else's page on this machine; its port."""
+
+    class Page(BaseHTTPRequestHandler):
+        def do_GET(self):
+            self.send_response(200)
+            self.send_header("Content-Type", "text/html")
+            self.end_headers()
+            self.wfile.write(b"<title>another page</title>")
+
+        def log_message(self, *_):
+            pass
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Page)
+    thread = Thread(target=server.serve_forever)
+    thread.start()
+    try:
+        yield server.server_address[1]
+    finally:
+        server.shutdown()
+        server.server_close()
+        thread.join()
+
+
+def test_no_other_page_opens_the_viewers_socket(browser, local):
+    opens = OPENS.replace("VERSION", repr(metadata.version("viser")))
+    with other_server() as port:
+        tab = browser.new_page()
+        for page in ("127.0.0.1", "localhost", "evil.localhost"):
+            tab.goto(f"http://{page}:{port}/")
+            for asked in ("127.0.0.1", "evil.localhost"):
+                assert tab.evaluate(opens, f"ws://{asked}:{local.port}") == "refused"
+        # A name that its owner points here: page and socket have the same origin.
+        assert tab.goto(f"http://evil.localhost:{local.port}").status == 403
+        assert tab.evaluate(opens, f"ws://evil.localhost:{local.port}") == "refused"
+        tab.goto(local.url)
+        assert tab.evaluate(opens, f"ws://127.0.0.1:{local.port}") == "read"
+        tab.close()
+
+
+def test_the_page_opens_by_the_other_names_of_this_machine_and_in_a_frame(browser, local):
+    with view(pteron.load("five-bar"), port=0, host="::1") as viewer, opened(browser, viewer.url):
+        assert viewer.url == f"http://[::1]:{viewer.port}"
+    # As a notebook shows it, whose page is another server's.
+    with other_server() as port:
+        tab = browser.new_page()
+        tab.goto(f"http://localhost:{port}/")
+        tab.set_content(f'<iframe src="http://localhost:{local.port}" width="900"></iframe>')
+        tab.frame_locator("iframe").locator("table.legs").wait_for(timeout=20_000)
+        tab.close()
 
 
 def test_a_lost_connection_and_a_server_that_starts_again(browser):

@@ -52,7 +52,7 @@ def view(
     machine = load_robot(robot, elbows)
     with spinner(f"Preparing {machine.name}"):
         from pteron.viewer import view as opened
-        from pteron.viewer.server import is_here
+        from pteron.viewer.guard import is_here
 
         viewer = opened(machine, host=host, port=port, motion=motion, payload=payload)
     # Ctrl-C is the usual way to end it.
@@ -62,7 +62,7 @@ def view(
         if not is_here(host):
             note(
                 f"Warning: --host {host}: anyone who can reach this machine over the network can "
-                "see the page and move the picture"
+                "see the page, move the picture and load files into it, without a password"
             )
         if json:
             show_json({"robot": machine.name, "url": viewer.url, "port": viewer.port})

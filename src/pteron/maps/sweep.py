@@ -70,7 +70,8 @@ def sweep(
         Where the results go, such as a `TableStore`.
     scheduler : str, optional
         The address of a Dask scheduler, such as ``tcp://host:8786``, whose workers do the work.
-        They reach the store by the same path as this process does.
+        They reach the store by the same path as this process does. It has no lock of its own: who
+        reaches it can run programs on the workers.
     workers : int, optional
         Processes of this computer that do the work; by default this process does it. A script that
         asks for them does so under ``if __name__ == "__main__":``, as Python's `multiprocessing`

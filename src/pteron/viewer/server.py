@@ -12,6 +12,7 @@ from contextlib import contextmanager, redirect_stdout
 from typing import TYPE_CHECKING, Any
 
 from pteron.errors import DataError, ModelError, shown
+from pteron.viewer.guard import guarded
 
 if TYPE_CHECKING:
     import viser
@@ -23,8 +24,6 @@ _MOST = 65535
 
 _NOT_OURS = (errno.EADDRNOTAVAIL, errno.EAFNOSUPPORT)
 
-_HERE = ("127.", "::1", "localhost")
-
 
 def serve(host: str, port: int, label: str) -> viser.ViserServer:
     """Return a running server.
@@ -34,7 +33,7 @@ def serve(host: str, port: int, label: str) -> viser.ViserServer:
     DataError
         If the host is no address of this machine, or no port from the given one on is free.
     ModelError
-        If viser is not installed.
+        If viser is not installed, or cannot be guarded.
     """
     try:
         import viser
@@ -44,8 +43,14 @@ def serve(host: str, port: int, label: str) -> viser.ViserServer:
         ) from None
     free = free_port(host, port)
     logging.getLogger("websockets.server").addFilter(_worth_telling)
-    with _quiet():
+    with _quiet(), guarded(host) as guards:
         server = viser.ViserServer(host=host, port=free, label=label, verbose=False)
+    if not guards:
+        stop(server)
+        raise ModelError(
+            f"viser {viser.__version__} gives no hold to keep foreign pages out, so the viewer is "
+            'not opened; pip install "viser==1.1.1"'
+        )
     # Any page that a browser shows could ask for a tunnel to the world; there is to be none.
     refused: Any = server
     refused.request_share_url = _no_tunnel
@@ -99,11 +104,6 @@ def _is_free(family: int, address: Any, port: int) -> bool:
                 ) from None
             return False
     return True
-
-
-def is_here(host: str) -> bool:
-    """Say whether only this machine can reach a host's address."""
-    return host.startswith(_HERE)
 
 
 def _worth_telling(record: logging.LogRecord) -> bool:

@@ -294,7 +294,8 @@ def view(
     robot : Manipulator, name or path
         The machine.
     host : str
-        The address to serve it at; by default only this machine can reach it.
+        The address to serve it at; by default only this machine can reach it, by its own names. A
+        wider one lets in all who can reach it, by any name. Other servers' pages never open it.
     port : int
         Its port, or the next one that is free; 0 is any.
     motion : Motion, Simulation, str or path, optional
