@@ -253,5 +253,5 @@ def test_a_log_too_short_for_the_trial_is_not_refused():
     result = found(robot, noisy(log))
     (how,) = result.preprocessing
     slow = replace(how, derivatives="central", cutoff=0.5)  # its edges leave nothing
-    shown = trial(result.model, result.estimate, recording(log.part(0, 1000)), slow)
+    shown = trial(result.model, result.estimate, [recording(log.part(0, 1000))], [slow])
     assert (shown.tried, shown.suspicions) == ((), ())

@@ -142,7 +142,7 @@ def identify(
 
     preprocessing, observations, estimate = fitted_by(wanted)
     if wanted.delay == "auto":
-        wanted = replace(wanted, delay=delay_of(model, estimate, fit[0], preprocessing[0]))
+        wanted = replace(wanted, delay=delay_of(model, estimate, fit, preprocessing))
         preprocessing, observations, estimate = fitted_by(wanted)
 
     # Judge by what was held out, which betrays columns that are not what they are called
@@ -165,7 +165,7 @@ def identify(
     if too_many:
         raise _with_findings(_too_little(model, hidden, estimate, preprocessing, fit[0]), whole)
     report("Looking for faults", 0, 0)
-    shown = trial(model, estimate, fit[0], preprocessing[0])
+    shown = trial(model, estimate, fit, preprocessing)
     verdict = verdict_of(held, shown, repeats=not others)
     fitted = tuple(
         predict(model, estimate.values, one.beginning(), how, _reader(report, "Predicting"))

@@ -193,7 +193,10 @@ def _of_trial(trial: Trial) -> _Opinion:
     if any(one.matters for one in trial.suspicions):
         found.grade = "usable with care"
         found.reasons.append("The stated errors of the values do not allow for that.")
-    if trial.tried and not trial.suspicions:
+    if not trial.tried:
+        found.grade = "usable with care"
+        found.reasons.append(f"The trial of faults was not run: {trial.why_not}.")
+    elif not trial.suspicions:
         found.reasons.append(f"No fault shows in the residuals; tried: {', '.join(trial.tried)}.")
     if np.isnan(trial.off).any():
         return found

@@ -28,8 +28,11 @@ _SHIFT = 1.0
 _CYCLE = 1.0
 """Standard deviations of a value, and percent of a cycle's forces, above which a fault matters."""
 
-_NEXT_TO_NOTHING = 0.05
-"""Percent of a cycle's forces below which it does not, however exact the values are."""
+_HALF = 0.6
+"""Steps of the log up to which a delay is one of sampling: a force that is held from one sample to
+the next belongs to the instant between them."""
+_SAMPLING = 3.0
+"""Percent of a cycle's forces above which such a delay matters all the same."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,8 @@ class Suspicion:
         where the machine has no room for one.
     speeds : array, shape (n,), optional
         Of Stribeck's friction: the speed of each joint with which it falls.
+    step : float
+        From one sample of the log to the next, s.
     """
 
     fault: Fault
@@ -63,13 +68,20 @@ class Suspicion:
     shift: float
     cycle: Array
     speeds: Array | None = None
+    step: float = 0.0
+
+    @property
+    def of_sampling(self) -> bool:
+        """Whether it is the half step by which forces that are held differ from positions."""
+        return self.fault == "delay" and abs(self.sizes[0]) <= _HALF * self.step
 
     @property
     def matters(self) -> bool:
         """Whether values or forces are off by more than their stated errors allow for."""
-        if (self.cycle > _CYCLE).any():
+        limit = _SAMPLING if self.of_sampling else _CYCLE
+        if (self.cycle > limit).any():
             return True
-        return self.shift > _SHIFT and not (self.cycle < _NEXT_TO_NOTHING).all()
+        return self.shift > _SHIFT and not self.of_sampling
 
     @property
     def message(self) -> str:
@@ -100,6 +112,11 @@ class Suspicion:
                 ("forces", "positions") if self.sizes[0] > 0.0 else ("positions", "forces")
             )
             size, error = 1e3 * abs(self.sizes[0]), 1e3 * self.deviations[0]
+            if self.of_sampling:
+                return (
+                    f"The {late} are half a sample ({size:.3g} ms) late for the {early}, as where "
+                    "forces are held from sample to sample"
+                )
             return f"The {late} are {size:.3g} ms (+- {error:.1g}) late for the {early}"
         if self.fault == "scale":
             size, error = 100.0 * abs(self.sizes[0]), 100.0 * self.deviations[0]

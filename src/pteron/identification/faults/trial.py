@@ -13,11 +13,11 @@ from pteron.identification.errors import LogError
 from pteron.identification.estimators import Estimate
 from pteron.identification.faults.cycle import Cycle, Extent
 from pteron.identification.faults.search import Named, searched
-from pteron.identification.faults.suspects import DELAY, Suspects, families_of
+from pteron.identification.faults.suspects import DELAY, Family, Suspects, families_of
 from pteron.identification.faults.suspicion import Suspicion
 from pteron.identification.logs import Log
 from pteron.identification.model import Model
-from pteron.identification.observation import observations_of
+from pteron.identification.observation import Observations, observations_of, stacked
 from pteron.identification.recordings import Recording
 from pteron.identification.signals import (
     Preprocessing,
@@ -44,6 +44,10 @@ _MOTION = 0.3
 _ROUNDS = 6
 """Times that a delay is taken out and looked for again, at most."""
 
+_NAMED = 0.05
+"""Percent of a cycle's forces from which a fault is named: statistics see smaller ones where a log
+has no noise, and the sampling itself makes them."""
+
 
 @dataclass(frozen=True)
 class Trial:
@@ -52,20 +56,23 @@ class Trial:
     Attributes
     ----------
     tried : tuple of str
-        The faults that were tried; none where the log has too few equations, or no noise.
+        The faults that were tried; none where the logs do not suffice for that.
     suspicions : tuple of Suspicion
-        Those that show, the clearest first.
+        Those that show, the clearest first. What changes a cycle by less than 0.05 % is none.
     uncertain : array, shape (n,)
         What the values' covariance leaves open of a pick-and-place cycle's forces, in percent of
         their standard deviation; NaN where the machine has no room for a cycle.
     spoiled : array, shape (n,)
         What all suspicions together spoil of it, likewise.
+    why_not : str
+        Why nothing was tried, where that is so.
     """
 
     tried: tuple[str, ...]
     suspicions: tuple[Suspicion, ...]
     uncertain: Array
     spoiled: Array
+    why_not: str = ""
 
     @property
     def off(self) -> Array:
@@ -77,6 +84,7 @@ class Trial:
         shares = {"uncertain": self.uncertain, "spoiled": self.spoiled, "off": self.off}
         return {
             "tried": list(self.tried),
+            "why_not": self.why_not,
             "faults": [one.as_dict() for one in self.suspicions],
             "cycle_percent": {
                 name: None if np.isnan(values).any() else values.tolist()
@@ -85,47 +93,70 @@ class Trial:
         }
 
 
+@dataclass(frozen=True)
+class _Look:
+    """A part of a recording that is looked at, how it is preprocessed, and what is tried on it."""
+
+    suspects: Suspects
+    log: Log
+    how: Preprocessing
+    states: list[States]
+
+    def late(self, delay: float) -> _Look:
+        """Return the same for forces that are late by so much more, s."""
+        later = float(np.clip(self.how.delay + delay, -LATEST, LATEST))
+        return replace(self, how=replace(self.how, delay=later))
+
+
 def trial(
-    model: Model, estimate: Estimate, recording: Recording, preprocessing: Preprocessing
+    model: Model,
+    estimate: Estimate,
+    recordings: Sequence[Recording],
+    preprocessing: Sequence[Preprocessing],
 ) -> Trial:
-    """Try a fit's residuals for faults of the log and of the machine.
+    """Try a fit's residuals for faults of the logs and of the machine.
 
     Each fault adds columns to the regressor (`families_of`). Those whose sizes the data tell from
     zero are taken in one after the other, the clearest first. What they spoil is worked out on a
-    pick-and-place cycle as fast as the log's own motion.
+    pick-and-place cycle as fast as the logs' own motion.
 
     Parameters
     ----------
     model, estimate : Model, Estimate
         The fit.
-    recording : Recording
-        What was fitted; 20 000 rows of it are looked at.
-    preprocessing : Preprocessing
-        How it was preprocessed.
+    recordings : sequence of Recording
+        What was fitted; 20 000 rows in all are looked at, with and without payload.
+    preprocessing : sequence of Preprocessing
+        How each was preprocessed.
     """
     nothing = np.full(len(model.robot.legs), np.nan)
-    log, how = _looked_at(model, recording, preprocessing)
+    try:
+        looks = _looks(model, estimate, recordings, preprocessing)
+        return _tried(looks, model, estimate)
+    except LogError as error:
+        return Trial((), (), nothing, nothing, str(error))
+
+
+def _tried(looks: list[_Look], model: Model, estimate: Estimate) -> Trial:
+    nothing = np.full(len(model.robot.legs), np.nan)
+    suspects = looks[0].suspects
+    tried = tuple(dict.fromkeys(family.name for family in suspects.families))
+    largest = max(float(np.abs(look.log.forces).max()) for look in looks)
 
     # Which faults the residuals show
-    try:
-        states = [block.states for block in samples(model.robot, log, how)]
-        suspects = _suspects(model, estimate, log, how, states)
-        if np.abs(estimate.residuals).max() < _EXACT * np.abs(log.forces).max():
-            suspects = replace(suspects, families=())
-        plain, named = searched(suspects, observations_of(suspects, log, how))
-    except LogError:  # what is looked at is too little by itself
-        return Trial((), (), nothing, nothing)
+    if np.abs(estimate.residuals).max() < _EXACT * largest:
+        looks = [_with(look, ()) for look in looks]
+    plain, named = searched(looks[0].suspects, _observed(looks))
     if any(one.family is DELAY for one in named):
         # A long delay is no small one: the rest is told once forces are where they belong.
-        late, shifted = _delay(suspects, log, how)
-        rest = replace(suspects, families=suspects.families[1:])
-        fit, named = searched(rest, observations_of(rest, log, shifted))
+        late, shifted = _delay(looks)
+        fit, named = _searched_beside(shifted, DELAY)
         if late is not None:
             named.insert(0, replace(late, fit=fit))
 
     # What they spoil
     p = len(model.names)
-    cycle = Cycle.within(model.robot, Extent.of(states))
+    cycle = Cycle.within(model.robot, Extent.of([s for look in looks for s in look.states]))
     uncertain, spoiled, each = nothing, nothing, [nothing for _ in named]
     if cycle is not None:
         later = np.full(len(cycle.states), 0.5)
@@ -149,6 +180,7 @@ def trial(
         float(np.abs((b.values[:p] - a.values[:p]) / b.deviations[:p]).max())
         for a, b in pairwise(fits)
     ]
+    step = 1.0 / max(look.how.rate for look in looks)
     suspicions = tuple(
         Suspicion(
             one.family.name,
@@ -159,71 +191,116 @@ def trial(
             shift,
             spoils,
             None if one.family.speed is None else one.family.speed * suspects.usual,
+            step,
         )
         for one, shift, spoils in zip(named, shifts, each, strict=True)
+        if not (spoils < _NAMED).all()
     )
-    tried = tuple(dict.fromkeys(family.name for family in suspects.families))
     return Trial(tried, suspicions, uncertain, spoiled)
 
 
 def delay_of(
-    model: Model, estimate: Estimate, recording: Recording, preprocessing: Preprocessing
+    model: Model,
+    estimate: Estimate,
+    recordings: Sequence[Recording],
+    preprocessing: Sequence[Preprocessing],
 ) -> float:
-    """Return the delay of a recording's forces that suits a fit best, s, beside that assumed."""
-    log, how = _looked_at(model, recording, preprocessing)
-    states = [block.states for block in samples(model.robot, log, how)]
-    _, shifted = _delay(_suspects(model, estimate, log, how, states), log, how)
-    return shifted.delay - how.delay
+    """Return the delay of recordings' forces that suits a fit best, s, beside that assumed."""
+    looks = _looks(model, estimate, recordings, preprocessing)
+    _, shifted = _delay(looks)
+    return shifted[0].how.delay - looks[0].how.delay
 
 
-def _looked_at(
-    model: Model, recording: Recording, preprocessing: Preprocessing
-) -> tuple[Log, Preprocessing]:
-    """Return the part of a recording that is tried, and how it is preprocessed."""
-    log = recording.head()
-    if log.rows > _LOOK:
-        steps = (np.diff(log.joints, axis=0) ** 2).sum(axis=1)
-        way = np.concatenate([[0.0], np.cumsum(steps)])
-        starts = np.arange(0, log.rows - _LOOK, _LOOK // 2)
-        start = int(starts[np.argmax(way[starts + _LOOK - 1] - way[starts])])
-        log = log.part(start, start + _LOOK)
-    if preprocessing.derivatives != "periodic":
-        return log, preprocessing
-    # One period that stands for all would not tell what comes and goes.
+def _looks(
+    model: Model,
+    estimate: Estimate,
+    recordings: Sequence[Recording],
+    preprocessing: Sequence[Preprocessing],
+) -> list[_Look]:
+    """Return the parts of recordings that are tried."""
+    rows = _LOOK // len(recordings)
+    parts = [
+        (log, _unaveraged(model, log, how), part)
+        for one, how in zip(recordings, preprocessing, strict=True)
+        for log in [one.head()]
+        for part in _moving_most(log, rows)
+    ]
+    states = [[b.states for b in samples(model.robot, part, how)] for _, how, part in parts]
+    rates = np.concatenate([s.joint_rates for blocks in states for s in blocks])
+    usual = np.sqrt((rates**2).mean(axis=0))
+    families = families_of(model.robot)
+    found = []
+    for (log, how, part), blocks in zip(parts, states, strict=True):
+        fastest = max(how.cutoff or 0.0, how.band)
+        suspects = Suspects(
+            model,
+            estimate.values,
+            usual,
+            float(log.time[0]),
+            float(log.time[-1]),
+            families,
+            max(int(how.rate / (_POINTS * fastest)), 1),
+            _MOTION * how.band,
+        )
+        found.append(_Look(suspects, part, how, blocks))
+    return found
+
+
+def _moving_most(log: Log, rows: int) -> list[Log]:
+    """Return as many rows of a log, without and with payload, in which the joints move most."""
+    if log.rows <= rows:
+        return [log]
+    steps = (np.diff(log.joints, axis=0) ** 2).sum(axis=1)
+    way = np.concatenate([[0.0], np.cumsum(steps)])
+    phase = np.zeros(log.rows) if log.payload is None else log.payload
+    edges = [0, *(np.flatnonzero(np.diff(phase)) + 1).tolist(), log.rows]
+    phases = sorted(pairwise(edges), key=lambda part: part[0] - part[1])
+    longest = {phase[start]: (start, stop) for start, stop in reversed(phases)}
+    size = rows // len(longest)
+    found = []
+    for start, stop in longest.values():
+        starts = np.arange(start, max(stop - size, start) + 1, max(size // 2, 1))
+        ends = np.minimum(starts + size, stop)
+        best = int(np.argmax(way[ends - 1] - way[starts]))
+        found.append(log.part(int(starts[best]), int(ends[best])))
+    return found
+
+
+def _unaveraged(model: Model, log: Log, how: Preprocessing) -> Preprocessing:
+    """Return how a log is looked at: one period for all would not tell what comes and goes."""
+    if how.derivatives != "periodic":
+        return how
     wanted = Processing(derivatives="central")
-    again = preprocessing_of(model.robot, log, wanted, start=preprocessing.start)
-    return log, replace(again, slow=preprocessing.slow, delay=preprocessing.delay)
+    again = preprocessing_of(model.robot, log, wanted, start=how.start)
+    return replace(again, slow=how.slow, delay=how.delay)
 
 
-def _suspects(
-    model: Model, estimate: Estimate, log: Log, how: Preprocessing, states: Sequence[States]
-) -> Suspects:
-    rates = np.concatenate([one.joint_rates for one in states])
-    fastest = max(how.cutoff or 0.0, how.band)
-    return Suspects(
-        model,
-        estimate.values,
-        np.sqrt((rates**2).mean(axis=0)),
-        float(log.time[0]),
-        float(log.time[-1]),
-        families_of(model.robot),
-        max(int(how.rate / (_POINTS * fastest)), 1),
-        _MOTION * how.band,
-    )
+def _observed(looks: Sequence[_Look]) -> Observations:
+    return stacked([observations_of(look.suspects, look.log, look.how) for look in looks])
 
 
-def _delay(suspects: Suspects, log: Log, how: Preprocessing) -> tuple[Named | None, Preprocessing]:
-    """Return the whole delay of a log's forces, and the preprocessing that takes it out."""
-    only = replace(suspects, families=(DELAY,))
-    late, shifted = None, how
+def _with(look: _Look, families: tuple[Family, ...]) -> _Look:
+    return replace(look, suspects=replace(look.suspects, families=families))
+
+
+def _searched_beside(looks: Sequence[_Look], known: Family) -> tuple[Estimate, list[Named]]:
+    """Return the fit, and the faults that show, but for one that is taken out."""
+    rest = tuple(one for one in looks[0].suspects.families if one is not known)
+    without = [_with(look, rest) for look in looks]
+    return searched(without[0].suspects, _observed(without))
+
+
+def _delay(looks: Sequence[_Look]) -> tuple[Named | None, list[_Look]]:
+    """Return the whole delay of logs' forces, and the parts with it taken out."""
+    late, shifted = None, list(looks)
     for _ in range(_ROUNDS):
-        _, left = searched(only, observations_of(only, log, shifted))
+        only = [_with(look, (DELAY,)) for look in shifted]
+        _, left = searched(only[0].suspects, _observed(only))
         if not left:
             break
         first, late = late or left[0], left[0]
-        later = float(np.clip(shifted.delay + late.sizes[0], -LATEST, LATEST))
-        shifted = replace(shifted, delay=later)
+        shifted = [look.late(float(late.sizes[0])) for look in shifted]
     if late is not None:
-        whole = np.array([shifted.delay - how.delay])
+        whole = np.array([shifted[0].how.delay - looks[0].how.delay])
         late = replace(late, sizes=whole, chance=first.chance)
     return late, shifted
