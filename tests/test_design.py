@@ -14,10 +14,13 @@ from pteron.design import (
     Spec,
     Summary,
     Task,
+    cube_proofs,
+    proved,
     proved_cube,
     read_spec,
     search,
     survey,
+    workspace_proofs,
 )
 from pteron.design.masses import stretched
 from pteron.design.paths import places
@@ -25,7 +28,7 @@ from pteron.design.variables import geometry_slopes
 from pteron.equations.machine import numbers
 from pteron.errors import DataError, ModelError, OutputError
 from pteron.indices import evaluate
-from pteron.workspace import conditions, largest_cube
+from pteron.workspace import Box, conditions, largest_cube, prove
 from pteron.workspace.conditions import kept
 
 LENGTHS = [
@@ -153,6 +156,49 @@ def test_a_tube_between_the_points_is_no_part_of_the_cube():
     poses = cube.center + cube.edge * rng.uniform(-0.5, 0.5, (20_000, 3))
     floors = conditions(design.robot, type_i=0.05, type_ii=0.01)
     assert kept(design.robot, floors, poses).all()
+
+
+def test_a_tube_is_seen_beside_many_points_on_a_limit(task):
+    """Where legs 1, 3 and 4 are at their floor along whole edges of the cube, and leg 2 has a tube:
+    more of the lattice's points are lower than those next to it.
+    """
+    legs = [0.1421513466196257, 0.14091138740676068, 0.20621511249695, 0.14091138740676074]
+    legs += [0.2709107028147659, 0.14134247537318864, 0.20621511249720534, 0.1413424753731848]
+    design = Design(task, task.machine([*legs, 0.15859749082937893]))
+    assert proved_cube(design).edge > 0.99 * design.cube.edge
+
+
+@pytest.mark.parametrize("difference", [1e-3, 1e-4])
+def test_what_the_points_miss_goes_back_to_the_search(difference):
+    """Tubes, as wide as the links differ, through which no point and no step of a search goes."""
+    asked = {"floors": {"type_i": 0.0, "type_ii": 0.0}, "requirements": []}
+    task = Task.of(spec_of(robot="tripteron", variables=LENGTHS[:2], **asked))
+    design = Design(task, task.machine([0.25] * 3 + [0.25 + difference] * 3))
+    (first,) = cube_proofs(design, design.cube.center, 0.9999 * design.cube.edge)
+    assert first.counterexample is not None
+    assert proved(design).design.quantity("cube") == proved_cube(design).edge
+    assert 0.9 * design.cube.edge < proved_cube(design).edge < 0.9999 * design.cube.edge
+
+
+def test_every_design_of_a_front_is_proved(found):
+    front, _ = found
+    for k, edge in enumerate(front.table["cube"]):
+        told = proved(Design(front.task, front.robot(k)))
+        assert told.cube.edge == edge == told.design.cube.edge
+        ends = (told.cube.center + side * edge for side in (-0.5, 0.5))
+        box = Box(*((*end.tolist(), 0.0) for end in ends))
+        assert prove(front.robot(k), box, type_i=0.05, type_ii=0.01).holds
+
+
+def test_a_workspace_that_fails_between_its_points_is_missed():
+    """The line onto which equal links of a Tripteron's first leg cannot fold, within a box."""
+    box = {"low": (-0.03, 0.2, -0.03), "high": (0.04, 0.26, 0.04), "samples": 2}
+    task = Task.of(workspace_spec(robot="tripteron", workspace=box, angles=None))
+    missed = [task.evaluated([0.25, 0.25], proofs=p)["misses workspace"] for p in (False, True)]
+    assert missed[0] == 0.0 < missed[1]
+    front = search(task.spec)
+    for k in range(len(front)):
+        assert all(one.holds for one in workspace_proofs(Design(task, front.robot(k))))
 
 
 def test_a_search_finds_a_larger_proved_cube_with_links_no_longer(found):

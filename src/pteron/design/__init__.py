@@ -3,7 +3,7 @@
 from pteron.design.changes import Change
 from pteron.design.design import Design
 from pteron.design.front import Front
-from pteron.design.proofs import ProvedCube, proved_cube, workspace_proofs
+from pteron.design.proofs import Proved, ProvedCube, cube_proofs, proved, proved_cube, workspace_proofs
 from pteron.design.quantities import Quantity, quantities
 from pteron.design.report import Summary, Told
 from pteron.design.search import search
@@ -16,6 +16,7 @@ __all__ = [
     "Change",
     "Design",
     "Front",
+    "Proved",
     "ProvedCube",
     "Quantity",
     "Spec",
@@ -23,6 +24,8 @@ __all__ = [
     "Task",
     "Told",
     "Variable",
+    "cube_proofs",
+    "proved",
     "proved_cube",
     "quantities",
     "read_spec",

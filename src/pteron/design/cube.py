@@ -45,7 +45,11 @@ class Cube:
 
 
 def largest(
-    conditions: Conditions, geometry: Array, orientations: Array, ball: tuple[Array, float]
+    conditions: Conditions,
+    geometry: Array,
+    orientations: Array,
+    ball: tuple[Array, float],
+    failing: Array,
 ) -> Cube:
     """Return the largest cube whose poses all keep the conditions, at every orientation.
 
@@ -63,8 +67,12 @@ def largest(
         Poses whose angles count.
     ball : (array, float)
         Centre (k,) and radius that hold every position in reach, m.
+    failing : array, shape (F, m)
+        Poses that are known to fail, which it must not hold: counterexamples of its proof.
     """
-    found = [_from_grid(conditions, geometry, orientations, ball, side) for side in (1.0, -1.0)]
+    found = [
+        _from_grid(conditions, geometry, orientations, ball, side, failing) for side in (1.0, -1.0)
+    ]
     best = max(found, key=lambda cube: (cube.edge, cube.reserve))
     if best.edge == 0.0:
         return best
@@ -78,6 +86,7 @@ def largest(
         np.append(np.zeros(lengths), -1.0),
         [(float(c) - size, float(c) + size) for c in best.center] + [(0.0, 2.0 * size)],
         orientations,
+        failing=failing,
     )
     samples, dense = (cube_samples(orientations, lengths, n) for n in (_FIRST, LATTICE))
     z = improved(program, samples, dense, _shrunk(program, dense, best))
@@ -110,6 +119,7 @@ def _from_grid(
     orientations: Array,
     ball: tuple[Array, float],
     side: float,
+    failing: Array,
 ) -> Cube:
     """Return about the largest cube, by its middle: the grid's point furthest from what fails."""
     low, high = ball[0] - ball[1], ball[0] + ball[1]
@@ -130,9 +140,12 @@ def _from_grid(
             # A row that is NaN fails, though not as clearly as one that says by how much.
             rows = np.where(np.isnan(rows), _UNKNOWN, rows)
             least = np.minimum(least, rows.min(axis=-1))
-            for place in holes(conditions, geometry, side, orientation, axes, rows):
-                nearby = tuple(np.rint((place - low) / step).astype(int))
-                least[nearby] = min(least[nearby], _UNKNOWN)
+            between = holes(conditions, geometry, side, orientation, axes, rows)
+            known = failing[(failing[:, lengths:] == orientation[lengths:]).all(axis=1), :lengths]
+            for place in (*between, *known):
+                nearby = np.rint((place - low) / step).astype(int)
+                if ((nearby >= 0) & (nearby < least.shape)).all():
+                    least[tuple(nearby)] = min(least[tuple(nearby)], _UNKNOWN)
         inside = least >= 0.0
         at = np.unravel_index(int(least.argmax()), least.shape)
         if not inside.any():

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 _IN_CUBE = 5
 """Poses along each edge of the cube, where that is the workspace."""
 
-_UNKNOWN = -1e-6
-"""What stands for a row that is NaN."""
+UNKNOWN = -1e-6
+"""What stands for a row that is NaN, or of which no proof says whether it is kept."""
 
 
 class DriveMotion(NamedTuple):
@@ -38,10 +38,24 @@ class DriveMotion(NamedTuple):
 
 @dataclass(frozen=True)
 class Design:
-    """A machine of a search, and its quantities, each worked out when it is asked for."""
+    """A machine of a search, and its quantities, each worked out when it is asked for.
+
+    Attributes
+    ----------
+    task : Task
+        The search.
+    robot : Manipulator
+        The machine.
+    known : Cube, optional
+        Its largest cube, where that is proved.
+    least : float
+        The least row of the conditions over the required workspace that a proof has shown.
+    """
 
     task: Task
     robot: Manipulator
+    known: Cube | None = None
+    least: float = np.inf
 
     @cached_property
     def geometry(self) -> Array:
@@ -58,9 +72,16 @@ class Design:
 
     @cached_property
     def cube(self) -> Cube:
-        """The largest cube, not yet proved."""
+        """The largest cube: found, and proved where it is known."""
+        if self.known is not None:
+            return self.known
+        return self.cube_without(np.empty((0, self.robot.freedom)))
+
+    def cube_without(self, failing: Array) -> Cube:
+        """Return the largest cube that holds none of the poses (F, m), which are known to fail."""
         ball = search_ball(self.robot)
-        return largest(self.task.conditions, self.geometry, self.task.orientations, ball)
+        task = self.task
+        return largest(task.conditions, self.geometry, task.orientations, ball, failing)
 
     @cached_property
     def poses(self) -> Array:
@@ -127,7 +148,7 @@ class Design:
             rows = self.task.conditions.rows(self.geometry, self.poses, side)
             least = float(np.nanmin(rows))
             # A row that is NaN fails, though not as clearly as one that says by how much.
-            found[side] = min(least, _UNKNOWN) if np.isnan(rows).any() else least
+            found[side] = min(least, UNKNOWN) if np.isnan(rows).any() else least
         return found
 
     @property
@@ -142,7 +163,7 @@ class Design:
         """The least row of the conditions over the workspace; below 0 where one fails."""
         if self.task.spec.workspace is None:
             return self.cube.reserve
-        return max(self._sides.values())
+        return min(max(self._sides.values()), self.least)
 
     def quantity(self, name: str) -> float:
         """Return one of its quantities; NaN where it has none."""

@@ -115,6 +115,8 @@ class Program:
         Of the cube; none where none is sought.
     above : tuple of (array, float)
         Each: a row (V + k + 1,) whose product with the unknowns is at least a number.
+    failing : array, shape (F, m), optional
+        Poses at which some geometry is known to fail.
     """
 
     conditions: Conditions
@@ -125,6 +127,7 @@ class Program:
     bounds: list[tuple[float, float]]
     orientations: Array
     above: tuple[tuple[Array, float], ...] = ()
+    failing: Array | None = None
 
     def geometry_at(self, z: Array, z0: Array) -> Array:
         """Return the geometry (G,) at unknowns z; its start belongs to z0."""
@@ -136,7 +139,10 @@ class Program:
         return self.conditions.rows(self.geometry_at(z, z0), poses, self.side)
 
     def between(self, z: Array, z0: Array) -> Samples:
-        """Return points of the cube that fail between those of a lattice that do not."""
+        """Return points of the cube that fail between those of a lattice that do not.
+
+        Known ones are among them, where the cube holds them and they still fail.
+        """
         center, half = z[self.slopes.shape[1] : -1], 0.5 * z[-1]
         lengths = len(center)
         line, geometry = np.linspace(-1.0, 1.0, LATTICE), self.geometry_at(z, z0)
@@ -148,12 +154,28 @@ class Program:
             samples = cube_samples(orientation[None], lengths, LATTICE)
             rows = self.conditions.rows(geometry, samples.at(center, z[-1]), self.side)
             lattice = rows.reshape(*(LATTICE,) * lengths, -1)
-            places = holes(self.conditions, geometry, self.side, orientation, axes, lattice)
+            places = np.concatenate(
+                [
+                    holes(self.conditions, geometry, self.side, orientation, axes, lattice),
+                    self._known(geometry, orientation, center, half),
+                ]
+            )
             poses = np.tile(orientation, (len(places), 1))
             poses[:, :lengths] = 0.0
             units = (places - center) / half
             found = found.joined(Samples(poses, units, np.ones(len(places))))
         return found
+
+    def _known(self, geometry: Array, orientation: Array, center: Array, half: float) -> Array:
+        """Return positions (F, k) of poses known to fail that a cube holds and that do fail."""
+        lengths = len(center)
+        if self.failing is None:
+            return np.empty((0, lengths))
+        inside = (np.abs(self.failing[:, :lengths] - center) <= half).all(axis=1)
+        inside &= (self.failing[:, lengths:] == orientation[lengths:]).all(axis=1)
+        poses = self.failing[inside]
+        rows = self.conditions.rows(geometry, poses, self.side)
+        return np.asarray(poses[~(rows > _KEPT).all(axis=-1), :lengths])
 
 
 def improved(program: Program, samples: Samples, dense: Samples, z0: Array) -> Array:

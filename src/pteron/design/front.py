@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -100,15 +100,52 @@ class Front:
         return found
 
 
-def front_of(task: Task, designs: pl.DataFrame) -> Front:
-    """Return the front of designs that were evaluated.
+class Proofs:
+    """The rows of designs that were proved, in place of those that a look at points gave.
 
-    Raises
-    ------
-    ModelError
-        If none of them keeps all that is asked; the message says what is missed by least, and how.
+    Parameters
+    ----------
+    task : Task
+        What was asked.
+    prove : callable
+        Values of designs (N, V) to their rows, each as far as it is proved.
     """
-    return front_of_parts(task, [designs])
+
+    def __init__(self, task: Task, prove: Callable[[list[list[float]]], pl.DataFrame]) -> None:
+        self._task, self._prove = task, prove
+        self._rows: dict[bytes, tuple[Any, ...]] = {}
+
+    def applied(self, designs: pl.DataFrame) -> pl.DataFrame:
+        """Return a table of designs, with the rows of those that were proved."""
+        keys = self._keys(designs)
+        if self._rows.keys().isdisjoint(keys):
+            return designs
+        rows = [self._rows.get(k, row) for k, row in zip(keys, designs.rows(), strict=True)]
+        return type(designs)(rows, schema=designs.schema, orient="row")
+
+    def front(self, parts: Callable[[], Iterable[pl.DataFrame]]) -> Front:
+        """Return the front of designs that come in parts, each design of it proved.
+
+        Where a proof takes something from one, the front is another, and that is proved.
+
+        Raises
+        ------
+        ModelError
+            As `front_of_parts`.
+        """
+        while True:
+            front = front_of_parts(self._task, map(self.applied, parts()))
+            values = front.values.tolist()
+            keys = self._keys(front.table)
+            unproved = [v for v, key in zip(values, keys, strict=True) if key not in self._rows]
+            if not unproved:
+                return front
+            found = self._prove(unproved)
+            self._rows |= zip(self._keys(found), found.rows(), strict=True)
+
+    def _keys(self, designs: pl.DataFrame) -> list[bytes]:
+        values = designs.select([v.name for v in self._task.variables]).to_numpy()
+        return [np.ascontiguousarray(row).tobytes() for row in values]
 
 
 def front_of_parts(task: Task, parts: Iterable[pl.DataFrame]) -> Front:
@@ -117,7 +154,7 @@ def front_of_parts(task: Task, parts: Iterable[pl.DataFrame]) -> Front:
     Raises
     ------
     ModelError
-        As `front_of`.
+        If none of them keeps all that is asked; the message says what is missed by least, and how.
     """
     import polars as pl
 

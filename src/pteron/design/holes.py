@@ -25,7 +25,8 @@ _DEPTH = 1e-5
 """A row that fails by less is left to the proof."""
 
 _MOST = 60
-"""Points that are looked at, the lowest first."""
+"""Points that are looked at of each row, the lowest first: along a limit that the lattice ends at,
+many are lower than those next to a tube, in an order that is rounding's."""
 
 
 def holes(
@@ -58,8 +59,9 @@ def holes(
     found = np.argwhere(lowest & near & (kept >= -_DEPTH))
     if not len(found):
         return np.empty((0, count))
-    order = np.argsort(kept[tuple(found.T)], kind="stable")[:_MOST]
-    at, row = found[order, :count], found[order, count]
+    found = found[np.argsort(kept[tuple(found.T)], kind="stable")]
+    found = np.concatenate([found[found[:, count] == r][:_MOST] for r in range(rows.shape[-1])])
+    at, row = found[:, :count], found[:, count]
     low, high = np.array([(a[0], a[-1]) for a in axes]).T
     cell = np.array([a[1] - a[0] for a in axes])
     start = np.stack([a[i] for a, i in zip(axes, at.T, strict=True)], axis=-1)

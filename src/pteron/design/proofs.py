@@ -1,21 +1,30 @@
-"""What is proved of a design: that all of a cube, or of the required workspace, can be used.
+"""Proofs of designs: that all of a cube, or of the required workspace, can be used.
 
 A search looks at points; here interval arithmetic takes in all that lies between them
-(`pteron.workspace.prove`), under the floors that the search asks for.
+(`pteron.workspace.prove`), under the floors that the search asks for. A counterexample goes back
+to the search for the cube, as a pose that it must not hold, until what it finds is proved.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pteron.design.design import Design
+from pteron.design.cube import Cube
+from pteron.design.design import UNKNOWN, Design
+from pteron.design.exchange import Samples, fixed_samples
 from pteron.kernels import Array
-from pteron.workspace import Box, Cylinder, Proof, prove
+from pteron.workspace import Box, Cylinder, Proof, Region, prove
 
-_SHARES = (0.9999, 0.999, 0.995, 0.98, 0.95, 0.9)
+_SHARES = (0.9999, 0.999, 0.995, 0.98, 0.95, 0.9, 0.75, 0.5, 0.25, 0.1)
 """Of the edge that was found: at the whole of it a condition is zero somewhere, and undecided."""
+
+_RIM = 0.98
+"""A counterexample further out, over the cube's half edge, is avoided by a smaller share."""
+
+_EXCHANGES = 20
+"""Counterexamples that go back to the search; what is found then is made smaller instead."""
 
 _MOST = 200_000
 """Boxes after which a proof is given up."""
@@ -32,15 +41,19 @@ class ProvedCube:
     edge : float
         m.
     found : float
-        The edge that the search found, m: a little more than what is proved.
+        The edge that the search found before its proof, m: a little more than what is proved, or
+        much more where its points missed a hole.
     proofs : tuple of Proof
         One for each orientation.
+    side : float
+        Sign of the type-II measure in it.
     """
 
     center: Array
     edge: float
     found: float
     proofs: tuple[Proof, ...]
+    side: float
 
     @property
     def words(self) -> str:
@@ -53,53 +66,132 @@ class ProvedCube:
         )
 
 
+@dataclass(frozen=True)
+class Proved:
+    """A design as far as it is proved.
+
+    Attributes
+    ----------
+    design : Design
+        Its cube is the proved one, and where the workspace is not proved it misses it.
+    cube : ProvedCube or None
+        The largest cube, where the search seeks one and there is one.
+    workspace : tuple of Proof
+        Of the required workspace, one for each orientation; none where none is required.
+    """
+
+    design: Design
+    cube: ProvedCube | None
+    workspace: tuple[Proof, ...]
+
+
+def proved(design: Design) -> Proved:
+    """Return a design with its proofs, and with the cube that they leave it."""
+    cube = proved_cube(design) if design.task.seeks_cube and design.cube.edge > 0.0 else None
+    workspace = workspace_proofs(design)
+    known = design.cube if design.task.seeks_cube else None
+    if cube is not None:
+        known = Cube(cube.center, cube.edge, cube.side, 0.0)
+    elif known is not None and known.edge > 0.0:
+        known = Cube(known.center, 0.0, known.side, UNKNOWN)
+    least = min((_least(design, one) for one in workspace if not one.holds), default=np.inf)
+    return Proved(replace(design, known=known, least=least), cube, workspace)
+
+
 def proved_cube(design: Design) -> ProvedCube | None:
-    """Return the largest cube of a design, so far as it is proved; None where none is."""
-    cube = design.cube
-    for share in _SHARES:
-        half = 0.5 * share * cube.edge
-        regions = [
-            Box(*(_whole(pose, cube.center + side * half) for side in (-1.0, 1.0)))
-            for pose in design.task.orientations
-        ]
-        proofs = _proved(design, regions)
-        if proofs is not None:
-            return ProvedCube(cube.center, 2.0 * half, cube.edge, proofs)
+    """Return the largest cube of a design that is found and proved; None where none is."""
+    cube, failing = design.cube, np.empty((0, design.robot.freedom))
+    while cube.edge > 0.0:
+        counterexample = None
+        for share in _SHARES:
+            edge = share * cube.edge
+            proofs = cube_proofs(design, cube.center, edge)
+            if all(proof.holds for proof in proofs):
+                return ProvedCube(cube.center, edge, design.cube.edge, proofs, cube.side)
+            counterexample = proofs[-1].counterexample
+            if counterexample is not None and len(failing) < _EXCHANGES:
+                away = np.abs(counterexample[: len(cube.center)] - cube.center).max()
+                if away < 0.5 * _RIM * cube.edge:
+                    break
+        else:
+            return None
+        failing = np.vstack([failing, counterexample])
+        cube = design.cube_without(failing)
     return None
 
 
-def workspace_proofs(design: Design) -> tuple[Proof, ...]:
-    """Return what is proved of the required workspace, a proof for each orientation."""
-    asked = design.task.spec.workspace
-    if asked is None:
-        return ()
-    regions: list[Box | Cylinder] = []
+def cube_proofs(design: Design, center: Array, edge: float) -> tuple[Proof, ...]:
+    """Return the proofs of a cube, one for each orientation up to the first that does not hold."""
+    found = []
     for pose in design.task.orientations:
-        if asked.shape == "cylinder":
-            assert asked.radius is not None  # the shape says so
-            assert asked.height is not None
-            x, y, z = np.eye(3)["xyz".index(asked.axis)].tolist()
-            center = _whole(pose, np.array(asked.center))
-            regions.append(Cylinder(center, asked.radius, asked.height, (x, y, z)))
-        else:
-            regions.append(Box(*(_whole(pose, np.array(end)) for end in asked.ends)))
-    floors = design.task.spec.floors
-    return tuple(
-        prove(design.robot, one, type_i=floors.type_i, type_ii=floors.type_ii, most=_MOST)
-        for one in regions
-    )
-
-
-def _proved(design: Design, regions: list[Box]) -> tuple[Proof, ...] | None:
-    floors, found = design.task.spec.floors, []
-    for region in regions:
-        proof = prove(
-            design.robot, region, type_i=floors.type_i, type_ii=floors.type_ii, most=_MOST
-        )
-        if not proof.holds:
-            return None
-        found.append(proof)
+        ends = (_whole(pose, center + side * edge) for side in (-0.5, 0.5))
+        found.append(_proof(design, Box(*ends)))
+        if not found[-1].holds:
+            break
     return tuple(found)
+
+
+def workspace_proofs(design: Design) -> tuple[Proof, ...]:
+    """Return what is proved of the required workspace, a proof for each orientation.
+
+    Where it touches the boundary it is undecided; the proof is then of 0.9999 of it, about its
+    middle, if that can be proved: its region tells, and `workspace_share`.
+    """
+    found = []
+    for pose in design.task.orientations if design.task.spec.workspace is not None else ():
+        whole = _proof(design, workspace_region(design, pose))
+        smaller = None if whole.holds is not None else workspace_region(design, pose, _SHARES[0])
+        nearly = whole if smaller is None else _proof(design, smaller)
+        found.append(nearly if nearly.holds else whole)
+    return tuple(found)
+
+
+def workspace_region(design: Design, pose: Array, share: float = 1.0) -> Region:
+    """Return the required workspace at the orientation of a pose, or so much of it."""
+    asked = design.task.spec.workspace
+    assert asked is not None  # who asks has one
+    if asked.shape == "cylinder":
+        assert asked.radius is not None  # the shape says so
+        assert asked.height is not None
+        x, y, z = np.eye(3)["xyz".index(asked.axis)].tolist()
+        center = _whole(pose, np.array(asked.center))
+        return Cylinder(center, share * asked.radius, share * asked.height, (x, y, z))
+    low, high = (np.array(end) for end in asked.ends)
+    inset = 0.5 * (1.0 - share) * (high - low)
+    return Box(_whole(pose, low + inset), _whole(pose, high - inset))
+
+
+def counterexamples(design: Design, center: Array, edge: float) -> Samples:
+    """Return points of a cube, and of the required workspace, that proofs have shown to fail."""
+    cube = cube_proofs(design, center, _SHARES[0] * edge) if edge > 0.0 else ()
+    inside, fixed = (
+        np.array([p.counterexample for p in part if p.counterexample is not None])
+        for part in (cube, workspace_proofs(design))
+    )
+    size, lengths = design.robot.freedom, len(center)
+    inside, fixed = inside.reshape(-1, size), fixed.reshape(-1, size)
+    units = (inside[:, :lengths] - center) / (0.5 * edge or 1.0)
+    inside[:, :lengths] = 0.0
+    return Samples(inside, units, np.ones(len(inside))).joined(fixed_samples(fixed, lengths))
+
+
+def workspace_share(design: Design, proof: Proof) -> float:
+    """Return which share of the required workspace a proof is of."""
+    whole = (workspace_region(design, pose) for pose in design.task.orientations)
+    return 1.0 if proof.region in whole else _SHARES[0]
+
+
+def _proof(design: Design, region: Region) -> Proof:
+    floors = design.task.spec.floors
+    return prove(design.robot, region, type_i=floors.type_i, type_ii=floors.type_ii, most=_MOST)
+
+
+def _least(design: Design, proof: Proof) -> float:
+    """Return the least row, below 0, of a region whose proof does not hold."""
+    if proof.counterexample is None:
+        return UNKNOWN
+    rows = design.task.conditions.rows(design.geometry, proof.counterexample, design.side)
+    return min(UNKNOWN, float(np.nan_to_num(rows, nan=UNKNOWN).min()))
 
 
 def _whole(pose: Array, position: Array) -> tuple[float, ...]:

@@ -9,12 +9,16 @@ import numpy as np
 
 from pteron.design.design import Design
 from pteron.design.exchange import LATTICE, Program, Samples, cube_samples, fixed_samples, improved
+from pteron.design.proofs import counterexamples, proved
 from pteron.design.quantities import quantities
 from pteron.design.task import ROUNDING, Task
 from pteron.design.variables import geometry_slopes, slopes_of
 from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kinematics.sampling import search_ball
+
+_EXCHANGES = 8
+"""How often counterexamples of the proof of what was found join its conditions."""
 
 _FIRST = 5
 """Points along a cube's edge at which its conditions are asked at first."""
@@ -25,7 +29,8 @@ def refined(task: Task, values: Sequence[float], objective: int) -> list[float]:
 
     Its unknowns are the variables together with the cube's centre and edge. Quantities of the
     machine alone are held to first order, those of its poses are not: whoever asks evaluates the
-    design again.
+    design again. Where a proof of the workspace or the cube fails, it is sought once more, with the
+    counterexample among its conditions.
 
     Parameters
     ----------
@@ -39,7 +44,7 @@ def refined(task: Task, values: Sequence[float], objective: int) -> list[float]:
     spec, start = task.spec, np.array(values)
     asked = spec.objectives[objective]
     try:
-        design = Design(task, task.machine(values))
+        design = proved(Design(task, task.machine(values))).design
         slopes = _Slopes(task, design, start)
         wanted = slopes.of(asked.quantity)
         if wanted is None or not wanted.any() or design.reserve < -ROUNDING:
@@ -65,7 +70,13 @@ def refined(task: Task, values: Sequence[float], objective: int) -> list[float]:
         tuple(slopes.bounds(objective, z0)),
     )
     first, dense = (_asked_at(design, lengths, count) for count in (_FIRST, LATTICE))
-    found: list[float] = improved(program, first, dense, z0)[: len(start)].tolist()
+    for _ in range(_EXCHANGES):
+        z = improved(program, first, dense, z0)
+        found: list[float] = z[: len(start)].tolist()
+        missed = counterexamples(Design(task, task.machine(found)), z[len(start) : -1], z[-1])
+        if not len(missed.inside):
+            break
+        first = first.joined(missed)
     return found
 
 

@@ -15,7 +15,7 @@ from pteron.design.changes import (
 )
 from pteron.design.design import Design
 from pteron.design.front import Front
-from pteron.design.proofs import ProvedCube, proved_cube, workspace_proofs
+from pteron.design.proofs import ProvedCube, proved, workspace_share
 from pteron.design.task import Task
 from pteron.manipulator import Manipulator
 from pteron.manipulator.saving import text_of
@@ -63,7 +63,14 @@ class Told:
         lines = []
         if self.design.task.seeks_cube:
             lines.append("cube: not proved" if self.cube is None else f"cube {self.cube.words}")
-        return [*lines, *(f"workspace {proof}" for proof in self.workspace)]
+        shares = (workspace_share(self.design, proof) for proof in self.workspace)
+        return [
+            *lines,
+            *(
+                f"workspace{'' if share == 1.0 else f', {100.0 * share:g} % of it,'} {proof}"
+                for share, proof in zip(shares, self.workspace, strict=True)
+            ),
+        ]
 
 
 @dataclass(frozen=True)
@@ -75,7 +82,7 @@ class Summary:
     @cached_property
     def start(self) -> Told:
         """The machine to begin with."""
-        return _told("start", self.front.task.first)
+        return _told("start", Design(self.front.task, self.front.task.robot))
 
     @cached_property
     def chosen(self) -> list[Told]:
@@ -150,8 +157,8 @@ def _design(task: Task, robot: Manipulator, name: str) -> Design:
 
 
 def _told(name: str, design: Design) -> Told:
-    seeks = design.task.seeks_cube and design.cube.edge > 0.0
-    return Told(name, design, proved_cube(design) if seeks else None, workspace_proofs(design))
+    found = proved(design)
+    return Told(name, found.design, found.cube, found.workspace)
 
 
 def _strokes(told: Told) -> list[str]:
@@ -172,4 +179,5 @@ def _data(told: Told) -> dict[str, Any]:
             "boxes": sum(proof.boxes for proof in told.cube.proofs),
         }
     found["workspace_proved"] = [proof.holds for proof in told.workspace]
+    found["workspace_share"] = [workspace_share(told.design, proof) for proof in told.workspace]
     return found

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pteron.design.extras import Evolution, one_thread
-from pteron.design.front import Front, front_of
+from pteron.design.front import Front, Proofs
 from pteron.design.refine import refined
 from pteron.design.spec import Spec
 from pteron.design.task import FAILED, Task
@@ -84,15 +84,13 @@ def search(
         spec = spec.with_seed(seed)
     task = Task.of(spec)
     with _place(folder) as kept, _workers(workers, scheduler) as address:
-        return front_of(task, _generations(task, kept, address, progress))
+        return _generations(task, kept, address, progress)
 
 
 def _generations(
     task: Task, folder: Path, scheduler: str | None, progress: Progress | None
-) -> pl.DataFrame:
-    """Return all designs that were evaluated."""
-    import polars as pl
-
+) -> Front:
+    """Return the front of all designs that were evaluated, each design of it proved."""
     settings = task.spec.search
     low, high = task.ranges
     evolution = Evolution(
@@ -102,23 +100,59 @@ def _generations(
         settings.seed,
     )
     tables: list[pl.DataFrame] = []
+    proofs = Proofs(task, partial(swept_proofs, task, folder, scheduler))
+    front: Front | None = None
     used: set[tuple[bytes, int]] = set()
     for number in range(1, settings.generations + 1):
         designs = low + evolution.ask() * (high - low)
         jobs = [(values, -1) for values in designs.tolist()]
-        if tables:
-            jobs += _promising(task, pl.concat(tables), number, used)
+        if front is not None:
+            jobs += _promising(front, number, used)
         plan = {**task.plan, "generation": number, "designs": _digest(designs)}
         store = TableStore(folder / f"{number:04d}", plan)
         chunks = [jobs[k : k + _CHUNK] for k in range(0, len(jobs), _CHUNK)]
         sweep(partial(worked, task), chunks, store, scheduler=scheduler)
         tables.append(store.scan().collect())
-        found = tables[-1]
+        front = _proved_front(proofs, tables)
+        found = proofs.applied(tables[-1])
         values = np.asarray(found.select([v.name for v in task.variables]).to_numpy())
         evolution.tell((values - low) / (high - low), *_costs(task, found))
         if progress is not None:
-            progress(number, settings.generations, _best(task, pl.concat(tables)))
-    return pl.concat(tables)
+            best = None if front is None else float(front.objectives[0, 0])
+            progress(number, settings.generations, best)
+    return proofs.front(lambda: tables)
+
+
+def _proved_front(proofs: Proofs, tables: list[pl.DataFrame]) -> Front | None:
+    """Return the front so far, if any design keeps all that is asked."""
+    try:
+        return proofs.front(lambda: tables)
+    except ModelError:
+        return None
+
+
+def swept_proofs(
+    task: Task,
+    folder: Path,
+    scheduler: str | None,
+    designs: list[list[float]],
+    *,
+    workers: int | None = None,
+) -> pl.DataFrame:
+    """Return the rows of designs, as far as they are proved, kept in a folder as the others are."""
+    digest = _digest(np.array(designs))
+    store = TableStore(folder / f"proofs-{digest}", {**task.plan, "designs": digest})
+    chunks = [designs[k : k + _CHUNK] for k in range(0, len(designs), _CHUNK)]
+    sweep(partial(rows_with_proofs, task), chunks, store, scheduler=scheduler, workers=workers)
+    return store.scan().collect()
+
+
+def rows_with_proofs(task: Task, designs: list[list[float]]) -> pl.DataFrame:
+    """Return the rows of designs, as far as they are proved."""
+    import polars as pl
+
+    with one_thread():
+        return pl.DataFrame(task.table(np.array(designs), proofs=True))
 
 
 def first_designs(task: Task, count: int, seed: int) -> Array:
@@ -141,14 +175,11 @@ def worked(task: Task, jobs: list[tuple[list[float], int]]) -> pl.DataFrame:
 
 
 def _promising(
-    task: Task, designs: pl.DataFrame, number: int, used: set[tuple[bytes, int]]
+    front: Front, number: int, used: set[tuple[bytes, int]]
 ) -> list[tuple[list[float], int]]:
     """Return designs of the front so far to improve, spread over it, each in one objective."""
-    try:
-        front = front_of(task, designs)
-    except ModelError:
-        return []
-    settings, objectives = task.spec.search, len(task.spec.objectives)
+    spec = front.task.spec
+    settings, objectives = spec.search, len(spec.objectives)
     count = settings.refined
     if number == settings.generations and count:
         count = settings.population  # the last word on the whole front
@@ -168,13 +199,6 @@ def _costs(task: Task, found: pl.DataFrame) -> tuple[Array, Array]:
     costs = found.select([o.quantity for o in task.spec.objectives]).to_numpy() * signs
     misses = found.select([c for c in found.columns if c.startswith("misses ")]).to_numpy()
     return np.where(np.isfinite(costs), costs, FAILED), misses
-
-
-def _best(task: Task, designs: pl.DataFrame) -> float | None:
-    try:
-        return float(front_of(task, designs).objectives[0, 0])
-    except ModelError:
-        return None
 
 
 def _digest(designs: Array) -> str:

@@ -11,7 +11,8 @@ import numpy as np
 from scipy.stats import qmc  # type: ignore[import-untyped]
 
 from pteron.design.extras import one_thread
-from pteron.design.front import Front, front_of_parts
+from pteron.design.front import Front, Proofs
+from pteron.design.search import swept_proofs
 from pteron.design.spec import Spec
 from pteron.design.task import Task
 from pteron.errors import DataError
@@ -80,7 +81,8 @@ def survey(
         workers=workers,
         progress=progress,
     )
-    return front_of_parts(task, _parts(store, len(chunks)))
+    proofs = Proofs(task, partial(swept_proofs, task, Path(folder), scheduler, workers=workers))
+    return proofs.front(lambda: _parts(store, len(chunks)))
 
 
 class _Chunks(Sequence[tuple[int, int]]):

@@ -13,6 +13,7 @@ import numpy as np
 
 from pteron.design.conditions import Conditions, conditions_of
 from pteron.design.design import Design
+from pteron.design.proofs import proved
 from pteron.design.quantities import quantities
 from pteron.design.region import orientations_of, workspace_poses
 from pteron.design.spec import Spec
@@ -119,8 +120,8 @@ class Task:
 
     @cached_property
     def first(self) -> Design:
-        """The machine to begin with, as it is."""
-        return Design(self, self.robot)
+        """The machine to begin with, as it is, as far as it is proved."""
+        return proved(Design(self, self.robot)).design
 
     def unit(self, name: str) -> str:
         """Return the unit of a quantity, for this machine's joints."""
@@ -144,14 +145,18 @@ class Task:
         stretch = self.spec.masses == "per length"
         return moved(self.robot, self.variables, values, stretch=stretch)
 
-    def evaluated(self, values: Sequence[float]) -> dict[str, float]:
+    def evaluated(self, values: Sequence[float], *, proofs: bool = False) -> dict[str, float]:
         """Return what a design is worth, as a row of a table: quantities, and what it misses.
+
+        With proofs its cube is the proved one, and a workspace that is not proved is missed.
 
         "misses workspace" is how far the least condition is below 0, and "misses 1 links" how far
         the first requirement, of `links`, is missed over its bound; 0 where it is kept.
         """
         try:
             design = Design(self, self.machine(values))
+            if proofs:
+                design = proved(design).design
             found = {name: design.quantity(name) for name in self.asked}
             reserve = design.reserve
         except ModelError:
@@ -161,9 +166,9 @@ class Task:
             misses[f"misses {k} {one.quantity}"] = one.missed_by(found[one.quantity], FAILED)
         return found | misses
 
-    def table(self, values: Array) -> dict[str, list[float]]:
+    def table(self, values: Array, *, proofs: bool = False) -> dict[str, list[float]]:
         """Return the columns of a table of designs (N, V): variables, then what they are worth."""
-        rows = [self.evaluated(row) for row in values.tolist()]
+        rows = [self.evaluated(row, proofs=proofs) for row in values.tolist()]
         found = {v.name: values[:, k].tolist() for k, v in enumerate(self.variables)}
         return found | {name: [row[name] for row in rows] for name in rows[0]}
 
