@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pteron.design.design import Design
+from pteron.design.proofs import counterexamples
 from pteron.design.task import Task
 from pteron.errors import ModelError
 from pteron.kernels import Array
@@ -225,7 +226,8 @@ def _worst_condition(design: Design) -> str:
         poses = task.orientations.copy()
         poses[:, : len(center)] = center
     else:
-        poses = design.poses
+        known = counterexamples(design, np.zeros(len(task.robot.platform.lengths)), 0.0)
+        poses = np.vstack([design.poses, known.poses])
     rows = np.nan_to_num(task.conditions.rows(design.geometry, poses, design.side))
     at, row = np.unravel_index(int(rows.argmin()), rows.shape)
     pose = ", ".join(f"{x:.4g}" for x in poses[at])
