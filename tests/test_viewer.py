@@ -325,7 +325,9 @@ def answer(viewer, host, origin=None, upgrade=True):
     headers = {"Host": host} if origin is None else {"Host": host, "Origin": origin}
     if upgrade:
         headers |= {
-            **{"Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Version": "13"},
+            "Upgrade": "websocket",
+            "Connection": "Upgrade",
+            "Sec-WebSocket-Version": "13",
             "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==",
         }
     address = urlsplit(viewer.url)

@@ -3,7 +3,14 @@
 from pteron.design.changes import Change
 from pteron.design.design import Design
 from pteron.design.front import Front
-from pteron.design.proofs import Proved, ProvedCube, cube_proofs, proved, proved_cube, workspace_proofs
+from pteron.design.proofs import (
+    Proved,
+    ProvedCube,
+    cube_proofs,
+    proved,
+    proved_cube,
+    workspace_proofs,
+)
 from pteron.design.quantities import Quantity, quantities
 from pteron.design.report import Summary, Told
 from pteron.design.search import search
