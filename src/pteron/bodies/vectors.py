@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pteron.errors import ModelError
+from pteron.errors import ModelError, shown
 
 Vector = tuple[float, float, float]
 
@@ -32,6 +32,8 @@ def number(value: object, key: str) -> float:
         result = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
         raise ModelError(f"{key}: {value!r} is not a number") from None
+    except OverflowError:
+        raise ModelError(f"{key}: {shown(value)} is too large a number") from None
     if not math.isfinite(result):
         raise ModelError(f"{key}: {result} is not a finite number")
     return result

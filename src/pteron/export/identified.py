@@ -69,7 +69,7 @@ def read_identified(robot: Manipulator, path: str | Path) -> Identified:
             raise ValueError("values are missing")
         groups = [tuple(group) for group in known["shared"]]
         grade = re.sub(r"[^a-z ]", "?", str(data["verdict"]["grade"])[:40])
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise DataError(
             f"{path}: not an identification.json of this version of pteron identify "
             f"({type(error).__name__}: {error}); run it again"

@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-import io
-import json
 from collections.abc import Callable
-from dataclasses import asdict
 from pathlib import Path
-from typing import Any
-from zipfile import BadZipFile
-
-import numpy as np
 
 from pteron.atomic import write_bytes
 from pteron.errors import DataError, OutputError
-from pteron.maps.grid import Axis, Grid
-from pteron.maps.map import ALL, Map
-from pteron.maps.stores import MapStore, read_store
+from pteron.maps.archive import read_archive, write_archive
+from pteron.maps.map import Map
+from pteron.maps.stores import read_store, save_store
 from pteron.maps.surfaces import ENDINGS as SURFACES
 from pteron.maps.surfaces import checked_surfaces, surface_bytes
-from pteron.tables import read_table, write_table
+from pteron.maps.table_file import read_map_table, write_map_table
 
 _TABLES = (".csv", ".parquet")
 
@@ -110,61 +103,8 @@ def checked_map_file(path: str | Path) -> Path:
     return target
 
 
-def _table(given: Map, target: Path) -> Path:
-    return write_table(given.table(), target)
-
-
-def _from_table(source: Path) -> Map:
-    table = read_table(source)
-    columns = {name.partition(" [")[0]: name for name in table.columns}
-    names = tuple(name for name in columns if name in ("x", "y", "z", "phi"))
-    indices = [name for name in columns if name in ALL]
-    if not names or not indices or "status" not in columns:
-        raise DataError(f"{source}: is no map's table: coordinates, indices and status expected")
-    given = table.numbers([columns[name] for name in (*names, *indices, "status")], "nan")
-    cells = dict(zip((*names, *indices, "status"), given.T, strict=True))
-    axes, pose = [], []
-    for name in names:
-        own = np.unique(cells[name])
-        pose.append(0.5 * float(own[0] + own[-1]))
-        if len(own) > 1:
-            axes.append(Axis(name, float(own[0]), float(own[-1]), len(own)))
-    grid = Grid(names, tuple(pose), tuple(axes))
-    if grid.size != len(given):
-        raise DataError(f"{source}: {len(given)} rows, {grid.size} expected: a whole grid of poses")
-    values = {name: cells[name].reshape(grid.shape) for name in indices}
-    return Map(source.stem, grid, values, cells["status"].reshape(grid.shape).astype(np.int8))
-
-
-def _archive(given: Map, target: Path) -> Path:
-    buffer = io.BytesIO()
-    about = {"robot": given.robot, "units": given.units, "grid": asdict(given.grid)}
-    axes = {axis.name: axis.values for axis in given.grid.axes}
-    values: dict[str, Any] = {**axes, **given.values}
-    np.savez_compressed(buffer, **values, status=given.status, about=np.array(json.dumps(about)))
-    return write_bytes(target, buffer.getvalue())
-
-
-def _from_archive(source: Path) -> Map:
-    try:
-        with np.load(source) as archive:
-            about = json.loads(str(archive["about"]))
-            values = {name: archive[name] for name in about["units"]}
-            status = archive["status"]
-    except (OSError, ValueError, KeyError, BadZipFile):
-        raise DataError(f"{source}: is no map's archive") from None
-    given = about["grid"]
-    axes = tuple(Axis(**axis) for axis in given["axes"])
-    grid = Grid(tuple(given["coordinates"]), tuple(given["pose"]), axes)
-    return Map(about["robot"], grid, values, status)
-
-
 def _zarr(given: Map, target: Path) -> Path:
-    grid = given.grid
-    store = MapStore.of(target, given.robot, grid, tuple(given.values), {"saved": True})
-    for number, region in enumerate(grid.regions()):
-        found = {name: values[region] for name, values in given.values.items()}
-        store.write(number, found | {"status": given.status[region]})
+    save_store(given, target)
     return target
 
 
@@ -173,14 +113,14 @@ def _surfaces(given: Map, target: Path) -> Path:
 
 
 _WRITERS: dict[str, Callable[[Map, Path], Path]] = {
-    **dict.fromkeys(_TABLES, _table),
-    ".npz": _archive,
+    **dict.fromkeys(_TABLES, write_map_table),
+    ".npz": write_archive,
     ".zarr": _zarr,
     **dict.fromkeys(SURFACES, _surfaces),
 }
 
 _READERS: dict[str, Callable[[Path], Map]] = {
-    **dict.fromkeys(_TABLES, _from_table),
-    ".npz": _from_archive,
+    **dict.fromkeys(_TABLES, read_map_table),
+    ".npz": read_archive,
     ".zarr": read_store,
 }

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from itertools import product
-from math import pi, prod
+from math import isfinite, pi, prod
+from numbers import Integral, Real
+from sys import float_info
+from typing import Any, Self
 
 import numpy as np
 
-from pteron.errors import DataError, ModelError
+from pteron.errors import DataError, ModelError, shown
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import checked_one
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -24,8 +27,13 @@ _POINTS = {1: 400, 2: 200, 3: 100, 4: 40}
 _TURNS = 5
 """Orientations of which the bounding boxes are taken together, where the angle varies."""
 
+_HUGE = float_info.max
+
 _CHUNK = 1 << 17
 """Poses of a chunk at most: a second's work or less, and a megabyte of each index."""
+
+COORDINATES = ("x", "y", "z", "phi")
+"""Of poses, in their order; a machine has some of them."""
 
 Region = tuple[slice, ...]
 """A part of a grid: from where to where along each of its axes."""
@@ -42,13 +50,39 @@ class Axis:
     least, greatest : float
         The first and the last value, m or rad.
     count : int
-        How many values there are.
+        How many values there are, 2 or more.
+
+    Raises
+    ------
+    DataError
+        If the name is none of these, the values do not ascend, or the count is none.
     """
 
     name: str
     least: float
     greatest: float
     count: int
+
+    def __post_init__(self) -> None:
+        if self.name not in COORDINATES:
+            raise DataError(
+                f"name: {shown(self.name)} given, one of {', '.join(COORDINATES)} expected"
+            )
+        least, greatest = (
+            _number(f"{self.name}: {key}", getattr(self, key)) for key in ("least", "greatest")
+        )
+        if not least < greatest or not isfinite(greatest - least):
+            raise DataError(
+                f"{self.name}: from {least:g} to {greatest:g} given, an ascending range expected"
+            )
+        if isinstance(self.count, bool) or not isinstance(self.count, Integral):
+            raise DataError(
+                f"{self.name}: {shown(self.count)} points given, a whole number expected"
+            )
+        if self.count < 2:
+            raise DataError(f"{self.name}: {self.count} points given, at least 2 expected")
+        for key, value in (("least", least), ("greatest", greatest), ("count", int(self.count))):
+            object.__setattr__(self, key, value)
 
     @property
     def values(self) -> Array:
@@ -74,11 +108,48 @@ class Grid:
         middle.
     axes : tuple of Axis
         The coordinates that vary, in the order of the pose; one array axis each.
+
+    Raises
+    ------
+    DataError
+        If the pose has not a finite number for each coordinate, or an axis is none of them, there
+        twice, or not in their order.
     """
 
     coordinates: tuple[str, ...]
     pose: tuple[float, ...]
     axes: tuple[Axis, ...]
+
+    def __post_init__(self) -> None:
+        names, varying = list(self.coordinates), [axis.name for axis in self.axes]
+        if not names or names != [name for name in COORDINATES if name in names]:
+            raise DataError(
+                f"coordinates: {shown(names)} given, some of {', '.join(COORDINATES)} expected, "
+                "each once and in this order"
+            )
+        if varying != [name for name in names if name in varying]:
+            raise DataError(
+                f"axes: {shown(varying)} given, some of {', '.join(names)} expected, each once and "
+                "in this order"
+            )
+        if len(self.pose) != len(names):
+            raise DataError(f"pose: {len(self.pose)} numbers given, {' '.join(names)} expected")
+        pose = tuple(_number(f"pose: {n}", x) for n, x in zip(names, self.pose, strict=True))
+        object.__setattr__(self, "pose", pose)
+
+    @classmethod
+    def of_plain(cls, given: Mapping[str, Any]) -> Self:
+        """Return the grid of which `plain` was."""
+        axes = tuple(Axis(**axis) for axis in given["axes"])
+        return cls(tuple(given["coordinates"]), tuple(given["pose"]), axes)
+
+    def plain(self) -> dict[str, Any]:
+        """Return it as JSON has it."""
+        return {
+            "coordinates": list(self.coordinates),
+            "pose": list(self.pose),
+            "axes": [asdict(axis) for axis in self.axes],
+        }
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -179,6 +250,8 @@ def pose_grid(
     robot = as_manipulator(robot)
     fixed, spans = dict(held or {}), dict(ranges or {})
     expect_coordinates(robot, fixed, spans)
+    if _number("rim", rim) < 0.0:
+        raise DataError(f"rim: {rim:g} given, 0 or more expected")
     names = robot.coordinates
     pose = np.zeros(len(names))
     if held is None:
@@ -204,10 +277,11 @@ def pose_grid(
     axes = []
     for name in varying_names:
         least, greatest, *own = spans[name]
-        number = int(own[0]) if own else count
-        if number < 2:
-            raise DataError(f"{name}: {number} points given, at least 2 expected")
-        axes.append(Axis(name, float(least), float(greatest), number))
+        number = own[0] if own else count
+        # A range is of floats, its count among them.
+        if isinstance(number, float) and number.is_integer():
+            number = int(number)
+        axes.append(Axis(name, least, greatest, number))  # type: ignore[arg-type]
         pose[names.index(name)] = 0.5 * (least + greatest)
     return Grid(names, tuple(pose.tolist()), tuple(axes))
 
@@ -225,6 +299,13 @@ def _box(robot: Manipulator, pose: Array, angles: tuple[float, ...] | None) -> A
     if not boxes:
         raise nowhere
     return np.array([np.min(boxes, axis=(0, 1)), np.max(boxes, axis=(0, 1))])
+
+
+def _number(key: str, value: object) -> float:
+    """Return a finite float, or say under which key it is none."""
+    if isinstance(value, bool) or not isinstance(value, Real) or not -_HUGE <= value <= _HUGE:
+        raise DataError(f"{key}: {shown(value)} given, a finite number expected")
+    return float(value)
 
 
 def expect_coordinates(

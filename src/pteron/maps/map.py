@@ -79,12 +79,16 @@ class Map:
         determined. ``margin`` is determined everywhere.
     status : array of int, shape grid.shape
         `REACHABLE`, 0; `BEYOND_LIMITS`, -1; or the leg, from 1, that misses the pose by most.
+    machine : str
+        The text of the machine's file, as `save` writes it; empty where it is not known, as of a
+        map that was read from a table.
     """
 
     robot: str
     grid: Grid
     values: Mapping[str, Array]
     status: NDArray[np.int8]
+    machine: str = ""
 
     def __repr__(self) -> str:
         sides = " x ".join(f"{axis.name} {axis.count}" for axis in self.grid.axes)
@@ -181,7 +185,7 @@ class Map:
         pose[self.grid.coordinates.index(name)] = float(steps[i])
         values = {index: np.take(own, i, axis=k) for index, own in self.values.items()}
         grid = Grid(self.grid.coordinates, tuple(pose), tuple(axes))
-        return Map(self.robot, grid, values, np.take(self.status, i, axis=k))
+        return Map(self.robot, grid, values, np.take(self.status, i, axis=k), self.machine)
 
 
 def headed(index: Index) -> str:

@@ -127,7 +127,7 @@ def map_index(
             threads=1 if engine == "jax" else cores(),
             progress=progress,
         )
-        found = store.map(robot.name)
+        found = store.map(robot.name, text_of(robot))
     if target is not None and not streams:
         save_map(found, target)
     return found
@@ -147,7 +147,6 @@ def _folder() -> TemporaryDirectory[str]:
 
 
 def _plan(robot: Manipulator, engine: str) -> dict[str, Any]:
-
     return {"robot": text_of(robot), "engine": engine, "pteron": version("pteron")}
 
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json
+import tomllib
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from pteron.errors import OutputError, shown
 
 _LONG = 40
+_MANY = 2
+"""Differences of each part of a plan that are told."""
 
 
-def expect_same(path: str | Path, found: Mapping[str, Any], wanted: Mapping[str, Any]) -> None:
+def expect_same(path: str | Path, found: Any, wanted: Mapping[str, Any]) -> None:
     """Refuse a store whose plan is another one.
 
     Parameters
@@ -19,24 +23,61 @@ def expect_same(path: str | Path, found: Mapping[str, Any], wanted: Mapping[str,
     path : str or Path
         The store.
     found, wanted : mapping
-        Plain data, as JSON has them: what it says, and what it is to be continued with.
+        Plain data, as JSON has them: what it says, and what it is to be continued with. Texts that
+        are TOML, as a robot's is, are compared by their keys.
 
     Raises
     ------
     OutputError
         If they differ; the message says in what.
     """
-    names = [name for name in {**wanted, **found} if found.get(name) != wanted.get(name)]
-    if not names:
-        return
-    told = "; ".join(_told(name, found.get(name), wanted.get(name)) for name in names)
-    raise OutputError(
-        f"{path}: holds results of another plan ({told}); name another place, or remove it"
-    )
+    if not isinstance(found, Mapping):
+        raise OutputError(f"{path}: holds no plan of results; name another place, or remove it")
+    told: list[str] = []
+    for key in {**wanted, **found}:
+        lines = list(_differences(str(key), found.get(key), wanted.get(key)))
+        told += lines[:_MANY]
+        if len(lines) > _MANY:
+            told.append(f"and {len(lines) - _MANY} more of the {shown(key, bare=True)}")
+    if told:
+        raise OutputError(
+            f"{path}: holds results of another plan ({'; '.join(told)}); name another place, or "
+            "remove it"
+        )
+
+
+def _differences(name: str, found: Any, wanted: Any) -> Iterator[str]:
+    """Yield a line for every number or text in which two plans differ."""
+    label = f"{name}."
+    if name == "robot":
+        found, wanted = _machine(found), _machine(wanted)
+        label = f"robot {shown(wanted.get('name'), bare=True)}: "
+    if isinstance(found, Mapping) and isinstance(wanted, Mapping):
+        for key in {**wanted, **found}:
+            yield from _differences(f"{label}{key}", found.get(key), wanted.get(key))
+    elif _listed(found) and _listed(wanted) and len(found) == len(wanted):
+        for k, both in enumerate(zip(found, wanted, strict=True), start=1):
+            yield from _differences(f"{name}[{k}]", *both)
+    # True is 1 and -0.0 is 0.0, but not as they are written.
+    elif json.dumps(found) != json.dumps(wanted):
+        yield _told(name, found, wanted)
+
+
+def _machine(text: Any) -> Mapping[str, Any]:
+    """Return what a machine's file says; of anything else, its name."""
+    try:
+        return tomllib.loads(text)
+    except (TypeError, AttributeError, ValueError, RecursionError):
+        return {"name": text}
+
+
+def _listed(value: Any) -> bool:
+    return isinstance(value, list) and any(isinstance(one, Mapping) for one in value)
 
 
 def _told(name: str, found: Any, wanted: Any) -> str:
-    texts = [shown(value) for value in (found, wanted)]
+    texts = ["none" if value is None else shown(value) for value in (found, wanted)]
+    name = shown(name, bare=True, longest=2 * _LONG)
     if any(len(text) > _LONG for text in texts):
         return f"another {name}"
     return f"{name} {texts[0]}, not {texts[1]}"

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import shutil
 import tempfile
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -14,12 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.errors import DataError, ModelError, OutputError
-from pteron.maps.grid import Axis, Grid
+from pteron.maps.checksums import checksum
+from pteron.maps.grid import COORDINATES, Grid
 from pteron.maps.map import ALL, Map
 from pteron.maps.plan import expect_same
 
-_FINISHED = "finished"
+_CHECKSUM = "checksum"
 _STATUS = "status"
+_NOT_COMPUTED = -128
+"""What `status` is where no chunk has been written: no pose is taken for one that serves."""
 
 
 class MemoryStore:
@@ -42,9 +48,9 @@ class MemoryStore:
             values[region] = result[name]
         self._status[region] = result[_STATUS]
 
-    def map(self, robot: str) -> Map:
-        """Return the map of a machine of that name."""
-        return Map(robot, self._grid, self._values, self._status)
+    def map(self, robot: str, machine: str) -> Map:
+        """Return the map of a machine of that name and that file's text."""
+        return Map(robot, self._grid, self._values, self._status, machine)
 
 
 @dataclass(frozen=True)
@@ -52,13 +58,16 @@ class MapStore:
     """A map in a Zarr store, which is a folder: a file a chunk and index, so that tasks share none.
 
     It is an array of the grid's shape for each index, one for `status`, one for each axis's values,
-    and `finished`, a number a chunk: written last, it says that the chunk is whole. Arrays carry
-    the names of their axes and their units, so that xarray reads the store.
+    and `checksum`, a number a chunk: written last, it says that the chunk is whole, and what it
+    holds. Arrays carry the names of their axes and their units, so that xarray reads the store.
+
+    `seal` is the checksum of all that the store is made of before its first chunk.
     """
 
     path: Path
     grid: Grid
     names: tuple[str, ...]
+    seal: str
 
     @classmethod
     def of(
@@ -78,76 +87,80 @@ class MapStore:
         Raises
         ------
         OutputError
-            If it is the store of another map, or cannot be written.
+            If it is the store of another map, is damaged, or cannot be written.
         ModelError
             If Zarr is not installed.
         """
-        store = cls(path.resolve(), grid, names)
-        wanted = {"index": list(names), "grid": _plain(grid), **plan}
+        wanted = {**plan, "index": list(names), "grid": grid.plain()}
         if not path.exists():
-            store._make({"name": robot, "plan": wanted})
+            with _beside(path) as work:
+                _make(work, grid, names, {"name": robot, "plan": wanted})
+                _placed(work, path)
         found = _attributes(path)
         if "plan" not in found:
             raise OutputError(f"{path}: is no map's store; name another place, or remove it")
         expect_same(path, found["plan"], wanted)
-        return store
+        try:
+            return cls(path.resolve(), grid, names, _checked_seal(path, found))
+        except DataError as error:
+            raise OutputError(f"{error}; remove it, or name another place") from None
 
     def finished(self) -> frozenset[int]:
-        """Return the numbers of the chunks that are written."""
-        return frozenset(np.flatnonzero(_group(self.path)[_FINISHED][:]).tolist())
+        """Return the numbers of the chunks that are there as they were written."""
+        count = len(self.grid.regions())
+        return frozenset(k for k in range(count) if self._read(k) is not None)
 
     def write(self, number: int, result: Mapping[str, NDArray[Any]]) -> None:
         """Write what a chunk gave, each array's part through a temporary file and a rename."""
         region, group = self.grid.regions()[number], _group(self.path)
-        for name in (*self.names, _STATUS):
-            group[name][region] = result[name]
-        group[_FINISHED][number] = 1
+        held = {name: np.asarray(result[name], dtype=_dtype(name)) for name in self._arrays}
+        for name, values in held.items():
+            group[name][region] = values
+        group[_CHECKSUM][number] = self._checksum(number, held)
 
-    def map(self, robot: str) -> Map:
-        """Return the map, read into memory."""
-        group = _group(self.path)
-        values = {name: np.asarray(group[name][...]) for name in self.names}
-        return Map(robot, self.grid, values, np.asarray(group[_STATUS][...]))
+    def map(self, robot: str, machine: str) -> Map:
+        """Return the map, read into memory.
 
-    def _make(self, attributes: dict[str, Any]) -> None:
-        """Make the store without chunks, whole or not at all."""
-        zarr, grid = _zarr(), self.grid
-        try:
-            work = tempfile.mkdtemp(prefix=f".{self.path.name}.", dir=self.path.parent)
-        except OSError as error:
-            raise OutputError(
-                f"{self.path}: cannot be written ({error.strerror or error})"
-            ) from None
-        try:
-            group = zarr.create_group(work, attributes=attributes)
-            axes = tuple(axis.name for axis in grid.axes)
-            for axis in grid.axes:
-                made = group.create_array(axis.name, data=axis.values, dimension_names=(axis.name,))
-                made.attrs["units"] = axis.unit
-            for name in (*self.names, _STATUS):
-                index = ALL.get(name)
-                made = group.create_array(
-                    name,
-                    shape=grid.shape,
-                    chunks=grid.chunk,
-                    dtype="float64" if index else "int8",
-                    fill_value=np.nan if index else 0,
-                    dimension_names=axes,
-                    config={"write_empty_chunks": True},
-                )
-                if index:
-                    made.attrs.update({"units": index.unit, "long_name": index.title})
-            count = len(grid.regions())
-            group.create_array(
-                _FINISHED, shape=(count,), chunks=(1,), dtype="uint8", compressors=None
+        Raises
+        ------
+        DataError
+            If a chunk is not there, or not as it was written.
+        """
+        regions = self.grid.regions()
+        values = {name: np.empty(self.grid.shape, _dtype(name)) for name in self._arrays}
+        missing = 0
+        for number, region in enumerate(regions):
+            found = self._read(number)
+            missing += found is None
+            for name, own in (found or {}).items():
+                values[name][region] = own
+        if missing:
+            raise DataError(
+                f"{self.path}: {missing} of {len(regions)} chunks are not finished, lost or "
+                "damaged; run again what made it, which computes them"
             )
-            Path(work).chmod(0o755)
-            Path(work).rename(self.path)
-        except OSError:
-            if not self.path.exists():  # else another has just made it
-                raise
-        finally:
-            shutil.rmtree(work, ignore_errors=True)
+        status = values.pop(_STATUS)
+        return Map(robot, self.grid, values, status, machine)
+
+    @property
+    def _arrays(self) -> tuple[str, ...]:
+        return (*self.names, _STATUS)
+
+    def _read(self, number: int) -> dict[str, NDArray[Any]] | None:
+        """Return a chunk as it was written; None where it is not there, lost or damaged."""
+        region, group = self.grid.regions()[number], _group(self.path)
+        try:
+            told = int(group[_CHECKSUM][number])
+            if not told:
+                return None
+            found = {name: np.asarray(group[name][region]) for name in self._arrays}
+        except Exception:  # codecs and their libraries raise what they like at damaged bytes
+            return None
+        return found if told == self._checksum(number, found) else None
+
+    def _checksum(self, number: int, values: Mapping[str, NDArray[Any]]) -> int:
+        """Return a number above zero for what a chunk holds: this one, of this store."""
+        return int(checksum([self.seal, number], values)[:15], 16) or 1
 
 
 def read_store(path: Path) -> Map:
@@ -156,34 +169,127 @@ def read_store(path: Path) -> Map:
     Raises
     ------
     DataError
-        If it is none, or not finished.
+        If it is none, not finished, or not as it was written.
     """
     found = _attributes(path)
     if "plan" not in found:
         raise DataError(f"{path}: is no map's store")
-    given = found["plan"]["grid"]
-    grid = Grid(
-        tuple(given["coordinates"]),
-        tuple(given["pose"]),
-        tuple(Axis(**axis) for axis in given["axes"]),
-    )
-    store = MapStore(path.resolve(), grid, tuple(found["plan"]["index"]))
-    missing = len(grid.regions()) - len(store.finished())
-    if missing:
-        raise DataError(
-            f"{path}: {missing} of {len(grid.regions())} chunks are not finished yet; run again "
-            "what made it"
+    seal = _checked_seal(path, found)
+    plan, name = found["plan"], found["name"]
+    store = MapStore(path.resolve(), Grid.of_plain(plan["grid"]), tuple(plan["index"]), seal)
+    return store.map(name, "" if plan["robot"] == name else plan["robot"])
+
+
+def save_store(given: Map, path: Path) -> None:
+    """Write a map to a Zarr store, whole or not at all.
+
+    Raises
+    ------
+    OutputError
+        If the store of another map is there, or it cannot be written.
+    """
+    plan = {"robot": given.machine or given.robot, "saved": True}
+    names = tuple(given.values)
+    if path.exists():
+        MapStore.of(path, given.robot, given.grid, names, plan)
+    with _beside(path) as work:
+        made = work / path.name
+        store = MapStore.of(made, given.robot, given.grid, names, plan)
+        for number, region in enumerate(given.grid.regions()):
+            found = {name: values[region] for name, values in given.values.items()}
+            store.write(number, found | {_STATUS: given.status[region]})
+        if path.exists():
+            path.rename(work / "former")
+        made.rename(path)
+
+
+def _make(work: Path, grid: Grid, names: tuple[str, ...], attributes: dict[str, Any]) -> None:
+    """Make a store without chunks in a folder."""
+    group = _zarr().create_group(work, attributes=attributes)
+    axes = tuple(axis.name for axis in grid.axes)
+    for axis in grid.axes:
+        made = group.create_array(axis.name, data=axis.values, dimension_names=(axis.name,))
+        made.attrs["units"] = axis.unit
+    for name in (*names, _STATUS):
+        index = ALL.get(name)
+        made = group.create_array(
+            name,
+            shape=grid.shape,
+            chunks=grid.chunk,
+            dtype=_dtype(name),
+            fill_value=np.nan if index else _NOT_COMPUTED,
+            dimension_names=axes,
+            config={"write_empty_chunks": True},
         )
-    return store.map(found["name"])
+        if index:
+            made.attrs.update({"units": index.unit, "long_name": index.title})
+    group.create_array(
+        _CHECKSUM,
+        shape=(len(grid.regions()),),
+        chunks=(1,),
+        dtype="uint64",
+        compressors=None,
+        dimension_names=("chunk",),
+    )
+    group.attrs["sha256"] = _seal(work, attributes)
 
 
-def _plain(grid: Grid) -> dict[str, Any]:
-    """Return a grid as JSON has it."""
-    return {
-        "coordinates": list(grid.coordinates),
-        "pose": list(grid.pose),
-        "axes": [asdict(axis) for axis in grid.axes],
-    }
+def _seal(path: Path, attributes: Mapping[str, Any]) -> str:
+    """Return the checksum of a store's attributes, its arrays' metadata and its axes."""
+    axes = [file for name in COORDINATES for file in path.glob(f"{name}/c/*")]
+    total = hashlib.sha256(
+        json.dumps([attributes["name"], attributes["plan"]], sort_keys=True).encode()
+    )
+    for file in sorted([*path.glob("*/zarr.json"), *axes]):
+        total.update(f"\0{file.relative_to(path).as_posix()}\0".encode())
+        total.update(file.read_bytes())
+    return total.hexdigest()
+
+
+def _checked_seal(path: Path, attributes: Mapping[str, Any]) -> str:
+    """Return a store's seal after a check that what it was made of is as it was.
+
+    Raises
+    ------
+    DataError
+        If not.
+    """
+    try:
+        seal = _seal(path, attributes)
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        seal = ""
+    if not seal or seal != attributes.get("sha256"):
+        raise DataError(
+            f"{path}: is damaged: its plan, axes or arrays are not as they were written"
+        )
+    return seal
+
+
+def _dtype(name: str) -> str:
+    return "int8" if name == _STATUS else "float64"
+
+
+@contextmanager
+def _beside(path: Path) -> Iterator[Path]:
+    """Yield a folder beside a path, for what takes its place; what is left of it goes."""
+    try:
+        work = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from None
+    try:
+        yield work
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
+
+
+def _placed(work: Path, path: Path) -> None:
+    """Give a store that is made its place, unless another process has just made it."""
+    try:
+        work.chmod(0o755)
+        work.rename(path)
+    except OSError:
+        if not path.exists():
+            raise
 
 
 @lru_cache(maxsize=8)
@@ -193,9 +299,12 @@ def _group(path: Path) -> Any:
 
 
 def _attributes(path: Path) -> dict[str, Any]:
+    """Return a store's attributes as they are in its file; none of what is no store."""
+    _zarr()
     try:
-        return dict(_zarr().open_group(path, mode="r").attrs)
-    except (FileNotFoundError, ValueError, KeyError, OSError):
+        found = json.loads((path / "zarr.json").read_bytes())["attributes"]
+        return dict(found) if isinstance(found["plan"], dict) else {}
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return {}
 
 

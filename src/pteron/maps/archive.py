@@ -1,0 +1,69 @@
+"""Maps as NumPy's archives: the arrays, and what they are of as JSON."""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+from typing import Any
+from zipfile import ZipFile
+
+import numpy as np
+
+from pteron.atomic import write_bytes
+from pteron.errors import DataError
+from pteron.maps.checksums import checksum
+from pteron.maps.grid import Grid
+from pteron.maps.map import Map
+
+_ABOUT, _STATUS = "about", "status"
+
+
+def write_archive(given: Map, target: Path) -> Path:
+    """Write a map to an .npz file."""
+    buffer = io.BytesIO()
+    axes = {axis.name: axis.values for axis in given.grid.axes}
+    arrays: dict[str, Any] = {**axes, **given.values, _STATUS: given.status}
+    about: dict[str, Any] = {
+        "robot": given.robot,
+        "machine": given.machine,
+        "units": given.units,
+        "grid": given.grid.plain(),
+    }
+    about["sha256"] = checksum(about, arrays)
+    np.savez_compressed(buffer, **arrays, **{_ABOUT: np.array(json.dumps(about))})
+    return write_bytes(target, buffer.getvalue())
+
+
+def read_archive(source: Path) -> Map:
+    """Return the map of an .npz file.
+
+    Raises
+    ------
+    DataError
+        If it is none, or not as it was written.
+    """
+    try:
+        arrays = _arrays(source)
+        about = json.loads(str(arrays.pop(_ABOUT)))
+        told = about.pop("sha256")
+        if told != checksum(about, arrays):
+            raise ValueError("its checksum is another one")
+        values = {name: arrays[name] for name in about["units"]}
+        grid = Grid.of_plain(about["grid"])
+        return Map(about["robot"], grid, values, arrays[_STATUS], about["machine"])
+    except Exception as error:  # unpacking damaged bytes raises anything
+        reason = str(error) if type(error) is ValueError else type(error).__name__
+        raise DataError(
+            f"{source}: is no map's archive, or is damaged ({reason}); save the map again"
+        ) from None
+
+
+def _arrays(source: Path) -> dict[str, Any]:
+    """Return the arrays of an archive, unpacked only after the archive's own checksums."""
+    with ZipFile(source) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    return {
+        name.removesuffix(".npy"): np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
+        for name, data in members.items()
+    }

@@ -1,0 +1,36 @@
+"""Checksums by which what is read is known to be what was written."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def checksum(about: Any, arrays: Mapping[str, NDArray[Any]]) -> str:
+    """Return the SHA-256 of plain data and arrays, their names, types and shapes among it.
+
+    Parameters
+    ----------
+    about : object
+        Plain data, as JSON has them.
+    arrays : mapping of str to array
+        Their order does not count, and a NaN is a NaN, whatever its bits.
+
+    Returns
+    -------
+    str
+        64 hexadecimal digits.
+    """
+    total = hashlib.sha256(json.dumps(about, sort_keys=True).encode())
+    for name, values in sorted(arrays.items()):
+        own = np.ascontiguousarray(values)
+        if own.dtype.kind == "f":
+            own = np.where(np.isnan(own), np.nan, own)
+        total.update(f"\0{name} {own.dtype.str} {own.shape}\0".encode())
+        total.update(own.data)
+    return total.hexdigest()

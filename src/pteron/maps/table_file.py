@@ -1,0 +1,175 @@
+"""Maps as tables: a row a pose, found again by its coordinates whatever the rows' order is."""
+
+from __future__ import annotations
+
+import io
+from math import prod
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.atomic import write_bytes
+from pteron.errors import DataError
+from pteron.kernels import Array
+from pteron.maps.checksums import checksum
+from pteron.maps.grid import COORDINATES, Axis, Grid
+from pteron.maps.map import ALL, Map, headed
+from pteron.tables import Table, read_table, write_table
+from pteron.workspace import BEYOND_LIMITS
+
+_STATUS = "status"
+_CHECKSUM = "pteron.sha256"
+
+_EQUAL = 1e-6
+"""Of a step: by how much the steps of a coordinate may differ, for tables with few digits."""
+
+
+def write_map_table(given: Map, target: Path) -> Path:
+    """Write a map to a CSV file, or to a Parquet file, which carries a checksum."""
+    frame = given.table()
+    if target.suffix.lower() == ".csv":
+        return write_table(frame, target)
+    buffer = io.BytesIO()
+    frame.write_parquet(buffer, metadata={_CHECKSUM: _checksum(given)})
+    return write_bytes(target, buffer.getvalue())
+
+
+def read_map_table(source: Path) -> Map:
+    """Return the map of a table.
+
+    Raises
+    ------
+    DataError
+        If it is none, its rows are not each pose of a grid once, or a Parquet file's checksum is
+        another one.
+    """
+    table = read_table(source)
+    coordinates = {name: f"{name} [{'rad' if name == 'phi' else 'm'}]" for name in COORDINATES}
+    wanted = {**coordinates, **{index.name: headed(index) for index in ALL.values()}}
+    columns = {name: _column(table, name, full) for name, full in wanted.items()}
+    columns = {name: column for name, column in columns.items() if column}
+    names = tuple(name for name in COORDINATES if name in columns)
+    indices = [name for name in columns if name in ALL]
+    if not names or not indices or _STATUS not in table.columns:
+        raise DataError(f"{source}: is no map's table: coordinates, indices and status expected")
+    poses = table.numbers([columns[name] for name in names])
+    status = _whole(table, len(names))
+    grid, order = _grid(table, names, poses)
+    found = table.numbers([columns[name] for name in indices], "nan")[order]
+    values = {name: own.reshape(grid.shape) for name, own in zip(indices, found.T, strict=True)}
+    made = Map(source.stem, grid, values, status[order].reshape(grid.shape))
+    if (told := _told_checksum(source)) and told != _checksum(made):
+        raise DataError(f"{source}: is damaged: its values are not those that were written")
+    return made
+
+
+def _column(table: Table, name: str, heading: str) -> str:
+    """Return the column of a coordinate or an index; empty where there is none.
+
+    Raises
+    ------
+    DataError
+        If it is there twice, or in another unit.
+    """
+    found = [one for one in table.columns if one.partition(" [")[0] == name]
+    if len(found) > 1:
+        raise DataError(f"{table.source}: columns {' and '.join(found)} are both {name}; drop one")
+    if found and found[0] not in (name, heading):
+        raise DataError(f"{table.source}: column {found[0]} given, {heading} expected")
+    return found[0] if found else ""
+
+
+def _whole(table: Table, legs: int) -> NDArray[np.int8]:
+    """Return the status of each row."""
+    found = table.numbers([_STATUS])[:, 0]
+    wrong = (found != np.rint(found)) | (found < BEYOND_LIMITS) | (found > legs)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise DataError(
+            f"{table.place(row)}, column {_STATUS}: {found[row]:g} given, {BEYOND_LIMITS} to "
+            f"{legs} expected"
+        )
+    return found.astype(np.int8)
+
+
+def _grid(table: Table, names: tuple[str, ...], poses: Array) -> tuple[Grid, NDArray[np.int64]]:
+    """Return the grid of a table's poses (N, m), and its rows in the order of the grid.
+
+    Raises
+    ------
+    DataError
+        If they are not each pose of a grid, once.
+    """
+    axes: list[Axis] = []
+    held: list[float] = []
+    ranks = []
+    for name, own in zip(names, poses.T, strict=True):
+        values, numbers = np.unique(own, return_inverse=True)
+        held.append(0.5 * float(values[0]) + 0.5 * float(values[-1]))
+        if len(values) > 1:
+            axes.append(_axis(table, name, values))
+            ranks.append(numbers)
+    grid = Grid(names, tuple(held), tuple(axes))
+    found = np.array(ranks, dtype=np.int64).reshape(len(axes), len(poses))
+    order = np.lexsort(found[::-1]) if axes else np.arange(len(poses))
+    again = (np.diff(found[:, order]) == 0).all(axis=0)
+    if again.any():
+        first, second = sorted(order[int(np.argmax(again)) :][:2].tolist())
+        raise DataError(
+            f"{table.place(second)}: is the pose of row {first + 1} again; {int(again.sum())} rows "
+            "are there already: drop them"
+        )
+    if grid.size > len(poses):
+        lost = dict(grid.held)
+        for axis, rank in zip(axes, _first_missing(grid.shape, found[:, order]), strict=True):
+            lost[axis.name] = float(axis.values[rank])
+        told = ", ".join(f"{name} = {lost[name]:g}" for name in names)
+        raise DataError(
+            f"{table.source}: {grid.size - len(poses)} of {grid.size} poses of a grid are missing, "
+            f"the first at {told}"
+        )
+    return grid, order
+
+
+def _first_missing(shape: tuple[int, ...], ranks: NDArray[np.int64]) -> list[int]:
+    """Return the place in a grid of the first pose that sorted places (axes, N) lack."""
+    count = ranks.shape[1]
+    strides = [prod(shape[k + 1 :]) for k in range(len(shape))]
+    # A stride beyond all rows is as good as any: it may have more digits than an integer here.
+    numbers = np.arange(count)
+    sides = list(zip(strides, shape, strict=True))
+    expected = [numbers // min(stride, count + 1) % side for stride, side in sides]
+    wrong = (ranks != np.array(expected)).any(axis=0)
+    first = int(np.argmax(wrong)) if wrong.any() else count
+    return [first // stride % side for stride, side in sides]
+
+
+def _axis(table: Table, name: str, values: Array) -> Axis:
+    """Return the axis of a coordinate's values, after a check that their steps are equal."""
+    axis = Axis(name, float(values[0]), float(values[-1]), len(values))
+    apart = np.abs(values - axis.values)
+    if apart.max() > _EQUAL * (axis.greatest - axis.least) / (axis.count - 1):
+        raise DataError(
+            f"{table.source}: {name} = {values[int(apart.argmax())]:g} is not in equal steps with "
+            "the others, so that these are not the poses of a grid"
+        )
+    return axis
+
+
+def _checksum(given: Map) -> str:
+    """Return the checksum of what a table holds of a map."""
+    values: dict[str, Any] = {
+        name: np.where(np.isfinite(own), own, np.nan) for name, own in given.values.items()
+    }
+    return checksum(given.grid.plain(), {**values, _STATUS: given.status})
+
+
+def _told_checksum(source: Path) -> str:
+    """Return the checksum that a Parquet file carries; empty where it carries none."""
+    import polars as pl
+
+    if source.suffix.lower() == ".csv":
+        return ""
+    return pl.read_parquet_metadata(source).get(_CHECKSUM, "")
