@@ -2,6 +2,7 @@
 
 import os
 import signal
+import time
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,12 @@ import polars as pl
 def rows(number):
     """Return what a chunk of a sweep gives."""
     return pl.DataFrame({"number": [number] * 3, "root": np.sqrt(number + np.arange(3.0))})
+
+
+def slow_rows(number):
+    """Return the same after a time in which its process may be killed."""
+    time.sleep(0.05)
+    return rows(number)
 
 
 def dies_once(flag, function, where, chunk):

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import polars as pl
@@ -224,8 +225,24 @@ def test_a_search_that_was_ended_goes_on_to_the_same_front(found, tmp_path):
     for chunk in sorted(again.glob("*/0*.parquet"))[2:]:
         chunk.unlink()
     assert search(spec_of(), folder=again).table.equals(front.table)
-    with pytest.raises(OutputError, match=r"holds"):
+    with pytest.raises(OutputError, match=r"another plan \(spec.search.seed 0, not 1; "):
         search(spec_of(), folder=again, seed=1)
+    heavy = pteron.save(replace(pteron.load("quadrupteron"), gravity=(0, 0, -1.6)), tmp_path / "r")
+    with pytest.raises(OutputError, match=r"robot quadrupteron: gravity \[0.0, 0.0, -9.81\], not"):
+        search(spec_of(robot=str(heavy)), folder=again)
+
+
+def test_a_checkpoint_that_is_damaged_is_computed_again(found, tmp_path):
+    front, folder = found
+    again = tmp_path / "generations"
+    shutil.copytree(folder, again)
+    first, second, third, *_ = sorted(again.glob("*/0*.parquet"))
+    data = bytearray(first.read_bytes())
+    data[len(data) // 2] ^= 1
+    first.write_bytes(data)
+    second.write_bytes(second.read_bytes()[:-100])
+    third.write_bytes(second.read_bytes())
+    assert search(spec_of(), folder=again).table.equals(front.table)
 
 
 def test_what_changed_is_told_in_words(found):
@@ -260,7 +277,7 @@ def test_a_survey_streams_and_goes_on(tmp_path):
     table = pl.read_parquet(tmp_path / "survey" / "*.parquet")
     good = table.filter(pl.col("misses workspace") == 0.0)
     assert front.table["links"][0] == good["links"].min()
-    (tmp_path / "survey" / "00000001.parquet").unlink()
+    next((tmp_path / "survey").glob("00000001-*.parquet")).unlink()
     again = survey(workspace_spec(), 500, tmp_path / "survey")
     assert again.table.equals(front.table)
     design = Summary(front).chosen[0]

@@ -1,14 +1,19 @@
 """Maps of indices over grids of poses, their files, and sweeps that resume."""
 
+import re
+import subprocess
+import sys
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import meshio
 import numpy as np
 import polars as pl
 import pytest
+import xarray
 import zarr
-from dying import dies_once, rows
+from dying import dies_once, rows, slow_rows
 
 import pteron
 from pteron.errors import DataError, ModelError, OutputError
@@ -117,6 +122,36 @@ def test_a_grid_that_cannot_be_is_refused(delta, held, ranges, words):
         pose_grid(delta, held, ranges)
 
 
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (lambda robot: pose_grid(robot, {"z": -0.9}, SPANS, rim=np.nan), "rim: nan given, a fin"),
+        (lambda robot: pose_grid(robot, {"z": -0.9}, SPANS, rim=-0.1), "rim: -0.1 given, 0 or "),
+        (lambda robot: pose_grid(robot, {"z": -0.9}, SPANS, points=2.5), "x: 2.5 points given, a"),
+        (
+            lambda robot: pose_grid(robot, {"z": -0.9}, SPANS, points=True),
+            "x: True points given, a",
+        ),
+        (lambda _: Axis("x", 0.0, 1.0, 2.5), "x: 2.5 points given, a whole number expected"),
+        (lambda _: Axis("x", 0.0, 1.0, 1), "x: 1 points given, at least 2 expected"),
+        (lambda _: Axis("x", 0.0, np.nan, 3), "x: greatest: nan given, a finite number expected"),
+        (lambda _: Axis("x", 0.0, 10**400, 3), "x: greatest: 1000.* given, a finite number"),
+        (lambda _: Axis("x", -1e308, 1e308, 3), "x: from -1e.308 to 1e.308 given, an ascending"),
+        (lambda _: Axis("w", 0.0, 1.0, 3), "name: 'w' given, one of x, y, z, phi expected"),
+        (lambda _: Grid(("x", "x"), (0.0, 0.0), ()), "coordinates: .'x', 'x'. given, some of x, y"),
+        (lambda _: Grid(("x", "y"), (0.0,), ()), "pose: 1 numbers given, x y expected"),
+        (lambda _: Grid(("x",), (True,), ()), "pose: x: True given, a finite number expected"),
+        (
+            lambda _: Grid(("x", "y"), (0.0, 0.0), (Axis("y", 0.0, 1.0, 2),) * 2),
+            "axes: .'y', 'y'. given, some of x, y expected, each once and in this order",
+        ),
+    ],
+)
+def test_axes_and_grids_check_what_they_are_given(delta, given, words):
+    with pytest.raises(DataError, match="^" + words):
+        given(delta)
+
+
 # Values.
 
 
@@ -201,6 +236,19 @@ def test_tables_carry_units_and_zarr_stores_axes(whole, tmp_path):
     assert group["margin"].attrs["units"] == group["x"].attrs["units"] == "m"
 
 
+def test_xarray_opens_a_store(whole, tmp_path):
+    path = save_map(whole, tmp_path / "map.zarr")
+    with xarray.open_zarr(path, consolidated=False) as found:
+        for name, values in whole.values.items():
+            assert found[name].dims == ("x", "y", "z")
+            np.testing.assert_array_equal(found[name].to_numpy(), values)
+        np.testing.assert_array_equal(found["status"].to_numpy(), whole.status)
+        np.testing.assert_array_equal(found["x"].to_numpy(), whole.grid.axes[0].values)
+        assert found["margin"].attrs["units"] == "m"
+        near = found["margin"].sel(z=-0.9, method="nearest")
+        np.testing.assert_array_equal(near.to_numpy(), whole.at("z", -0.9).values["margin"])
+
+
 def test_the_surface_of_the_reach_encloses_its_volume(delta, whole, tmp_path):
     """A closed surface has a volume, by the divergence theorem; so have random positions."""
     found = surfaces(whole, "condition")
@@ -223,6 +271,15 @@ def test_the_surface_of_the_reach_encloses_its_volume(delta, whole, tmp_path):
             np.testing.assert_allclose(mesh.point_data["condition"], value, rtol=1e-6)
     mesh = meshio.read(tmp_path / "delta.vtk")
     assert set(np.unique(mesh.cell_data["surface"][0])) == {0, 1, 2, 3}
+    # Types of arrays that VTK's reader of legacy files knows: vtktypeint32 is none of them.
+    lines = (tmp_path / "delta.vtk").read_bytes().split(b"\n")
+    arrays = [
+        line.split() for line in lines if re.fullmatch(rb"(condition|surface) 1 \d+ \w+", line)
+    ]
+    assert [(name, kind) for name, _, _, kind in arrays] == [
+        (b"condition", b"double"),
+        (b"surface", b"vtktypeint64"),
+    ]
 
 
 @pytest.mark.parametrize(
@@ -276,7 +333,7 @@ def test_a_worker_and_a_client_may_die_and_nothing_is_lost(delta, tmp_path):
     plain = map_index(delta, "condition", grid)
     map_index(delta, "condition", grid, out=tmp_path / "map.zarr")
     group = zarr.open_group(tmp_path / "map.zarr", mode="r+")
-    group["finished"][0] = 0
+    group["checksum"][0] = 0
     group["condition"][:] = 0.0
     told = []
     found = map_index(
@@ -297,14 +354,57 @@ def test_a_worker_and_a_client_may_die_and_nothing_is_lost(delta, tmp_path):
     assert sweep(work, range(12), there, workers=2) == 0  # and starts nothing
 
 
+SCHEDULER = """\
+import distributed
+options = {"processes": False, "protocol": "tcp", "dashboard_address": None}
+with distributed.LocalCluster(1, threads_per_worker=1, **options) as cluster:
+    print(cluster.scheduler_address, flush=True)
+    input()
+"""
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.filterwarnings("ignore::ResourceWarning")
+def test_a_scheduler_may_die_and_nothing_is_lost(tmp_path):
+    """It has its worker in its own process, so that both go at once."""
+    store = TableStore(tmp_path, {"seed": 1})
+    told = []
+    with subprocess.Popen(
+        [sys.executable, "-c", SCHEDULER],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        cwd=Path(__file__).parent,
+    ) as cluster:
+        address = cluster.stdout.readline().strip()
+
+        def progress(done, total):
+            told.append(done)
+            if done == 3:
+                cluster.kill()
+
+        with pytest.raises(pteron.PteronError) as refused:
+            sweep(slow_rows, range(40), store, scheduler=address, progress=progress)
+    assert str(refused.value) == (
+        f"scheduler {address}: has ended, or its connection has; what is finished is kept: run it "
+        "again"
+    )
+    kept = len(store.finished())
+    assert told[-1] <= kept < 40
+    assert sweep(rows, range(40), store) == 40 - kept
+    assert store.scan().collect()["number"].to_list() == [k for k in range(40) for _ in range(3)]
+
+
 def test_the_store_of_another_plan_is_refused(delta, tmp_path):
     grid = pose_grid(delta, {"z": -0.9}, SPANS, points=4)
     map_index(delta, "condition", grid, out=tmp_path / "map.zarr")
     heavy = replace(delta, gravity=(0.0, 0.0, -1.6))
+    coarse = pose_grid(delta, {"z": -0.9}, SPANS, points=5)
     for robot, index, own, words in (
-        (heavy, "condition", grid, "another robot"),
+        (heavy, "condition", grid, r"robot delta: gravity \[0.0, 0.0, -9.81\], not \[0.0, 0.0"),
         (delta, "kappa", grid, r"index \['condition'\], not \['kappa'\]"),
-        (delta, "condition", pose_grid(delta, {"z": -0.9}, SPANS, points=5), "another grid"),
+        (delta, "condition", coarse, r"grid.axes\[1\].count 4, not 5; grid.axes\[2\].count 4"),
     ):
         with pytest.raises(OutputError, match=f"holds results of another plan .{words}"):
             map_index(robot, index, own, out=tmp_path / "map.zarr")

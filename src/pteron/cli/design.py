@@ -46,7 +46,11 @@ def design(
     ] = None,
     scheduler: Annotated[
         str | None,
-        option("scheduler", "A Dask scheduler whose workers do it: tcp://host:8786.", "ADDRESS"),
+        option(
+            "scheduler",
+            "A Dask cluster that does it, tcp://host:8786; it has no lock of its own.",
+            "ADDRESS",
+        ),
     ] = None,
     json: Json = False,
 ) -> None:

@@ -89,7 +89,11 @@ def workspace(
     ] = None,
     scheduler: Annotated[
         str | None,
-        option("scheduler", "A Dask cluster that does the work, tcp://host:8786.", "ADDRESS"),
+        option(
+            "scheduler",
+            "A Dask cluster that does the work, tcp://host:8786; it has no lock of its own.",
+            "ADDRESS",
+        ),
     ] = None,
     certify: Annotated[
         bool,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -78,12 +77,10 @@ class Task:
         return {one.name: getattr(self, one.name) for one in fields(self)}
 
     @property
-    def plan(self) -> dict[str, str]:
+    def plan(self) -> dict[str, Any]:
         """What makes its results what they are: the spec, the machine, and Pteron's version."""
-        spec = self.spec.model_dump_json(exclude={"robot"})
-        machine = text_of(self.robot)
-        key = hashlib.sha256(f"{spec}\n{machine}".encode()).hexdigest()[:16]
-        return {"spec": spec, "robot": self.robot.name, "sha256": key, "pteron": version("pteron")}
+        spec = self.spec.model_dump(mode="json", exclude={"robot"})
+        return {"robot": text_of(self.robot), "spec": spec, "pteron": version("pteron")}
 
     @cached_property
     def conditions(self) -> Conditions:

@@ -123,7 +123,8 @@ def surface_bytes(given: Map, ending: str) -> bytes:
     triangles = [part.triangles + start for part, start in zip(parts, starts, strict=False)]
     levels = sorted(part.level for part in parts if part.level is not None)
     numbers = [0 if part.level is None else 1 + levels.index(part.level) for part in parts]
-    kinds = [np.full(len(one), k, np.int32) for one, k in zip(triangles, numbers, strict=True)]
+    # VTK reads no shorter integers from its own legacy files.
+    kinds = [np.full(len(one), k, np.int64) for one, k in zip(triangles, numbers, strict=True)]
     mesh = meshio.Mesh(
         np.concatenate([part.points for part in parts]),
         [("triangle", np.concatenate(triangles).astype(np.int32))],

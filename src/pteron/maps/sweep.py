@@ -12,7 +12,7 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Callable, Collection, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack, contextmanager
 from functools import partial
 from importlib.metadata import version
@@ -30,6 +30,11 @@ _WAIT = 10.0
 
 _START = 300.0
 """Seconds in which processes of a computer that has much else to do are started."""
+
+_GONE = 60.0
+"""Seconds in which a cluster without any worker may get another."""
+
+_AGAIN = "what is finished is kept: run it again"
 
 _AHEAD = 4
 """Chunks for each thread that a cluster is given at once; a sweep may have millions."""
@@ -95,7 +100,8 @@ def sweep(
         If `dask.distributed` is not installed: ``pip install "pteron[cluster]"``.
     PteronError
         If the scheduler does not answer, has no workers, or those have another version of Pteron;
-        if a chunk ends one worker after another. What the function raises comes as it is.
+        if it ends meanwhile, or all its workers do, or a chunk ends one worker after another. What
+        the function raises comes as it is.
     """
     if scheduler is not None and workers is not None:
         raise DataError("scheduler and workers given; a scheduler has its own workers: give one")
@@ -160,23 +166,71 @@ def _elsewhere(
         future: Future[None] = client.submit(task, *one, pure=False)
         return future
 
-    with _client(scheduler, workers) as client:
-        ahead = _AHEAD * max(1, sum(client.nthreads().values()))
-        pending = distributed.as_completed([submitted(one) for one in islice(tasks, ahead)])
-        for future in pending:
-            try:
-                yield future.result()
-            except distributed.KilledWorker as error:
-                raise PteronError(
-                    f"a chunk has ended {error.allowed_failures + 1} workers one after another: do "
-                    "they have enough memory? What is finished is kept: run it again"
-                ) from None
-            for one in islice(tasks, 1):
-                pending.add(submitted(one))
+    where = "local workers" if scheduler is None else f"scheduler {scheduler}"
+    patience = _START if scheduler is None else _GONE
+    with _quiet(), _client(where, scheduler, workers) as client:
+        with _told_if_lost(where):
+            ahead = _AHEAD * max(1, sum(client.nthreads().values()))
+            pending = {submitted(one) for one in islice(tasks, ahead)}
+        alone = 0.0
+        while pending:
+            with _told_if_lost(where):
+                try:
+                    ready, pending = distributed.wait(pending, _WAIT, "FIRST_COMPLETED")
+                except TimeoutError:
+                    alone = 0.0 if client.nthreads() else alone + _WAIT
+                    ready = ()
+            if alone >= patience:
+                raise PteronError(f"{where}: has no workers any more; {_AGAIN}")
+            for future in ready:
+                alone = 0.0
+                yield _result(future, where)
+                with _told_if_lost(where):
+                    pending |= {submitted(one) for one in islice(tasks, 1)}
+
+
+def _result(future: Future[None], where: str) -> None:
+    """Take what a task gave, or raise what ended it."""
+    try:
+        future.result()
+    except _distributed().KilledWorker as error:
+        raise PteronError(
+            f"a chunk has ended {error.allowed_failures + 1} workers one after another: do they "
+            f"have enough memory? {_AGAIN}"
+        ) from None
+    except CancelledError:
+        raise _lost(where) from None
 
 
 @contextmanager
-def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
+def _told_if_lost(where: str) -> Iterator[None]:
+    """Say what has ended if a scheduler does not answer any more."""
+    try:
+        yield
+    except (CancelledError, OSError, RuntimeError):
+        raise _lost(where) from None
+
+
+def _lost(where: str) -> PteronError:
+    return PteronError(f"{where}: has ended, or its connection has; {_AGAIN}")
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Let no part of Dask log what is told in one line here."""
+    loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)
+
+
+@contextmanager
+def _client(where: str, scheduler: str | None, workers: int | None) -> Iterator[Any]:
     """Yield a client of a cluster that answers and has Pteron as it is here."""
     distributed = _distributed()
     with ExitStack() as opened:
@@ -188,9 +242,9 @@ def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
                 dashboard_address=None,
                 silence_logs=logging.CRITICAL,
             )
-            address, where = opened.enter_context(cluster), "local workers"
+            address = opened.enter_context(cluster)
         else:
-            address, where = scheduler, f"scheduler {scheduler}"
+            address = scheduler
         limit = _START if scheduler is None else _WAIT
         try:
             client = opened.enter_context(distributed.Client(address, timeout=limit))

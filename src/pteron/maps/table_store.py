@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pteron.atomic import make_folder, write_text
+from pteron.atomic import make_folder, write_bytes, write_text
 from pteron.errors import DataError, OutputError
 from pteron.maps.plan import expect_same
-from pteron.tables import write_table
+from pteron.tables import table_bytes
 
 if TYPE_CHECKING:
     import polars as pl
@@ -21,6 +22,9 @@ _ENDING = ".parquet"
 
 class TableStore:
     """Results of a sweep as tables: each chunk gives the rows of one Parquet file.
+
+    Its name is the chunk's number and a checksum of the plan, the number and the file. One that is
+    not as it was written counts as not finished, so that it is computed again.
 
     Parameters
     ----------
@@ -41,11 +45,14 @@ class TableStore:
         self.folder = make_folder(folder)
         file = self.folder / _PLAN
         wanted = json.loads(json.dumps(plan))
+        self._plan = json.dumps(wanted, sort_keys=True)
         if file.exists():
             try:
                 found = json.loads(file.read_text(encoding="utf-8"))
-            except (OSError, ValueError):
-                raise OutputError(f"{file}: cannot be read; remove {self.folder}") from None
+            except (OSError, ValueError, RecursionError):
+                raise OutputError(
+                    f"{file}: is damaged; remove {self.folder}, or name another place"
+                ) from None
             expect_same(self.folder, found, wanted)
         elif any(self.folder.iterdir()):
             raise OutputError(
@@ -55,12 +62,14 @@ class TableStore:
             write_text(file, json.dumps(wanted, indent=1) + "\n")
 
     def finished(self) -> frozenset[int]:
-        """Return the numbers of the chunks that are written."""
-        return frozenset(int(path.stem) for path in self.folder.glob(f"[0-9]*{_ENDING}"))
+        """Return the numbers of the chunks that are there as they were written."""
+        return frozenset(number for number, _ in self._whole())
 
     def write(self, number: int, result: pl.DataFrame) -> None:
         """Write a chunk's rows, through a temporary file and a rename."""
-        write_table(result, self.folder / f"{number:08d}{_ENDING}")
+        data = table_bytes(result, self.folder / f"{number}{_ENDING}")
+        name = f"{number:08d}-{self._checksum(number, data)}{_ENDING}"
+        write_bytes(self.folder / name, data)
 
     def scan(self) -> pl.LazyFrame:
         """Return all rows that are written, in the plan's order, read only as far as asked for.
@@ -72,7 +81,26 @@ class TableStore:
         """
         import polars as pl
 
-        files = sorted(self.folder.glob(f"[0-9]*{_ENDING}"))
+        files = [file for _, file in sorted(self._whole())]
         if not files:
             raise DataError(f"{self.folder}: no chunk is finished yet")
         return pl.scan_parquet(files, glob=False)
+
+    def _whole(self) -> Iterator[tuple[int, Path]]:
+        """Yield the number and the file of each chunk that is as it was written."""
+        seen = set()
+        for file in sorted(self.folder.glob(f"[0-9]*{_ENDING}")):
+            name = file.name.partition("-")[0]
+            if name not in seen and self._is_whole(file):
+                seen.add(name)
+                yield int(name), file
+
+    def _is_whole(self, file: Path) -> bool:
+        number, _, told = file.stem.partition("-")
+        try:
+            return number.isdecimal() and told == self._checksum(int(number), file.read_bytes())
+        except OSError:  # gone meanwhile, or it cannot be read
+            return False
+
+    def _checksum(self, number: int, data: bytes) -> str:
+        return hashlib.sha256(f"{self._plan} {number} ".encode() + data).hexdigest()[:16]
