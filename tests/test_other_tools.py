@@ -30,6 +30,7 @@ from pteron.export import (
     export_klipper,
     export_linuxcnc,
 )
+from pteron.motion import joint_points
 
 
 def driven(robot, **more):
@@ -421,6 +422,20 @@ def reversed_cranks(robot):
     return driven(replace(robot, legs=(first, turned, last)))
 
 
+def tooled(robot, tool):
+    """Return a machine with a tool."""
+    return replace(robot, platform=replace(robot.platform, tool=tool))
+
+
+def raised(robot, height):
+    """Return a machine that stands higher in its frame."""
+    legs = [
+        replace(leg, guide_point=tuple(np.add(leg.guide_point, (0.0, 0.0, height))))
+        for leg in robot.legs
+    ]
+    return replace(robot, legs=tuple(legs))
+
+
 KLIPPER = {
     "tripteron": CATALOG["tripteron"],
     "tripteron-router": driven(CATALOG["tripteron-router"]),
@@ -432,7 +447,24 @@ KLIPPER = {
     "mirrored": mirrored(CATALOG["linear-delta"]),
     "delta": CATALOG["delta"],
     "cranks": reversed_cranks(CATALOG["delta"]),
+    "cranks with a tool": tooled(CATALOG["delta"], (0.0, 0.0, -0.045)),
+    "raised cranks": tooled(raised(CATALOG["delta"], 1.1), (0.0, 0.0, -0.045)),
+    "cranks too high": raised(CATALOG["delta"], 2.0),
+    "guides with a tool": tooled(CATALOG["linear-delta"], (0.0, 0.0, -0.045)),
+    "guides on high": raised(CATALOG["linear-delta"], 0.5),
+    "guides below": raised(CATALOG["linear-delta"], -3.0),
+    "a tool aside": tooled(CATALOG["tripteron-oblique"], (0.01, -0.02, -0.045)),
 }
+
+
+def klippers(robot, poses, text):
+    """Return Klipper's x, y and z, mm, at poses: the tool's, from the bed."""
+    places = 1000.0 * (poses + np.array(robot.platform.tool))
+    bed = re.search(r"the bed, is the (pose|tool)'s z = (\S+) mm", text)
+    if bed:
+        assert bed[1] == ("tool" if any(robot.platform.tool) else "pose")
+        places[..., 2] -= float(bed[2])
+    return places
 
 
 @pytest.mark.parametrize("name", KLIPPER)
@@ -440,9 +472,6 @@ def test_klipper_puts_the_joints_where_the_library_does(tmp_path, name):
     robot = KLIPPER[name]
     config, text = settings(robot, tmp_path)
     rotary = config["printer"]["kinematics"] == "rotary_delta"
-    shift = 0.0
-    if rotary:
-        shift = float(re.search(r"the bed, is the pose's z = (\S+) mm", text)[1])
     poses = lowered(robot) if rotary else states(robot, 50)[0]
     assert len(poses) > 10
     joints = pteron.inverse_kinematics(robot, poses)
@@ -452,7 +481,7 @@ def test_klipper_puts_the_joints_where_the_library_does(tmp_path, name):
         zip(klipper_steppers(config), told, strict=True)
     ):
         assert joint == f"{robot.legs[i].joint.coordinate}{i + 1}"
-        found = stepper(1000.0 * poses - [0.0, 0.0, shift])
+        found = stepper(klippers(robot, poses, text))
         expected = unit * joints[:, i] * (-1.0 if sign else 1.0)
         apart = found - expected
         if rotary:  # whole turns left out
@@ -475,6 +504,69 @@ def test_klippers_end_stops_are_the_joints_upper_limits(tmp_path, name):
         scale = 1000.0 if unit == "mm" else 1.0
         (found,) = stepper(np.array([[0.0, 0.0, end]]))
         assert found == pytest.approx(scale * limit + float(side + offset), abs=1e-6 * scale)
+
+
+DELTAS = [name for name in KLIPPER if "delta" in name or "cranks" in name or "guides" in name]
+
+
+@pytest.mark.parametrize("name", DELTAS)
+def test_klipper_homes_a_delta_and_reaches_its_bed(tmp_path, name):
+    """`home` of rotary_delta.py comes from z = -1, that of delta.py from far below."""
+    robot = KLIPPER[name]
+    config, text = settings(robot, tmp_path)
+    printer, towers = config["printer"], [config[f"stepper_{k}"] for k in "abc"]
+    ends = [float(tower["position_endstop"]) for tower in towers]
+    assert min(ends) > 0.0  # stepper.py refuses one below position_min, which is 0
+    if printer["kinematics"] == "rotary_delta":
+        start = -1.0
+        shoulder = float(printer["shoulder_radius"])
+        most = min(
+            shoulder + min(float(tower["upper_arm_length"]) for tower in towers),
+            min(float(tower["lower_arm_length"]) for tower in towers) - shoulder,
+        )
+    else:
+        radius = float(printer["delta_radius"])
+        arms = [float(tower["arm_length"]) for tower in towers]
+        most = min(radius, min(arms) - radius)
+        start = -1.5 * np.sqrt(max(arms) ** 2 - most**2)
+    way = np.zeros((200, 3))
+    way[:, 2] = np.linspace(start, min(ends), 200)
+    for stepper in klipper_steppers(config):
+        steps = stepper(way)
+        assert np.isfinite(steps).all()
+        assert np.abs(np.diff(steps)).max() < 0.1 * np.ptp(steps)  # no elbow jumps
+    told = re.search(r"At the bed P reaches (\d+) mm", text)
+    reach = float(told[1]) if told else most
+    assert reach > 0.5 * most
+    turns = np.linspace(0.0, 2.0 * np.pi, 100)
+    rim = np.stack([np.cos(turns), np.sin(turns), np.zeros(100)], axis=-1) * 0.99 * reach
+    bed = klippers(robot, np.zeros(3), text)
+    joints = pteron.inverse_kinematics(robot, (rim - bed) / 1000.0)
+    for leg, values in zip(robot.legs, joints.T, strict=True):
+        assert leg.limits[0] <= values.min()
+        assert values.max() <= leg.limits[1]
+
+
+def test_a_tool_beside_the_axis_is_told_to_a_delta(tmp_path):
+    robot = tooled(CATALOG["delta"], (0.01, -0.02, -0.045))
+    config, text = settings(robot, tmp_path)
+    assert "SET_GCODE_OFFSET X=-10 Y=20 makes them the tool's" in " ".join(
+        re.sub(r"^# ", "", text, flags=re.MULTILINE).split()
+    )
+    plain, _ = settings(tooled(robot, (0.0, 0.0, -0.045)), tmp_path)
+    assert {k: dict(v) for k, v in config.items()} == {k: dict(v) for k, v in plain.items()}
+
+
+def test_klippers_box_is_the_tools(tmp_path):
+    """The steppers are where they were while the tool is where P was."""
+    aside = np.array([0.01, -0.02, -0.045])
+    limited = [replace(leg, limits=(-0.05, 0.11)) for leg in CATALOG["tripteron-router"].legs]
+    robot = replace(CATALOG["tripteron-router"], legs=tuple(limited))
+    (box, _), (moved, _) = (settings(tooled(robot, tool), tmp_path) for tool in ((0, 0, 0), aside))
+    for axis, way in zip("xyz", 1000.0 * aside, strict=True):
+        for key in ("position_min", "position_max"):
+            least, most = (float(c[f"carriage {axis}"][key]) for c in (box, moved))
+            assert most - least == pytest.approx(way, abs=1e-3)
 
 
 def test_klippers_box_keeps_the_joints_limits(tmp_path):
@@ -525,6 +617,10 @@ LINEAR, DELTA = CATALOG["linear-delta"], CATALOG["delta"]
         (with_elbows(LINEAR, "+++"), "leg 1: its slider is below the platform"),
         (with_elbows(DELTA, "+-+"), "leg 2: its elbow is inside"),
         (with_leg(DELTA, platform_point=(-0.0625, 0.1, 0.0)), "leg 2: its crank's plane passes"),
+        (
+            replace(DELTA, legs=tuple(replace(leg, limits=(3.0, 3.1)) for leg in DELTA.legs)),
+            "nowhere well in reach below its end stops",
+        ),
         (
             with_leg(DELTA, platform_point=(-0.0625, 0.10825317547305482, 0.02)),
             "leg 2: has its shoulder at z = -20 mm, leg 1 0 mm",
@@ -597,11 +693,21 @@ LINUXCNC = {name: ROBOTS[name] for name in ("par4", "five-bar", "3-rrr", "mixed"
     "mühle": replace(CATALOG["linear-delta"], name="mühle"),
     "sideways": pteron.turned(CATALOG["quadrupteron"], [[0, 0, 1], [1, 0, 0], [0, 1, 0]]),
     "h4": CATALOG["h4"],
+    "turning tool": tooled(CATALOG["quadrupteron"], (0.01, -0.02, -0.045)),
+    "3-rrr with a tool": tooled(CATALOG["3-rrr"], (0.03, -0.02, 0.5)),
+    "five-bar with a tool": tooled(CATALOG["five-bar"], (0.03, -0.02, 0.5)),
+    "sideways with a tool": tooled(
+        pteron.turned(CATALOG["quadrupteron"], [[0, 0, 1], [1, 0, 0], [0, 1, 0]]),
+        (0.01, -0.02, -0.045),
+    ),
     "cranks": KLIPPER["cranks"],
 }
 """The second of the last one's cranks passes half a turn within its limits, as the five-bar's."""
 
-ANGLE = {"upside": ("c", -1.0), "sideways": ("a", 1.0)}
+ANGLE = {
+    "upside": ("c", -1.0),
+    **dict.fromkeys(("sideways", "sideways with a tool"), ("a", 1.0)),
+}
 
 
 @pytest.mark.parametrize("name", LINUXCNC)
@@ -612,14 +718,14 @@ def test_linuxcnc_goes_to_the_joints_and_back(tmp_path, name):
     n, degrees = robot.freedom, 180.0 / np.pi
     units = [degrees if leg.joint.unit == "rad" else 1000.0 for leg in robot.legs]
     letter, sign = ANGLE.get(name, ("c", 1.0))
-    lengths = len(robot.platform.lengths)
     joints = (ctypes.c_double * 16)(*[77.0] * 16)
     poses = states(robot, 20)[0] if name != "cranks" else lowered(robot, 20)
     poses = poses.copy()
     if robot.platform.turns and not robot.platform.slides and name != "mixed":
         poses[::2, -1] += 4.0 * np.pi  # a whole turn more is kept
     for pose in poses:
-        given = dict(zip("xyz", 1000.0 * pose[:lengths], strict=False))
+        place = robot.platform.directions @ joint_points(robot, pose).tool
+        given = dict(zip("xyz", 1000.0 * place, strict=False))
         if robot.platform.turns:
             given[letter] = sign * degrees * pose[-1]
         world = EmcPose(**given, w=5.0)
@@ -662,9 +768,10 @@ def test_linuxcncs_files_tell_home_and_limits(tmp_path):
     assert files["hal"].read_text().count("motor-pos-fb") == 4
 
 
+@pytest.mark.parametrize("tool", [(0.0, 0.0, 0.0), (0.01, -0.02, -0.045)])
 @pytest.mark.parametrize("name", ["tripteron-oblique", "random 3T 0"])
-def test_matrixkins_moves_the_joints_as_the_library_does(tmp_path, name):
-    robot = MECHANISMS[name]
+def test_matrixkins_moves_the_joints_as_the_library_does(tmp_path, name, tool):
+    robot = tooled(MECHANISMS[name], tool)
     *_, path = export_linuxcnc(robot, tmp_path)
     text = path.read_text()
     values = dict(re.findall(r"setp matrixkins\.C_(\w\w) (\S+)", text))
@@ -673,7 +780,8 @@ def test_matrixkins_moves_the_joints_as_the_library_does(tmp_path, name):
     offsets = [float(side + size) for side, size in told]
     poses = states(robot, 20)[0]
     joints = 1000.0 * pteron.inverse_kinematics(robot, poses) + offsets
-    np.testing.assert_allclose(1000.0 * poses @ rows.T, joints, 0.0, 1e-6)
+    places = 1000.0 * joint_points(robot, poses).tool
+    np.testing.assert_allclose(places @ rows.T, joints, 0.0, 1e-6)
 
 
 # The command line

@@ -25,6 +25,7 @@ from pteron.kernels.code import rendered
 from pteron.kinematics import inverse_kinematics, jacobian
 from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.platforms import Platform
 
 _MILLIMETRES = 1000.0
 _DEGREES = 180.0 / math.pi
@@ -56,12 +57,49 @@ class _Joint:
     """The last four in mm or degrees, the speed per second; None where the file has none."""
 
 
+@dataclass(frozen=True)
+class _Arm:
+    """The way from P to the tool, m along the pose's lengths: still + cos phi a + sin phi b."""
+
+    still: Array
+    cosine: Array
+    sine: Array
+
+    @classmethod
+    def of(cls, platform: Platform) -> _Arm:
+        x, y, z = (platform.directions @ axis for axis in platform.frame)
+        a, b, c = platform.tool
+        if not platform.turns:
+            return cls(a * x + b * y + c * z, np.zeros_like(x), np.zeros_like(x))
+        return cls(c * z, a * x + b * y, a * y - b * x)
+
+    def __bool__(self) -> bool:
+        return any(part.any() for part in (self.still, self.cosine, self.sine))
+
+    @property
+    def turns(self) -> bool:
+        """Whether it hangs on phi."""
+        return bool(self.cosine.any())
+
+    @property
+    def rows(self) -> list[list[float]]:
+        """The three numbers of each length."""
+        return np.stack([self.still, self.cosine, self.sine], axis=-1).tolist()
+
+    def at(self, pose: Array) -> Array:
+        """Return it at a pose (m,), with 0 for the angle."""
+        place = np.zeros_like(pose)
+        turned = np.cos(pose[-1]) * self.cosine + np.sin(pose[-1]) * self.sine
+        place[: len(self.still)] = self.still + turned
+        return place
+
+
 def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
     """Write a machine's kinematics for LinuxCNC, with lines for its INI and HAL files.
 
     The component is built by `halcompile --install NAMEkins.comp` and gives LinuxCNC 2.8 and 2.9
     `kinematicsForward`, `kinematicsInverse` and `kinematicsType`. Axes X, Y and Z are the position
-    of P, in mm; for planar machines X and Y are the pose's two lengths; phi, in degrees, is A, B or
+    of the tool, in mm; for planar machines X and Y are its two lengths; phi, in degrees, is A, B or
     C where the platform turns about x, y or z, else C. Joints are in mm or degrees. Of the poses
     that joints allow, forward kinematics return the one nearest to the last.
 
@@ -102,6 +140,8 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
     texts = c_texts(robot, exported)
     home = start_pose(robot)
     axes, joints = _axes(robot), tuple(_joints(robot, home))
+    arm = _Arm.of(robot.platform)
+    seen = home + arm.at(home)
     values = {
         "banner": [line for line in banner(robot, "LinuxCNC") if "SI units" not in line],
         "prefix": prefix,
@@ -115,12 +155,11 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
         "modes": exported[1].outputs[0].shape[0] if closed else 0,
         "lengths": len(robot.platform.lengths),
         "free": _turns_freely(robot),
-        "home": dict(zip((axis.letter for axis in axes), home, strict=True)),
         "places": [
             next(
                 (
                     f"{axis.scale * value:.6f}"
-                    for axis, value in zip(axes, home, strict=True)
+                    for axis, value in zip(axes, seen, strict=True)
                     if axis.letter == letter
                 ),
                 "0",
@@ -128,7 +167,7 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
             for letter in "XYZABC"
         ],
         "planar": robot.platform.planar,
-        "tool": [_MILLIMETRES * v for v in robot.platform.tool],
+        "arm": arm,
         "number": repr,
     }
     files = {
@@ -138,7 +177,8 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
     }
     if _linear(robot):
         rows = np.asarray(jacobian(robot, np.zeros(3)))
-        offsets = _MILLIMETRES * np.asarray(unchecked(robot, "joint_coordinates", np.zeros(3)))
+        zero = np.asarray(unchecked(robot, "joint_coordinates", np.zeros(3)))
+        offsets = _MILLIMETRES * (zero - rows @ arm.still)
         files[f"{prefix}_matrixkins.hal"] = rendered(
             "pteron.export", "matrixkins.hal.j2", rows=rows.tolist(), offsets=offsets, **values
         )

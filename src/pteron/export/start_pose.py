@@ -47,8 +47,18 @@ def good_poses(robot: Manipulator) -> Array:
     return poses[keeps_limits(robot, poses)]
 
 
+def measures_of(robot: Manipulator, poses: Array) -> Array:
+    """Return how far poses (..., m) are from singular: the worst type-I or twice the type-II.
+
+    It is NaN where a leg does not reach, or a joint is beyond its limits.
+    """
+    kept = keeps_limits(robot, poses)
+    found = np.full(kept.shape, np.nan)
+    found[kept] = _measures(robot, poses[kept])
+    return found
+
+
 def _measures(robot: Manipulator, poses: Array) -> Array:
-    """Return how far poses (..., m) are from singular: the worst type-I or twice the type-II."""
     bent = np.sqrt(unchecked(robot, "squared_type_i", poses).min(axis=-1))
     held = 2.0 * np.abs(unchecked(robot, "type_ii", poses))
     return np.asarray(np.minimum(bent, held))

@@ -12,6 +12,7 @@ from itertools import product
 import numpy as np
 
 from pteron.errors import ModelError
+from pteron.export.klipper.bed import tool_of
 from pteron.export.klipper.sections import INSTEAD, PINS, SPEEDS, Section, rotation_distance, signed
 from pteron.kernels import Array
 from pteron.kinematics import inverse_kinematics, jacobian
@@ -34,7 +35,11 @@ def cartesian(robot: Manipulator) -> Iterator[Section]:
         If Klipper would hold the directions for dependent.
     """
     rows = np.asarray(jacobian(robot, np.zeros(3)))
-    offsets = 1000.0 * np.asarray(unchecked(robot, "joint_coordinates", np.zeros(3)))
+    tool = tool_of(robot)
+    # The joints where the tool is at zero.
+    offsets = 1000.0 * (
+        np.asarray(unchecked(robot, "joint_coordinates", np.zeros(3))) - rows @ tool
+    )
     size = float(np.linalg.det(rows.T @ rows))
     if size < _LEAST_DETERMINANT:
         raise ModelError(
@@ -42,7 +47,7 @@ def cartesian(robot: Manipulator) -> Iterator[Section]:
             f"Klipper, which asks for 1e-5, refuses them; {INSTEAD}"
         )
     yield Section("printer", (("kinematics", "generic_cartesian"), *SPEEDS))
-    box, comments = _box(robot, rows, offsets)
+    box, comments = _box(robot, rows, offsets, tool)
     straight = ((np.abs(rows) > ZERO).sum(axis=1) == 1).all()
     homing = (
         "Each slider moves along one axis: its end stop is that axis' own."
@@ -87,7 +92,7 @@ def _sum(row: Array) -> str:
 
 
 def _box(
-    robot: Manipulator, rows: Array, offsets: Array
+    robot: Manipulator, rows: Array, offsets: Array, tool: Array
 ) -> tuple[list[tuple[str | None, str | None]], tuple[str, ...]]:
     """Return ranges of x, y and z, mm, that keep the joints' limits, and what to say of them."""
     if any(leg.limits is None for leg in robot.legs):
@@ -102,7 +107,9 @@ def _box(
         if len(own) == 1 and (np.abs(rows[:, own[0]]) > ZERO).sum() == 1:
             sides[own[0]] = reach / abs(row[own[0]])
     grid = middle + sides * np.array(list(product(np.linspace(-1.0, 1.0, 9), repeat=3)))
-    reached = np.isfinite(inverse_kinematics(robot, grid / 1000.0, on_failure="nan")).all(axis=1)
+    reached = np.isfinite(inverse_kinematics(robot, grid / 1000.0 - tool, on_failure="nan")).all(
+        axis=1
+    )
     told = ["This box keeps the joints' limits; Klipper checks the box and no leg's reach."]
     if not reached.all():
         share = 100.0 * (1.0 - reached.mean())

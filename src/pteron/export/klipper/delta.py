@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from pteron.export.klipper.bed import bed, told_bed, tool_of
 from pteron.export.klipper.centers import SAME, Center, common, degrees, end_stop
 from pteron.export.klipper.sections import (
     PINS,
@@ -43,6 +44,11 @@ def delta(robot: Manipulator, centers: Sequence[Center]) -> Iterator[Section]:
         if not (height > poses[:, 2]).all():
             told = "its slider is below the platform, and Klipper has it above: turn the model over"
             raise differs(robot, i, told, "delta")
+    ends = [
+        _ends(robot.legs[center.leg].limits, center.at[2], rise, math.sqrt(arm**2 - radius**2))
+        for center, rise, arm in zip(centers, rises, arms, strict=True)
+    ]
+    level, told = _bed(robot, radius, arms, ends)
     yield Section(
         "printer",
         (
@@ -52,15 +58,14 @@ def delta(robot: Manipulator, centers: Sequence[Center]) -> Iterator[Section]:
             ("minimum_z_position", None),
             ("print_radius", None),
         ),
-        ("Klipper's z is the pose's z, in mm.",),
+        told,
     )
-    for name, center, rise, arm, angle in zip("abc", centers, rises, arms, angles, strict=True):
+    for name, center, rise, arm, angle, pair in zip(
+        "abc", centers, rises, arms, angles, ends, strict=True
+    ):
         leg = robot.legs[center.leg]
         joint = f"{leg.joint.coordinate}{center.leg + 1}"
-        top = None
-        if leg.limits is not None:
-            highest = center.at[2] + rise * leg.limits[1 if rise > 0.0 else 0]
-            top = mm(highest - math.sqrt(arm**2 - radius**2))
+        top = None if pair is None else mm(pair[1] - level)
         yield Section(
             f"stepper_{name}",
             (
@@ -73,10 +78,36 @@ def delta(robot: Manipulator, centers: Sequence[Center]) -> Iterator[Section]:
             ),
             (
                 f"Its position is {'' if rise > 0.0 else '-'}{joint} in mm "
-                f"{signed(1000.0 * center.at[2])} mm.",
+                f"{signed(1000.0 * (center.at[2] - level))} mm.",
                 *end_stop(top, "carriage"),
             ),
         )
+
+
+def _ends(
+    limits: tuple[float, float] | None, foot: float, rise: float, below: float
+) -> tuple[float, float] | None:
+    """Return P's z on the axis with a carriage as low, and as high, as its limits let it."""
+    if limits is None:
+        return None
+    low, high = sorted(foot + rise * limit - below for limit in limits)
+    return low, high
+
+
+def _bed(
+    robot: Manipulator,
+    radius: float,
+    arms: Sequence[float],
+    ends: Sequence[tuple[float, float] | None],
+) -> tuple[float, tuple[str, ...]]:
+    """Return P's z at Klipper's bed, and what is said of it."""
+    most = min(radius, min(arms) - radius)
+    known = [pair for pair in ends if pair is not None]
+    if not known:  # the builder's end stops are anywhere
+        level = -float(tool_of(robot)[2])
+        return level, told_bed(robot, level, most, most)
+    level, good = bed(robot, most, max(low for low, _ in known), min(high for _, high in known))
+    return level, told_bed(robot, level, good, most)
 
 
 def _longer(robot: Manipulator, arms: Sequence[float], radius: float) -> None:

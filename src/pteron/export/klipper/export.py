@@ -30,8 +30,9 @@ def export_klipper(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
 
     A machine whose joints are linear in the pose, as a Tripteron, becomes `generic_cartesian`; a
     Delta with vertical guides `delta`; one with cranks `rotary_delta`, if its towers or shoulders
-    stand as regularly as Klipper has them. X, Y and Z are the position of P in mm, not of the tool.
-    Pins, speeds and homing are left to who builds the machine.
+    stand as regularly as Klipper has them. X, Y and Z are the tool's position in mm; Klipper's
+    Deltas have no place for a tool beside the z axis, and the file says so. Pins, speeds and homing
+    are left to who builds the machine.
 
     Parameters
     ----------
@@ -75,7 +76,7 @@ def export_klipper(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
         "klipper.cfg.j2",
         banner=[line for line in banner(robot, "Klipper configuration") if "SI units" not in line],
         sections=sections,
-        tool=[1000.0 * v for v in robot.platform.tool],
+        tool=any(robot.platform.tool),
     )
     return write_texts(folder, {f"{prefix}.cfg": text})
 

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from pteron.errors import ModelError
+from pteron.export.klipper.bed import bed, told_bed
 from pteron.export.klipper.centers import SAME, Center, common, degrees, end_stop
 from pteron.export.klipper.sections import (
     INSTEAD,
@@ -47,31 +48,29 @@ def rotary(robot: Manipulator, centers: Sequence[Center]) -> Iterator[Section]:
     height = common(robot, heights, "has its shoulder at z = {:.6g} mm", kind)
     uppers = [float(np.linalg.norm(center.along)) for center in centers]
     arms = [center.radius for center in centers]
-    bed = _bed(robot, radius, height, uppers, arms)
     _outside(robot, centers, lifts, zeros, height)
     tops = [
         _rotary_top(robot.legs[k].limits, lift, zero, radius, upper, arm)
         for k, (lift, zero, upper, arm) in enumerate(zip(lifts, zeros, uppers, arms, strict=True))
     ]
+    highest = min((top for top in tops if top is not None), default=0.0)
+    level, told = _bed(robot, radius, height, uppers, arms, highest)
     yield Section(
         "printer",
         (
             ("kinematics", kind),
             *SPEEDS,
             ("shoulder_radius", mm(radius)),
-            ("shoulder_height", mm(height - bed)),
+            ("shoulder_height", mm(height - level)),
             ("minimum_z_position", None),
         ),
-        (
-            f"Klipper's z = 0, the bed, is the pose's z = {1000.0 * bed:.6g} mm.",
-            "Its z counts from there; for another bed change shoulder_height and the end stops.",
-        ),
+        (*told, "For another bed change shoulder_height and the end stops."),
     )
     for k, name in enumerate("abc"):
         leg = robot.legs[k]
         joint = f"{leg.joint.coordinate}{k + 1}"
         top = tops[k]
-        end = None if top is None else mm(height + top - bed)
+        end = None if top is None else mm(height + top - level)
         yield Section(
             f"stepper_{name}",
             (
@@ -124,17 +123,23 @@ def _outside(
 
 
 def _bed(
-    robot: Manipulator, radius: float, height: float, uppers: Sequence[float], arms: Sequence[float]
-) -> float:
-    """Return the pose's z of Klipper's bed: 0 if the shoulders are above it, else the lowest z."""
-    if height > SAME:
-        return 0.0
+    robot: Manipulator,
+    radius: float,
+    height: float,
+    uppers: Sequence[float],
+    arms: Sequence[float],
+    top: float,
+) -> tuple[float, tuple[str, ...]]:
+    """Return P's z at Klipper's bed, and what is said of it."""
     lengths = [upper + arm for upper, arm in zip(uppers, arms, strict=True)]
     for i, length in enumerate(lengths, start=1):
         if length <= radius:
             raise differs(robot, i, "its arms do not reach the z axis", "rotary_delta")
     reach = math.sqrt(min(lengths) ** 2 - radius**2)
-    return math.floor(1000.0 * (height - reach)) / 1000.0
+    # Klipper lets the tool go so far from the axis, whatever the legs reach.
+    most = min(radius + min(uppers), min(arms) - radius)
+    level, good = bed(robot, most, height - reach, height + top)
+    return level, told_bed(robot, level, good, most)
 
 
 def _rotary_top(
