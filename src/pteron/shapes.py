@@ -8,14 +8,21 @@ in a plane, without phi where the platform does not turn.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Literal, Protocol, runtime_checkable
+from typing import Annotated, Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
+from pteron.arguments import Between
+
 OnFailure = Literal["raise", "nan"]
 """What a batch function does with a pose it cannot serve: raise the error, or return NaN there."""
+
+Seed = Annotated[int, Between(0)]
+"""Where the randomness of a result comes from: the same seed, the same result."""
+Workers = Annotated[int, Between(1, 1024)]
+"""Processes or threads that share the work."""
 
 
 @runtime_checkable

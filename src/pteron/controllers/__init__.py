@@ -1,5 +1,6 @@
 """Controllers: laws that turn what is wanted and what is measured into forces of the drives."""
 
+from pteron.arguments import check_arguments
 from pteron.controllers.adaptive import Adaptive
 from pteron.controllers.computed_torque import ComputedTorque
 from pteron.controllers.controller import Controller
@@ -27,6 +28,7 @@ __all__ = [
     "PDGravity",
     "joint_masses",
 ]
+check_arguments(__name__)
 
 
 def __dir__() -> list[str]:

@@ -1,5 +1,6 @@
 """Which dimensions are best: searches over a machine's geometry, with proofs of what they find."""
 
+from pteron.arguments import check_arguments
 from pteron.design.changes import Change
 from pteron.design.design import Design
 from pteron.design.front import Front
@@ -40,6 +41,7 @@ __all__ = [
     "survey",
     "workspace_proofs",
 ]
+check_arguments(__name__)
 
 
 def __dir__() -> list[str]:

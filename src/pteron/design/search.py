@@ -25,6 +25,7 @@ from pteron.design.task import FAILED, Task
 from pteron.errors import DataError, ModelError
 from pteron.kernels import Array
 from pteron.maps import TableStore, sweep
+from pteron.shapes import Workers
 
 if TYPE_CHECKING:
     import polars as pl
@@ -41,7 +42,7 @@ def search(
     *,
     folder: str | Path | None = None,
     seed: int | None = None,
-    workers: int | None = None,
+    workers: Workers | None = None,
     scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> Front:
@@ -222,8 +223,6 @@ def _workers(count: int | None, scheduler: str | None) -> Iterator[str | None]:
     if count is None:
         yield scheduler
         return
-    if count < 1:
-        raise DataError(f"workers: {count} given, 1 or more expected")
     try:
         import distributed
     except ImportError:

@@ -18,6 +18,7 @@ from pteron.design.task import Task
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.maps import TableStore, sweep
+from pteron.shapes import Workers
 
 if TYPE_CHECKING:
     import polars as pl
@@ -31,7 +32,7 @@ def survey(
     count: int,
     folder: str | Path,
     *,
-    workers: int | None = None,
+    workers: Workers | None = None,
     scheduler: str | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Front:

@@ -1,5 +1,6 @@
 """Dynamics in numbers: batched, validated, documented."""
 
+from pteron.arguments import check_arguments
 from pteron.dynamics.forces import (
     drive_accelerations,
     drive_forces,
@@ -29,6 +30,7 @@ __all__ = [
     "potential_energy",
     "regressor",
 ]
+check_arguments(__name__)
 
 
 def __dir__() -> list[str]:

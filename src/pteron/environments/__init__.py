@@ -11,6 +11,7 @@ except ImportError:
         'pip install "pteron[gymnasium]"'
     ) from None
 
+from pteron.arguments import check_arguments
 from pteron.environments.batch import PteronVectorEnv
 from pteron.environments.single import PteronEnv
 from pteron.environments.world import World
@@ -30,6 +31,7 @@ if REACH not in gymnasium.registry:
     )
 
 __all__ = ["EPISODE", "REACH", "PteronEnv", "PteronVectorEnv", "World"]
+check_arguments(__name__)
 
 
 def __dir__() -> list[str]:

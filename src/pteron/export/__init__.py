@@ -1,5 +1,6 @@
 """The machine for others: code for a controller, files for engines, models for other tools."""
 
+from pteron.arguments import check_arguments
 from pteron.export.c import Real, export_c
 from pteron.export.casadi_functions import casadi_functions, export_casadi
 from pteron.export.engines import (
@@ -39,6 +40,7 @@ __all__ = [
     "pinocchio_model",
     "tree",
 ]
+check_arguments(__name__)
 
 
 def __dir__() -> list[str]:

@@ -30,7 +30,7 @@ from pteron.export.descriptions import banner
 from pteron.export.fmu_variables import layout
 from pteron.export.functions import chosen
 from pteron.export.start_pose import start_pose
-from pteron.kernels import Array
+from pteron.kernels import Array, as_array
 from pteron.kernels.c import c_compiler
 from pteron.kernels.code import rendered
 from pteron.kinematics import inverse_kinematics
@@ -145,7 +145,7 @@ def export_fmu(
 
 def _expected(robot: Manipulator, pose: ArrayLike) -> Array:
     """Return the pose to start from, after a check that the machine can be there."""
-    given = np.asarray(pose, dtype=float)
+    given = as_array(pose, "pose", np.shape(pose))
     if given.shape != (robot.freedom,):
         names = ", ".join(robot.platform.coordinates)
         raise DataError(f"pose: shape {given.shape} given, ({robot.freedom},) expected: {names}")

@@ -6,6 +6,7 @@ real bodies, `excitation` makes the motions worth recording. `estimate` takes a 
 robot.
 """
 
+from pteron.arguments import check_arguments
 from pteron.identification import consistency, estimators, excitation, logs, signals
 from pteron.identification.consistency import Bounds, Consistency, consistent_model
 from pteron.identification.drive_gains import DriveGains, identify_drive_gains
@@ -101,6 +102,7 @@ __all__ = [
     "weighted",
     "write_log",
 ]
+check_arguments(__name__)
 
 
 def __dir__() -> list[str]:

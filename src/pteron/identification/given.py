@@ -73,7 +73,7 @@ def finite(given: ArrayLike, place: str) -> Array:
     except (TypeError, ValueError):
         raise DataError(f"{place}: an array of numbers expected") from None
     if not np.isfinite(numbers).all():
-        where = tuple(int(k[0]) for k in np.nonzero(~np.isfinite(numbers)))
+        where = tuple(int(k) for k in np.argwhere(~np.isfinite(numbers))[0])
         raise DataError(
             f"{place}: {numbers[where]} at {list(where)}, a finite number expected; leave out "
             "samples that are not known, of regressor and forces"

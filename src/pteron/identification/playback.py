@@ -13,6 +13,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from pteron.errors import DataError, shown
 from pteron.identification.logs import Description, Log, LogFile, find_description, read_log
 from pteron.identification.signals import States, preprocessing_of, samples, spline_motion
 from pteron.kernels import Array
@@ -94,6 +95,11 @@ def playback(robot: Manipulator, motion: Given, start: PoseLike | None = None) -
         motion = read_motion(robot, motion)
     if isinstance(motion, Log):
         return of_log(robot, motion)
+    if not isinstance(motion, Table):
+        raise DataError(
+            f"motion: {shown(motion)} given; a Motion, a Simulation, a Table, a Log or a file's "
+            "path expected"
+        )
     return of_table(robot, motion, start)
 
 

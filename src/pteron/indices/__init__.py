@@ -1,5 +1,6 @@
 """How good a machine is at a pose: indices of performance, stiffness, errors and reactions."""
 
+from pteron.arguments import check_arguments
 from pteron.indices.compliance import Stiffness, stiffness
 from pteron.indices.conditioning import GlobalConditioning, global_conditioning
 from pteron.indices.elasticity import ALUMINIUM, STEEL, Elasticity, Material, Section
@@ -31,6 +32,7 @@ __all__ = [
     "reactions",
     "stiffness",
 ]
+check_arguments(__name__)
 
 
 def __dir__() -> list[str]:

@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import qmc  # type: ignore[import-untyped]
 
+from pteron.arguments import expect_to_fit
 from pteron.errors import DataError, ModelError
 from pteron.indices.evaluation import evaluate
 from pteron.kernels import as_array, numeric
 from pteron.kinematics.evaluate import checked_one
 from pteron.manipulator import RobotLike, as_manipulator
-from pteron.shapes import PoseLike
+from pteron.shapes import PoseLike, Seed
 from pteron.workspace import bounding_box
 from pteron.workspace.reserve import room_to_limits
 
@@ -50,7 +51,7 @@ def global_conditioning(
     box: ArrayLike | None = None,
     points: bool = False,
     count: int = 1 << 16,
-    seed: int = 0,
+    seed: Seed = 0,
 ) -> GlobalConditioning:
     """Return the global conditioning index: the integral of 1 / kappa over that of 1.
 
@@ -92,6 +93,7 @@ def global_conditioning(
     robot = as_manipulator(robot)
     if count < 1:
         raise DataError(f"count: {count} given, at least 1 expected")
+    expect_to_fit("count", count, 4.0 * count / _GROUPS * robot.freedom)
     given = checked_one(robot, pose, "pose")
     if box is None:
         low, high = np.array([given, given])

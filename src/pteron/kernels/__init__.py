@@ -3,6 +3,7 @@
 Batching, threads and caching live here and only here.
 """
 
+from pteron.arguments import check_arguments
 from pteron.kernels.bounds import Bounded, bounded, bounds
 from pteron.kernels.choice import numeric
 from pteron.kernels.fields import Field, NoSquareRoot, PrimeField, RationalField, evaluate
@@ -66,6 +67,8 @@ __all__ = [
     "same_layout",
     "specialised",
 ]
+# The others serve the floors above, in inner loops.
+check_arguments(__name__, ("bounded", "bounds", "compile"))
 
 
 def __dir__() -> list[str]:

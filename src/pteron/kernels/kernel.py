@@ -282,7 +282,7 @@ def _converted(value: ArrayLike, name: str, dtype: str) -> Array:
     value = unmasked(value, name)
     try:
         given = np.asarray(value)
-        if given.dtype.kind not in "biufO":
+        if given.dtype.kind not in "iufO":
             raise TypeError
         if given.dtype.kind == "O" and any(isinstance(v, str | bytes) for v in given.flat):
             raise TypeError

@@ -1,5 +1,6 @@
 """Kinematics in numbers: batched, validated, documented."""
 
+from pteron.arguments import check_arguments
 from pteron.kinematics.architecture import Architecture, architecture, is_singular_everywhere
 from pteron.kinematics.constraints import constraint_measure
 from pteron.kinematics.direct import (
@@ -44,6 +45,7 @@ __all__ = [
     "singular_orientations",
     "working_mode",
 ]
+check_arguments(__name__)
 
 
 def __dir__() -> list[str]:

@@ -7,12 +7,13 @@ from operator import itemgetter
 import casadi as ca
 import numpy as np
 
+from pteron.arguments import expect_to_fit
 from pteron.equations.kinematics import passive_joints
 from pteron.equations.machine import Machine
 from pteron.errors import DataError, ModelError
 from pteron.kernels import Array, numeric
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.shapes import Poses
+from pteron.shapes import Poses, Seed
 
 _BATCH = 4096
 _ATTEMPTS = 250
@@ -28,7 +29,7 @@ def random_poses(
     robot: RobotLike,
     count: int,
     *,
-    seed: int | np.random.Generator = 0,
+    seed: Seed | np.random.Generator = 0,
     type_i: float = 0.1,
     type_ii: float = 0.1,
     limits: bool = True,
@@ -72,10 +73,9 @@ def random_poses(
     (5, 4)
     """
     robot = as_manipulator(robot)
-    if isinstance(count, bool) or not isinstance(count, (int, np.integer)):
-        raise DataError(f"count: {count!r} given, a whole number expected")
     if count < 0:
         raise DataError(f"count: {count} given, 0 or more expected")
+    expect_to_fit("count", count, 4.0 * count * robot.freedom)
     rng = np.random.default_rng(seed)
     center, radius = search_ball(robot)
     low, high = center - radius, center + radius

@@ -1,5 +1,6 @@
 """What a robot is: legs, platform and gravity as a value, its TOML files, and the catalog."""
 
+from pteron.arguments import check_arguments
 from pteron.manipulator.files import catalog, load
 from pteron.manipulator.given import RobotLike, as_manipulator
 from pteron.manipulator.manipulator import STANDARD_GRAVITY, Manipulator
@@ -31,6 +32,7 @@ __all__ = [
     "with_parameters",
     "working_modes",
 ]
+check_arguments(__name__)
 
 
 def __dir__() -> list[str]:

@@ -4,6 +4,7 @@ A map says what indices of performance are over a grid of poses, and which of th
 the same for any function.
 """
 
+from pteron.arguments import check_arguments
 from pteron.maps.files import load_map, save_map
 from pteron.maps.grid import Axis, Grid, pose_grid
 from pteron.maps.map import Map, Summary
@@ -28,6 +29,7 @@ __all__ = [
     "surfaces",
     "sweep",
 ]
+check_arguments(__name__)
 
 
 def __dir__() -> list[str]:

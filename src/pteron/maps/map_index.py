@@ -25,6 +25,7 @@ from pteron.maps.map import MARGIN, Map
 from pteron.maps.stores import MapStore, MemoryStore
 from pteron.maps.surfaces import ENDINGS as SURFACES
 from pteron.maps.sweep import cores, sweep
+from pteron.shapes import Workers
 
 Engine = Literal["auto", "jax"]
 
@@ -43,7 +44,7 @@ def map_index(
     engine: Engine = "auto",
     out: str | Path | None = None,
     scheduler: str | None = None,
-    workers: int | None = None,
+    workers: Workers | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Map:
     """Return what indices of performance are over a grid of poses, and which of the poses serve.

@@ -20,6 +20,7 @@ from itertools import islice
 from typing import Any, Protocol, TypeVar
 
 from pteron.errors import DataError, ModelError, PteronError
+from pteron.shapes import Workers
 
 _Chunk = TypeVar("_Chunk")
 _Result = TypeVar("_Result")
@@ -56,8 +57,8 @@ def sweep(
     store: Store[_Result],
     *,
     scheduler: str | None = None,
-    workers: int | None = None,
-    threads: int = 1,
+    workers: Workers | None = None,
+    threads: Workers = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> int:
     """Compute the chunks that a store has not yet, and write what each gives to the store.
@@ -105,9 +106,6 @@ def sweep(
     """
     if scheduler is not None and workers is not None:
         raise DataError("scheduler and workers given; a scheduler has its own workers: give one")
-    for name, count in (("workers", workers), ("threads", threads)):
-        if count is not None and count < 1:
-            raise DataError(f"{name}: {count} given, 1 or more expected")
     done = set(store.finished())
     left = [k for k in range(len(chunks)) if k not in done]
     tell = progress or (lambda *_: None)

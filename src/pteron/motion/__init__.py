@@ -1,5 +1,6 @@
 """Motions of the platform, what they ask of the drives, and simulation of the machine."""
 
+from pteron.arguments import check_arguments
 from pteron.motion.joint_points import Guide, JointPoints, Part, joint_guides, joint_points
 from pteron.motion.motion import Motion
 from pteron.motion.overloads import overloads
@@ -77,6 +78,7 @@ __all__ = [
     "time_optimal",
     "with_payload",
 ]
+check_arguments(__name__)
 
 
 def __dir__() -> list[str]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pteron.arguments import expect_to_fit
 from pteron.errors import DataError, shown
 from pteron.html_table import Column, html_table
 from pteron.kernels import Array, as_array
@@ -146,6 +147,7 @@ class Motion:
                 f"the motion ends {ends[0]:.3g} m or rad from where it begins, and its velocity "
                 f"differs by {ends[1]:.3g}: it cannot be repeated"
             )
+        expect_to_fit("count", count, 2.0 * count * 3.0 * self.pose.size)
         starts = self.duration * np.arange(count)
         time = np.add.outer(starts, self.time[:-1] - self.time[0]).ravel()
         parts = (

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pteron.kernels import as_array
 from pteron.legs import Drive
 from pteron.manipulator import RobotLike, as_manipulator
 
@@ -37,7 +38,10 @@ def overloads(robot: RobotLike, forces: ArrayLike, speeds: ArrayLike) -> tuple[s
     """
     robot = as_manipulator(robot)
     found = []
-    peaks = [np.abs(np.atleast_2d(v)).reshape(-1, robot.freedom) for v in (forces, speeds)]
+    peaks = [
+        np.abs(as_array(values, name, (len(robot.legs),))).reshape(-1, len(robot.legs))
+        for name, values in (("forces", forces), ("speeds", speeds))
+    ]
     # Rows that no pose serves are NaN.
     force, speed = (np.fmax.reduce(values, axis=0, initial=0.0) for values in peaks)
     for i, leg in enumerate(robot.legs):

@@ -3,6 +3,7 @@
 Physics is asked elsewhere; nothing here touches pyplot's global state.
 """
 
+from pteron.arguments import check_arguments
 from pteron.plots.canvas import LEG_COLORS, svg, svg_file
 from pteron.plots.certainty import (
     autocorrelation_figure,
@@ -69,6 +70,7 @@ __all__ = [
     "trajectory_figure",
     "svg_file",
 ]
+check_arguments(__name__)
 
 
 def __dir__() -> list[str]:

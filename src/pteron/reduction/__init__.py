@@ -1,5 +1,6 @@
 """Which inertial parameters count: base parameters, three ways, and the reduced model."""
 
+from pteron.arguments import check_arguments
 from pteron.reduction.certificate import (
     Certificate,
     ExactCertificate,
@@ -22,6 +23,7 @@ __all__ = [
     "cheapest_parameters",
     "model_forms",
 ]
+check_arguments(__name__)
 
 
 def __dir__() -> list[str]:

@@ -17,6 +17,7 @@ from pteron.reduction.numerical import qr_grouping, svd_grouping
 from pteron.reduction.result import BaseParameters
 from pteron.reduction.sharing import Sharing, default_order, leg_groups, share
 from pteron.reduction.transfers import transfers
+from pteron.shapes import Seed
 
 Method = Literal["exact", "svd", "qr"]
 
@@ -31,7 +32,7 @@ def base_parameters(
     keep: Sequence[str] | None = None,
     *,
     shared: Sharing = False,
-    seed: int = 0,
+    seed: Seed = 0,
 ) -> BaseParameters:
     """Return the base inertial parameters of a machine.
 

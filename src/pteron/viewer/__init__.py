@@ -1,8 +1,10 @@
 """A machine in the browser: seen in space, moved by sliders or by hand, with what it feels."""
 
+from pteron.arguments import check_arguments
 from pteron.viewer.view import Viewer, view
 
 __all__ = ["Viewer", "view"]
+check_arguments(__name__)
 
 
 def __dir__() -> list[str]:

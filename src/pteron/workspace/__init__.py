@@ -1,5 +1,6 @@
 """Where a machine can work: its reserves, its home pose, its reach and its joints' ranges."""
 
+from pteron.arguments import check_arguments
 from pteron.kinematics.limits import LimitedJoint, limited_joints
 from pteron.workspace.clearance import Clearance, clearance, interference
 from pteron.workspace.components import Component, Components, components
@@ -65,6 +66,7 @@ __all__ = [
     "reach_volume",
     "reserve",
 ]
+check_arguments(__name__)
 
 
 def __dir__() -> list[str]:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pteron.arguments import expect_to_fit
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import checked_one
@@ -78,6 +79,8 @@ def quadrature_volume(
         raise DataError(f"lines: {lines} given, an even number of them expected")
     at = checked_one(robot, pose, "pose")
     box = bounding_box(robot, at)
+    across = box.shape[1] - 1
+    expect_to_fit("lines", lines, 3.0 * float(lines) ** across * across)
     asked = conditions(robot) if given is None else given
     fine, coarse = (_sum(robot, asked, at, box, count) for count in (lines, lines // 2))
     return Quadrature(fine, abs(fine - coarse))

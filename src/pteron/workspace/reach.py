@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from pteron.arguments import expect_to_fit
 from pteron.errors import DataError
 from pteron.kernels import Array, numeric
 from pteron.kinematics.evaluate import checked_one
@@ -119,6 +120,7 @@ def reach_slice(
         raise DataError(f"plane: {plane!r} is not one of {valid}")
     if points < 2:
         raise DataError(f"points: {points} given, at least 2 expected")
+    expect_to_fit("points", points, 2.0 * points**2 * (robot.freedom + len(robot.legs)))
     pose = checked_one(robot, center, "center")
     i, j = (robot.coordinates.index(letter) for letter in plane)
     if extent is None:

@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize  # type: ignore[import-untyped]
 
+from pteron.arguments import expect_to_fit
 from pteron.errors import DataError, ModelError
 from pteron.kernels import Array, numeric
 from pteron.kinematics.evaluate import checked_one
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.shapes import PoseLike
+from pteron.shapes import PoseLike, Seed
 from pteron.workspace.reserve import room_to_limits
 
 _SAMPLES = 20_000
@@ -205,7 +206,7 @@ def _furthest(room: Callable[[Array], Array], start: Array, objective: Array) ->
 
 
 def reach_volume(
-    robot: RobotLike, pose: PoseLike, *, count: int = 50_000, seed: int = 0
+    robot: RobotLike, pose: PoseLike, *, count: int = 50_000, seed: Seed = 0
 ) -> ReachVolume:
     """Return the volume in reach at the orientation of a pose, by random positions in its box.
 
@@ -236,6 +237,7 @@ def reach_volume(
     robot = as_manipulator(robot)
     if count < 1:
         raise DataError(f"count: {count} given, at least 1 expected")
+    expect_to_fit("count", count, 4.0 * count * robot.freedom)
     given = checked_one(robot, pose, "pose")
     box = bounding_box(robot, given)
     poses = np.tile(given, (count, 1))

@@ -16,6 +16,7 @@ from pteron.identification.model import Model
 from pteron.identification.observation import Observations, observations_of
 from pteron.identification.signals import Preprocessing
 from pteron.kernels import Array
+from pteron.shapes import Seed
 
 _SETTLED = 1e-3
 """Relative change of the forces' noise that no longer matters."""
@@ -135,7 +136,7 @@ def total(
     )
 
 
-def column_errors(model: Model, log: Log, preprocessing: Preprocessing, *, seed: int = 0) -> Array:
+def column_errors(model: Model, log: Log, preprocessing: Preprocessing, *, seed: Seed = 0) -> Array:
     """Return the standard deviation (p,) of the noise in the regressor's columns.
 
     Noise like that of the positions is put on them once more; what it changes has the size of what

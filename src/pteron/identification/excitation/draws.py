@@ -15,6 +15,7 @@ from pteron.identification.signals.states import home
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.shapes import Seed
 
 _FINE = 800
 """Samples in a period of the highest harmonic at which the limits are checked."""
@@ -50,7 +51,7 @@ def random_excitation(
     harmonics: int = 5,
     period: float = 5.0,
     limits: Limits | None = None,
-    seed: int | np.random.Generator = 0,
+    seed: Seed | np.random.Generator = 0,
 ) -> FourierMotion:
     """Return a random Fourier motion about the home pose, as large as the limits allow.
 

@@ -10,6 +10,7 @@ from typing import Any, Literal, cast, get_args
 import numpy as np
 import polars as pl
 
+from pteron.arguments import expect_to_fit
 from pteron.dynamics import drive_forces
 from pteron.errors import DataError, shown
 from pteron.identification.excitation.movement import Movement
@@ -122,7 +123,9 @@ class Layout:
         """
         robot = movement.robot
         self.description(robot)
-        ticks = np.arange(math.ceil(movement.duration * rate - _ROUNDING) + 1)
+        samples = movement.duration * rate
+        expect_to_fit("rate", rate, 8.0 * samples * (robot.freedom + len(robot.legs)))
+        ticks = np.arange(math.ceil(samples - _ROUNDING) + 1)
         state = movement.states(ticks / rate)
         values = {"joints": [state.joints], "poses": [state.pose]}.get(self.contents) or [
             *(state.joints, state.pose, state.rates, state.accelerations),

@@ -25,6 +25,7 @@ from pteron.identification.excitation.result import Excitation, Start
 from pteron.kernels import columns_of
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.reduction import BaseParameters, base_parameters
+from pteron.shapes import Seed, Workers
 
 _MOST_WORKERS = 4
 
@@ -52,9 +53,9 @@ def optimal_excitation(
     criterion: Criterion = "condition",
     starts: int = 12,
     draws: int = 100,
-    seed: int = 0,
+    seed: Seed = 0,
     seconds: float = 60.0,
-    workers: int | None = None,
+    workers: Workers | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Excitation:
     """Return a periodic trajectory from whose forces the base parameters are seen best.
@@ -134,7 +135,7 @@ def optimal_excitation(
     """
     robot = as_manipulator(robot)
     limits = limits or Limits.of(robot)
-    _check(criterion, starts, draws, seconds, workers)
+    _check(criterion, starts, draws, seconds)
     base = base or base_parameters(robot)
     search = _Search(criterion, base, progress or (lambda share: None))
     interrupted = False
@@ -265,11 +266,11 @@ class _Search:
         )
 
 
-def _check(criterion: str, starts: int, draws: int, seconds: float, workers: int | None) -> None:
+def _check(criterion: str, starts: int, draws: int, seconds: float) -> None:
     if criterion not in get_args(Criterion):
         raise DataError(f'criterion: {criterion!r} is neither "condition" nor "logdet"')
-    for name, value in (("starts", starts), ("draws", draws), ("workers", workers)):
-        if value is not None and value < 1:
+    for name, value in (("starts", starts), ("draws", draws)):
+        if value < 1:
             raise DataError(f"{name}: {value} given, 1 or more expected")
     if not 0.0 < seconds < math.inf:
         raise DataError(f"seconds: {seconds} given, a number above 0 expected")

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pteron.errors import DataError
-from pteron.kernels import Array
+from pteron.kernels import Array, as_array
 from pteron.manipulator import Manipulator
 from pteron.motion.trajectories.tool import pose_motion, turning_arm
 from pteron.platforms import Platform
@@ -167,7 +167,7 @@ def moves(
         level = level - np.outer(upright, upright)
 
     if direction is not None:
-        given = np.asarray(direction, dtype=float)
+        given = as_array(direction, "direction", (3,))
         first = level @ given
         if not np.linalg.norm(first) > _NONE * np.linalg.norm(given):
             place = " in the machine's plane" if platform.planar else ""

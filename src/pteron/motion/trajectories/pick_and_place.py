@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import minimize_scalar  # type: ignore[import-untyped]
 
+from pteron.arguments import expect_to_fit
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import checked_one
@@ -116,6 +117,7 @@ def pick_and_place(
             raise DataError(f"{name}: {value} given, a number above 0 expected")
     if samples < 2:
         raise DataError(f"samples: {samples} given, at least 2 expected")
+    expect_to_fit("samples", samples, 10.0 * samples * robot.freedom)
     middle = home_pose(robot) if around is None else checked_one(robot, around, "around")
     if scale is None:
         scale, direction = scaled_to_reach(

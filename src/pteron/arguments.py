@@ -1,0 +1,289 @@
+"""The kinds and sizes of a public function's arguments, checked before it runs.
+
+Kinds are those of the type hints. Each package's `__init__` asks for it once, so that a new public
+function is checked too. What is converted at every call anyway, machines and arrays of states, is
+checked where that is done.
+"""
+
+from __future__ import annotations
+
+import collections.abc
+import inspect
+import math
+import operator
+import os
+import sys
+import types
+import typing
+from collections.abc import Callable, Collection, Mapping
+from functools import cache, update_wrapper
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import AbstractArray
+from numpy.typing import ArrayLike
+
+from pteron.errors import DataError, shown
+
+_CHECKED_LATER = {
+    *("RobotLike", "PoseLike", "PoseLike | None", "JointsLike", "JointsLike | None"),
+    "OnFailure",
+}
+"""Type hints of arguments that the functions themselves check, at no cost."""
+
+_LOOKED_AT = 1000
+"""Longest sequence whose elements are all looked at."""
+
+
+_LARGEST = 2**63
+"""Whole numbers are smaller: what counts elements in memory or indexes them."""
+
+
+class Between(NamedTuple):
+    """The bounds of a number, which may be given themselves, as an annotation of its type hint."""
+
+    least: float
+    most: float = math.inf
+
+
+class _Kind(NamedTuple):
+    """What an argument may be: in words, and as a test."""
+
+    words: str
+    holds: Callable[[Any], bool]
+
+
+def check_arguments(package: str, functions: Collection[str] | None = None) -> None:
+    """Let the public functions of a package refuse arguments of another kind than they say.
+
+    Parameters
+    ----------
+    package : str
+        Its name.
+    functions : collection of str, optional
+        Which of its functions; by default all that `__all__` lists.
+    """
+    names = vars(sys.modules[package])
+    for name in names["__all__"] if functions is None else functions:
+        function = names[name]
+        if not isinstance(function, types.FunctionType):
+            continue
+        hints = {hint for key, hint in function.__annotations__.items() if key != "return"}
+        if hints - _CHECKED_LATER - {"bool"}:
+            checking = _checking(function)
+            names[name] = checking
+            # Pickles and doctests look for a function where it says that it is from.
+            setattr(sys.modules[function.__module__], name, checking)
+
+
+def expect_kinds(
+    function: Callable[..., Any], args: tuple[Any, ...], named: Mapping[str, Any]
+) -> None:
+    """Refuse arguments of another kind than the type hints say, all in one line.
+
+    Raises
+    ------
+    DataError
+        If there are some.
+    """
+    wrong = []
+    kinds, order, others = _kinds_of(function)
+    names = [*order, *[others] * (len(args) - len(order))]
+    given = [*zip(names, args, strict=False), *named.items()]
+    for name, value in given:
+        kind, default = kinds.get(name, (None, None))
+        if kind is not None and value is not default and not kind.holds(value):
+            wrong.append(f"{name}: {shown(value)} given, {kind.words} expected")
+    if wrong:
+        raise DataError("; ".join(wrong))
+
+
+def expect_to_fit(name: str, given: float, numbers: float) -> None:
+    """Refuse a size whose arrays do not fit into this computer's memory, before they are made.
+
+    Parameters
+    ----------
+    name, given : str, float
+        The argument that says how many there are.
+    numbers : float
+        How many numbers of 8 bytes it takes to hold them.
+
+    Raises
+    ------
+    DataError
+        If they are more than the memory holds.
+    """
+    if 8.0 * numbers > _memory():
+        raise DataError(
+            f"{name}: {given} given, which takes {8e-9 * numbers:.3g} GB of memory; this computer "
+            f"has {1e-9 * _memory():.3g} GB: give less"
+        )
+
+
+@cache
+def _memory() -> float:
+    """Return the bytes of this computer's memory."""
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):  # Windows does not tell it this way
+        return 16e9
+
+
+def _checking(function: types.FunctionType) -> types.FunctionType:
+    expect = expect_kinds
+
+    def call(*args: Any, **named: Any) -> Any:
+        expect(function, args, named)
+        return function(*args, **named)
+
+    # With the globals of its module: a doctest is looked for where they are the module's.
+    made = types.FunctionType(
+        call.__code__, function.__globals__, function.__name__, None, call.__closure__
+    )
+    return typing.cast(types.FunctionType, update_wrapper(made, function))
+
+
+@cache
+def _kinds_of(
+    function: Callable[..., Any],
+) -> tuple[dict[str, tuple[_Kind | None, Any]], list[str], str]:
+    """Return kind and default of each argument, the names in order, and the name of the rest."""
+    kinds, order, others = {}, [], ""
+    for name, argument in inspect.signature(function).parameters.items():
+        if argument.kind is argument.VAR_POSITIONAL:
+            others = name
+        elif argument.kind is not argument.KEYWORD_ONLY:
+            order.append(name)
+        if argument.kind is not argument.VAR_KEYWORD and argument.annotation not in _CHECKED_LATER:
+            kinds[name] = (_kind(_hint(function, argument.annotation)), argument.default)
+    return kinds, order, others
+
+
+def _hint(function: Callable[..., Any], annotation: Any) -> Any:
+    """Return what a type hint means; anything where its names are there for type checkers only."""
+    try:
+        return eval(annotation, function.__globals__) if isinstance(annotation, str) else annotation
+    except NameError:
+        return Any
+
+
+def _kind(hint: Any) -> _Kind | None:
+    """Return what a type hint asks for; nothing where any value may do."""
+    if hint in _PLAIN:
+        return _PLAIN[hint]
+    origin, inner = typing.get_origin(hint), typing.get_args(hint)
+    if origin is np.ndarray or (isinstance(hint, type) and issubclass(hint, AbstractArray)):
+        return _Kind("an array", _is_array)
+    if origin in (typing.Union, types.UnionType):
+        # ArrayLike is a union too, and one with another flattens it.
+        numbers = set(inner) >= _ARRAY_LIKE
+        rest = [_kind(one) for one in inner if not (numbers and one in _ARRAY_LIKE)]
+        return _either([*rest, *([_Kind("real numbers", _are_numbers)] if numbers else [])])
+    if origin is typing.Annotated and isinstance(inner[1], Between):
+        return _bounded(_kind(inner[0]), inner[1])
+    if origin is typing.Literal:
+        choices = tuple({type(one) for one in inner})
+        return _Kind(" or ".join(map(repr, inner)), lambda value: isinstance(value, choices))
+    kind = origin or hint
+    if not isinstance(kind, type):
+        return None
+    if kind is collections.abc.Callable:
+        return _Kind("a function", callable)
+    if issubclass(kind, Mapping):
+        return _Kind("a mapping", lambda value: isinstance(value, Mapping))
+    if issubclass(kind, collections.abc.Iterable) and kind.__module__ in _COLLECTIONS:
+        every = _kind(inner[0]) if inner else None
+        if kind is tuple and Ellipsis not in inner:
+            return _sequence(every, count=len(inner))
+        return _sequence(every, lazy=not issubclass(kind, collections.abc.Collection))
+    if getattr(kind, "_is_protocol", False) and not getattr(kind, "_is_runtime_protocol", False):
+        return None
+    article = "an" if kind.__name__[0] in "AEIO" else "a"
+    return _Kind(f"{article} {kind.__name__}", lambda value: isinstance(value, kind))
+
+
+def _either(kinds: list[_Kind | None]) -> _Kind | None:
+    known = [kind for kind in kinds if kind is not None]
+    if len(known) < len(kinds):
+        return None
+    words = [kind.words for kind in known if kind.words != "None"]
+    listed = " or ".join([", ".join(words[:-1]), words[-1]] if words[:-1] else words)
+    return _Kind(listed, lambda value: any(kind.holds(value) for kind in known))
+
+
+def _bounded(kind: _Kind | None, bounds: Between) -> _Kind | None:
+    if kind is None:
+        return None
+    least, most = bounds
+    words = f"of {least:g} or more" if most == math.inf else f"from {least:g} to {most:g}"
+    return _Kind(
+        f"{kind.words} {words}", lambda value: kind.holds(value) and least <= value <= most
+    )
+
+
+def _sequence(every: _Kind | None, *, lazy: bool = False, count: int | None = None) -> _Kind:
+    def holds(value: Any) -> bool:
+        if isinstance(value, str | bytes | Mapping) or not hasattr(value, "__iter__"):
+            return False
+        if np.ndim(value) == 0 if isinstance(value, np.ndarray) else lazy:
+            return lazy
+        if not hasattr(value, "__len__") or count not in (None, len(value)):
+            return False
+        return every is None or len(value) > _LOOKED_AT or all(map(every.holds, value))
+
+    called = "a sequence" if count is None else f"{count} values"
+    return _Kind(f"{called}, each {every.words}," if every else called, holds)
+
+
+def _is_number(value: Any) -> bool:
+    if isinstance(value, bool | np.bool_ | str | bytes) or not hasattr(value, "__float__"):
+        return False
+    try:
+        return np.ndim(value) == 0 and float(value) is not None
+    except (TypeError, ValueError, OverflowError):
+        return False
+
+
+def _is_array(value: Any) -> bool:
+    return isinstance(value, np.ndarray) and value.ndim > 0 and value.dtype.kind in "biuf"
+
+
+def _is_whole(value: Any) -> bool:
+    if isinstance(value, bool | np.bool_):
+        return False
+    try:
+        return abs(operator.index(value)) < _LARGEST
+    except TypeError:
+        return False
+
+
+def _are_numbers(value: Any) -> bool:
+    if isinstance(value, str | bytes) or value is None:
+        return False
+    try:
+        given = np.asarray(value)
+        if given.dtype.kind == "O":
+            given = given.astype(float) if not _has_text(given) else given
+    except (TypeError, ValueError, OverflowError):
+        return False
+    return given.dtype.kind in "biuf"
+
+
+def _has_text(values: np.ndarray[Any, Any]) -> bool:
+    return any(isinstance(one, str | bytes) for one in values.flat)
+
+
+_ARRAY_LIKE = set(typing.get_args(ArrayLike))
+_COLLECTIONS = ("builtins", "collections.abc")
+
+_PLAIN: dict[Any, _Kind | None] = {
+    Any: None,
+    object: None,
+    None: _Kind("None", lambda value: value is None),
+    type(None): _Kind("None", lambda value: value is None),
+    bool: _Kind("True or False", lambda value: isinstance(value, bool | np.bool_)),
+    int: _Kind("a whole number", _is_whole),
+    float: _Kind("a number", _is_number),
+    str: _Kind("a text", lambda value: isinstance(value, str)),
+    os.PathLike: _Kind("a path", lambda value: isinstance(value, os.PathLike)),
+}
