@@ -171,7 +171,6 @@ def test_a_platform_has_a_motion_and_axes():
     refused(platform(x_axis=(0.0, 0.0, 1.0)), words)
     words = "x_axis: [0.6, 0.0, 0.8] is not perpendicular to axis", "; [1.0, 0.0, 0.0] is"
     refused(platform(x_axis=(0.6, 0.0, 0.8)), *words)
-    refused(platform(limits=(-45.0, 45.0)), "limits: [-45, 45] rad reaches beyond", "are these deg")
     refused(platform("3T", limits=(-0.5, 0.5)), "limits: a 3T platform has no angle to limit")
     refused(platform(x_axis=(1.0, 0.0)), "x_axis: 2 numbers given, 3 expected")
     assert platform()().frame == ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -651,7 +650,8 @@ def test_parameters_of_no_real_body_are_refused():
     words = "parameters: shape (39,) given, (40,) expected"
     refused(lambda: pteron.with_parameters(robot, np.ones(39)), words)
     refused(lambda: pteron.with_parameters(robot, np.ones((1, 40))), "parameters: shape (1, 40)")
-    refused(lambda: pteron.with_parameters(robot, "heavy"), "parameters: not an array of real num")
+    words = "values: 'heavy' given, real numbers expected"
+    refused(lambda: pteron.with_parameters(robot, "heavy"), words, error=pteron.DataError)
     masked = np.ma.masked_array(pteron.parameters(robot), mask=np.arange(40) == 5)
     refused(lambda: pteron.with_parameters(robot, masked), "body u1: first_moment[0]: nan is not")
 
@@ -698,7 +698,8 @@ def test_what_is_no_rotation_is_refused():
     words = "rotation: not an orthogonal 3x3 matrix"
     refused(lambda: pteron.turned(robot, 2 * np.eye(3)), words)
     refused(lambda: pteron.turned(robot, np.eye(2)), words)
-    refused(lambda: pteron.turned(robot, "over"), "rotation: not an array of real numbers")
+    words = "rotation: 'over' given, real numbers expected"
+    refused(lambda: pteron.turned(robot, "over"), words, error=pteron.DataError)
     refused(lambda: pteron.turned(robot, np.full((3, 3), np.nan)), words)
     words = "rotation: the matrix is a reflection (determinant -1); negate one column"
     refused(lambda: pteron.turned(robot, np.diag([1, 1, -1])), words)

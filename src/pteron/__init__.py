@@ -32,6 +32,7 @@ from pteron.errors import (
     OutputError,
     PteronError,
     SingularPose,
+    UnlikelyValue,
     UnreachablePose,
 )
 from pteron.kernels import compile
@@ -154,6 +155,7 @@ __all__ = [
     "RodInertia",
     "SingularPose",
     "Stribeck",
+    "UnlikelyValue",
     "UnreachablePose",
     "architecture",
     "assembly_mode",

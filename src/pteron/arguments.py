@@ -183,7 +183,10 @@ def _kind(hint: Any) -> _Kind | None:
         return _bounded(_kind(inner[0]), inner[1])
     if origin is typing.Literal:
         choices = tuple({type(one) for one in inner})
-        return _Kind(" or ".join(map(repr, inner)), lambda value: isinstance(value, choices))
+        return _Kind(
+            _listed([f'"{one}"' if isinstance(one, str) else repr(one) for one in inner]),
+            lambda value: isinstance(value, choices),
+        )
     kind = origin or hint
     if not isinstance(kind, type):
         return None
@@ -207,8 +210,11 @@ def _either(kinds: list[_Kind | None]) -> _Kind | None:
     if len(known) < len(kinds):
         return None
     words = [kind.words for kind in known if kind.words != "None"]
-    listed = " or ".join([", ".join(words[:-1]), words[-1]] if words[:-1] else words)
-    return _Kind(listed, lambda value: any(kind.holds(value) for kind in known))
+    return _Kind(_listed(words), lambda value: any(kind.holds(value) for kind in known))
+
+
+def _listed(words: list[str]) -> str:
+    return " or ".join([", ".join(words[:-1]), words[-1]] if words[:-1] else words)
 
 
 def _bounded(kind: _Kind | None, bounds: Between) -> _Kind | None:
@@ -245,7 +251,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _is_array(value: Any) -> bool:
-    return isinstance(value, np.ndarray) and value.ndim > 0 and value.dtype.kind in "biuf"
+    return _are_numbers(value) and np.ndim(value) > 0
 
 
 def _is_whole(value: Any) -> bool:

@@ -61,6 +61,10 @@ class OutputError(PteronError):
     """A result cannot be written where it was asked for."""
 
 
+class UnlikelyValue(UserWarning):
+    """A value that is possible, but likely in another unit: millimetres, degrees."""
+
+
 class UnreachablePose(PteronError):
     """A leg is too short, or folds too far, for the pose.
 

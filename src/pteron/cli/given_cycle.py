@@ -67,7 +67,7 @@ def _doubted(robot: Manipulator, rows: Table, start: PoseLike | None = None) -> 
     import numpy as np
 
     from pteron.identification.playback import of_table
-    from pteron.workspace.doubts import value_doubts
+    from pteron.kinematics.unlikely import unlikely_values
 
     file = rows.source
     _check_rates(robot, rows)
@@ -76,7 +76,7 @@ def _doubted(robot: Manipulator, rows: Table, start: PoseLike | None = None) -> 
     try:
         found = of_table(robot, rows, start)
     except (UnreachablePose, SingularPose) as error:
-        unlikely = "; ".join(value_doubts(robot, names, values))
+        unlikely = "; ".join(unlikely_values(robot, names, values))
         if not unlikely or (isinstance(error, UnreachablePose) and error.millimetres):
             raise
         raise PteronError(f"{error}; {file}: {unlikely}") from None
@@ -100,9 +100,9 @@ def told_doubts(
     robot: Manipulator, columns: Sequence[str], values: NDArray[Any], source: str
 ) -> None:
     """Tell what is possible but unlikely in numbers that are given."""
-    from pteron.workspace.doubts import value_doubts
+    from pteron.kinematics.unlikely import unlikely_values
 
-    for text in value_doubts(robot, columns, values):
+    for text in unlikely_values(robot, columns, values):
         note(f"Note: {source}: {text}")
 
 

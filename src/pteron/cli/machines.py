@@ -135,6 +135,7 @@ def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
     from pteron.kinematics import architecture, singular_orientations
     from pteron.kinematics.architecture import singular_everywhere
     from pteron.workspace import home_pose, limited_joints, reserve
+    from pteron.workspace.doubts import elbow_doubts
     from pteron.workspace.drive_doubts import load_doubts
 
     layout = architecture(robot)
@@ -154,7 +155,7 @@ def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
         "home_reserve": float(reserve(robot, home).smallest),
         "limited_joints": [asdict(joint) for joint in limited_joints(robot, home)],
         "holds_orientation": layout.holds,
-        "doubts": [*unlikely, *loose, *load_doubts(robot, home)],
+        "doubts": [*unlikely, *loose, *elbow_doubts(robot, home), *load_doubts(robot, home)],
     }
 
 

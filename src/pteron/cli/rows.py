@@ -44,10 +44,10 @@ class Rows:
         """Return what `serve` makes of the numbers (..., K) in `columns`, chunk by chunk."""
         import numpy as np
 
-        from pteron.workspace.doubts import value_doubts
+        from pteron.kinematics.unlikely import unlikely_values
 
         values = self.table.numbers(columns, on_failure)
-        unlikely = "; ".join(value_doubts(robot, columns, values))
+        unlikely = "; ".join(unlikely_values(robot, columns, values))
         if len(values) <= LONG:
             parts = list(self._chunks(serve, values, unlikely))
         else:

@@ -20,10 +20,10 @@ from pteron.design.variables import Variable, moved, variables_of
 from pteron.errors import DataError, ModelError
 from pteron.indices import INDICES
 from pteron.kernels import Array, Kernel, compile
+from pteron.kinematics.unlikely import unlikely_values
 from pteron.manipulator import Manipulator, load
 from pteron.manipulator.saving import text_of
 from pteron.toml import told
-from pteron.workspace.doubts import value_doubts
 
 FAILED = 1e6
 """How much a requirement is missed by a design that is no machine, or has no such quantity."""
@@ -186,9 +186,9 @@ def _misfits(spec: Spec, robot: Manipulator) -> Iterator[str]:
         yield f"workspace: a cylinder given, but {robot.name} moves in a plane; give a box"
     elif spec.workspace is not None:
         corners = workspace_poses(spec.workspace, np.zeros((1, robot.freedom)), samples=2)
-        for doubt in value_doubts(robot, robot.coordinates, corners):
+        for doubt in unlikely_values(robot, robot.coordinates, corners):
             yield f"workspace: {doubt}"
-    for doubt in value_doubts(robot, ["phi"], np.array(spec.angles or ())[:, None]):
+    for doubt in unlikely_values(robot, ["phi"], np.array(spec.angles or ())[:, None]):
         yield f"angles: {doubt}"
     asked = {o.quantity for o in spec.objectives} | {r.quantity for r in spec.requirements}
     units = {leg.joint.force_unit for leg in robot.legs}

@@ -14,9 +14,9 @@ from pteron.design.spec import VariableTable
 from pteron.equations.machine import numbers
 from pteron.errors import ModelError
 from pteron.kernels import Array
+from pteron.kinematics.unlikely import unlikely_length
 from pteron.manipulator import Manipulator
 from pteron.toml import told
-from pteron.workspace.doubts import unlikely_length
 
 _STEP = 1e-6
 """Share of a range over which the geometry's change is measured."""

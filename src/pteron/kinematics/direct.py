@@ -13,6 +13,7 @@ from pteron.kernels import Array
 from pteron.kinematics.architecture import is_singular_everywhere, singular_everywhere
 from pteron.kinematics.assembly import every_pose, in_order, within_a_turn
 from pteron.kinematics.evaluate import checked, evaluated, place, unchecked
+from pteron.kinematics.unlikely import unlikely_values, warn_of_unlikely
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.manipulator.variants import with_elbows
 from pteron.shapes import JointsLike, OnFailure, PerJoint, PoseLike, Poses
@@ -85,13 +86,15 @@ def direct_kinematics(
     lost = np.isnan(poses).all(axis=(-2, -1))
     if on_failure == "raise" and lost.any():
         index = tuple(int(i) for i in np.argwhere(lost)[0])
+        unlikely = unlikely_values(robot, robot.joint_names, given[index])
         raise UnreachablePose(
             f"{place('joints', index)}: no pose has these joint coordinates "
-            f"{given[index].tolist()}",
+            f"{'; '.join([str(given[index].tolist()), *unlikely])}",
             leg=0,
             shortfall=float("nan"),
             index=index,
         )
+    warn_of_unlikely(robot, robot.joint_names, given)
     return poses
 
 

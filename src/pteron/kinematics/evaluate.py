@@ -15,6 +15,7 @@ from pteron.errors import DataError, PteronError, SingularPose, UnreachablePose
 from pteron.kernels import Array, Selects, as_array, needs_of, numeric
 from pteron.kernels.functions import TYPE_I, TYPE_II
 from pteron.kinematics.architecture import is_singular_everywhere, singular_everywhere
+from pteron.kinematics.unlikely import warn_of_unlikely
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import OnFailure, PoseLike
 
@@ -22,6 +23,9 @@ _Outputs = TypeVar("_Outputs")
 
 _COINCIDENT = 1e-6
 """Share of a leg's length within which its two ends count as coincident, in messages."""
+
+_TYPED = (list, tuple)
+"""What a person types; a program's arrays are not asked for their units."""
 
 _MILLIMETRES = 20.0
 """A pose that misses a leg's reach by so many times its size was perhaps given in millimetres."""
@@ -52,6 +56,9 @@ def evaluated(
                 raise _failure(as_manipulator(robot), what, values, status, wrench)
             for result in results:
                 result[status == 0.0] = np.nan
+    if type(values[0]) in _TYPED:
+        machine = as_manipulator(robot)
+        warn_of_unlikely(machine, machine.coordinates, np.asarray(values[0], dtype=float))
     found: Any = results[0] if len(results) == 1 else tuple(results)
     return found  # type: ignore[no-any-return]
 

@@ -107,7 +107,8 @@ def _drawn(
         poses = rng.uniform(-1.0, 1.0, (_BATCH, robot.freedom))
         lengths = len(low)
         poses[:, :lengths] = 0.5 * (low + high) + 0.5 * (high - low) * poses[:, :lengths]
-        poses[:, lengths:] *= np.pi
+        # Beyond half a turn phi counts where the platform's shaft makes several.
+        poses[:, lengths:] *= max((np.pi, *map(abs, robot.platform.limits or ())))
         _, measures, _, _ = numeric(robot, "reach")(poses)
         poses = poses[(measures >= type_i).all(axis=-1)]
         if type_ii:

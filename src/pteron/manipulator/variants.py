@@ -72,10 +72,7 @@ def turned(robot: RobotLike, rotation: ArrayLike, *, gravity: bool = True) -> Ma
         If the matrix is not a rotation.
     """
     robot = as_manipulator(robot)
-    try:
-        matrix = np.asarray(rotation, dtype=float)
-    except (TypeError, ValueError):
-        raise ModelError("rotation: not an array of real numbers") from None
+    matrix = np.asarray(rotation, dtype=float)
     if matrix.shape != (3, 3) or not np.allclose(matrix @ matrix.T, np.eye(3), atol=_ORTHOGONAL):
         raise ModelError(f"rotation: not an orthogonal 3x3 matrix: {matrix.tolist()}")
     if np.linalg.det(matrix) < 0:

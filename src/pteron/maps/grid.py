@@ -16,10 +16,10 @@ import numpy as np
 from pteron.errors import DataError, ModelError, shown
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import checked_one
+from pteron.kinematics.unlikely import unlikely_values
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike
 from pteron.workspace import bounding_box, home_pose
-from pteron.workspace.doubts import value_doubts
 
 _POINTS = {1: 400, 2: 200, 3: 100, 4: 40}
 """Along each axis, by how many there are: about as much as a picture shows."""
@@ -327,5 +327,5 @@ def expect_coordinates(
             raise DataError(
                 f"{name}: from {values[0]:g} to {values[1]:g} given, an ascending range expected"
             )
-        for doubt in value_doubts(robot, [name], np.array([values[:2]])):
+        for doubt in unlikely_values(robot, [name], np.array([values[:2]])):
             raise DataError(doubt)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
@@ -148,12 +147,7 @@ class Platform:
             return {}
         if not self.turns:
             raise ModelError(f"limits: a {self.motion} platform has no angle to limit")
-        low, high = interval(self.limits, "limits")
-        if not -math.pi <= low < high <= math.pi:
-            raise ModelError(
-                f"limits: [{low:g}, {high:g}] rad reaches beyond -pi to pi; are these degrees?"
-            )
-        return {"limits": (low, high)}
+        return {"limits": interval(self.limits, "limits")}
 
     def _checked_tool(self) -> dict[str, Any]:
         return {"tool": vector(self.tool, "tool")}

@@ -9,12 +9,16 @@ from typing import Any
 import numpy as np
 
 from pteron.bodies.vectors import Vector, cross
+from pteron.errors import PteronError
 from pteron.kernels import Array
 from pteron.legs import LegKind
 from pteron.manipulator import Manipulator
 from pteron.manipulator.manipulator import told_legs
+from pteron.manipulator.variants import with_elbows
 from pteron.platforms import Platform
 from pteron.workspace.drive_doubts import drive_doubts
+from pteron.workspace.home import home_pose
+from pteron.workspace.reserve import reserve
 
 _LARGE = 10.0
 """Length, m, beyond which millimetres are likelier."""
@@ -22,6 +26,12 @@ _LARGE = 10.0
 _UNLIKE = 20.0
 """How many times a uniform bar's, about its centre, a link's inertia may be, or the inverse: two
 masses at its ends have 3 times."""
+
+_UPRIGHT = 0.1
+"""Share of a leg's length by which a platform is above or below its base, not level with it."""
+
+_ALIKE = 0.7
+"""Share of the reserve in one working mode from which on another serves as well."""
 
 _PULL = 30.0
 """Gravity, m/s^2, beyond which another unit is likelier."""
@@ -51,6 +61,11 @@ def doubts(robot: Manipulator) -> tuple[str, ...]:
     found = _in_millimetres(far)
     if hypot(*robot.gravity) > _PULL:
         found.append(f"gravity: {hypot(*robot.gravity):g} m/s^2: is that mm/s^2?")
+    if platform.limits and max(map(abs, platform.limits)) > 2.0 * pi:
+        found.append(
+            f"platform: limits: {list(platform.limits)} rad, more than a turn from phi = 0: are "
+            "these degrees?"
+        )
     radius = max(hypot(*leg.platform_point) for leg in robot.legs)
     points = any("platform_point" in keys for keys in far.values())
     # What follows from lengths in millimetres is not told beside them.
@@ -63,6 +78,42 @@ def doubts(robot: Manipulator) -> tuple[str, ...]:
     if axis is not None:
         found += _turning_offsets(robot.legs, axis)
     return tuple(found)
+
+
+def elbow_doubts(robot: Manipulator, home: Array) -> tuple[str, ...]:
+    """Return the doubt whether the other working mode is meant, where the platform stands upright.
+
+    Most machines hang below their base. One that stands above it, and whose other elbows would let
+    it hang there with much the same reserve, was perhaps given the wrong ones.
+    """
+    down, base = np.array(robot.gravity), np.mean([leg.guide_point for leg in robot.legs], axis=0)
+    others = [-leg.elbow if len(leg.branches) > 1 else leg.elbow for leg in robot.legs]
+    directions = robot.platform.directions
+
+    def below(pose: Array) -> float:
+        depth = down @ (pose[: len(directions)] @ directions - base)
+        return float(depth / (hypot(*robot.gravity) or 1.0))
+
+    least = _UPRIGHT * max(leg.size for leg in robot.legs)
+    if not below(home) < -least or others == [leg.elbow for leg in robot.legs]:
+        return ()
+    other = with_elbows(robot, others)
+    try:
+        hanging = home_pose(other)
+    except PteronError:
+        return ()
+    worth = float(reserve(other, hanging).smallest) / float(reserve(robot, home).smallest)
+    if below(hanging) < least or worth < _ALIKE:
+        return ()
+    return (
+        f"elbow: the platform stands {-below(home):.2g} m above its base at {_pose(home)}; with "
+        f"the other elbows it hangs {below(hanging):.2g} m below it at {_pose(hanging)}: is that "
+        "the working mode that is meant?",
+    )
+
+
+def _pose(values: Array) -> str:
+    return f"({', '.join(f'{value:.3g}' for value in values)})"
 
 
 def _far(robot: Manipulator) -> dict[int, dict[str, Sequence[float]]]:
@@ -179,43 +230,3 @@ def _spread(platform: Platform, radius: float) -> Iterator[str]:
                 f"geared item {i}: {part.ratio:g}^2 times {part.inertia:g} kg m^2 is the "
                 f"platform's mass {away:g} m away: is it in kg m^2?"
             )
-
-
-def unlikely_length(robot: Manipulator) -> float:
-    """Return the size from which on a length of a pose or a part is rather one in mm, m."""
-    return 10.0 * max(
-        hypot(*leg.guide_point) + leg.size + hypot(*leg.platform_point) for leg in robot.legs
-    )
-
-
-def value_doubts(robot: Manipulator, columns: Sequence[str], values: Array) -> tuple[str, ...]:
-    """Return what is unlikely in poses or joint coordinates, one line each.
-
-    Parameters
-    ----------
-    robot : Manipulator
-        The machine.
-    columns : sequence of str
-        What the values are: ``x``, ``phi``, ``rho1``, ...; others are not looked at.
-    values : array, shape (..., len(columns))
-        m and rad.
-
-    Returns
-    -------
-    tuple of str
-    """
-    units = {"phi": "rad"} | {
-        f"{leg.joint.coordinate}{i}": leg.joint.unit for i, leg in enumerate(robot.legs, start=1)
-    }
-    lengths = [k for k, name in enumerate(columns) if name in "xyz" or units.get(name) == "m"]
-    angles = [k for k, name in enumerate(columns) if units.get(name) == "rad"]
-    found = []
-    for chosen, far, question in (
-        (lengths, unlikely_length(robot), "are these mm? m are expected"),
-        (angles, 2.0 * np.pi, "are these degrees? rad are expected"),
-    ):
-        largest = float(np.nanmax(np.abs(values[..., chosen]), initial=0.0))
-        if largest > far:
-            names = ", ".join(columns[k] for k in chosen)
-            found.append(f"{names} up to {largest:g}: {question}")
-    return tuple(found)

@@ -9,12 +9,14 @@ from itertools import product
 
 import numpy as np
 from scipy.optimize import minimize  # type: ignore[import-untyped]
+from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
 
 from pteron.errors import ModelError
 from pteron.kernels import Array, bare
 from pteron.kernels.cache import find_text, keep_text
 from pteron.kernels.kept import name_of
 from pteron.kinematics import inverse_kinematics, random_poses, singular_orientations
+from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import Numbers
 from pteron.workspace.limits import beyond_limits, nowhere
@@ -34,6 +36,12 @@ _DEGREES = (30.0, 15.0, 5.0, 1.0)
 
 _WORTH = 0.99
 """The share of the best reserve that counts as equal to it: nobody wants to type the rest."""
+
+_AXIS = 0.75
+"""The share that a place on the axis of a machine's symmetry must have: it is looked for there."""
+
+_SAME = 1e-9
+"""Differences of reserves that are rounding."""
 
 _MIDDLE = 0.9
 """The share that the middle between equals must have: from there the machine goes every way."""
@@ -57,7 +65,8 @@ def home_pose(robot: RobotLike) -> Array:
     array, shape (m,)
         m and rad. Its reserve is at least 98 % of the best one found. Of equals it is the one whose
         sliders are nearest to their guide points, and cranks to their zero; or the middle between
-        them, as of a machine with symmetric places, if that has 90 %.
+        them, if that has 90 %. Of a machine that a turn about the platform's axis leaves as it is,
+        it is on that axis, if the best place there has 75 %.
 
     Raises
     ------
@@ -103,11 +112,13 @@ def _best(robot: Manipulator) -> Array:
         raise beyond_limits(robot, np.concatenate([refined[reached], drawn]))
     # Zero says where the joints are meant to be, where nothing else tells.
     equals = refined[reserves >= _WORTH * most]
-    travel = np.abs(inverse_kinematics(robot, equals)).max(axis=-1)
-    best: Array = equals[travel.argmin()]
+    best = _least_travel(robot, equals)
     middle = _distinct(equals, _steps(robot, *_STEPS)).mean(axis=0)
     if _worth(robot, middle) >= _MIDDLE * most:
         best = middle
+    on_axis = _on_axis(robot, np.concatenate([refined, drawn]))
+    if len(on_axis) and max(worth := _worth(robot, on_axis)) >= _AXIS * most:
+        best = _least_travel(robot, on_axis[worth >= _WORTH * max(worth)])
     least = _WORTH * float(_worth(robot, best))
     for metres, degrees in product(_METRES, _DEGREES):
         step = _steps(robot, metres, np.radians(degrees))
@@ -122,6 +133,33 @@ def _random_poses(robot: Manipulator) -> Array:
         with suppress(ModelError):
             return random_poses(robot, count, type_i=least, type_ii=least)
     raise nowhere(robot)
+
+
+def _least_travel(robot: Manipulator, poses: Array) -> Array:
+    """Return the pose whose joints are nearest to zero."""
+    travel = np.abs(inverse_kinematics(robot, poses)).max(axis=-1)
+    nearest: Array = poses[travel.argmin()]
+    return nearest
+
+
+def _on_axis(robot: Manipulator, poses: Array) -> Array:
+    """Return poses (K, m) moved onto the axis of the machine's symmetry; none if it has none.
+
+    A symmetry is a turn about the platform's axis after which each leg stands where another stood:
+    the reserves are the same then.
+    """
+    center, _ = search_ball(robot)
+    directions, axis = robot.platform.directions, np.array(robot.platform.axis)
+    lengths = len(center)
+    turn = Rotation.from_rotvec(2.0 * np.pi / len(robot.legs) * axis).as_matrix()
+    beside = poses[:, :lengths] - center
+    images = poses.copy()
+    images[:, :lengths] = center + beside @ (directions @ turn @ directions.T).T
+    if not np.allclose(_worth(robot, images), _worth(robot, poses), rtol=0.0, atol=_SAME):
+        return poses[:0]
+    along = directions @ axis
+    images[:, :lengths] = center + np.outer(beside @ along, along)
+    return images
 
 
 def _distinct(poses: Array, apart: Array) -> Array:

@@ -9,8 +9,11 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pteron.errors import DataError
+from pteron.errors import DataError, shown
 from pteron.kernels import Array
+
+_FARTHEST = 1e70
+"""Numbers whose squares and fourth powers are still numbers are smaller."""
 
 _WIDER = 1e-12
 """m, and relative: far more than the rounding of what is compared."""
@@ -152,7 +155,10 @@ class Cylinder:
 
 
 def _numbers(value: object, name: str) -> tuple[float, ...]:
-    array = np.asarray(value, dtype=float)
-    if array.ndim != 1 or not np.isfinite(array).all():
-        raise DataError(f"{name}: {value!r} given, a row of finite numbers expected")
+    try:
+        array = np.asarray(value, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        array = np.array(np.nan)
+    if array.ndim != 1 or not (np.abs(array) < _FARTHEST).all():
+        raise DataError(f"{name}: {shown(value)} given, a row of numbers of sensible size expected")
     return tuple(array.tolist())

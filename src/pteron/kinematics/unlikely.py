@@ -1,0 +1,73 @@
+"""Values that are possible but unlikely: lengths in millimetres, angles in degrees."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from math import hypot
+
+import numpy as np
+
+from pteron.errors import UnlikelyValue
+from pteron.kernels import Array
+from pteron.manipulator import Manipulator
+
+
+def unlikely_length(robot: Manipulator) -> float:
+    """Return the size from which on a length of a pose or a part is rather one in mm, m."""
+    return 10.0 * max(
+        hypot(*leg.guide_point) + leg.size + hypot(*leg.platform_point) for leg in robot.legs
+    )
+
+
+def unlikely_values(robot: Manipulator, columns: Sequence[str], values: Array) -> tuple[str, ...]:
+    """Return what in poses or joint coordinates is likely in another unit, one line each.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    columns : sequence of str
+        What the values are: ``x``, ``phi``, ``rho1``, ...; others are not looked at.
+    values : array, shape (..., len(columns))
+        m and rad.
+
+    Returns
+    -------
+    tuple of str
+    """
+    far = {"x": unlikely_length(robot), "phi": _turn(robot.platform.limits)}
+    far |= {"y": far["x"], "z": far["x"]}
+    for i, leg in enumerate(robot.legs, start=1):
+        turns = leg.joint.unit == "rad"
+        most = max(_turn(leg.limits), far["phi"]) if turns else far["x"]
+        far[f"{leg.joint.coordinate}{i}"] = most
+    angles = {"phi"} | {
+        f"{leg.joint.coordinate}{i}"
+        for i, leg in enumerate(robot.legs, start=1)
+        if leg.joint.unit == "rad"
+    }
+    found = []
+    for turning, question in (
+        (False, "are these mm? m are expected"),
+        (True, "are these degrees? rad are expected"),
+    ):
+        chosen = [
+            k for k, name in enumerate(columns) if name in far and turning is (name in angles)
+        ]
+        sizes = np.abs(values[..., chosen])
+        if (sizes > [far[columns[k]] for k in chosen]).any():
+            names = ", ".join(columns[k] for k in chosen)
+            found.append(f"{names} up to {float(np.nanmax(sizes)):g}: {question}")
+    return tuple(found)
+
+
+def _turn(limits: tuple[float, float] | None) -> float:
+    """Return the angle beyond which degrees are likelier: a turn, or more where limits allow it."""
+    return max((2.0 * np.pi, *map(abs, limits or ())))
+
+
+def warn_of_unlikely(robot: Manipulator, columns: Sequence[str], values: Array) -> None:
+    """Issue a warning, `UnlikelyValue`, of what is likely in another unit."""
+    for text in unlikely_values(robot, columns, values):
+        warnings.warn(text, UnlikelyValue, stacklevel=4)

@@ -1,0 +1,90 @@
+"""What is possible but unlikely is doubted aloud, in Python too: units, and the other elbows."""
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mechanisms import CATALOG
+
+import pteron
+from pteron.manipulator.variants import with_elbows
+from pteron.workspace import Box, home_pose, prove, reserve
+from pteron.workspace.doubts import doubts, elbow_doubts
+
+
+def mirrored(robot):
+    """Return the machine with the other elbow of every leg that has two."""
+    signs = [-leg.elbow if len(leg.branches) > 1 else leg.elbow for leg in robot.legs]
+    return with_elbows(robot, signs)
+
+
+def test_degrees_that_are_typed_are_answered_with_a_warning():
+    with pytest.warns(pteron.UnlikelyValue, match="^phi up to 45: are these degrees"):
+        typed = pteron.inverse_kinematics("quadrupteron", [0, 0, 0, 45])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # a program's arrays are taken as they are
+        given = pteron.inverse_kinematics("quadrupteron", np.array([0.0, 0.0, 0.0, 45.0]))
+    np.testing.assert_array_equal(typed, given)
+
+
+def test_joints_in_degrees_or_millimetres_are_told_beside_the_missing_pose():
+    with pytest.warns(
+        pteron.UnlikelyValue, match="^theta1, theta2, theta3 up to 30: are these deg"
+    ):
+        assert np.isnan(pteron.direct_kinematics("delta", [10.0, 20.0, 30.0])).all()
+    with pytest.warns(pteron.UnlikelyValue, match="rho4 up to 80: are these mm"):
+        pteron.direct_kinematics("quadrupteron", np.array([30.0, 10.0, 20.0, 80.0]))
+    with pytest.raises(pteron.UnreachablePose, match=r"30\.0\]; theta1, .* are these degrees"):
+        pteron.direct_kinematics("delta", [10.0, 20.0, 30.0], on_failure="raise")
+
+
+def test_a_shaft_that_makes_many_turns_has_the_limits_it_has():
+    robot = CATALOG["delta-4"]
+    many = replace(robot, platform=replace(robot.platform, limits=(-20.0, 20.0)))
+    assert doubts(many) == (
+        "platform: limits: [-20.0, 20.0] rad, more than a turn from phi = 0: are these degrees?",
+    )
+    angles = pteron.random_poses(many, 200)[:, 3]
+    assert angles.min() < -15.0
+    assert angles.max() > 15.0
+    pose = [0.1, 0.0, -0.9, 18.0]
+    joints = pteron.inverse_kinematics(many, pose)  # a warning here would be an error
+    np.testing.assert_allclose(pteron.direct_kinematics(many, joints)[0], pose, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["delta", "delta-4", "h4", "par4"])
+def test_elbows_that_raise_a_hanging_machine_are_doubted(name):
+    upside = mirrored(CATALOG[name])
+    (told,) = elbow_doubts(upside, home_pose(upside))
+    assert told.startswith("elbow: the platform stands ")
+    assert told.endswith("is that the working mode that is meant?")
+    assert elbow_doubts(CATALOG[name], home_pose(CATALOG[name])) == ()
+
+
+@pytest.mark.parametrize("name", ["delta-omnid", "quadrupteron", "five-bar", "linear-delta"])
+def test_machines_that_stand_or_have_no_such_side_are_not(name):
+    assert elbow_doubts(CATALOG[name], home_pose(CATALOG[name])) == ()
+
+
+def test_the_home_of_a_symmetric_machine_is_on_its_axis():
+    """Three equal places beside the axis, of which a search may find one or two."""
+    robot = CATALOG["linear-delta"]
+    legs = []
+    for i, leg in enumerate(robot.legs):
+        angle = 2.0 * np.pi * i / 3.0
+        out = np.array([np.cos(angle), np.sin(angle), 0.0])
+        sizes = {"lower_length": 0.36754, "limits": (-0.3, 0.3), "platform_point": 0.057 * out}
+        legs.append(replace(leg, guide_point=0.2 * out, **sizes))
+    wide = replace(robot, legs=tuple(legs))
+    home = home_pose(wide)
+    np.testing.assert_array_equal(home[:2], 0.0)
+    others = pteron.random_poses(wide, 500, seed=3, type_i=0.0, type_ii=0.0)
+    assert reserve(wide, home).smallest >= 0.75 * reserve(wide, others).smallest.max()
+
+
+def test_boxes_beyond_all_numbers_are_refused():
+    with pytest.raises(
+        pteron.DataError, match=r"^low: .* a row of numbers of sensible size expected"
+    ):
+        prove("quadrupteron", Box([1e200] * 4, [2e200] * 4))
