@@ -698,8 +698,8 @@ def test_what_is_no_rotation_is_refused():
     words = "rotation: not an orthogonal 3x3 matrix"
     refused(lambda: pteron.turned(robot, 2 * np.eye(3)), words)
     refused(lambda: pteron.turned(robot, np.eye(2)), words)
+    refused(lambda: pteron.turned(robot, np.full((3, 3), np.nan)), words)
     words = "rotation: 'over' given, real numbers expected"
     refused(lambda: pteron.turned(robot, "over"), words, error=pteron.DataError)
-    refused(lambda: pteron.turned(robot, np.full((3, 3), np.nan)), words)
     words = "rotation: the matrix is a reflection (determinant -1); negate one column"
     refused(lambda: pteron.turned(robot, np.diag([1, 1, -1])), words)

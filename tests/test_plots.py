@@ -502,7 +502,7 @@ def test_a_saved_figure_keeps_its_text_and_is_the_same_each_time(tmp_path):
         with pytest.raises(pteron.OutputError, match=words):
             save_figure(powers(), tmp_path / path)
     for width in ("colum", 0.0, -1, float("nan"), None):
-        with pytest.raises(pteron.DataError, match='"column".* "page"'):
+        with pytest.raises(pteron.DataError, match=r'"column".* "page"'):
             resized(powers(), width)
 
 
