@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 import sympy
 from counted_modes import count_modes
-from mechanisms import random_machine
+from mechanisms import CATALOG, random_machine, with_elbows
 
 import pteron
 from pteron.equations.machine import closure_of
 from pteron.errors import DataError, ModelError, UnreachablePose
+from pteron.kernels import numeric
 
 MOST = {
     "RRRR": 8,
@@ -238,8 +239,10 @@ def test_a_step_from_a_pose_that_is_near(kinds, target):
     step = pteron.compile(robot, "direct_step", target)
     poses, joints = reached(robot, 200)
     held = well_held(robot, poses)
+    held &= (numeric(robot, "squared_type_i")(poses + 5e-4)[0] >= 0.0).all(axis=-1)
     poses, joints = poses[held], joints[held]
-    found, measure = step(joints, poses + 5e-4)
+    found, measure, bent = step(joints, poses + 5e-4)
+    assert not bent.any()
     np.testing.assert_allclose(found, poses, rtol=0, atol=1e-11)
     expected = np.abs(pteron.compile(robot, "type_ii")(poses))
     np.testing.assert_allclose(np.abs(measure), expected, rtol=1e-6)
@@ -253,13 +256,70 @@ def test_no_step_is_taken_at_a_singularity():
     step = pteron.compile(robot, "direct_step")
     pose = np.array([0.01, 0.02, 0.03, 0.0])
     joints = pteron.inverse_kinematics(robot, pose)
-    found, measure = step(joints, [0.0, 0.0, 0.0, 0.5])
+    found, measure, _ = step(joints, [0.0, 0.0, 0.0, 0.5])
     np.testing.assert_allclose(found, pose, rtol=0, atol=1e-12)
-    other, opposite = step(joints, [0.0, 0.0, 0.0, 2.5])
+    other, opposite, _ = step(joints, [0.0, 0.0, 0.0, 2.5])
     np.testing.assert_allclose(other, [0.01, 0.02, 0.03, np.pi], rtol=0, atol=1e-12)
     assert measure * opposite < 0.0
     edge = np.array([0.0, 0.0, 0.0, 0.5 * np.pi])
     assert not np.isfinite(step(pteron.inverse_kinematics(robot, edge), edge)[0]).all()
+
+
+SIDES = {
+    **{name: CATALOG[name] for name in ("delta", "five-bar", "par4", "orthoglide", "quadrupteron")},
+    **{kinds: random_machine(0, kinds) for kinds in ("RPPP", "CCC", "RRRU", "SSS")},
+}
+
+
+@pytest.mark.parametrize("share", [0.1, 1.0])
+@pytest.mark.parametrize("name", SIDES)
+def test_a_step_stays_on_its_side_of_all_singularities(name, share):
+    """From anywhere in reach, a tenth of the way to another pose, and all of it."""
+    robot = SIDES[name]
+    everywhere = {"type_i": 0.0, "type_ii": 0.0, "limits": False}
+    start, end = pteron.random_poses(robot, 2000, seed=5, **everywhere).reshape(2, 1000, -1)
+    end = start + share * (end - start)
+    reached = (numeric(robot, "squared_type_i")(end)[0] >= 0.0).all(axis=-1)
+    start, end = start[reached], end[reached]
+    joints = pteron.inverse_kinematics(robot, end)
+    found, _, bent = pteron.compile(robot, "direct_step")(joints, start)
+    came = np.isfinite(found).all(axis=-1)
+    assert came.any()
+    assert not bent[came].any()
+    own = pteron.inverse_kinematics(robot, found[came])
+    away = own - joints[came]
+    turns = np.where([leg.goes_round for leg in robot.legs], np.round(away / (2.0 * np.pi)), 0.0)
+    assert np.abs(away - 2.0 * np.pi * turns).max() < 1e-6
+    sides = [numeric(robot, "type_ii")(poses)[0] for poses in (start[came], found[came])]
+    assert (sides[0] * sides[1] > 0.0).all()
+    if (name, share) == ("delta", 0.1):  # whose steps all converge: NaN leads to the other side
+        sides = [numeric(robot, "type_ii")(poses)[0] for poses in (start, end)]
+        np.testing.assert_array_equal(came, sides[0] * sides[1] > 0.0)
+        assert not came.all()
+
+
+def test_a_step_over_a_singularity_is_told():
+    """Measured with the joints to come the start seems to lie on the other side."""
+    robot = CATALOG["five-bar"]
+    start = np.array([-0.00645167584305894, -0.1628013106639689])
+    joints = np.array([-0.8483849165790605, -2.294662569722324])
+    found, measure, bent = pteron.compile(robot, "direct_step")(joints, start)
+    assert np.isnan(found).all()
+    assert measure > 0.0 > numeric(robot, "type_ii")(start)[0]
+    assert bent == 0.0
+
+
+def test_the_leg_that_a_step_bends_the_other_way_is_named():
+    robot = CATALOG["linear-delta"]
+    pose = pteron.workspace.home_pose(robot)
+    turned = with_elbows(robot, "--+")
+    joints = pteron.inverse_kinematics(turned, pose)
+    found, _, bent = pteron.compile(robot, "direct_step")(joints, pose)
+    assert np.isnan(found).all()
+    assert bent == 3.0
+    found, _, bent = pteron.compile(turned, "direct_step")(joints, pose)
+    np.testing.assert_allclose(found, pose, rtol=0, atol=1e-12)
+    assert bent == 0.0
 
 
 @pytest.mark.parametrize("name", ["par4", "h4", "3-rrr", "3-prr", "delta", "five-bar", "delta-4"])

@@ -101,7 +101,7 @@ def test_casadi_functions_are_the_librarys(name):
             poses = np.array(functions["direct_kinematics"](joints))
             assert np.nanmin(np.abs(poses - pose).max(axis=1)) < 1e-9
         else:
-            found, _ = functions["direct_step"](joints, pose + 1e-3)
+            found, *_ = functions["direct_step"](joints, pose + 1e-3)
             np.testing.assert_allclose(np.array(found).ravel(), pose, 0.0, 1e-9)
 
 

@@ -36,6 +36,7 @@ FUNCTIONS = (
     "feed_forward_base",
     "feed_forward_pd",
     "feed_forward_pd_base",
+    "followed_step",
     "forward_dynamics",
     "gravity_forces",
     "inverse_dynamics",

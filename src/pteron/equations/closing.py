@@ -11,8 +11,8 @@ from typing import NamedTuple
 import casadi as ca
 
 from pteron.bodies.motion import Expression
-from pteron.closures.closure import nan_below_zero
-from pteron.closures.determinants import adjugate
+from pteron.closures.closure import nan_below_zero, plain_rows
+from pteron.closures.determinants import adjugate, determinant
 from pteron.equations.kinematics import reach
 from pteron.equations.machine import Machine
 from pteron.legs.leg import Circle, Plane, Sphere, Turned
@@ -106,6 +106,8 @@ class Misses(NamedTuple):
     """(n, m): their derivatives with respect to the pose."""
     relative: Expression
     """The largest, as a share of the terms that they are the differences of, of all legs."""
+    arms: list[Expression | None]
+    """From the centers of spheres and circles to the platform points, (3, 1) each."""
 
     @property
     def step(self) -> tuple[Expression, Expression]:
@@ -119,10 +121,12 @@ def misses(machine: Machine, joints: Expression, pose: Expression) -> Misses:
     rest = ca.SX.zeros(machine.freedom)
     platform = machine.platform.motion(pose, rest, rest)
     lengths, rows, angles, sizes = [], [], [ca.SX(0)], [ca.SX(_NOTHING)]
+    arms: list[Expression | None] = []
     for leg, q, point, matrix in zip(
         machine.legs, ca.vertsplit(joints), platform.points, platform.matrices, strict=True
     ):
         locus, c = leg.locus(q), point.position
+        arms.append(None)
         if isinstance(locus, Turned):
             assert platform.angle is not None
             length, row = platform.angle.angle - locus.angle, ca.SX([[0, 0, 0, 1]])
@@ -135,6 +139,7 @@ def misses(machine: Machine, joints: Expression, pose: Expression) -> Misses:
             length = 0.5 * (ca.dot(b, b) / locus.radius - locus.radius)
             row = ca.horzcat(b.T / locus.radius, 0)
             sizes.append(locus.radius + ca.norm_1(c) + ca.norm_1(locus.center))
+            arms[-1] = b
         lengths.append(length)
         rows.append(ca.mtimes(row, matrix))
     # The terms of all legs are the measure: those of a plane through the origin may all be zero.
@@ -144,7 +149,8 @@ def misses(machine: Machine, joints: Expression, pose: Expression) -> Misses:
         if not isinstance(leg.locus(q), Turned)
     ]
     share = ca.mmax(ca.vertcat(*missed)) / ca.sum1(ca.vertcat(*sizes))
-    return Misses(ca.vertcat(*lengths), ca.vertcat(*rows), ca.mmax(ca.vertcat(share, *angles)))
+    largest = ca.mmax(ca.vertcat(share, *angles))
+    return Misses(ca.vertcat(*lengths), ca.vertcat(*rows), largest, arms)
 
 
 def newton_step(
@@ -156,28 +162,68 @@ def newton_step(
     return pose + step / determinant, missed.relative
 
 
-def direct_step(
-    machine: Machine, joints: Expression, pose: Expression, least: float
-) -> tuple[Expression, Expression]:
-    """Return the pose of joints next to a pose, and its type-II measure.
+class Stepped(NamedTuple):
+    """Where Newton's steps lead to."""
 
-    NaN where Newton's steps do not converge, come to another side of the singularities, or to where
-    a leg does not reach; not finite where the measure is not above `least`.
-    """
+    pose: Expression
+    """NaN where they do not converge, or a leg does not reach; not finite where the type-II
+    measure is not above what was asked."""
+    measure: Expression
+    """The type-II measure."""
+    determinant: Expression
+    """Of the closures' derivatives: it has the same zeros, and changes its sign there."""
+    missed: Misses
+    """Before the last step."""
+
+
+def followed_step(machine: Machine, joints: Expression, pose: Expression, least: float) -> Stepped:
+    """Return the pose of joints next to a pose, on whichever side of the singularities."""
     missed = misses(machine, joints, pose)
-    start = machine.closure.measure_of(missed.rows)
-    step, determinant = missed.step
+    step, divisor = missed.step
     for _ in range(_STEPS - 1):
-        before, pose = determinant, pose + step / determinant
+        before, pose = divisor, pose + step / divisor
         missed = misses(machine, joints, pose)
-        step, determinant = missed.step
+        step, divisor = missed.step
     measure = machine.closure.measure_of(missed.rows)
-    lost = nan_below_zero(_CLOSED - missed.relative) + nan_below_zero(start * measure)
-    lost += nan_below_zero(_STEADY - ca.fabs(determinant / before - 1))
+    lost = nan_below_zero(_CLOSED - missed.relative)
+    lost += nan_below_zero(_STEADY - ca.fabs(divisor / before - 1))
     # The last step's divisor vanishes where the measure is too small.
     enough = ca.fmax(measure * measure - least * least, 0) / (measure * measure)
-    found = pose + step / (determinant * enough)
+    found = pose + step / (divisor * enough)
     for leg, q, at in zip(machine.legs, ca.vertsplit(joints), reach(machine, found), strict=True):
         if isinstance(leg.locus(q), Plane):  # it goes on where the leg does not reach
             lost += nan_below_zero(at.discriminant)
-    return found + lost, measure
+    return Stepped(found + lost, measure, divisor, missed)
+
+
+def direct_step(
+    machine: Machine, joints: Expression, pose: Expression, least: float
+) -> tuple[Expression, Expression, Expression]:
+    """Return the pose of joints next to a pose, its type-II measure, and the leg bent otherwise.
+
+    NaN where `followed_step` has it, where a leg does not reach the pose to start from, and where
+    it comes to the other side of a singularity than that pose in the robot's working mode: the
+    type-II measure has another sign, or a leg is bent the other way. That leg is the last result,
+    from 1; 0 where there is none, or Newton's steps do not converge.
+    """
+    stepped = followed_step(machine, joints, pose, least)
+    # The start is held by the loci of its own joints, not of those to come.
+    start, rows = machine.state(pose), ca.vertsplit(misses(machine, joints, pose).rows)
+    own = ca.vertsplit(plain_rows(start.platform, start.legs))
+    lost, bent = ca.SX(0), ca.SX(0)
+    legs = zip(machine.legs, ca.vertsplit(joints), start.legs, reach(machine, pose), strict=True)
+    for i, (leg, q, motion, at) in enumerate(legs):
+        arm, joint = stepped.missed.arms[i], ca.SX.sym("joint")
+        locus = leg.locus(joint)
+        if arm is None or not isinstance(locus, Sphere | Circle):
+            continue
+        rows[i] = own[i]
+        lost += nan_below_zero(at.discriminant)
+        moved = ca.substitute(ca.jacobian(locus.center, joint), joint, q)
+        turned = ca.dot(arm, moved) * motion.divisor
+        # Below zero, as 1 would be a truth value.
+        bent = ca.fmin(bent, ca.if_else(turned < 0, -(i + 1), 0))
+    bent = ca.if_else(stepped.missed.relative < _CLOSED, -bent, 0)
+    side = determinant(ca.vertcat(*rows)) * stepped.determinant
+    lost += nan_below_zero(side) + nan_below_zero(-bent)
+    return stepped.pose + lost, stepped.measure, bent

@@ -61,8 +61,8 @@ def casadi_functions(robot: RobotLike) -> dict[str, ca.Function]:
     -------
     dict of str to casadi.Function
         `inverse_kinematics` (pose) -> joints; `direct_kinematics` (joints) -> poses (k, m), in
-        reach or not, or `direct_step` (joints, pose) -> found, type_ii where there is no closed
-        form; `jacobian` (pose) -> (n, m); `type_i_squares` (pose) -> (n), the squares of the
+        reach or not, or `direct_step` (joints, pose) -> found, type_ii, bent where there is no
+        closed form; `jacobian` (pose) -> (n, m); `type_i_squares` (pose) -> (n), the squares of the
         legs' type-I measures, negative out of reach, and `type_ii` (pose): what a path must keep
         away from zero; `mass_matrix` (pose); `bias_forces` (pose, velocity), h of M x'' + h =
         J^T F; `inverse_dynamics` (pose, velocity, acceleration, wrench) -> forces and

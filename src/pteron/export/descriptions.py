@@ -17,7 +17,7 @@ SUMMARIES = {
     "closure_poses": "Every pose that the joint coordinates allow, one a row, in reach or not.",
     "direct_step": "The pose of the joint coordinates next to a given one, such as the last one "
     "of a motion, by Newton's method; NaN where it does not converge, or comes to another side of "
-    "the singularities.",
+    "the singularities: the type-II measure has another sign, or a leg is bent the other way.",
     "jacobian": "Jacobian: joint rates = J velocity.",
     "inverse_dynamics": "Actuator forces of a motion, from the inertial parameters; no friction.",
     "forward_dynamics": "Acceleration of the platform under actuator forces; no friction.",
@@ -113,6 +113,7 @@ def meaning(robot: Manipulator, port: Port, output: Output) -> str:
         "jacobian": "joint rates per unit of the platform's rates",
         "regressor": "actuator forces per unit of each parameter",
         "type_ii": "type-II measure: 0 at a singularity",
+        "bent": "the leg, from 1, that would be bent the other way, of which found is NaN; else 0",
         "type_i": "type-I measure of each leg: 0 where it is stretched or folded, 1 at best",
         "margin": "from each leg to the edge of its reach, m; negative beyond it",
     }

@@ -92,8 +92,13 @@ def _newton_step(m: Machine, v: Symbols) -> Outputs:
 
 
 def _direct_step(m: Machine, v: Symbols) -> Outputs:
-    found, measure = closing.direct_step(m, v["joints"], v["pose"], TYPE_II)
-    return {"found": found, "type_ii": measure}
+    found, measure, bent = closing.direct_step(m, v["joints"], v["pose"], TYPE_II)
+    return {"found": found, "type_ii": measure, "bent": bent}
+
+
+def _followed_step(m: Machine, v: Symbols) -> Outputs:
+    found = closing.followed_step(m, v["joints"], v["pose"], TYPE_II)
+    return {"found": found.pose, "type_ii": found.measure}
 
 
 def _reach(m: Machine, v: Symbols) -> Outputs:
@@ -223,7 +228,7 @@ def _drive_forces(m: Machine, v: Symbols, *, smooth: bool) -> Outputs:
 
 def _joint_feed_forward(m: Machine, v: Symbols) -> Outputs:
     moving = v["joint_rates"], v["joint_accelerations"]
-    found, _ = closing.direct_step(m, v["joints"], v["pose"], TYPE_II)
+    found, *_ = closing.direct_step(m, v["joints"], v["pose"], TYPE_II)
     state = m.state(found, *kinematics.platform_rates(m, found, *moving))
     rigid = inverse_dynamics(
         m, state, v["parameters"], v.get("wrench"), carried=v.get("carried", True)
@@ -329,6 +334,7 @@ TABLE: dict[str, Entry] = {
     "closure_rows": Entry(("joints",), _closure_rows),
     "newton_step": Entry(("joints", "pose"), _newton_step),
     "direct_step": Entry(("joints", "pose"), _direct_step),
+    "followed_step": Entry(("joints", "pose"), _followed_step),
     "reach": Entry(_POSE, _reach),
     "passive_room": Entry(_POSE, _passive_room),
     "room": Entry(

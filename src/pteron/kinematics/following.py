@@ -63,7 +63,7 @@ def follow(
             f"joints, start: shapes {given.shape} and {pose.shape} given, (N, {n}) and ({n},) "
             "expected"
         )
-    step = numeric(robot, "direct_step")
+    step = numeric(robot, "followed_step")
     found = np.full(given.shape, np.nan)
     before, side = pose, 0.0
     for k, q in enumerate(given):
