@@ -1,5 +1,6 @@
 """The machine in other engines: exported files load there, and say what the library says."""
 
+import re
 import runpy
 import subprocess
 import sys
@@ -223,12 +224,14 @@ def test_every_file_is_named_after_the_machine(tmp_path):
     robot = replace(CATALOG["par4"], name='A & B <"robot"> -- 2')
     exports = (export_mjcf, export_sdf, export_urdf, export_pinocchio)
     paths = [path for export in exports for path in export(robot, tmp_path)]
+    stem = paths[0].stem
+    assert re.fullmatch(r"a-b-robot-2-[0-9a-f]{6}", stem)
     assert [path.name for path in paths] == [
-        "a-b-robot-2.xml",
-        "a-b-robot-2.sdf",
-        "a-b-robot-2.urdf",
-        "a-b-robot-2.closure.yaml",
-        "a_b_robot_2_pinocchio.py",
+        f"{stem}.xml",
+        f"{stem}.sdf",
+        f"{stem}.urdf",
+        f"{stem}.closure.yaml",
+        f"{stem.replace('-', '_')}_pinocchio.py",
     ]
     for path in paths:
         text = path.read_text()

@@ -256,8 +256,38 @@ def test_a_saved_machine_is_loaded_without_loss(name, tmp_path):
 def test_names_and_limits_survive_too(tmp_path):
     robot = CATALOG["tripteron"]
     legs = (replace(robot.legs[0], limits=None), *robot.legs[1:])
-    robot = replace(robot, name='Mühle "3T"\n\\ # = 翼', legs=legs)
+    robot = replace(robot, name='Mühle "3T" \\ # = 翼', legs=legs)
     assert pteron.load(pteron.save(robot, tmp_path / "a b.toml")) == robot
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("a\nb", r"name: has control characters \(U\+000A\), which files and messages"),
+        ("\x1b[31m\x07\x01\x7f", r"\(U\+0001, U\+0007, U\+001B, ...\)"),
+        ("a\u202eb", r"\(U\+202E\)"),
+        ("a\u2028b", r"\(U\+2028\)"),
+        ("a\ufffeb", r"\(U\+FFFE\)"),
+        (201 * "a", "name: 201 characters given, at most 200 expected"),
+    ],
+)
+def test_names_that_files_cannot_hold_are_refused(tmp_path, name, words):
+    path = pteron.save(pteron.load("five-bar"), tmp_path / "robot.toml")
+    given = "".join(c if c.isprintable() else f"\\u{ord(c):04X}" for c in name)
+    path.write_text(path.read_text().replace('"five-bar"', f'"{given}"'))
+    with pytest.raises(ModelError, match=words):
+        pteron.load(path)
+    with pytest.raises(ModelError, match=words) as refusal:
+        replace(pteron.load("five-bar"), name=name)
+    assert all(fault.isprintable() for fault in refusal.value.faults)
+    with pytest.raises(ModelError, match=r"U\+D800"):
+        replace(pteron.load("five-bar"), name="a\ud800b")
+
+
+@pytest.mark.parametrize("name", [200 * "翼", "دلتا", "می\u200cرود", "नमस्ते", "a\u00a0b", "🦾"])
+def test_names_of_every_script_are_kept(tmp_path, name):
+    robot = replace(pteron.load("five-bar"), name=name)
+    assert pteron.load(pteron.save(robot, tmp_path / "robot.toml")) == robot
 
 
 @settings(deadline=None, derandomize=True, max_examples=25)

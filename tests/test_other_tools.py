@@ -10,6 +10,7 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from tempfile import mkdtemp
+from xml.etree import ElementTree
 
 import casadi as ca
 import fmpy
@@ -29,6 +30,10 @@ from pteron.export import (
     export_fmu,
     export_klipper,
     export_linuxcnc,
+    export_mjcf,
+    export_pinocchio,
+    export_sdf,
+    export_urdf,
 )
 from pteron.motion import joint_points
 
@@ -782,6 +787,77 @@ def test_matrixkins_moves_the_joints_as_the_library_does(tmp_path, name, tool):
     joints = 1000.0 * pteron.inverse_kinematics(robot, poses) + offsets
     places = 1000.0 * joint_points(robot, poses).tool
     np.testing.assert_allclose(places @ rows.T, joints, 0.0, 1e-6)
+
+
+# Names
+
+NAMES = [
+    200 * "x",
+    200 * "翼",
+    40 * "\N{ARABIC LIGATURE SALLALLAHOU ALAYHE WASALLAM}",
+    "\"*/ *) <a & b='c'> 翼 -- ${x} {{ y }} %s \\",
+    "con",
+    "double",
+]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_format_holds_every_name(tmp_path, name):
+    robot = replace(CATALOG["tripteron"], name=name)
+    sources = pteron.export_c(robot, ["inverse_kinematics"], tmp_path)
+    program = [path.name for path in sources if path.suffix == ".c"]
+    subprocess.run(["gcc", *program, "-o", "tried", "-lm"], cwd=tmp_path, check=True)
+    subprocess.run([tmp_path / "tried"], check=True, capture_output=True)
+    pteron.export_st(robot, ["inverse_kinematics"], tmp_path)
+    settings(robot, tmp_path)
+    kinematics(robot, tmp_path)
+    modules = [path for path in export_casadi(robot, tmp_path) if path.suffix == ".py"]
+    for path in (*modules, *export_pinocchio(robot, tmp_path)):
+        compile(path.read_text(), path.name, "exec")
+    for export in (export_mjcf, export_sdf, export_urdf):
+        for path in export(robot, tmp_path):
+            if path.suffix != ".yaml":
+                ElementTree.parse(path)
+    assert max(len(path.name) for path in tmp_path.iterdir()) < 160
+
+
+def test_an_fmus_description_holds_a_name(tmp_path):
+    robot = replace(CATALOG["tripteron"], name=NAMES[3])
+    (unit,) = export_fmu(robot, tmp_path)
+    with zipfile.ZipFile(unit) as members:
+        described = ElementTree.fromstring(members.read("modelDescription.xml"))
+    assert described.get("modelName") == robot.name
+    assert described.find("CoSimulation").get("modelIdentifier") == unit.stem
+
+
+def test_names_that_differ_in_letters_stay_apart(tmp_path):
+    names = ["翼", "鳥", "mühle", "mühle ", "muhle", "a+b", "a-b", "a*b", 120 * "x", 121 * "x"]
+    stems = []
+    for name in names:
+        robot = replace(CATALOG["tripteron"], name=name)
+        (path,) = export_klipper(robot, tmp_path)
+        (model,) = export_mjcf(robot, tmp_path)
+        stems.append((path.stem, model.stem))
+    assert len({stem for stem, _ in stems}) == len({stem for _, stem in stems}) == len(names)
+    assert stems[4] == ("muhle", "muhle")
+    assert stems[6] == ("a_b", "a-b")
+    assert all(re.fullmatch(r"[a-z][a-z0-9_]*", stem) for stem, _ in stems)
+
+
+@pytest.mark.parametrize(
+    ("name", "stem"),
+    [
+        ("tripod", "tripod_[0-9a-f]{6}kins"),
+        (30 * "a", "a{19}_[0-9a-f]{6}kins"),
+        ("delta", "deltakins"),
+    ],
+)
+def test_linuxcncs_own_modules_keep_their_names(tmp_path, name, stem):
+    path, *_ = export_linuxcnc(replace(CATALOG["tripteron"], name=name), tmp_path)
+    assert re.fullmatch(stem, path.stem)
+    assert len(path.stem) < 31  # RTAPI_NAME_LEN
+    assert f"component {path.stem} " in path.read_text()
+    assert f"KINEMATICS = {path.stem}\n" in (tmp_path / f"{name}.ini").read_text()
 
 
 # The command line

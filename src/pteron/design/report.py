@@ -18,6 +18,7 @@ from pteron.design.front import Front
 from pteron.design.proofs import ProvedCube, proved, workspace_share
 from pteron.design.task import Task
 from pteron.manipulator import Manipulator
+from pteron.manipulator.names import LONGEST_NAME
 from pteron.manipulator.saving import text_of
 
 if TYPE_CHECKING:
@@ -153,7 +154,8 @@ class Summary:
 
 
 def _design(task: Task, robot: Manipulator, name: str) -> Design:
-    return Design(task, replace(robot, name=f"{robot.name}-{name.split(', ')[0]}"))
+    ending = f"-{name.split(', ')[0]}"
+    return Design(task, replace(robot, name=robot.name[: LONGEST_NAME - len(ending)] + ending))
 
 
 def _told(name: str, design: Design) -> Told:

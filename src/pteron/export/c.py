@@ -6,7 +6,6 @@ C99's macros, which are quiet for NaN: a plain `<` sets off the trap for invalid
 
 from __future__ import annotations
 
-import re
 import textwrap
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ from pteron.atomic import write_texts
 from pteron.errors import ModelError
 from pteron.export.descriptions import banner
 from pteron.export.functions import Asked, Exported, chosen
+from pteron.export.names import prefix_of
 from pteron.export.outputs import Output
 from pteron.kernels import Array
 from pteron.kernels.code import (
@@ -140,12 +140,6 @@ def c_texts(
         "CMakeLists.txt": "CMakeLists.txt.j2",
     }
     return {file: rendered("pteron.export", name, **values) for file, name in files.items()}
-
-
-def prefix_of(robot: Manipulator) -> str:
-    """Return the machine's name as an identifier of C."""
-    name = re.sub(r"[^a-z0-9]+", "_", robot.name.lower()).strip("_")
-    return name if name and not name[0].isdigit() else f"robot_{name}".rstrip("_")
 
 
 @dataclass(frozen=True)

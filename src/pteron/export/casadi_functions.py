@@ -14,9 +14,9 @@ from pteron.bodies.motion import Expression
 from pteron.equations import drives
 from pteron.equations.kinematics import jacobian
 from pteron.equations.machine import Machine, closure_of
-from pteron.export.c import prefix_of
 from pteron.export.descriptions import banner
 from pteron.export.functions import has_drives
+from pteron.export.names import prefix_of
 from pteron.export.start_pose import good_poses, joint_limits, keeps_limits, start_pose
 from pteron.kernels import program, specialised
 from pteron.kernels.code import rendered

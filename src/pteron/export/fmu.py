@@ -25,10 +25,11 @@ from numpy.typing import ArrayLike
 from pteron.atomic import make_folder, write_files
 from pteron.dynamics import drive_forces
 from pteron.errors import DataError, ModelError
-from pteron.export.c import Printer, c_texts, prefix_of
+from pteron.export.c import Printer, c_texts
 from pteron.export.descriptions import banner
 from pteron.export.fmu_variables import layout
 from pteron.export.functions import chosen
+from pteron.export.names import prefix_of
 from pteron.export.start_pose import start_pose
 from pteron.kernels import Array, as_array
 from pteron.kernels.c import c_compiler

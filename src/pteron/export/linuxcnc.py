@@ -16,9 +16,10 @@ import numpy as np
 
 from pteron.atomic import write_texts
 from pteron.equations.machine import Machine, closure_of
-from pteron.export.c import c_texts, prefix_of
+from pteron.export.c import c_texts
 from pteron.export.descriptions import banner
 from pteron.export.functions import chosen
+from pteron.export.names import marked, prefix_of
 from pteron.export.start_pose import start_pose
 from pteron.kernels import Array
 from pteron.kernels.code import rendered
@@ -29,6 +30,15 @@ from pteron.platforms import Platform
 
 _MILLIMETRES = 1000.0
 _DEGREES = 180.0 / math.pi
+
+_LONGEST = 26
+"""Characters of a module's name before "kins": rtapi.h has 31 in all (RTAPI_NAME_LEN)."""
+
+_THEIRS = (
+    *("corexy", "genhex", "genser", "gentriv", "lineardelta", "matrix", "max", "penta", "puma"),
+    *("rose", "rotarydelta", "rotate", "scara", "tripod", "triv", "user"),
+)
+"""Machines after which modules of LinuxCNC 2.9 are called."""
 
 
 @dataclass(frozen=True)
@@ -146,7 +156,7 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
         "banner": [line for line in banner(robot, "LinuxCNC") if "SI units" not in line],
         "prefix": prefix,
         "upper": prefix.upper(),
-        "name": f"{prefix}kins",
+        "name": _component(prefix),
         # One file, since halcompile takes one.
         "code": texts[f"{prefix}.h"] + texts[f"{prefix}.c"].partition("#include <math.h>\n")[2],
         "axes": axes,
@@ -171,7 +181,7 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
         "number": repr,
     }
     files = {
-        f"{prefix}kins.comp": rendered("pteron.export", "kins.comp.j2", **values),
+        f"{_component(prefix)}.comp": rendered("pteron.export", "kins.comp.j2", **values),
         f"{prefix}.ini": rendered("pteron.export", "linuxcnc.ini.j2", **values),
         f"{prefix}.hal": rendered("pteron.export", "linuxcnc.hal.j2", **values),
     }
@@ -185,6 +195,13 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
     # halcompile reads what the locale says: nothing but ASCII.
     plain = {name: text.encode("ascii", "replace").decode() for name, text in files.items()}
     return write_texts(folder, plain)
+
+
+def _component(prefix: str) -> str:
+    """Return the name of a module that LinuxCNC can load and has none of its own by."""
+    if prefix in _THEIRS or len(prefix) > _LONGEST:
+        prefix = marked(prefix, prefix, _LONGEST)
+    return f"{prefix}kins"
 
 
 def _linear(robot: Manipulator) -> bool:

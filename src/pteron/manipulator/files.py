@@ -107,13 +107,16 @@ def explained(name_or_path: str | Path) -> str:
     ModelError
         As `load`.
     """
+    from pteron.manipulator.names import LONGEST_NAME
     from pteron.manipulator.writing import written
 
     given = document(name_or_path)
     name = _machine(given, str(name_or_path)).name
     legs = [{"type": _DEFAULT_KIND, **leg} for leg in given["legs"]]
     about = (f"Made after {shown(name, bare=True)}. Put in your numbers, then: pteron check FILE",)
-    return written({**given, "name": f"my {name}", "legs": legs}, explained=True, about=about)
+    return written(
+        {**given, "name": f"my {name}"[:LONGEST_NAME], "legs": legs}, explained=True, about=about
+    )
 
 
 def _machine(document: dict[str, Any], source: str) -> Manipulator:

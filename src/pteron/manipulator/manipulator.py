@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pteron.bodies.vectors import Vector, complement, parallel, vector
 from pteron.errors import ModelError
 from pteron.legs import LegKind
+from pteron.manipulator.names import name_faults
 from pteron.manipulator.radii import Radii
 from pteron.platforms import Platform
 from pteron.toml import told
@@ -132,9 +133,7 @@ class Manipulator:
 
 def faults_of(name: object, platform: Platform, legs: Sequence[LegKind | None]) -> list[str]:
     """Return all that is wrong with a machine, a line each; a leg that is None is wrong itself."""
-    found = []
-    if type(name) is not str or not name.strip():
-        found.append(f"name: {name!r} is not a text with at least one letter")
+    found = list(name_faults(name))
     freedom = len(platform.coordinates)
     if len(legs) != freedom:
         found.append(

@@ -18,7 +18,6 @@ from pteron.export.engines.writing import (
     PLATFORM_COLOR,
     frame,
     head,
-    identifier,
     inverse,
     left_out,
     look,
@@ -29,6 +28,7 @@ from pteron.export.engines.writing import (
     small,
     within,
 )
+from pteron.export.names import identifier
 from pteron.kernels import Array
 from pteron.kernels.code import rendered
 from pteron.manipulator import RobotLike, as_manipulator

@@ -20,13 +20,13 @@ from pteron.export.engines.tree import tree
 from pteron.export.engines.writing import (
     frame,
     head,
-    identifier,
     inverse,
     left_out,
     number,
     small,
     within,
 )
+from pteron.export.names import identifier
 from pteron.kernels import Array
 from pteron.kernels.code import rendered
 from pteron.manipulator import RobotLike, as_manipulator

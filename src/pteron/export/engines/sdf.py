@@ -18,13 +18,13 @@ from pteron.export.engines.writing import (
     PLATFORM_COLOR,
     frame,
     head,
-    identifier,
     left_out,
     number,
     row,
     small,
     within,
 )
+from pteron.export.names import identifier
 from pteron.kernels.code import rendered
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.shapes import PoseLike

@@ -13,7 +13,6 @@ from pteron.equations.kinematics import passive_joints
 from pteron.equations.machine import Machine
 from pteron.export.engines.parts import BASE, Tree, TreeBody
 from pteron.kernels import Array
-from pteron.manipulator import Manipulator
 
 _DIGITS = 15
 """After the point; what is beyond is rounding. m, rad, or parts of a unit vector."""
@@ -74,12 +73,6 @@ def within(body: TreeBody, points: Array) -> Array:
 def parent_frame(opened: Tree, body: TreeBody) -> Array:
     """Return the frame (4, 4) at the home pose of the body before."""
     return np.eye(4) if body.parent == BASE else frame(opened.bodies[body.parent])
-
-
-def identifier(robot: Manipulator) -> str:
-    """Return a machine's name as one of files and of XML."""
-    name = re.sub(r"[^A-Za-z0-9]+", "-", robot.name).strip("-").lower()
-    return name or "robot"
 
 
 def material(body: TreeBody) -> str:

@@ -1,0 +1,55 @@
+"""A machine's name as files, code and formats take it: letters, digits and one separator."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import unicodedata
+
+from pteron.manipulator import Manipulator
+
+_PLAIN = re.compile(r"[A-Za-z0-9]+([ _-][A-Za-z0-9]+)*")
+"""Names of which nothing is lost but which separator it was, and capitals."""
+
+_LONGEST = 100
+"""Characters of a stem: with what is added it fits file systems, and FMI's 200 for identifiers."""
+
+_DIGITS = 6
+
+_TAKEN = {"all", "clean", "depend", "help", "install", "package", "test"} | {
+    *("con", "prn", "aux", "nul"),
+    *(f"{port}{i}" for port in ("com", "lpt") for i in range(1, 10)),
+}
+"""Targets that CMake keeps for itself, and names of devices, which are no files on Windows."""
+
+
+def prefix_of(robot: Manipulator) -> str:
+    """Return the machine's name as an identifier of C and the stem of files."""
+    name = _safe(robot.name, "_")
+    return name if name and not name[0].isdigit() else f"robot_{name}".rstrip("_")
+
+
+def identifier(robot: Manipulator) -> str:
+    """Return a machine's name as one of XML and its files."""
+    return _safe(robot.name, "-") or "robot"
+
+
+def _safe(name: str, separator: str) -> str:
+    """Return a name in small ASCII letters, digits and a separator; empty if it has none.
+
+    A name that is long, or loses more than its capitals and which separator it has, gets a
+    checksum: two that differ stay apart.
+    """
+    letters = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode().lower()
+    found = re.sub(r"[^a-z0-9]+", separator, letters).strip(separator)
+    if found in _TAKEN:
+        found = f"robot{separator}{found}"
+    plain = _PLAIN.fullmatch(name) is not None
+    return found if plain and len(found) <= _LONGEST else marked(found, name, _LONGEST, separator)
+
+
+def marked(stem: str, name: str, longest: int, separator: str = "_") -> str:
+    """Return a stem with a name's checksum, cut to a length."""
+    digest = hashlib.sha256(name.encode()).hexdigest()[:_DIGITS]
+    kept = stem[: longest - _DIGITS - 1].rstrip(separator) or "robot"
+    return f"{kept}{separator}{digest}"

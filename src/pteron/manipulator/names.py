@@ -1,0 +1,35 @@
+"""Names of machines: what every message, file and format can hold."""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Iterator
+
+LONGEST_NAME = 200
+"""Characters; file systems hold 255 bytes, and files add to the machine's name what they are."""
+
+_JOINERS = "\u200c\u200d"
+"""Unseen characters that spelling needs, in Persian and Hindi."""
+
+
+def name_faults(name: object) -> Iterator[str]:
+    """Yield what is wrong with a machine's name."""
+    if type(name) is not str or not name.strip():
+        yield f"name: {name!r} is not a text with at least one letter"
+        return
+    if len(name) > LONGEST_NAME:
+        yield f"name: {len(name)} characters given, at most {LONGEST_NAME} expected"
+    unseen = sorted({c for c in name if _is_unseen(c)})
+    if unseen:
+        codes = ", ".join(f"U+{ord(c):04X}" for c in unseen[:3])
+        yield (
+            f"name: has control characters ({codes}{', ...' if len(unseen) > 3 else ''}), which "
+            "files and messages cannot hold; write it in one line of letters, digits and signs"
+        )
+
+
+def _is_unseen(c: str) -> bool:
+    """Say whether a character controls the text about it, or is none."""
+    if unicodedata.category(c) in ("Cc", "Cf", "Cs", "Zl", "Zp"):
+        return c not in _JOINERS
+    return ord(c) & 0xFFFE == 0xFFFE or 0xFDD0 <= ord(c) <= 0xFDEF
