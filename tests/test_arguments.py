@@ -141,6 +141,10 @@ TOO_MANY = {
     "quadrature_volume": lambda: workspace.quadrature_volume("delta", [0, 0, -0.9], lines=FAR),
     "global_conditioning": lambda: indices.global_conditioning("delta", [0, 0, -0.9], count=FAR),
     "pick_and_place": lambda: motion.pick_and_place("delta", samples=FAR),
+    "map_index": lambda: maps.map_index(
+        "five-bar", "condition", maps.pose_grid("five-bar", points=10**6)
+    ),
+    "random_excitation": lambda: identification.random_excitation("delta", harmonics=FAR),
     "repeated": lambda: motion.pick_and_place("delta", scale=0.5).repeated(FAR),
 }
 

@@ -98,13 +98,13 @@ def expect_kinds(
         raise DataError("; ".join(wrong))
 
 
-def expect_to_fit(name: str, given: float, numbers: float) -> None:
+def expect_to_fit(name: str, given: object, numbers: float) -> None:
     """Refuse a size whose arrays do not fit into this computer's memory, before they are made.
 
     Parameters
     ----------
-    name, given : str, float
-        The argument that says how many there are.
+    name, given : str, object
+        The argument that says how many there are, and its value.
     numbers : float
         How many numbers of 8 bytes it takes to hold them.
 

@@ -65,6 +65,9 @@ class Program(TyperGroup):
             complain(f"{where}: {error.strerror or error}")
             _close_standard_output()
             status = _USER_ERROR
+        except MemoryError as error:
+            complain(f"there is not enough memory: {error or 'ask for less at once'}")
+            status = _USER_ERROR
         except (Abort, KeyboardInterrupt):
             note("Interrupted")
             status = _INTERRUPTED

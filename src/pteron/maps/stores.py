@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
@@ -16,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pteron.arguments import expect_to_fit
 from pteron.errors import DataError, ModelError, OutputError
 from pteron.maps.checksums import checksum
 from pteron.maps.grid import COORDINATES, Grid
@@ -32,6 +34,8 @@ class MemoryStore:
     """A map in this process's memory."""
 
     def __init__(self, grid: Grid, names: tuple[str, ...]) -> None:
+        poses = " x ".join(map(str, grid.shape))
+        expect_to_fit("grid", f"{poses} poses", (len(names) + 1.0) * math.prod(grid.shape))
         self._grid = grid
         self._regions = grid.regions()
         self._values = {name: np.empty(grid.shape) for name in names}

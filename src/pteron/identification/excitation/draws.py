@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from pteron.arguments import expect_to_fit
 from pteron.errors import DataError, ModelError
 from pteron.identification.excitation.fourier import FourierMotion, Space
 from pteron.identification.excitation.limits import Limits
@@ -94,6 +95,8 @@ def random_excitation(
     limits = limits or Limits.of(robot)
     if harmonics < 1:
         raise DataError(f"harmonics: {harmonics} given, 1 or more expected")
+    # Sines and cosines of all harmonics at the samples of a look.
+    expect_to_fit("harmonics", harmonics, 2.0 * _FINE * harmonics * harmonics)
     rng = np.random.default_rng(seed)
     middle = np.array(home(robot))
     check_rest(robot, middle, limits)
