@@ -18,8 +18,11 @@ import casadi as ca
 
 from pteron.bodies.motion import Expression
 from pteron.closures.determinants import adjugate, determinant, solved_across
-from pteron.legs.leg import LegEquations, LegMotion
+from pteron.legs.leg import LegEquations, LegMotion, Plane, Turned
 from pteron.platforms.motion import PlatformEquations, PlatformMotion
+
+_COINCIDENT = 1e-9
+"""Share of the points' distances from P within which points count as one, or on one line."""
 
 
 class Closure(ABC):
@@ -68,27 +71,34 @@ class Closure(ABC):
     def measure(self, platform: PlatformMotion, legs: Sequence[LegMotion]) -> Expression:
         """Return the type-II measure: 1 in size at best, 0 where J is singular, without unit.
 
-        It is det A, J = B^-1 A, with each row made a unit force, or a unit moment, over the most
-        that so many forces on these platform points may have: 1 where the forces are isotropic and
-        their moments balanced. So it is the same in any units and frame, for every kind of leg.
+        It is det A, J = B^-1 A, with each leg's force on its platform point, or moment on the
+        platform, made one of unit size in space, over the most that so many forces on these points
+        may have: 1 where the forces are isotropic and their moments balanced. So it is the same in
+        any units and frame, for every kind of leg; a force across a planar machine counts as the
+        little that it does in the plane.
         """
-        return self.measure_of(plain_rows(platform, legs))
+        if any(leg.row.is_zero() for leg in legs):
+            return ca.SX(0)  # a leg that moves nothing
+        return self.measure_of(plain_rows(platform, legs), [leg.wrench_size for leg in legs])
 
-    def measure_of(self, rows: Expression) -> Expression:
-        """Return the type-II measure of the rows of A (n, m), of any length."""
+    def measure_of(self, rows: Expression, sizes: Sequence[Expression] | None = None) -> Expression:
+        """Return the type-II measure of the rows of A (n, m).
+
+        `sizes` are those of the legs' forces in space, or of their moments. Without them the rows
+        are those of the legs' loci: unit forces on spheres and circles, unit moments, and the
+        planes' normals as they are.
+        """
         lengths = self.platform.directions.shape[1]
-        forces = [not row[:lengths].is_zero() for row in ca.vertsplit(rows)]
-        parts = (
-            row[:lengths] if force else row[lengths:]
-            for row, force in zip(ca.vertsplit(rows), forces, strict=True)
-        )
-        sizes = ca.sqrt(reduce(mul, (ca.dot(part, part) for part in parts)))
-        greatest = (sum(forces) / lengths) ** (lengths / 2)
-        if all(forces) and "phi" in self.platform.coordinates:
-            if self._lever.is_zero():  # no force has a moment
+        loci = [leg.locus(ca.SX(0)) for leg in self.legs]
+        if sizes is None:
+            sizes = [ca.norm_2(x.normal) if isinstance(x, Plane) else ca.SX(1) for x in loci]
+        forces = sum(not isinstance(locus, Turned) for locus in loci)
+        greatest = (forces / lengths) ** (lengths / 2)
+        if forces == len(self.legs) and "phi" in self.platform.coordinates:
+            if self._in_line:  # no force has a moment
                 return ca.SX(0)
             greatest = greatest * self._lever
-        return determinant(rows) / (greatest * sizes)
+        return determinant(rows) / (greatest * reduce(mul, sizes))
 
     @property
     def _lever(self) -> Expression:
@@ -101,6 +111,14 @@ class Closure(ABC):
         points = [offset.a - first for offset in self.platform.offsets]
         center = sum(points) / len(points)
         return ca.sqrt(sum(ca.dot(point - center, point - center) for point in points))
+
+    @property
+    def _in_line(self) -> bool:
+        """Whether all platform points are on one line along k, but for rounding, in numbers."""
+        size = sum(ca.norm_2(offset.a) for offset in self.platform.offsets)
+        if not size.is_constant():
+            return False
+        return bool(float(self._lever) <= _COINCIDENT * float(size))
 
     keeps_modes: bool = False
     """Whether each column of `poses` is one assembly mode throughout."""

@@ -269,7 +269,8 @@ def _status(
     if "type II" in entry.needs:
         state = machine.state(symbols["pose"])
         measure = machine.closure.measure(state.platform, state.legs)
-        status = ca.if_else(measure * measure > TYPE_II**2, status, 0)
+        for held in (measure * measure > TYPE_II**2, measure * measure < _HUGE):
+            status = ca.if_else(held, status, 0)
     return status
 
 

@@ -19,6 +19,7 @@ from pteron.equations.machine import closure_of
 from pteron.errors import ModelError, SingularPose
 from pteron.kernels import Array, NoSquareRoot, PrimeField, evaluate, general_program, numeric
 from pteron.kinematics.recognised import modular_geometry
+from pteron.kinematics.sizes import type_ii_sizes
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _VANISHING = 1e-10
@@ -81,6 +82,12 @@ def architecture(robot: RobotLike) -> Architecture:
     -------
     Architecture
 
+    Raises
+    ------
+    ModelError
+        If no pose is found that all legs reach, unless the layout's numbers tell that it is
+        singular.
+
     Examples
     --------
     >>> import pteron
@@ -94,14 +101,17 @@ def architecture(robot: RobotLike) -> Architecture:
 @lru_cache(maxsize=256)
 def _architecture(robot: Manipulator) -> Architecture:
     poses = _poses(robot)
-    measures = np.abs(numeric(robot, "type_ii")(poses)[0])
+    measures = type_ii_sizes(robot, poses)
     constraints = np.abs(numeric(robot, "constraint")(poses)[0])
     most, constraint = (float(v.max(initial=0.0)) for v in (measures, constraints))
     holds = None if np.isnan(constraint) else constraint > _VANISHING
-    singular = is_singular_everywhere(robot)
-    if singular and _points_are_in_line(robot):
-        most = 0.0  # of rounding's size, and no more
-    if not singular:
+    if not is_singular_everywhere(robot):
+        if not len(poses):
+            raise ModelError(
+                "no pose was found that all legs reach, so that none shows whether the layout is "
+                "singular; bring the guide points nearer or lengthen the links",
+                subject=robot.name,
+            )
         return Architecture(False, "", "one pose", most, holds, constraint)
     proof: Proof = "numerical" if closure_of(robot).vanishes() is None else "closed form"
     if _vanishes_exactly(robot):
@@ -127,6 +137,12 @@ def is_singular_everywhere(robot: RobotLike) -> bool:
     return _is_singular_everywhere(as_manipulator(robot))
 
 
+def expect_regular(robot: Manipulator) -> None:
+    """Refuse a machine that is singular at every pose, with the reason."""
+    if is_singular_everywhere(robot):
+        raise singular_everywhere(robot)
+
+
 @lru_cache(maxsize=256)
 def _is_singular_everywhere(robot: Manipulator) -> bool:
     known = closure_of(robot).vanishes()
@@ -137,7 +153,7 @@ def _is_singular_everywhere(robot: Manipulator) -> bool:
     poses = _poses(robot)
     if not len(poses):
         return False  # nowhere in reach, which is told where a pose is used
-    return bool((np.abs(numeric(robot, "type_ii")(poses)[0]) <= _VANISHING).all())
+    return bool((type_ii_sizes(robot, poses) <= _VANISHING).all())
 
 
 @lru_cache(maxsize=64)
@@ -201,6 +217,8 @@ def _reason(robot: Manipulator) -> str:
             "det J ~ A cos(phi) + B sin(phi)"
         )
     legs = _dependent_legs(jacobian)
+    if len(legs) == 1:
+        return f"the row of leg {legs[0]} of J is zero: its joint does not move the platform"
     if len(legs) < robot.freedom:
         *rest, last = map(str, legs)
         return f"the rows of legs {', '.join(rest)} and {last} of J depend on each other"
@@ -214,10 +232,7 @@ def _reason(robot: Manipulator) -> str:
 
 
 def _points_are_in_line(robot: Manipulator) -> bool:
-    """Say whether the platform turns about an axis through all its points, but for rounding.
-
-    The type-II measure does not tell: it counts lengths by the size of the platform.
-    """
+    """Say whether the platform turns about an axis through all its points, but for rounding."""
     if not robot.platform.turns or robot.platform.slides:
         return False
     if any(leg.follows_angle for leg in robot.legs):

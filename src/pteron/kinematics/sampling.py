@@ -12,6 +12,8 @@ from pteron.equations.kinematics import passive_joints
 from pteron.equations.machine import Machine
 from pteron.errors import DataError, ModelError
 from pteron.kernels import Array, numeric
+from pteron.kinematics.architecture import expect_regular
+from pteron.kinematics.sizes import type_ii_sizes
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import Poses, Seed
 
@@ -65,6 +67,8 @@ def random_poses(
         If the count is no whole number, or negative.
     ModelError
         If the legs have next to no common reach.
+    SingularPose
+        If a type-II measure above 0 is asked of a machine that is singular at every pose.
 
     Examples
     --------
@@ -111,10 +115,10 @@ def _drawn(
         poses[:, lengths:] *= max((np.pi, *map(abs, robot.platform.limits or ())))
         _, measures, _, _ = numeric(robot, "reach")(poses)
         poses = poses[(measures >= type_i).all(axis=-1)]
-        if type_ii:
-            # Of a machine that is singular everywhere the measure is 0: all poses count.
-            measure = np.abs(numeric(robot, "type_ii")(poses)[0])
-            poses = poses[(measure >= type_ii) | ~(measure > 0.0).any()]
+        if type_ii > 0.0 and len(poses):
+            poses = poses[type_ii_sizes(robot, poses) >= type_ii]
+            if not len(poses):
+                expect_regular(robot)
         reached += len(poses)
         seen = seen if len(seen) >= _SEEN else np.concatenate([seen, poses])
         if limits:

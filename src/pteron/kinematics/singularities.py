@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 from pteron.equations.machine import closure_of
 from pteron.errors import DataError, SingularPose
 from pteron.kernels import Array, as_array, numeric
-from pteron.kinematics.architecture import is_singular_everywhere, singular_everywhere
+from pteron.kinematics.architecture import expect_regular
+from pteron.kinematics.sizes import type_ii_sizes
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _VANISHING = 1e-10
@@ -51,8 +52,7 @@ def best_type_ii(robot: Manipulator) -> float:
 
     def measure(poses: Array) -> Array:
         reached = ~np.isnan(numeric(robot, "reach")(poses)[1]).any(axis=-1)
-        sizes = np.abs(numeric(robot, "type_ii")(poses)[0])
-        return np.where(reached, np.nan_to_num(sizes), 0.0)
+        return np.where(reached, type_ii_sizes(robot, poses), 0.0)
 
     drawn = random_poses(robot, _DRAWN, type_i=0.0, type_ii=0.0, limits=False)
     sizes = measure(drawn)
@@ -102,8 +102,7 @@ def singular_orientations(robot: RobotLike, position: ArrayLike | None = None) -
     array([-90.,  90.])
     """
     robot = as_manipulator(robot)
-    if is_singular_everywhere(robot):
-        raise singular_everywhere(robot)
+    expect_regular(robot)
     given = None
     if position is not None:
         names = tuple(name for name in robot.coordinates if name != "phi")

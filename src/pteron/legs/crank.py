@@ -248,6 +248,7 @@ class CrankEquations(LegEquations):
             (joint, *joints),
             (l_u, b),
             ((at.rate, at.acceleration), turning),
+            self.ll,
         )
 
     def named(self, point: PointMotion, angle: AngleMotion | None) -> dict[str, Expression]:

@@ -81,6 +81,17 @@ class LegMotion(NamedTuple):
     turning: tuple[tuple[Expression, Expression] | None, ...] = (None, None)
     """Rate and acceleration of the angles of upper and lower link about the leg's axis d, where
     that describes their motion."""
+    row_size: Expression | None = None
+    """The size in space of the force that `row` is, where it is known without being worked out: the
+    length of the link that `row` lies along."""
+
+    @property
+    def wrench_size(self) -> Expression:
+        """The size in space of the force that `row` is; of its moment where it has no force."""
+        if self.row_size is not None:
+            return self.row_size
+        force = self.row[:3]
+        return ca.fabs(self.row[3]) if force.is_zero() else ca.norm_2(force)
 
 
 class Passive(NamedTuple):

@@ -193,6 +193,7 @@ class SlideEquations(LegEquations):
             (slider, *joints),
             (None, b),
             (None, turning),
+            self.ll,
         )
 
     def named(self, point: PointMotion, angle: AngleMotion | None) -> dict[str, Expression]:

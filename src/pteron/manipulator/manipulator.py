@@ -8,12 +8,14 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from pteron.bodies.vectors import Vector, complement, parallel, vector
 from pteron.errors import ModelError
 from pteron.legs import LegKind
+from pteron.legs.protocol import breaches
 from pteron.manipulator.names import name_faults
 from pteron.manipulator.radii import Radii
 from pteron.platforms import Platform
@@ -21,6 +23,9 @@ from pteron.toml import told
 
 _COINCIDENT = 1e-9
 """m between points that are taken for one."""
+
+_ACROSS = 1e-9
+"""Share of a leg's force in the platform's plane below which it counts as none."""
 
 STANDARD_GRAVITY: Vector = (0.0, 0.0, -9.81)
 """Acceleration of gravity where a file does not say it, m/s^2."""
@@ -164,10 +169,12 @@ def _misfits(platform: Platform, leg: object) -> Iterator[str]:
             "across it, so give 0"
         )
     try:
-        normal = leg.under(platform.axis).plane_normal
+        leg = leg.under(platform.axis)
     except ModelError as error:
         yield str(error)
         return
+    yield from breaches(leg, platform.axis if platform.turns and not platform.slides else None)
+    normal = leg.plane_normal
     if normal is not None and not platform.planar:
         yield (
             f"a {leg.type} leg moves in a plane, which a {platform.motion} platform leaves; make "
@@ -178,6 +185,14 @@ def _misfits(platform: Platform, leg: object) -> Iterator[str]:
             f"direction {list(normal)} is not along the platform's axis {list(platform.axis)}, the "
             "normal of its plane"
         )
+    elif platform.planar and leg.equations_class.row_is_constant:
+        row = np.array(ca.evalf(leg.equations().constant_row)).ravel()
+        if np.linalg.norm(platform.directions @ row) <= _ACROSS * np.linalg.norm(row):
+            yield (
+                f"its joint does not move the platform: a {leg.type} leg with these directions "
+                f"pushes along the platform's axis {list(platform.axis)} alone, across the plane; "
+                "turn its direction"
+            )
 
 
 def _loose(platform: Platform, legs: list[LegKind]) -> list[str]:

@@ -138,6 +138,8 @@ def rooms_left(robot: Manipulator, given: Sequence[Condition], poses: Array) -> 
         if value.ndim > lead:
             size = int(np.prod(value.shape[lead:]))
             value = value.reshape(*value.shape[:lead], size)[..., condition.element]
+        # What is infinite is as little known as NaN.
+        value = np.where(np.isfinite(value), value, np.nan)
         found.append((np.abs(value) if condition.sized else value) - condition.floor)
     return np.stack(found, axis=-1)
 
@@ -201,7 +203,7 @@ class Judge:
             least, most, defined = self.bounds(c, low[chosen], high[chosen])
             # Undefined everywhere is NaN, which is not above the floor.
             outside[chosen] = ~(most >= condition.floor)
-            open_[chosen[(least >= condition.floor) & defined]] &= ~bit
+            open_[chosen[(least >= condition.floor) & (least < np.inf) & defined]] &= ~bit
         return outside, open_
 
     def undecided(self, low: Array, high: Array) -> NDArray[np.bool_]:

@@ -119,10 +119,10 @@ def free_of_singularities(
     while len(boxes):
         looked += len(boxes)
         measure = bounds(robot, "type_ii", boxes)["type_ii"]
-        away = (measure.low > nearest) | (measure.high < -nearest)
-        reach = bounds(robot, "squared_type_i", boxes)["squares"].high
-        nowhere = np.isnan(measure.low) | (reach < 0.0).any(axis=-1)
         size = np.where(measure.low > 0.0, measure.low, -measure.high)
+        away = (size > nearest) & (size < np.inf)  # NaN is neither
+        reach = bounds(robot, "squared_type_i", boxes)["squares"].high
+        nowhere = (reach < 0.0).any(axis=-1)
         least = float(np.min(size[away], initial=least))
         boxes = boxes[~(away | nowhere)]
         if not len(boxes):

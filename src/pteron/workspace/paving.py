@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pteron.errors import DataError
 from pteron.kernels import Array, as_array
+from pteron.kinematics.architecture import expect_regular
 from pteron.kinematics.evaluate import checked_one
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike
@@ -192,6 +193,8 @@ def paving(
         If the reach has no end.
     DataError
         If the tolerance is not positive, or the box is none.
+    SingularPose
+        If the machine is singular at every pose.
 
     Examples
     --------
@@ -204,6 +207,7 @@ def paving(
     at = checked_one(robot, pose, "pose")
     if not tolerance > 0.0:
         raise DataError(f"tolerance: {tolerance!r} given, a share above 0 expected")
+    expect_regular(robot)
     box = region_box(robot, at, within)
     asked = conditions(robot) if given is None else given
     inner, boundary, complete = _refined(judge(robot, asked), box, tolerance, most)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from pteron.errors import DataError
 from pteron.kernels import Array, numeric
+from pteron.kinematics.architecture import expect_regular
 from pteron.kinematics.limits import limited_joints
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.workspace.conditions import Condition, Judge, conditions, judge, rooms_left
@@ -130,6 +131,8 @@ def prove(
     DataError
         If the region is none, its poses have not the machine's coordinates, it is a cylinder and
         the machine is planar, or a floor is negative.
+    SingularPose
+        If the machine is singular at every pose.
 
     Examples
     --------
@@ -147,6 +150,7 @@ def prove(
         raise DataError(f"region: {box.shape[1]} coordinates given, {names} expected")
     if isinstance(region, Cylinder) and robot.platform.planar:
         raise DataError("region: a planar machine has no cylinder in its workspace; give a box")
+    expect_regular(robot)
     asked = conditions(robot, type_i=type_i, type_ii=type_ii)
     if given is not None:
         asked = (*given, *(c for c in asked if c.what != "room"))

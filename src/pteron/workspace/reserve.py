@@ -13,6 +13,7 @@ from pteron.errors import DataError
 from pteron.kernels import Array, numeric
 from pteron.kinematics import inverse_kinematics
 from pteron.kinematics.singularities import best_type_ii
+from pteron.kinematics.sizes import type_ii_sizes
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import Numbers, PerJoint, PoseLike
 
@@ -68,8 +69,7 @@ def reserve(robot: RobotLike, pose: PoseLike) -> Reserve:
     margin, measure, _, _ = numeric(robot, "reach")(pose)
     # A shaft without lengths reaches everywhere.
     type_i = np.divide(margin, facts.sizes, out=np.nan_to_num(measure), where=margin < 0.0)
-    type_ii = np.nan_to_num(np.abs(numeric(robot, "type_ii")(pose)[0])) / best_type_ii(robot)
-    type_ii = np.minimum(type_ii, 1.0)
+    type_ii = np.minimum(type_ii_sizes(robot, pose) / best_type_ii(robot), 1.0)
     room = clearances(robot, numeric(robot, "joint_coordinates")(pose)[0])
     shares = np.where(np.isinf(room), 1.0, room / facts.half_ranges)
     shares = np.where(np.isnan(shares), np.minimum(type_i, 0.0), shares)

@@ -198,8 +198,9 @@ def _check_regular(robot: Manipulator, pose: Array, source: str, first_row: int)
     if closure_of(robot).vanishes() is None or robot.platform.turns:
         measures["the pose is all but singular"] = np.abs(unchecked(robot, "type_ii", pose))
     for what, size in measures.items():
-        if (size < _REGULAR).any():
-            row = int(np.argmax(size < _REGULAR))
+        lost = ~(size >= _REGULAR)  # NaN is none
+        if lost.any():
+            row = int(np.argmax(lost))
             raise LogError(
                 "singular",
                 f"{source}: row {first_row + row + 1}",

@@ -17,7 +17,7 @@ from pteron.equations.machine import Machine, closure_of
 from pteron.errors import DataError, PteronError, SingularPose, UnreachablePose
 from pteron.kernels import Array, numeric
 from pteron.kernels.functions import TYPE_I, TYPE_II
-from pteron.kinematics.architecture import is_singular_everywhere, singular_everywhere
+from pteron.kinematics.architecture import expect_regular
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.demand import told_pose
@@ -107,8 +107,7 @@ def check_way(
 
     `marks` are where it is looked at first, and `place` says in words where a parameter is.
     """
-    if is_singular_everywhere(robot):
-        raise singular_everywhere(robot)
+    expect_regular(robot)
     way = _Way(robot, poses, place)
     # Beyond the reach nothing else is measured.
     failures = [_failed_reach(way, marks)]

@@ -14,6 +14,7 @@ from pteron.kernels import Array, numeric
 from pteron.kinematics import inverse_kinematics
 from pteron.kinematics.evaluate import checked_one
 from pteron.kinematics.singularities import best_type_ii
+from pteron.kinematics.sizes import type_ii_sizes
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.trajectories.cycle import Cycle, moves
 from pteron.shapes import PoseLike
@@ -155,7 +156,7 @@ def _keeps(robot: Manipulator, poses: Array, least: float) -> bool:
     if not (type_i >= least + _DIP).all():  # NaN, out of reach, compares false
         return False
     if closure_of(robot).vanishes() is not False or robot.platform.turns:
-        type_ii = np.abs(numeric(robot, "type_ii")(poses)[0]) / best_type_ii(robot)
+        type_ii = type_ii_sizes(robot, poses) / best_type_ii(robot)
         if not (type_ii >= least + _DIP).all():
             return False
     joints = numeric(robot, "joint_coordinates")(poses)[0]

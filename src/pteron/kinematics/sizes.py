@@ -1,0 +1,17 @@
+"""The size of the type-II measure, as floors ask for it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pteron.kernels import Array, numeric
+from pteron.manipulator import Manipulator
+
+
+def type_ii_sizes(robot: Manipulator, poses: Array) -> Array:
+    """Return the size (...) of the type-II measure of poses (..., m): 0 where it is not a number.
+
+    What is not finite passes no floor: out of reach, or where a leg's force is lost.
+    """
+    sizes = np.abs(numeric(robot, "type_ii")(poses)[0])
+    return np.where(np.isfinite(sizes), sizes, 0.0)

@@ -1,0 +1,101 @@
+"""What of the protocol of `legs.leg` a kind of leg breaks: asked before a machine has such legs."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from functools import lru_cache
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.bodies.motion import AngleMotion, Expression, PointMotion
+from pteron.bodies.vectors import Vector
+from pteron.legs.kind import LegKind
+from pteron.legs.leg import LegMotion
+
+_TRIED = 200
+"""Random points among which one in reach is sought."""
+
+_ALIKE = 1e-9
+"""Share of a row's size within which two rows are one."""
+
+
+def breaches(leg: LegKind, axis: Vector | None) -> tuple[str, ...]:
+    """Return why a leg cannot be modelled, whoever wrote its kind: one line each.
+
+    `axis` is that of a platform that turns against the leg, or None.
+    """
+    if not leg.size > 0.0 and not leg.follows_angle:
+        return (
+            f"a {leg.type} leg has no size, {leg.size:g} m, to measure its reach by: give its kind "
+            'a quantity of role "length", or a `size`',
+        )
+    return _of_chain(leg, axis) if (type(leg), axis is None) not in _SOUND else ()
+
+
+_SOUND: set[tuple[type[LegKind], bool]] = set()
+"""Kinds whose chains were found to be in order, under platforms that turn or do not: a design's
+search makes thousands of machines, and a chain's order does not depend on a leg's numbers."""
+
+
+@lru_cache(maxsize=64)
+def _of_chain(leg: LegKind, axis: Vector | None) -> tuple[str, ...]:
+    motion = _motion(leg, axis)
+    if motion is None:
+        return ()  # nowhere in reach, which is told where a pose is used
+    found = (*_carried(leg, motion), *_driven(leg, motion))
+    if not found:
+        _SOUND.add((type(leg), axis is None))
+    return found
+
+
+def _motion(leg: LegKind, axis: Vector | None) -> LegMotion | None:
+    """Return what the leg does at rest at a random point in its reach."""
+    equations, bound = leg.equations(), leg.reach_bound
+    center, radius = (leg.guide_point, 1.0) if bound is None else (bound.point, bound.radius)
+    rest, rng = ca.SX(3, 1), np.random.default_rng(0)
+    for point in center + radius * rng.uniform(-1.0, 1.0, (_TRIED, 3)):
+        c = ca.SX(ca.DM(point))
+        if _numbers(equations.reach(c).discriminant) > 0.0:
+            angle = (
+                None if axis is None else AngleMotion(ca.SX(list(axis)), *map(ca.SX, (0.3, 0, 0)))
+            )
+            return equations.motion(PointMotion(c, rest, rest), angle)
+    return None
+
+
+def _carried(leg: LegKind, motion: LegMotion) -> Iterator[str]:
+    """Yield which bodies are not carried by one joint each."""
+    named = Counter(joint.body for joint in motion.chain if joint.body)
+    for letter in sorted({*leg.bodies, *motion.bodies, *named}):
+        name = f'body "{letter}"' + (f" ({leg.names[letter]})" if letter in leg.names else "")
+        if letter not in motion.bodies or letter not in leg.bodies:
+            where = "its keys" if letter not in leg.bodies else "`LegMotion.bodies`"
+            yield f"the {name} of a {leg.type} leg is not among {where}; name it there too"
+        elif named[letter] != 1:
+            yield (
+                f"the {name} of a {leg.type} leg is carried by {named[letter]} joints of its "
+                "chain, and reactions count it as often; name it in the `body` of one"
+            )
+
+
+def _driven(leg: LegKind, motion: LegMotion) -> Iterator[str]:
+    """Yield it where the driven joint is not the first of the chain."""
+    row = _numbers(motion.row / motion.divisor)
+    size = np.abs(row).max()
+    if not size > 0.0:
+        yield f"a {leg.type} leg moves nothing: no motion of its platform point moves its joint"
+        return
+    moved = [np.abs(_numbers(joint.row) - row).max() <= _ALIKE * size for joint in motion.chain]
+    if not any(moved[:1]):
+        place = f"its joint {moved.index(True) + 1}" if any(moved) else "none of its joints"
+        yield (
+            f"a {leg.type} leg is not driven at the first joint of its chain ({place} moves as "
+            "its coordinate does); such legs are not modelled: put the driven joint first"
+        )
+
+
+def _numbers(row: Expression) -> NDArray[np.float64]:
+    return np.asarray(ca.DM(ca.evalf(ca.densify(row)))).ravel()
