@@ -247,20 +247,25 @@ def inverse_kinematics(machine, poses):
     return np.where(cranks, -((np.pi - joints) % (2 * np.pi)) + np.pi, joints)
 
 
+def jacobians(machine, poses):
+    """Return J (B, m, m) of poses (B, m), and the least bend of the legs (B,)."""
+    _, jacobian, bends = (np.array(v) for v in _positions(machine)(poses.T))
+    return jacobian.reshape(len(jacobian), *poses.shape).swapaxes(0, 1), bends.min(axis=0)
+
+
 def distances_from_singular(machine, poses):
     """Return the least bend of the legs, and the least singular value of J with rows of length 1.
 
     Poses are (B, m), results (B,); NaN where a leg does not reach.
     """
-    _, jacobian, bends = (np.array(v) for v in _positions(machine)(poses.T))
-    rows = jacobian.reshape(len(jacobian), *poses.shape).swapaxes(0, 1)
+    rows, bends = jacobians(machine, poses)
     rows[..., machine.moves.shape[1] :] /= LENGTH
     reached = np.isfinite(rows).all(axis=(1, 2))
     held = np.full(len(rows), np.nan)
     rows = rows[reached]
     rows /= np.linalg.norm(rows, axis=-1, keepdims=True)
     held[reached] = np.linalg.svd(rows, compute_uv=False)[:, -1]
-    return bends.min(axis=0), held
+    return bends, held
 
 
 def states(machine, count, seed, least=0.1):

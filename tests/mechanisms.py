@@ -225,6 +225,41 @@ def _drawn_machine(rng, name, kinds):
     return pteron.Manipulator(name, platform, tuple(legs), 9.81 * unit(rng))
 
 
+def scaled(robot, factor):
+    """Return the machine with every length times a factor; masses stay."""
+
+    def times(values, power=1):
+        return tuple(factor**power * v for v in values)
+
+    def body(inertia):
+        if isinstance(inertia, float):
+            return inertia
+        return replace(
+            inertia,
+            first_moment=times(inertia.first_moment),
+            inertia=factor**2 * inertia.inertia,
+        )
+
+    legs = []
+    for leg in robot.legs:
+        changes = {
+            key: times(v) if isinstance(getattr(leg, key), tuple) else factor * v[0]
+            for key, v in leg.metres.items()
+        }
+        if getattr(leg, "bar_length", None) is not None:
+            changes["bar_length"] = factor * leg.bar_length
+        masses = {"upper", "lower"} & set(leg.every_key())
+        legs.append(replace(leg, **changes, **{key: body(getattr(leg, key)) for key in masses}))
+    platform = replace(
+        robot.platform,
+        inertia=body(robot.platform.inertia),
+        tool=times(robot.platform.tool),
+        bars=tuple(replace(bar, hinge=times(bar.hinge)) for bar in robot.platform.bars),
+        geared=tuple(replace(g, inertia=factor**2 * g.inertia) for g in robot.platform.geared),
+    )
+    return replace(robot, legs=tuple(legs), platform=platform, radii=None)
+
+
 CATALOG = {name: pteron.load(name) for name in pteron.catalog()}
 
 

@@ -7,11 +7,11 @@ import numpy as np
 import polars as pl
 import pytest
 from differences import OFFSETS
-from mechanisms import CATALOG, random_machine, states
+from mechanisms import CATALOG, random_machine, scaled, states
 
 import pteron
 from pteron.errors import DataError, UnreachablePose
-from pteron.indices import reactions
+from pteron.indices import Elasticity, Section, reactions, stiffness
 
 ROUTER = Path(__file__).parent / "data" / "router_reactions.csv"
 
@@ -107,3 +107,43 @@ def test_bad_poses_and_bad_words():
     # What no leg holds is told: hinges on bars of single legs leave this platform free to tilt.
     free = random_machine(0, "PRSU")
     assert reactions(free, states(free, 1)[0][0]).unheld > 0.01
+
+
+def scaled_pose(robot, pose, factor):
+    lengths = len(robot.platform.lengths)
+    return np.concatenate([factor * pose[..., :lengths], pose[..., lengths:]], axis=-1)
+
+
+@pytest.mark.parametrize("name", [*CATALOG, *RANDOM])
+def test_reactions_do_not_depend_on_the_unit_of_length(name):
+    robot = random_machine(0, name) if name in RANDOM else CATALOG[name]
+    pose, tilt = states(robot, 1)[0][0], np.array([1.0, -2.0, 3.0])
+    wrench = np.linspace(-30.0, 40.0, robot.freedom)
+    here = reactions(robot, pose, wrench=wrench, moment=tilt)
+    largest = np.nanmax(np.abs(here.forces))
+    for factor in (1e-3, 1e5):
+        at = scaled_pose(robot, pose, factor)
+        whole = wrench * np.where(np.array(robot.coordinates) == "phi", factor, 1.0)
+        there = reactions(scaled(robot, factor), at, wrench=whole, moment=factor * tilt)
+        assert there.redundancy == here.redundancy
+        np.testing.assert_allclose(there.forces, here.forces, rtol=0, atol=1e-9 * largest)
+        moments = there.moments / factor
+        np.testing.assert_allclose(moments, here.moments, rtol=0, atol=1e-9 * largest)
+        np.testing.assert_allclose(there.unheld, here.unheld, rtol=0, atol=1e-9 * largest)
+
+
+@pytest.mark.parametrize("name", ["delta", "quadrupteron"])
+def test_stiffness_does_not_depend_on_the_unit_of_length(name):
+    robot = CATALOG[name]
+    pose = states(robot, 1)[0][0]
+    found = []
+    for factor in (1.0, 1e-3, 1e5):
+        link = Section(1e6, *3 * (2e3 * factor**2,))
+        elasticity = Elasticity(upper=link, lower=link, rod_distance=0.05 * factor)
+        one = scaled(robot, factor)
+        compliance = stiffness(one, scaled_pose(robot, pose, factor), elasticity).compliance
+        turns = np.where(np.array(robot.coordinates) == "phi", factor, 1.0)
+        found.append(compliance * turns * turns[:, None] / factor)
+    assert np.abs(found[0]).max() > 0.0
+    for one in found[1:]:
+        np.testing.assert_allclose(one, found[0], rtol=0, atol=1e-8 * np.abs(found[0]).max())

@@ -191,7 +191,9 @@ def _released(leg: LegKind, motion: LegMotion, found: LegForces, last: bool) -> 
     if couple is None:
         return [_along(motion, found, k) for k in range(1, len(motion.chain) - last)]
     # Rods: what is no force along them is their couple, the same at both of their ends.
-    n, across, tip = motion.links[1], motion.chain[2].axis, found.wrenches[1]
+    length = ca.norm_2(motion.links[1])
+    n, couple = motion.links[1] / length, couple / length
+    across, tip = motion.chain[2].axis, found.wrenches[1]
     blocked = ca.horzsplit(ca.SX.eye(3))
     if not couple.is_zero():
         blocked = [n, ca.cross(n, couple)]

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from pteron.dynamics import mass_matrix
 from pteron.errors import DataError
 from pteron.indices.elasticity import Elasticity, Section, Springs
-from pteron.indices.internal_forces import Equations, blocks, hold, moved, on_platform, size_of
+from pteron.indices.internal_forces import Equations, blocks, hold, moved, on_platform, units
 from pteron.indices.sensitivities import tool_arm
 from pteron.kernels import Array, as_array
 from pteron.kinematics.evaluate import checked, evaluated
@@ -190,11 +190,12 @@ def _compliance(robot: Manipulator, given: Equations, energy: Array, arm: Array)
     right = np.zeros((batch, given.rows.shape[-2], m))
     presumed = np.zeros((batch, given.presumed_rows.shape[-2], m))
     right[:, :m], presumed[:, :6] = -wrench.mT, -load.mT
-    held = hold(given, right, presumed, size_of(robot))
+    held = hold(robot, given, right, presumed)
     w, free = held.forces, held.stresses
     if free.shape[-1]:  # the self-stress of the least energy
         values, vectors = np.linalg.eigh(free.mT @ energy @ free)
-        counts = values > _NOTHING * np.trace(energy, axis1=-2, axis2=-1)[:, None]
+        whole = (units(robot) ** 2 * np.diagonal(energy, axis1=-2, axis2=-1)).sum(axis=-1)
+        counts = values > _NOTHING * whole[:, None]
         back = vectors @ (vectors / np.where(counts, values, np.inf)[:, None]).mT
         w = w - free @ back @ (free.mT @ energy @ w)
     found = w.mT @ energy @ w

@@ -55,15 +55,25 @@ def size_of(robot: Manipulator) -> float:
     return float(np.mean([leg.size for leg in robot.legs]))
 
 
-def hold(given: Equations, right: Array, presumed: Array, length: float) -> Held:
-    """Return what holds loads: right sides (B, R, K) and (B, S, K), `length` being the size.
+def units(robot: Manipulator) -> Array:
+    """Return what makes the legs' forces and moments (6 n,) comparable: 1, and the size, m."""
+    return np.tile(np.repeat([1.0, size_of(robot)], 3), robot.freedom)
 
-    First what must hold; of that what is nearest to what the legs are presumed to hold.
+
+def hold(robot: Manipulator, given: Equations, right: Array, presumed: Array) -> Held:
+    """Return what holds loads: right sides (B, R, K) and (B, S, K).
+
+    First what must hold; of that what is nearest to what the legs are presumed to hold. Moments
+    count as forces at the machine's size, so that no rank depends on a unit.
     """
-    count = given.rows.shape[-1]
-    size = np.tile([1.0, 1.0, 1.0, length, length, length], count // 6)
+    count, length = given.rows.shape[-1], size_of(robot)
+    size = units(robot)
     rows, more = given.rows * size, given.presumed_rows * size
-    # Moments of the platform are forces over the length, too.
+    parts = given.rows.reshape(*given.rows.shape[:-1], -1, 6)
+    moments = (parts[..., 3:] != 0.0).any(axis=(0, -1, -2))
+    moments[robot.freedom - 1] |= robot.platform.turns
+    each = np.where(moments, 1.0 / length, 1.0)[:, None]
+    rows, right = each * rows, each * right
     per = np.ones(more.shape[-2])
     per[3:] = 1.0 / length
     more, presumed = per[:, None] * more, per[:, None] * presumed

@@ -188,7 +188,7 @@ def _solved(
     right, presumed = g.right.copy(), g.presumed_right.copy()
     right[:, :n] -= wrench[good]
     presumed[:, :6] -= load[good]
-    held = hold(g, right[..., None], presumed[..., None], size_of(robot))
+    held = hold(robot, g, right[..., None], presumed[..., None])
     w, redundancy = held.forces[..., 0], held.stresses.shape[-1]
     there = np.isfinite(g.passed[..., 0])
     spread = moved(g.ends[:, :, None] - g.points)
