@@ -13,6 +13,8 @@ file of this folder:
 Two lines bind them: `MyLeg.equations_class = MyEquations`, and `pteron.legs.KINDS[MyLeg.type] =
 MyLeg`, after which files may name the kind.
 
+A machine whose legs break this protocol is refused when it is made (`legs.protocol`).
+
 That is all: Jacobian, dynamics, regressor, energies, limits, drawings, logs, exported code and
 files for other engines follow.
 `examples/new_leg.py` is a complete kind of leg. More may be overridden: `needs`, a cheaper form of

@@ -1,0 +1,108 @@
+"""Kinds of legs from elsewhere that break the protocol are refused in one line."""
+
+from dataclasses import dataclass, replace
+from unittest.mock import patch
+
+import pytest
+from mechanisms import CATALOG
+
+import pteron
+from pteron.legs import KINDS, PRR
+from pteron.legs.prr import PRREquations
+
+
+class RamEquations(PRREquations):
+    """A passive joint comes first, as in an R-P-R leg with a ram."""
+
+    def motion(self, point, angle):
+        found = super().motion(point, angle)
+        driven, first, *others = found.chain
+        return found._replace(chain=(first, driven, *others))
+
+
+class SilentEquations(PRREquations):
+    def motion(self, point, angle):
+        found = super().motion(point, angle)
+        return found._replace(chain=tuple(joint._replace(body="") for joint in found.chain))
+
+
+class TwiceEquations(PRREquations):
+    def motion(self, point, angle):
+        found = super().motion(point, angle)
+        return found._replace(chain=tuple(joint._replace(body="p") for joint in found.chain))
+
+
+class IdleEquations(PRREquations):
+    def motion(self, point, angle):
+        found = super().motion(point, angle)
+        return found._replace(row=0 * found.row)
+
+
+@dataclass(frozen=True)
+class Sizeless(PRR):
+    type = "Sizeless"
+
+    @property
+    def quantities(self):
+        return tuple(q._replace(role="number") for q in super().quantities if q.role != "point")
+
+
+def kind(equations):
+    @dataclass(frozen=True)
+    class Own(PRR):
+        type = "Own"
+        equations_class = equations
+
+    return Own
+
+
+def with_kind(kind):
+    """Return a planar machine whose second leg is of a kind."""
+    robot = CATALOG["3-prr"]
+    old = robot.legs[1]
+    leg = kind(**{name: getattr(old, name) for name in old.every_key()})
+    return replace(robot, legs=(robot.legs[0], leg, robot.legs[2]))
+
+
+@pytest.mark.parametrize(
+    ("made", "words"),
+    [
+        (
+            kind(RamEquations),
+            "leg 2: a Own leg is not driven at the first joint .*its joint 2 moves",
+        ),
+        (
+            kind(SilentEquations),
+            r'leg 2: the body "l" \(link\) of a Own leg is carried by 0 joints',
+        ),
+        (
+            kind(TwiceEquations),
+            r'leg 2: the body "p" \(slider\) of a Own leg is carried by 4 joints',
+        ),
+        (kind(IdleEquations), "leg 2: a Own leg moves nothing"),
+        (Sizeless, 'leg 2: a Sizeless leg has no size, 0 m, .* of role "length"'),
+    ],
+    ids=["driven later", "no body", "bodies twice", "idle", "no size"],
+)
+def test_a_kind_that_breaks_the_protocol_is_refused(made, words):
+    with pytest.raises(pteron.ModelError, match=words) as caught:
+        with_kind(made)
+    assert all("\n" not in fault for fault in caught.value.faults)
+
+
+def test_a_file_that_names_such_a_kind_is_refused(tmp_path):
+    path = pteron.save(CATALOG["3-prr"], tmp_path / "own.toml")
+    path.write_text(path.read_text().replace('type = "PRR"', 'type = "Own"', 1))
+    with (
+        patch.dict(KINDS, Own=kind(RamEquations)),
+        pytest.raises(pteron.ModelError, match=r"own.toml: .*leg 1: a Own leg is not driven"),
+    ):
+        pteron.load(path)
+
+
+def test_a_kind_that_keeps_it_is_taken():
+    robot = with_kind(kind(PRREquations))
+    pose = pteron.random_poses(robot, 1)[0]
+    rest = [0.0] * 3
+    expected = pteron.inverse_dynamics("3-prr", pose, rest, rest)
+    assert pteron.inverse_dynamics(robot, pose, rest, rest) == pytest.approx(expected, rel=1e-12)
