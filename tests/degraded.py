@@ -7,6 +7,9 @@ import mechanisms
 import numpy as np
 
 import pteron
+from pteron.indices import reactions
+from pteron.motion import check_path, line_path
+from pteron.workspace import Box, free_of_singularities, home_pose, paving, prove, reserve
 
 KINDS = [
     *("PPP", "RRR", "SSS", "PRS", "RPP", "SSP"),  # 3T
@@ -56,10 +59,15 @@ def alongside(robot, rng):
     return _with(robot, j, replace(leg, platform_point=point, guide_point=guide))
 
 
+def across_legs(robot):
+    """Return the P-R-R-R legs of a planar machine."""
+    return [i for i, leg in enumerate(robot.legs) if leg.type == "PRRR" and robot.platform.planar]
+
+
 def across_the_plane(robot, rng):
     """Turn a P-R-R-R leg of a planar machine so that it pushes across its plane."""
-    found = [i for i, leg in enumerate(robot.legs) if leg.type == "PRRR"]
-    if not found or not robot.platform.planar:
+    found = across_legs(robot)
+    if not found:
         return None
     leg = robot.legs[found[0]]
     return _with(robot, found[0], replace(leg, direction=robot.platform.axis))
@@ -99,15 +107,27 @@ def two_shafts(robot, rng):
     return None if i is None else _with(robot, i - 1, robot.legs[i])
 
 
+def slanted(robot, rng):
+    """Lean such a leg by less than its numbers tell."""
+    found = across_legs(robot)
+    if not found:
+        return None
+    k, x = np.array(robot.platform.axis), np.array(robot.platform.x_axis)
+    return _with(robot, found[0], replace(robot.legs[found[0]], direction=tuple(k + 1e-11 * x)))
+
+
 def out_of_reach(robot, rng):
-    """Move one leg's guide point so far away that no pose is in reach."""
-    leg = robot.legs[0]
-    return _with(robot, 0, replace(leg, guide_point=tuple(np.array(leg.guide_point) + 50.0)))
+    """Move one of two cranks so far away that no pose is in reach."""
+    found = [i for i, leg in enumerate(robot.legs) if leg.type in ("RSS", "RRR")]
+    if len(found) < 2:
+        return None
+    leg = robot.legs[found[0]]
+    return _with(robot, found[0], replace(leg, guide_point=tuple(np.array(leg.guide_point) + 50.0)))
 
 
 FAULTS = (
     *(coincident, across_the_plane, in_line, alongside, in_a_plane, mirrored),
-    *(no_gear, two_shafts, out_of_reach),
+    *(no_gear, two_shafts, slanted, out_of_reach),
 )
 
 
@@ -136,3 +156,60 @@ def _applies(make: Callable) -> bool:
         return make() is not None
     except pteron.PteronError:
         return True
+
+
+def judged(robot, check):
+    """Return what is said of a machine that is singular at every pose, or that no pose reaches.
+
+    `check` is asked in turn of the name of a call and of the call; it says whether it was refused.
+    Where one is answered its name is returned, else "flagged".
+    """
+    try:
+        layout = pteron.architecture(robot)
+    except pteron.ModelError:
+        layout = None
+    if layout is not None and not (layout.singular and layout.reason):
+        return "not flagged"
+    for name, call in calls(robot):
+        if not check(call):
+            return name
+    return "flagged"
+
+
+def calls(robot):
+    """Yield by name the calls that must not be answered of such a machine."""
+    try:
+        pose = pteron.random_poses(robot, 2, type_ii=0.0)
+    except pteron.ModelError:
+        pose = np.zeros((2, robot.freedom))
+    rest = np.zeros_like(pose)
+    box = Box(pose[0] - 1e-4, pose[0] + 1e-4)
+    yield "random_poses", lambda: pteron.random_poses(robot, 2)
+    yield "inverse_dynamics", lambda: pteron.inverse_dynamics(robot, pose, rest, rest)
+    yield "drive_forces", lambda: pteron.drive_forces(robot, pose, rest, rest)
+    yield "regressor", lambda: pteron.regressor(robot, pose, rest, rest)
+    yield "reactions", lambda: reactions(robot, pose)
+    yield "prove", lambda: prove(robot, box)
+    yield "prove with a floor", lambda: prove(robot, box, type_ii=0.1)
+    yield "paving", lambda: paving(robot, pose[0], within=box.box[:, : len(robot.platform.lengths)])
+    yield "free_of_singularities", lambda: free_of_singularities(robot, box)
+    yield "reserve", lambda: reserve(robot, pose)
+    yield "home_pose", lambda: home_pose(robot)
+    yield "check_path", lambda: check_path(robot, line_path(robot, pose))
+    yield "direct_kinematics", lambda: pteron.direct_kinematics(robot, rest[0])
+    yield "base_parameters", lambda: pteron.base_parameters(robot)
+
+
+def refused(call):
+    """Say whether a call is refused in the house's words, or answers that it does not hold."""
+    try:
+        found = call()
+    except pteron.PteronError as error:
+        return "\n" not in str(error)
+    if hasattr(found, "holds"):
+        return found.holds is not True
+    if hasattr(found, "free"):
+        return found.free is not True
+    if hasattr(found, "inner"):
+        return not len(found.inner)
+    return hasattr(found, "type_ii") and bool((found.type_ii <= 1e-9).all())

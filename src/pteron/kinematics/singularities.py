@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from pteron.equations.machine import closure_of
 from pteron.errors import DataError, SingularPose
 from pteron.kernels import Array, as_array, numeric
-from pteron.kinematics.architecture import expect_regular
+from pteron.kinematics.architecture import expect_regular, is_singular_everywhere
 from pteron.kinematics.sizes import type_ii_sizes
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
@@ -54,6 +54,8 @@ def best_type_ii(robot: Manipulator) -> float:
         reached = ~np.isnan(numeric(robot, "reach")(poses)[1]).any(axis=-1)
         return np.where(reached, type_ii_sizes(robot, poses), 0.0)
 
+    if is_singular_everywhere(robot):
+        return 1.0  # no share of rounding
     drawn = random_poses(robot, _DRAWN, type_i=0.0, type_ii=0.0, limits=False)
     sizes = measure(drawn)
     improved = [
@@ -65,7 +67,7 @@ def best_type_ii(robot: Manipulator) -> float:
         ).fun
         for start in drawn[np.argsort(-sizes, kind="stable")[:_FOREMOST]]
     ]
-    return float(max(improved)) or 1.0
+    return float(max(improved))
 
 
 def singular_orientations(robot: RobotLike, position: ArrayLike | None = None) -> Array:
