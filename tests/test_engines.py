@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 
 import descriptions
 import mechanisms
+import mujoco
 import numpy as np
 import pytest
 import trees
@@ -250,6 +251,23 @@ def test_what_a_file_cannot_hold_is_said_in_it():
     assert f"Left out: the drives' greatest speeds, {told}" in mjcf(opened)
     assert f"Left out: the motors' inertia, friction's constant part, {told}" in trees.urdf(opened)
     assert "Left out" not in mjcf(tree(CATALOG["delta"]))
+
+
+@pytest.mark.parametrize("name", CATALOG)
+def test_every_link_of_a_urdf_has_an_inertia_that_engines_take(tmp_path, name):
+    path, _ = export_urdf(CATALOG[name], tmp_path)
+    links = ElementTree.parse(path).iter("link")
+    without = [link.get("name") for link in links if link.find("inertial") is None]
+    assert without == ["world"]  # which has no mass for any engine
+    (model,) = export_mjcf(CATALOG[name], tmp_path)
+    mass = mujoco.MjModel.from_xml_path(str(model)).body_mass.sum()
+    found = mujoco.MjModel.from_xml_path(str(path)).body_mass.sum()
+    assert found == pytest.approx(mass, rel=1e-9)
+
+
+def test_sdf_is_of_a_version_that_gazebo_knows():
+    text = trees.sdf(tree(CATALOG["delta-4"]))
+    assert ElementTree.fromstring(text).get("version") == "1.9"
 
 
 def test_names_in_sdf_are_unique():

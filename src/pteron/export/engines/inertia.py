@@ -30,8 +30,11 @@ _LEAST = 1e-10
 """The least moment about the centre, over mass times the square of what is given as its distance:
 a body whose whole mass is at its centre is none to an engine."""
 
-_TINY = 2e-15
+_TINY = 2e-14
 """kg m^2; engines refuse less."""
+
+SHARE = 1e-10
+"""Of a body's mass and moments, what a link between its joints has."""
 
 
 def about_center(inertia: Inertia) -> tuple[float, Array, float]:
@@ -56,6 +59,14 @@ def rod_moments(mass: float, moment: float, lever: float) -> Array:
 def cube_moments(mass: float, side: float) -> Array:
     """Return the moments (3,) of a cube."""
     return np.full(3, max(mass * side**2 / 6.0, _TINY))
+
+
+def between_joints(mass: float, moments: Array) -> tuple[float, Array]:
+    """Return the mass and the moments (3,) of a link between the joints of a body.
+
+    It has none; but an engine takes 1 kg where a file says nothing, or refuses it.
+    """
+    return SHARE * mass, np.full(3, max(SHARE * float(moments.max()), _TINY))
 
 
 def shared_masses(

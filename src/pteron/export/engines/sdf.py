@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from pteron.atomic import write_texts
+from pteron.export.engines.inertia import SHARE, between_joints
 from pteron.export.engines.looks import Look, look_of, placed
 from pteron.export.engines.parts import BASE, Tree, TreeBody, TreeJoint
 from pteron.export.engines.shapes import dressed
@@ -28,9 +27,6 @@ from pteron.export.names import identifier
 from pteron.kernels.code import rendered
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.shapes import PoseLike
-
-_SHARE = 1e-10
-"""Of a body's mass and moments, what a link between its joints has."""
 
 
 def export_sdf(
@@ -90,7 +86,7 @@ def sdf(opened: Tree) -> str:
         "robot.sdf.j2",
         head=head(opened, "SDF"),
         notes=left_out(opened, ("viscous", "coulomb", "max_force", "max_speed")),
-        share=_SHARE,
+        share=SHARE,
         name=identifier(opened.robot),
         gravity=row(opened.robot.gravity),
         base=[look_of(shape, None) for _, shape in opened.base],
@@ -110,7 +106,7 @@ def _links(opened: Tree, body: TreeBody) -> list[dict[str, Any]]:
         last = k == len(body.joints) - 1
         mass, moments = body.mass, body.moments
         if not last:
-            mass, moments = _SHARE * mass, np.full(3, _SHARE * body.moments.max())
+            mass, moments = between_joints(mass, moments)
         link = {
             "name": body.name if last else f"{joint.name}_link",
             "parent": parent,

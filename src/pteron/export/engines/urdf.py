@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from pteron.atomic import write_texts
+from pteron.export.engines.inertia import SHARE, between_joints
 from pteron.export.engines.looks import Look, look_of, placed
 from pteron.export.engines.parts import BASE, Tree, TreeBody, TreeJoint, at_zero
 from pteron.export.engines.shapes import dressed
@@ -100,6 +101,7 @@ def urdf(opened: Tree) -> str:
         gravity=", ".join(map(number, opened.robot.gravity)),
         name=name,
         colors=[("base", BASE_COLOR), ("platform", PLATFORM_COLOR), *legs],
+        share=SHARE,
         base=[look_of(shape, None) for _, shape in opened.base],
         links=links,
         visual=_visual,
@@ -107,7 +109,7 @@ def urdf(opened: Tree) -> str:
 
 
 def _links(opened: Tree, bodies: Sequence[TreeBody], body: TreeBody) -> list[dict[str, Any]]:
-    """Return a body's links with their joints; those between joints at one place have no mass."""
+    """Return a body's links with their joints: those between joints at one place are light."""
     parent, before = "base", np.eye(4)
     if body.parent != BASE:
         parent, before = bodies[body.parent].name, frame(bodies[body.parent])
@@ -115,15 +117,18 @@ def _links(opened: Tree, bodies: Sequence[TreeBody], body: TreeBody) -> list[dic
     found: list[dict[str, Any]] = []
     for k, joint in enumerate(body.joints):
         last = k == len(body.joints) - 1
+        mass, moments = body.mass, body.moments
+        if not last:
+            mass, moments = between_joints(mass, moments)
         link = {
             "name": body.name if last else f"{joint.name}_link",
             "parent": parent,
             "place": place,
             "turn": turn,
             "joint": _joint(opened, body, joint),
-            "mass": small(body.mass) if last else "",
-            "center": row(within(body, body.center)),
-            "moments": [small(moment) for moment in body.moments],
+            "mass": small(mass),
+            "center": row(within(body, body.center)) if last else "0 0 0",
+            "moments": [small(moment) for moment in moments],
             "looks": [look_of(shape, body) for shape in body.shapes] if last else [],
             "material": material(body),
         }
