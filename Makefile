@@ -7,7 +7,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
 QUICK := published kinematics delta family manipulator errors toml passes payload costs
 
-.PHONY: demo quick test lint bench docs wheels clean
+.PHONY: demo quick test lint bench docs first wheels clean
 
 demo: $(VENV)/.runtime
 	$(BIN)/pteron report quadrupteron --out demo
@@ -39,13 +39,18 @@ docs: $(VENV)/.docs
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m sphinx -W --keep-going -n -q -d docs/_build/doctrees docs docs/_build/html
 	$(BIN)/python docs/check_site.py docs/_build/html
 
+# README's commands in a fresh copy of this clone, after README's set-up; some minutes.
+first:
+	$(PYTHON) tests/installed/readme.py
+
 # The wheel in empty environments: every Python here, each extra alone and all; over half an hour.
 wheels:
 	$(PYTHON) tests/installed/matrix.py
 
-$(VENV)/.runtime: pyproject.toml
+# What README shows runs in this one: `make first` tries it.
+$(VENV)/.runtime: pyproject.toml Makefile
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(PIP) install --editable '.[consistency]'
+	$(PIP) install --editable '.[consistency,design,film,viewer]'
 	touch $@
 
 $(VENV)/.dev: pyproject.toml

@@ -346,7 +346,7 @@ def test_the_result_is_a_model_file(tmp_path):
 def test_a_missing_library_is_one_line(monkeypatch, name):
     monkeypatch.setitem(sys.modules, name, None)
     base = base_of(QUADRUPTERON)
-    with pytest.raises(pteron.ModelError, match=r'pip install "pteron\[consistency\]"') as error:
+    with pytest.raises(pteron.ModelError, match=r"-m pip install .*\[consistency\]") as error:
         consistent_model(QUADRUPTERON, base, base.values())
     assert "\n" not in str(error.value)
 

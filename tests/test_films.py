@@ -127,7 +127,7 @@ def test_what_makes_no_film_is_told_before_the_work(options, kind, words):
 
 def test_without_the_encoder_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "imageio_ffmpeg", None)
-    with pytest.raises(PteronError, match=r"pip install 'pteron\[film\]'.*\.gif"):
+    with pytest.raises(PteronError, match=r"-m pip install .*\[film\].*\.gif"):
         film(TRIPTERON, CYCLE, "cycle.mp4")
 
 

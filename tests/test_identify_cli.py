@@ -19,6 +19,7 @@ from test_report import Reader, strict
 import pteron
 from pteron.cli import identify as command
 from pteron.cli.screen import stages
+from pteron.extras import install_command
 from pteron.identification import METHODS, write_log
 from pteron.identification.model import Passive
 from pteron.identification.signals import Derivatives
@@ -176,7 +177,7 @@ def test_without_cvxpy_there_is_no_model_file(monkeypatch: pytest.MonkeyPatch):
     write_log(log("tripteron"), "fit.csv")
     text = done("identify fit.csv --robot tripteron --out out")
     assert sorted(file.name for file in Path("out").iterdir()) == FILES
-    assert text.count('pip install "pteron[consistency]"') == 1
+    assert text.count(install_command("consistency")) == 1
     assert strict(Path("out/identification.json").read_text())["real_bodies"] is None
 
 

@@ -10,9 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.errors import ModelError
+from pteron.extras import install_command
 from pteron.kernels import Array
 
-_MISSING = 'a search needs pymoo, which is not installed; pip install "pteron[design]"'
+
+def _missing() -> ModelError:
+    return ModelError(f"a search needs pymoo, which is not installed; {install_command('design')}")
 
 
 def non_dominated(costs: Array) -> NDArray[np.int_]:
@@ -20,7 +23,7 @@ def non_dominated(costs: Array) -> NDArray[np.int_]:
     try:
         from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
     except ImportError:
-        raise ModelError(_MISSING) from None
+        raise _missing() from None
     found = NonDominatedSorting().do(costs, only_non_dominated_front=True)
     return np.sort(np.asarray(found, dtype=int))
 
@@ -59,7 +62,7 @@ class Evolution:
             from pymoo.algorithms.moo.nsga2 import NSGA2
             from pymoo.core.problem import Problem
         except ImportError:
-            raise ModelError(_MISSING) from None
+            raise _missing() from None
         self._problem = Problem(
             n_var=first.shape[1], n_obj=objectives, n_ieq_constr=constraints, xl=0.0, xu=1.0
         )

@@ -23,6 +23,7 @@ from pteron.design.refine import refined
 from pteron.design.spec import Spec
 from pteron.design.task import FAILED, Task
 from pteron.errors import DataError, ModelError
+from pteron.extras import install_command
 from pteron.kernels import Array
 from pteron.maps import TableStore, sweep
 from pteron.shapes import Workers
@@ -228,7 +229,7 @@ def _workers(count: int | None, scheduler: str | None) -> Iterator[str | None]:
     except ImportError:
         raise ModelError(
             "other processes need dask.distributed, which is not installed; "
-            'pip install "pteron[cluster]"'
+            + install_command("cluster")
         ) from None
     # One for all generations: a process compiles what it needs once.
     options: dict[str, Any] = {"threads_per_worker": 1, "dashboard_address": None}

@@ -3,12 +3,14 @@
 `import pteron.environments` registers `pteron/Reach-v0`. Needs the extra `gymnasium`.
 """
 
+from pteron.extras import install_command
+
 try:
     import gymnasium
 except ImportError:
     raise ImportError(
         "pteron.environments needs Gymnasium, which is not installed; "
-        'pip install "pteron[gymnasium]"'
+        + install_command("gymnasium")
     ) from None
 
 from pteron.arguments import check_arguments

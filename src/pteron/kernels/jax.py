@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from pteron.errors import DataError, ModelError
+from pteron.extras import install_command
 from pteron.kernels.code import PYTHON, names_of, statements
 from pteron.kernels.graph import graph_of
 from pteron.kernels.kernel import Kernel, unmasked
@@ -59,7 +60,7 @@ class Traced(Kernel):
             from jax import numpy as jnp
         except ImportError:
             raise ModelError(
-                'target: "jax" needs JAX, which is not installed; pip install "pteron[jax]"'
+                f'target: "jax" needs JAX, which is not installed; {install_command("jax")}'
             ) from None
         if self.dtype == "float64":
             # Without it JAX would take float64 for float32 and say nothing.

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pteron.errors import ModelError
+from pteron.extras import install_command
 from pteron.kernels.cache import digest, entry, find
 from pteron.kernels.code import PYTHON, Language, module_values, rendered
 from pteron.kernels.exponential import straight
@@ -44,7 +45,7 @@ class Jitted(ArrayKernel):
     def _entry(self) -> str:
         if importlib.util.find_spec("numba") is None:
             raise ModelError(
-                'target: "numba" needs Numba, which is not installed; pip install "pteron[numba]"'
+                f'target: "numba" needs Numba, which is not installed; {install_command("numba")}'
             )
         return f"numba-{self.name}-{digest(self.source, version('numba'), version('llvmlite'))}"
 

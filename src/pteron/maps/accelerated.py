@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from pteron.errors import ModelError
+from pteron.extras import install_command
 from pteron.kernels import Array
 from pteron.kernels.choice import guarded
 from pteron.kernels.jax import Traced
@@ -52,7 +53,7 @@ def _function(
         from jax import numpy as jnp
     except ImportError:
         raise ModelError(
-            'engine: "jax" needs JAX, which is not installed; pip install "pteron[jax]"'
+            f'engine: "jax" needs JAX, which is not installed; {install_command("jax")}'
         ) from None
     jax.config.update("jax_enable_x64", True)
     kernels = {

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from pteron.arguments import expect_to_fit
 from pteron.errors import DataError, ModelError, OutputError
+from pteron.extras import install_command
 from pteron.maps.checksums import checksum
 from pteron.maps.grid import COORDINATES, Grid
 from pteron.maps.map import ALL, Map
@@ -317,6 +318,6 @@ def _zarr() -> Any:
         import zarr
     except ImportError:
         raise ModelError(
-            'a .zarr store needs Zarr, which is not installed; pip install "pteron[cluster]"'
+            f"a .zarr store needs Zarr, which is not installed; {install_command('cluster')}"
         ) from None
     return zarr

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, map_coordinates  # type: ignore[import-untyped]
 
 from pteron.errors import DataError, ModelError
+from pteron.extras import install_command
 from pteron.kernels import Array
 from pteron.maps.map import MARGIN, Map, headed
 
@@ -154,7 +155,7 @@ def checked_surfaces() -> tuple[Any, Any]:
         from skimage import measure
     except ImportError as error:
         raise ModelError(
-            f'surfaces need {error.name}, which is not installed; pip install "pteron[surfaces]"'
+            f"surfaces need {error.name}, which is not installed; {install_command('surfaces')}"
         ) from None
     return measure, meshio
 

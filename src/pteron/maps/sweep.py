@@ -20,6 +20,7 @@ from itertools import islice
 from typing import Any, Protocol, TypeVar
 
 from pteron.errors import DataError, ModelError, PteronError
+from pteron.extras import install_command
 from pteron.shapes import Workers
 
 _Chunk = TypeVar("_Chunk")
@@ -275,7 +276,7 @@ def _distributed() -> Any:
     except ImportError:
         raise ModelError(
             "other processes need dask.distributed, which is not installed; "
-            'pip install "pteron[cluster]"'
+            + install_command("cluster")
         ) from None
     return distributed
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from pteron.errors import PteronError
+from pteron.extras import install_command
 
 Picture = NDArray[np.uint8]
 """(height, width, 3): red, green and blue."""
@@ -156,6 +157,6 @@ def _ffmpeg() -> Any:
         imageio_ffmpeg.get_ffmpeg_exe()
     except (ImportError, RuntimeError) as error:
         raise PteronError(
-            "MP4 films need FFmpeg: pip install 'pteron[film]' brings it; or write a .gif"
+            f"MP4 films need FFmpeg; {install_command('film')} brings it; or write a .gif"
         ) from error
     return imageio_ffmpeg

@@ -12,6 +12,7 @@ from contextlib import contextmanager, redirect_stdout
 from typing import TYPE_CHECKING, Any
 
 from pteron.errors import DataError, ModelError, shown
+from pteron.extras import install_command
 from pteron.viewer.guard import guarded
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ def serve(host: str, port: int, label: str) -> viser.ViserServer:
         import viser
     except ImportError:
         raise ModelError(
-            'the viewer needs viser, which is not installed; pip install "pteron[viewer]"'
+            f"the viewer needs viser, which is not installed; {install_command('viewer')}"
         ) from None
     free = free_port(host, port)
     logging.getLogger("websockets.server").addFilter(_worth_telling)

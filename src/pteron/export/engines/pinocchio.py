@@ -27,6 +27,7 @@ from pteron.export.engines.writing import (
     within,
 )
 from pteron.export.names import identifier
+from pteron.extras import install_command
 from pteron.kernels import Array
 from pteron.kernels.code import rendered
 from pteron.manipulator import RobotLike, as_manipulator
@@ -112,7 +113,7 @@ def pinocchio_model(robot: RobotLike, *, home: PoseLike | None = None) -> Any:
         absent = isinstance(error, ModuleNotFoundError) and error.name == "pinocchio"
         raise ModelError(
             f"Pinocchio {'is not installed' if absent else f'cannot be imported ({error})'}; "
-            'pip install "pteron[oracles]", or pip install pin'
+            f"{install_command('oracles')}, or pip install pin"
         ) from None
     source = pinocchio_source(tree(robot, home))
     # What is returned in this process is what the written file returns: one code for both.

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from pteron.errors import ModelError
+from pteron.extras import install_command
 from pteron.identification.consistency.bodies import Bodies
 from pteron.kernels import Array
 
@@ -113,6 +114,6 @@ def _cvxpy() -> Any:
     except ImportError:
         raise MissingSolver(
             "consistency needs cvxpy and Clarabel, which are not installed; "
-            'pip install "pteron[consistency]"'
+            + install_command("consistency")
         ) from None
     return cvxpy

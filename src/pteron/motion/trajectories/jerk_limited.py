@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from pteron.errors import DataError, PteronError, UnreachablePose
+from pteron.extras import install_command
 from pteron.kernels import Array
 from pteron.kinematics import follow, inverse_kinematics
 from pteron.kinematics.evaluate import checked_one, unchecked
@@ -180,6 +181,6 @@ def _ruckig() -> Any:
     except ImportError:
         raise PteronError(
             "motion with limited jerk needs ruckig, which is not installed; "
-            "pip install 'pteron[motion]'"
+            + install_command("motion")
         ) from None
     return ruckig

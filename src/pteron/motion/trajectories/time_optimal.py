@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pteron.errors import DataError, ModelError, PteronError
+from pteron.extras import install_command
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
@@ -289,6 +290,6 @@ def _toppra() -> Any:
         import toppra.constraint
     except ImportError:
         raise PteronError(
-            "time-optimal motion needs toppra, which is not installed; pip install 'pteron[motion]'"
+            "time-optimal motion needs toppra, which is not installed; " + install_command("motion")
         ) from None
     return toppra

@@ -1,0 +1,41 @@
+"""The command that installs an extra into the Python that runs, from where Pteron came."""
+
+from __future__ import annotations
+
+import json
+import sys
+from importlib.metadata import PackageNotFoundError, distribution
+from pathlib import Path
+from urllib.parse import urlsplit
+from urllib.request import url2pathname
+
+
+def install_command(extra: str) -> str:
+    """Return the command that installs an extra: it works in any folder and environment.
+
+    Pteron may come from a folder of sources, a wheel, a repository or a registry; pip keeps which
+    (PEP 610, direct_url.json).
+    """
+    return f"{_quoted(sys.executable or 'python')} -m pip install {_wanted(extra)}"
+
+
+def _wanted(extra: str) -> str:
+    name = f"pteron[{extra}]"
+    try:
+        record = distribution("pteron").read_text("direct_url.json")
+    except PackageNotFoundError:  # it runs from a folder of sources
+        return f'--editable "{Path(__file__).parents[2]}[{extra}]"'
+    if record is None:
+        return f'"{name}"'
+    origin = json.loads(record)
+    url = origin["url"]
+    if "dir_info" in origin:
+        option = "--editable " if origin["dir_info"].get("editable") else ""
+        return f'{option}"{url2pathname(urlsplit(url).path)}[{extra}]"'
+    if "vcs_info" in origin:
+        return f'"{name} @ {origin["vcs_info"]["vcs"]}+{url}@{origin["vcs_info"]["commit_id"]}"'
+    return f'"{name} @ {url}"'
+
+
+def _quoted(path: str) -> str:
+    return f'"{path}"' if " " in path else path
