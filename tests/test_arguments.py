@@ -133,6 +133,21 @@ def test_numbers_of_other_libraries_are_numbers():
     assert workspace.reach_slice("five-bar", [0.0, 0.25], extent=[-0.1, 0.1, 0.2, 0.3], points=3)
 
 
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: pteron.Manipulator("m", 4, [1]), "platform: 4 given, a Platform expected; legs: "),
+        (lambda: identification.Terms(stribeck="slow"), "stribeck: 'slow' given, a number or"),
+        (lambda: motion.MotionLimits(speed=Odd()), "speed: <odd> given, an array expected"),
+        (lambda: indices.Tolerances(Odd()), "joints: <odd> given"),
+        (lambda: maps.Grid("xy", [], "xy"), "coordinates: 'xy' given, a sequence"),
+    ],
+)
+def test_what_a_user_makes_is_made_of_the_right_kinds(make, message):
+    with pytest.raises(pteron.DataError, match=f"^{message}"):
+        make()
+
+
 FAR = 10**12
 TOO_MANY = {
     "random_poses": lambda: pteron.random_poses("delta", FAR),

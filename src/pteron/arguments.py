@@ -53,7 +53,9 @@ class _Kind(NamedTuple):
     holds: Callable[[Any], bool]
 
 
-def check_arguments(package: str, functions: Collection[str] | None = None) -> None:
+def check_arguments(
+    package: str, functions: Collection[str] | None = None, *, classes: Collection[str] = ()
+) -> None:
     """Let the public functions of a package refuse arguments of another kind than they say.
 
     Parameters
@@ -62,6 +64,8 @@ def check_arguments(package: str, functions: Collection[str] | None = None) -> N
         Its name.
     functions : collection of str, optional
         Which of its functions; by default all that `__all__` lists.
+    classes : collection of str
+        Classes that are made from what a user gives, and have no check of their own.
     """
     names = vars(sys.modules[package])
     for name in names["__all__"] if functions is None else functions:
@@ -74,6 +78,8 @@ def check_arguments(package: str, functions: Collection[str] | None = None) -> N
             names[name] = checking
             # Pickles and doctests look for a function where it says that it is from.
             setattr(sys.modules[function.__module__], name, checking)
+    for name in classes:
+        names[name].__init__ = _checking(names[name].__init__)
 
 
 def expect_kinds(
@@ -154,7 +160,8 @@ def _kinds_of(
             others = name
         elif argument.kind is not argument.KEYWORD_ONLY:
             order.append(name)
-        if argument.kind is not argument.VAR_KEYWORD and argument.annotation not in _CHECKED_LATER:
+        hinted = argument.annotation not in {argument.empty, *_CHECKED_LATER}
+        if argument.kind is not argument.VAR_KEYWORD and hinted:
             kinds[name] = (_kind(_hint(function, argument.annotation)), argument.default)
     return kinds, order, others
 

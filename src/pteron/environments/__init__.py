@@ -33,7 +33,7 @@ if REACH not in gymnasium.registry:
     )
 
 __all__ = ["EPISODE", "REACH", "PteronEnv", "PteronVectorEnv", "World"]
-check_arguments(__name__)
+check_arguments(__name__, classes=("PteronEnv", "PteronVectorEnv"))
 
 
 def __dir__() -> list[str]:

@@ -102,7 +102,7 @@ __all__ = [
     "weighted",
     "write_log",
 ]
-check_arguments(__name__)
+check_arguments(__name__, classes=("Bounds", "Terms"))
 
 
 def __dir__() -> list[str]:

@@ -32,7 +32,7 @@ __all__ = [
     "reactions",
     "stiffness",
 ]
-check_arguments(__name__)
+check_arguments(__name__, classes=("Elasticity", "Tolerances"))
 
 
 def __dir__() -> list[str]:

@@ -32,7 +32,7 @@ __all__ = [
     "with_parameters",
     "working_modes",
 ]
-check_arguments(__name__)
+check_arguments(__name__, classes=("Manipulator",))
 
 
 def __dir__() -> list[str]:

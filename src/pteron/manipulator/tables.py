@@ -127,7 +127,7 @@ class PlatformTable(PlanarBody, _Motion):
     )
     limits: Two | None = Field(
         None,
-        description="least and greatest phi, rad, where hinges of the platform allow no more",
+        description="least and greatest phi, rad, where hinges allow no more; may be several turns",
         examples=[[-0.8, 0.8]],
     )
     tool: Three = Field(

@@ -29,7 +29,7 @@ __all__ = [
     "surfaces",
     "sweep",
 ]
-check_arguments(__name__)
+check_arguments(__name__, classes=("Grid",))
 
 
 def __dir__() -> list[str]:

@@ -78,7 +78,7 @@ __all__ = [
     "time_optimal",
     "with_payload",
 ]
-check_arguments(__name__)
+check_arguments(__name__, classes=("FourierSeries", "Motor", "MotionLimits"))
 
 
 def __dir__() -> list[str]:
