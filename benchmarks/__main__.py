@@ -25,6 +25,7 @@ _SCRIPTS = {
     "Fastest": "speed.py",
     "Public functions": "public_calls.py",
     "Second start": "startup.py",
+    "Commands that one waits for": "waiting.py",
     "Memory traffic": "memory_traffic.py",
     "The paper's 41 %": "paper_claim.py",
     "Excitation": "excitation.py",

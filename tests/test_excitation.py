@@ -271,7 +271,7 @@ def test_passive_joints_and_phi_keep_their_limits(search):
         few = {"starts": 1, "draws": 4, "workers": 1, "criterion": "logdet"}
     found = search(robot, harmonics=2, period=2.0, limits=limits, **few)
     motion = getattr(found, "motion", found)
-    pose = motion.at(motion.uniform_times(2000)).pose
+    pose = motion.at(motion.uniform_times(20_000)).pose
     shares = pteron.workspace.reserve(robot, pose).clearances
     assert 0.55 <= shares.min() < 0.56
     assert np.abs(pose[:, 3]).max() < 0.45 * np.pi / 4
@@ -488,7 +488,6 @@ def test_an_interrupt_keeps_the_best_until_then(share: float):
 
 
 def test_an_interrupt_during_the_program_ends_it_at_once():
-    # A signal that arrives while IPOPT runs is CasADi's to see first.
     robot = CATALOG["quadrupteron"]
     interrupted = []
 

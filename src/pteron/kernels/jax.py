@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -30,13 +31,25 @@ _PRINTED = (
     | {operation: f"where({PYTHON[operation]}, 1.0, 0.0)" for operation in _TRUTHS}
 )
 
+_ROUNDED = ("float32", "float64")
+"""Type of an array and of the kernel it is given to, where digits are lost unseen."""
+
 
 class Traced(Kernel):
     """A kernel that JAX traces. It takes and returns JAX arrays, and may be called inside `jit`.
 
     What is given by name, such as `parameters`, can be differentiated with respect to as well.
-    With dtype float64 it switches JAX to 64 bits (`jax_enable_x64`), for the process.
+    With dtype float64 it switches JAX to 64 bits (`jax_enable_x64`), for the process, when it is
+    made: arrays made from then on have them. Earlier ones, which do not, are refused.
     """
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        if self.dtype == "float64" and find_spec("jax"):
+            # Without it JAX would take float64 for float32 and say nothing.
+            import jax
+
+            jax.config.update("jax_enable_x64", True)
 
     @cached_property
     def source(self) -> str:
@@ -62,9 +75,6 @@ class Traced(Kernel):
             raise ModelError(
                 f'target: "jax" needs JAX, which is not installed; {install_command("jax")}'
             ) from None
-        if self.dtype == "float64":
-            # Without it JAX would take float64 for float32 and say nothing.
-            jax.config.update("jax_enable_x64", True)
 
         def stack(*values: Any) -> Any:
             return jnp.stack(jnp.broadcast_arrays(*values), axis=-1)
@@ -98,8 +108,20 @@ class Traced(Kernel):
             given[port.name] = by_name(
                 unmasked(given[port.name], port.name), port.columns, port.name
             )
+            self._check_digits(port.name, given[port.name])
             shape = np.shape(given[port.name])
             if shape[max(len(shape) - len(port.shape), 0) :] != port.shape:
                 expected = ", ".join(["...", *map(str, port.shape)])
                 raise DataError(f"{port.name}: shape {shape} given, ({expected}) expected")
         return self._traced(*(given[port.name] for port in self.ports))
+
+    def _check_digits(self, name: str, value: Any) -> None:
+        """Refuse an array that JAX has rounded to 32 bits, values and derivatives alike."""
+        import jax
+
+        if isinstance(value, jax.Array) and (str(value.dtype), self.dtype) == _ROUNDED:
+            raise DataError(
+                f"{name}: a float32 array of JAX given, float64 expected; make it after `compile`, "
+                'or after jax.config.update("jax_enable_x64", True), or compile with '
+                'dtype="float32"'
+            )

@@ -1,10 +1,16 @@
-"""The nonlinear program behind an exciting trajectory: IPOPT with CasADi's exact gradients."""
+"""The nonlinear program behind an exciting trajectory: sequential quadratic programming (SLSQP).
+
+It has some 30 variables, and a thousand rows that each depend on all of them. Interior points
+factor all rows in every iteration; here an iteration solves a dense problem as small as the
+variables, and needs half as many. Gradients are exact (CasADi).
+"""
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Literal
+from typing import Literal
 
 import casadi as ca
 import numpy as np
@@ -13,6 +19,7 @@ from pteron.bodies.motion import Expression
 from pteron.identification.excitation.draws import sizes
 from pteron.identification.excitation.fourier import Space
 from pteron.identification.excitation.limits import Limits, drive_load, joint_sizes, per_joint
+from pteron.identification.excitation.sequential import Program, sequential_minimum
 from pteron.identification.signals.states import home, home_mode
 from pteron.kernels import Array, Columns, program
 from pteron.kinematics.evaluate import unchecked
@@ -32,9 +39,11 @@ _BACK_OFF = 1e-3
 
 _ITERATIONS = 200
 
-_INTERRUPTED = ("User_Requested_Stop", "NonIpopt_Exception_Thrown")
-"""How IPOPT ends when CasADi has taken an interrupt from the keyboard for itself: all other errors
-of its callbacks are numbers that are invalid."""
+_SETTLED = 1e-6
+"""Decrease of the measure, a logarithm, below which a step is not worth it."""
+
+_RADIUS = 0.2
+"""Of the first trust region, over the sizes of motions."""
 
 
 @dataclass(frozen=True)
@@ -63,60 +72,78 @@ def minimised(
     None if it could not begin at `start` (2 H + 1, n). `doublings` is the sharpness of `measure`.
     The limits `watched` by name are kept, at the `extra` instants (E,) too; the fewer, the faster.
     """
-    n, rows = setting.robot.freedom, 2 * setting.harmonics + 1
-    count = max(_SAMPLES * setting.harmonics, 3 * _SAMPLES)
-    times: Array = np.linspace(0.0, setting.period, count, endpoint=False)
-    z = ca.MX.sym("z", rows * n)
     size = sizes(setting.robot, setting.space)
-    coefficients = ca.mtimes(ca.reshape(z, rows, n), ca.diag(ca.DM(size)))
-    guarded = np.concatenate([times, extra])
-    path, low, high = _path(setting, watched)
-    bounded = path.map(len(guarded))(*_along(setting, coefficients, guarded))
-    blocks = _regressor(setting).map(count)(*_along(setting, coefficients, times))
-    information = ca.mtimes(blocks, blocks.T) / count
-    nlp = {"x": z, "f": measure(information, setting.criterion, doublings), "g": ca.vec(bounded)}
-    solver = ca.nlpsol("excitation", "ipopt", nlp, _options(seconds))
-    try:
-        found = solver(
-            x0=ca.vec(ca.DM(start / size)),
-            lbg=np.tile(low, len(guarded)),
-            ubg=np.tile(high, len(guarded)),
-        )
-    except RuntimeError:
-        return None
-    status = solver.stats()["return_status"]
-    if status in _INTERRUPTED:
-        raise KeyboardInterrupt
-    if status == "Invalid_Number_Detected":
-        return None
-    result: Array = np.array(ca.reshape(found["x"], rows, n)) * size
-    return result if np.isfinite(result).all() else None
+    cost = _cost(setting, doublings)
+    kept = _Kept(setting, watched, np.concatenate([_instants(setting), extra]))
+    deadline = time.monotonic() + seconds
+
+    def measured(z: Array) -> tuple[float, Array]:
+        value, gradient = cost(z.reshape(start.shape))
+        return float(value), np.array(gradient).ravel()
+
+    found = sequential_minimum(
+        Program(measured, kept.values, kept.slopes),
+        (start / size).ravel(),
+        radius=_RADIUS,
+        settled=_SETTLED,
+        iterations=_ITERATIONS,
+        stop=lambda: time.monotonic() > deadline,
+    )
+    return None if found is None else found.reshape(start.shape) * size
 
 
-def _options(seconds: float) -> dict[str, Any]:
-    return {
-        "print_time": False,
-        "show_eval_warnings": False,  # a step out of reach is NaN, which the line search rejects
-        "error_on_fail": False,
-        "ipopt": {
-            "print_level": 0,
-            "sb": "yes",
-            "hessian_approximation": "limited-memory",
-            "limited_memory_max_history": 6,
-            "mu_strategy": "adaptive",
-            "tol": 1e-3,
-            "acceptable_tol": 1e-2,
-            "acceptable_iter": 10,
-            "max_iter": _ITERATIONS,
-            "max_wall_time": max(seconds, 1e-2),
-        },
-    }
+class _Kept:
+    """The limits at instants (T,), as values of the program's variables that are 0 or more."""
+
+    def __init__(self, setting: Setting, watched: tuple[str, ...], times: Array) -> None:
+        path, slopes, low, high = _path(setting, watched)
+        size = sizes(setting.robot, setting.space)
+        self._path, self._slopes = path.map(len(times)), slopes.map(len(times))
+        self._rows = np.array(fourier_basis(times, setting.harmonics, setting.period))
+        self._size, self._low, self._high = size, low, high
+        self._above, self._below = np.isfinite(low), np.isfinite(high)
+
+    def values(self, z: Array) -> Array:
+        """Return the margins (R,)."""
+        found = np.array(self._path(*self._along(z))).T
+        return self._sides(found - self._low, self._high - found)
+
+    def slopes(self, z: Array) -> Array:
+        """Return their derivatives by the variables (R, v)."""
+        count, limits, n = self._rows.shape[1], len(self._low), len(self._size)
+        blocks = np.array(self._slopes(*self._along(z))).T.reshape(count, 3, n, limits)
+        found = np.einsum("tdig,dtk->tgki", blocks * self._size[:, None], self._rows)
+        found = found.reshape(count, limits, -1)
+        return self._sides(found, -found)
+
+    def _along(self, z: Array) -> list[Array]:
+        coefficients = z.reshape(-1, len(self._size)) * self._size
+        return [(rows @ coefficients).T for rows in self._rows]
+
+    def _sides(self, above: Array, below: Array) -> Array:
+        parts = above[:, self._above], below[:, self._below]
+        return np.concatenate([part.reshape(-1, *part.shape[2:]) for part in parts])
 
 
-def _along(setting: Setting, coefficients: Expression, times: Array) -> list[Expression]:
-    """Return q, q' and q'' at times (T,), (n, T) each."""
+def _instants(setting: Setting) -> Array:
+    """Return the instants (T,) at which the regressor is taken, s."""
+    count = max(_SAMPLES * setting.harmonics, 3 * _SAMPLES)
+    return np.linspace(0.0, setting.period, count, endpoint=False)
+
+
+@lru_cache(maxsize=16)
+def _cost(setting: Setting, doublings: int) -> ca.Function:
+    """Return the measure and its gradient as a function of the coefficients over their sizes."""
+    times = _instants(setting)
+    n = setting.robot.freedom
+    z = ca.MX.sym("z", 2 * setting.harmonics + 1, n)
+    coefficients = ca.mtimes(z, ca.diag(ca.DM(sizes(setting.robot, setting.space))))
     rows = fourier_basis(times, setting.harmonics, setting.period)
-    return [ca.mtimes(ca.DM(row), coefficients).T for row in rows]
+    along = [ca.mtimes(ca.DM(row), coefficients).T for row in rows]
+    blocks = _regressor(setting).map(len(times))(*along)
+    information = ca.mtimes(blocks, blocks.T) / len(times)
+    value = measure(information, setting.criterion, doublings)
+    return ca.Function("cost", [z], [value, ca.gradient(value, z)])
 
 
 @lru_cache(maxsize=16)
@@ -128,9 +155,12 @@ def _regressor(setting: Setting) -> ca.Function:
 
 
 @lru_cache(maxsize=32)
-def _path(setting: Setting, watched: tuple[str, ...]) -> tuple[ca.Function, Array, Array]:
-    """Return limits as a function of q, q' and q'', and the least and greatest values (g,) of it.
+def _path(
+    setting: Setting, watched: tuple[str, ...]
+) -> tuple[ca.Function, ca.Function, Array, Array]:
+    """Return limits (g,) as a function of q, q' and q'', its slopes, and its least and greatest.
 
+    The slopes are a column (3 n g,): the derivatives of all by q1, then those by q2, and so on.
     Squared sines stay finite and smooth out of reach.
     """
     robot, limits = setting.robot, setting.limits
@@ -169,7 +199,14 @@ def _path(setting: Setting, watched: tuple[str, ...]) -> tuple[ca.Function, Arra
         np.concatenate([np.broadcast_to(b, v.shape[0]) for v, b in zip(values, side, strict=True)])
         for side in sides
     )
-    return ca.Function("path", q, [ca.densify(ca.vertcat(*values))], {"cse": True}), low, high
+    value = ca.densify(ca.vertcat(*values))
+    slopes = ca.vec(ca.densify(ca.jacobian(value, ca.vertcat(*q))))
+    return (
+        ca.Function("path", q, [value], {"cse": True}),
+        ca.Function("slopes", q, [slopes], {"cse": True}),
+        low,
+        high,
+    )
 
 
 def _state(setting: Setting) -> tuple[list[Expression], list[Expression]]:

@@ -35,7 +35,7 @@ _DRAWING = 0.3
 _FIRST = 0.6
 """The share of the time left that the first round may take."""
 
-_ONE_OF = 3
+_ONE_OF = 2
 """One of so many starts, the best after the first round, goes on to the second."""
 
 _SEEN = 0.1
@@ -61,9 +61,9 @@ def optimal_excitation(
     """Return a periodic trajectory from whose forces the base parameters are seen best.
 
     The best of many random Fourier motions, each as large as the limits allow, are improved by
-    IPOPT with exact gradients. The limits hold at samples; where they are then violated between
-    these, the worst instants join the samples; in the end the motion is shrunk about its center, if
-    need be, until all limits are kept throughout the period.
+    sequential quadratic programming with exact gradients. The limits hold at samples; where they
+    are then violated between these, the worst instants join the samples; in the end the motion is
+    shrunk about its center, if need be, until all limits are kept throughout the period.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def optimal_excitation(
         (see `scaled_condition`), or the volume of the confidence ellipsoid, -log det.
     starts : int
         How many of the random motions, the best ones, are improved: all of them roughly, then the
-        best third thoroughly.
+        better half thoroughly.
     draws : int
         How many random motions there are.
     seed : int
