@@ -511,3 +511,38 @@ def test_every_figure_is_in_the_page_about_them():
     figures = [name for name in pteron.plots.__all__ if name.endswith("_figure")]
     assert len(figures) > 20
     assert [name for name in (*figures, "draw", "film", "resized") if name not in page] == []
+
+
+def titled(title):
+    """Return a figure with a title, and a legend that is laid out before it is drawn."""
+    figure = power_figure(np.linspace(0.0, 1.0, 5), np.ones((5, 3)))
+    figure.suptitle(title)
+    figure.axes[0].plot([0.0], [1.0], label=title)
+    return figure
+
+
+@pytest.mark.parametrize("width", [None, "column"])
+def test_letters_that_another_font_has_are_drawn_in_it(tmp_path, width):
+    plain, other = (titled(text) for text in ("Aa", "\N{MATHEMATICAL SCRIPT CAPITAL A}a"))
+    for ending in ("png", "pdf", "svg"):
+        save_figure(other, tmp_path / f"a.{ending}", width=width)  # warnings are errors
+    assert len(other.findobj(Text)) > len([t for t in other.findobj(Text) if lone(t)])
+    assert all(lone(text) for text in plain.findobj(Text))
+
+
+def lone(text):
+    """Say whether a text has one font."""
+    return len(text.get_fontfamily()) == 1
+
+
+@pytest.mark.parametrize("width", [None, "column"])
+def test_letters_that_no_font_has_are_told_once(tmp_path, width):
+    letters = "".join(map(chr, range(0xF0000, 0xF0020)))  # for private use, and used by nobody
+    for ending in ("png", "pdf"):
+        with pytest.warns(UserWarning, match="boxes stand for them") as told:
+            save_figure(titled(f"a {letters}"), tmp_path / f"a.{ending}", width=width)
+        assert len(told) == 1
+        assert "\n" not in str(told[0].message)
+        assert len(str(told[0].message)) < 260
+    save_figure(titled(letters), tmp_path / "a.svg", width=width)
+    assert letters in (tmp_path / "a.svg").read_text()

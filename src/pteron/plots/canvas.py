@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from html import escape
 from io import BytesIO, StringIO
+from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
@@ -19,6 +20,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
+
+from pteron.plots.fonts import no_word_of_glyphs, take_fonts, warn_of_absent
 
 LEG_COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7")
 _LEG_STYLES = ("-", (0, (6, 1.5)), (0, (2, 1.2)), (0, (6, 1.5, 1.5, 1.5)))
@@ -55,7 +58,22 @@ _NOTEBOOK_DPI = 144
 
 
 class Picture(Figure):
-    """A figure that notebooks show without pyplot."""
+    """A figure that notebooks show without pyplot, in fonts that have its letters."""
+
+    def draw(self, renderer: Any) -> None:
+        """Draw the figure."""
+        take_fonts(self)
+        with no_word_of_glyphs():
+            super().draw(renderer)
+
+    def savefig(self, fname: Any, **options: Any) -> None:  # type: ignore[override]
+        """Write the figure; letters that no font here has are told in one warning."""
+        absent = take_fonts(self)
+        with no_word_of_glyphs():
+            super().savefig(fname, **options)
+        # An .svg keeps text as text, for its reader's fonts.
+        if str(options.get("format") or Path(str(fname)).suffix[1:]).lower() != "svg":
+            warn_of_absent(absent)
 
     def _ipython_display_(self) -> None:
         # The way that goes before pyplot's, which notebooks know only once it is imported.

@@ -16,6 +16,7 @@ from matplotlib.ticker import MultipleLocator
 from pteron.atomic import write_bytes
 from pteron.errors import DataError, OutputError, shown
 from pteron.plots.canvas import FONT_SIZE, legend
+from pteron.plots.fonts import no_word_of_glyphs, take_fonts
 
 Width = Literal["column", "page"]
 
@@ -86,7 +87,9 @@ def resized(figure: Figure, width: Width | float) -> Figure:
     for scale in (scale for axes in figure.axes for scale in (axes.xaxis, axes.yaxis)):
         for label in scale.get_ticklabels()[:1]:
             scale.set_tick_params(labelsize=label.get_fontsize())  # also of those to come
-    _fit_legend(figure, inches)
+    take_fonts(figure)
+    with no_word_of_glyphs():
+        _fit_legend(figure, inches)
     figure.draw_without_rendering()
     for axes in figure.axes:
         _thin(axes)

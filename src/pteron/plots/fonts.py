@@ -1,0 +1,85 @@
+"""Letters that the usual font lacks: from another font of this machine, or told in one line."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import lru_cache
+
+from matplotlib import font_manager
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from pteron.errors import shown
+
+_NO_LETTERS = ("Last Resort", "STIXNonUnicode", "STIXSize", "cm")
+"""Families whose letters are boxes, or signs of mathematics in letters' places."""
+
+
+def take_fonts(figure: Figure) -> str:
+    """Give every text of a figure the fonts that its letters need; return what no font has."""
+    absent: set[str] = set()
+    for text in figure.findobj(Text):
+        assert isinstance(text, Text)
+        letters = text.get_text()
+        if letters.isascii():
+            continue
+        usual = font_manager.findfont(text.get_fontproperties())
+        lacking = _lacking(usual, frozenset(c for c in letters if not c.isspace()))
+        if lacking:
+            families, missing = _others(lacking)
+            own = [name for name in text.get_fontfamily() if name not in families]
+            text.set_fontfamily([*own, *families])
+            absent |= missing
+    return "".join(sorted(absent))
+
+
+def warn_of_absent(letters: str) -> None:
+    """Issue one warning of letters that are drawn as boxes, if there are any."""
+    if letters:
+        some = shown(letters, bare=True, longest=8)
+        warnings.warn(
+            f"no font on this machine has {some}: boxes stand for them in the picture; install "
+            "one that has, such as Noto Sans, or write an .svg, which takes the reader's fonts",
+            stacklevel=4,
+        )
+
+
+@contextmanager
+def no_word_of_glyphs() -> Iterator[None]:
+    """Keep to itself that letters are missing, which matplotlib tells of each one, many times."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", r"(?s)(Glyph|Matplotlib currently does not).*")
+        yield
+
+
+@lru_cache(maxsize=64)
+def _others(letters: frozenset[str]) -> tuple[list[str], frozenset[str]]:
+    """Return families that have letters, and the letters that none of this machine has."""
+    families: list[str] = []
+    for name, path in _upright().items():
+        rest = _lacking(path, letters)
+        if rest < letters:
+            families, letters = [*families, name], rest
+        if not letters:
+            break
+    return families, letters
+
+
+@lru_cache(maxsize=1)
+def _upright() -> dict[str, str]:
+    """Return one file of each family, upright where there is one, of those that have letters."""
+    listed = sorted(font_manager.fontManager.ttflist, key=lambda font: font.style == "normal")
+    files = {font.name: font.fname for font in listed if not font.name.startswith(_NO_LETTERS)}
+    return dict(sorted(files.items()))
+
+
+@lru_cache(maxsize=1024)
+def _lacking(path: str, letters: frozenset[str]) -> frozenset[str]:
+    """Return the letters that a font has not."""
+    try:
+        known = font_manager.get_font(path).get_charmap()
+    except (OSError, RuntimeError):  # a file that is gone, or no font that matplotlib draws
+        return letters
+    return frozenset(c for c in letters if ord(c) not in known)
