@@ -194,7 +194,7 @@ def _kind(hint: Any) -> _Kind | None:
             _listed([f'"{one}"' if isinstance(one, str) else repr(one) for one in inner]),
             lambda value: isinstance(value, choices),
         )
-    kind = origin or hint
+    kind: Any = origin or hint
     if not isinstance(kind, type):
         return None
     if kind is collections.abc.Callable:

@@ -66,7 +66,7 @@ class Program(TyperGroup):
             _close_standard_output()
             status = _USER_ERROR
         except MemoryError as error:
-            complain(f"there is not enough memory: {error or 'ask for less at once'}")
+            complain(f"there is not enough memory: {str(error) or 'ask for less at once'}")
             status = _USER_ERROR
         except (Abort, KeyboardInterrupt):
             note("Interrupted")

@@ -24,7 +24,7 @@ _Outputs = TypeVar("_Outputs")
 _COINCIDENT = 1e-6
 """Share of a leg's length within which its two ends count as coincident, in messages."""
 
-_TYPED = (list, tuple)
+_TYPED: tuple[type, ...] = (list, tuple)
 """What a person types; a program's arrays are not asked for their units."""
 
 _MILLIMETRES = 20.0

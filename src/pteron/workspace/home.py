@@ -117,8 +117,9 @@ def _best(robot: Manipulator) -> Array:
     if _worth(robot, middle) >= _MIDDLE * most:
         best = middle
     on_axis = _on_axis(robot, np.concatenate([refined, drawn]))
-    if len(on_axis) and max(worth := _worth(robot, on_axis)) >= _AXIS * most:
-        best = _least_travel(robot, on_axis[worth >= _WORTH * max(worth)])
+    worth = np.asarray(_worth(robot, on_axis))
+    if worth.max(initial=0.0) >= _AXIS * most:
+        best = _least_travel(robot, on_axis[worth >= _WORTH * worth.max()])
     least = _WORTH * float(_worth(robot, best))
     for metres, degrees in product(_METRES, _DEGREES):
         step = _steps(robot, metres, np.radians(degrees))
