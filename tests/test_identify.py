@@ -543,7 +543,8 @@ def test_negative_inertia_is_seen_on_every_machine():
 
 
 def test_a_fault_says_what_is_wrong():
-    fault = Fault(("force1", "force2", "force3"), (1, 2, 0), (1, 1, -1), 0.5, 0.01)
+    names = [tuple(f"{name}{i}" for i in (1, 2, 3)) for name in ("force", "rho")]
+    fault = Fault(*names, (1, 2, 0), (1, 1, -1), (0, 1, 2), (1, 1, 1), 0.5, 0.01)
     text = fault.message()
     assert "force1, force2 and force3 are in another order" in text
     assert "force1 has the sign flipped" in text

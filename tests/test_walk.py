@@ -40,10 +40,15 @@ def test_the_whole_way(tmp_path, monkeypatch, capsys):
         pytest.skip("no C compiler")
     monkeypatch.chdir(tmp_path)
     printed = {line: done(line, monkeypatch, capsys) for line in COMMANDS}
-    assert len(printed) == 13
+    assert len(printed) == 17
     assert printed["controller/test"] == "all functions agree with the library\n"
     verdicts = [text for line, text in printed.items() if line.startswith("pteron identify")]
     assert all(text.startswith("my delta: trustworthy") for text in verdicts)
+    # Without noise nothing is accused, but what no log can show is said.
+    simulated = verdicts[0].replace("\n", " ")
+    assert "half a sample (0.5 ms) late" in simulated
+    assert "cannot show a factor that all forces have in common" in simulated
+    assert "stated errors of the values do not allow" not in simulated
 
     # The C of the page, against the model file: real bodies have the values of the page's list.
     (code,) = re.findall(r"(?s)```c\n(.*?)```", PAGE)

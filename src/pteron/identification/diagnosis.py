@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations, product
 
@@ -13,124 +13,239 @@ from pteron.identification.estimators import weighted
 from pteron.identification.logs import Log
 from pteron.identification.model import Model
 from pteron.identification.observation import Observations, observations_of
-from pteron.identification.plausibility import has_negative_inertia
+from pteron.identification.plausibility import unphysical
 from pteron.identification.signals import Preprocessing
 
-_DECISIVE = 3.0
+DECISIVE = 3.0
 """Factor by which the error must fall for a fault to be called found."""
 
 _EXPLAINED = 0.3
 """Error relative to the forces below which a fit explains them."""
 
+_ALIKE = 1.2
+"""Error over the least one up to which faults explain the forces as well."""
+
+_ROUNDING = 1e-9
+"""Error relative to the forces below which all is explained."""
+
 _ROWS = 4000
 
-_Choice = tuple[tuple[int, ...], tuple[int, ...]]
-"""An order of the columns, and their signs."""
+_LOOKED_INTO = 12
+"""Faults that fit alike, and of which the fewest changes are seen to be physical or not."""
+
+_TOLD = 3
+"""Equivalent faults that are listed."""
 
 
 @dataclass(frozen=True)
 class Fault:
-    """Columns of forces, or of joints, that are not what their `names` say.
+    """Columns of forces and of joints that are not what their names say, or gravity that is not.
 
-    `order` is which of them, from 0, belongs to each actuator, a sign is -1 where it is flipped;
-    `before` and `after` mending they leave such errors of the fit relative to the forces.
+    `order` is which of the columns, from 0, belongs to each actuator, a sign is -1 where it is
+    flipped; `before` and `after` mending they leave such errors of the fit relative to the forces.
+    `equivalents` explain the forces as well.
     """
 
-    names: tuple[str, ...]
+    forces: tuple[str, ...]
+    joints: tuple[str, ...]
     order: tuple[int, ...]
     signs: tuple[int, ...]
+    joint_order: tuple[int, ...]
+    joint_signs: tuple[int, ...]
     before: float
     after: float
+    gravity: bool = False
+    equivalents: tuple[str, ...] = ()
+
+    @property
+    def changes(self) -> int:
+        """How many exchanges and flips mend it; legs that are exchanged count once."""
+        legs = self.order == self.joint_order
+        orders = (self.order,) if legs else (self.order, self.joint_order)
+        flips = self.signs.count(-1) + self.joint_signs.count(-1)
+        return flips + sum(map(_exchanges, orders)) + self.gravity
 
     def message(self) -> str:
         """Return what is wrong and what to do, as part of a sentence."""
         parts = []
-        n = len(self.order)
-        flipped = [k for k in range(n) if self.signs[k] < 0]
-        moved = [name for k, name in enumerate(self.names) if self.order[k] != k]
-        if len(moved) == 2:
-            parts.append(f"{_listed(moved)} are swapped")
-        elif moved:
-            order = ", ".join(self.names[k] for k in self.order)
-            parts.append(f"{_listed(moved)} are in another order (they should be {order})")
-        if len(flipped) == n:
+        usual = tuple(range(len(self.order)))
+        if self.gravity:
+            parts.append("gravity points the other way than in the machine's file")
+        if self.order == self.joint_order != usual:
+            pairs = [f"leg {k + 1}" for k in usual if self.order[k] != k]
+            parts.append(f"{_listed(pairs)} are exchanged, forces and joints alike")
+        else:
+            for names, order in ((self.joints, self.joint_order), (self.forces, self.order)):
+                parts += _moved(names, order)
+        parts += _flipped(self.joints, self.joint_order, self.joint_signs)
+        if -1 not in self.joint_signs and self.signs.count(-1) == len(usual):
             parts.append("the forces, or all joints, have the sign flipped")
-        elif flipped:
-            names = _listed([self.names[self.order[k]] for k in flipped])
-            parts.append(f"{names} {'has' if len(flipped) == 1 else 'have'} the sign flipped")
+        else:
+            parts += _flipped(self.forces, self.order, self.signs)
         return " and ".join(parts)
+
+
+def _exchanges(order: Sequence[int]) -> int:
+    """Return how many exchanges of two make an order."""
+    left, count = set(range(len(order))), len(order)
+    while left:
+        at, count = left.pop(), count - 1
+        while (at := order[at]) in left:
+            left.remove(at)
+    return count
+
+
+def _moved(names: Sequence[str], order: Sequence[int]) -> Iterator[str]:
+    moved = [name for k, name in enumerate(names) if order[k] != k]
+    if len(moved) == 2:
+        yield f"{_listed(moved)} are swapped"
+    elif moved:
+        right = ", ".join(names[k] for k in order)
+        yield f"{_listed(moved)} are in another order (they should be {right})"
+
+
+def _flipped(names: Sequence[str], order: Sequence[int], signs: Sequence[int]) -> Iterator[str]:
+    flipped = [names[order[k]] for k, sign in enumerate(signs) if sign < 0]
+    if flipped:
+        yield f"{_listed(flipped)} {'has' if len(flipped) == 1 else 'have'} the sign flipped"
 
 
 def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> Fault | None:
     """Return the exchange of columns, or of signs, that explains a log's forces far better.
 
-    None where nothing makes the error three times smaller, or the machine's inertia positive.
+    Of those that explain them alike, the one comes first with which friction and inertia are
+    positive, then the one of fewest changes. None where nothing makes the error three times
+    smaller, or a machine of negative inertia or friction one that can be.
     """
     # Without the mask of slow joints, which belongs to the order that is in question.
     plain = replace(preprocessing, slow=np.zeros_like(preprocessing.slow))
-    observations = observations_of(model, log, plain)
-    n = observations.actuators
-    # A choice of signs and its opposite fit alike.
-    signs = [(1, *rest) for rest in product((1, -1), repeat=n - 1)]
-    choices = [(order, sign) for order in permutations(range(n)) for sign in signs]
-    errors = _errors(observations, choices)
-    before = errors[0]
-    best = int(np.argmin(errors))
-    if not errors[best] * _DECISIVE < before:
-        best = 0
-    (order, sign), after = choices[best], errors[best]
-    swapped = exchanged_joints(model, log, plain, before)
-    # Exchanged forces can do some of what exchanged joints do.
-    if swapped is not None and swapped.after < 0.7 * after:
-        return swapped
-    mended = observations.with_forces(observations.forces[:, list(order)] * np.array(sign))
-    # Where nothing explains the forces, the sign of what is left says nothing.
-    found = weighted(mended)
-    if after < _EXPLAINED and has_negative_inertia(model, found.values, found.covariance):
-        sign = tuple(-s for s in sign)
-    if (order, sign) == choices[0]:
+    usual = observations_of(model, log, plain)
+    none = _fault(model, usual.actuators)
+    found = [(fault, usual, model) for fault in _of_forces(none, usual)]
+    before = found[0][0].after
+    found += _others(model, log, plain, before)
+    faults = [replace(fault, before=before) for fault, _, _ in found]
+    least = min(fault.after for fault in faults)
+    limit = _ALIKE * max(least, _ROUNDING)
+    if not least * DECISIVE < before:
+        # Signs of what is not explained say nothing.
+        if before > _EXPLAINED:
+            return None
+        limit = _ALIKE * max(before, _ROUNDING)
+    alike = [k for k, fault in enumerate(faults) if fault.after <= limit]
+    alike = sorted(alike, key=lambda k: (faults[k].changes, faults[k].after))[:_LOOKED_INTO]
+    states = {k: _unphysical(faults[k], *found[k][1:]) for k in alike}
+    first, *rest = sorted(alike, key=lambda k: (states[k], faults[k].changes, faults[k].after))
+    if faults[first].changes == 0:
         return None
-    return Fault(model.robot.force_names, order, sign, before, after)
-
-
-def _errors(observations: Observations, choices: Sequence[_Choice]) -> list[float]:
-    """Return the error of the fit relative to the forces, for each order and signs of these."""
-    step = max(len(observations.forces) // _ROWS, 1)
-    matrix, forces = observations.matrix[::step], observations.forces[::step]
-    flat = matrix.reshape(-1, matrix.shape[-1])
-    lengths = np.linalg.norm(flat, axis=0)
-    basis = np.linalg.qr(flat / np.where(lengths > 0.0, lengths, 1.0))[0]
-    found = []
-    # One factorisation serves all: the error is what the projection on the columns leaves.
-    for order, signs in choices:
-        given = (forces[:, list(order)] * np.array(signs)).ravel()
-        image = basis.T @ given
-        power = float(given @ given)
-        found.append(float(np.sqrt(max(power - float(image @ image), 0.0) / power)))
-    return found
+    # Legs that are alike can be renamed beside every fault: more changes tell nothing new.
+    most = states[first], faults[first].changes
+    as_well = [faults[k].message() for k in rest if (states[k], faults[k].changes) <= most]
+    return replace(faults[first], equivalents=tuple(as_well[:_TOLD]))
 
 
 def exchanged_joints(
     model: Model, log: Log, preprocessing: Preprocessing, before: float
 ) -> Fault | None:
     """Return the order of the joints, or the sign of one, that makes the error `before` small."""
-    n = log.joints.shape[1]
+    none = _fault(model, log.joints.shape[1])
     best: Fault | None = None
+    for fault, observations in _moved_joints(none, model, log, preprocessing):
+        (error,) = _errors(observations, [fault])
+        if error * DECISIVE < (before if best is None else best.after * DECISIVE):
+            best = replace(fault, before=before, after=error)
+    return best
+
+
+def _fault(model: Model, n: int) -> Fault:
+    """Return that of a log without a fault."""
     usual, upright = tuple(range(n)), (1,) * n
-    choices = [(usual, tuple(-1 if k == i else 1 for k in range(n))) for i in range(n)]
+    names = model.robot.force_names, model.robot.joint_names
+    return Fault(*names, usual, upright, usual, upright, np.inf, np.inf)
+
+
+def _of_forces(none: Fault, observations: Observations) -> list[Fault]:
+    """Return all orders and signs of the forces with their errors, the usual one first."""
+    signs = list(product((1, -1), repeat=len(none.order)))
+    orders = permutations(none.order)
+    return _with_errors(
+        observations, [replace(none, order=o, signs=s) for o in orders for s in signs]
+    )
+
+
+def _others(
+    model: Model, log: Log, how: Preprocessing, before: float
+) -> Iterator[tuple[Fault, Observations, Model]]:
+    """Yield faults of joints, of legs and of gravity that explain the forces far better."""
+    none = _fault(model, log.joints.shape[1])
+    signs = list(product((1, -1), repeat=len(none.order)))
+
+    def clear(faults: Iterable[Fault]) -> Iterator[Fault]:
+        return (fault for fault in faults if fault.after * DECISIVE < before)
+
+    for fault, observations in _moved_joints(none, model, log, how):
+        orders = {none.order, fault.joint_order}
+        tried = [replace(fault, order=o, signs=s) for o in orders for s in signs]
+        for one in clear(_with_errors(observations, tried)):
+            yield one, observations, model
+    if any(model.robot.gravity):
+        x, y, z = model.robot.gravity
+        turned = replace(model.robot, gravity=(-x, -y, -z))
+        other = replace(model, base=replace(model.base, robot=turned))
+        observations = observations_of(other, log, how)
+        tried = [replace(none, gravity=True, signs=s) for s in signs]
+        for one in clear(_with_errors(observations, tried)):
+            yield one, observations, other
+
+
+def _moved_joints(
+    none: Fault, model: Model, log: Log, how: Preprocessing
+) -> Iterator[tuple[Fault, Observations]]:
+    """Yield logs with the sign of a joint flipped, or joints in another order, that have poses."""
+    n = len(none.order)
+    faults = [
+        replace(none, joint_signs=tuple(-1 if k == i else 1 for k in range(n))) for i in range(n)
+    ]
     # Few exchanges first: of two orders that do as well, the simpler one is meant.
-    orders = sorted(permutations(range(n)), key=lambda order: sum(map(int.__ne__, order, usual)))
-    choices += [(order, upright) for order in orders[1:]]
-    for order, signs in choices:
-        other = replace(log, joints=log.joints[:, list(order)] * np.array(signs))
+    orders = sorted(permutations(none.order), key=_exchanges)
+    faults += [replace(none, joint_order=order) for order in orders[1:]]
+    for fault in faults:
+        joints = log.joints[:, list(fault.joint_order)] * np.array(fault.joint_signs)
         try:
-            observations = observations_of(model, other, preprocessing)
+            yield fault, observations_of(model, replace(log, joints=joints), how)
         except DataError:
             continue  # no poses in this order
-        (error,) = _errors(observations, [(usual, upright)])
-        if error * _DECISIVE < (before if best is None else best.after * _DECISIVE):
-            best = Fault(model.robot.joint_names, order, signs, before, error)
-    return best
+
+
+def _with_errors(observations: Observations, faults: Sequence[Fault]) -> list[Fault]:
+    errors = _errors(observations, faults)
+    return [replace(fault, after=error) for fault, error in zip(faults, errors, strict=True)]
+
+
+def _errors(observations: Observations, faults: Sequence[Fault]) -> list[float]:
+    """Return the error of the fit relative to the forces, for each order and signs of these."""
+    step = max(len(observations.forces) // _ROWS, 1)
+    matrix, forces = observations.matrix[::step], observations.forces[::step]
+    rows, n, p = matrix.shape
+    flat = matrix.reshape(-1, p)
+    lengths = np.linalg.norm(flat, axis=0)
+    basis = np.linalg.qr(flat / np.where(lengths > 0.0, lengths, 1.0))[0].reshape(rows, n, -1)
+    # What each column, given to each actuator, is made of: orders and signs only add these up.
+    parts = np.einsum("rnk,rj->njk", basis, forces)
+    power = float((forces**2).sum())
+    found = []
+    for fault in faults:
+        chosen = parts[np.arange(n), list(fault.order)]
+        image = np.array(fault.signs) @ chosen
+        found.append(float(np.sqrt(max(power - float(image @ image), 0.0) / power)))
+    return found
+
+
+def _unphysical(fault: Fault, observations: Observations, model: Model) -> int:
+    """Return how much of the machine cannot be, once the forces are mended."""
+    forces = observations.forces[:, list(fault.order)] * np.array(fault.signs)
+    mended = observations.with_forces(forces)
+    return unphysical(model, mended, weighted(mended))
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -8,6 +8,7 @@ from pteron.errors import DataError
 
 Reason = Literal[
     "columns",
+    "constant",
     "currents",
     "gap",
     "no payload",
@@ -20,6 +21,7 @@ Reason = Literal[
     "too short",
     "twice",
     "unsettled",
+    "wrapped",
 ]
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from itertools import combinations, product
 
 from pteron.errors import DataError
-from pteron.identification.diagnosis import column_fault, exchanged_joints
+from pteron.identification.diagnosis import DECISIVE, column_fault, exchanged_joints
 from pteron.identification.errors import LogError
 from pteron.identification.estimators import (
     ESTIMATORS,
@@ -19,6 +19,7 @@ from pteron.identification.estimators import (
     total,
 )
 from pteron.identification.logs import Log
+from pteron.identification.logs.recorded import check_recorded
 from pteron.identification.logs.sizes import check_forces as check_strength
 from pteron.identification.model import Model
 from pteron.identification.observation import Observations, observations_of, stacked
@@ -33,7 +34,7 @@ _EXPLAINED = 0.2
 """Error relative to the forces, three times smaller than which joints without a pose must make it
 to be called mended."""
 
-_LOOK = 30_000
+_LOOK = 12_000
 """Rows that are tried in other orders."""
 
 
@@ -42,6 +43,7 @@ def check_recordings(
 ) -> None:
     """Refuse recordings of currents, of values that are no forces, and what is given twice."""
     for one in (*whole, *others):
+        check_recorded(one.head())
         if isinstance(one.log, Log):
             check_strength(one.log.forces, one.log.force_names, one.source, one.log.first_row)
         unit = one.head().description.force_unit
@@ -160,13 +162,19 @@ def check_columns(model: Model, one: Recording, preprocessing: Preprocessing) ->
         return
     if fault.after < 1e-6 * fault.before:
         why = ": mended so, the error of the fit vanishes"
-    elif fault.after < fault.before:
+    elif fault.after * DECISIVE < fault.before:
         why = f": mended so, the error of the fit falls {fault.before / fault.after:.1f} times"
     else:
-        why = ": as they are, the machine would have negative inertia"
+        why = ": as they are, the machine would have negative inertia or friction"
+    if fault.equivalents:
+        why += f" (as well explained: {'; or '.join(fault.equivalents)})"
     raise LogError(
         "columns",
         one.source,
-        f"{fault.message()}{why}; correct the columns, or declare their order and gains in the "
-        "log's description",
+        f"{fault.message()}{why}; "
+        + (
+            "correct gravity in the machine's file"
+            if fault.gravity
+            else "correct the columns, or declare their order and gains in the log's description"
+        ),
     )

@@ -28,14 +28,15 @@ from pteron.identification.fitting import (
     preprocessing_for,
 )
 from pteron.identification.logs import Log, LogFile
+from pteron.identification.logs.recorded import at_limits
 from pteron.identification.model import Model, Terms, identification_model
 from pteron.identification.observation import Observations, stacked
-from pteron.identification.plausibility import doubts, has_negative_inertia, left_over, unseen
+from pteron.identification.plausibility import doubts, left_over, unphysical, unseen
 from pteron.identification.prediction import predict
 from pteron.identification.recordings import Recording, divided, recording
 from pteron.identification.result import Identification
 from pteron.identification.signals import Preprocessing, Processing
-from pteron.identification.verdict import judged, verdict_of
+from pteron.identification.verdict import judged, verdict_of, with_bodies
 from pteron.kernels import Array
 from pteron.legs import Drive
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -115,6 +116,7 @@ def identify(
         for given in (logs, held_out)
     )
     check_recordings(whole, others, wanted)
+    limits = tuple(said for one in whole for said in at_limits(one.head()))
     halves = [] if others else [divided(one, wanted.period) for one in whole]
     fit = [first for first, _ in halves] or whole
     check = others or [second for _, second in halves]
@@ -158,15 +160,15 @@ def identify(
         for one, start in zip(check, modes, strict=True)
     ]
     by_held_out = verdict_of(held, repeats=not others)
-    negative = has_negative_inertia(model, estimate.values, estimate.covariance)
-    if by_held_out.grade != "trustworthy" or negative:
+    impossible = unphysical(model, observations, estimate)
+    if by_held_out.grade != "trustworthy" or impossible:
         check_columns(model, fit[0], preprocessing[0])
     hidden, too_many = unseen(model, estimate.deviations)
     if too_many:
         raise _with_findings(_too_little(model, hidden, estimate, preprocessing, fit[0]), whole)
     report("Looking for faults", 0, 0)
-    shown = trial(model, estimate, fit, preprocessing)
-    verdict = verdict_of(held, shown, repeats=not others)
+    shown = trial(model, estimate, fit, preprocessing, _reflected(rotors))
+    verdict = verdict_of(held, shown, repeats=not others, limits=limits)
     fitted = tuple(
         predict(model, estimate.values, one.beginning(), how, _reader(report, "Predicting"))
         for one, how in zip(fit, preprocessing, strict=True)
@@ -178,7 +180,10 @@ def identify(
     known = np.zeros(len(model.names))
     for name, mass in _reflected(rotors).items():
         known += model.share_of(name, mass)
-    consistency, share, missing = _real_bodies(model, estimate, known, observations, drawn, bounds)
+    consistency, share, off, missing = _real_bodies(
+        model, estimate, known, observations, drawn, bounds
+    )
+    verdict = with_bodies(verdict, consistency, off)
     advice = doubts(model, estimate, known, consistency, drawn)
     if hidden or essential.dropped:
         weak = ", ".join(dict.fromkeys((*hidden, *essential.dropped)))
@@ -279,8 +284,11 @@ def _real_bodies(
     observations: Observations,
     cad: Manipulator | None,
     bounds: Bounds | None,
-) -> tuple[Consistency | None, float, tuple[str, ...]]:
-    """Return real bodies, how far their forces are off, and why there are none if so."""
+) -> tuple[Consistency | None, float, float, tuple[str, ...]]:
+    """Return real bodies, how far their forces are off, and why there are none if so.
+
+    Their forces are off by so much over the residuals, and by so many percent of the forces.
+    """
     rank = model.base.rank
     values = (estimate.values - known)[:rank]
     covariance = estimate.covariance[:rank, :rank]
@@ -289,12 +297,13 @@ def _real_bodies(
             model.robot, model.base, values, covariance, cad=cad, bounds=bounds
         )
     except MissingSolver as error:
-        return None, float("nan"), (f"No model of real bodies: {error}",)
+        return None, float("nan"), float("nan"), (f"No model of real bodies: {error}",)
     shift = np.zeros(len(estimate.values))
     shift[:rank] = found.base_values - values
     moved = np.sqrt(((observations.matrix @ shift) ** 2).mean())
     left = np.sqrt((estimate.residuals**2).mean())
-    return found, float(moved / max(left, np.finfo(float).tiny)), ()
+    size, tiny = np.sqrt((observations.forces**2).mean()), np.finfo(float).tiny
+    return found, float(moved / max(left, tiny)), float(100.0 * moved / max(size, tiny)), ()
 
 
 def _notes(model: Model, estimate: Estimate, rotors: dict[str, float]) -> list[str]:

@@ -10,6 +10,7 @@ from pteron.identification.consistency import Consistency
 from pteron.identification.consistency.bodies import bodies_of
 from pteron.identification.estimators import Estimate
 from pteron.identification.model import Model
+from pteron.identification.observation import Observations
 from pteron.identification.signals import Preprocessing
 from pteron.kernels import Array
 from pteron.kinematics import random_poses
@@ -29,11 +30,29 @@ _FAR_ABOVE = 5.0
 _FAR = 0.5
 """Difference from the drawn machine, as a share of what a parameter is made of, that is doubted."""
 
+_TOLD = 0.2
+"""Standard deviation, and spread, of values over those drawn up to which their ratio is told."""
+
+_APART = 1.5
+_FEWEST = 3
+"""Factor that this many values have in common, from which they are scaled rather than drawn badly.
+"""
+
 _LEAST_SHARE = 0.02
 """Share of a body's mass and length that a parameter is usually made of, at least."""
 
 _BEYOND_DOUBT = 3.0
 """Standard deviations by which energy is below zero where the data say so."""
+
+_NOTABLE = 0.1
+"""Energy below zero, over that of the machine as drawn, from which it counts: without noise next to
+nothing is beyond doubt."""
+
+_PUSHED = 0.05
+"""Share of the forces from which friction that pushes counts, likewise."""
+
+_POSITIVE = ("coulomb", "viscous", "passive", "rotor")
+"""Terms that no machine has below zero."""
 
 _CHANCE = 1e-3
 """Probability below which infeasible values are not chance."""
@@ -63,6 +82,13 @@ def doubts(
     if cad is not None:
         drawn = parameters(cad)
         base = model.base
+        factor = common_factor(model, estimate, known, drawn)
+        if not 1.0 / _APART < factor < _APART:
+            found.append(
+                f"All values together are {factor:.2g} times those drawn, as where the gain of all "
+                "torques or the gear ratio is off by that factor: check gains, rated torque and "
+                "ratio, or the drawing's masses."
+            )
         usual = usual_sizes(base, drawn)
         values = (estimate.values - known)[: base.rank]
         off = np.abs(values - base.grouping @ drawn)
@@ -80,6 +106,23 @@ def doubts(
     return found
 
 
+def common_factor(model: Model, estimate: Estimate, known: Array, drawn: Array) -> float:
+    """Return by what all base parameters are multiplied beside those drawn (N,); 1 by nothing.
+
+    They need not agree better than drawings do; `known` (p,) is what rotors have of the values.
+    """
+    base = model.base
+    wanted = base.grouping @ drawn + known[: base.rank]
+    clear = np.abs(wanted) > _FAR * usual_sizes(base, drawn)
+    clear &= estimate.deviations[: base.rank] < _TOLD * np.abs(wanted)
+    if clear.sum() < _FEWEST:
+        return 1.0
+    ratios = estimate.values[: base.rank][clear] / wanted[clear]
+    factor = float(np.median(ratios))
+    spread = float(np.median(np.abs(ratios - factor)))
+    return factor if spread < _TOLD * abs(factor) else 1.0
+
+
 def left_over(estimate: Estimate, preprocessing: Sequence[Preprocessing]) -> str:
     """Return what may explain a fit that leaves far more of the forces than their noise."""
     noise = np.max([one.force_noise for one in preprocessing], axis=0)
@@ -94,19 +137,42 @@ def left_over(estimate: Estimate, preprocessing: Sequence[Preprocessing]) -> str
 
 def has_negative_inertia(model: Model, values: Array, covariance: Array) -> bool:
     """Say whether values (p,) give a machine whose kinetic energy is negative beyond doubt."""
+    return _negative_directions(model, values, covariance) > 0
+
+
+def unphysical(model: Model, observations: Observations, fit: Estimate) -> int:
+    """Return in how many ways the values of a fit are no machine's, beyond doubt.
+
+    Directions of motion in which kinetic energy is negative, and joints that friction pushes, with
+    more than 5 % of the forces.
+    """
+    effect = np.abs(fit.values) * np.sqrt((observations.matrix**2).mean(axis=0))
+    size = np.sqrt((observations.forces**2).mean(axis=0))
+    pushed = np.isin(model.kinds, _POSITIVE) & (fit.values < -_BEYOND_DOUBT * fit.deviations)
+    pushed &= (effect > _PUSHED * size[:, None]).any(axis=0)
+    return _negative_directions(model, fit.values, fit.covariance) + int(pushed.sum())
+
+
+def _negative_directions(model: Model, values: Array, covariance: Array) -> int:
+    """Return along how many coordinates, and all at once, energy is negative in most poses."""
     # x''^T M x'' is positive for every real machine, whatever its CAD says.
     robot, rng = model.robot, np.random.default_rng(0)
+    drawn = model.base.grouping @ parameters(robot)
     pose = random_poses(robot, _PROBES, seed=rng, type_i=0.3, type_ii=0.1)
-    acceleration = rng.normal(size=pose.shape)
     rest = np.zeros_like(pose)
-    needed = base_regressor(robot, model.base, pose, rest, acceleration)
     still = base_regressor(robot, model.base, pose, rest, rest)
     jacobians = unchecked(robot, "jacobian", pose)
-    rows = np.einsum("rnp,rnm,rm->rp", needed - still, jacobians, acceleration)
     rank = model.base.rank
     known = covariance[:rank, :rank]
-    spread = np.sqrt(np.maximum(np.einsum("rp,pq,rq->r", rows, known, rows), 0.0))
-    return bool((rows @ values[:rank] < -_BEYOND_DOUBT * spread).mean() > 0.5)
+    ways = [rng.normal(size=pose.shape), *(rest + axis for axis in np.eye(pose.shape[1]))]
+    found = 0
+    for way in ways:
+        needed = base_regressor(robot, model.base, pose, rest, way)
+        rows = np.einsum("rnp,rnm,rm->rp", needed - still, jacobians, way)
+        spread = np.sqrt(np.maximum(np.einsum("rp,pq,rq->r", rows, known, rows), 0.0))
+        least = np.maximum(_BEYOND_DOUBT * spread, _NOTABLE * np.abs(rows @ drawn))
+        found += bool((rows @ values[:rank] < -least).mean() > 0.5)
+    return found
 
 
 def unseen(model: Model, deviations: Array) -> tuple[tuple[str, ...], bool]:

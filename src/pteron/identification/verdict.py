@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from pteron.identification.consistency import Consistency
 from pteron.identification.faults import Trial
 from pteron.identification.model import Model
 from pteron.identification.prediction import Prediction, predict
@@ -32,6 +33,33 @@ CYCLE = 3.0
 
 _LOWER = (0.7, 0.5)
 """Cut-offs that are tried too, over that of the whole recording."""
+
+FAR = 5.0
+"""Standard deviations beyond which values that no real bodies have are not trusted."""
+
+_SEEN = 0.5
+"""Percent of the forces by which those of the nearest real bodies differ, from which that counts:
+without noise standard deviations are next to nothing."""
+
+_HIDDEN: dict[str, tuple[str, str]] = {
+    "gain": (
+        "These logs cannot show a factor that all forces have in common (gains, rated torque, gear "
+        "ratio): all values grow with it, and nothing of known mass or inertia is told apart.",
+        "Carry a payload of known mass in a second phase (--payload, and [payload] in the log's "
+        "description): it gives the scale of the forces.",
+    ),
+    "clock": (
+        "These logs cannot show a clock that runs at another rate: no weight that the drives feel "
+        "tells it from inertia.",
+        "Compare the duration of the log with another clock's.",
+    ),
+    "scale": (
+        "These logs cannot show that one force is out of scale by some per cent: its own values "
+        "grow with it, and what it shares with other forces is small beside the noise.",
+        "Check each drive's gain by itself, or move more coordinates at once, and faster.",
+    ),
+}
+"""What a log cannot tell, and what would, by fault."""
 
 _ORDER: tuple[Grade, ...] = ("trustworthy", "usable with care", "not trustworthy")
 
@@ -77,7 +105,11 @@ class _Opinion:
 
 
 def verdict_of(
-    held_out: Sequence[Prediction], trial: Trial | None = None, *, repeats: bool
+    held_out: Sequence[Prediction],
+    trial: Trial | None = None,
+    *,
+    repeats: bool,
+    limits: Sequence[str] = (),
 ) -> Verdict:
     """Return the verdict on a model.
 
@@ -89,8 +121,12 @@ def verdict_of(
         What the residuals of the fit show.
     repeats : bool
         Whether what was held out repeats the motion that was fitted.
+    limits : sequence of str
+        What is said of forces that stay at their limit: then the grade is "usable with care" at
+        best.
     """
-    opinions = [_of_prediction(one) for one in held_out]
+    opinions = [_Opinion("usable with care", list(limits), [])] if limits else []
+    opinions += [_of_prediction(one) for one in held_out]
     if trial is not None:
         opinions.append(_of_trial(trial))
     reasons = [reason for one in opinions for reason in one.reasons]
@@ -106,6 +142,22 @@ def verdict_of(
         )
     grade = max((one.grade for one in opinions), key=_ORDER.index)
     return Verdict(grade, tuple(reasons), tuple(dict.fromkeys(steps)))
+
+
+def with_bodies(verdict: Verdict, consistency: Consistency | None, off: float) -> Verdict:
+    """Return a verdict that says first where no real bodies have the values.
+
+    `off` is what the forces of the nearest ones differ from those of the fit, percent.
+    """
+    if consistency is None or consistency.metric != "covariance":
+        return verdict
+    if not (consistency.distance > FAR and off > _SEEN):
+        return verdict
+    reason = (
+        f"No real bodies have these values: the nearest are {consistency.distance:.2g} standard "
+        f"deviations away, and their forces {off:.2g} % off; up to {FAR:g} are trusted."
+    )
+    return replace(verdict, grade="not trustworthy", reasons=(reason, *verdict.reasons))
 
 
 def judged(
@@ -198,6 +250,10 @@ def _of_trial(trial: Trial) -> _Opinion:
         found.reasons.append(f"The trial of faults was not run: {trial.why_not}.")
     elif not trial.suspicions:
         found.reasons.append(f"No fault shows in the residuals; tried: {', '.join(trial.tried)}.")
+    for fault in trial.hidden:
+        reason, step = _HIDDEN[fault]
+        found.reasons.append(reason)
+        found.steps.append(step)
     if np.isnan(trial.off).any():
         return found
     worst = int(np.argmax(trial.off))

@@ -66,16 +66,22 @@ class Named:
     others: tuple[tuple[Family, Array], ...] = ()
 
 
-def searched(suspects: Suspects, observations: Observations) -> tuple[Estimate, list[Named]]:
-    """Return the fit of the model without faults, and the faults that the observations show."""
+def searched(
+    suspects: Suspects, observations: Observations, families: Sequence[Family] | None = None
+) -> tuple[Estimate, list[Named]]:
+    """Return the fit of the model without faults, and the faults that the observations show.
+
+    Looked for are those of all `families` that are given, by default of all.
+    """
     p = len(suspects.model.names)
     named: list[Named] = []
     first = 0.0
     plain = weighted(observations.columns(range(p)))
+    wanted = suspects.families if families is None else families
     while len(named) < _MOST:
         clear = []
         for k, family in enumerate(suspects.families):
-            if family.name in (one.family.name for one in named):
+            if family not in wanted or family.name in (one.family.name for one in named):
                 continue
             one, wald = _taken_in(suspects, observations, named, k)
             if one is not None and one.chance < _CHANCE and _is_possible(one, suspects):
@@ -159,9 +165,11 @@ def _likely(size: Array, covariance: Array, mix: Array, suspects: Suspects) -> f
 
 def _wald(size: Array, covariance: Array) -> float:
     """Return Wald's statistic of sizes (q,) that may all be zero."""
-    unit = np.sqrt(np.diag(covariance))
+    unit = np.maximum(np.sqrt(np.maximum(np.diag(covariance), 0.0)), 1e-300)
     standard = size / unit
-    return float(standard @ np.linalg.solve(covariance / np.outer(unit, unit), standard))
+    # Two mixtures of a fit without noise may be known alike: least squares, where it is singular.
+    correlation = covariance / np.outer(unit, unit)
+    return float(standard @ np.linalg.lstsq(correlation, standard, rcond=None)[0])
 
 
 def _is_possible(one: Named, suspects: Suspects) -> bool:

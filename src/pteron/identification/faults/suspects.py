@@ -7,7 +7,7 @@ one, adds its time times minus their derivative. `Suspects` puts these columns b
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import chain, pairwise
 
@@ -29,6 +29,8 @@ _STRIBECK = (0.05, 0.15, 0.4)
 """Speeds at which friction may fall, over each joint's root mean square: all are tried."""
 
 _FEWEST = 8
+
+_MOTION = ("joint_rates", "joint_accelerations", "velocity", "acceleration")
 
 _STEP = 1e-6
 """Change over which forces are differenced: m, rad, or a share of a joint's range."""
@@ -114,7 +116,8 @@ class Family:
     machine itself has the fault where it is `of_machine`: then feed-forward should know it; else
     only the log has it. Sizes below zero are none where they must be `positive`, and beyond the
     `largest` they are another fault, told badly. Friction that falls with speed does so with a
-    `speed`, over the usual one.
+    `speed`, over the usual one. Where the machine's forces change otherwise than those of the log,
+    `effect` returns how: by a clock that is off all inertia is, and with it the mass that weighs.
     """
 
     name: Fault
@@ -125,6 +128,11 @@ class Family:
     positive: bool = False
     largest: float = np.inf
     speed: float | None = None
+    effect: Callable[[Motion], Array] | None = None
+
+    def of_cycle(self, motion: Motion) -> Array:
+        """Return what the machine has, and the model beside the fault has not, (R, n, k)."""
+        return (self.effect or self.columns)(motion)
 
 
 def _joints(model: Model) -> Sequence[str]:
@@ -144,9 +152,10 @@ def _elasticity(m: Motion) -> Array:
     # The motor, where friction mostly is, is ahead of its joint by what the load deflects: the
     # joint is that much behind what was measured.
     load = m.load
-    if m.cutoff is not None:
+    pace = (len(load) - 1) / float(np.ptp(m.states.time))
+    if m.cutoff is not None and 2.0 * m.cutoff < pace:
         # Noise of the accelerations would be in both, the residuals and the column.
-        load = smoothed(load, (len(load) - 1) / float(np.ptp(m.states.time)), m.cutoff)
+        load = smoothed(load, pace, m.cutoff)
     rate = m.rate(load)
     behind = load, rate, m.rate(rate)
     return m.moved(lambda moved: moved.give([part[m.some] for part in behind], _STEP))
@@ -155,6 +164,13 @@ def _elasticity(m: Motion) -> Array:
 def _drift(m: Motion) -> Array:
     later = m.along[:, None]
     return np.concatenate([_each(later * m.direction), _each(later + 0.0 * m.direction)], axis=-1)
+
+
+def _weight(m: Motion) -> Array:
+    still = {name: np.zeros_like(getattr(m.states, name)) for name in _MOTION}
+    bodies = np.array([kind in ("base", "payload") for kind in m.model.kinds])
+    matrix = m.model.matrix(replace(m.states, **still))
+    return np.asarray(matrix @ np.where(bodies, m.values, 0.0))[..., None]
 
 
 def _passive_legs(model: Model) -> Sequence[str]:
@@ -179,6 +195,14 @@ _OTHERS = (
         lambda m: ["tilt", "tilt"],
         lambda m: m.moved(lambda moved: moved.tilt(_STEP)),
         largest=0.2,
+    ),
+    Family(
+        "clock",
+        "",
+        lambda m: ["weight"],
+        _weight,
+        largest=3.0,
+        effect=lambda m: m.load[..., None],
     ),
     Family(
         "geometry",

@@ -12,7 +12,9 @@ from pteron.kernels import Array
 Fault = Literal[
     "delay",
     "scale",
+    "gain",
     "gravity",
+    "clock",
     "geometry",
     "stribeck",
     "elasticity",
@@ -20,9 +22,9 @@ Fault = Literal[
     "load",
     "passive",
 ]
-"""What is told by name: forces that are late, one force's scale, the direction of gravity, lengths,
-friction that falls with speed, drives that give, what drifts, friction that grows with the load,
-friction in passive joints."""
+"""What is told by name: forces that are late, one force's scale, that of all forces, gravity's
+direction, its size or the rate of the clock, lengths, friction that falls with speed, drives that
+give, what drifts, friction that grows with the load, friction in passive joints."""
 
 _SHIFT = 1.0
 _CYCLE = 1.0
@@ -125,6 +127,12 @@ class Suspicion:
         if self.fault == "gravity":
             tilt, error = np.degrees([np.linalg.norm(self.sizes), self.deviations.max()])
             return f"Gravity is {tilt:.2g} degrees (+- {error:.1g}) off the direction in the model"
+        if self.fault == "gain":
+            size, error = 100.0 * abs(self.sizes[0]), 100.0 * self.deviations[0]
+            more = "large" if self.sizes[0] > 0.0 else "small"
+            return f"All forces are {size:.3g} % (+- {error:.1g}) too {more} for what is known"
+        if self.fault == "clock":
+            return self._clock()
         k = int(np.argmax(np.abs(self.sizes) / np.maximum(self.deviations, 1e-300)))
         if self.fault == "geometry":
             return f"Lengths or points of the geometry are off, most clearly in {self.labels[k]}"
@@ -138,11 +146,24 @@ class Suspicion:
             return f"Friction grows with the load, most clearly at {self.labels[k]}"
         return f"Passive joints have friction, most clearly in {self.labels[k]}"
 
+    def _clock(self) -> str:
+        more, error = float(self.sizes[0]), 100.0 * self.deviations[0]
+        if more <= -1.0:
+            return "The weight acts the other way: gravity has the wrong sign"
+        rate = (1.0 + more) ** -0.5 - 1.0
+        return (
+            f"The weight is {100.0 * abs(more):.2g} % (+- {error:.1g}) too "
+            f"{'large' if more > 0.0 else 'small'} for the inertia, as where the log's clock runs "
+            f"{100.0 * abs(rate):.2g} % {'slow' if rate < 0.0 else 'fast'}"
+        )
+
 
 _REMEDY: dict[Fault, str] = {
     "delay": "--delay auto takes it out",
     "scale": "check that drive's gain, or its torque constant",
     "gravity": "level the machine, or correct gravity in its file",
+    "gain": "check gains, rated torque and gear ratio, and the payload's mass",
+    "clock": "check the log's time, and gravity and the unit of lengths in the machine's file",
     "geometry": "measure them again, or calibrate",
     "stribeck": "--stribeck {} adds it to the model",
     "elasticity": "measure positions behind the drive, or move more slowly",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -12,9 +12,10 @@ import numpy as np
 from pteron.identification.errors import LogError
 from pteron.identification.estimators import Estimate
 from pteron.identification.faults.cycle import Cycle, Extent
+from pteron.identification.faults.scales import cannot_be_told, factor_of_forces, known_values
 from pteron.identification.faults.search import Named, searched
 from pteron.identification.faults.suspects import DELAY, Family, Suspects, families_of
-from pteron.identification.faults.suspicion import Suspicion
+from pteron.identification.faults.suspicion import Fault, Suspicion
 from pteron.identification.logs import Log
 from pteron.identification.model import Model
 from pteron.identification.observation import Observations, observations_of, stacked
@@ -66,6 +67,9 @@ class Trial:
         What all suspicions together spoil of it, likewise.
     why_not : str
         Why nothing was tried, where that is so.
+    hidden : tuple of {"gain", "clock", "scale"}
+        Faults that these logs cannot tell by the rank of their equations: a factor that all forces
+        have, a clock at another rate, one force out of scale beside the others.
     """
 
     tried: tuple[str, ...]
@@ -73,6 +77,7 @@ class Trial:
     uncertain: Array
     spoiled: Array
     why_not: str = ""
+    hidden: tuple[Fault, ...] = ()
 
     @property
     def off(self) -> Array:
@@ -85,6 +90,7 @@ class Trial:
         return {
             "tried": list(self.tried),
             "why_not": self.why_not,
+            "cannot_be_told": list(self.hidden),
             "faults": [one.as_dict() for one in self.suspicions],
             "cycle_percent": {
                 name: None if np.isnan(values).any() else values.tolist()
@@ -113,6 +119,7 @@ def trial(
     estimate: Estimate,
     recordings: Sequence[Recording],
     preprocessing: Sequence[Preprocessing],
+    rotors: Mapping[str, float] | None = None,
 ) -> Trial:
     """Try a fit's residuals for faults of the logs and of the machine.
 
@@ -128,25 +135,32 @@ def trial(
         What was fitted; 20 000 rows in all are looked at, with and without payload.
     preprocessing : sequence of Preprocessing
         How each was preprocessed.
+    rotors : mapping of str to float, optional
+        What rotors are known to weigh on the joints, by the name of the value, SI units.
     """
     nothing = np.full(len(model.robot.legs), np.nan)
     try:
         looks = _looks(model, estimate, recordings, preprocessing)
-        return _tried(looks, model, estimate)
+        known = known_values(model, recordings, rotors or {})
+        return _tried(looks, model, estimate, known)
     except LogError as error:
         return Trial((), (), nothing, nothing, str(error))
 
 
-def _tried(looks: list[_Look], model: Model, estimate: Estimate) -> Trial:
+def _tried(
+    looks: list[_Look], model: Model, estimate: Estimate, known: Mapping[str, float]
+) -> Trial:
     nothing = np.full(len(model.robot.legs), np.nan)
     suspects = looks[0].suspects
     tried = tuple(dict.fromkeys(family.name for family in suspects.families))
     largest = max(float(np.abs(look.log.forces).max()) for look in looks)
 
     # Which faults the residuals show
-    if np.abs(estimate.residuals).max() < _EXACT * largest:
-        looks = [_with(look, ()) for look in looks]
-    plain, named = searched(looks[0].suspects, _observed(looks))
+    observations = _observed(looks)
+    noise = np.mean([look.how.force_noise for look in looks], axis=0)
+    left_open = cannot_be_told(suspects, observations, noise)
+    exact = np.abs(estimate.residuals).max() < _EXACT * largest
+    plain, named = searched(suspects, observations, () if exact else suspects.families)
     if any(one.family is DELAY for one in named):
         # A long delay is no small one: the rest is told once forces are where they belong.
         late, shifted = _delay(looks)
@@ -167,7 +181,7 @@ def _tried(looks: list[_Look], model: Model, estimate: Estimate) -> Trial:
             forces = matrix @ one.fit.values[:p]
             for family, sizes in (*one.others, (one.family, one.sizes)):
                 if family.of_machine:
-                    forces = forces + family.columns(motion) @ sizes
+                    forces = forces + family.of_cycle(motion) @ sizes
             told.append(forces)
         each = [cycle.share(b - a, told[0]) for a, b in pairwise(told)]
         spoiled = cycle.share(told[-1] - told[0], told[0])
@@ -181,7 +195,7 @@ def _tried(looks: list[_Look], model: Model, estimate: Estimate) -> Trial:
         for a, b in pairwise(fits)
     ]
     step = 1.0 / max(look.how.rate for look in looks)
-    suspicions = tuple(
+    suspicions = [
         Suspicion(
             one.family.name,
             tuple(one.family.sizes(model)),
@@ -195,8 +209,29 @@ def _tried(looks: list[_Look], model: Model, estimate: Estimate) -> Trial:
         )
         for one, shift, spoils in zip(named, shifts, each, strict=True)
         if not (spoils < _NAMED).all()
-    )
-    return Trial(tried, suspicions, uncertain, spoiled)
+    ]
+
+    # What the residuals cannot show: scales of all forces and of time
+    factor = factor_of_forces(model, fits[-1], known)
+    # By a slow clock all inertia is too small, what is known as well.
+    slow = [1.0 + float(one.sizes[0]) for one in suspicions if one.fault == "clock"]
+    if factor is not None and factor.wrong and all(factor.times(s).wrong for s in slow):
+        off = factor.value - 1.0
+        wrong = np.full(len(nothing), 100.0 * abs(1.0 - 1.0 / factor.value))
+        size, deviation = np.array([off]), np.array([factor.deviation])
+        shift = abs(off) / factor.deviation
+        labels = tuple(known)
+        suspicions.insert(
+            0, Suspicion("gain", labels, size, deviation, factor.chance, shift, wrong)
+        )
+        spoiled = np.hypot(spoiled, wrong)
+    if factor is None or not factor.told:
+        left_open.insert(0, "gain")
+    shown = {one.fault for one in suspicions}
+    hidden = tuple(fault for fault in left_open if fault not in shown)
+    if factor is not None:
+        tried = (*tried, "gain")
+    return Trial(tried, tuple(suspicions), uncertain, spoiled, hidden=hidden)
 
 
 def delay_of(

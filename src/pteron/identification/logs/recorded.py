@@ -1,0 +1,115 @@
+"""Faults that columns show by themselves: a force that never changes, encoders that wrap, limits.
+
+Logs that are read from files are looked at as they are read (`channels`), those in memory here.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.identification.errors import LogError
+from pteron.identification.logs.log import GAP, Log
+from pteron.identification.logs.spikes import LONGEST
+
+_SPAN = 0.9
+"""Share of a joint's span that it jumps by where its encoder wraps."""
+
+_STILL = 0.1
+"""Largest step beside such a jump, over it: a joint that is as fast as that does not wrap."""
+
+_ALIKE = 0.02
+"""By how much a turn and the jumps of one encoder differ at most, over the jump."""
+
+_TIES = 1e-9
+"""Difference of two forces, over their span, below which they are one."""
+
+_LEAST = 0.005
+"""Share of the samples at an extreme from which a force is at its limit."""
+
+_LEVEL = 8.0
+"""How many times rarer the next value is: a round top of a coarse channel has it half as often."""
+
+_MOVES = 0.02
+"""Speed, over the joint's largest, from which a force that stays is not that of a joint at rest."""
+
+
+def check_recorded(log: Log) -> None:
+    """Refuse forces that never change, and joints whose encoder wraps; all of them at once."""
+    still = [
+        f"{name} is {force[0]:g} throughout"
+        for name, force in zip(log.force_names, log.forces.T, strict=True)
+        if len(force) > 1 and np.ptp(force) <= _TIES * np.abs(force).max(initial=0.0)
+    ]
+    if still:
+        raise LogError(
+            "constant",
+            log.source,
+            f"{'; '.join(still)}: no force of a drive that moves a machine; look at the channel, "
+            "and record it again, or correct which columns are read",
+        )
+    wraps = [
+        _wrapped(name, size, row + log.first_row, "rad" if turns else "m")
+        for name, joint, turns in zip(log.joint_names, log.joints.T, _turns(log), strict=True)
+        for size, row in _jump(log, joint, turns)
+    ]
+    if wraps:
+        raise LogError(
+            "wrapped",
+            log.source,
+            f"{'; '.join(wraps)}: an encoder that wraps; unwrap it, such as with "
+            "numpy.unwrap(joint, period=...), and identify that",
+        )
+
+
+def at_limits(log: Log) -> tuple[str, ...]:
+    """Return a sentence for each force that stays at its largest or least value while it moves."""
+    found = []
+    speeds = np.abs(np.diff(log.joints, axis=0, append=log.joints[-1:]))
+    for name, force, speed in zip(log.force_names, log.forces.T, speeds.T, strict=True):
+        moving = force[speed > _MOVES * speed.max(initial=0.0)]
+        if not moving.size:
+            continue
+        for word, signed in (("largest", moving), ("least", -moving)):
+            values, counts = np.unique(signed, return_counts=True)
+            first = values >= values[-1] - _TIES * np.ptp(force)
+            top, below = int(counts[first].sum()), counts[~first]
+            if top < _LEAST * len(moving) or not below.size or top < _LEVEL * below[-1]:
+                continue
+            value = values[-1] if word == "largest" else -values[-1]
+            found.append(
+                f"{name} stays at its {word} value, {value:.4g}, in {100.0 * top / len(moving):.2g}"
+                f" % of the samples of {log.source}: the drive or what measures it is at its limit "
+                "(saturation), and forces there need not be those that act; move more slowly, or "
+                "leave such stretches out."
+            )
+    return tuple(found)
+
+
+def _jump(log: Log, joint: NDArray[np.float64], turns: bool) -> list[tuple[float, int]]:
+    """Return by how much a joint jumps and in which row, from 0, where its encoder wraps."""
+    if len(joint) < 2 * LONGEST:
+        return []
+    steps = np.diff(joint)
+    steps[np.diff(log.time) > GAP * np.median(np.diff(log.time))] = 0.0  # it may move in a gap
+    size = float(np.abs(steps).max())
+    far = np.abs(steps) > (1.0 - _ALIKE) * size
+    if size < _SPAN * np.ptp(joint) or np.abs(steps[~far]).max(initial=0.0) > _STILL * size:
+        return []
+    rows = np.flatnonzero(far)
+    turn = turns and abs(size - 2.0 * np.pi) <= _ALIKE * size
+    side = joint > joint.min() + 0.5 * size
+    # What is away for some samples and back is a spike.
+    if not turn and min(side.sum(), (~side).sum()) <= LONGEST:
+        return []
+    return [(size, int(rows[0]) + 1)]
+
+
+def _wrapped(name: str, size: float, row: int, unit: str) -> str:
+    what = ", a turn," if unit == "rad" and abs(size - 2.0 * np.pi) <= _ALIKE * size else ""
+    return f"{name} jumps by {size:.4g} {unit}{what} at row {row + 1}"
+
+
+def _turns(log: Log) -> list[bool]:
+    symbols = log.symbols or ()
+    return [joint.unit == "rad" for joint in symbols] or [False] * log.joints.shape[1]

@@ -1,0 +1,237 @@
+"""Faults that are told by name, or told to be beyond what a log can show."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from logs_of_motions import log_of
+from test_faults import RATE, brisk, clean, found, late_by, noisy
+
+from pteron.identification import LogError, Processing, Terms, Trial, identify
+from pteron.identification.logs import Description, KnownPayload
+from pteron.identification.verdict import verdict_of
+from pteron.motion import with_payload
+
+
+def refused(robot, log, reason, *words):
+    with pytest.raises(LogError) as caught:
+        found(robot, log)
+    assert caught.value.reason == reason
+    for word in words:
+        assert word in str(caught.value)
+    return str(caught.value)
+
+
+# What columns show by themselves ---------------------------------------------------------------
+
+
+def test_forces_that_never_change_are_refused_in_one_line():
+    robot, log, _ = clean("delta")
+    forces = noisy(log).forces.copy()
+    forces[:, 1] = 3.0
+    refused(robot, replace(log, forces=forces), "constant", "torque2 is 3 throughout")
+    text = refused(robot, replace(log, forces=np.full_like(forces, -2.0)), "constant")
+    assert all(f"torque{k} is -2 throughout" in text for k in (1, 2, 3))
+
+
+@pytest.mark.parametrize(
+    ("name", "said"), [("delta", "theta2 jumps by 6.283 rad, a turn"), ("linear-delta", "rho2 ")]
+)
+def test_an_encoder_that_wraps_is_named(name, said):
+    robot, log, _ = clean(name)
+    joint = log.joints[:, 1]
+    turn = 2.0 * np.pi if name == "delta" else 1.1 * np.ptp(joint)
+    joints = log.joints.copy()
+    joints[:, 1] = np.mod(joint - joint.mean(), turn)
+    refused(robot, noisy(replace(log, joints=joints)), "wrapped", said, "wraps", "unwrap")
+
+
+def test_a_wild_sample_of_a_joint_is_no_wrap():
+    robot, log, _ = clean("linear-delta")
+    joints = log.joints.copy()
+    joints[1000:1003, 0] += 1.5 * np.ptp(joints[:, 0])
+    assert found(robot, replace(log, joints=joints)).trial.tried
+
+
+def test_drives_at_their_limit_are_named():
+    robot, log, _ = clean("delta")
+    log = noisy(log)
+    low, high = log.forces.min(axis=0), log.forces.max(axis=0)
+    clipped = np.clip(log.forces, 0.75 * low + 0.25 * high, 0.25 * low + 0.75 * high)
+    result = found(robot, replace(log, forces=clipped))
+    assert result.verdict.grade != "trustworthy"
+    assert "torque1 stays at its largest value" in result.verdict.reasons[0]
+    assert "saturation" in result.verdict.reasons[0]
+
+
+def test_a_coarse_channel_is_not_at_its_limit():
+    robot, log, _ = clean("delta", dry=0.2)
+    log = noisy(log, noise=0.003)
+    step = 0.005 * np.ptp(log.forces, axis=0)
+    result = found(robot, replace(log, forces=np.round(log.forces / step) * step))
+    assert not any("stays at its" in reason for reason in result.verdict.reasons)
+
+
+# What repairs are proposed ---------------------------------------------------------------------
+
+
+def test_gravity_that_points_the_other_way_is_named():
+    robot, log, _ = clean("delta")
+    fallen = replace(robot, gravity=tuple(-g for g in robot.gravity))
+    refused(fallen, noisy(log), "columns", "gravity points the other way", "machine's file")
+
+
+@pytest.mark.parametrize("flipped", [1, 3])
+def test_one_flipped_force_is_one_flipped_force(flipped):
+    robot, log, _ = clean("delta-4")
+    log = noisy(log)
+    signs = np.ones(4)
+    signs[flipped] = -1.0
+    text = refused(robot, replace(log, forces=signs * log.forces), "columns")
+    assert f"torque{flipped + 1} has the sign flipped: " in text
+    assert sum(f"torque{k}" in text for k in (1, 2, 3, 4)) == 1
+
+
+def test_swapped_positions_and_what_is_equivalent_are_told():
+    robot, log, _ = clean("delta-4")
+    log = noisy(log)
+    text = refused(robot, replace(log, joints=log.joints[:, [1, 0, 2, 3]]), "columns")
+    assert "theta1 and theta2 are swapped" in text
+    assert "as well explained: torque1 and torque2 are swapped" in text
+    # Either way leads to a machine that exists.
+    mended = found(
+        robot, replace(log, joints=log.joints[:, [1, 0, 2, 3]], forces=log.forces[:, [1, 0, 2, 3]])
+    )
+    assert mended.verdict.grade == "trustworthy"
+    assert mended.consistency.feasible
+
+
+def test_legs_that_are_exchanged_are_called_so():
+    robot, log, _ = clean("quadrupteron")
+    log = noisy(log)
+    order = [1, 0, 2, 3]
+    other = replace(log, joints=log.joints[:, order], forces=log.forces[:, order])
+    refused(robot, other, "columns", "leg 1 and leg 2 are exchanged, forces and joints alike")
+
+
+# Scales of all forces and of time --------------------------------------------------------------
+
+
+def with_phases(name, mass, **about):
+    """Return a machine and its log without and with a payload."""
+    robot, log, friction = clean(name)
+    loaded = log_of(with_payload(robot, mass), friction=friction, **brisk(robot))
+    rows = log.rows
+    both = replace(
+        log,
+        time=np.arange(2 * rows) / RATE,
+        joints=np.concatenate([log.joints, loaded.joints]),
+        forces=np.concatenate([log.forces, loaded.forces]),
+        payload=np.repeat([0, 1], rows),
+        description=Description(**about),
+    )
+    return robot, noisy(both)
+
+
+def test_a_factor_of_all_forces_is_told_by_a_known_payload():
+    robot, log = with_phases("delta", 1.5, payload=KnownPayload(1.5))
+    terms = Terms(payload=True)
+    right = found(robot, log, terms=terms)
+    assert right.verdict.grade == "trustworthy"
+    assert "gain" not in (*right.trial.hidden, *(one.fault for one in right.trial.suspicions))
+    more = found(robot, replace(log, forces=1.1 * log.forces), terms=terms)
+    (gain,) = more.trial.suspicions
+    assert gain.fault == "gain"
+    assert gain.sizes[0] == pytest.approx(0.1, abs=0.02)
+    assert "All forces are" in gain.message
+    assert more.verdict.grade != "trustworthy"
+
+
+def test_a_factor_of_all_forces_that_no_log_can_show_is_said():
+    robot, log, _ = clean("delta")
+    result = identify(robot, replace(noisy(log), forces=0.5 * noisy(log).forces))
+    assert result.trial.hidden == ("gain",)
+    assert any("cannot show a factor that all forces" in one for one in result.verdict.reasons)
+    assert any("0.5 times those drawn" in one for one in result.verdict.next_steps)
+
+
+@pytest.mark.parametrize("name", ["delta", "five-bar"])
+def test_a_slow_clock_is_named_where_weight_tells_it(name):
+    robot, log, _ = clean(name)
+    result = found(robot, noisy(replace(log, time=0.97 * log.time)))
+    named = {one.fault: one for one in result.trial.suspicions}
+    if name == "five-bar":
+        assert "clock" in result.trial.hidden
+        assert any("cannot show a clock" in one for one in result.verdict.reasons)
+        return
+    assert "clock" not in result.trial.hidden
+    assert 1.0 + named["clock"].sizes[0] == pytest.approx(0.97**-2, abs=0.03)
+    assert "clock runs" in named["clock"].message
+    assert result.verdict.grade != "trustworthy"
+
+
+def test_rotors_heavier_than_what_is_there_are_not_trusted():
+    robot, log, _ = clean("delta")
+    about = Description(rotor_inertia=(5e-4,) * 3, ratio=(50.0,) * 3)
+    result = identify(robot, noisy(replace(log, description=about)))
+    assert result.consistency.distance > 5.0
+    assert result.verdict.grade == "not trustworthy"
+    assert result.verdict.reasons[0].startswith("No real bodies have these values")
+
+
+# Where the trial is run ------------------------------------------------------------------------
+
+
+def test_a_fault_shows_in_a_log_with_two_phases_too_long_to_be_looked_at_whole():
+    robot, log = with_phases("five-bar", 0.02)
+    late = replace(log, forces=late_by(log, 6e-3))
+    rows = np.r_[np.tile(np.arange(4000), 3), np.tile(np.arange(4000, 8000), 3)]
+    late = replace(
+        late,
+        time=np.arange(len(rows)) / RATE,
+        joints=late.joints[rows],
+        forces=late.forces[rows],
+        payload=late.payload[rows],
+    )
+    result = found(robot, late, terms=Terms(payload=True))
+    assert result.trial.tried
+    assert "delay" in [one.fault for one in result.trial.suspicions]
+    mended = found(robot, late, terms=Terms(payload=True), processing=Processing(delay="auto"))
+    assert mended.preprocessing[0].delay == pytest.approx(6e-3, abs=5e-4)
+
+
+def test_a_fault_shows_that_is_in_the_second_log_alone():
+    robot, log, friction = clean("delta")
+    other = log_of(robot, friction=friction, seed=5, **brisk(robot))
+    late = noisy(replace(other, source="late.csv", forces=late_by(other, 8e-3)), seed=1)
+    result = found(robot, [noisy(log), late])
+    assert result.trial.suspicions[0].matters
+    assert result.verdict.grade != "trustworthy"
+
+
+def test_where_the_trial_was_not_run_nothing_is_trusted():
+    robot, log, _ = clean("delta")
+    held = found(robot, noisy(log)).held_out
+    nothing = np.full(3, np.nan)
+    verdict = verdict_of(held, Trial((), (), nothing, nothing, "too short"), repeats=False)
+    assert verdict.grade == "usable with care"
+    assert "The trial of faults was not run: too short." in verdict.reasons
+
+
+def motion_of(robot):
+    return {key: value for key, value in brisk(robot).items() if key not in ("duration", "rate")}
+
+
+# Without noise ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["delta", "par4"])
+def test_forces_held_from_sample_to_sample_are_no_fault(name):
+    """As `pteron simulate` writes them: half a step late, and not a trace of noise."""
+    robot, log, friction = clean(name)
+    later = log_of(robot, time=log.time + 0.5 / RATE, friction=friction, **motion_of(robot))
+    result = found(robot, replace(log, forces=later.forces))
+    assert not any(one.matters for one in result.trial.suspicions)
+    assert [one.fault for one in result.trial.suspicions] == ["delay"]
+    assert "half a sample" in result.trial.suspicions[0].message
+    assert result.verdict.grade == "trustworthy"
