@@ -40,6 +40,7 @@ _SCRIPTS = {
     "The Gymnasium environment": "environment.py",
     "The viewer": "viewer.py",
     "Maps of eight million poses": "maps.py",
+    "Twenty thousand damaged files": "mutants.py",
     "From a log to a running machine": "identification/chain.py",
 }
 _PACKAGES = ("pteron", "numpy", "casadi", "numba", "jax", "pin", "mujoco")

@@ -380,6 +380,8 @@ def test_a_file_that_is_no_identification_of_the_machine_is_refused(tmp_path):
     refused("i.json: no JSON; give the identification.json", text="t,rho1")
     refused("values are missing", expressions=[])
     refused("values are missing", base_parameters=whole["base_parameters"] | {"values": [np.nan]})
+    far = whole["base_parameters"] | {"values": [10**400]}
+    refused("not an identification.json .*OverflowError", base_parameters=far)
     refused("of another machine", CATALOG["tripteron"])
     longer = [replace(leg, lower_length=leg.lower_length + 1e-3) for leg in DELTA.legs]
     refused("of another machine", replace(DELTA, legs=tuple(longer)))

@@ -229,6 +229,15 @@ def test_time_that_does_not_rise_is_refused(tmp_path, change, what, rows):
         list(open_log(file, QUADRUPTERON).pieces(rows))
 
 
+@pytest.mark.parametrize("row", [200, 499])
+@pytest.mark.parametrize("value", [1e308, -1e308, 1e18])
+def test_times_too_large_for_their_steps_are_refused(tmp_path, row, value):
+    given = columns(motion())
+    given["t"][row] = value
+    with pytest.raises(DataError, match=rf"row {row + 1}, column t: at .* digits cannot tell time"):
+        open_log(saved(tmp_path, given), QUADRUPTERON).read()
+
+
 @pytest.mark.parametrize(("factor", "unit"), [(1e3, "mm"), (1e6, "um")])
 def test_sliders_in_another_unit_are_refused_until_it_is_declared(tmp_path, factor, unit):
     log = motion()

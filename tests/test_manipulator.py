@@ -50,6 +50,7 @@ def message(call):
 NOT_NUMBERS = {
     "nan": (np.nan, "is not a finite number"),
     "inf": (np.inf, "is not a finite number"),
+    "digits": (10**400, "is too large a number"),
     "text": ("long", "is not a number"),
     "none": (None, "is not a number"),
     "list": ([1.0], "is not a number"),

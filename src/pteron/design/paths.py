@@ -66,8 +66,11 @@ def places(robot: Manipulator, path: str) -> list[Place]:
     minus, numbers, key, part = found.groups()
     legs = range(1, robot.freedom + 1)
     if numbers is not None:
-        named = [int(word) for word in numbers.split(",") if word.strip()]
-        if wrong := [str(i) for i in named if i not in legs]:
+        try:
+            named = [int(word) for word in numbers.split(",") if word.strip()]
+        except ValueError:  # blanks within a number, or thousands of digits
+            raise ModelError(f"{shown(path)} is not {_SHAPE}") from None
+        if wrong := [shown(i) for i in named if i not in legs]:
             raise ModelError(
                 f"{shown(path)}: no leg {', '.join(wrong)}; {robot.name} has legs 1 to {legs[-1]}"
             )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -210,7 +211,7 @@ def _loose(platform: Platform, legs: list[LegKind]) -> list[str]:
         return []
     if platform.motion == "2T":
         first, second = (_in_plane(platform, leg) for leg in legs)
-        apart = float(np.linalg.norm(first - second))
+        apart = math.hypot(*(first - second))
         if apart <= _COINCIDENT:
             return []
         return [

@@ -59,7 +59,7 @@ def _differences(name: str, found: Any, wanted: Any) -> Iterator[str]:
         for k, both in enumerate(zip(found, wanted, strict=True), start=1):
             yield from _differences(f"{name}[{k}]", *both)
     # True is 1 and -0.0 is 0.0, but not as they are written.
-    elif json.dumps(found) != json.dumps(wanted):
+    elif json.dumps(found, default=str) != json.dumps(wanted, default=str):
         yield _told(name, found, wanted)
 
 

@@ -16,11 +16,15 @@ from pteron.kernels import Array
 from pteron.maps.checksums import checksum
 from pteron.maps.grid import COORDINATES, Axis, Grid
 from pteron.maps.map import ALL, Map, headed
-from pteron.tables import Table, read_table, write_table
+from pteron.tables import Table, listed, read_table, write_table
 from pteron.workspace import BEYOND_LIMITS
 
 _STATUS = "status"
-_CHECKSUM = "pteron.sha256"
+_CHECKSUMS = ("pteron.sha256", "pteron.sha256.again")
+"""Where a Parquet file's metadata have it: no one damaged place takes it away."""
+
+_WRITER = "ARROW:schema"
+"""What is there in files of data frames; where it is not, the metadata are damaged."""
 
 _EQUAL = 1e-6
 """Of a step: by how much the steps of a coordinate may differ, for tables with few digits."""
@@ -32,7 +36,7 @@ def write_map_table(given: Map, target: Path) -> Path:
     if target.suffix.lower() == ".csv":
         return write_table(frame, target)
     buffer = io.BytesIO()
-    frame.write_parquet(buffer, metadata={_CHECKSUM: _checksum(given)})
+    frame.write_parquet(buffer, metadata=dict.fromkeys(_CHECKSUMS, _checksum(given)))
     return write_bytes(target, buffer.getvalue())
 
 
@@ -60,8 +64,8 @@ def read_map_table(source: Path) -> Map:
     found = table.numbers([columns[name] for name in indices], "nan")[order]
     values = {name: own.reshape(grid.shape) for name, own in zip(indices, found.T, strict=True)}
     made = Map(source.stem, grid, values, status[order].reshape(grid.shape))
-    if (told := _told_checksum(source)) and told != _checksum(made):
-        raise DataError(f"{source}: is damaged: its values are not those that were written")
+    if source.suffix.lower() != ".csv":
+        _expect_whole(source, made)
     return made
 
 
@@ -75,9 +79,9 @@ def _column(table: Table, name: str, heading: str) -> str:
     """
     found = [one for one in table.columns if one.partition(" [")[0] == name]
     if len(found) > 1:
-        raise DataError(f"{table.source}: columns {' and '.join(found)} are both {name}; drop one")
+        raise DataError(f"{table.source}: columns {listed(found)} are all {name}; keep one")
     if found and found[0] not in (name, heading):
-        raise DataError(f"{table.source}: column {found[0]} given, {heading} expected")
+        raise DataError(f"{table.source}: column {listed(found)} given, {heading} expected")
     return found[0] if found else ""
 
 
@@ -166,10 +170,11 @@ def _checksum(given: Map) -> str:
     return checksum(given.grid.plain(), {**values, _STATUS: given.status})
 
 
-def _told_checksum(source: Path) -> str:
-    """Return the checksum that a Parquet file carries; empty where it carries none."""
+def _expect_whole(source: Path, found: Map) -> None:
+    """Refuse a Parquet file whose checksum, if it has one, is not that of what it holds."""
     import polars as pl
 
-    if source.suffix.lower() == ".csv":
-        return ""
-    return pl.read_parquet_metadata(source).get(_CHECKSUM, "")
+    metadata = pl.read_parquet_metadata(source)
+    told = {metadata[key] for key in _CHECKSUMS if key in metadata}
+    if told - {_checksum(found)} or (not told and _WRITER not in metadata):
+        raise DataError(f"{source}: is damaged: it does not hold what was written; save it again")

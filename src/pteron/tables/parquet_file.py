@@ -13,6 +13,9 @@ from pteron.tables.table import Table
 
 _ROWS = 262_144
 
+_UNREADABLE = (pl.exceptions.PolarsError, pl.exceptions.PanicException)
+"""What Polars raises at damaged bytes; a panic is no `Exception`."""
+
 
 class ParquetFile:
     """A Parquet file, open for reading as a `CsvFile` is; `rows_estimate` is exact.
@@ -34,7 +37,7 @@ class ParquetFile:
         try:
             self._kinds = self._frame.collect_schema()
             self.rows_estimate = int(self._frame.select(pl.len()).collect().item())
-        except pl.exceptions.PolarsError:
+        except _UNREADABLE:
             raise DataError(
                 f"{source}: not a Parquet file; write it again, or give a CSV"
             ) from None
@@ -60,7 +63,7 @@ class ParquetFile:
         for start in range(0, self.rows_estimate, _ROWS):
             try:
                 part = frame.slice(start, _ROWS).collect()
-            except pl.exceptions.PolarsError as error:
+            except _UNREADABLE as error:
                 reason = str(error).splitlines()[0]
                 raise DataError(
                     f"{self.source}: cannot be read behind row {start} ({reason}); write it again"

@@ -31,8 +31,16 @@ class TimeStamps:
         Raises
         ------
         DataError
-            If a time stamp is repeated or runs backward.
+            If a time stamp is repeated, runs backward, or is too large to tell its steps.
         """
+        vague = np.spacing(np.abs(time)) > self._step
+        if vague.any():
+            i = int(np.argmax(vague))
+            raise DataError(
+                f"{self._source}: row {self._rows + i + 1}, column {self._column}: at "
+                f"{time[i]:g} s a number's digits cannot tell time steps apart; correct the cell, "
+                "or declare the unit of time"
+            )
         before = time[:1] if self._last is None else np.array([self._last])
         steps = np.diff(time, prepend=before)
         if self._last is None:
