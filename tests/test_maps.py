@@ -127,10 +127,13 @@ def test_a_grid_that_cannot_be_is_refused(delta, held, ranges, words):
     [
         (lambda robot: pose_grid(robot, {"z": -0.9}, SPANS, rim=np.nan), "rim: nan given, a fin"),
         (lambda robot: pose_grid(robot, {"z": -0.9}, SPANS, rim=-0.1), "rim: -0.1 given, 0 or "),
-        (lambda robot: pose_grid(robot, {"z": -0.9}, SPANS, points=2.5), "x: 2.5 points given, a"),
+        (
+            lambda robot: pose_grid(robot, {"z": -0.9}, SPANS, points=2.5),
+            "points: 2.5 given, a whole",
+        ),
         (
             lambda robot: pose_grid(robot, {"z": -0.9}, SPANS, points=True),
-            "x: True points given, a",
+            "points: True given, a whole",
         ),
         (lambda _: Axis("x", 0.0, 1.0, 2.5), "x: 2.5 points given, a whole number expected"),
         (lambda _: Axis("x", 0.0, 1.0, 1), "x: 1 points given, at least 2 expected"),
@@ -140,7 +143,7 @@ def test_a_grid_that_cannot_be_is_refused(delta, held, ranges, words):
         (lambda _: Axis("w", 0.0, 1.0, 3), "name: 'w' given, one of x, y, z, phi expected"),
         (lambda _: Grid(("x", "x"), (0.0, 0.0), ()), "coordinates: .'x', 'x'. given, some of x, y"),
         (lambda _: Grid(("x", "y"), (0.0,), ()), "pose: 1 numbers given, x y expected"),
-        (lambda _: Grid(("x",), (True,), ()), "pose: x: True given, a finite number expected"),
+        (lambda _: Grid(("x",), (True,), ()), "pose: .True,. given, a sequence, each a"),
         (
             lambda _: Grid(("x", "y"), (0.0, 0.0), (Axis("y", 0.0, 1.0, 2),) * 2),
             "axes: .'y', 'y'. given, some of x, y expected, each once and in this order",
