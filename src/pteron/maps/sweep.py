@@ -183,13 +183,14 @@ def _elsewhere(
                 raise PteronError(f"{where}: has no workers any more; {_AGAIN}")
             for future in ready:
                 alone = 0.0
-                yield _result(future, where)
+                _settle(future, where)
+                yield
                 with _told_if_lost(where):
                     pending |= {submitted(one) for one in islice(tasks, 1)}
 
 
-def _result(future: Future[None], where: str) -> None:
-    """Take what a task gave, or raise what ended it."""
+def _settle(future: Future[None], where: str) -> None:
+    """Raise what ended a task, if anything did."""
     try:
         future.result()
     except _distributed().KilledWorker as error:
