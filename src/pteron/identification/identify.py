@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from pteron.errors import DataError, ModelError
+from pteron.errors import DataError, ModelError, PteronError
 from pteron.identification.consistency import Bounds, Consistency, MissingSolver, consistent_model
 from pteron.identification.errors import LogError
 from pteron.identification.estimators import (
@@ -162,7 +162,10 @@ def identify(
     by_held_out = verdict_of(held, repeats=not others)
     impossible = unphysical(model, observations, estimate)
     if by_held_out.grade != "trustworthy" or impossible:
-        check_columns(model, fit[0], preprocessing[0])
+        try:
+            check_columns(model, fit[0], preprocessing[0])
+        except LogError as error:
+            raise _with_findings(error, whole) from None
     hidden, too_many = unseen(model, estimate.deviations)
     if too_many:
         raise _with_findings(_too_little(model, hidden, estimate, preprocessing, fit[0]), whole)
@@ -180,9 +183,12 @@ def identify(
     known = np.zeros(len(model.names))
     for name, mass in _reflected(rotors).items():
         known += model.share_of(name, mass)
-    consistency, share, off, missing = _real_bodies(
-        model, estimate, known, observations, drawn, bounds
-    )
+    try:
+        consistency, share, off, missing = _real_bodies(
+            model, estimate, known, observations, drawn, bounds
+        )
+    except ModelError as error:
+        raise _with_findings(error, whole) from None
     verdict = with_bodies(verdict, consistency, off)
     advice = doubts(model, estimate, known, consistency, drawn)
     if hidden or essential.dropped:
@@ -248,9 +254,10 @@ def _reflected(rotors: tuple[tuple[float, float], ...] | None) -> dict[str, floa
     return {f"J_m{i}": inertia * r**2 for i, (inertia, r) in enumerate(rotors or (), start=1)}
 
 
-def _with_findings(error: DataError, whole: Sequence[Recording]) -> DataError:
+def _with_findings(error: PteronError, whole: Sequence[Recording]) -> PteronError:
     """Return an error with what was noticed in the logs behind it, which may explain it."""
-    findings = [finding.message for one in whole for finding in one.findings]
+    findings = [said.rstrip(".") for one in whole for said in at_limits(one.head())]
+    findings += [finding.message for one in whole for finding in one.findings]
     if findings:
         error.args = (f"{error} (noticed before: {'; '.join(findings[:3])})",)
     return error
