@@ -30,8 +30,9 @@ from pteron.identification.signals import (
 from pteron.identification.signals.preprocessing import LATEST
 from pteron.kernels import Array
 
-_LOOK = 20_000
-"""Rows of a log that are looked at: those in which the joints move most."""
+_LOOK, _MORE = 20_000, 100_000
+"""Rows of all logs that are looked at, those in which the joints move most; and where these are too
+little motion."""
 
 _EXACT = 1e-7
 """Residuals, over the forces, that tell of rounding and of how columns are differenced."""
@@ -138,13 +139,17 @@ def trial(
     rotors : mapping of str to float, optional
         What rotors are known to weigh on the joints, by the name of the value, SI units.
     """
+    known, why_not = known_values(model, recordings, rotors or {}), ""
+    for rows in (_LOOK, _MORE):
+        try:
+            looks = _looks(model, estimate, recordings, preprocessing, rows)
+            return _tried(looks, model, estimate, known)
+        except LogError as error:
+            why_not = str(error)
+        if sum(one.rows for one in recordings) <= rows:
+            break
     nothing = np.full(len(model.robot.legs), np.nan)
-    try:
-        looks = _looks(model, estimate, recordings, preprocessing)
-        known = known_values(model, recordings, rotors or {})
-        return _tried(looks, model, estimate, known)
-    except LogError as error:
-        return Trial((), (), nothing, nothing, str(error))
+    return Trial((), (), nothing, nothing, why_not)
 
 
 def _tried(
@@ -251,9 +256,10 @@ def _looks(
     estimate: Estimate,
     recordings: Sequence[Recording],
     preprocessing: Sequence[Preprocessing],
+    most: int = _LOOK,
 ) -> list[_Look]:
-    """Return the parts of recordings that are tried."""
-    rows = _LOOK // len(recordings)
+    """Return the parts of recordings that are tried, `most` rows in all."""
+    rows = most // len(recordings)
     parts = [
         (log, _unaveraged(model, log, how), part)
         for one, how in zip(recordings, preprocessing, strict=True)
