@@ -779,6 +779,62 @@ def test_the_public_functions_move_to_c_and_return_the_same_bits(automatic):
     np.testing.assert_allclose(pteron.inverse_dynamics(heavy, *motion), 2 * before, rtol=1e-11)
 
 
+SHORT = """
+import numpy as np, pteron
+robot = pteron.load("five-bar")
+poses = np.tile([0.0, 0.12], (400_000, 1))
+pteron.inverse_dynamics(robot, poses, poses, poses)
+"""
+"""Longer than the virtual machine is let alone, and over before a compiler is."""
+
+SLOW = """#!{python}
+import os, pathlib, subprocess, sys
+if "--version" not in sys.argv:
+    child = subprocess.Popen(["sleep", "1000"])
+    pathlib.Path({told!r}).write_text(f"{{os.getpid()}} {{child.pid}}")
+    child.wait()
+"""
+
+
+def ended(script, **environment):
+    """Run a script in a process of its own, in which C code is compiled."""
+    given = {**os.environ, "PTERON_KERNELS": "auto", **environment}
+    subprocess.run([sys.executable, "-c", script], check=True, env=given)
+
+
+@needs_compiler
+def test_a_short_script_leaves_its_kernel_to_the_next(fresh):
+    ended(SHORT)
+    (name,) = [path.name for path in entries(fresh)]
+    assert name.startswith("c-")
+    (library,) = [path.name for path in (fresh / name).glob("pteron_kernel*")]
+    assert cache.find(name, library) is not None
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there are no groups of processes")
+@needs_compiler
+def test_a_compiler_that_takes_long_ends_with_the_script(fresh, tmp_path):
+    told, slow = tmp_path / "told", tmp_path / "slow"
+    slow.write_text(SLOW.format(python=sys.executable, told=str(told)))
+    slow.chmod(0o755)
+    ended(SHORT, CC=str(slow))
+    assert not entries(fresh)
+    started = [int(number) for number in told.read_text().split()]
+    for _ in range(200):  # the system takes its time to end what was killed
+        left = [number for number in started if is_running(number)]
+        if not left:
+            break
+        time.sleep(0.05)
+    assert not left
+
+
+def is_running(number):
+    """Say whether there is such a process, and not only its name."""
+    asked = ["ps", "-o", "stat=", "-p", str(number)]
+    found = subprocess.run(asked, capture_output=True, text=True, check=False).stdout.strip()
+    return found != "" and not found.startswith("Z")
+
+
 class Turning(Tier):
     """A tier that is ready when it has been missed three times."""
 

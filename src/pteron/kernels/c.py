@@ -13,7 +13,6 @@ import importlib.util
 import os
 import shlex
 import shutil
-import subprocess
 import sys
 import sysconfig
 from collections.abc import Callable, Mapping, Sequence
@@ -37,6 +36,7 @@ from pteron.kernels.code import (
     rendered,
     single_precision,
 )
+from pteron.kernels.compilers import run
 from pteron.kernels.exponential import straight
 from pteron.kernels.graph import Graph, graph_of
 from pteron.kernels.kernel import SHARE, Array, ArrayKernel, Port
@@ -85,14 +85,7 @@ def _command(given: str, path: str) -> tuple[str, ...] | None:
 
 @lru_cache(maxsize=4)
 def _version(command: tuple[str, ...]) -> str:
-    return _run(command, "--version").stdout
-
-
-def _run(command: Sequence[str], *more: str) -> subprocess.CompletedProcess[str]:
-    # Messages may be in any language and encoding; what cannot be read of them does not matter.
-    return subprocess.run(
-        [*command, *more], capture_output=True, text=True, errors="replace", check=False
-    )
+    return run([*command, "--version"]).stdout
 
 
 def module_source(
@@ -195,7 +188,7 @@ class Code:
         source, library = folder / "kernel.c", folder / _LIBRARY
         source.write_text(self.source, encoding="utf-8")
         headers = (f"-I{path}" for path in (sysconfig.get_path("include"), np.get_include()))
-        done = _run(command, *_FLAGS, *headers, *_LINKED, str(source), "-o", str(library), "-lm")
+        done = run([*command, *_FLAGS, *headers, *_LINKED, str(source), "-o", str(library), "-lm"])
         if done.returncode != 0:
             lines = done.stderr.strip().splitlines() or [f"exit code {done.returncode}"]
             raise ModelError(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import math
 import os
 import threading
@@ -13,6 +14,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from pteron.kernels.c import Code, compiler
+from pteron.kernels.compilers import end_all
 from pteron.kernels.kernel import Array, Kernel, sliced
 from pteron.kernels.programs import Columns, bare, program
 from pteron.kernels.targets import FIXED, Selects, columns_of
@@ -21,6 +23,9 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 VARIABLE = "PTERON_KERNELS"
 """Environment variable: `vm` keeps the public functions on CasADi's virtual machine."""
+
+_AT_EXIT = 3.0
+"""Seconds that a process waits at its end for a compiler in the background: most take less."""
 
 _AT_WORK = threading.Semaphore(1)
 """One compilation at a time; who comes meanwhile asks again later."""
@@ -36,8 +41,10 @@ def numeric(
     cache or, where there is a compiler, compiled in the background: half a second or so that no
     call waits for. From then on calls, and what is left of a large batch, run that code, at some
     tens of nanoseconds a state. It returns the same bits, so that a result does not depend on when
-    it was asked for. Nothing is compiled at import. `PTERON_KERNELS=vm` in the environment keeps to
-    the virtual machine; `compile` gives a kernel of any target, compiled when asked.
+    it was asked for. Nothing is compiled at import. A process that ends while one compiles waits
+    for it, three seconds at most, so that the next one has the code. `PTERON_KERNELS=vm` in the
+    environment keeps to the virtual machine; `compile` gives a kernel of any target, compiled when
+    asked.
     """
     columns = None if base is None else columns_of(base)
     try:
@@ -117,7 +124,9 @@ class Tier:
             _AT_WORK.release()
             return
         _ = self.code.source  # here, not in the thread: CasADi is not made for two at a time
-        threading.Thread(target=self._fetch, name="pteron-compile", daemon=True).start()
+        worker = threading.Thread(target=self._fetch, name="pteron-compile", daemon=True)
+        worker.start()
+        atexit.register(_end, worker)
 
     def _fetch(self) -> None:
         try:
@@ -129,6 +138,14 @@ class Tier:
             pass
         finally:
             _AT_WORK.release()
+
+
+def _end(worker: threading.Thread) -> None:
+    """Wait for a compiler whose work the next process takes; end one that is far from done."""
+    worker.join(_AT_EXIT)
+    if worker.is_alive():
+        end_all()
+        worker.join(_AT_EXIT)
 
 
 class Adaptive(VirtualMachine):

@@ -66,7 +66,7 @@ class Picture(Figure):
         with no_word_of_glyphs():
             super().draw(renderer)
 
-    def savefig(self, fname: Any, **options: Any) -> None:  # type: ignore[override]
+    def savefig(self, fname: Any, **options: Any) -> None:
         """Write the figure; letters that no font here has are told in one warning."""
         absent = take_fonts(self)
         with no_word_of_glyphs():

@@ -1,0 +1,55 @@
+"""Compilers at work: a command with all that it starts, which can be ended from another thread."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Sequence
+from contextlib import suppress
+
+_RUNNING: set[subprocess.Popen[str]] = set()
+_CHANGES = threading.Lock()
+
+
+def run(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
+    """Run a command to its end, and return its code and what it printed."""
+    # Messages may be in any language and encoding; what cannot be read of them does not matter.
+    process = subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        errors="replace",
+        # A group of its own: a compiler starts others, which are to end with it.
+        **({} if sys.platform == "win32" else {"process_group": 0}),
+    )
+    with _CHANGES:
+        _RUNNING.add(process)
+    try:
+        out, error = process.communicate()
+    except BaseException:
+        _end(process)
+        process.wait()
+        raise
+    finally:
+        with _CHANGES:
+            _RUNNING.discard(process)
+    return subprocess.CompletedProcess(command, process.returncode, out, error)
+
+
+def end_all() -> None:
+    """End every command that runs, with all that it started."""
+    with _CHANGES:
+        for process in _RUNNING:
+            _end(process)
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    with suppress(OSError):
+        if sys.platform == "win32":
+            process.kill()
+        else:
+            os.killpg(process.pid, signal.SIGKILL)
