@@ -6,7 +6,10 @@ and a length of the body, so that the three numbers are of one size.
 
 from __future__ import annotations
 
+import sys
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -110,10 +113,25 @@ class MissingSolver(ModelError):
 def _cvxpy() -> Any:
     try:
         import clarabel  # type: ignore[import-untyped]  # noqa: F401
-        import cvxpy
+
+        with _without_jax():
+            import cvxpy
     except ImportError:
         raise MissingSolver(
             "consistency needs cvxpy and Clarabel, which are not installed; "
             + install_command("consistency")
         ) from None
     return cvxpy
+
+
+@contextmanager
+def _without_jax() -> Iterator[None]:
+    """Keep JAX from being imported, which cvxpy tries for a solver of its own: a second or two."""
+    missing = "jax" not in sys.modules
+    if missing:
+        sys.modules["jax"] = None  # type: ignore[assignment]
+    try:
+        yield
+    finally:
+        if missing:
+            del sys.modules["jax"]

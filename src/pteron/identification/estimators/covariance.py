@@ -85,6 +85,7 @@ def noise_of(
     residuals: Array,
     used: NDArray[np.bool_],
     weights: Array | float = 1.0,
+    whitened: Array | None = None,
 ) -> Noise:
     """Return the noise that has left such residuals after a fit.
 
@@ -101,6 +102,9 @@ def noise_of(
         Which equations there are; rows and residuals of the others are 0.
     weights : array, shape (R, n), or float
         What the fit has multiplied the rows with.
+    whitened : array, shape (p, p), optional
+        What makes orthonormal columns of the weighted rows, where that is known: else they are
+        decomposed.
     """
     counts = np.maximum(_lagged(used[..., None].astype(float)), 1.0)
     found = _lagged(residuals[..., None])
@@ -109,7 +113,8 @@ def noise_of(
         return _shared(_autoregression(found / counts, rows), residuals, used)
     factors = np.broadcast_to(weights, used.shape)
     weighted = (matrix * factors[..., None]).reshape(-1, p)
-    columns = np.linalg.qr(weighted)[0].reshape(rows, n, p)  # H = X X^T
+    orthonormal = np.linalg.qr(weighted)[0] if whitened is None else weighted @ whitened
+    columns = orthonormal.reshape(rows, n, p)  # H = X X^T
     noise = Noise((np.ones(1),) * n, np.diag(np.sqrt(found[0] / counts[0])))
     for _ in range(_ROUNDS):
         times = noise.times(columns) * used[..., None]

@@ -205,7 +205,8 @@ def estimate_of(
     bread = factor.inverse() if inverse is None else inverse
     rows = observations.matrix if instruments is None else instruments
     pulled = weights * rest if pull is None else pull
-    found = noise_of(rows, pulled, observations.gain > 0.0, weights)
+    whitened = factor.whitening() if instruments is None else None
+    found = noise_of(rows, pulled, observations.gain > 0.0, weights, whitened)
     middle = found.sum_covariance(rows, weights)
     covariance = bread @ (middle + beside) @ bread.T
     return Estimate(

@@ -6,7 +6,7 @@ import numpy as np
 
 from pteron.errors import DataError
 from pteron.identification.estimators.estimate import Estimate, estimate_of, residuals_of
-from pteron.identification.estimators.qr import qr_factor
+from pteron.identification.estimators.qr import actuator_factors, qr_factor
 from pteron.identification.observation import Observations
 from pteron.identification.signals.filters import MEDIAN_SIZE
 from pteron.kernels import Array
@@ -40,7 +40,9 @@ def ordinary(observations: Observations) -> Estimate:
     return estimate_of("ordinary", observations, factor, factor.values(), weights=weights)
 
 
-def weighted(observations: Observations, *, iterations: int = 20) -> Estimate:
+def weighted(
+    observations: Observations, *, iterations: int = 20, triangles: Observations | None = None
+) -> Estimate:
     """Return the values of weighted least squares, iterated: an actuator counts by its noise.
 
     This is the default: actuators differ in their noise, and equal weights would let the worst
@@ -52,18 +54,21 @@ def weighted(observations: Observations, *, iterations: int = 20) -> Estimate:
         From `observations_of`.
     iterations : int
         How many times the noise is estimated anew at most.
+    triangles : Observations, optional
+        Their `actuator_factors`, where these are known.
 
     Raises
     ------
     LogError
         If the observations do not determine the values.
     """
-    factor = qr_factor(observations)
+    triangles = triangles or actuator_factors(observations)
+    factor = qr_factor(triangles)
     factor.check_seen()
     noise = actuator_noise(observations, factor.values())
     converged = False
     for iteration in range(1, iterations + 1):  # noqa: B007 (told in the result)
-        factor = qr_factor(observations, 1.0 / noise)
+        factor = qr_factor(triangles, 1.0 / noise)
         values = factor.values()
         before, noise = noise, actuator_noise(observations, values)
         converged = bool(np.abs(noise / before - 1.0).max() < _SETTLED_NOISE)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import solve_triangular  # type: ignore[import-untyped]
@@ -20,6 +20,9 @@ _UNSEEN = 1e-10
 
 _TAKES_PART = 0.05
 """Share in an unseen combination that makes a value one of those it concerns."""
+
+_PLAIN = 1e5
+"""Condition number of W up to which W R^-1 is orthonormal to some ten digits."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +62,13 @@ class QrFactor:
         inverse = solve_triangular(self.factor, np.eye(len(self.names)))
         return np.asarray((inverse @ inverse.T) / np.outer(self.scale, self.scale))
 
+    def whitening(self) -> Array | None:
+        """Return what makes orthonormal columns of W (p, p); None where it would lose digits."""
+        if not self.condition < _PLAIN:
+            return None
+        inverse = solve_triangular(self.factor, np.eye(len(self.names)))
+        return np.asarray(inverse / self.scale[:, None])
+
     def check_seen(self) -> None:
         """Refuse, with a LogError that names them, observations that leave values open."""
         if self.degrees <= 0:
@@ -80,6 +90,23 @@ class QrFactor:
                 f"({', '.join(names)}); move all coordinates at once, such as along a trajectory "
                 "of pteron excite",
             )
+
+
+def actuator_factors(observations: Observations, *, block: int = BLOCK) -> Observations:
+    """Return observations that stand for others: the triangle of each actuator's [W F].
+
+    Whatever weights (n,) actuators have, they have the same `qr_factor`, from p + 1 rows each.
+    """
+    p = len(observations.names)
+    triangles = np.zeros((p + 1, observations.actuators, p + 1))
+    for i in range(observations.actuators):
+        factor = np.zeros((0, p + 1))
+        for start in range(0, len(observations.forces), block):
+            rows = slice(start, start + block)
+            new = observations.matrix[rows, i], observations.forces[rows, i]
+            factor = np.linalg.qr(np.vstack([factor, np.column_stack(new)]), mode="r")
+        triangles[: len(factor), i] = factor
+    return replace(observations, matrix=triangles[..., :p], forces=triangles[..., p])
 
 
 def qr_factor(

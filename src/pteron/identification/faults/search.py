@@ -13,6 +13,7 @@ import numpy as np
 from scipy.stats import chi2  # type: ignore[import-untyped]
 
 from pteron.identification.estimators import Estimate, weighted
+from pteron.identification.estimators.qr import actuator_factors
 from pteron.identification.faults.suspects import Family, Suspects
 from pteron.identification.observation import Observations
 from pteron.kernels import Array
@@ -76,14 +77,16 @@ def searched(
     p = len(suspects.model.names)
     named: list[Named] = []
     first = 0.0
-    plain = weighted(observations.columns(range(p)))
     wanted = suspects.families if families is None else families
+    # Fits ask for products of columns, and the columns' triangles have the same.
+    triangles = actuator_factors(observations)
+    plain = weighted(observations.columns(range(p)), triangles=triangles.columns(range(p)))
     while len(named) < _MOST:
         clear = []
         for k, family in enumerate(suspects.families):
             if family not in wanted or family.name in (one.family.name for one in named):
                 continue
-            one, wald = _taken_in(suspects, observations, named, k)
+            one, wald = _taken_in(suspects, observations, triangles, named, k)
             if one is not None and one.chance < _CHANCE and _is_possible(one, suspects):
                 clear.append((wald, one))
         best = max((wald for wald, _ in clear), default=0.0)
@@ -101,15 +104,20 @@ def searched(
 
 
 def _taken_in(
-    suspects: Suspects, observations: Observations, before: Sequence[Named], k: int
+    suspects: Suspects,
+    observations: Observations,
+    triangles: Observations,
+    before: Sequence[Named],
+    k: int,
 ) -> tuple[Named | None, float]:
     """Return a family, by its place, as it is seen beside those before it; and Wald's statistic.
 
     Mixtures of its columns that are at right angles to the model's and to each other are tried
     together. Those whose sizes are clear are then kept, and fitted alone: the others are noise.
+    `triangles` are the `actuator_factors` of the observations.
     """
     p = len(suspects.model.names)
-    flat = observations.matrix.reshape(-1, observations.matrix.shape[-1])
+    flat = triangles.matrix.reshape(-1, triangles.matrix.shape[-1])
     known = _scaled(flat[:, :p])[0]
     taken = [suspects.families.index(one.family) for one in before]
     mixes = [one.mix for one in before]
@@ -125,14 +133,18 @@ def _taken_in(
     def fitted(mix: Array) -> tuple[Estimate, Array, Array]:
         """Return the fit with these mixtures, their sizes, and the sizes' covariance."""
         places = [suspects.places[j] for j in (*taken, k)]
-        parts = [
-            observations.matrix[..., place] @ one
-            for place, one in zip(places, (*mixes, mix), strict=True)
-        ]
-        matrix = np.concatenate([observations.matrix[..., :p], *parts], axis=-1)
-        names = tuple(map(str, range(matrix.shape[-1])))
-        fit = weighted(replace(observations, matrix=matrix, names=names, units=names, kinds=()))
-        last = slice(matrix.shape[-1] - mix.shape[1], None)
+
+        def chosen(rows: Observations) -> Observations:
+            parts = [
+                rows.matrix[..., place] @ one
+                for place, one in zip(places, (*mixes, mix), strict=True)
+            ]
+            matrix = np.concatenate([rows.matrix[..., :p], *parts], axis=-1)
+            names = tuple(map(str, range(matrix.shape[-1])))
+            return replace(rows, matrix=matrix, names=names, units=names, kinds=())
+
+        fit = weighted(chosen(observations), triangles=chosen(triangles))
+        last = slice(len(fit.values) - mix.shape[1], None)
         return fit, fit.values[last], fit.covariance[last, last]
 
     fit, size, covariance = fitted(mix)
