@@ -601,11 +601,17 @@ def test_the_sweep_removes_what_a_killed_process_left_and_nothing_else(fresh, tm
     os.killpg(process.pid, signal.SIGKILL)
     process.wait()
     (left,) = entries(fresh)
+    assert_works()
+    assert not left.exists()  # nobody works on it any more
+    left.mkdir()
+    (left / ".made-by-pteron").write_text("another-computer 1")
     others = [fresh / ".config-old", fresh / ".pteron-work-notes", fresh / "c-mine"]
     day = time.time() - 24 * 3600
     for folder in others:
         folder.mkdir()
         (folder / "kernel.c").write_text("")
+    (made,) = fresh.glob("c-jacobian-*")
+    (made / "manifest.json").unlink()
     assert_works()
     assert left.exists()
     for folder in (left, *others):
@@ -616,6 +622,24 @@ def test_the_sweep_removes_what_a_killed_process_left_and_nothing_else(fresh, tm
     assert_works()
     assert not left.exists()
     assert all((folder / "kernel.c").exists() for folder in others)
+
+
+@needs_compiler
+def test_the_entries_used_least_lately_are_removed(fresh, monkeypatch):
+    assert_works()
+    (used,) = fresh.glob("c-jacobian-*")
+    older = []
+    for number in range(3):
+        older.append(fresh / f"c-older-{number}")
+        older[-1].mkdir()
+        (older[-1] / "library").write_bytes(bytes(1000))
+        (older[-1] / "manifest.json").write_text("{}")
+        os.utime(older[-1] / "manifest.json", (1e9 + number, 1e9 + number))
+    size = sum(path.stat().st_size for path in used.iterdir())
+    monkeypatch.setattr(cache, "MOST_BYTES", size + 1100)
+    pteron.compile(replace(ROBOT, name="one more"), "reach", "c")(POSE)
+    assert used.exists()
+    assert [folder.exists() for folder in older] == [False, False, True]
 
 
 @needs_compiler
@@ -730,6 +754,7 @@ def test_the_compilers_command_may_have_several_words(fresh, monkeypatch, comman
         ("/bin/false -x", r'^target: "c" could not be compiled with /bin/false -x: .*'),
         ("no-such-compiler", 'target: "c" needs a C compiler .* CC=no-such-compiler'),
         ("gcc 'open", 'target: "c" needs a C compiler'),
+        ("true", 'target: "c" could not be compiled with .*true: exit code 0, no library'),
     ],
 )
 def test_a_compiler_that_fails_is_one_line(fresh, monkeypatch, command, message):

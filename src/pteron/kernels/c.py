@@ -178,8 +178,14 @@ class Code:
         loader = ExtensionFileLoader("pteron_kernel", path)
         spec = importlib.util.spec_from_file_location("pteron_kernel", path, loader=loader)
         assert spec is not None
-        module = importlib.util.module_from_spec(spec)
-        loader.exec_module(module)
+        try:
+            module = importlib.util.module_from_spec(spec)
+            loader.exec_module(module)
+        except ImportError as error:
+            raise ModelError(
+                f'target: "c" was compiled with {" ".join(compiler() or ())} to what Python cannot '
+                f'load ({error}); use "vm" or "numba", or set CC to another compiler'
+            ) from None
         return module
 
     def _build(self, folder: Path) -> None:
@@ -189,8 +195,8 @@ class Code:
         source.write_text(self.source, encoding="utf-8")
         headers = (f"-I{path}" for path in (sysconfig.get_path("include"), np.get_include()))
         done = run([*command, *_FLAGS, *headers, *_LINKED, str(source), "-o", str(library), "-lm"])
-        if done.returncode != 0:
-            lines = done.stderr.strip().splitlines() or [f"exit code {done.returncode}"]
+        if done.returncode != 0 or not library.exists():
+            lines = done.stderr.strip().splitlines() or [f"exit code {done.returncode}, no library"]
             raise ModelError(
                 f'target: "c" could not be compiled with {" ".join(command)}: {lines[0]}; use '
                 '"vm" or "numba", or set CC to another compiler'

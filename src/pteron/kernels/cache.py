@@ -4,7 +4,8 @@ An entry is a folder of files under the user's cache directory, named by a diges
 was made of. It is built in a folder of its own and moved into place, so that two processes may
 build it at once; a manifest of digests tells a damaged one, which is then built again.
 
-A text is one file, which begins with its digest; so many of the latest are kept.
+A text is one file, which begins with its digest; so many of the latest are kept. Of entries, those
+used last are kept, up to 512 MB.
 
 What lies there is loaded and run. So a directory that belongs to somebody else, or that others may
 write to, is neither read nor written: a temporary one, gone with the process, takes its place.
@@ -35,13 +36,14 @@ from pteron.errors import OutputError
 VARIABLE = "PTERON_CACHE"
 """Environment variable with another directory for compiled code."""
 
-_MANIFEST = "manifest.json"
-
 _WORK = ".pteron-work-"
 """Begins the name of a folder that is being built, or being removed."""
 
+_MANIFEST = "manifest.json"
+
 _MARK = ".made-by-pteron"
-"""A file in each folder that is made here: the sweep touches no other."""
+"""A file in each folder that is made here, which says whose process works on it: the sweep touches
+no other folder."""
 
 _STALE = 3600.0
 """Seconds after which nobody works on a folder any more."""
@@ -51,6 +53,9 @@ TEXTS = "texts"
 
 MOST = 3000
 """Texts that are kept, of some 10 kB each."""
+
+MOST_BYTES = 1 << 29
+"""Size of all entries together, above which those that were used least lately are removed."""
 
 
 def directory() -> Path:
@@ -88,6 +93,8 @@ def find(name: str, file: str) -> Path | None:
         whole = file in manifest and all(_hash(folder / f) == v for f, v in manifest.items())
     except (OSError, ValueError, AttributeError, TypeError):
         return None
+    with suppress(OSError):  # used now, and as old as ever
+        os.utime(folder / _MANIFEST, ns=(time.time_ns(), (folder / _MANIFEST).stat().st_mtime_ns))
     return folder / file if whole else None
 
 
@@ -102,13 +109,7 @@ def entry(name: str, file: str, build: Callable[[Path], None]) -> Path:
     found = find(name, file)
     if found is not None:
         return found
-    root = _root()
-    _sweep(root)
-    try:
-        work = _work_folder(root)
-    except OSError:
-        root = _private()
-        work = _work_folder(root)
+    root, work = _begun()
     try:
         build(work)
         files = [path for path in sorted(work.rglob("*")) if path.is_file()]
@@ -185,9 +186,21 @@ def _private() -> Path:
     return folder
 
 
+def _begun() -> tuple[Path, Path]:
+    """Return the directory of entries, cleared of what is not needed, and a new folder in it."""
+    root = _root()
+    _sweep(root)
+    _bound(root, MOST_BYTES)
+    try:
+        return root, _work_folder(root)
+    except OSError:
+        root = _private()
+        return root, _work_folder(root)
+
+
 def _work_folder(root: Path) -> Path:
     folder = Path(tempfile.mkdtemp(prefix=_WORK, dir=root))
-    (folder / _MARK).touch()
+    (folder / _MARK).write_text(f"{platform.node()} {os.getpid()}", encoding="utf-8")
     return folder
 
 
@@ -195,8 +208,49 @@ def _sweep(root: Path) -> None:
     """Remove what processes that were killed at work have left behind, and nothing else."""
     for mark in root.glob(f"{_WORK}*/{_MARK}"):
         with suppress(OSError):
-            if time.time() - mark.stat().st_mtime > _STALE:
+            if time.time() - mark.stat().st_mtime > _STALE or not _at_work(mark.read_text()):
                 shutil.rmtree(mark.parent, ignore_errors=True)
+
+
+def _at_work(mark: str) -> bool:
+    """Say whether the process of a mark may still be there; another computer's may."""
+    node, _, number = mark.rpartition(" ")
+    if os.name != "posix" or node != platform.node() or not number.isdigit():
+        return True
+    try:
+        os.kill(int(number), 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        return True
+    return True
+
+
+def _bound(root: Path, most: int) -> None:
+    """Remove the entries that were used least lately, where all are larger than that together.
+
+    One that a process is about to load may go: it is then built again. What is loaded stays.
+    """
+    found = []
+    for manifest in root.glob(f"*/{_MANIFEST}"):
+        with suppress(OSError):
+            size = sum(path.stat().st_size for path in manifest.parent.iterdir())
+            used = max(manifest.stat().st_atime, manifest.stat().st_mtime)
+            found.append((used, size, manifest.parent))
+    total = sum(size for _, size, _ in found)
+    for _, size, folder in sorted(found):
+        if total <= most:
+            return
+        _removed(folder)
+        total -= size
+
+
+def _removed(folder: Path) -> None:
+    """Move a folder out of the way, so that nobody sees half of it, and remove it."""
+    wreck = _work_folder(folder.parent)
+    with suppress(OSError):
+        folder.rename(wreck / folder.name)
+    shutil.rmtree(wreck, ignore_errors=True)
 
 
 def _moved(work: Path, target: Path, file: str) -> Path:
@@ -208,11 +262,7 @@ def _moved(work: Path, target: Path, file: str) -> Path:
             if find(target.name, file) is not None:
                 shutil.rmtree(work, ignore_errors=True)
                 return target
-            # In place, but damaged: out of the way first, so that nobody sees half of it.
-            wreck = _work_folder(target.parent)
-            with suppress(OSError):
-                target.rename(wreck / target.name)
-            shutil.rmtree(wreck, ignore_errors=True)
+            _removed(target)  # in place, but damaged
         else:
             return target
     return work

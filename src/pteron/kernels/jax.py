@@ -103,7 +103,7 @@ class Traced(Kernel):
         return compiled
 
     def _evaluate(self, *values: Any, **fixed: Any) -> Any:
-        given = self._by_name(values, fixed)
+        traced, given = self._traced, self._by_name(values, fixed)
         for port in self.ports:
             given[port.name] = by_name(
                 unmasked(given[port.name], port.name), port.columns, port.name
@@ -113,7 +113,7 @@ class Traced(Kernel):
             if shape[max(len(shape) - len(port.shape), 0) :] != port.shape:
                 expected = ", ".join(["...", *map(str, port.shape)])
                 raise DataError(f"{port.name}: shape {shape} given, ({expected}) expected")
-        return self._traced(*(given[port.name] for port in self.ports))
+        return traced(*(given[port.name] for port in self.ports))
 
     def _check_digits(self, name: str, value: Any) -> None:
         """Refuse an array that JAX has rounded to 32 bits, values and derivatives alike."""
