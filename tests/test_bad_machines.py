@@ -547,3 +547,26 @@ def test_drives_that_cannot_hold_the_home_pose_and_rotors_that_outweigh_all_are_
 
 def test_nothing_in_the_catalog_is_doubted():
     assert {name: doubts(robot) for name, robot in CATALOG.items() if doubts(robot)} == {}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("mass = 0.045", "mass = 5e-324", "inf times that of a uniform bar"),
+        (
+            "platform_point = [0.0, 0.0, 0.0]",
+            "platform_point = [0.0, -1e308, 0.0]",
+            "1e+308 m apart",
+        ),
+    ],
+)
+def test_numbers_whose_products_vanish_or_overflow_are_told(tmp_path, old, new, words):
+    text = text_of("five-bar")
+    assert old in text
+    file = tmp_path / "bad.toml"
+    file.write_text(text.replace(old, new, 1), encoding="utf-8")
+    try:
+        told = doubts(pteron.load(file))
+    except ModelError as error:
+        told = error.faults
+    assert any(words in line for line in told)

@@ -196,7 +196,8 @@ def _unlike_a_bar(body: Any, length: float) -> Iterator[str]:
         yield f"center_of_mass: {beside:g} m beside it: are these mm?"
         return
     own = body.inertia - body.mass * sum(x * x for x in body.center_of_mass)
-    share = own / (body.mass * length * length / 12.0)
+    # One by one: a product of small numbers may vanish.
+    share = 12.0 * own / length / length / body.mass
     if not 1.0 / _UNLIKE <= share <= _UNLIKE:
         yield (
             f"inertia: {body.inertia:g} kg m^2 leaves {own:.3g} about the centre of mass, "
