@@ -94,7 +94,8 @@ class _Arm:
     @property
     def rows(self) -> list[list[float]]:
         """The three numbers of each length."""
-        return np.stack([self.still, self.cosine, self.sine], axis=-1).tolist()
+        parts = (part.tolist() for part in (self.still, self.cosine, self.sine))
+        return [list(row) for row in zip(*parts, strict=True)]
 
     def at(self, pose: Array) -> Array:
         """Return it at a pose (m,), with 0 for the angle."""

@@ -23,8 +23,8 @@ def run(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
         stderr=subprocess.PIPE,
         text=True,
         errors="replace",
-        # A group of its own: a compiler starts others, which are to end with it.
-        **({} if sys.platform == "win32" else {"process_group": 0}),
+        # A group of its own, where there are groups: a compiler starts others, which end with it.
+        process_group=0,
     )
     with _CHANGES:
         _RUNNING.add(process)

@@ -71,7 +71,7 @@ def told_bed(robot: Manipulator, level: float, good: float, most: float) -> tupl
 
 def tool_of(robot: Manipulator) -> Array:
     """Return the way from P to the tool, m in the base frame, of a platform that does not turn."""
-    return np.array(robot.platform.tool) @ np.array(robot.platform.frame)
+    return np.asarray(np.array(robot.platform.tool) @ np.array(robot.platform.frame))
 
 
 def _radius(robot: Manipulator, reach: float, level: float) -> float:
@@ -82,4 +82,4 @@ def _radius(robot: Manipulator, reach: float, level: float) -> float:
     poses = radii[:, None, None] * ring + [0.0, 0.0, level]
     poses[0] -= [0.0, 0.0, _BELOW]
     good = (measures_of(robot, poses) >= _GOOD).all(axis=-1)
-    return float(radii[max(0, int(np.argmin([*good, False])) - 1)])
+    return float(radii[max(0, int(np.argmin([*good.tolist(), False])) - 1)])

@@ -48,7 +48,7 @@ def delta(robot: Manipulator, centers: Sequence[Center]) -> Iterator[Section]:
         _ends(robot.legs[center.leg].limits, center.at[2], rise, math.sqrt(arm**2 - radius**2))
         for center, rise, arm in zip(centers, rises, arms, strict=True)
     ]
-    level, told = _bed(robot, radius, arms, ends)
+    level, comments = _bed(robot, radius, arms, ends)
     yield Section(
         "printer",
         (
@@ -58,7 +58,7 @@ def delta(robot: Manipulator, centers: Sequence[Center]) -> Iterator[Section]:
             ("minimum_z_position", None),
             ("print_radius", None),
         ),
-        told,
+        comments,
     )
     for name, center, rise, arm, angle, pair in zip(
         "abc", centers, rises, arms, angles, ends, strict=True

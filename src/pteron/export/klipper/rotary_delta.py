@@ -54,7 +54,7 @@ def rotary(robot: Manipulator, centers: Sequence[Center]) -> Iterator[Section]:
         for k, (lift, zero, upper, arm) in enumerate(zip(lifts, zeros, uppers, arms, strict=True))
     ]
     highest = min((top for top in tops if top is not None), default=0.0)
-    level, told = _bed(robot, radius, height, uppers, arms, highest)
+    level, comments = _bed(robot, radius, height, uppers, arms, highest)
     yield Section(
         "printer",
         (
@@ -64,7 +64,7 @@ def rotary(robot: Manipulator, centers: Sequence[Center]) -> Iterator[Section]:
             ("shoulder_height", mm(height - level)),
             ("minimum_z_position", None),
         ),
-        (*told, "For another bed change shoulder_height and the end stops."),
+        (*comments, "For another bed change shoulder_height and the end stops."),
     )
     for k, name in enumerate("abc"):
         leg = robot.legs[k]
