@@ -104,7 +104,8 @@ def actuator_factors(observations: Observations, *, block: int = BLOCK) -> Obser
         for start in range(0, len(observations.forces), block):
             rows = slice(start, start + block)
             new = observations.matrix[rows, i], observations.forces[rows, i]
-            factor = np.linalg.qr(np.vstack([factor, np.column_stack(new)]), mode="r")
+            rows_of = np.vstack([factor, np.column_stack(new)])
+            factor = np.asarray(np.linalg.qr(rows_of, mode="r"))
         triangles[: len(factor), i] = factor
     return replace(observations, matrix=triangles[..., :p], forces=triangles[..., p])
 
