@@ -82,4 +82,4 @@ def _radius(robot: Manipulator, reach: float, level: float) -> float:
     poses = radii[:, None, None] * ring + [0.0, 0.0, level]
     poses[0] -= [0.0, 0.0, _BELOW]
     good = (measures_of(robot, poses) >= _GOOD).all(axis=-1)
-    return float(radii[max(0, int(np.argmin([*good.tolist(), False])) - 1)])
+    return float(radii[max(0, int(np.argmin(np.append(good, False))) - 1)])
