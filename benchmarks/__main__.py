@@ -37,6 +37,7 @@ _SCRIPTS = {
     "Energy": "energy.py",
     "Exported FMUs": "fmu.py",
     "Certified workspaces": "certified.py",
+    "Nearest singular poses": "nearest_singularities.py",
     "The Gymnasium environment": "environment.py",
     "The viewer": "viewer.py",
     "Maps of eight million poses": "maps.py",

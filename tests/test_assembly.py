@@ -2,6 +2,7 @@
 
 from itertools import product
 
+import mpmath
 import numpy as np
 import pytest
 import sympy
@@ -203,6 +204,51 @@ def test_two_modes_meet_and_vanish_together():
     joints = start + (inside + np.linspace(-1e-13, 1e-13, 21))[:, None] * way
     found = pteron.direct_kinematics(robot, joints, all_branches=True)
     assert set(counts(found)) <= {number - 2, number - 1, number}
+
+
+def test_modes_that_all_but_meet_are_told_apart():
+    """To some 2e-7, as in forty digits."""
+    robot = pteron.load("3-prr")
+    start, way = pteron.inverse_kinematics(robot, [0.0, 0.0, 0.2]), np.array([1.0, -0.6, 0.3])
+    inside, beyond = 0.0, 1.0
+    for _ in range(60):
+        middle = 0.5 * (inside + beyond)
+        poses = pteron.direct_kinematics(robot, start + middle * way, all_branches=True)
+        inside, beyond = (middle, beyond) if counts(poses) == 2 else (inside, middle)
+    mpmath.mp.dps = 40
+    apart = []
+    for short in (1e-15, 1e-14, 1e-13, 1e-12):
+        joints = start + (inside - short) * way
+        found = pteron.direct_kinematics(robot, joints, all_branches=True)
+        found = found[~np.isnan(found[:, 0])]
+        assert len(found) == 2
+        exact = [exact_pose(robot, joints, pose) for pose in found]
+        between = [float(mpmath.norm(mpmath.matrix(a) - mpmath.matrix(b))) for a, b in [exact]]
+        np.testing.assert_allclose(
+            found, np.array(exact, dtype=float), rtol=0, atol=0.25 * between[0]
+        )
+        apart += between
+    assert apart[0] < 4e-7
+    assert apart[0] > 1e-8
+
+
+def exact_pose(robot, joints, near):
+    """Return the pose of planar P-R-R legs' joints next to one, in forty digits."""
+
+    def missed(x, y, phi):
+        c, s = mpmath.cos(phi), mpmath.sin(phi)
+        found = []
+        for leg, q in zip(robot.legs, joints, strict=True):
+            ends = [
+                mpmath.mpf(float(a)) + mpmath.mpf(float(q)) * mpmath.mpf(float(b))
+                for a, b in zip(leg.guide_point, leg.slider_direction, strict=True)
+            ]
+            a, b = (mpmath.mpf(float(v)) for v in leg.platform_point[:2])
+            across = x + c * a - s * b - ends[0], y + s * a + c * b - ends[1]
+            found.append(across[0] ** 2 + across[1] ** 2 - mpmath.mpf(leg.lower_length) ** 2)
+        return found
+
+    return list(mpmath.findroot(missed, [mpmath.mpf(float(v)) for v in near], tol=1e-60))
 
 
 def test_what_is_no_number_has_no_pose():

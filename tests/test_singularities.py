@@ -203,6 +203,88 @@ def test_no_sampled_singular_pose_is_nearer_than_the_nearest(name):
             assert metres == pytest.approx(1e-4 * one.distance, rel=1e-3)
 
 
+SEEN = [
+    ([0.21395636506464263, 0.7560125047188176, -0.6566581245477972], 0.280),
+    ([0.09612123458, -0.17823451618, -1.02350944585], 0.721),
+]
+"""Poses of the Delta, and how near a type-II pose is known: where its surface ends at the reach."""
+
+
+def turned(pose):
+    """Return a pose turned by 120 degrees about z."""
+    c, s = -0.5, 0.5 * np.sqrt(3.0)
+    return np.array([c * pose[0] - s * pose[1], s * pose[0] + c * pose[1], *pose[2:]])
+
+
+@pytest.mark.parametrize(("pose", "known"), SEEN)
+def test_singular_poses_at_the_edge_of_the_reach_are_found(pose, known):
+    robot = CATALOG["delta"]
+    found = nearest_singularities(robot, pose, most=4000)
+    (two,) = [one for one in found if one.kind == "II"]
+    assert two.distance < known
+    assert 0.6 * two.distance < two.lower_bound < two.distance
+    assert abs(two.measure) <= 1e-10
+    assert (numeric(robot, "squared_type_i")(two.pose)[0] > -1e-9).all()
+    # What symmetry makes equal is told alike, leg by leg.
+    again = nearest_singularities(robot, turned(pose), most=4000)
+    for kind in ("I", "II", "constraint"):
+        sizes = [[one.distance for one in told if one.kind == kind] for told in (found, again)]
+        np.testing.assert_allclose(*sizes, rtol=2e-3)
+
+
+def test_distances_do_not_depend_on_the_unit_of_length():
+    robot, pose = CATALOG["delta"], np.array([0.1, -0.2, -0.8])
+    lengths = ("guide_point", "platform_point", "fixed_offset", "upper_length", "lower_length")
+    found = nearest_singularities(robot, pose, most=2000)
+    for scale in (1e-3, 1e3):
+        legs = []
+        for leg in robot.legs:
+            values = {name: scale * np.array(getattr(leg, name)) for name in lengths}
+            legs.append(replace(leg, **{k: v.tolist() for k, v in values.items()}))
+        again = nearest_singularities(replace(robot, legs=tuple(legs)), scale * pose, most=2000)
+        assert [(one.kind, one.leg) for one in again] == [(one.kind, one.leg) for one in found]
+        sizes = [np.array([one.distance for one in told]) for told in (again, found)]
+        np.testing.assert_allclose(sizes[0], scale * sizes[1], rtol=1e-3)
+
+
+@pytest.mark.parametrize("name", ["3-prr", "orthoglide", "linear-delta", "quadrupteron"])
+def test_no_singular_pose_is_nearer_than_proved(name):
+    """In a ball of the proved radius no function changes its sign between neighbours in reach."""
+    robot, rng = CATALOG[name], np.random.default_rng(8)
+    lengths = len(robot.platform.lengths)
+    for pose in pteron.random_poses(robot, 2, seed=6, type_i=0.05, type_ii=0.05):
+        for one in nearest_singularities(robot, pose, most=1000):
+            assert 0.0 < one.lower_bound <= one.distance
+            moved = slice(0, lengths) if one.by == "translation" else slice(lengths, None)
+            around = rng.normal(size=(10000, lengths if moved.start == 0 else 1))
+            size = rng.random((10000, 1)) ** 0.5 / np.linalg.norm(around, axis=-1, keepdims=True)
+            ways = np.zeros((2, 10000, robot.freedom))
+            ways[0, :, moved] = around * size * one.lower_bound
+            ways[1] = 0.97 * ways[0]
+            ways[1, :, moved] += 0.02 * one.lower_bound * np.sign(around) * rng.random(size.shape)
+            squares = numeric(robot, "squared_type_i")(pose + ways)[0]
+            if one.kind == "I":
+                values = squares[..., one.leg - 1].copy()
+                squares[..., one.leg - 1] = 0.0
+            else:
+                what = {"II": "type_ii", "constraint": "constraint"}[one.kind]
+                values = numeric(robot, what)(pose + ways)[0]
+            reached = (squares >= 0.0).all(axis=(0, -1))
+            assert reached.any()
+            assert (values[0, reached] * values[1, reached] > 0.0).all()
+
+
+def test_a_search_that_is_given_up_tells_its_bound():
+    robot, pose = CATALOG["delta"], [0.1, -0.2, -0.8]
+    whole = {(one.kind, one.leg): one for one in nearest_singularities(robot, pose, most=2000)}
+    short = nearest_singularities(robot, pose, most=1)
+    assert {(one.kind, one.leg) for one in short} == set(whole)
+    for one in short:
+        assert one.lower_bound <= whole[one.kind, one.leg].distance <= 1.05 * one.distance
+    with pytest.raises(pteron.DataError, match="most: 0 given"):
+        nearest_singularities(robot, pose, most=0)
+
+
 def test_distances_in_closed_form_are_met():
     robot, pose = CATALOG["quadrupteron"], np.array([0.01, 0.0, 0.02, 0.3])
     found = nearest_singularities(robot, pose)

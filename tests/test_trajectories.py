@@ -157,9 +157,9 @@ def sides(robot, motion, finer=10):
     )
 
 
-def used(robot, motion, limits):
+def used(robot, motion, limits, finer=10):
     """Return the largest share of a limit that a motion takes, between its samples too."""
-    sizes = (np.abs(part).max(axis=0) for part in sides(robot, motion))
+    sizes = (np.abs(part).max(axis=0) for part in sides(robot, motion, finer))
     kept = limits.speed, limits.acceleration, limits.force
     return max(float((size / limit).max()) for size, limit in zip(sizes, kept, strict=True))
 
@@ -303,6 +303,25 @@ def test_the_fastest_motion_keeps_every_limit_and_is_never_slower(name):
     np.testing.assert_allclose(fastest.pose[[0, -1]], cycle.pose[[0, -1]], atol=1e-9)
     for part in (fastest.velocity, fastest.acceleration):
         np.testing.assert_allclose(part[[0, -1]], 0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize(("name", "strength"), [("five-bar", 1.2), ("3-rrr", 1.5), ("delta", 1.3)])
+def test_a_force_keeps_its_limit_where_a_joint_reverses_between_samples(name, strength):
+    """There dry friction changes its sign: what was against the motion helps it."""
+    robot, pose = CATALOG[name], pteron.workspace.home_pose(CATALOG[name])
+    still = np.zeros(robot.freedom)
+    held = max(float(np.abs(pteron.inverse_dynamics(robot, pose, still, still)).max()), 1.0)
+    robot = driven(robot, pteron.Drive(coulomb=0.3 * held, viscous=0.02 * held))
+    path = cycle_path(pick_and_place(robot, pose))
+    slow = along(robot, path, duration=1.0)
+    forces = np.abs(pteron.drive_forces(robot, slow.pose, slow.velocity, slow.acceleration))
+    limits = limits_of(robot, force=strength * forces.max(axis=0))
+    fastest = time_optimal(robot, path, limits)
+    assert used(robot, fastest, limits, finer=100) <= 1.0 + 1e-8
+    slowed = shortest(robot, pick_and_place(robot, pose).cycle.at, limits)
+    assert used(robot, slowed, limits, finer=100) <= 1.0 + 1e-8
+    rates = sides(robot, fastest, finer=1)[0]
+    assert (rates[1:] * rates[:-1] < 0.0).any()
 
 
 def axis_move(**drive):

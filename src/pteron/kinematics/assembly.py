@@ -58,7 +58,12 @@ _SPAN = np.pi
 """rad: where a platform slides, what half a turn of alpha is divided at."""
 
 _SAME = 1e-6
-"""Two poses within this, in rad and sizes of the machine, are one: nothing tells them apart."""
+"""Two poses within this, in rad and sizes of the machine, may be one, found twice."""
+
+_APART, _LEAST = 6.0, 2e-16
+"""Between two modes that meet the closures are missed, by a quarter of the square of their distance
+or so; it must be so many times what both poses miss, and no less than rounding. That tells modes
+apart to some 1e-7 of the size, where joints are themselves known to half of the digits of that."""
 
 _TURN_ROUNDING = 1e-14
 """rad."""
@@ -89,10 +94,12 @@ def _poses(robot: Manipulator, joints: Array, most: int) -> Array:
     which, phi = _angles(rows, slides)
     which, points, phi = _points(_at(rows[which], phi, slides), which, phi)
     starts = np.column_stack([origin[which] + size[which, None] * points, phi])
-    which, poses = _polished(robot, joints, which, starts)
+    which, poses, missed = _polished(robot, joints, which, starts)
     if not slides:
         poses[:, -1] = within_a_turn(poses[:, -1])
-    return in_order(_table(poses, which, size, most, slides))[:, :most]
+    same = _found_twice(robot, joints, which, poses, missed, size)
+    which, poses = which[~same], poses[~same]
+    return in_order(_table(poses, which, most, len(joints)))[:, :most]
 
 
 def _apart(rows: Array) -> Array:
@@ -202,8 +209,8 @@ def _quadric(x: Array, y: Array) -> Array:
 
 def _polished(
     robot: Manipulator, joints: Array, which: NDArray[np.int64], poses: Array
-) -> tuple[NDArray[np.int64], Array]:
-    """Return the poses that Newton's steps come to, those that close."""
+) -> tuple[NDArray[np.int64], Array, Array]:
+    """Return the poses that Newton's steps come to, those that close, and what they miss."""
     step = numeric(robot, "newton_step")
     found, missed = np.empty_like(poses), np.full(len(poses), _NEAR)
     active = np.arange(len(poses))
@@ -216,24 +223,43 @@ def _polished(
             break
         found[active], missed[active], poses[active] = tried, misses[better], after
     closed = missed <= _ROUNDING
-    return which[closed], found[closed]
+    return which[closed], found[closed], missed[closed]
 
 
-def _table(poses: Array, which: NDArray[np.int64], size: Array, most: int, slides: bool) -> Array:
-    """Return the poses of each state (B, k, m), k at least `most`, each once, among NaN."""
-    counts = np.bincount(which, minlength=len(size))
+def _found_twice(
+    robot: Manipulator,
+    joints: Array,
+    which: NDArray[np.int64],
+    poses: Array,
+    missed: Array,
+    size: Array,
+) -> NDArray[np.bool_]:
+    """Return which poses (K, m) another before them is, of the same joints."""
+    count = np.arange(len(which)) - np.searchsorted(which, which)  # they come in order
+    found = np.zeros(len(which), dtype=bool)
+    for back in range(1, int(count.max(initial=0)) + 1):
+        later = np.flatnonzero(count >= back)
+        apart = poses[later] - poses[later - back]
+        if not robot.platform.slides:
+            apart[:, -1] = within_a_turn(apart[:, -1])
+        units = np.ones_like(apart)
+        units[:, :-1] = size[which[later], None]
+        near = (np.abs(apart) < _SAME * units).all(axis=-1)
+        later, apart = later[near], apart[near]
+        _, between, _ = numeric(robot, "newton_step")(
+            joints[which[later]], poses[later] - 0.5 * apart
+        )
+        most = np.maximum(np.maximum(missed[later], missed[later - back]), _LEAST)
+        found[later[between <= _APART * most]] = True
+    return found
+
+
+def _table(poses: Array, which: NDArray[np.int64], most: int, states: int) -> Array:
+    """Return the poses of each state (B, k, m), k at least `most`, NaN after them."""
+    counts = np.bincount(which, minlength=states)
     columns = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
-    table = np.full((len(size), counts.max(initial=most), poses.shape[-1]), np.nan)
+    table = np.full((states, counts.max(initial=most), poses.shape[-1]), np.nan)
     table[which, columns] = poses
-    same = np.ones((*table.shape[:2], table.shape[1]), dtype=bool)
-    for k, values in enumerate(np.moveaxis(table, -1, 0)):
-        apart = values[:, :, None] - values[:, None]
-        if k < table.shape[-1] - 1:
-            apart /= size[:, None, None]
-        elif not slides:
-            apart = 2.0 * np.sin(0.5 * apart)
-        same &= np.abs(apart) < _SAME
-    table[np.tril(same, -1).any(axis=-1)] = np.nan
     return table
 
 

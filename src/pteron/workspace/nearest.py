@@ -1,26 +1,22 @@
 """How far a pose is from the nearest singular poses, moved or turned alone, in metres or radians.
 
-A singular pose is where a function that is smooth in the pose vanishes: the square of a leg's
-type-I measure, the type-II measure, or the constraint measure. Under translation it is sought along
-rays in all directions, on which the function changes its sign; the nearest such places are starts
-for the nearest point of the surface on which it vanishes (sequential quadratic programming, with
-CasADi's gradients). Under rotation it is sought round the axis. Where a function touches zero
-without changing its sign, that is not found.
+A singular pose is where a function that is smooth in the pose and in its roots vanishes: the square
+of a leg's type-I measure, the type-II measure, or the constraint measure. Under translation it is
+sought in all of the reach, under rotation in a whole turn; intervals prove how near none is.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Literal
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from pteron.equations.machine import closure_of
-from pteron.kernels import Array, numeric, program
+from pteron.errors import DataError, ModelError
+from pteron.kernels import Array
 from pteron.kinematics import inverse_kinematics, singular_orientations
 from pteron.kinematics.architecture import (
     architecture,
@@ -31,32 +27,13 @@ from pteron.kinematics.evaluate import checked_one
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike
+from pteron.workspace.enclosing import enclosing_box
+from pteron.workspace.nearest_zero import SINGULAR, Nearest, Search
+from pteron.workspace.vanishing import Kind, Vanishing
 
-_RAYS = 400
-_STEPS = 160
-"""Places on a ray, closer together near the pose."""
+_MOST = 20_000
 
-_ANGLES = 1440
-_HALVINGS = 60
-_STARTS = 6
-"""The nearest of the places found on rays, from which a nearer one is sought."""
-
-_CONES = 40
-"""Narrower and narrower cones of rays round the best, where no gradient helps: at an edge of the
-reach."""
-
-_EDGE = 1e-9
-"""Squares of type-I measures below zero that count as in reach: of a pose on the edge."""
-
-_SINGULAR = 1e-10
-"""The measure of a pose that counts as singular."""
-
-_TINY = 1e-300
-
-Kind = Literal["I", "II", "constraint"]
-
-_WHAT = {"I": "squared_type_i", "II": "type_ii", "constraint": "constraint"}
-"""The function that vanishes, by kind."""
+By = Literal["translation", "rotation"]
 
 
 @dataclass(frozen=True)
@@ -73,19 +50,23 @@ class NearestSingularity:
     by : {"translation", "rotation"}
         What leads there: the position alone, or the angle alone.
     distance : float
-        m or rad; rad too where the platform slides.
+        m or rad; rad too where the platform slides. Infinite where none was found.
     pose : array, shape (m,)
-        The singular pose.
+        The singular pose, to rounding: at the edge of a leg's reach the measure feels its root.
+        NaN where none was found.
     measure : float
         What vanishes there: the type-I measure's square, the type-II or the constraint measure.
+    lower_bound : float
+        No singular pose of this kind is nearer: proved by intervals, in the unit of `distance`.
     """
 
     kind: Kind
     leg: int
-    by: Literal["translation", "rotation"]
+    by: By
     distance: float
     pose: Array
     measure: float
+    lower_bound: float
 
     @property
     def unit(self) -> str:
@@ -93,7 +74,9 @@ class NearestSingularity:
         return "m" if self.by == "translation" else "rad"
 
 
-def nearest_singularities(robot: RobotLike, pose: PoseLike) -> tuple[NearestSingularity, ...]:
+def nearest_singularities(
+    robot: RobotLike, pose: PoseLike, *, most: int = _MOST
+) -> tuple[NearestSingularity, ...]:
     """Return the nearest singular poses of each kind, by translation and by rotation alone.
 
     Only poses in reach of all legs count, and of the robot's working mode; limits of joints do not.
@@ -105,12 +88,16 @@ def nearest_singularities(robot: RobotLike, pose: PoseLike) -> tuple[NearestSing
         The machine.
     pose : array, shape (m,)
         One pose, m and rad.
+    most : int
+        Boxes after which the search for each is given up; what is proved until then is its
+        `lower_bound`. It ends before where that is 0.5 % below the distance.
 
     Returns
     -------
     tuple of NearestSingularity
-        Those by translation first, the nearest first. A kind of which none is found is left out,
-        and constraint singularities where every pose is one, or bars are not told.
+        Those by translation first, the nearest first. A kind of which there is none, which is
+        proved, is left out, and constraint singularities where every pose is one, or bars are not
+        told.
 
     Raises
     ------
@@ -118,6 +105,8 @@ def nearest_singularities(robot: RobotLike, pose: PoseLike) -> tuple[NearestSing
         If a leg does not reach the pose.
     SingularPose
         If the machine is singular everywhere.
+    DataError
+        If `most` is below 1.
 
     Examples
     --------
@@ -127,231 +116,71 @@ def nearest_singularities(robot: RobotLike, pose: PoseLike) -> tuple[NearestSing
     >>> (turn,) = [one for one in found if one.kind == "II"]
     >>> turn.by, float(np.degrees(turn.pose[3]).round(9))
     ('rotation', 90.0)
+    >>> all(0.99 * one.distance < one.lower_bound <= one.distance for one in found)
+    True
     """
     robot = as_manipulator(robot)
     at = checked_one(robot, pose, "pose")
+    if most < 1:
+        raise DataError(f"most: {most} given, 1 box at least expected")
     if is_singular_everywhere(robot):
         raise singular_everywhere(robot)
     inverse_kinematics(robot, at)
-    kinds: list[tuple[Kind, int]] = [("I", i) for i in range(1, robot.freedom + 1)]
-    kinds += [("II", 0), ("constraint", 0)] if architecture(robot).holds else [("II", 0)]
-    found = []
-    for by in ("translation", "rotation")[: 1 + ("phi" in robot.coordinates)]:
-        search = _turned if by == "rotation" else _moved
-        several: list[NearestSingularity] = []
-        for kind, leg in kinds:
-            vanishing = _Vanishing(robot, leg - 1 if kind == "I" else None, kind)
-            place = search(vanishing, at)
-            if place is not None:
-                lengths = len(robot.platform.lengths)
-                way = (place - at)[:lengths] if by == "translation" else (place - at)[lengths:]
-                distance = float(np.linalg.norm(way))
-                measure = float(vanishing(place[None])[0][0])
-                several.append(NearestSingularity(kind, leg, by, distance, place, measure))  # type: ignore[arg-type]
-        found += sorted(several, key=lambda one: one.distance)
+    found: list[NearestSingularity] = []
+    ways: tuple[By, ...] = ("translation", "rotation")
+    for by in ways[: 1 + ("phi" in robot.coordinates)]:
+        several = [
+            _told(robot, at, by, vanishing, _search(vanishing, at, by, most))
+            for vanishing in _kinds(robot)
+        ]
+        some = [one for one in several if np.isfinite(one.lower_bound)]
+        found += sorted(some, key=lambda one: (one.distance, one.lower_bound))
     return tuple(found)
 
 
-@dataclass(frozen=True)
-class _Vanishing:
-    """A function that vanishes at the singular poses of a kind."""
-
-    robot: Manipulator
-    leg: int | None
-    """Of type I, from 0."""
-    kind: Kind
-
-    def __call__(self, poses: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Return its values at poses (..., m), and which of them are in reach of other legs."""
-        squares = numeric(self.robot, "squared_type_i")(poses)[0]
-        values = (
-            squares if self.leg is not None else numeric(self.robot, _WHAT[self.kind])(poses)[0]
-        )
-        return self.among(squares, values)
-
-    def among(self, squares: Array, values: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Return the same of the squares of all type-I measures and of a measure's values."""
-        if self.leg is None:
-            return values, np.asarray((squares >= 0.0).all(axis=-1) & np.isfinite(values))
-        others = np.delete(squares, self.leg, axis=-1)
-        return squares[..., self.leg], np.asarray((others >= -_EDGE).all(axis=-1))
-
-    def slope(self, pose: Array) -> tuple[Array, Array, Array]:
-        """Return its gradient, the squares of all type-I measures, and their gradients (n, m)."""
-        row = self.robot.freedom + (self.kind == "constraint")
-        values, slopes = (np.asarray(part) for part in _smooth(self.robot)(pose))
-        n = self.robot.freedom
-        return slopes[row if self.leg is None else self.leg], values[:n, 0], slopes[:n]
+def _kinds(robot: Manipulator) -> Iterator[Vanishing]:
+    for i in range(1, robot.freedom + 1):
+        yield Vanishing(robot, "I", i)
+    yield Vanishing(robot, "II")
+    if architecture(robot).holds:
+        yield Vanishing(robot, "constraint")
 
 
-@lru_cache(maxsize=32)
-def _smooth(robot: Manipulator) -> ca.Function:
-    """Return the functions that vanish, and their gradients."""
-    pose = ca.SX.sym("pose", robot.freedom)
-    parts = [
-        program(robot, what).function(pose) for what in ("squared_type_i", "type_ii", "constraint")
-    ]
-    values = ca.vertcat(*(ca.vec(part) for part in parts))
-    return ca.Function("smooth", [pose], ca.cse([values, ca.jacobian(values, pose)]))
-
-
-def _changes(
-    vanishing: _Vanishing,
-    start: Array,
-    way: Array,
-    places: Array,
-    known: tuple[Array, NDArray[np.bool_]] | None = None,
-) -> Array:
-    """Return the least share (R,) of ways (R, m) from a start at which the sign changes, or inf.
-
-    It is looked for between each two of `places` (S,), where the function may be known.
-    """
-    values, reached = known or vanishing(start + places[:, None, None] * way)
-    negative = values < 0.0
-    changed = (negative[1:] != negative[:-1]) & reached[1:] & reached[:-1]
-    rays = np.flatnonzero(changed.any(axis=0))
-    first = changed[:, rays].argmax(axis=0)
-    low, high, side = places[first], places[first + 1], negative[first, rays]
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        value, _ = vanishing(start + middle[:, None] * way[rays])
-        before = (value < 0.0) == side
-        low, high = np.where(before, middle, low), np.where(before, high, middle)
-    found = np.full(len(way), np.inf)
-    value, reached_too = vanishing(start + low[:, None] * way[rays])
-    # Else a gap in the reach lies between two places.
-    true = reached_too & (np.abs(value) <= 1e3 * _SINGULAR)
-    found[rays[true]] = low[true]
-    return found
-
-
-def _turned(vanishing: _Vanishing, start: Array) -> Array | None:
-    """Return the nearest pose at which the function vanishes, turned only."""
-    if np.abs(vanishing(start[None])[0][0]) <= _SINGULAR:
-        return start
-    if vanishing.kind == "II" and closure_of(vanishing.robot).orientation is not None:
-        ways = singular_orientations(vanishing.robot) - start[-1]
-        ways -= 2.0 * np.pi * np.round(ways / (2.0 * np.pi))
-        return np.append(start[:-1], start[-1] + ways[np.abs(ways).argmin()])
-    way = np.zeros((2, len(start)))
-    way[:, -1] = np.pi, -np.pi
-    shares = _changes(vanishing, start, way, np.linspace(0.0, 1.0, _ANGLES // 2 + 1))
-    best = int(shares.argmin())
-    return start + shares[best] * way[best] if np.isfinite(shares[best]) else None
-
-
-def _moved(vanishing: _Vanishing, start: Array) -> Array | None:
-    """Return the nearest pose at which the function vanishes, moved only."""
-    if np.abs(vanishing(start[None])[0][0]) <= _SINGULAR:
-        return start
-    robot, lengths = vanishing.robot, len(vanishing.robot.platform.lengths)
-    rays, places = _rays(robot, tuple(start.tolist()))
-    squares, values = (
-        _on_rays(robot, tuple(start.tolist()), _WHAT[kind]) for kind in ("I", vanishing.kind)
+def _told(
+    robot: Manipulator, at: Array, by: By, vanishing: Vanishing, found: Nearest
+) -> NearestSingularity:
+    pose = np.full_like(at, np.nan) if found.pose is None else found.pose
+    distance = np.inf
+    if found.pose is not None:
+        distance = float(np.linalg.norm((pose - at)[_moving(robot, by)]))
+    bound = min(found.bound, distance)
+    return NearestSingularity(
+        vanishing.kind, vanishing.leg, by, distance, pose, found.measure, bound
     )
-    shares = _changes(vanishing, start, rays, places, vanishing.among(squares, values))
-    order = np.argsort(shares, kind="stable")[:_STARTS]
-    hits = [start + shares[i] * rays[i] for i in order if np.isfinite(shares[i])]
-    if not hits:
-        return None
-    nearer = [found for hit in hits if (found := _projected(vanishing, start, hit)) is not None]
-
-    def distance(pose: Array) -> float:
-        return float(np.linalg.norm(pose - start))
-
-    best: Array = min([hits[0], *nearer], key=distance)
-    return _narrowed(vanishing, start, best, lengths) if best is hits[0] else best
 
 
-def _rays(robot: Manipulator, start: tuple[float, ...]) -> tuple[Array, Array]:
-    """Return rays (R, m) from a start to beyond all that is in reach, and shares (S,) of them."""
+def _moving(robot: Manipulator, by: By) -> NDArray[np.intp]:
+    """Return the coordinates that vary."""
     lengths = len(robot.platform.lengths)
-    center, radius = search_ball(robot)
-    far = float(np.linalg.norm(np.array(start[:lengths]) - center)) + radius
-    rays = np.zeros((_RAYS, len(start)))
-    rays[:, :lengths] = far * _directions(lengths)
-    return rays, np.linspace(0.0, 1.0, _STEPS + 1) ** 1.5
+    return np.arange(lengths) if by == "translation" else np.arange(lengths, robot.freedom)
 
 
-@lru_cache(maxsize=4)
-def _on_rays(robot: Manipulator, start: tuple[float, ...], what: str) -> Array:
-    """Return a function at all places on all rays."""
-    rays, places = _rays(robot, start)
-    return np.asarray(numeric(robot, what)(np.array(start) + places[:, None, None] * rays)[0])
-
-
-def _directions(lengths: int) -> Array:
-    """Return unit vectors spread evenly over a sphere (Fibonacci's lattice) or a circle."""
-    k = np.arange(_RAYS) + 0.5
-    if lengths == 2:
-        angles = 2.0 * np.pi * k / _RAYS
-        return np.column_stack([np.cos(angles), np.sin(angles)])
-    height, angles = 1.0 - 2.0 * k / _RAYS, np.pi * (1.0 + np.sqrt(5.0)) * k
-    across = np.sqrt(1.0 - height * height)
-    return np.column_stack([across * np.cos(angles), across * np.sin(angles), height])
-
-
-def _projected(vanishing: _Vanishing, start: Array, hit: Array) -> Array | None:
-    """Return the point of the surface nearest to the start, sought from a hit; None if lost."""
-    # Kinematics load without SciPy.
-    from scipy.optimize import minimize  # type: ignore[import-untyped]
-
-    lengths, scale = len(vanishing.robot.platform.lengths), float(np.linalg.norm(hit - start))
-    if scale == 0.0:
-        return hit
-
-    def pose_of(x: Array) -> Array:
-        pose = start.copy()
-        pose[:lengths] += scale * x
-        return pose
-
-    def value(x: Array) -> float:
-        return float(vanishing(pose_of(x)[None])[0][0])
-
-    def slope(x: Array) -> Array:
-        return np.asarray(scale * vanishing.slope(pose_of(x))[0][:lengths])
-
-    others = [i for i in range(vanishing.robot.freedom) if i != vanishing.leg]
-    conditions: list[dict[str, str | Callable[[Array], object]]] = [
-        {"type": "eq", "fun": value, "jac": slope},
-        {
-            "type": "ineq",
-            "fun": lambda x: vanishing.slope(pose_of(x))[1][others],
-            "jac": lambda x: scale * vanishing.slope(pose_of(x))[2][others, :lengths],
-        },
-    ]
-    with np.errstate(all="ignore"):
-        run = minimize(
-            lambda x: (0.5 * x @ x, x),
-            (hit - start)[:lengths] / scale,
-            jac=True,
-            method="SLSQP",
-            constraints=conditions,
-            options={"ftol": 1e-15, "maxiter": 60},
-        )
-        pose = pose_of(run.x)
-        for _ in range(3):  # on the surface to rounding
-            g = vanishing.slope(pose)[0][:lengths]
-            pose[:lengths] -= vanishing(pose[None])[0][0] * g / max(float(g @ g), _TINY)
-        measure, reached = vanishing(pose[None])
-    good = np.isfinite(pose).all() and reached[0] and abs(measure[0]) <= _SINGULAR
-    return pose if good else None
-
-
-def _narrowed(vanishing: _Vanishing, start: Array, hit: Array, lengths: int) -> Array:
-    """Return a nearer place than a hit, on rays in narrower and narrower cones round it."""
-    rng, places = np.random.default_rng(0), np.linspace(0.9, 1.001, 12)
-    spread = 2.0 / np.sqrt(_RAYS)
-    for _ in range(_CONES):
-        size = float(np.linalg.norm(hit - start))
-        rays = np.zeros((32, len(start)))
-        rays[:, :lengths] = (hit - start)[:lengths]
-        rays[1:, :lengths] += spread * size * rng.normal(size=(31, lengths))
-        rays *= size / np.linalg.norm(rays, axis=-1, keepdims=True)
-        shares = _changes(vanishing, start, rays, places)
-        best = int(shares.argmin())
-        if shares[best] < 1.0:
-            hit = start + shares[best] * rays[best]
-        else:
-            spread *= 0.6
-    return hit
+def _search(vanishing: Vanishing, at: Array, by: By, most: int) -> Nearest:
+    """Return the nearest pose at which a function vanishes, moved or turned alone."""
+    robot, moving = vanishing.robot, _moving(vanishing.robot, by)
+    if by == "translation":
+        try:
+            box, beyond = enclosing_box(robot, at, at), np.inf
+        except ModelError:  # the reach has no end
+            center, radius = search_ball(robot)
+            beyond = float(np.linalg.norm(at[moving] - center)) + radius
+            box = at[moving] + beyond * np.array([[-1.0], [1.0]])
+        return Search(vanishing, at, moving, box).run(beyond, most)
+    if vanishing.kind == "II" and closure_of(robot).orientation is not None:
+        ways = singular_orientations(robot) - at[-1]
+        ways -= 2.0 * np.pi * np.round(ways / (2.0 * np.pi))
+        way = float(ways[np.abs(ways).argmin()])
+        return Nearest(np.append(at[:-1], at[-1] + way), 0.0, abs(way) * (1.0 - SINGULAR))
+    beyond = np.pi if robot.platform.slides else np.inf
+    box = at[moving] + np.pi * np.array([[-1.0], [1.0]])
+    return Search(vanishing, at, moving, box).run(beyond, most)

@@ -6,9 +6,11 @@ by the sign of the joint's motion, viscous friction by its speed.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pteron.equations.drives import Drives, drive_numbers
 from pteron.errors import ModelError
@@ -16,9 +18,14 @@ from pteron.kernels import Array
 from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.trajectories.limits import MotionLimits
-from pteron.motion.trajectories.tool import tool_motion
+from pteron.motion.trajectories.tool import Curve, tool_motion
 
 _ROUNDING = 1e-12
+
+_CREEP = 1e-30
+"""The rate of a joint that reverses: next to none, either way."""
+
+_HALVINGS = 50
 
 _WORDS = {
     "speed": ("moves at up to", "{unit}/s"),
@@ -82,6 +89,44 @@ def demand(robot: Manipulator, pose: Array, first: Array, second: Array) -> Dema
         np.asarray(drives.viscous),
         (speed[:, :count], bend[:, :count]),
     )
+
+
+def demand_between(
+    robot: Manipulator, states: Callable[[Array], Curve], at: Array
+) -> tuple[Array, Demand, Array]:
+    """Return places on a curve, what they ask for and their poses (K, m): also where joints turn.
+
+    `states` gives the curve at places, which ascend. Where a joint reverses between two of them dry
+    friction changes its sign, and a force jumps: that place is there twice, moving either way.
+    """
+    turns, joints = _reversals(robot, states, at)
+    every = np.concatenate([at, turns, turns])
+    order = np.argsort(every, kind="stable")
+    pose, first, second = states(every[order])
+    asked = demand(robot, pose, first, second)
+    rates = asked.first.copy()
+    rows = np.argsort(order)[len(at) :]
+    rates[rows, np.tile(joints, 2)] = np.repeat([_CREEP, -_CREEP], len(turns))
+    return every[order], asked._replace(first=rates), pose
+
+
+def _reversals(
+    robot: Manipulator, states: Callable[[Array], Curve], at: Array
+) -> tuple[Array, NDArray[np.intp]]:
+    """Return where (R,) joints reverse between places (K,) or on them, and which (R,)."""
+
+    def rates(places: Array) -> Array:
+        return np.asarray(unchecked(robot, "joint_rates", *states(places)[:2])[0])
+
+    known = rates(at)
+    k, joints = np.nonzero(known[1:] * known[:-1] < 0.0)
+    ahead, low, high = known[k, joints] > 0.0, at[k], at[k + 1]
+    for _ in range(_HALVINGS if len(k) else 0):
+        middle = 0.5 * (low + high)
+        before = (rates(middle)[np.arange(len(k)), joints] > 0.0) == ahead
+        low, high = np.where(before, middle, low), np.where(before, high, middle)
+    rest, still = np.nonzero((known[1:-1] == 0.0) & (known[2:] * known[:-2] < 0.0))
+    return np.concatenate([low, at[rest + 1]]), np.concatenate([joints, still])
 
 
 def most_rate(

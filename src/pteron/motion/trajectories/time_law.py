@@ -12,7 +12,7 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.checks import check_path
 from pteron.motion.trajectories.course import Course, InTime, Timed
-from pteron.motion.trajectories.demand import demand, most_rate, peaks
+from pteron.motion.trajectories.demand import demand, demand_between, most_rate, peaks
 from pteron.motion.trajectories.limits import MotionLimits, limits_of
 from pteron.motion.trajectories.path import Path
 from pteron.motion.trajectories.polynomials import Law, Progress, polynomial
@@ -214,14 +214,17 @@ def too_short(robot: Manipulator, course: InTime, limits: MotionLimits, least: f
 def kept_motion(robot: Manipulator, course: InTime, limits: MotionLimits, step: float) -> Motion:
     """Return a course as a motion that keeps the limits at ten times its samples too.
 
+    And where a joint reverses between them.
+
     Its duration is a multiple of the step; the course is slowed by what it exceeds a limit.
     """
     for _ in range(_TRIES):
         count = max(1, int(np.ceil(course.duration / _expect_time("step", step) - 1e-9)))
         course = course.slowed(count * step / course.duration)
         motion = sampled(course.at, count * step, step)
-        fine = motion.at(np.linspace(0.0, motion.duration, _FINER * count + 1))
-        rate = most_rate(robot, demand(robot, *fine), limits, fine[0], 1.0)
+        fine = np.linspace(0.0, motion.duration, _FINER * count + 1)
+        _, asked, poses = demand_between(robot, motion.at, fine)
+        rate = most_rate(robot, asked, limits, poses, 1.0)
         if rate * KEPT >= 1.0:
             return motion
         course = course.slowed(1.0 / rate)

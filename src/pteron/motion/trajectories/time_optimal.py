@@ -27,13 +27,14 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.checks import check_path
 from pteron.motion.trajectories.course import Course
-from pteron.motion.trajectories.demand import Demand, demand
+from pteron.motion.trajectories.demand import demand, demand_between
 from pteron.motion.trajectories.limit_rows import LimitRows, limit_rows
 from pteron.motion.trajectories.limits import MotionLimits, limits_of
 from pteron.motion.trajectories.path import Path
 from pteron.motion.trajectories.polynomials import polynomial
 from pteron.motion.trajectories.profile import Profile
 from pteron.motion.trajectories.time_law import STEP, kept_motion, stretch_times
+from pteron.motion.trajectories.tool import Curve
 
 _GRID = 400
 """Intervals of a stretch."""
@@ -181,11 +182,11 @@ def _fastest(
     even = np.linspace(0.0, 1.0, _GRID + 1)
     grid = _EVEN * even + (1.0 - _EVEN) * (0.5 - 0.5 * np.cos(np.pi * even))
 
-    def asked_at(share: Array) -> Demand:
+    def states(share: Array) -> Curve:
         pose, first, second = path.at(begin + (end - begin) * share)
-        return demand(robot, pose, (end - begin) * first, (end - begin) ** 2 * second)
+        return pose, (end - begin) * first, (end - begin) ** 2 * second
 
-    rows = limit_rows(asked_at(grid), limits, unit)
+    rows = limit_rows(demand(robot, *states(grid)), limits, unit)
     squares = _first(toppra, rows, grid)
     bound = Profile.of(grid, squares).duration
     found: list[_Stretch] = []
@@ -197,11 +198,13 @@ def _fastest(
         spread = min(_SPREAD * step / unit, _SHARE * profile.duration)
         progress = profile.spread(spread)
         # What the spreading exceeds is taken from the limits there.
-        tau = np.linspace(0.0, 1.0, _LOOK)
-        share, rate, gain = progress(tau)
+        tau, asked, _ = demand_between(
+            robot, lambda at, gone=progress: states(gone(at)[0]), np.linspace(0.0, 1.0, _LOOK)
+        )
+        _, rate, gain = progress(tau)
         whole = profile.duration + 2.0 * spread
         x, u = (rate / whole) ** 2, gain / whole**2
-        there = limit_rows(asked_at(share), limits, unit)
+        there = limit_rows(asked, limits, unit)
         used = there.used(u, x)
         fast = x / there.most
         slower = max(1.0, float(used.max(initial=0.0)) ** 0.5, float(fast.max()) ** 0.5)

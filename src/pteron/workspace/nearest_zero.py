@@ -1,0 +1,307 @@
+"""The nearest pose at which a function vanishes, and a distance that is proved free of such poses.
+
+Branch and bound: boxes of poses about the one asked for are cut in two, the nearest first. Those in
+which intervals prove that the function does not vanish, or no pose is in reach, are done with; so
+are those that are farther than a singular pose that is known. The nearest box that is left bounds
+the distance from below. From the middles of others Newton's steps, in pose and roots, lead to
+singular poses, which need no change of sign and may lie on the edge of reach; and from the best of
+them sequential quadratic programming leads to the nearest.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property, lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.kernels import Array
+from pteron.workspace.vanishing import Vanishing
+
+SINGULAR = 1e-10
+"""The measure of a pose that counts as singular."""
+
+_BATCH = 256
+"""Boxes at a time."""
+
+_TRIED = 12
+"""The nearest of them from which a singular pose is sought."""
+
+_SEEKING, _SELDOM = 16, 4
+"""Rounds in each of which one is sought; later in every fourth."""
+
+_FARTHER = 1.2
+"""Times the least distance known within which another pose is worth quadratic programs."""
+
+_BESIDE = 0.1
+"""Share of its distance within which other poses are next to one."""
+
+_LAST, _HITS = 128, 12
+"""Where boxes are left in the end: so many of the nearest, and of all, are looked into, and so many
+poses found in them lead to quadratic programs."""
+
+_STEPS = 30
+"""Of Newton: where a function does not change its sign they halve the distance only."""
+
+_CONVERGED = 1e-14
+
+_DRAWN, _DRAWN_LESS = 16, 1e-6
+"""Rounds in which a state is drawn nearer, and by what share of the distance it must be."""
+
+_RESTARTS = 4
+"""Of quadratic programs, each from where the last one led to."""
+
+_CLOSE = 5e-3
+"""Share of the distance to which it is searched."""
+
+_ROUNDING = 1e-12
+"""Share of a distance that rounding may take from a bound."""
+
+_EDGE = 1e-9
+"""Roots, and squares of type-I measures, below zero that count as in reach, as a share of the
+largest: of a pose on the edge."""
+
+
+class Nearest(NamedTuple):
+    """A pose at which a function vanishes; None where there is none."""
+
+    pose: Array | None
+    measure: float
+    bound: float
+    """No such pose is nearer: proved. Infinite where there is none at all."""
+
+
+class Search:
+    """A search about a pose, in some of its coordinates.
+
+    Parameters
+    ----------
+    vanishing : Vanishing
+        The function.
+    at : array, shape (m,)
+        The pose.
+    moving : array of int, shape (k,)
+        The coordinates that vary: metres, or one angle.
+    box : array, shape (2, k)
+        Where they are sought.
+    """
+
+    def __init__(
+        self, vanishing: Vanishing, at: Array, moving: NDArray[np.intp], box: Array
+    ) -> None:
+        self.vanishing, self.at, self.moving, self.box = vanishing, at, moving, box
+        self.smooth = vanishing.smooth
+        others = np.ones(len(at), bool)
+        if vanishing.leg:
+            others[vanishing.leg - 1] = False
+        self.others = np.flatnonzero(others)
+
+    def run(self, beyond: float, most: int) -> Nearest:
+        """Return the nearest place; of what is farther than `beyond` nothing is known."""
+        boxes, away = self.box[None], self._distances(self.box[None])
+        best, nearest, looked, rounds = None, beyond, 0, 0
+        while len(boxes) and looked < most and away.min() < (1.0 - _CLOSE) * nearest:
+            order = np.argsort(away, kind="stable")
+            batch, rest = boxes[order[:_BATCH]], boxes[order[_BATCH:]]
+            looked += len(batch)
+            batch = batch[~self.vanishing.absent(self._whole(batch))]
+            tried = batch[: 0 if rounds >= _SEEKING and rounds % _SELDOM else _TRIED]
+            rounds += 1
+            best, nearest = self._better(tried, best, nearest, 1)
+            boxes = np.concatenate([_halved(batch), rest])
+            away = self._distances(boxes)
+            boxes, away = boxes[away < nearest], away[away < nearest]
+        if len(boxes) and away.min() < (1.0 - _CLOSE) * nearest:
+            order = np.argsort(away, kind="stable")
+            last = np.concatenate([order[:_LAST], order[:: max(1, len(order) // _LAST)]])
+            best, nearest = self._better(boxes[last], best, nearest, _HITS)
+            if best is not None and len(self.moving) > 1:
+                best = self._drawn(best)
+                nearest = self._way(best)
+        bound = float(away.min(initial=nearest)) * (1.0 - _ROUNDING)
+        if best is None:
+            return Nearest(None, np.nan, bound)
+        return Nearest(self._pose(best), float(self._values(best[None])[0][0, 0]), bound)
+
+    def _better(
+        self, boxes: Array, best: Array | None, nearest: float, most: int
+    ) -> tuple[Array | None, float]:
+        """Return the nearest singular state and its distance, after looking into boxes (B, 2, k).
+
+        From the nearest of them, `most` at most and none next to another, quadratic programs go on.
+        """
+        hits = self._stepped(boxes.mean(axis=1))
+        for _ in range(most):
+            places = hits[:, : len(self.moving)]
+            ways = np.linalg.norm(places, axis=-1)
+            if self._sizes[0] * float(ways.min(initial=np.inf)) >= _FARTHER * nearest:
+                break
+            k = int(ways.argmin())
+            found = self._nearer(hits[k])
+            if self._way(found) < nearest:
+                best, nearest = found, self._way(found)
+            hits = hits[np.linalg.norm(places - places[k], axis=-1) > _BESIDE * ways[k]]
+        return best, nearest
+
+    # A state is a pose's coordinates that vary, and the roots, as shares of their sizes.
+
+    @cached_property
+    def _sizes(self) -> tuple[float, Array]:
+        """What lengths and roots are counted in: their sizes in the box."""
+        length = float(np.linalg.norm(self.box[1] - self.box[0]))
+        if not self.smooth.roots:
+            return length, np.empty(0)
+        whole = self._whole(self.box[None])
+        low, high, _ = self.smooth.radicands(whole[:, 0], whole[:, 1], range(self.smooth.roots))
+        most = np.nan_to_num(np.abs(np.concatenate([low, high])).max(axis=0), posinf=1.0)
+        return length, np.sqrt(np.where(most > 0.0, most, 1.0))
+
+    def _pose(self, state: Array) -> Array:
+        found = np.broadcast_to(self.at, (*state.shape[:-1], len(self.at))).copy()
+        found[..., self.moving] += self._sizes[0] * state[..., : len(self.moving)]
+        return found
+
+    def _way(self, state: Array) -> float:
+        return self._sizes[0] * float(np.linalg.norm(state[: len(self.moving)]))
+
+    def _values(self, states: Array) -> tuple[Array, Array, Array]:
+        """Return what is to vanish of states (K, k + R), what is not to be negative, both's slopes.
+
+        The value and r^2 - g, (K, 1 + R); r and the squares of the other legs' measures, (K, R + n)
+        or one less; the slopes (K, 1 + 2 R + n, k + R).
+        """
+        k, (length, sizes) = len(self.moving), self._sizes
+        count, r = len(states), len(sizes)
+        roots = states[:, k:] * sizes
+        values, slopes = (
+            np.asarray(part) for part in self.smooth.function(self._pose(states).T, roots.T)
+        )
+        slopes = slopes.reshape(len(values), count, len(self.at) + r).swapaxes(0, 1)
+        columns = [*self.moving, *range(len(self.at), len(self.at) + r)]
+        slopes = slopes[:, :, columns] * np.concatenate([np.full(k, length), sizes])
+        values = values.T
+        under = (roots * roots - values[:, 1 : 1 + r]) / sizes**2
+        slopes[:, 1 : 1 + r] /= -(sizes**2)[:, None]
+        slopes[:, np.arange(r) + 1, np.arange(r) + k] += 2.0 * states[:, k:]
+        squares, bends = values[:, 1 + r :], slopes[:, 1 + r :]
+        own = np.zeros((count, r, k + r))
+        own[:, np.arange(r), np.arange(r) + k] = 1.0
+        return (
+            np.hstack([values[:, :1], under]),
+            np.hstack([states[:, k:], squares[:, self.others]]),
+            np.concatenate([slopes[:, : 1 + r], own, bends[:, self.others]], axis=1),
+        )
+
+    def _stepped(self, places: Array) -> Array:
+        """Return singular states that Newton's steps, the shortest, lead to from places (K, k)."""
+        k, (length, sizes) = len(self.moving), self._sizes
+        states = np.zeros((len(places), k + len(sizes)))
+        states[:, :k] = (places - self.at[self.moving]) / length
+        if not len(states):
+            return states
+        roots = np.zeros((len(sizes), len(states)))
+        under = np.asarray(self.smooth.function(self._pose(states).T, roots)[0])[1 : 1 + len(sizes)]
+        states[:, k:] = np.sqrt(np.maximum(under.T, 0.0)) / sizes
+        with np.errstate(all="ignore"):
+            for _ in range(_STEPS):
+                missed, _, slopes = self._values(states)
+                good = np.isfinite(missed).all(axis=-1) & np.isfinite(slopes).all(axis=(-2, -1))
+                states, missed, slopes = states[good], missed[good], slopes[good]
+                if (np.abs(missed) <= _CONVERGED).all():
+                    break
+                across = np.linalg.pinv(slopes[:, : missed.shape[1]], rcond=1e-12)
+                states = states - (across @ missed[..., None])[..., 0]
+        return states[self._singular(states)]
+
+    def _singular(self, states: Array) -> NDArray[np.bool_]:
+        """Return which states (K,) are singular poses in reach."""
+        missed, kept, _ = self._values(states)
+        closed = (np.abs(missed) <= SINGULAR).all(axis=-1)
+        return np.asarray(closed & (kept >= -_EDGE).all(axis=-1))
+
+    def _nearer(self, state: Array) -> Array:
+        """Return the nearest singular state, sought from one on."""
+        if len(self.moving) == 1 or self._way(state) == 0.0:
+            return state
+        with np.errstate(all="ignore"):
+            for _ in range(_RESTARTS):
+                found = self._programmed(state)
+                if not (np.isfinite(found).all() and self._singular(found[None])[0]):
+                    return self._drawn(state)
+                before, state = state, min(state, found, key=self._way)
+                if self._way(state) > (1.0 - _EDGE) * self._way(before):
+                    break
+        return state
+
+    def _programmed(self, state: Array) -> Array:
+        """Return where sequential quadratic programs lead to."""
+        # Kinematics load without SciPy.
+        from scipy.optimize import minimize  # type: ignore[import-untyped]
+
+        k, count = len(self.moving), 1 + len(self._sizes[1])
+        scale = float(state[:k] @ state[:k])
+
+        def distance(x: Array) -> tuple[float, Array]:
+            way = np.concatenate([x[:k], np.zeros(len(x) - k)])
+            return 0.5 * float(way @ way) / scale, way / scale
+
+        @lru_cache(maxsize=1)
+        def values(x: bytes) -> list[Array]:
+            return [part[0] for part in self._values(np.frombuffer(x)[None])]
+
+        def part(i: int, rows: slice) -> dict[str, object]:
+            return {
+                "type": ("eq", "ineq")[i],
+                "fun": lambda x: values(x.tobytes())[i],
+                "jac": lambda x: values(x.tobytes())[2][rows],
+            }
+
+        run = minimize(
+            distance,
+            state,
+            jac=True,
+            method="SLSQP",
+            constraints=[part(0, slice(count)), part(1, slice(count, None))],
+            options={"ftol": 1e-14, "maxiter": 60},
+        )
+        return np.asarray(run.x)
+
+    def _drawn(self, state: Array) -> Array:
+        """Return a nearer singular state: by Newton's steps from places that are nearer by less.
+
+        Where the function touches zero it has no slope that quadratic programs could use.
+        """
+        k = len(self.moving)
+        rng, shares = np.random.default_rng(0), 0.5 ** np.arange(1, _DRAWN + 1)
+        for _ in range(_DRAWN):
+            aside = rng.normal(size=(3, _DRAWN, k)) * np.array([0.0, 0.5, 1.0])[:, None, None]
+            size = float(np.linalg.norm(state[:k]))
+            places = state[:k] * (1.0 - shares[:, None]) + aside * (size * shares[:, None])
+            places = self.at[self.moving] + self._sizes[0] * places.reshape(-1, k)
+            found = self._stepped(places)
+            nearest = min(found, key=self._way, default=state)
+            if self._way(nearest) > (1.0 - _DRAWN_LESS) * self._way(state):
+                break
+            state = nearest
+        return state
+
+    def _whole(self, boxes: Array) -> Array:
+        """Return boxes (B, 2, m) of poses."""
+        found = np.broadcast_to(self.at, (len(boxes), 2, len(self.at))).copy()
+        found[:, :, self.moving] = boxes
+        return found
+
+    def _distances(self, boxes: Array) -> Array:
+        """Return how far the nearest places of boxes (B, 2, k) are."""
+        here = self.at[self.moving]
+        apart = np.maximum(np.maximum(boxes[:, 0] - here, here - boxes[:, 1]), 0.0)
+        return np.asarray(np.linalg.norm(apart, axis=-1))
+
+
+def _halved(boxes: Array) -> Array:
+    """Return each box (B, 2, k) cut in two across its longest side."""
+    rows, longest = np.arange(len(boxes)), (boxes[:, 1] - boxes[:, 0]).argmax(axis=-1)
+    lower, upper, middles = boxes.copy(), boxes.copy(), boxes.mean(axis=1)
+    lower[rows, 1, longest] = upper[rows, 0, longest] = middles[rows, longest]
+    return np.concatenate([lower, upper])

@@ -1,0 +1,135 @@
+"""The functions of the pose that vanish at singular poses: their values, slopes and bounds.
+
+Next to the edge of a leg's reach the slope of what vanishes there has no end, as that of a square
+root has none. So roots are variables of their own, r^2 = g(x), r >= 0: of pose and roots the
+function is smooth on the edge too, and beyond it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Literal, NamedTuple
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.kernels import Array, Port, bounded, bounds
+from pteron.kernels.bounds import Bounded
+from pteron.kernels.graph import INPUT, expression, graph_of
+from pteron.manipulator import Manipulator
+
+Kind = Literal["I", "II", "constraint"]
+
+_WHAT = {"I": "squared_type_i", "II": "type_ii", "constraint": "constraint"}
+"""The function that vanishes, by kind."""
+
+
+@dataclass(frozen=True)
+class Vanishing:
+    """A function that vanishes at the singular poses of a kind.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        The machine.
+    kind : {"I", "II", "constraint"}
+        Of type I the square of a leg's measure, else the measure.
+    leg : int
+        The leg of type I, from 1; else 0.
+    """
+
+    robot: Manipulator
+    kind: Kind
+    leg: int = 0
+
+    @property
+    def smooth(self) -> Smooth:
+        """It, as a function of pose and roots."""
+        return _smooth(self.robot, self.kind, self.leg)
+
+    def absent(self, boxes: Array) -> NDArray[np.bool_]:
+        """Return for which boxes (B, 2, m) intervals prove that it vanishes at no pose in reach."""
+        squares = bounds(self.robot, "squared_type_i", boxes)["squares"]
+        found = np.asarray((squares.high < 0.0).any(axis=-1))
+        if self.leg:
+            return found | (squares.low[:, self.leg - 1] > 0.0)
+        for bounds_in in (self._plain_bounds, self.smooth.bounds):
+            left = np.flatnonzero(~found)
+            if len(left):
+                low, high = bounds_in(boxes[left])
+                found[left] = (low > 0.0) | (high < 0.0) | np.isnan(low)
+        return found
+
+    def _plain_bounds(self, boxes: Array) -> tuple[Array, Array]:
+        """Return bounds (B,) of the function of the pose alone: narrower where it has slopes."""
+        (value,) = bounds(self.robot, _WHAT[self.kind], boxes).values()
+        return value.low, value.high
+
+
+class Smooth(NamedTuple):
+    """A function of the pose and of the roots in it."""
+
+    radicands: Bounded
+    """Of the pose: the squares of the roots."""
+    dividend: Bounded
+    """Of pose and roots: the zeros of a quotient are those of its dividend."""
+    function: ca.Function
+    """Of poses (m, K) and roots (R, K) the value, the radicands, the squares of all type-I
+    measures, and their slopes by pose and roots."""
+
+    @property
+    def roots(self) -> int:
+        """How many roots there are."""
+        return self.radicands.outputs[0].size
+
+    def bounds(self, boxes: Array) -> tuple[Array, Array]:
+        """Return bounds (B,) of the dividend in boxes (B, 2, m); NaN where it has no value."""
+        low, high, nowhere = boxes[:, 0], boxes[:, 1], np.zeros(len(boxes), bool)
+        if self.roots:
+            least, most, _ = self.radicands(low, high, range(self.roots))
+            nowhere = np.asarray(~(most >= 0.0).all(axis=-1))
+            least, most = (np.sqrt(np.maximum(part, 0.0)) for part in (least, most))
+            # A root rounds to the nearest float.
+            low = np.hstack([low, np.maximum(np.nextafter(least, -np.inf), 0.0)])
+            high = np.hstack([high, np.nextafter(most, np.inf)])
+            low[nowhere], high[nowhere] = 0.0, 0.0
+        least, most, _ = self.dividend(low, high, [0])
+        return np.where(nowhere, np.nan, least[:, 0]), np.where(nowhere, np.nan, most[:, 0])
+
+
+@lru_cache(maxsize=256)
+def _smooth(robot: Manipulator, kind: Kind, leg: int) -> Smooth:
+    graph = graph_of(bounded(robot, _WHAT[kind]).function)
+    pose = ca.SX.sym("pose", robot.freedom)
+    radicands, roots = [], []
+    values: list[ca.SX] = []
+    lifted: list[bool] = []
+    for node in graph.nodes:
+        if node.operation == INPUT:
+            values.append(pose[node.arguments[1]])
+            lifted.append(False)
+            continue
+        parts = [values[k] for k in node.arguments]
+        lifted.append(any(lifted[k] for k in node.arguments))
+        if node.operation == "sqrt" and not lifted[-1] and not parts[0].is_constant():
+            radicands.append(parts[0])
+            roots.append(ca.SX.sym("root"))
+            values.append(roots[-1])
+            lifted[-1] = True
+        else:
+            values.append(expression(node, parts))
+    top = graph.outputs[0][max(leg - 1, 0)]
+    value = values[top]
+    while graph.nodes[top].operation == "div":
+        top = graph.nodes[top].arguments[0]
+    under, over = ca.vertcat(*radicands), ca.vertcat(*roots)
+    both = ca.vertcat(pose, over)
+    (squares,) = bounded(robot, "squared_type_i").function.call([pose])
+    whole = ca.vertcat(value, under, ca.vec(squares))
+    return Smooth(
+        Bounded(ca.Function("radicands", [pose], [under]), (Port("radicands", (len(roots),)),)),
+        Bounded(ca.Function("dividend", [both], [values[top]]), (Port("dividend", ()),)),
+        ca.Function("smooth", [pose, over], ca.cse([whole, ca.densify(ca.jacobian(whole, both))])),
+    )
