@@ -31,7 +31,7 @@ from pteron.motion.trajectories.demand import demand, demand_between
 from pteron.motion.trajectories.limit_rows import LimitRows, limit_rows
 from pteron.motion.trajectories.limits import MotionLimits, limits_of
 from pteron.motion.trajectories.path import Path
-from pteron.motion.trajectories.polynomials import polynomial
+from pteron.motion.trajectories.polynomials import Progress, polynomial
 from pteron.motion.trajectories.profile import Profile
 from pteron.motion.trajectories.time_law import STEP, kept_motion, stretch_times
 from pteron.motion.trajectories.tool import Curve
@@ -198,9 +198,11 @@ def _fastest(
         spread = min(_SPREAD * step / unit, _SHARE * profile.duration)
         progress = profile.spread(spread)
         # What the spreading exceeds is taken from the limits there.
-        tau, asked, _ = demand_between(
-            robot, lambda at, gone=progress: states(gone(at)[0]), np.linspace(0.0, 1.0, _LOOK)
-        )
+
+        def at_times(tau: Array, progress: Progress = progress) -> Curve:
+            return states(progress(tau)[0])
+
+        tau, asked, _ = demand_between(robot, at_times, np.linspace(0.0, 1.0, _LOOK))
         _, rate, gain = progress(tau)
         whole = profile.duration + 2.0 * spread
         x, u = (rate / whole) ** 2, gain / whole**2
