@@ -43,7 +43,8 @@ docs: $(VENV)/.docs
 first:
 	$(PYTHON) tests/installed/readme.py
 
-# The wheel in empty environments: every Python here, each extra alone and all; over half an hour.
+# The wheel in empty environments: every Python here, each extra alone, all, and all at their lowest
+# versions; over half an hour.
 wheels:
 	$(PYTHON) tests/installed/matrix.py
 

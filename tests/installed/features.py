@@ -49,7 +49,7 @@ def first_results() -> None:
 
 
 def everywhere() -> None:
-    """Try what needs no extra: files, the command line, code for a controller, a page."""
+    """Try what needs no extra: files, the command line, code for a controller, pages, a log."""
     robot = pteron.load("quadrupteron")
     pteron.save(robot, "robot.toml")
     assert pteron.load("robot.toml") == robot
@@ -60,6 +60,15 @@ def everywhere() -> None:
     command("cycle", "robot.toml", "--out", "cycle.parquet")
     command("report", "tripteron", "--out", "page")
     assert (Path("page") / "report.html").stat().st_size > 50_000
+    command("simulate", "five-bar", "--out", "run")
+    command("identify", "run/simulation.csv", "--robot", "five-bar", "--out", "identified")
+
+
+def cluster() -> None:
+    """Make a map in another process, into a store of arrays."""
+    grid = pteron.maps.pose_grid("five-bar", points=5)
+    pteron.maps.map_index("five-bar", "condition", grid, out="map.zarr", workers=1)
+    assert (Path("map.zarr") / "zarr.json").exists()
 
 
 def consistency() -> None:
@@ -68,6 +77,20 @@ def consistency() -> None:
     base = pteron.base_parameters(robot)
     found = pteron.identification.consistent_model(robot, base, base.values())
     assert found.feasible
+
+
+def design() -> None:
+    """Search for dimensions."""
+    spec = pteron.design.Spec.model_validate(
+        {
+            "robot": "five-bar",
+            "variables": [{"moves": "legs.lower_length", "by": "factor", "range": (0.7, 1.3)}],
+            "workspace": {"low": (-0.02, 0.01), "high": (0.02, 0.05)},
+            "objectives": [{"minimise": "links"}],
+            "search": {"population": 4, "generations": 1},
+        }
+    )
+    assert len(pteron.design.search(spec))
 
 
 def film() -> None:
@@ -124,6 +147,14 @@ def oracles() -> None:
     assert mujoco.MjModel.from_xml_path(str(file)).nv > 3
 
 
+def surfaces() -> None:
+    """Draw the surface of a map."""
+    region = dict.fromkeys("xyz", (-0.05, 0.05))
+    grid = pteron.maps.pose_grid("tripteron", ranges=region, points=8)
+    found = pteron.maps.map_index("tripteron", "condition", grid)
+    assert all(len(one.triangles) for one in pteron.maps.surfaces(found, "condition"))
+
+
 def viewer() -> None:
     """Serve the page of the viewer."""
     with pteron.viewer.view("delta", port=8123) as shown, urlopen(shown.url) as page:
@@ -131,13 +162,16 @@ def viewer() -> None:
 
 
 EXTRAS: dict[str, tuple[Callable[[], None], str]] = {
+    "cluster": (cluster, "distributed"),
     "consistency": (consistency, "cvxpy"),
+    "design": (design, "pymoo"),
     "film": (film, "imageio_ffmpeg"),
     "gymnasium": (gymnasium, "gymnasium"),
     "jax": (jax, "jax"),
     "motion": (motion, "toppra"),
     "numba": (numba, "numba"),
     "oracles": (oracles, "mujoco"),
+    "surfaces": (surfaces, "skimage"),
     "viewer": (viewer, "viser"),
 }
 """What tries an extra, and a module that it brings."""

@@ -1,5 +1,8 @@
 """The wheel in empty environments: every Python that is here, with each extra alone and with all.
 
+On the oldest Python all extras are tried once more with the lowest versions of everything that
+`pyproject.toml` asks for: these are the floors that were tried.
+
 ``make wheels`` runs it; it takes half an hour. It builds the wheel, and for each Python and choice
 of extras makes an environment, installs the wheel with pip and runs `features.py` there, with no C
 compiler in PATH, an empty home and nothing of this clone in reach. It prints a Markdown table:
@@ -22,6 +25,8 @@ from zipfile import ZipFile
 ROOT = Path(__file__).parents[2]
 FEATURES = Path(__file__).with_name("features.py")
 OLDEST = (3, 11)
+LOWEST = "lowest"
+"""All extras, each dependency at its floor."""
 DEVELOPERS = ("docs", "dev")
 """Extras of those who work on Pteron itself, who have a clone."""
 
@@ -67,7 +72,16 @@ def extras() -> list[str]:
     """Return the choices of extras: none, each alone, all together."""
     with (ROOT / "pyproject.toml").open("rb") as file:
         named = tomllib.load(file)["project"]["optional-dependencies"]
-    return ["none", *(name for name in named if name not in ("all", *DEVELOPERS)), "all"]
+    return ["none", *(name for name in named if name not in ("all", *DEVELOPERS)), "all", LOWEST]
+
+
+def floors() -> list[str]:
+    """Return the lowest version of each dependency of Pteron and its extras: numpy==2.2, ..."""
+    with (ROOT / "pyproject.toml").open("rb") as file:
+        project = tomllib.load(file)["project"]
+    given = project["optional-dependencies"]
+    own = [part for name in given if name not in ("all", *DEVELOPERS) for part in given[name]]
+    return [wanted.replace(">=", "==") for wanted in (*project["dependencies"], *own)]
 
 
 def tried(python: Path, wheel: Path, extra: str, work: Path) -> str:
@@ -81,13 +95,15 @@ def tried(python: Path, wheel: Path, extra: str, work: Path) -> str:
     home.mkdir(parents=True)
     subprocess.run([str(python), "-m", "venv", str(environment)], check=True)
     programs = environment / ("Scripts" if os.name == "nt" else "bin")
-    wanted = str(wheel) if extra == "none" else f"{wheel}[{extra}]"
+    wanted = {"none": str(wheel), LOWEST: f"{wheel}[all]"}.get(extra, f"{wheel}[{extra}]")
+    constraints = work / "constraints.txt"
+    constraints.write_text("\n".join(floors() if extra == LOWEST else []), encoding="utf-8")
     start = time.perf_counter()
     log = work / "log.txt"
     pip = [str(programs / "python"), "-m", "pip", "install", "--quiet", "--no-compile"]
     # Nothing is built here: a wheel for everything, as where there is no compiler.
     done = subprocess.run(
-        [*pip, "--only-binary", ":all:", wanted],
+        [*pip, "--only-binary", ":all:", "--constraint", str(constraints), wanted],
         env={"PIP_CACHE_DIR": str(wheel.parent / "cache"), **os.environ},
         capture_output=True,
         text=True,
@@ -101,7 +117,7 @@ def tried(python: Path, wheel: Path, extra: str, work: Path) -> str:
     kept = {name: os.environ[name] for name in ("SYSTEMROOT",) if name in os.environ}
     bare = {**kept, "PATH": str(programs), "HOME": str(home), "USERPROFILE": str(home)}
     done = subprocess.run(
-        [str(programs / "python"), str(FEATURES), extra],
+        [str(programs / "python"), str(FEATURES), "all" if extra == LOWEST else extra],
         cwd=home,
         env=bare,
         capture_output=True,
@@ -137,9 +153,12 @@ def main() -> None:
         for extra in choices:
             cells = []
             for version, python in found.items():
+                if extra == LOWEST and version != next(iter(found)):
+                    cells.append("-")
+                    continue
                 cells.append(tried(python, wheel, extra, work / version.replace(os.sep, "_")))
                 print(f"{extra}, {version}: {cells[-1]}", file=sys.stderr, flush=True)
-            failed |= any(not cell.endswith(" s") for cell in cells)
+            failed |= any(cell != "-" and not cell.endswith(" s") for cell in cells)
             print(f"| {extra} | " + " | ".join(cells) + " |", flush=True)
     raise SystemExit(failed)
 
