@@ -31,7 +31,8 @@ def write_archive(given: Map, target: Path) -> Path:
         "grid": given.grid.plain(),
     }
     about["sha256"] = checksum(about, arrays)
-    np.savez_compressed(buffer, **arrays, **{_ABOUT: np.array(json.dumps(about))})
+    arrays[_ABOUT] = np.array(json.dumps(about))
+    np.savez_compressed(buffer, **arrays)
     return write_bytes(target, buffer.getvalue())
 
 

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from functools import cached_property
 from itertools import product
 from math import isfinite, pi, prod
-from numbers import Integral, Real
+from numbers import Integral
 from sys import float_info
 from typing import Any, Self
 
@@ -303,9 +303,13 @@ def _box(robot: Manipulator, pose: Array, angles: tuple[float, ...] | None) -> A
 
 def _number(key: str, value: object) -> float:
     """Return a finite float, or say under which key it is none."""
-    if isinstance(value, bool) or not isinstance(value, Real) or not -_HUGE <= value <= _HUGE:
-        raise DataError(f"{key}: {shown(value)} given, a finite number expected")
-    return float(value)
+    if (
+        isinstance(value, int | float | np.integer | np.floating)
+        and not isinstance(value, bool)
+        and -_HUGE <= value <= _HUGE
+    ):
+        return float(value)
+    raise DataError(f"{key}: {shown(value)} given, a finite number expected")
 
 
 def expect_coordinates(
