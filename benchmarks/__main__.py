@@ -43,6 +43,7 @@ _SCRIPTS = {
     "Maps of eight million poses": "maps.py",
     "Twenty thousand damaged files": "mutants.py",
     "From a log to a running machine": "identification/chain.py",
+    "An owner's way": "identification/owner.py",
 }
 _PACKAGES = ("pteron", "numpy", "casadi", "numba", "jax", "pin", "mujoco")
 

@@ -615,6 +615,7 @@ def test_drives_are_a_table_and_data(mixed: str, monkeypatch: pytest.MonkeyPatch
         "rated_torque": None,
         "max_force": None,
         "max_speed": None,
+        "counts_per_turn": None,
     }
     pteron.save(driven(pteron.load(mixed)), "mixed.toml")
     text = done("check mixed.toml")

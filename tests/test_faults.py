@@ -141,10 +141,16 @@ def test_friction_that_falls_with_speed_is_named_and_then_identified():
     log = noisy(replace(log, forces=log.forces + more), noise=0.003)
     first, _ = named(robot, log)
     assert first.fault == "stribeck"
-    assert f"--stribeck {first.speeds[0]:.2g}," in first.message
-    result = found(robot, log, terms=Terms(stribeck=speed))
-    places = [result.model.names.index(f"Fs{i}") for i in (1, 2, 3)]
-    errors = result.estimate.values[places] - friction.coulomb
+    assert "--stribeck auto" in first.message
+    result = found(robot, log, terms=Terms(stribeck="auto"))
+    assert "stribeck" not in result.trial.tried
+    # The motion is fast: not every joint shows near rest what its friction does.
+    seen = np.flatnonzero(np.isfinite(result.unknowns.speeds))
+    assert len(seen)
+    off = np.log(result.unknowns.speeds[seen] / speed)
+    assert (np.abs(off) < 4.0 * result.unknowns.speed_deviations[seen]).all()
+    places = [result.model.names.index(f"Fs{i + 1}") for i in seen]
+    errors = result.estimate.values[places] - friction.coulomb[seen]
     assert (np.abs(errors) < 4.0 * result.estimate.deviations[places]).all()
 
 

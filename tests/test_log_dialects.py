@@ -381,8 +381,7 @@ def test_a_trace_of_codesys_2_is_read(tmp_path):
     above = "CoDeSys Trace\r\nD:\\PROJECTS\\DELTA.PRO"
     rows = sheet.rows([str(t) for t in sheet.milliseconds])
     path = written(tmp_path, [names, *rows], " ", above=above)
-    log = refused_then_read(path, sheet, "no columns for the time")
-    log = refused_then_read(path, sheet, "the median step is 2 s")
+    log = refused_then_read(path, sheet, "no columns for the time; .* the median step is 2 s")
     assert "cells separated by blanks, 3 header lines" in message(log)
 
 
@@ -605,6 +604,5 @@ def test_columns_of_unknown_names_are_declared_as_the_message_shows(tmp_path):
     sheet = Sheet("quadrupteron")
     names = ['Uhr "1" \\', *(f"Weg {c}" for c in "abcd"), *(f"Kraft {c}" for c in "abcd")]
     path = written(tmp_path, [names, *sheet.rows(seconds(sheet))], ";")
-    for words in ("no columns for the time", "no columns for the sliders"):
-        assert refused_then_read(path, sheet, words) is None
-    assert refused_then_read(path, sheet, "no columns for the forces") is not None
+    told = "no columns for the time; .* no columns for the sliders; .* no columns for the forces"
+    assert refused_then_read(path, sheet, told) is not None

@@ -404,9 +404,12 @@ def test_a_description_is_given_by_value_or_path(tmp_path):
         ("[forces]\nunits = 'N'\n", "forces.units: unknown key; .* columns, unit, gains, limits"),
         (
             "[sliders]\nunit = 'cm'\n",
-            "joints.unit: 'cm' given, 'm', 'mm', 'um', 'rad' or 'deg' expected",
+            "joints.unit: 'cm' given, 'm', 'mm', 'um', 'rad', 'deg', 'turns' or 'counts' expected",
         ),
-        ("[joints]\nunit = 'deg'\n", "joints.unit: deg given, but .* it is one of m, mm, um$"),
+        (
+            "[joints]\nunit = 'deg'\n",
+            "joints.unit: deg given, but .* it is one of m, mm, um, turns, counts$",
+        ),
         ("[joints]\n[sliders]\n", "older name"),
         (
             "[forces]\ngains = [1, 'x', 1, 1]\n",

@@ -52,7 +52,7 @@ class Controller:
         if feed_forward is None:
             state = platform_state(robot, joints, rates, accelerations)
             needed = pteron.inverse_dynamics(drawn, state.pose, state.velocity, state.acceleration)
-            braking = np.array(friction.coulomb) * np.tanh(rates / _REVERSAL)
+            braking = friction.dry(rates) * np.tanh(rates / _REVERSAL)
             braking += np.array(friction.viscous) * rates + np.array(friction.offset)
             needed = needed + compensation * braking
         else:

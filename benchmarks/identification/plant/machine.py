@@ -27,7 +27,7 @@ from plant.friction import Friction, Guides
 from plant.inverse import platform_state
 from plant.model import (
     Array,
-    first_joint,
+    actuated_coordinates,
     joint_damping,
     loop_rows,
     mujoco_model,
@@ -187,16 +187,10 @@ class _Plant:
 
         self.step, self.forward = mujoco.mj_step, mujoco.mj_forward
         self.model, self.data, self.controller = model, data, controller
-        m, first = machine.robot.freedom, first_joint(machine)
-        self.guides = Guides(friction, model, data, first, loop_rows(machine))
+        m, self.at = machine.robot.freedom, actuated_coordinates(machine)
+        self.guides = Guides(friction, model, data, self.at, loop_rows(machine))
         self.damping = friction.joints * joint_damping(machine) if friction.joints else None
-        # Views: MuJoCo's arrays stay where they are.
-        self.poses, self.joints, self.rates = (
-            data.qpos[:m],
-            data.qpos[first::3],
-            data.qvel[first::3],
-        )
-        self.accelerations, self.applied = data.qacc[first::3], data.qfrc_applied[first::3]
+        self.poses = data.qpos[:m]  # a view: MuJoCo's arrays stay where they are
         self.forces = np.zeros(m)
         self.sites = [
             [data.site(f"leg{i}_{side}").id for i in range(1, m + 1)] for side in ("end", "seat")
@@ -204,12 +198,12 @@ class _Plant:
 
     def load(self, _model: Any, _data: Any) -> None:
         """Apply the actuators' forces and friction; MuJoCo calls it at every stage."""
-        self.forces = self.controller.forces(self.data.time, self.joints, self.rates)
+        self.forces = self.controller.forces(self.data.time, self.guides.joints, self.guides.rates)
         if self.damping is not None:
             self.data.qfrc_applied[:] = -self.damping @ self.data.qvel
-            self.applied += self.forces - self.guides.braking()
+            self.data.qfrc_applied[self.at] += self.forces - self.guides.braking()
         else:
-            self.applied[:] = self.forces - self.guides.braking()
+            self.data.qfrc_applied[self.at] = self.forces - self.guides.braking()
 
     def advance(self, steps: int) -> None:
         """Go on by some steps, finely where a joint is about to turn round."""
@@ -225,7 +219,8 @@ class _Plant:
         self.forward(self.model, self.data)
         leg, platform = (self.data.site_xpos[sites] for sites in self.sites)
         gap = float(np.linalg.norm(leg - platform, axis=-1).max())
-        state = self.joints, self.rates, self.accelerations, self.forces, self.poses
+        guides = self.guides
+        state = guides.joints, guides.rates, guides.accelerations, self.forces, self.poses
         joints, rates, accelerations, forces, poses = (column.copy() for column in state)
         return joints, rates, accelerations, forces, poses, gap
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 import pteron
 from pteron.export import Tree, mjcf, tree
 
-__all__ = ["Array", "first_joint", "joint_damping", "loop_rows", "mujoco_model", "opened"]
+__all__ = ["Array", "actuated_coordinates", "joint_damping", "loop_rows", "mujoco_model", "opened"]
 
 Array = NDArray[np.float64]
 """Floats of any shape."""
@@ -34,14 +34,15 @@ def mujoco_model(machine: Tree, step: float) -> Any:
     """Return the model: its coordinates are the pose, what gears turn, where bars are, the legs.
 
     Each leg has three: slider, R1 and R2; or crank, and the angles of the universal joint between
-    it and its rod. Its constraints are first the loops', three rows for each leg, then three for
-    each bar's hinge and one for each gear, then those that can hold an actuated joint that sticks,
-    which are not active.
+    it and its rod; or the shaft's two angles and its length. Its constraints are first the loops',
+    three rows for each leg, then three for each bar's hinge and one for each gear, then those that
+    can hold an actuated joint that sticks, which are not active.
 
     Parameters
     ----------
     machine : Tree
-        The machine, with its real inertia; of P-R-R-R or R-S-S legs.
+        The machine, with its real inertia; of P-R-R-R or R-S-S legs, and a shaft that turns the
+        platform one to one.
     step : float
         Step of the integration, s.
 
@@ -52,7 +53,7 @@ def mujoco_model(machine: Tree, step: float) -> Any:
     import mujoco
 
     spec = mujoco.MjSpec.from_string(mjcf(machine, step=step))
-    for name in machine.robot.joint_names:
+    for name in _actuated(machine):
         spec.add_equality(
             type=mujoco.mjtEq.mjEQ_JOINT,
             objtype=mujoco.mjtObj.mjOBJ_JOINT,
@@ -65,10 +66,16 @@ def mujoco_model(machine: Tree, step: float) -> Any:
     return spec.compile()
 
 
-def first_joint(machine: Tree) -> int:
-    """Return which coordinate is the first leg's actuated joint; the next ones follow by threes."""
+def actuated_coordinates(machine: Tree) -> NDArray[np.int64]:
+    """Return which coordinates are the actuated joints (n,)."""
     names = [joint.name for joint in machine.joints]
-    return names.index(machine.robot.joint_names[0])
+    return np.array([names.index(name) for name in _actuated(machine)])
+
+
+def _actuated(machine: Tree) -> list[str]:
+    """Return what the actuated joints are called in the model: a shaft's is the platform's."""
+    legs, names = machine.robot.legs, machine.robot.joint_names
+    return ["phi" if leg.follows_angle else one for leg, one in zip(legs, names, strict=True)]
 
 
 def loop_rows(machine: Tree) -> int:
@@ -77,14 +84,14 @@ def loop_rows(machine: Tree) -> int:
 
 
 def joint_damping(machine: Tree) -> Array:
-    """Return C: passive joints with a unit coefficient load the coordinates with -C q'.
+    """Return C: passive joints with a unit coefficient load the coordinates with -C q'; no shaft.
 
     What is beyond the constraints is told by what is before them. R3 of a P-R-R-R leg turns at
     -theta_l', or at phi' - theta_l' about d where d is parallel to k and no R4 follows; every R4
     turns at phi'. The end of a rod turns as its tip does, back, and its hinge at phi'.
     """
     robot = machine.robot
-    n, first = len(robot.legs), first_joint(machine)
+    n, first = len(robot.legs), int(actuated_coordinates(machine)[0])
     unit = np.eye(first + 3 * n)
     turn = unit[robot.freedom - 1]
     rows = []

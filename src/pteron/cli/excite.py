@@ -50,6 +50,9 @@ def excite(
     harmonics: Annotated[int, _motion("harmonics", "How many.")] = 5,
     period: Annotated[float, _motion("period", "In s.")] = 5.0,
     periods: Annotated[int, _motion("periods", "Between lead-in and lead-out.")] = 3,
+    stribeck: Annotated[
+        bool, _motion("stribeck", "Slow passages too, for friction that falls with speed.")
+    ] = False,
     speed: Annotated[
         float | None,
         _limit("speed", "Of the joints, m/s or rad/s.", show_default="the drives', else 1"),
@@ -104,7 +107,9 @@ def excite(
     The file leads in from rest, repeats the trajectory, and leads out to rest in the pose where it
     began, all on the trajectory's own way: take the machine to the first row, and play it. Every
     limit is kept, at ten times as many samples too. Beside motion.csv, motion-held-out.csv has
-    pick-and-place cycles within the same limits, to judge the identified model by.
+    pick-and-place cycles within the same limits, to judge the identified model by; and, with
+    --stribeck, motion-slow.csv the same way slowly from rest to rest, which shows how friction
+    falls with speed: record all, and pteron identify log.csv slow.csv --stribeck auto.
 
     The columns are t rho1 ... x y z phi and their rates (d..., dd..., per s), and force1 ... by the
     machine's nominal inertia and its drives' friction; theta1 ... and torque1 ... of cranks. The
@@ -165,15 +170,18 @@ def excite(
     if found.interrupted:
         note("Note: interrupted; this is the best until then")
     led, cycles = found.with_leads(periods), _held_out(found, rate)
+    slow = found.slow() if stribeck else None
     left = {"motion": led.margins(limits, rate)}
     if cycles is not None:
         left["held out"] = cycles.margins(limits, rate)
+    if slow is not None:
+        left["slow"] = slow.margins(limits, rate)
     for name, margins in left.items():
         if not margins.kept:
             raise ModelError(
                 f"{name}: the limits are not kept between samples; choose another --seed"
             )
-    files = [] if out is None else found.write(out, rate, periods, layout, cycles)
+    files = [] if out is None else found.write(out, rate, periods, layout, cycles, slow)
     if json:
         show_json(
             {
@@ -182,6 +190,7 @@ def excite(
                 "end": led.end,
                 "duration": led.duration,
                 "held_out": cycles and cycles.as_dict(),
+                "slow": slow and slow.duration,
                 "files": [str(path) for path in files],
             }
         )
@@ -196,6 +205,8 @@ def excite(
             f"To hold out: {cycles.count} pick-and-place cycles of {cycles.length:.4g} s, "
             f"{cycles.cycle.scale:.0%} of the standard size."
         )
+    if slow is not None:
+        show(f"Slowly: the same way in {slow.duration:g} s, for friction that falls with speed.")
     show(*(f"Written: {plain(str(path))}" for path in files))
 
 

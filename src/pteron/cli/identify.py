@@ -11,7 +11,8 @@ from typer import Argument
 
 from pteron.cli.arguments import Elbows, Json, load_robot, option
 from pteron.cli.completion import machines
-from pteron.cli.screen import plain, show, show_json, spinner, stages, table
+from pteron.cli.screen import is_terminal, note, plain, show, show_json, spinner, stages, table
+from pteron.cli.times import Times
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
@@ -66,14 +67,17 @@ def identify(
     ] = "none",
     stribeck: Annotated[
         str | None,
-        option("stribeck", "Friction falls with this speed, m/s or rad/s.", "SPEED,..."),
+        option("stribeck", "Friction falls with this speed, m/s or rad/s.", "SPEED,...|auto"),
     ] = None,
     delay: Annotated[
         str | None,
         option("delay", "How late forces are for positions, s; auto: find it.", "S|auto"),
     ] = None,
     rotors: Annotated[bool, option("rotors", "With the inertia of the motors.")] = False,
-    payload: Annotated[bool, option("payload", "With the payload carried.")] = False,
+    payload: Annotated[
+        bool,
+        option("payload", "A payload too: logs with it and without, column payload 1 and 0."),
+    ] = False,
     shared: Annotated[
         bool, option("shared", "All legs share one set of inertial parameters.")
     ] = False,
@@ -98,6 +102,9 @@ def identify(
 ) -> None:
     """Identify a machine from recorded motions, and say whether the result can be trusted.
 
+    With --payload, what a payload adds is found from the motion recorded with it and without: in
+    one log whose column payload is 0, then 1, or in two logs, such as without.csv with.csv.
+
     The folder gets identification.html to read, identification.json with all numbers, and the
     machine with real bodies as NAME.toml. The exit code is 0 whatever the verdict.
     """
@@ -110,8 +117,8 @@ def identify(
         from pteron.report.identification import model_path, numbers, write_identification
         from pteron.report.write import checked_folder
 
-        speeds = None if stribeck is None else _speeds(stribeck)
-        terms = _terms(without, joints, rotors=rotors, payload=payload, stribeck=speeds)
+        falls = _speeds(stribeck)
+        terms = _terms(without, joints, rotors=rotors, payload=payload, stribeck=falls)
         bounds = _bounds(boxes, machine)
         processing = Processing(derivatives, cutoff, band, period, delay=_delay(delay))
         fit, check = (
@@ -124,6 +131,7 @@ def identify(
     rows = sum(log.rows_estimate or 0 for log in (*fit, *check))
     folder = checked_folder(out)
     with stages(f"Identifying {machine.name}", rows) as tell:
+        times = Times(tell)
         result = identified(
             machine,
             fit,
@@ -134,23 +142,28 @@ def identify(
             processing=processing,
             cad=drawn,
             bounds=bounds,
-            progress=tell,
+            progress=times,
         )
     with spinner("Drawing the report"):
+        times("Drawing the report", 0, 0)
         files = write_identification(result, folder, sources=sources)
+    if is_terminal():
+        note(times.told())
     if as_json:
         show_json({"files": [str(path) for path in files.paths], **numbers(result)})
         return
     _show(result, files)
 
 
-def _speeds(text: str) -> tuple[float, ...]:
+def _speeds(text: str | None) -> tuple[float, ...] | Literal["auto"] | None:
+    if text in (None, "auto"):
+        return "auto" if text else None
     try:
-        return tuple(float(part) for part in text.split(","))
+        return tuple(float(part) for part in str(text).split(","))
     except ValueError:
         raise DataError(
             f"--stribeck: {text!r} given, a speed in m/s or rad/s expected, or one for each joint, "
-            "such as 0.02,0.03"
+            "such as 0.02,0.03, or auto"
         ) from None
 
 
@@ -171,7 +184,7 @@ def _terms(
     *,
     rotors: bool,
     payload: bool,
-    stribeck: tuple[float, ...] | None,
+    stribeck: tuple[float, ...] | Literal["auto"] | None,
 ) -> Terms:
     from pteron.identification import Terms
 
@@ -240,10 +253,13 @@ def _values(result: Identification) -> Table:
     from pteron.report.identification import measured, parameter_rows
     from pteron.report.typeset import significant
 
-    headings = ("value", "+- 95 %", "rel. (%)")
+    short = result.understated
+    headings = ("value", "+- 95 % (!)" if short else "+- 95 %", "rel. (%)")
     numbers = headings[: 2 if _narrow() else 3]
     columns = ["parameter", *numbers, *(() if _narrow() else ("unit",)), ""]
     caption = "Base parameters are sums, named by one term; the page has them in full."
+    if short:
+        caption += " (!) Too short: they do not allow for the faults that are named."
     made = table(*columns, numbers=numbers, caption=caption)
     marks = {"essential": "", "dropped": "[yellow]weak[/]", "unseen": "[yellow]unseen[/]"}
     for row in parameter_rows(result):

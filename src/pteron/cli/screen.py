@@ -114,9 +114,12 @@ def note(message: str) -> None:
 
 
 def complain(message: str) -> None:
-    """Print an error as one line on standard error."""
+    """Print an error as one line on standard error; lines to paste into a file stay lines."""
     console = Console(stderr=True, highlight=False, emoji=False, soft_wrap=True)
-    console.print(f"[bold red]Error:[/bold red] {plain(message)}")
+    told, start, lines = message.partition("\n[")
+    console.print(f"[bold red]Error:[/bold red] {plain(told)}")
+    for line in (start + lines).split("\n")[1:]:
+        console.print(plain(line))
 
 
 @contextmanager

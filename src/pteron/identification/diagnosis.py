@@ -12,7 +12,7 @@ from pteron.errors import DataError
 from pteron.identification.estimators import weighted
 from pteron.identification.logs import Log
 from pteron.identification.model import Model
-from pteron.identification.observation import Observations, observations_of
+from pteron.identification.observation import Linear, Observations, observations_of
 from pteron.identification.plausibility import unphysical
 from pteron.identification.signals import Preprocessing
 
@@ -145,7 +145,7 @@ def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> Fault 
 
 
 def exchanged_joints(
-    model: Model, log: Log, preprocessing: Preprocessing, before: float
+    model: Linear, log: Log, preprocessing: Preprocessing, before: float
 ) -> Fault | None:
     """Return the order of the joints, or the sign of one, that makes the error `before` small."""
     none = _fault(model, log.joints.shape[1])
@@ -157,7 +157,7 @@ def exchanged_joints(
     return best
 
 
-def _fault(model: Model, n: int) -> Fault:
+def _fault(model: Linear, n: int) -> Fault:
     """Return that of a log without a fault."""
     usual, upright = tuple(range(n)), (1,) * n
     names = model.robot.force_names, model.robot.joint_names
@@ -199,7 +199,7 @@ def _others(
 
 
 def _moved_joints(
-    none: Fault, model: Model, log: Log, how: Preprocessing
+    none: Fault, model: Linear, log: Log, how: Preprocessing
 ) -> Iterator[tuple[Fault, Observations]]:
     """Yield logs with the sign of a joint flipped, or joints in another order, that have poses."""
     n = len(none.order)

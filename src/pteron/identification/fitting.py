@@ -6,7 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import combinations, product
 
-from pteron.errors import DataError
+import numpy as np
+
+from pteron.errors import DataError, PteronError
 from pteron.identification.diagnosis import DECISIVE, column_fault, exchanged_joints
 from pteron.identification.errors import LogError
 from pteron.identification.estimators import (
@@ -17,14 +19,19 @@ from pteron.identification.estimators import (
     instrumental,
     maximum_likelihood,
     total,
+    weighted,
 )
 from pteron.identification.logs import Log
-from pteron.identification.logs.recorded import check_recorded
+from pteron.identification.logs.at_motor import per_cent_advice
+from pteron.identification.logs.recorded import at_limits, check_recorded
 from pteron.identification.logs.sizes import check_forces as check_strength
 from pteron.identification.model import Model
-from pteron.identification.observation import Observations, observations_of, stacked
+from pteron.identification.observation import Linear, Observations, observations_of, stacked
+from pteron.identification.plausibility import left_over
 from pteron.identification.recordings import Recording, same
 from pteron.identification.signals import Preprocessing, Processing, preprocessing_of
+from pteron.identification.signals.filters import MEDIAN_SIZE
+from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 
 METHODS = (*ESTIMATORS, "instrumental", "likelihood")
@@ -37,9 +44,15 @@ to be called mended."""
 _LOOK = 12_000
 """Rows that are tried in other orders."""
 
+_MOST = 10.0
+"""Ratio of the noise of two recordings, at most."""
+
+_NOISELESS = 1e-10
+"""Residuals, relative to the forces, that are rounding."""
+
 
 def check_recordings(
-    whole: Sequence[Recording], others: Sequence[Recording], wanted: Processing
+    robot: Manipulator, whole: Sequence[Recording], others: Sequence[Recording], wanted: Processing
 ) -> None:
     """Refuse recordings of currents, of values that are no forces, and what is given twice."""
     for one in (*whole, *others):
@@ -48,11 +61,12 @@ def check_recordings(
             check_strength(one.log.forces, one.log.force_names, one.source, one.log.first_row)
         unit = one.head().description.force_unit
         if unit != "N":
+            other = f", {per_cent_advice(robot)}" if unit == "%" else ""
             raise LogError(
                 "currents",
                 one.source,
                 f"its forces are in {unit}; declare gains (N, at a crank N m, per {unit}) in its "
-                "description, or find them with identify_drive_gains",
+                f"description, or find them with identify_drive_gains{other}",
             )
     for one, other in combinations(whole, 2):
         if same(one, other):
@@ -112,7 +126,7 @@ def preprocessing_for(
 
 
 def fit_observations(
-    model: Model, one: Recording, preprocessing: Preprocessing, progress: Callable[[int], None]
+    model: Linear, one: Recording, preprocessing: Preprocessing, progress: Callable[[int], None]
 ) -> Observations:
     """Return a recording's observations; where it has no poses, say whether joints are swapped."""
     try:
@@ -125,6 +139,46 @@ def fit_observations(
             raise
         error.args = (f"{error}; or {swap.message()}: then every row has a pose",)
         raise
+
+
+def balanced(parts: Sequence[Observations]) -> Observations:
+    """Return the observations of recordings as one, with the rows of each by its own noise.
+
+    A motion of small forces is recorded with less noise than one of large ones: unscaled, the noise
+    of both would be taken for one, and the values' intervals would hold for neither.
+    """
+    if len(parts) == 1:
+        return parts[0]
+    whole = stacked(parts)
+    found = weighted(whole)
+    ends = np.cumsum([len(part.forces) for part in parts])[:-1]
+    rest = [
+        _size(part, left) for part, left in zip(parts, np.split(found.residuals, ends), strict=True)
+    ]
+    usual = _size(whole, found.residuals)
+    if (usual <= _NOISELESS * np.abs(whole.forces).max(axis=0)).any():
+        return whole
+    scales = [np.clip(usual / np.maximum(one, 1e-300), 1.0 / _MOST, _MOST) for one in rest]
+    return stacked([_scaled(part, one) for part, one in zip(parts, scales, strict=True)])
+
+
+def _size(part: Observations, rest: Array) -> Array:
+    """Return the noise of residuals (R, n) for each actuator, which wild ones leave as it is."""
+    used = np.where(part.gain > 0.0, np.abs(rest), np.nan)
+    seen = part.used > 0
+    found = np.zeros(part.actuators)
+    found[seen] = np.nanmedian(used[:, seen], axis=0) / MEDIAN_SIZE
+    return found
+
+
+def _scaled(part: Observations, factor: Array) -> Observations:
+    """Return observations with each actuator's rows times a factor (n,)."""
+    return replace(
+        part,
+        matrix=part.matrix * factor[:, None],
+        forces=part.forces * factor,
+        gain=part.gain / factor,
+    )
 
 
 def estimated(
@@ -153,6 +207,36 @@ def estimated(
     if estimator == "likelihood":
         return maximum_likelihood(model, logs[0], preprocessing[0])
     return total(observations, column_errors(model, logs[0], preprocessing[0]))
+
+
+def with_findings(error: PteronError, whole: Sequence[Recording]) -> PteronError:
+    """Return an error with what was noticed in the logs behind it, which may explain it."""
+    findings = [said.rstrip(".") for one in whole for said in at_limits(one.head())]
+    findings += [finding.message for one in whole for finding in one.findings]
+    if findings:
+        error.args = (f"{error} (noticed before: {'; '.join(findings[:3])})",)
+    return error
+
+
+def too_little_motion(
+    model: Model,
+    hidden: tuple[str, ...],
+    estimate: Estimate,
+    preprocessing: Sequence[Preprocessing],
+    first: Recording,
+) -> LogError:
+    """Return the error for a motion that leaves most base parameters unseen."""
+    rank = model.base.rank
+    names = ", ".join(hidden) if len(hidden) < rank else "all"
+    cause = left_over(estimate, preprocessing)
+    return LogError(
+        "too little motion",
+        first.source,
+        f"{cause or 'too little motion'}: {len(hidden)} of {rank} base parameters cannot be seen "
+        f"({names}), their standard deviations are larger than their usual size; "
+        f"{'mend that, or ' if cause else ''}move faster and along all coordinates, as the motion "
+        "does that pteron excite ROBOT --out motion.csv writes",
+    )
 
 
 def check_columns(model: Model, one: Recording, preprocessing: Preprocessing) -> None:

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from pteron.errors import DataError, ModelError, PteronError
+from pteron.errors import DataError, ModelError
 from pteron.identification.consistency import Bounds, Consistency, MissingSolver, consistent_model
 from pteron.identification.errors import LogError
 from pteron.identification.estimators import (
@@ -20,22 +20,27 @@ from pteron.identification.estimators import (
 from pteron.identification.faults import delay_of, trial
 from pteron.identification.fitting import (
     METHODS,
+    balanced,
     check_columns,
     check_payload,
     check_recordings,
     estimated,
     fit_observations,
     preprocessing_for,
+    too_little_motion,
+    with_findings,
 )
 from pteron.identification.logs import Log, LogFile
+from pteron.identification.logs.at_motor import by_rated_torque
 from pteron.identification.logs.recorded import at_limits
 from pteron.identification.model import Model, Terms, identification_model
-from pteron.identification.observation import Observations, stacked
-from pteron.identification.plausibility import doubts, left_over, unphysical, unseen
+from pteron.identification.observation import Linear, Observations
+from pteron.identification.plausibility import doubts, unphysical, unseen
 from pteron.identification.prediction import predict
 from pteron.identification.recordings import Recording, divided, recording
 from pteron.identification.result import Identification
-from pteron.identification.signals import Preprocessing, Processing
+from pteron.identification.signals import Processing
+from pteron.identification.unknowns import Unknowns, searched_speeds, settled
 from pteron.identification.verdict import judged, verdict_of, with_bodies
 from pteron.kernels import Array
 from pteron.legs import Drive
@@ -44,6 +49,11 @@ from pteron.reduction import base_parameters
 from pteron.reduction.sharing import Sharing
 
 Logs = Log | LogFile | Sequence[Log | LogFile]
+
+_SLOWLY = (
+    "It shows where joints move slowly: pteron excite ROBOT --stribeck --out motion.csv writes "
+    "motion-slow.csv too; record it, and give its log with the others."
+)
 
 Stage = Callable[[str, int, int], None]
 """Told what is being done, how many rows of it are done, and how many there are."""
@@ -115,7 +125,7 @@ def identify(
         [recording(log, read, wanted.period) for log in _sequence(given, robot)]
         for given in (logs, held_out)
     )
-    check_recordings(whole, others, wanted)
+    check_recordings(robot, whole, others, wanted)
     limits = tuple(said for one in whole for said in at_limits(one.head()))
     halves = [] if others else [divided(one, wanted.period) for one in whole]
     fit = [first for first, _ in halves] or whole
@@ -130,22 +140,41 @@ def identify(
         check_payload(fit)
 
     # Preprocess, stack and solve
-    def fitted_by(how: Processing) -> tuple[tuple[Preprocessing, ...], Observations, Estimate]:
-        treated = tuple(preprocessing_for(robot, one, how) for one in fit)
-        parts = [
-            fit_observations(model, one, each, _reader(report, "Filtering"))
-            for one, each in zip(fit, treated, strict=True)
-        ]
-        rows = stacked(parts)
-        try:
-            return treated, rows, estimated(estimator, model, fit, treated, rows)
-        except DataError as error:
-            raise _with_findings(error, whole) from None
+    preprocessing = tuple(preprocessing_for(robot, one, wanted) for one in fit)
 
-    preprocessing, observations, estimate = fitted_by(wanted)
-    if wanted.delay == "auto":
-        wanted = replace(wanted, delay=delay_of(model, estimate, fit, preprocessing))
-        preprocessing, observations, estimate = fitted_by(wanted)
+    def observe(columns: Linear, delay: float | None = None) -> Observations:
+        late = [how if delay is None else replace(how, delay=delay) for how in preprocessing]
+        return balanced(
+            [
+                fit_observations(columns, one, how, _reader(report, "Filtering"))
+                for one, how in zip(fit, late, strict=True)
+            ]
+        )
+
+    found, more = Unknowns(), np.zeros(())
+    if model.terms.stribeck == "auto":
+        usual = np.max([how.usual for how in preprocessing], axis=0)
+        found = Unknowns(searched_speeds(model, observe, usual))
+        model = model.falling(np.asarray(found.speeds))
+    observations = observe(model)
+    try:
+        if wanted.delay == "auto" or found.speeds is not None:
+            first = weighted(observations)
+            if wanted.delay == "auto":
+                coarse = delay_of(model, first, fit, preprocessing)
+                found = replace(found, delay=coarse)
+            else:
+                found = replace(found, delay=wanted.delay)
+            late = wanted.delay == "auto"
+            model, observations, found, more = settled(
+                model, observe, found, first.values, late=late
+            )
+            wanted = replace(wanted, delay=found.delay)
+            preprocessing = tuple(replace(how, delay=found.delay) for how in preprocessing)
+        estimate = estimated(estimator, model, fit, preprocessing, observations)
+        estimate = replace(estimate, covariance=estimate.covariance + more)
+    except DataError as error:
+        raise with_findings(error, whole) from None
 
     # Judge by what was held out, which betrays columns that are not what they are called
     modes = [None] * len(check) if others else [how.start for how in preprocessing]
@@ -165,10 +194,12 @@ def identify(
         try:
             check_columns(model, fit[0], preprocessing[0])
         except LogError as error:
-            raise _with_findings(error, whole) from None
+            raise with_findings(error, whole) from None
     hidden, too_many = unseen(model, estimate.deviations)
     if too_many:
-        raise _with_findings(_too_little(model, hidden, estimate, preprocessing, fit[0]), whole)
+        raise with_findings(
+            too_little_motion(model, hidden, estimate, preprocessing, fit[0]), whole
+        )
     report("Looking for faults", 0, 0)
     shown = trial(model, estimate, fit, preprocessing, _reflected(rotors))
     verdict = verdict_of(held, shown, repeats=not others, limits=limits)
@@ -178,6 +209,7 @@ def identify(
     )
 
     # Find what the data show by themselves, and real bodies
+    report("Finding real bodies", 0, 0)
     again = ESTIMATORS.get(estimator, weighted) if isinstance(estimator, str) else estimator
     essential = essential_parameters(observations, estimate, again)
     known = np.zeros(len(model.names))
@@ -188,17 +220,12 @@ def identify(
             model, estimate, known, observations, drawn, bounds
         )
     except ModelError as error:
-        raise _with_findings(error, whole) from None
+        raise with_findings(error, whole) from None
     verdict = with_bodies(verdict, consistency, off)
     advice = doubts(model, estimate, known, consistency, drawn)
     if hidden or essential.dropped:
-        weak = ", ".join(dict.fromkeys((*hidden, *essential.dropped)))
-        advice.insert(
-            0,
-            f"Weak with this motion: {weak}. pteron excite ROBOT --out motion.csv writes a motion "
-            "that shows more of them; the faster (--speed, --acceleration) and longer (--periods), "
-            "the more.",
-        )
+        weak = dict.fromkeys((*hidden, *essential.dropped))
+        advice[:0] = _more_motion(model, list(weak))
     return Identification(
         robot=robot,
         model=model,
@@ -213,18 +240,20 @@ def identify(
         verdict=replace(verdict, next_steps=(*verdict.next_steps, *advice)),
         unseen=hidden,
         findings=tuple(f for one in (*whole, *others) for f in one.findings),
-        notes=(*_notes(model, estimate, _reflected(rotors)), *missing),
+        notes=(*_notes(model, estimate, _reflected(rotors)), *_told(found, model), *missing),
         rotors=rotors,
+        unknowns=found,
     )
 
 
 def _sequence(logs: Logs, robot: Manipulator) -> list[Log | LogFile]:
-    """Return the logs, with the names of the machine's joints where they have none."""
+    """Return the logs, with the names of the machine's joints where they have none, in newtons."""
     symbols = tuple(leg.joint for leg in robot.legs)
-    return [
+    named = [
         replace(one, symbols=symbols) if isinstance(one, Log) and one.symbols is None else one
         for one in ([logs] if isinstance(logs, Log | LogFile) else logs)
     ]
+    return [by_rated_torque(one, robot) for one in named]
 
 
 def _reader(report: Stage, task: str) -> Callable[[int], None]:
@@ -254,34 +283,46 @@ def _reflected(rotors: tuple[tuple[float, float], ...] | None) -> dict[str, floa
     return {f"J_m{i}": inertia * r**2 for i, (inertia, r) in enumerate(rotors or (), start=1)}
 
 
-def _with_findings(error: PteronError, whole: Sequence[Recording]) -> PteronError:
-    """Return an error with what was noticed in the logs behind it, which may explain it."""
-    findings = [said.rstrip(".") for one in whole for said in at_limits(one.head())]
-    findings += [finding.message for one in whole for finding in one.findings]
-    if findings:
-        error.args = (f"{error} (noticed before: {'; '.join(findings[:3])})",)
-    return error
+def _more_motion(model: Model, weak: Sequence[str]) -> list[str]:
+    """Return which motion shows more of values that are weak: friction at rest wants slow ones."""
+    kinds = dict(zip(model.names, model.kinds, strict=True))
+    falls = [name for name in weak if kinds[name] == "stribeck"]
+    others = [name for name in weak if name not in falls]
+    advice = []
+    if others:
+        advice.append(
+            f"Weak with this motion: {', '.join(others)}. pteron excite ROBOT --out motion.csv "
+            "writes a motion that shows more of them; the faster (--speed, --acceleration) and "
+            "longer (--periods), the more."
+        )
+    if falls:
+        advice.append(f"Weak with this motion: {', '.join(falls)}. {_SLOWLY}")
+    return advice
 
 
-def _too_little(
-    model: Model,
-    hidden: tuple[str, ...],
-    estimate: Estimate,
-    preprocessing: Sequence[Preprocessing],
-    first: Recording,
-) -> LogError:
-    """Return the error for a motion that leaves most base parameters unseen."""
-    rank = model.base.rank
-    names = ", ".join(hidden) if len(hidden) < rank else "all"
-    cause = left_over(estimate, preprocessing)
-    return LogError(
-        "too little motion",
-        first.source,
-        f"{cause or 'too little motion'}: {len(hidden)} of {rank} base parameters cannot be seen "
-        f"({names}), their standard deviations are larger than their usual size; "
-        f"{'mend that, or ' if cause else ''}move faster and along all coordinates, as the motion "
-        "does that pteron excite ROBOT --out motion.csv writes",
-    )
+def _told(found: Unknowns, model: Model) -> list[str]:
+    """Return what was found of the delay and of the speeds with which friction falls."""
+    notes = []
+    if found.delay_deviation:
+        notes.append(
+            f"The forces are {1e3 * found.delay:.3g} ms (+- {2e3 * found.delay_deviation:.1g}) "
+            "late for the positions; that is taken out."
+        )
+    if found.speeds is not None:
+        low, high = found.speed_intervals()
+        joints = [leg.joint for leg in model.robot.legs]
+        seen = np.isfinite(found.speeds)
+        parts = [
+            f"{found.speeds[i]:.3g} ({low[i]:.3g} to {high[i]:.3g}) {joint.unit}/s"
+            for i, joint in enumerate(joints)
+            if seen[i]
+        ]
+        if parts:
+            notes.append(f"Friction falls with these speeds (95 %): {', '.join(parts)}.")
+        hidden = [name for name, one in zip(model.robot.force_names, seen, strict=True) if not one]
+        if hidden:
+            notes.append(f"Friction is not seen to fall at {', '.join(hidden)}. {_SLOWLY}")
+    return notes
 
 
 def _real_bodies(

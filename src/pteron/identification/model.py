@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal, NamedTuple, get_args
 
@@ -43,9 +43,10 @@ class Terms:
         r in rad/m (kg), or in rad/rad at a crank (kg m^2). Its column is q'': at a crank it joins
         I_u, on a level guide the mass of its slider, m_p; on any other guide, where gravity pulls
         at m_p but not at a rotor, m_p and the offset. `Model.joins` and the expressions say so.
-    stribeck : float or sequence of n floats, optional
+    stribeck : float, sequence of n floats or "auto", optional
         Friction of each actuated joint that falls as it moves faster (Stribeck), with this speed:
-        Fs sign(q') exp(-(q' / speed)^2); m/s or rad/s. None, the default, for none.
+        Fs sign(q') exp(-(q' / speed)^2); m/s or rad/s. "auto" lets `identify` find the speeds.
+        None, the default, for none.
     """
 
     coulomb: bool = True
@@ -54,10 +55,10 @@ class Terms:
     passive: Passive = "none"
     payload: bool = False
     rotors: bool = False
-    stribeck: float | tuple[float, ...] | None = None
+    stribeck: float | tuple[float, ...] | Literal["auto"] | None = None
 
     def __post_init__(self) -> None:
-        if self.stribeck is not None:
+        if self.stribeck is not None and self.stribeck != "auto":
             speeds = np.atleast_1d(np.array(self.stribeck, dtype=float))
             if not (speeds.size and np.isfinite(speeds).all() and (speeds > 0.0).all()):
                 raise ModelError(f"stribeck: {self.stribeck} given, speeds above 0 expected")
@@ -92,11 +93,15 @@ class Model:
     joins : dict
         Terms whose columns depend on others at every state, and the share of each that goes with
         those it joins: they are no values of their own.
+    speeds : tuple of n floats, optional
+        With which friction falls, where `Terms` ask for them to be found; infinite where it does
+        not. Without them the model has none of that friction.
     """
 
     base: BaseParameters
     terms: Terms
     joins: dict[str, dict[str, float]] = field(default_factory=dict)
+    speeds: tuple[float, ...] | None = None
 
     @property
     def left_out(self) -> tuple[str, ...]:
@@ -129,7 +134,7 @@ class Model:
         if self.terms.rotors:
             units = {i: "kg" if slides[i] else "kg m^2" for i in slides}
             found += [Term("rotor", f"J_m{i}", "J", f"m{i}", units[i]) for i in slides]
-        if self.terms.stribeck is not None:
+        if self.stribeck_speeds is not None:
             found += [Term("stribeck", f"Fs{i}", "F", f"s{i}", j.force_unit) for i, j in joints]
         if self.terms.payload:
             found += [
@@ -143,8 +148,12 @@ class Model:
     @property
     def stribeck_speeds(self) -> Array | None:
         """The speed of each joint with which friction falls (n,), where the model has that."""
-        given = self.terms.stribeck
+        given = self.speeds if self.terms.stribeck == "auto" else self.terms.stribeck
         return None if given is None else np.broadcast_to(given, (len(self.robot.legs),))
+
+    def falling(self, speeds: Array) -> Model:
+        """Return the model with speeds (n,) that were found."""
+        return _independent(Model(self.base, self.terms, speeds=tuple(speeds.tolist())))
 
     @cached_property
     def kept_terms(self) -> tuple[Term, ...]:
@@ -281,14 +290,20 @@ def identification_model(
     """
     robot = as_manipulator(robot)
     model = Model(base or base_parameters(robot), terms or Terms())
-    speeds = np.atleast_1d(model.terms.stribeck or 1.0)
+    given = model.terms.stribeck
+    speeds = np.atleast_1d(1.0 if given in (None, "auto") else given)
     if speeds.size not in (1, len(robot.legs)):
         raise ModelError(
             f"stribeck: {speeds.size} speeds given, one expected or {len(robot.legs)}, one for "
             f"each joint of {robot.name}"
         )
+    return _independent(model)
+
+
+def _independent(model: Model) -> Model:
+    """Return a model without the terms whose columns depend on others at every state."""
     names = model.names
-    flat = model._everything(_probes(robot)).reshape(-1, len(names))
+    flat = model._everything(_probes(model.robot)).reshape(-1, len(names))
     lengths = np.linalg.norm(flat, axis=0)
     lengths = np.where(lengths > 0.0, lengths, 1.0)
     factor: Array = np.linalg.qr(flat / lengths)[1]
@@ -305,7 +320,7 @@ def identification_model(
             for j, share, size in zip(kept, scaled, shares, strict=True)
             if abs(size) > _DEPENDENT
         }
-    return Model(model.base, model.terms, joins)
+    return replace(model, joins=joins)
 
 
 def _probes(robot: Manipulator) -> States:

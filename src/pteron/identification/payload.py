@@ -2,21 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from scipy.stats import chi2  # type: ignore[import-untyped]
 
 from pteron.bodies.parameters import PLATFORM_KINDS
+from pteron.errors import DataError
 from pteron.identification.errors import LogError
 from pteron.identification.estimators import Estimate, weighted
-from pteron.identification.logs import Log
+from pteron.identification.faults import Trial, trial
+from pteron.identification.fitting import (
+    balanced,
+    check_columns,
+    check_recordings,
+    too_little_motion,
+    with_findings,
+)
+from pteron.identification.logs import Finding, Log
+from pteron.identification.logs.at_motor import by_rated_torque
 from pteron.identification.model import Model, Terms, identification_model
 from pteron.identification.observation import Observations, observations_of, stacked
-from pteron.identification.recordings import periodic_part
-from pteron.identification.signals import Processing, preprocessing_of
+from pteron.identification.plausibility import left_over, unphysical, unseen
+from pteron.identification.recordings import Recording, recording
+from pteron.identification.signals import Preprocessing, Processing, preprocessing_of
 from pteron.kernels import Array
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.reduction import BaseParameters
@@ -47,6 +58,10 @@ class Payload:
         The fit of everything: base parameters, friction and offsets first, the payload last.
     residual : array, shape (n,)
         Standard deviation of what is left of each actuator's forces, N or N m, before the filter.
+    trial : Trial
+        Faults of the logs or the machine that the residuals show, and what they spoil.
+    findings : tuple of Finding
+        What was noticed in the logs, such as uneven time stamps.
     """
 
     mass: float | None
@@ -56,6 +71,8 @@ class Payload:
     covariance: Array = field(repr=False)
     estimate: Estimate = field(repr=False)
     residual: Array
+    trial: Trial = field(repr=False)
+    findings: tuple[Finding, ...] = ()
 
     @property
     def values(self) -> Array:
@@ -92,6 +109,11 @@ class Payload:
         scaled = self.values / deviations
         return bool(scaled @ np.linalg.solve(correlation, scaled) > chi2.isf(_CHANCE, len(scaled)))
 
+    @property
+    def allowed_for(self) -> bool:
+        """Whether no fault that matters shows, so that the values' errors are as stated."""
+        return not any(one.matters for one in self.trial.suspicions)
+
     def summary(self) -> str:
         """Return what was found, for people, as lines of text."""
         lines = ["Payload, about P in the platform's frame:"]
@@ -105,6 +127,10 @@ class Payload:
         if hidden:
             lines.append(f"Not felt by the actuators: {', '.join(hidden)}.")
         lines.append(self._opinion())
+        lines += [one.message for one in self.trial.suspicions if one.matters]
+        if not self.allowed_for:
+            lines.append("The stated errors do not allow for that.")
+        lines += [f"Note: {one.message}" for one in self.findings]
         left = ", ".join(f"{value:.2g}" for value in self.residual)
         lines.append(f"Left of the actuator forces: {left} (N, at a crank N m).")
         return "\n".join(lines)
@@ -132,6 +158,8 @@ class Payload:
             "felt": self.felt,
             "real": self.real,
             "residual": self.residual.tolist(),
+            "trial": self.trial.as_dict(),
+            "findings": [asdict(one) for one in self.findings],
         }
 
 
@@ -171,8 +199,8 @@ def identify_payload(
     Raises
     ------
     LogError
-        If a phase is missing, the forces are not in newtons, or the motion does not show the
-        values.
+        If a phase is missing, the forces are not in newtons, columns are swapped or have their sign
+        flipped, or the motion does not show the values: all that `identify` refuses.
 
     References
     ----------
@@ -180,17 +208,21 @@ def identify_payload(
     industrial manipulators", ICRA 2007: the log with payload and the one without, solved as one.
     """
     robot = as_manipulator(robot)
-    for log in (without, with_payload):
-        if log is not None and log.description.force_unit != "N":
-            unit = log.description.force_unit
-            raise LogError(
-                "currents",
-                log.source,
-                f"its forces are in {unit}, newtons are expected; declare gains (N per {unit}) in "
-                "its description",
-            )
     model = identification_model(robot, replace(terms or Terms(), payload=True), base=base)
-    estimate = estimator(observations_with_payload(model, without, with_payload, processing))
+    both = (None if log is None else by_rated_torque(log, robot) for log in (without, with_payload))
+    fit = _phases(*both, processing)
+    check_recordings(robot, fit, (), processing or Processing())
+    parts, plans = _observed(model, fit, processing)
+    try:
+        observations = balanced(parts)
+        estimate = estimator(observations)
+    except DataError as error:
+        raise with_findings(error, fit) from None
+    if unphysical(model, observations, estimate) or left_over(estimate, plans):
+        check_columns(model, fit[0], plans[0])
+    hidden, too_many = unseen(model, estimate.deviations)
+    if too_many:
+        raise with_findings(too_little_motion(model, hidden, estimate, plans, fit[0]), fit)
     names = tuple(name for name in estimate.names if name in _NAMES)
     chosen = [estimate.names.index(name) for name in names]
     mass, hx, hy, inertia = (estimate.value(n) if n in names else None for n in _NAMES)
@@ -202,6 +234,8 @@ def identify_payload(
         covariance=estimate.covariance[np.ix_(chosen, chosen)],
         estimate=estimate,
         residual=estimate.noise,
+        trial=trial(model, estimate, fit, plans),
+        findings=tuple(finding for one in fit for finding in one.findings),
     )
 
 
@@ -209,17 +243,33 @@ def observations_with_payload(
     model: Model, without: Log, with_payload: Log | None, processing: Processing | None
 ) -> Observations:
     """Return the observations of a log with both phases, or of two logs, as one."""
+    return stacked(_observed(model, _phases(without, with_payload, processing), processing)[0])
+
+
+def _phases(
+    without: Log, with_payload: Log | None, processing: Processing | None
+) -> list[Recording]:
+    """Return a log with both phases, or two logs, as recordings."""
     if with_payload is None:
         logs = [without]
         _check_phases(without)
     else:
         logs = [_in_phase(without, 0), _in_phase(with_payload, 1)]
     period = None if processing is None else processing.period
-    logs = [periodic_part(log, period) for log in logs]
+    return [recording(log, period=period) for log in logs]
+
+
+def _observed(
+    model: Model, fit: Sequence[Recording], processing: Processing | None
+) -> tuple[list[Observations], list[Preprocessing]]:
+    """Return the observations of each recording, in which both phases must be, and its plan."""
+    logs = [one.head() for one in fit]
     plans = [preprocessing_of(model.robot, log, processing) for log in logs]
-    observations = stacked(
-        [observations_of(model, *pair) for pair in zip(logs, plans, strict=True)]
-    )
+    try:
+        parts = [observations_of(model, *pair) for pair in zip(logs, plans, strict=True)]
+    except DataError as error:
+        raise with_findings(error, fit) from None
+    observations = stacked(parts)
     seen = (observations.gain > 0.0).any(axis=1)
     for phase, called in ((0, "without payload"), (1, "with payload")):
         if not (seen & ((observations.payload != 0) == phase)).any():
@@ -229,7 +279,7 @@ def observations_with_payload(
                 f"no samples {called} are left between the filters' edges; record that phase "
                 "longer",
             )
-    return observations
+    return parts, plans
 
 
 def _check_phases(log: Log) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from pteron.errors import DataError
 from pteron.identification.logs import Finding, Log, LogFile
+from pteron.identification.logs.time_stamps import TimeStamps
 from pteron.identification.signals.repetition import repeating_rows
 from pteron.kernels import Array
 
@@ -97,9 +98,18 @@ def recording(
     if isinstance(log, LogFile) and (log.rows_estimate or 0) <= log.rows_in_memory:
         log = log.read(progress)
     if isinstance(log, Log):
-        log = periodic_part(replace(log, time=_since(log.time)), period)
+        log = periodic_part(replace(log, time=_since(log.time), findings=_noticed(log)), period)
         return Recording(log, 0, log.rows)
     return Recording(log, 0, _END)
+
+
+def _noticed(log: Log) -> tuple[Finding, ...]:
+    """Return a log's findings; of one that comes from no file, those of its time stamps."""
+    if log.findings or log.rows < 2:
+        return log.findings
+    stamps = TimeStamps(1.0 / log.rate, "t", log.source)
+    stamps.take(log.time)
+    return stamps.findings()
 
 
 def periodic_part(log: Log, period: float | None = None) -> Log:

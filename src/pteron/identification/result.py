@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -16,6 +16,7 @@ from pteron.identification.logs import Finding
 from pteron.identification.model import Model
 from pteron.identification.prediction import Prediction
 from pteron.identification.signals import Preprocessing
+from pteron.identification.unknowns import Unknowns
 from pteron.identification.verdict import Verdict
 from pteron.kernels import Array
 from pteron.legs import Drive, Stribeck
@@ -57,6 +58,8 @@ class Identification:
         What else is to be known.
     rotors : tuple of (float, float), optional
         Inertia and ratio of each joint's motor, where they are known: no part of the real bodies.
+    unknowns : Unknowns
+        The delay, and the speeds with which friction falls, where they were asked for.
     """
 
     robot: Manipulator
@@ -74,6 +77,7 @@ class Identification:
     findings: tuple[Finding, ...]
     notes: tuple[str, ...] = ()
     rotors: tuple[tuple[float, float], ...] | None = None
+    unknowns: Unknowns = field(default_factory=Unknowns)
 
     def __repr__(self) -> str:
         """Return the result in a line."""
@@ -96,12 +100,17 @@ class Identification:
         )
         columns = [Column("value", "long"), Column("identified", "number")]
         columns += [
-            Column("\u00b1 95 %", "number"),
+            Column("\u00b1 95 %" + " (too short)" * self.understated, "number"),
             Column("drawn", "number"),
             Column("unit"),
         ]
         about = f"identified, {self.verdict.grade}"
         return html_table(self.robot.name, about, columns, rows, self.verdict.reasons)
+
+    @property
+    def understated(self) -> bool:
+        """Whether a fault that matters shows, for which the values' stated errors do not allow."""
+        return any(one.matters for one in self.trial.suspicions)
 
     @cached_property
     def machine(self) -> Manipulator | None:
@@ -177,6 +186,7 @@ class Identification:
                 for friction, inertia in zip(self.friction, self._per_joint("rotor"), strict=True)
             ],
             "estimate": self.estimate.as_dict(),
+            "unknowns": self.unknowns.as_dict(),
             "essential": {
                 "names": list(self.essential.names),
                 "dropped": list(self.essential.dropped),

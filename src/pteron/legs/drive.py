@@ -53,6 +53,8 @@ class Drive:
         What dry friction has more at rest.
     rated_torque : float, optional
         Of the motor, N m: what commands in per cent are of.
+    counts_per_turn : float, optional
+        Counts of the motor's encoder in a turn of the motor: what logs in counts are in.
     max_force, max_speed : float, optional
         What the drive can do, N and m/s, or N m and rad/s, at the joint.
     """
@@ -67,13 +69,14 @@ class Drive:
     rated_torque: float | None = None
     max_force: float | None = None
     max_speed: float | None = None
+    counts_per_turn: float | None = None
 
     def __post_init__(self) -> None:
         _check(
             self,
             free=("offset",),
             least=("coulomb", "viscous", "rotor_inertia"),
-            above=("rest_speed", "rated_torque", "max_force", "max_speed"),
+            above=("rest_speed", "rated_torque", "max_force", "max_speed", "counts_per_turn"),
             nonzero=("ratio",),
         )
 

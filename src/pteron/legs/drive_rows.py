@@ -20,6 +20,7 @@ _QUANTITIES = (
     ("rated torque", "rated_torque", "N m"),
     ("greatest force", "max_force", "{force}"),
     ("greatest speed", "max_speed", "{rate}"),
+    ("encoder", "counts_per_turn", "counts a turn of the motor"),
 )
 """Names, where a `Drive` has them, and units."""
 

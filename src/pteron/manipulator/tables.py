@@ -84,6 +84,11 @@ class DriveTable(Table):
         None, description="what the drive can do, N or N m", examples=[120.0]
     )
     max_speed: Number | None = Field(None, description="m/s or rad/s", examples=[1.5])
+    counts_per_turn: Number | None = Field(
+        None,
+        description="of the motor's encoder in a turn of the motor: what logs in counts are in",
+        examples=[131072.0],
+    )
 
     def drive_of(self, key: str) -> Drive:
         """Build the drive; `key` goes before what an error names."""

@@ -13,11 +13,11 @@ from pteron.identification.logs import Description, find_description
 from pteron.identification.logs.description_file import description_text
 from pteron.tables import check_output, table_bytes
 
-_HELD_OUT = "-held-out"
+_BESIDE = "-held-out", "-slow"
 
 
-def motion_paths(path: str | Path, layout: Layout | None = None) -> tuple[Path, Path]:
-    """Return where a motion and the one to be held out go, after a check that they can be written.
+def motion_paths(path: str | Path, layout: Layout | None = None) -> tuple[Path, Path, Path]:
+    """Return where a motion, the one to be held out and slow passages go, if they can be written.
 
     Raises
     ------
@@ -27,14 +27,16 @@ def motion_paths(path: str | Path, layout: Layout | None = None) -> tuple[Path, 
     """
     dialect = None if layout is None else layout.dialect
     first = check_output(path, dialect)
-    both = first, check_output(first.with_stem(first.stem + _HELD_OUT), dialect)
-    for one in both:
+    held_out, slow = (
+        check_output(first.with_stem(first.stem + ending), dialect) for ending in _BESIDE
+    )
+    for one in (first, held_out, slow):
         beside = one.with_suffix(".toml")
         if beside.is_dir():
             raise OutputError(f"{beside}: is a folder; name another file")
         if beside.is_file() and find_description(one) is None:
             raise OutputError(f"{beside}: describes a machine, and is kept; name another file")
-    return both
+    return first, held_out, slow
 
 
 def write_motions(

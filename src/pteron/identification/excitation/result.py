@@ -24,6 +24,9 @@ from pteron.identification.logs import Description, write_description
 from pteron.kinematics import assembly_mode
 from pteron.tables import write_table
 
+_SLOWER = 5.0
+"""How many times slower than the trajectory its slow passages are at their fastest."""
+
 
 @dataclass(frozen=True)
 class Start:
@@ -106,6 +109,17 @@ class Excitation:
         """
         return held_out_cycle(self.motion.robot, self.limits, rate)
 
+    def slow(self) -> LedMotion:
+        """Return passages that show how friction falls with speed (Stribeck), from rest to rest.
+
+        The trajectory's own curve, once and in ten of its periods, at a rate that rises from 0 to a
+        fifth and falls again: each joint turns back as often as in a period, and crosses all speeds
+        between rest and a fifth of its usual ones slowly. What keeps limits faster keeps them so.
+        """
+        period = _SLOWER * self.motion.period
+        lead = Lead(period, _SLOWER * self.lead.phase)
+        return LedMotion(replace(self.motion, period=period), lead, periods=0)
+
     def write(
         self,
         path: str | Path,
@@ -113,11 +127,13 @@ class Excitation:
         periods: int = 3,
         layout: Layout | None = None,
         held_out: RepeatedCycle | None = None,
+        slow: LedMotion | None = None,
     ) -> list[Path]:
         """Write what `pteron excite` writes: motions, and descriptions of their logs beside them.
 
         motion.csv (or .parquet) and motion.toml, as `write_csv` and `write_toml` do; and
-        motion-held-out.csv and .toml of what is given to be held out. All of them, or none.
+        motion-held-out.csv and .toml of what is given to be held out, motion-slow.csv and .toml of
+        slow passages. All of them, or none.
 
         Parameters
         ----------
@@ -131,6 +147,8 @@ class Excitation:
             Columns, units and how a CSV file is written.
         held_out : RepeatedCycle, optional
             Such as `held_out` returns.
+        slow : LedMotion, optional
+            Such as `slow` returns.
 
         Raises
         ------
@@ -147,6 +165,8 @@ class Excitation:
         }
         if held_out is not None:
             motions[paths[1]] = held_out, _described(held_out, layout)
+        if slow is not None:
+            motions[paths[2]] = slow, _described(slow, layout)
         return write_motions(motions, layout, rate)
 
     def frame(

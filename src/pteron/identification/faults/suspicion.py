@@ -88,10 +88,7 @@ class Suspicion:
     @property
     def message(self) -> str:
         """What is wrong, and what to do, in a sentence."""
-        remedy = _REMEDY[self.fault]
-        if self.speeds is not None:
-            remedy = remedy.format(",".join(f"{speed:.2g}" for speed in self.speeds))
-        return f"{self._what()}; {remedy}."
+        return f"{self._what()}; {_REMEDY[self.fault]}."
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
@@ -165,7 +162,8 @@ _REMEDY: dict[Fault, str] = {
     "gain": "check gains, rated torque and gear ratio, and the payload's mass",
     "clock": "check the log's time, and gravity and the unit of lengths in the machine's file",
     "geometry": "measure them again, or calibrate",
-    "stribeck": "--stribeck {} adds it to the model",
+    "stribeck": "--stribeck auto finds its speeds, and adds it to the model; slow passages, which "
+    "pteron excite --stribeck writes, show them best",
     "elasticity": "measure positions behind the drive, or move more slowly",
     "drift": "warm the machine up, or record shorter",
     "load": "no term of the model has it: keep to loads like those of the log",

@@ -270,6 +270,8 @@ def _looks(
     rates = np.concatenate([s.joint_rates for blocks in states for s in blocks])
     usual = np.sqrt((rates**2).mean(axis=0))
     families = families_of(model.robot)
+    if model.terms.stribeck == "auto":  # its speeds are found already
+        families = tuple(one for one in families if one.name != "stribeck")
     found = []
     for (log, how, part), blocks in zip(parts, states, strict=True):
         fastest = max(how.cutoff or 0.0, how.band)

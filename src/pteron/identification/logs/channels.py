@@ -17,6 +17,9 @@ _FROZEN_ROWS = 1000
 _MOVED = 0.01
 """A channel is frozen that stays for over so many rows while another joint moves this part of
 its span."""
+_RESTED = 10.0
+"""How many times as far others may move while a channel rests at an end of the log: a motion sets
+off slowly, and not with all joints at once."""
 _ROUNDING = 1e-9
 
 Values = NDArray[np.float64]
@@ -132,7 +135,7 @@ class Channel:
                     f"{self._rows} rows: dead channel; record it again, or correct which columns "
                     "are read"
                 )
-            self._close(self._run)
+            self._close(self._run, last=True)
             self._run = None
         column = f"column {self._column}"
         found = []
@@ -161,13 +164,14 @@ class Channel:
                     found.append(self._finding("clipped", message, one.rows))
         return tuple(found)
 
-    def _close(self, run: _Run) -> None:
+    def _close(self, run: _Run, *, last: bool = False) -> None:
+        moved = self._moved * (_RESTED if last or run.start == 0 else 1.0)
         rows = run.stop - run.start
         for extreme in self._extremes:
             if rows >= _CLIPPED_ROWS and run.value == extreme.sign * extreme.value:
                 extreme.runs += 1
                 extreme.rows.add(rows, run.start)
-        if rows > _FROZEN_ROWS and (run.greatest - run.least > self._moved).any():
+        if rows > _FROZEN_ROWS and (run.greatest - run.least > moved).any():
             self._frozen.add(1, run.start, run.stop, run.value)
 
     def _finding(self, kind: Kind, message: str, tally: _Tally) -> Finding:

@@ -36,7 +36,9 @@ TimeFormat = Literal[
 LengthUnit = Literal["m", "mm", "um"]
 AngleUnit = Literal["rad", "deg"]
 ForceUnit = Literal["N", "N m", "A", "V", "%"]
-JointUnit = Literal["m", "mm", "um", "rad", "deg"]
+MotorUnit = Literal["turns", "counts"]
+"""Of positions at the motor: its turns, or the counts of its encoder."""
+JointUnit = Literal["m", "mm", "um", "rad", "deg", "turns", "counts"]
 
 _ROUNDING = 1e-12
 _OF_DRIVES = ("A", "V", "%")
@@ -95,7 +97,7 @@ def joint_symbols(robot: Manipulator) -> tuple[ActuatedJoint, ...]:
 
 def _units_of(joint: ActuatedJoint) -> tuple[str, ...]:
     """Return the units in which a joint's coordinate may stand in a file."""
-    return get_args(LengthUnit if joint.unit == "m" else AngleUnit)
+    return get_args(LengthUnit if joint.unit == "m" else AngleUnit) + get_args(MotorUnit)
 
 
 @_raises_data_errors
@@ -161,8 +163,10 @@ class Description:
     time_unit : {"s", "ms", "us", "ns", "100 ns"}, optional
     time_format : str, optional
         One of `TimeFormat`, where times are text.
-    joint_unit : {"m", "mm", "um", "rad", "deg"}, optional
-        Unit of the joint coordinates that it can measure: lengths of sliders, angles of cranks.
+    joint_unit : {"m", "mm", "um", "rad", "deg", "turns", "counts"}, optional
+        Unit of the joint coordinates that it can measure: lengths of sliders, angles of cranks. Or
+        turns of the motors, or counts of their encoders, of all joints: they are taken to the
+        joints by `ratio` and `counts_per_turn` of the machine's drives.
     joint_angle_unit : {"rad", "deg"}, optional
         Unit of the cranks' coordinates where there are both.
     length_unit : {"m", "mm", "um"}, optional

@@ -15,12 +15,10 @@ from numpy.typing import NDArray
 
 from pteron.errors import DataError
 from pteron.identification.logs.description import Description
+from pteron.identification.logs.gaps import gaps
 from pteron.legs.kind import SLIDER, ActuatedJoint
 from pteron.shapes import PerCoordinate, PerJoint, Series
 from pteron.tables import write_table
-
-GAP = 1.5
-"""A step longer than this many usual ones is a gap: at least one sample is missing."""
 
 _ARRAYS = ("time", "joints", "forces", "pose", "payload")
 _POSE = ("x", "y", "z", "phi")
@@ -154,8 +152,8 @@ class Log:
         """The stretches without a gap, in order; together they are the whole log."""
         if not self.rows:
             return ()
-        gaps = np.flatnonzero(np.diff(self.time) * self.rate > GAP) + 1
-        edges = [0, *(int(i) for i in gaps), self.rows]
+        ends = np.flatnonzero(gaps(self.time, 1.0 / self.rate)) + 1
+        edges = [0, *ends.tolist(), self.rows]
         return tuple(slice(a, b) for a, b in pairwise(edges))
 
     @property

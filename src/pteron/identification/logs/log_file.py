@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 
 from pteron.errors import DataError, shown
 from pteron.identification.logs.as_read import RepeatedTimes, as_read, check_names
+from pteron.identification.logs.at_motor import joint_factors
 from pteron.identification.logs.channels import Channel
 from pteron.identification.logs.clock import Clock, find_clock
 from pteron.identification.logs.columns import find_columns
 from pteron.identification.logs.description import Description, joint_symbols
 from pteron.identification.logs.description_file import find_description, read_description
-from pteron.identification.logs.log import Log, joined
+from pteron.identification.logs.log import Finding, Log, joined
 from pteron.identification.logs.sizes import (
     check_bounds,
     check_forces,
@@ -30,6 +31,7 @@ from pteron.identification.logs.sizes import (
 )
 from pteron.identification.logs.spikes import MARGIN, Spikes
 from pteron.identification.logs.time_stamps import TimeStamps
+from pteron.identification.logs.undeclared import told_at_once
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.tables import CsvFile, Dialect, ParquetFile, open_table
 
@@ -78,6 +80,7 @@ class LogFile:
         self.description = description
         self.rows_estimate = file.rows_estimate
         self._groups = (c.joints, c.forces, c.pose, c.payload)
+        self._factors = joint_factors(c.joints, robot, source)
         self._names = tuple(name for group in self._groups for name in group.names)
         self._again = RepeatedTimes(file.repeated, c, source)
         self._bounds = joint_bounds(robot), pose_bounds(robot)
@@ -87,6 +90,12 @@ class LogFile:
             *c.findings,
         )
         self.findings = self._read
+
+    def describe(self, description: Description, finding: Finding) -> None:
+        """Take another description of the same columns, which a finding tells."""
+        self.description = description
+        self._read = (*self._read, finding)
+        self.findings = (*self.findings, finding)
 
     def pieces(
         self, rows: int | None = None, progress: Callable[[int], None] | None = None
@@ -197,6 +206,7 @@ class LogFile:
                 self._groups, np.split(values[:, 1:], edges, axis=1), strict=True
             )
         )
+        joints *= self._factors
         of_joints, of_pose = self._bounds
         check_bounds(joints, of_joints, c.joints, source, first)
         if self.description.gains is not None:
@@ -278,7 +288,18 @@ def open_log(
         about.check(robot)
     except DataError as error:
         raise DataError(f"{shown(str(origin), bare=True, longest=1000)}: {error}") from None
-    return LogFile(open_table(path, noun="log", dialect=about.csv or Dialect()), robot, about)
+
+    def opened(described: Description) -> LogFile:
+        dialect = described.csv or Dialect()
+        return LogFile(open_table(path, noun="log", dialect=dialect), robot, described)
+
+    def looked_at(described: Description) -> None:
+        next(opened(described).pieces(), None)
+
+    try:
+        return opened(about)
+    except DataError as error:
+        raise told_at_once(error, about, looked_at, robot.legs[0].joint) from None
 
 
 def read_log(

@@ -19,8 +19,9 @@ UNITS = {
 }
 """Spellings of the units, in small letters, by the SI unit of what they measure."""
 
-_POSITION = ("position", "actpos", "actposition", "actualposition")
-_EFFORT = ("effort", "actcurrent", "actualcurrent", "acttorque", "actualtorque")
+_POSITION = ("position", "actpos", "actposition", "actualposition", "istposition", "istlage")
+_EFFORT = ("effort", "actcurrent", "actualcurrent", "acttorque", "actualtorque", "iststrom")
+_EFFORT += ("istmoment", "istdrehmoment")
 _WORDS: dict[str, tuple[str, ...]] = {
     "t": ("t", "time", "timestamp", "zeit"),
     "rho": ("rho", "q", "s", "joint", *_POSITION),
@@ -29,9 +30,9 @@ _WORDS: dict[str, tuple[str, ...]] = {
     "torque": ("torque", "moment", "tau", "current", "i", *_EFFORT),
 }
 """What columns are called, by the documented word; small letters without blanks and lines."""
-CURRENTS = ("current", "i", "actcurrent", "actualcurrent")
+CURRENTS = ("current", "i", "actcurrent", "actualcurrent", "iststrom")
 """Words that say amperes."""
-RATED = ("acttorque", "actualtorque")
+RATED = ("acttorque", "actualtorque", "istmoment", "istdrehmoment")
 """Words for what drives write in per cent, in per mille or in N m: their unit must be said."""
 
 _SPELLED = "|".join(re.escape(one) for units in UNITS.values() for one in units if len(one) > 1)
@@ -85,6 +86,7 @@ def called(name: str) -> Called | None:
     if match is None:
         return None
     word = re.sub("[ _]", "", match["word"].lower())
+    word = re.sub("(?<=.)(?:axis|achse)$", "", word)
     parts = match.groupdict()
     number = parts["index"] or parts.get("number")
     if match["path"] and len(word) == 1:

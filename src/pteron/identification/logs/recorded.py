@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.identification.errors import LogError
-from pteron.identification.logs.log import GAP, Log
+from pteron.identification.logs.gaps import gaps
+from pteron.identification.logs.log import Log
 from pteron.identification.logs.spikes import LONGEST
 
 _SPAN = 0.9
@@ -91,7 +92,7 @@ def _jump(log: Log, joint: NDArray[np.float64], turns: bool) -> list[tuple[float
     if len(joint) < 2 * LONGEST:
         return []
     steps = np.diff(joint)
-    steps[np.diff(log.time) > GAP * np.median(np.diff(log.time))] = 0.0  # it may move in a gap
+    steps[gaps(log.time, 1.0 / log.rate)] = 0.0  # it may move in a gap
     size = float(np.abs(steps).max())
     far = np.abs(steps) > (1.0 - _ALIKE) * size
     if size < _SPAN * np.ptp(joint) or np.abs(steps[~far]).max(initial=0.0) > _STILL * size:

@@ -6,7 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.errors import DataError
-from pteron.identification.logs.log import GAP, Finding
+from pteron.identification.logs.gaps import gaps
+from pteron.identification.logs.log import Finding
+
+_CONTEXT = 32
+"""Rows of the piece before that are kept."""
 
 _JITTER = 0.01
 """Steps that differ from the usual one by more than this part of it are uneven."""
@@ -17,7 +21,7 @@ class TimeStamps:
 
     def __init__(self, step: float, column: str, source: str) -> None:
         self._step, self._column, self._source = step, column, source
-        self._last: float | None = None
+        self._before = np.zeros(0)
         self._rows = 0
         self._gaps = 0
         self._missing = 0
@@ -41,32 +45,33 @@ class TimeStamps:
                 f"{time[i]:g} s a number's digits cannot tell time steps apart; correct the cell, "
                 "or declare the unit of time"
             )
-        before = time[:1] if self._last is None else np.array([self._last])
-        steps = np.diff(time, prepend=before)
-        if self._last is None:
+        first = not len(self._before)
+        before = time[:1] if first else self._before
+        steps = np.diff(time, prepend=before[-1:])
+        if first:
             steps[:1] = self._step
         if (steps <= 0.0).any():
             i = int(np.argmax(steps <= 0.0))
-            earlier = float(time[i - 1] if i else before[0])
+            earlier = float(time[i - 1] if i else before[-1])
             what = "is repeated" if time[i] == earlier else "runs backward"
             raise DataError(
                 f"{self._source}: row {self._rows + i + 1}, column {self._column}: time {what} "
                 f"({time[i]:.12g} s behind {earlier:.12g} s); put the rows in order, each with its "
                 "own time"
             )
-        gaps = steps > GAP * self._step
-        if gaps.any():
+        missing = gaps(np.concatenate([before, time]), self._step)[len(before) - 1 :]
+        if missing.any():
             if not self._gaps:
-                i = int(np.argmax(gaps))
+                i = int(np.argmax(missing))
                 self._first_gap = (self._rows + i, float(time[i] - steps[i]), float(steps[i]))
-            self._gaps += int(gaps.sum())
-            self._missing += int(self._lost(steps[gaps]).sum())
-        deviations = np.where(gaps, 0.0, np.abs(steps - self._step))
+            self._gaps += int(missing.sum())
+            self._missing += int(self._lost(steps[missing]).sum())
+        deviations = np.where(missing, 0.0, np.abs(steps - self._step))
         self._uneven += int((deviations > _JITTER * self._step).sum())
         worst = int(np.argmax(deviations))
         if deviations[worst] > self._worst[0]:
             self._worst = (float(deviations[worst]), self._rows + worst)
-        self._last = float(time[-1])
+        self._before = np.concatenate([before, time])[-_CONTEXT:]
         self._rows += len(time)
 
     def findings(self) -> tuple[Finding, ...]:

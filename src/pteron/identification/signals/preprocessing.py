@@ -50,6 +50,10 @@ _TOLERABLE = 0.5
 _REPEATS = 0.02
 """What a series may leave of a motion, as a share of its span, where it is said to repeat."""
 
+_NOISE_ALONE = 1.25
+"""What it leaves, over the positions' noise, where that is noise alone: what stick and slip have
+above its last harmonic is little beside jitter in positions, and much in forces."""
+
 _ROUNDING = 1e-13
 """What it leaves by rounding."""
 
@@ -144,6 +148,8 @@ class Preprocessing:
         Root mean square of the noise on joints (m) and forces (N).
     slow : array, shape (n,)
         Speed of each joint below which its friction is not known, m/s.
+    usual : array, shape (n,)
+        Root mean square rate of each joint, m/s.
     stroke : float
         Mean time between two reversals of the joint that reverses most, s.
     delay : float
@@ -159,6 +165,7 @@ class Preprocessing:
     joint_noise: Array
     force_noise: Array
     slow: Array
+    usual: Array
     stroke: float
     delay: float = 0.0
 
@@ -264,6 +271,7 @@ def preprocessing_of(
     band = wanted.band or min(_PRODUCTS * edge, rate / 2.0)
     if wanted.band is None and cutoff is not None and series is None:
         band = min(band, cutoff)
+    usual = np.sqrt((rates**2).mean(axis=0))
     return Preprocessing(
         derivatives=derivatives,
         start=start or start_pose(robot, log),
@@ -273,7 +281,8 @@ def preprocessing_of(
         period=period,
         joint_noise=position_noise(joints),
         force_noise=noise,
-        slow=wanted.slow * np.sqrt((rates**2).mean(axis=0)),
+        slow=wanted.slow * usual,
+        usual=usual,
         stroke=_stroke(rates, rate),
         delay=0.0 if wanted.delay == "auto" else wanted.delay,
     )
@@ -318,7 +327,7 @@ def _checked_series(log: Log, period: float | None) -> FourierSeries:
 def _is_series(series: FourierSeries, joints: Array) -> bool:
     """Say whether a Fourier series leaves noise alone: jumps of acceleration take more terms."""
     least = _ROUNDING * np.ptp(joints, axis=0)
-    return bool((series.noise <= np.maximum(3.0 * position_noise(joints), least)).all())
+    return bool((series.noise <= np.maximum(_NOISE_ALONE * position_noise(joints), least)).all())
 
 
 def _check_frequencies(wanted: Processing, rate: float) -> None:

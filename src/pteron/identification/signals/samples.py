@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from pteron.identification.errors import LogError
 from pteron.identification.logs import Log, joined
+from pteron.identification.logs.gaps import are_apart, gaps
 from pteron.identification.signals.preprocessing import Preprocessing
 from pteron.identification.signals.states import States
 from pteron.kernels import Array
@@ -19,9 +20,6 @@ from pteron.manipulator import Manipulator
 
 BLOCK = 1 << 15
 """Rows of a block: a regressor of 40 columns takes 40 MB of it."""
-
-_GAP = 1.5
-"""Steps of time between two samples that miss none; beyond it a new stretch begins."""
 
 
 @dataclass(frozen=True)
@@ -131,7 +129,7 @@ def _rest(held: Log | None, margin: int) -> Iterator[Log]:
 def _stretches(piece: Log, rate: float) -> Iterator[Log]:
     """Yield the parts of a piece between gaps and changes of the payload."""
     # Not `piece.segments`: the usual step of a few rows may be that of a gap.
-    ends = np.diff(piece.time) * rate > _GAP
+    ends = gaps(piece.time, 1.0 / rate)
     if piece.payload is not None:
         ends |= np.diff(piece.payload) != 0
     edges = [0, *(np.flatnonzero(ends) + 1).tolist(), piece.rows]
@@ -141,8 +139,7 @@ def _stretches(piece: Log, rate: float) -> Iterator[Log]:
 
 
 def _continues(held: Log, following: Log, rate: float) -> bool:
-    step = float(following.time[0] - held.time[-1])
     same = held.payload is None or (
         following.payload is not None and held.payload[-1] == following.payload[0]
     )
-    return same and step * rate <= _GAP
+    return same and not are_apart(held.time, following.time, 1.0 / rate)

@@ -1,0 +1,101 @@
+"""What the machine's drives tell of logs that were taken at the motors: turns, counts, per cent."""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.errors import DataError
+from pteron.identification.logs.log import Finding, Log
+from pteron.identification.logs.search import Group
+from pteron.legs import Drive
+from pteron.manipulator import Manipulator
+
+if TYPE_CHECKING:
+    from pteron.identification.logs.log_file import LogFile
+
+_NEEDS = {"turns": ("ratio",), "counts": ("ratio", "counts_per_turn")}
+"""What the drives must tell, by the unit of the joints."""
+
+_RATED = ("ratio", "rated_torque")
+"""What they must tell of per cent."""
+
+
+def joint_factors(joints: Group, robot: Manipulator, source: str) -> NDArray[np.float64]:
+    """Return what turns, or counts, of the motors are multiplied by (n,); 1 for other units.
+
+    Raises
+    ------
+    DataError
+        If the drives do not tell how a motor moves its joint.
+    """
+    needed = _NEEDS.get(joints.units[0], ())
+    lacking = _lacking(robot, needed)
+    if lacking:
+        raise DataError(
+            f"{source}: the joints are in {joints.units[0]} of the motors, but the drives of "
+            f"{robot.name} have no {lacking}; give it in the robot's file, such as drive = "
+            "{ ratio = 50.0, counts_per_turn = 131072.0 }: a joint's coordinate is 2 pi counts / "
+            "counts_per_turn / ratio"
+        )
+    drives = [leg.drive or Drive() for leg in robot.legs]
+    if not needed:
+        return np.ones(len(drives))
+    each = [(drive.counts_per_turn or 1.0) * drive.gear for drive in drives]
+    if joints.units[0] == "turns":
+        each = [drive.gear for drive in drives]
+    return 2.0 * np.pi / np.array(each)
+
+
+def by_rated_torque(log: Log | LogFile, robot: Manipulator) -> Log | LogFile:
+    """Return a log whose forces are in per cent of rated torque with gains, where drives tell them.
+
+    Other logs are returned as they are.
+    """
+    about = log.description
+    if about.force_unit != "%" or _lacking(robot, _RATED):
+        return log
+    drives = [leg.drive or Drive() for leg in robot.legs]
+    gains = tuple(drive.gear * (drive.rated_torque or 0.0) / 100.0 for drive in drives)
+    whole = ", ".join(
+        f"{100.0 * gain:.4g} {leg.joint.force_unit}"
+        for gain, leg in zip(gains, robot.legs, strict=True)
+    )
+    finding = Finding(
+        "read",
+        f"{log.source}: forces in per cent of the motors' rated torque: by ratio and rated_torque "
+        f"of the robot's drives 100 % are {whole}",
+    )
+    described = replace(about, gains=gains)
+    if isinstance(log, Log):
+        found = (*log.findings, finding)
+        return replace(log, forces=log.forces * gains, description=described, findings=found)
+    again = copy(log)
+    again.describe(described, finding)
+    return again
+
+
+def per_cent_advice(robot: Manipulator) -> str:
+    """Return how forces in per cent become forces at the joints, for a message."""
+    lacking = _lacking(robot, _RATED)
+    return (
+        f"or give {lacking} in the drives of {robot.name}'s file, such as drive = {{ ratio = 50.0, "
+        "rated_torque = 1.27 }: a force is per cent / 100 times rated_torque times ratio"
+    )
+
+
+def _lacking(robot: Manipulator, names: tuple[str, ...]) -> str:
+    """Return which of a drive's values some leg has not, with the legs; empty if none."""
+    legs = [
+        i
+        for i, leg in enumerate(robot.legs, start=1)
+        if any(getattr(leg.drive, name, None) is None for name in names)
+    ]
+    absent = [
+        name for name in names if any(getattr(leg.drive, name, None) is None for leg in robot.legs)
+    ]
+    return f"{' and '.join(absent)} (legs {', '.join(map(str, legs))})" if absent else ""

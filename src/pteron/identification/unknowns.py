@@ -1,0 +1,289 @@
+"""What the forces are not linear in: speeds with which friction falls (Stribeck's), and a delay.
+
+Fs sign(q') exp(-(q'/v)^2) is linear in Fs and not in v. The speeds, and the delay of the forces for
+the positions, are those of least squares, all other values being projected out (variable
+projection). Speeds are first searched among columns of a row of them; then both are refined by
+Gauss's and Newton's steps, with the slopes of the forces as columns. What their uncertainty adds to
+that of the values comes with the steps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import make_interp_spline  # type: ignore[import-untyped]
+
+from pteron.identification.estimators import weighted
+from pteron.identification.estimators.least_squares import actuator_noise
+from pteron.identification.model import Model
+from pteron.identification.observation import Linear, Observations
+from pteron.identification.signals import States
+from pteron.identification.signals.preprocessing import LATEST
+from pteron.kernels import Array
+from pteron.manipulator import Manipulator
+
+_SLOWEST, _FASTEST = 3e-3, 3.0
+"""Speeds between which they are searched, over each joint's root mean square."""
+
+_COLUMNS = 24
+_FINE = 200
+"""Speeds with a column of their own, and those that are tried, between them."""
+
+_ROUNDS = 8
+"""Times that the joints are gone through one by one, and steps on exact columns, at most."""
+
+_CLEAR = 30.0
+"""Twice the logarithm of the likelihood, which a joint's fall must raise by as much to be seen."""
+
+_STEP = 0.5
+"""Largest step of a speed's logarithm."""
+
+_SETTLED = 0.02
+"""Step that no longer matters, in standard deviations."""
+
+_ROUNDING = 1e-9
+"""Step that never matters: s, or of a speed's logarithm."""
+
+_TWO_SIDED = 1.959963984540054
+"""Standard deviations of an interval of 95 %."""
+
+Observe = Callable[[Linear], Observations]
+"""Makes the observations of all recordings, with the columns of a model or of more."""
+
+
+@dataclass(frozen=True)
+class Unknowns:
+    """Speeds and a delay, as the data show them.
+
+    Attributes
+    ----------
+    speeds : array, shape (n,), optional
+        With which each joint's friction falls, m/s or rad/s; infinite where it is not seen to fall.
+    delay : float
+        By how much forces are late for positions, s.
+    speed_deviations : array, shape (n,)
+        Standard deviations of the speeds' logarithms.
+    delay_deviation : float
+        s.
+    """
+
+    speeds: Array | None = None
+    delay: float = 0.0
+    speed_deviations: Array = field(default_factory=lambda: np.zeros(0))
+    delay_deviation: float = 0.0
+
+    def speed_intervals(self) -> tuple[Array, Array]:
+        """Return the ends (n,) of the speeds' intervals at 95 %, which are as large in ratio."""
+        factor = np.exp(_TWO_SIDED * self.speed_deviations)
+        return self.speeds / factor, self.speeds * factor
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as plain data, null where friction is not seen to fall."""
+        found: dict[str, Any] = {"delay": self.delay, "delay_deviation": self.delay_deviation}
+        if self.speeds is not None:
+            ends = np.array([self.speeds, *self.speed_intervals()]).T.tolist()
+            rows = [row if np.isfinite(row[0]) else None for row in ends]
+            found["stribeck_speeds"] = [row and row[0] for row in rows]
+            found["stribeck_intervals_95"] = [row and row[1:] for row in rows]
+        return found
+
+
+@dataclass(frozen=True)
+class _With:
+    """A model with a group of columns behind it that are each actuator's own, (R, n, k)."""
+
+    model: Model
+    count: int
+    columns: Callable[[States], Array]
+
+    @property
+    def robot(self) -> Manipulator:
+        return self.model.robot
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return (*self.model.names, *(f"column {k}" for k in range(self.count)))
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        return (*self.model.units, *("" for _ in range(self.count)))
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        return (*self.model.kinds, *("stribeck" for _ in range(self.count)))
+
+    def matrix(self, states: States) -> Array:
+        return np.concatenate([self.model.matrix(states), self.columns(states)], axis=-1)
+
+
+def settled(
+    model: Model,
+    observe: Callable[[Linear, float], Observations],
+    begin: Unknowns,
+    values: Array,
+    *,
+    late: bool,
+) -> tuple[Model, Observations, Unknowns, Array]:
+    """Return a model with the unknowns that suit the data best.
+
+    Parameters
+    ----------
+    model : Model
+        The model, with the speeds to begin with where it has such friction.
+    observe : callable
+        Makes the observations of all recordings, with the columns of a model or of more, of forces
+        that are so late, s.
+    begin : Unknowns
+        Where to begin.
+    values : array, shape (p,)
+        Values of a fit there.
+    late : bool
+        Whether the delay is unknown.
+
+    Returns
+    -------
+    tuple
+        The model, its observations, the unknowns, and what the values' covariance (p, p) has more
+        than if they were known.
+    """
+    found, p = begin, len(model.names)
+    speeds = None if found.speeds is None else found.speeds.copy()
+    seen = np.flatnonzero(np.isfinite(speeds)) if speeds is not None else np.zeros(0, dtype=int)
+    for _ in range(_ROUNDS):
+        if speeds is not None:
+            model = model.falling(speeds)
+        columns = partial(_slopes, model, seen, values, late)
+        rows = observe(_With(model, len(seen) + late, columns), found.delay)
+        plain = rows.columns(range(p))
+        whole, part = weighted(rows), weighted(plain)
+        values, more = part.values, whole.covariance[:p, :p] - part.covariance
+        step, deviations = whole.values[p:], whole.deviations[p:]
+        if speeds is not None:
+            forces = np.array([part.value(f"Fs{i + 1}") for i in seen])
+            step[: len(seen)] /= forces
+            deviations[: len(seen)] /= np.abs(forces)
+            spread = np.full(len(speeds), np.nan)
+            spread[seen] = deviations[: len(seen)]
+            found = replace(found, speeds=speeds.copy(), speed_deviations=spread)
+        if late:
+            found = replace(found, delay_deviation=float(deviations[-1]))
+        if not (np.abs(step) > np.maximum(_SETTLED * deviations, _ROUNDING)).any():
+            break
+        if speeds is not None:
+            speeds[seen] *= np.exp(np.clip(step[: len(seen)], -_STEP, _STEP))
+        if late:
+            found = replace(found, delay=float(np.clip(found.delay + step[-1], -LATEST, LATEST)))
+    return model, plain, found, more
+
+
+def searched_speeds(model: Model, observe: Observe, usual: Array) -> Array:
+    """Return the speeds (n,) of least squares, about; infinite where friction is not seen to fall.
+
+    `model` has none of that friction yet, and `usual` (n,) are the root mean squares of the joints'
+    rates.
+    """
+    n, p = len(usual), len(model.names)
+    shares = np.geomspace(_SLOWEST, _FASTEST, _COLUMNS)
+
+    def columns(states: States) -> Array:
+        rates = states.joint_rates[..., None]
+        falls = np.exp(-((rates / (usual[:, None] * shares)) ** 2))
+        return np.asarray(np.sign(rates) * falls)
+
+    rows = observe(_With(model, _COLUMNS, columns))
+    plain = rows.columns(range(p))
+    noise = weighted(plain).noise
+    tried = np.geomspace(_SLOWEST, _FASTEST, _FINE)
+    spline = make_interp_spline(np.log(shares), np.eye(_COLUMNS), k=5)(np.log(tried))
+    speeds = np.full(n, np.inf)
+    for _ in range(2):
+        # Of all columns, and the forces, what the others leave; the noise is that of the last fit.
+        scaled = plain.matrix / noise[:, None]
+        basis = np.linalg.qr(_unit(scaled.reshape(-1, p)))[0]
+        forces = (plain.forces / noise).ravel()
+        own = np.zeros((*plain.forces.shape, n, _COLUMNS))
+        for i in range(n):
+            own[:, i, i] = rows.matrix[:, i, p:] / noise[i]
+        own = own.reshape(len(forces), -1)
+        inner = basis.T @ own
+        gram = (own.T @ own - inner.T @ inner).reshape(n, _COLUMNS, n, _COLUMNS)
+        image = (own.T @ forces - inner.T @ (basis.T @ forces)).reshape(n, _COLUMNS)
+        chosen = _coordinatewise(spline, gram, image)
+        speeds = np.where(chosen >= 0, usual * tried[np.maximum(chosen, 0)], np.inf)
+        seen = np.flatnonzero(chosen >= 0)
+        extra = np.zeros((*plain.forces.shape, len(seen)))
+        for k, i in enumerate(seen):
+            extra[:, i, k] = rows.matrix[:, i, p:] @ spline[chosen[i]]
+        whole = _appended(plain, extra)
+        noise = actuator_noise(whole, weighted(whole).values)
+    return speeds
+
+
+def _coordinatewise(spline: Array, gram: Array, image: Array) -> NDArray[np.int64]:
+    """Return which of the speeds tried suits each joint (n,); -1 where none is clear."""
+    n = len(image)
+    chosen = np.full(n, -1)
+
+    def gain(picked: NDArray[np.int64]) -> float:
+        """Return by how much squares fall with these speeds; less than 0 if friction rises."""
+        seen = np.flatnonzero(picked >= 0)
+        if not len(seen):
+            return 0.0
+        mix = spline[picked[seen]]
+        normal = np.einsum("ig,igjh,jh->ij", mix, gram[seen][:, :, seen], mix)
+        right = np.einsum("ig,ig->i", mix, image[seen])
+        sizes = np.linalg.lstsq(normal, right, rcond=1e-12)[0]
+        return float(right @ sizes) if (sizes > 0.0).all() else -1.0
+
+    for _ in range(_ROUNDS):
+        before = chosen.copy()
+        for i in range(n):
+            without = chosen.copy()
+            without[i] = -1
+            gains = []
+            for k in range(len(spline)):
+                without[i] = k
+                gains.append(gain(without))
+            without[i] = -1
+            best = int(np.argmax(gains))
+            chosen[i] = best if gains[best] > gain(without) + _CLEAR else -1
+        if (chosen == before).all():
+            break
+    return chosen
+
+
+def _slopes(
+    model: Model, seen: NDArray[np.int64], values: Array, late: bool, states: States
+) -> Array:
+    """Return columns (R, n, k): how friction changes with the logarithms of speeds, by its size.
+
+    And, where forces are late, how those of a fit change with the delay, but for dry friction.
+    """
+    rates = states.joint_rates
+    found = np.zeros((*rates.shape, len(seen) + late))
+    if len(seen):
+        square = (rates[:, seen] / np.asarray(model.stribeck_speeds)[seen]) ** 2
+        slope = 2.0 * np.sign(rates[:, seen]) * square * np.exp(-square)
+        found[:, seen, np.arange(len(seen))] = slope
+    if late:
+        dry = np.array([kind in ("coulomb", "stribeck") for kind in model.kinds])
+        smooth = model.matrix(states) @ np.where(dry, 0.0, values)
+        found[..., -1] = -np.gradient(smooth, states.time, axis=0, edge_order=2)
+    return found
+
+
+def _unit(columns: Array) -> Array:
+    lengths = np.linalg.norm(columns, axis=0)
+    return np.asarray(columns / np.where(lengths > 0.0, lengths, 1.0))
+
+
+def _appended(observations: Observations, columns: Array) -> Observations:
+    """Return observations with more columns (R, n, k)."""
+    matrix = np.concatenate([observations.matrix, columns], axis=-1)
+    names = tuple(map(str, range(matrix.shape[-1])))
+    return replace(observations, matrix=matrix, names=names, units=names, kinds=())
