@@ -20,8 +20,9 @@ UNITS = {
 """Spellings of the units, in small letters, by the SI unit of what they measure."""
 
 _POSITION = ("position", "actpos", "actposition", "actualposition", "istposition", "istlage")
-_EFFORT = ("effort", "actcurrent", "actualcurrent", "acttorque", "actualtorque", "iststrom")
-_EFFORT += ("istmoment", "istdrehmoment")
+RATED = ("acttorque", "actualtorque", "istmoment", "istdrehmoment")
+"""Words for what drives write in per cent, in per mille or in N m: their unit must be said."""
+_EFFORT = ("effort", "actcurrent", "actualcurrent", "iststrom", *RATED)
 _WORDS: dict[str, tuple[str, ...]] = {
     "t": ("t", "time", "timestamp", "zeit"),
     "rho": ("rho", "q", "s", "joint", *_POSITION),
@@ -32,8 +33,6 @@ _WORDS: dict[str, tuple[str, ...]] = {
 """What columns are called, by the documented word; small letters without blanks and lines."""
 CURRENTS = ("current", "i", "actcurrent", "actualcurrent", "iststrom")
 """Words that say amperes."""
-RATED = ("acttorque", "actualtorque", "istmoment", "istdrehmoment")
-"""Words for what drives write in per cent, in per mille or in N m: their unit must be said."""
 
 _SPELLED = "|".join(re.escape(one) for units in UNITS.values() for one in units if len(one) > 1)
 _SPELLED += "|(?-i:[smANV%°])"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 from pydantic import TypeAdapter
@@ -51,9 +50,9 @@ def told_at_once(
     if len(reasons) < 2:
         return first
     if about.joint_columns and not (about.joint_unit or about.joint_angle_unit):
-        about = replace(about, joint_unit=joint.unit)
+        about = _with(about, {"joints": {"unit": joint.unit}})
     if about.force_columns and not about.column_force_unit:
-        about = replace(about, column_force_unit=joint.force_unit)
+        about = _with(about, {"forces": {"unit": joint.force_unit}})
     numbered = "; ".join(f"({i}) {reason}" for i, reason in enumerate(reasons, start=1))
     lines = description_text(about).partition("\n\n")[2]
     return DataError(
