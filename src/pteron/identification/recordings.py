@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -178,17 +179,31 @@ def divided(whole: Recording, period: float | None) -> tuple[Recording, Recordin
     """Return the part of a recording to fit, and the part to hold out: its end.
 
     At a whole number of periods, where the motion is periodic: with `period`, or as it is declared.
+    Of a log that carries a payload at times, the end of each phase is held out: both are fitted.
     """
-    cut = whole.start + int(_FIT * whole.rows)
     log = whole.log
     period = period or log.description.period
-    if period is not None and isinstance(log, Log):
-        whole_periods = int((log.duration + 1.0 / log.rate) / period + 1e-3)
-        if whole_periods >= 2:
-            share = min(max(round(_FIT * whole_periods), 1), whole_periods - 1)
-            cut = int(np.searchsorted(log.time, log.time[0] + (share * period - 0.5 / log.rate)))
+    if isinstance(log, Log) and log.payload is not None and np.ptp(log.payload):
+        edges = [0, *(np.flatnonzero(np.diff(log.payload)) + 1).tolist(), log.rows]
+        out = np.zeros(log.rows, dtype=bool)
+        for start, stop in pairwise(edges):
+            out[start + _cut(log.part(start, stop), stop - start, period) : stop] = True
+        parts = log.without(out), log.without(~out)
+        first, second = (Recording(part, 0, part.rows) for part in parts)
+        return first, second
+    cut = whole.start + _cut(log, whole.rows, period)
     if cut - whole.start < 2 or whole.start + whole.rows - cut < 2:
         raise DataError(
             f"{whole.source}: {whole.rows} rows are too few to hold some out; record longer"
         )
     return replace(whole, stop=cut), replace(whole, start=cut)
+
+
+def _cut(log: Log | LogFile, rows: int, period: float | None) -> int:
+    """Return how many of a log's rows are fitted."""
+    if period is not None and isinstance(log, Log):
+        whole_periods = int((log.duration + 1.0 / log.rate) / period + 1e-3)
+        if whole_periods >= 2:
+            share = min(max(round(_FIT * whole_periods), 1), whole_periods - 1)
+            return int(np.searchsorted(log.time, log.time[0] + (share * period - 0.5 / log.rate)))
+    return int(_FIT * rows)
