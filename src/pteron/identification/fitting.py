@@ -56,9 +56,10 @@ def check_recordings(
 ) -> None:
     """Refuse recordings of currents, of values that are no forces, and what is given twice."""
     for one in (*whole, *others):
-        check_recorded(one.head())
+        # What is no force at all would hide how much the others change.
         if isinstance(one.log, Log):
             check_strength(one.log.forces, one.log.force_names, one.source, one.log.first_row)
+        check_recorded(one.head())
         unit = one.head().description.force_unit
         if unit != "N":
             other = f", {per_cent_advice(robot)}" if unit == "%" else ""
