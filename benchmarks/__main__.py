@@ -38,6 +38,7 @@ _SCRIPTS = {
     "Exported FMUs": "fmu.py",
     "Certified workspaces": "certified.py",
     "Nearest singular poses": "nearest_singularities.py",
+    "Singular machines and poses": "singular.py",
     "The Gymnasium environment": "environment.py",
     "The viewer": "viewer.py",
     "Maps of eight million poses": "maps.py",

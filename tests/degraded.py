@@ -158,22 +158,23 @@ def _applies(make: Callable) -> bool:
         return True
 
 
-def judged(robot, check):
-    """Return what is said of a machine that is singular at every pose, or that no pose reaches.
-
-    `check` is asked in turn of the name of a call and of the call; it says whether it was refused.
-    Where one is answered its name is returned, else "flagged".
-    """
+def judged(make):
+    """Return "refused", "flagged" or "out of reach", or which call answers for the machine."""
+    try:
+        robot = make()
+    except pteron.ModelError:
+        return "refused"
     try:
         layout = pteron.architecture(robot)
     except pteron.ModelError:
-        layout = None
-    if layout is not None and not (layout.singular and layout.reason):
-        return "not flagged"
-    for name, call in calls(robot):
-        if not check(call):
-            return name
-    return "flagged"
+        # Nothing is known of it; that what it does not reach is free of singularities holds.
+        known, left_out = "out of reach", {"free_of_singularities"}
+    else:
+        known, left_out = "flagged", set()
+        if not (layout.singular and layout.reason):
+            return "not flagged"
+    asked = ((name, call) for name, call in calls(robot) if name not in left_out)
+    return next((f"answered: {name}" for name, call in asked if not refused(call)), known)
 
 
 def calls(robot):

@@ -6,6 +6,8 @@ import descriptions
 import mechanisms
 import numpy as np
 
+from pteron.kernels import numeric
+
 KINDS = [
     *("PPP", "RRR", "SSS", "PRS", "RPP"),  # 3T
     *("PPPP", "RRRR", "SSSS", "PPSS", "RRRU", "PRSU", "PRSSI"),  # 3T1R
@@ -17,6 +19,7 @@ KINDS = [
 LINES = 100
 STEPS = 60
 HALVINGS = 80
+DISTANCES = (1e-8, 1e-5, 1e-3)
 
 
 def crossed(robot, rng, bend=0.2):
@@ -98,3 +101,26 @@ def around(robot, pose, distance, rng, count):
     if "phi" in robot.coordinates:
         steps[:, -1] /= size_of(robot)
     return pose + steps
+
+
+def found(robot, rng):
+    """Yield machines and poses at which they are singular: the machine, and one made so at zero."""
+    pose = crossed(robot, rng)
+    if pose is not None:
+        yield robot, pose
+    if robot.platform.planar and any(leg.type in ("PSS", "RSS") for leg in robot.legs):
+        yield across_the_plane(robot, rng), np.zeros(robot.freedom)
+
+
+def slopes(robot, pose, rng, count=100):
+    """Return the type-II measure at a singular pose, and the most of it over the distance to it.
+
+    Distances are shares of the machine's size.
+    """
+    measure = numeric(robot, "type_ii")
+    most = 0.0
+    for distance in DISTANCES:
+        poses = around(robot, pose, distance * size_of(robot), rng, count)
+        sizes = np.abs(measure(poses)[0])
+        most = max(most, float(np.nanmax(sizes)) / distance)
+    return abs(float(measure(pose)[0])), most
