@@ -116,18 +116,9 @@ def slanted(robot, rng):
     return _with(robot, found[0], replace(robot.legs[found[0]], direction=tuple(k + 1e-11 * x)))
 
 
-def out_of_reach(robot, rng):
-    """Move one of two cranks so far away that no pose is in reach."""
-    found = [i for i, leg in enumerate(robot.legs) if leg.type in ("RSS", "RRR")]
-    if len(found) < 2:
-        return None
-    leg = robot.legs[found[0]]
-    return _with(robot, found[0], replace(leg, guide_point=tuple(np.array(leg.guide_point) + 50.0)))
-
-
 FAULTS = (
     *(coincident, across_the_plane, in_line, alongside, in_a_plane, mirrored),
-    *(no_gear, two_shafts, slanted, out_of_reach),
+    *(no_gear, two_shafts, slanted),
 )
 
 
@@ -159,30 +150,21 @@ def _applies(make: Callable) -> bool:
 
 
 def judged(make):
-    """Return "refused", "flagged" or "out of reach", or which call answers for the machine."""
+    """Return "refused" or "flagged", or what answers for the machine all the same."""
     try:
         robot = make()
     except pteron.ModelError:
         return "refused"
-    try:
-        layout = pteron.architecture(robot)
-    except pteron.ModelError:
-        # Nothing is known of it; that what it does not reach is free of singularities holds.
-        known, left_out = "out of reach", {"free_of_singularities"}
-    else:
-        known, left_out = "flagged", set()
-        if not (layout.singular and layout.reason):
-            return "not flagged"
-    asked = ((name, call) for name, call in calls(robot) if name not in left_out)
-    return next((f"answered: {name}" for name, call in asked if not refused(call)), known)
+    layout = pteron.architecture(robot)
+    if not (layout.singular and layout.reason):
+        return "not flagged"
+    asked = (f"answered: {name}" for name, call in calls(robot) if not refused(call))
+    return next(asked, "flagged")
 
 
 def calls(robot):
     """Yield by name the calls that must not be answered of such a machine."""
-    try:
-        pose = pteron.random_poses(robot, 2, type_ii=0.0)
-    except pteron.ModelError:
-        pose = np.zeros((2, robot.freedom))
+    pose = pteron.random_poses(robot, 2, type_ii=0.0)
     rest = np.zeros_like(pose)
     box = Box(pose[0] - 1e-4, pose[0] + 1e-4)
     yield "random_poses", lambda: pteron.random_poses(robot, 2)
@@ -211,6 +193,4 @@ def refused(call):
         return found.holds is not True
     if hasattr(found, "free"):
         return found.free is not True
-    if hasattr(found, "inner"):
-        return not len(found.inner)
     return hasattr(found, "type_ii") and bool((found.type_ii <= 1e-9).all())

@@ -253,6 +253,16 @@ def jacobians(machine, poses):
     return jacobian.reshape(len(jacobian), *poses.shape).swapaxes(0, 1), bends.min(axis=0)
 
 
+def force_sizes(machine, poses):
+    """Return |dq/dc| (B, n), c moving anywhere in space; of a shaft its ratio."""
+    x, phi, c = (ca.SX.sym(name, n) for name, n in (("x", machine.freedom), ("phi", 1), ("c", 3)))
+    sizes = []
+    for leg, at in zip(machine.legs, places(machine, x), strict=True):
+        slope = ca.norm_2(ca.jacobian(_place(leg, c, phi).joint, c))
+        sizes.append(ca.substitute(slope, c, at.point) if leg.ratio is None else abs(leg.ratio))
+    return np.array(ca.Function("sizes", [x], [ca.vertcat(*sizes)])(poses.T)).T
+
+
 def distances_from_singular(machine, poses):
     """Return the least bend of the legs, and the least singular value of J with rows of length 1.
 
