@@ -7,6 +7,7 @@ import mechanisms
 import numpy as np
 
 import pteron
+from pteron.export import tree
 from pteron.indices import reactions
 from pteron.motion import check_path, line_path
 from pteron.workspace import Box, free_of_singularities, home_pose, paving, prove, reserve
@@ -180,6 +181,7 @@ def calls(robot):
     yield "home_pose", lambda: home_pose(robot)
     yield "check_path", lambda: check_path(robot, line_path(robot, pose))
     yield "direct_kinematics", lambda: pteron.direct_kinematics(robot, rest[0])
+    yield "tree", lambda: tree(robot)
     yield "base_parameters", lambda: pteron.base_parameters(robot)
 
 

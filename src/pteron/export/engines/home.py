@@ -7,9 +7,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from pteron.errors import DataError, ModelError, SingularPose
+from pteron.errors import DataError, ModelError
 from pteron.kernels import Array, as_array, numeric
 from pteron.kinematics import direct_kinematics, inverse_kinematics, random_poses
+from pteron.kinematics.sizes import type_ii_sizes
 from pteron.manipulator import Manipulator
 from pteron.shapes import PoseLike
 
@@ -27,6 +28,8 @@ def chosen_home(robot: Manipulator, home: PoseLike | None) -> Array:
     ------
     DataError, UnreachablePose
         If the pose given is none, or out of reach.
+    SingularPose
+        If the machine is singular at every pose.
     """
     if home is None:
         return np.array(_middle(robot))
@@ -45,10 +48,8 @@ def _middle(robot: Manipulator) -> tuple[float, ...]:
     limits if any are.
     """
     ranges = np.array([leg.limits or (0.0, 0.0) for leg in robot.legs])
-    found = np.empty((0, robot.freedom))
-    with suppress(SingularPose):
-        found = direct_kinematics(robot, ranges.mean(axis=1)).reshape(-1, robot.freedom)
-        found = found[np.isfinite(found).all(axis=-1)]
+    found = direct_kinematics(robot, ranges.mean(axis=1)).reshape(-1, robot.freedom)
+    found = found[np.isfinite(found).all(axis=-1)]
     worth = _worth(robot, found)
     if len(found) and worth.max() >= _GOOD:
         return tuple((np.round(found[worth.argmax()], 12) + 0.0).tolist())
@@ -73,9 +74,7 @@ def _worth(robot: Manipulator, poses: Array) -> Array:
     if not len(poses):
         return np.empty(0)
     bent = numeric(robot, "reach")(poses)[1].min(axis=-1)
-    held = np.abs(numeric(robot, "type_ii")(poses)[0])
-    if not held.max() > 0.0:  # singular everywhere
-        held = bent
+    held = type_ii_sizes(robot, poses)
     room = numeric(robot, "passive_room")(poses)[0].min(axis=-1)
     worth = np.minimum(bent, held)
     if robot.platform.turns:  # a machine seldom works the wrong way round
