@@ -20,6 +20,9 @@ _GOOD = 0.1
 _SEARCHES = ((200, 0.3), (200, 0.02), (200, 0.0))
 """How many random poses, and their least measures."""
 
+_ALIKE = 1e-9
+"""Measures that differ by less are the same."""
+
 
 def chosen_home(robot: Manipulator, home: PoseLike | None) -> Array:
     """Return the pose given, checked, or one chosen by the joints' ranges.
@@ -52,7 +55,7 @@ def _middle(robot: Manipulator) -> tuple[float, ...]:
     found = found[np.isfinite(found).all(axis=-1)]
     worth = _worth(robot, found)
     if len(found) and worth.max() >= _GOOD:
-        return tuple((np.round(found[worth.argmax()], 12) + 0.0).tolist())
+        return tuple((np.round(found[_best(worth)], 12) + 0.0).tolist())
     for count, least in _SEARCHES:
         with suppress(ModelError):
             found = random_poses(robot, count, type_i=least, type_ii=least)
@@ -66,7 +69,12 @@ def _middle(robot: Manipulator) -> tuple[float, ...]:
     given = np.array([leg.limits is not None for leg in robot.legs])
     beyond = (joints < ranges[:, 0]) | (joints > ranges[:, 1])
     worth = _worth(robot, found) - (beyond & given).any(axis=-1)
-    return tuple((np.round(found[worth.argmax()], 6) + 0.0).tolist())
+    return tuple((np.round(found[_best(worth)], 6) + 0.0).tolist())
+
+
+def _best(worth: Array) -> int:
+    """Return the first of the best, so that rounding does not choose between mirrored poses."""
+    return int((worth >= worth.max() - _ALIKE).argmax())
 
 
 def _worth(robot: Manipulator, poses: Array) -> Array:
