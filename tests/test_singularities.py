@@ -244,7 +244,8 @@ def test_distances_do_not_depend_on_the_unit_of_length():
         again = nearest_singularities(replace(robot, legs=tuple(legs)), scale * pose, most=2000)
         assert [(one.kind, one.leg) for one in again] == [(one.kind, one.leg) for one in found]
         sizes = [np.array([one.distance for one in told]) for told in (again, found)]
-        np.testing.assert_allclose(sizes[0], scale * sizes[1], rtol=1e-3)
+        # As closely as it is searched: rounding leads to other boxes.
+        np.testing.assert_allclose(sizes[0], scale * sizes[1], rtol=5e-3)
 
 
 @pytest.mark.parametrize("name", ["3-prr", "orthoglide", "linear-delta", "quadrupteron"])
