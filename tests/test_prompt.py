@@ -70,7 +70,7 @@ def test_every_public_function_takes_a_robot_by_name():
         assert "RobotLike" in str(signature.parameters["robot"].annotation), name
         by_name = {p.name: None for p in needed if p.kind is not p.VAR_POSITIONAL}
         with pytest.raises(ModelError, match=r"^quadruptron: neither a file nor a machine of the"):
-            function(**by_name | {"robot": "quadruptron"})
+            inspect.unwrap(function)(**by_name | {"robot": "quadruptron"})
 
 
 def test_a_name_serves_as_the_robot_does():

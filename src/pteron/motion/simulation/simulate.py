@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from typing import Protocol, get_args, runtime_checkable
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from pteron.errors import DataError, shown
 from pteron.kernels import Array, as_array
@@ -20,7 +19,7 @@ from pteron.motion.simulation.loop import Controlled, Given, Law, Loads, Source,
 from pteron.motion.simulation.plant import Method, Plant, allowed_step
 from pteron.motion.simulation.result import Simulation
 from pteron.motion.simulation.sensors import Encoders, Sensors
-from pteron.shapes import PoseLike
+from pteron.shapes import JointsLike, PoseLike
 
 STEP = 1e-4
 """Length of the integration's steps, s, where none is given and friction allows it."""
@@ -56,10 +55,10 @@ def simulate(
     *,
     start: tuple[PoseLike, PoseLike] | None = None,
     duration: float | None = None,
-    forces: ArrayLike | Callable[[float], ArrayLike] | None = None,
+    forces: JointsLike | Callable[[float], JointsLike] | None = None,
     model: RobotLike | None = None,
     payload: float | Sequence[tuple[float, float]] = 0.0,
-    wrench: ArrayLike | Callable[[float], ArrayLike] | None = None,
+    wrench: PoseLike | Callable[[float], PoseLike] | None = None,
     sensors: Sensors | None = None,
     delay: float = 0.0,
     limits: bool = True,
@@ -252,13 +251,13 @@ def _masses(payload: float | Sequence[tuple[float, float]], time: Array) -> Arra
 
 
 def _of_time(
-    given: ArrayLike | Callable[[float], ArrayLike] | None, robot: Manipulator, name: str
+    given: PoseLike | Callable[[float], PoseLike] | None, robot: Manipulator, name: str
 ) -> Callable[[float], Array]:
     """Return what gives a machine's forces or a wrench at a time: what was given, or zeros."""
     columns = robot.column_names[name]
     size = len(columns)
 
-    def numbers(value: ArrayLike, told: str) -> Array:
+    def numbers(value: PoseLike, told: str) -> Array:
         found = as_array(by_name(value, columns, told), told, (size,))
         if found.ndim != 1:
             raise DataError(f"{told}: shape {found.shape} given, ({size},) expected")
