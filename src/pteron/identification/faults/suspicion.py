@@ -163,7 +163,7 @@ _REMEDY: dict[Fault, str] = {
     "clock": "check the log's time, and gravity and the unit of lengths in the machine's file",
     "geometry": "measure them again, or calibrate",
     "stribeck": "--stribeck auto finds its speeds, and adds it to the model; slow passages, which "
-    "pteron excite --stribeck writes, show them best",
+    "pteron excite --stribeck writes, show them best. It hides a delay: take --delay auto with it",
     "elasticity": "measure positions behind the drive, or move more slowly",
     "drift": "warm the machine up, or record shorter",
     "load": "no term of the model has it: keep to loads like those of the log",
