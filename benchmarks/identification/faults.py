@@ -17,7 +17,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -156,7 +156,8 @@ def other_geometry(robot: pteron.Manipulator, rng: np.random.Generator) -> ptero
     for leg in robot.legs:
         changed = {}
         for name, key in leg.every_key().items():
-            if getattr(leg, name) is None:
+            one_point = name == "platform_point" and robot.coordinates == ("x", "y")
+            if getattr(leg, name) is None or one_point:
                 continue
             if key.role == "point" and name != "fixed_offset":
                 way = rng.normal(size=3)
@@ -369,9 +370,11 @@ def recorded(name: str, fault: str, seed: int, *, other: bool = False) -> tuple[
     symbols = tuple(leg.joint for leg in motion.robot.legs)
     phase, about = None, Description()
     if case.carried:
-        # P carries it: of the platform's mass alone.
+        carrying = with_payload(case.robot, case.carried)
+        # The tool carries it, which need not be at P.
+        m, x, y, inertia = (pteron.parameters(carrying) - pteron.parameters(case.robot))[-4:]
+        about = Description(payload=KnownPayload(m, (x, y), max(inertia, _SMALL * m)))
         phase = case.phase
-        about = Description(payload=KnownPayload(case.carried, inertia=_SMALL * case.carried))
     log = Log(
         source, case.time, coded, case.forces, symbols=symbols, payload=phase, description=about
     )
@@ -441,7 +444,8 @@ def cell(said: list[Said]) -> str:
     if faults:
         parts.append(", ".join(f"{fault} {count}" for fault, count in faults.items()))
     if not np.isnan(off := [one.off for one in said]).all():
-        parts.append(f"{np.nanmin(off):.2g} to {np.nanmax(off):.2g} %")
+        ends = [f"{end:.2g}" for end in (np.nanmin(off), np.nanmax(off))]
+        parts.append(f"{' to '.join(dict.fromkeys(ends))} %")
     if hidden := sorted({fault for one in said for fault in one.hidden}):
         parts.append(f"cannot tell: {', '.join(hidden)}")
     return "<br>".join(parts)
@@ -460,11 +464,7 @@ def misjudged(said: dict[Key, Said]) -> list[str]:
         for key, one in said.items():
             # A log of the machine with that fault in it says whether it can be told.
             other = said.get((key[0], fault + PAYLOAD * (PAYLOAD in key[1]), 0))
-            if (
-                other is not None
-                and one.grade != "refused"
-                and (kind in one.hidden) == (kind in other.faults)
-            ):
+            if other is not None and kind in one.hidden and kind in other.faults:
                 wrong.append((key, kind))
     count = sum(k[1] in CORRECT for k in said)
     return [
@@ -505,24 +505,23 @@ def main() -> None:
         for key, one in zip(keys, pool.map(judged, *zip(*keys, strict=True)), strict=True):
             said[key] = one
             print(*key, one, file=sys.stderr, flush=True)
-    lines = [
-        f"| fault | {' | '.join(asked.machines)} |",
-        "| --- |" + " --- |" * len(asked.machines),
-    ]
+    text = table(said, asked.machines)
+    print(text)
+    if asked.machines == list(MACHINES):
+        path = Path(__file__).parents[2] / "docs" / "faults.md"
+        atomic.write_text(path, _HEAD.format(asked.seeds) + text + "\n")
+
+
+def table(said: dict[Key, Said], machines: Sequence[str]) -> str:
+    """Return what was said of all logs as a table, and what should not have been."""
+    lines = [f"| fault | {' | '.join(machines)} |", "| --- |" + " --- |" * len(machines)]
     for fault in (*CASES, *CORRECT):
         cells = [
             cell([one for key, one in said.items() if key[:2] == (machine, fault)])
-            for machine in asked.machines
+            for machine in machines
         ]
         lines.append(f"| {fault} | {' | '.join(cells)} |")
-    lines += ["", *misjudged(said)]
-    text = "\n".join(lines)
-    print(text)
-    if asked.machines == list(MACHINES):
-        atomic.write_text(
-            Path(__file__).parents[2] / "docs" / "faults.md",
-            _HEAD.format(asked.seeds) + text + "\n",
-        )
+    return "\n".join([*lines, "", *(f"- {line}" for line in misjudged(said))])
 
 
 _HEAD = """# What identify says of logs with a fault
