@@ -55,10 +55,10 @@ def unlikely_values(robot: Manipulator, columns: Sequence[str], values: Array) -
         chosen = [
             k for k, name in enumerate(columns) if name in far and turning is (name in angles)
         ]
-        sizes = np.abs(values[..., chosen])
+        sizes = np.nan_to_num(np.abs(values[..., chosen]), nan=0.0, posinf=0.0)
         if (sizes > [far[columns[k]] for k in chosen]).any():
             names = ", ".join(columns[k] for k in chosen)
-            found.append(f"{names} up to {float(np.nanmax(sizes)):g}: {question}")
+            found.append(f"{names} up to {float(sizes.max()):g}: {question}")
     return tuple(found)
 
 
