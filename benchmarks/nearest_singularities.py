@@ -17,8 +17,8 @@ from functools import partial
 
 import numpy as np
 from measuring import quick
-from scipy.optimize import minimize
-from scipy.spatial import cKDTree
+from scipy.optimize import minimize  # type: ignore[import-untyped]
+from scipy.spatial import cKDTree  # type: ignore[import-untyped]
 
 import pteron
 from pteron.kernels import Array, numeric

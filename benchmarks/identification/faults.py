@@ -370,10 +370,10 @@ def recorded(name: str, fault: str, seed: int, *, other: bool = False) -> tuple[
     symbols = tuple(leg.joint for leg in motion.robot.legs)
     phase, about = None, Description()
     if case.carried:
-        carrying = with_payload(case.robot, case.carried)
+        loaded = with_payload(case.robot, case.carried)
         # The tool carries it, which need not be at P.
-        m, x, y, inertia = (pteron.parameters(carrying) - pteron.parameters(case.robot))[-4:]
-        about = Description(payload=KnownPayload(m, (x, y), max(inertia, _SMALL * m)))
+        mass, x, y, inertia = (pteron.parameters(loaded) - pteron.parameters(case.robot))[-4:]
+        about = Description(payload=KnownPayload(mass, (x, y), max(inertia, _SMALL * mass)))
         phase = case.phase
     log = Log(
         source, case.time, coded, case.forces, symbols=symbols, payload=phase, description=about

@@ -69,16 +69,16 @@ def check_recordings(
                 f"its forces are in {unit}; declare gains (N, at a crank N m, per {unit}) in its "
                 f"description, or find them with identify_drive_gains{other}",
             )
-    for one, other in combinations(whole, 2):
-        if same(one, other):
+    for one, again in combinations(whole, 2):
+        if same(one, again):
             raise LogError(
-                "twice", other.source, f"the same samples as {one.source}; give them once"
+                "twice", again.source, f"the same samples as {one.source}; give them once"
             )
-    for one, other in product(whole, others):
-        if same(one, other):
+    for one, again in product(whole, others):
+        if same(one, again):
             raise LogError(
                 "twice",
-                other.source,
+                again.source,
                 "is held out, but the same samples are fitted; hold out another motion, or "
                 "nothing: then the end of each log is",
             )

@@ -209,8 +209,10 @@ def identify_payload(
     """
     robot = as_manipulator(robot)
     model = identification_model(robot, replace(terms or Terms(), payload=True), base=base)
-    both = (None if log is None else by_rated_torque(log, robot) for log in (without, with_payload))
-    fit = _phases(*both, processing)
+    without = by_rated_torque(without, robot)
+    if with_payload is not None:
+        with_payload = by_rated_torque(with_payload, robot)
+    fit = _phases(without, with_payload, processing)
     check_recordings(robot, fit, (), processing or Processing())
     parts, plans = _observed(model, fit, processing)
     try:

@@ -217,7 +217,7 @@ def searched_speeds(model: Model, observe: Observe, usual: Array) -> Array:
         speeds = np.where(chosen >= 0, usual * tried[np.maximum(chosen, 0)], np.inf)
         seen = np.flatnonzero(chosen >= 0)
         extra = np.zeros((*plain.forces.shape, len(seen)))
-        for k, i in enumerate(seen):
+        for k, i in enumerate(seen.tolist()):
             extra[:, i, k] = rows.matrix[:, i, p:] @ spline[chosen[i]]
         whole = _appended(plain, extra)
         noise = actuator_noise(whole, weighted(whole).values)

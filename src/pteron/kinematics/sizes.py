@@ -6,9 +6,10 @@ import numpy as np
 
 from pteron.kernels import Array, numeric
 from pteron.manipulator import Manipulator
+from pteron.shapes import PoseLike
 
 
-def type_ii_sizes(robot: Manipulator, poses: Array) -> Array:
+def type_ii_sizes(robot: Manipulator, poses: PoseLike) -> Array:
     """Return the size (...) of the type-II measure of poses (..., m): 0 where it is not a number.
 
     What is not finite passes no floor: out of reach, or where a leg's force is lost.

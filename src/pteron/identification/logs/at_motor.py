@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,8 @@ from pteron.manipulator import Manipulator
 
 if TYPE_CHECKING:
     from pteron.identification.logs.log_file import LogFile
+
+_Recorded = TypeVar("_Recorded", bound="Log | LogFile")
 
 _NEEDS = {"turns": ("ratio",), "counts": ("ratio", "counts_per_turn")}
 """What the drives must tell, by the unit of the joints."""
@@ -51,7 +53,7 @@ def joint_factors(joints: Group, robot: Manipulator, source: str) -> NDArray[np.
     return 2.0 * np.pi / np.array(each)
 
 
-def by_rated_torque(log: Log | LogFile, robot: Manipulator) -> Log | LogFile:
+def by_rated_torque(log: _Recorded, robot: Manipulator) -> _Recorded:
     """Return a log whose forces are in per cent of rated torque with gains, where drives tell them.
 
     Other logs are returned as they are.
