@@ -62,9 +62,19 @@ class Picture(Figure):
 
     def draw(self, renderer: Any) -> None:
         """Draw the figure."""
-        take_fonts(self)
+        saving, engine = self.canvas.is_saving(), self.get_layout_engine()
+        if not saving:  # else `savefig` has done it
+            take_fonts(self)
         with no_word_of_glyphs():
-            super().draw(renderer)
+            if saving and engine is not None and self._is_flat:
+                # Matplotlib draws all in vain to place the axes, and then again without an engine.
+                engine.execute(self)
+            else:
+                super().draw(renderer)
+
+    @property
+    def _is_flat(self) -> bool:
+        return all(axes.name == "rectilinear" for axes in self.axes)
 
     def savefig(self, fname: Any, **options: Any) -> None:
         """Write the figure; letters that no font here has are told in one warning."""
