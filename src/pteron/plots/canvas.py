@@ -20,6 +20,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from pteron.plots.fonts import no_word_of_glyphs, take_fonts, warn_of_absent
 
@@ -66,8 +67,8 @@ class Picture(Figure):
         if not saving:  # else `savefig` has done it
             take_fonts(self)
         with no_word_of_glyphs():
-            if saving and engine is not None and self._is_flat:
-                # Matplotlib draws all in vain to place the axes, and then again without an engine.
+            if saving and isinstance(engine, ConstrainedLayoutEngine) and self._is_flat:
+                # Matplotlib draws all in vain to place the axes, then again with an idle engine.
                 engine.execute(self)
             else:
                 super().draw(renderer)
@@ -215,7 +216,7 @@ def svg(figure: Figure, *, name: str, title: str) -> Markup:
     # The generic families that end matplotlib's list are the page's affair too.
     text = re.sub(r"font: ([^'\";]*?)'[^;\"]*", r"font: \1var(--font, sans-serif)", text)
     # A hundredth of a point is enough; only tags hold coordinates, the rest is text to read.
-    text = re.sub(r"<[^>]*>", lambda tag: re.sub(r"(\.\d\d)\d+", r"\1", tag[0]), text)
+    text = re.sub(r"<[^>]*>", lambda tag: re.sub(r"(?<=\.\d\d)\d+", "", tag[0]), text)
     for color, variable in _VARIABLES.items():
         text = text.replace(color, f"var({variable}, {color})")
     box = re.search(r'viewBox="([^"]+)"', text)
