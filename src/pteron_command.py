@@ -5,6 +5,7 @@ It stands outside the package: importing anything inside loads NumPy and CasADi 
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 from types import FrameType
@@ -12,9 +13,18 @@ from typing import NoReturn
 
 _INTERRUPTED = 130
 
+_THREADS = "OPENBLAS_NUM_THREADS"
+"""Read once, when NumPy is imported."""
+
+_ALIVE = 100_000
+"""Objects made before Python looks for cycles among them: imports make many, and no garbage."""
+
 
 def main() -> None:
     """Run the command line."""
+    # Matrices are small: more threads wait more than they work, and add up in another order.
+    os.environ.setdefault(_THREADS, "1")
+    gc.set_threshold(_ALIVE, *gc.get_threshold()[1:])
     ours = signal.getsignal(signal.SIGINT) is signal.default_int_handler
     if ours:
         # An exception would be lost, or become an ImportError, in what is written in C.
