@@ -1076,6 +1076,26 @@ def test_a_closed_stream_is_no_defect(closed: str, line: str, status: int):
     assert result.stderr.count("\n") <= 1
 
 
+@pytest.mark.parametrize("given", [None, "2"])
+def test_linear_algebra_has_one_thread_unless_the_environment_says_otherwise(tmp_path, given):
+    # NumPy reads it when it is imported: it counts what is there before.
+    stand_in = tmp_path / "numpy.py"
+    stand_in.write_text("import os; print(os.environ['OPENBLAS_NUM_THREADS']); os._exit(0)")
+    paths = [str(tmp_path), os.environ.get("PYTHONPATH", "")]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths))}
+    environment.pop("OPENBLAS_NUM_THREADS", None)
+    if given is not None:
+        environment["OPENBLAS_NUM_THREADS"] = given
+    done = subprocess.run(
+        [sys.executable, "-u", *PROGRAM[1:], "catalog"],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.split() == [given or "1"]
+
+
 def test_data_is_utf_8_in_every_locale():
     result = subprocess.run(
         [*PROGRAM, "inverse", "tripteron", "--table", "-"],

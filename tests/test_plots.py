@@ -5,12 +5,14 @@ import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from mechanisms import CATALOG, MECHANISMS, random_machine
 from mpl_toolkits.mplot3d.art3d import Line3D, Poly3DCollection
@@ -43,7 +45,7 @@ from pteron.plots import (
     svg_file,
     trajectory_figure,
 )
-from pteron.plots.canvas import PAPER
+from pteron.plots.canvas import PAPER, blank
 from pteron.plots.space import upright
 from pteron.workspace import home_pose, reach_slice
 
@@ -161,6 +163,33 @@ def test_pictures_with_other_names_share_no_identifier():
     )
     assert first
     assert not first & second
+
+
+class Counted(Line2D):
+    """A line that counts how often it is drawn."""
+
+    times = 0
+
+    def draw(self, renderer):
+        Counted.times += 1
+        super().draw(renderer)
+
+
+def test_an_svg_is_drawn_once_and_laid_out_as_matplotlib_does():
+    def picture(kind):
+        figure = kind(figsize=(3.0, 2.0), layout="constrained")
+        axes = figure.add_subplot(xlabel="time (s)", ylabel="a long label\nof two lines")
+        axes.plot([0.0, 1.0], [0.0, 1e6])
+        return figure, axes
+
+    figure, axes = picture(type(blank(1.0, 1.0)))
+    axes.add_line(Counted([0.0, 1.0], [1e6, 0.0]))
+    Counted.times = 0
+    svg_file(figure)
+    assert Counted.times == 1
+    plain, same = picture(Figure)
+    plain.savefig(BytesIO(), format="svg")
+    np.testing.assert_array_equal(axes.get_position().bounds, same.get_position().bounds)
 
 
 def test_pictures_need_no_pyplot():
