@@ -150,7 +150,7 @@ def _taken_in(
     fit, size, covariance = fitted(mix)
     wald = _wald(size, covariance)
     chance = float(chi2.sf(wald, q))
-    clear = np.abs(size) > _CLEAR * np.sqrt(np.diag(covariance))
+    clear = np.abs(size) > _CLEAR * np.sqrt(np.maximum(np.diag(covariance), 0.0))
     if chance < _CHANCE and clear.any() and not clear.all():
         mix = mix[:, clear]
         fit, size, covariance = fitted(mix)
@@ -159,7 +159,9 @@ def _taken_in(
         (one.family, one.mix @ fit.values[start:stop])
         for one, (start, stop) in zip(before, pairwise(ends), strict=True)
     ]
-    deviations = np.sqrt(np.einsum("ij,jk,ik->i", mix, covariance, mix))
+    # Without noise a size may be known exactly: its variance is rounding, of either sign.
+    variances = np.einsum("ij,jk,ik->i", mix, covariance, mix)
+    deviations = np.sqrt(np.maximum(variances, 0.0))
     family = suspects.families[k]
     usual = _likely(size, covariance, mix, suspects) if family.unit == "m" else 1.0
     return Named(family, mix, mix @ size, deviations, chance, fit, usual, tuple(others)), wald
