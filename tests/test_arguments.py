@@ -97,10 +97,10 @@ def test_all_that_is_wrong_is_told_at_once():
     [
         (lambda: motion.with_payload("delta", "1"), "mass: '1' given, a number expected"),
         (lambda: motion.with_payload("delta", True), "mass: True given, a number expected"),
-        (lambda: pteron.save("delta", 3), "path: 3 given, a text or a Path expected"),
+        (lambda: pteron.save("delta", 3), "path: 3 given, a text or a path expected"),
         (
             lambda: identification.identify("delta", Odd()),
-            "logs: <odd> given, a Log, a LogFile or a sequence, each a Log or a LogFile, exp",
+            "logs: <odd> given, a Log, a LogFile or a sequence .each a Log or a LogFile. exp",
         ),
         (
             lambda: pteron.random_poses("delta", 1, seed=-7),

@@ -408,11 +408,11 @@ def test_keep_chooses_the_columns():
         (["mgx_u1"], "mgx_u1 cannot be kept"),
         (["m_p1", "m_u1"], "m_u1 cannot be kept"),
         (["nothing"], "'nothing' is no list of parameter names"),
-        ("m_p1", "'m_p1' is no list of parameter names"),
+        ("m_p1", r"keep: 'm_p1' given, a sequence \(each a text\) expected"),
     ],
 )
 def test_a_choice_that_cannot_be_is_refused(keep, message):
-    with pytest.raises(pteron.ModelError, match=message):
+    with pytest.raises(pteron.PteronError, match=message):
         pteron.base_parameters(pteron.load("quadrupteron"), keep=keep)
 
 
@@ -597,5 +597,5 @@ def test_a_base_of_another_layout_is_refused():
 
 @pytest.mark.parametrize("shared", [[1, 2], [(1.0, 2)], 3, [(1, 2), (2, 3)], "all", [("1",)]])
 def test_groups_that_are_none_are_refused(shared):
-    with pytest.raises(pteron.ModelError, match=r"^shared: "):
+    with pytest.raises(pteron.PteronError, match=r"^shared: "):
         pteron.base_parameters(machine("quadrupteron"), shared=shared)

@@ -523,7 +523,7 @@ def test_time_cuts_the_search_and_a_result_is_there_all_the_same():
 )
 def test_what_the_search_cannot_do_is_refused(given: dict, words: str):
     with pytest.raises(pteron.DataError, match=words):
-        optimal_excitation(CATALOG["tripteron"], **given)
+        pteron.identification.optimal_excitation(CATALOG["tripteron"], **given)
 
 
 # What is written

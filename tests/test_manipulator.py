@@ -202,7 +202,8 @@ def test_a_manipulator_needs_as_many_legs_as_freedoms(name):
 def test_a_manipulator_has_a_name_and_gravity():
     robot = CATALOG["tripteron"]
     refused(lambda: replace(robot, name="  "), "name: '  ' is not a text with at least one letter")
-    refused(lambda: replace(robot, gravity=(0.0, 1.0)), "gravity: 2 numbers given, 3 expected")
+    words = "gravity: (0.0, 1.0) given, 3 values (each a number) expected"
+    refused(lambda: replace(robot, gravity=(0.0, 1.0)), words, error=pteron.DataError)
     refused(lambda: replace(robot, gravity=(0.0, 0.0, np.nan)), "gravity[2]: nan is not a finite")
     assert Manipulator("t", robot.platform, list(robot.legs)).gravity == (0.0, 0.0, -9.81)
 

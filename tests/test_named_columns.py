@@ -156,7 +156,7 @@ def test_a_motion_needs_a_time():
     for table, message in (
         ({"x": [0.0]}, "table: no column t, the time in s; its columns are x"),
         (pl.DataFrame({"t": []}), "table: no rows; its columns are t"),
-        (3.0, "table: 3.0 given, a text, a Path, a Table, a HasColumns or a mapping expected"),
+        (3.0, "table: 3.0 given, a text, a path, a Table, a data frame or a mapping expected"),
     ):
         with pytest.raises(DataError, match=f"^{message}$"):
             pteron.motion.replay("tripteron", table)

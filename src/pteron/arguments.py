@@ -184,7 +184,7 @@ def _kind(hint: Any) -> _Kind | None:
     if origin in (typing.Union, types.UnionType):
         # ArrayLike is a union too, and one with another flattens it.
         numbers = set(inner) >= _ARRAY_LIKE
-        rest = [_kind(one) for one in inner if not (numbers and one in _ARRAY_LIKE)]
+        rest = [_alternative(one) for one in inner if not (numbers and one in _ARRAY_LIKE)]
         return _either([*rest, *([_Kind("real numbers", _are_numbers)] if numbers else [])])
     if origin is typing.Annotated and isinstance(inner[1], Between):
         return _bounded(_kind(inner[0]), inner[1])
@@ -209,7 +209,17 @@ def _kind(hint: Any) -> _Kind | None:
     if getattr(kind, "_is_protocol", False) and not getattr(kind, "_is_runtime_protocol", False):
         return None
     article = "an" if kind.__name__[0] in "AEIO" else "a"
-    return _Kind(f"{article} {kind.__name__}", lambda value: isinstance(value, kind))
+    called = _CALLED.get(kind.__name__, f"{article} {kind.__name__}")
+    return _Kind(called, lambda value: isinstance(value, kind))
+
+
+def _alternative(hint: Any) -> _Kind | None:
+    """Return what one of several type hints asks for: of choices, one of them."""
+    kind = _kind(hint)
+    if kind is None or typing.get_origin(hint) is not typing.Literal:
+        return kind
+    choices = typing.get_args(hint)
+    return _Kind(kind.words, lambda value: any(value is one or value == one for one in choices))
 
 
 def _either(kinds: list[_Kind | None]) -> _Kind | None:
@@ -245,7 +255,7 @@ def _sequence(every: _Kind | None, *, lazy: bool = False, count: int | None = No
         return every is None or len(value) > _LOOKED_AT or all(map(every.holds, value))
 
     called = "a sequence" if count is None else f"{count} values"
-    return _Kind(f"{called}, each {every.words}," if every else called, holds)
+    return _Kind(f"{called} (each {every.words})" if every else called, holds)
 
 
 def _is_number(value: Any) -> bool:
@@ -287,6 +297,9 @@ def _has_text(values: np.ndarray[Any, Any]) -> bool:
 
 
 _ARRAY_LIKE = set(typing.get_args(ArrayLike))
+_CALLED = {"HasColumns": "a data frame", "Path": "a path"}
+"""Kinds that have a word of their own."""
+
 _COLLECTIONS = ("builtins", "collections.abc")
 
 _PLAIN: dict[Any, _Kind | None] = {

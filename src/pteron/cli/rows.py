@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -44,18 +45,21 @@ class Rows:
         """Return what `serve` makes of the numbers (..., K) in `columns`, chunk by chunk."""
         import numpy as np
 
+        from pteron.errors import UnlikelyValue
         from pteron.kinematics.unlikely import unlikely_values
 
         values = self.table.numbers(columns, on_failure)
         unlikely = "; ".join(unlikely_values(robot, columns, values))
-        if len(values) <= LONG:
-            parts = list(self._chunks(serve, values, unlikely))
-        else:
-            parts = []
-            with progress_bar(self.table.source, len(values)) as advance:
-                for part in self._chunks(serve, values, unlikely):
-                    parts.append(part)
-                    advance(len(part))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UnlikelyValue)  # it is told once, of the whole table
+            if len(values) <= LONG:
+                parts = list(self._chunks(serve, values, unlikely))
+            else:
+                parts = []
+                with progress_bar(self.table.source, len(values)) as advance:
+                    for part in self._chunks(serve, values, unlikely):
+                        parts.append(part)
+                        advance(len(part))
         if unlikely:
             note(f"Note: {self.table.source}: {unlikely}")
         return np.concatenate(parts)

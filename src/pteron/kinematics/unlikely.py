@@ -12,6 +12,9 @@ from pteron.errors import UnlikelyValue
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 
+_WOUND = 6.0 * np.pi
+"""rad, three turns: beyond them the coordinate of a crank is likelier in degrees."""
+
 
 def unlikely_length(robot: Manipulator) -> float:
     """Return the size from which on a length of a pose or a part is rather one in mm, m."""
@@ -40,7 +43,7 @@ def unlikely_values(robot: Manipulator, columns: Sequence[str], values: Array) -
     far |= {"y": far["x"], "z": far["x"]}
     for i, leg in enumerate(robot.legs, start=1):
         turns = leg.joint.unit == "rad"
-        most = max(_turn(leg.limits), far["phi"]) if turns else far["x"]
+        most = max(_turn(leg.limits), far["phi"], _WOUND) if turns else far["x"]
         far[f"{leg.joint.coordinate}{i}"] = most
     angles = {"phi"} | {
         f"{leg.joint.coordinate}{i}"
