@@ -133,16 +133,14 @@ def check(
 
 def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
     from pteron.kinematics import architecture, singular_orientations
-    from pteron.kinematics.architecture import singular_everywhere
     from pteron.workspace import home_pose, limited_joints, reserve
     from pteron.workspace.doubts import elbow_doubts
     from pteron.workspace.drive_doubts import load_doubts
 
-    layout = architecture(robot)
-    if layout.singular:
-        raise singular_everywhere(robot)
-    loose = () if layout.holds is not False else (_LOOSE,)
+    # Refuses a singular layout, and one without a common reach with by how much legs miss it
     home = home_pose(robot)
+    layout = architecture(robot)
+    loose = () if layout.holds is not False else (_LOOSE,)
     position = home[: len(robot.platform.lengths)]
     return {
         **_machine(robot),

@@ -46,7 +46,7 @@ def evaluate(
     Examples
     --------
     >>> from pteron.indices import evaluate
-    >>> evaluate("quadrupteron", "condition", [[0.0, 0.0, 0.0, 0.0], [9.0, 0.0, 0.0, 0.0]]).round(3)
+    >>> evaluate("quadrupteron", "condition", [[0.0, 0.0, 0.0, 0.0], [0.9, 0.0, 0.0, 0.0]]).round(3)
     array([2.414,   nan])
     """
     robot = as_manipulator(robot)
