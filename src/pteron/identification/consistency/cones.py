@@ -20,7 +20,9 @@ from pteron.extras import install_command
 from pteron.identification.consistency.bodies import Bodies
 from pteron.kernels import Array
 
-_TOLERANCE = 1e-10
+_TOLERANCES = (1e-10, 1e-9, 1e-8)
+"""The solver's, each where it gives up at the one before: the caller checks the answer alike."""
+
 _SOLVED = ("optimal", "optimal_inaccurate")
 
 
@@ -96,14 +98,16 @@ def closest(
 
 def _solve(cp: Any, problem: Any) -> bool:
     """Solve, and tell whether there is a solution; the caller checks it, not the solver."""
-    options = dict.fromkeys(("tol_gap_abs", "tol_gap_rel", "tol_feas"), _TOLERANCE)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        try:
-            problem.solve(solver=cp.CLARABEL, **options)
-        except cp.SolverError:
-            return False
-    return problem.status in _SOLVED
+    for tolerance in _TOLERANCES:
+        options = dict.fromkeys(("tol_gap_abs", "tol_gap_rel", "tol_feas"), tolerance)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            try:
+                problem.solve(solver=cp.CLARABEL, **options)
+            except cp.SolverError:
+                continue
+        return problem.status in _SOLVED
+    return False
 
 
 class MissingSolver(ModelError):
