@@ -137,7 +137,7 @@ def test_numbers_of_other_libraries_are_numbers():
     ("make", "message"),
     [
         (lambda: pteron.Manipulator("m", 4, [1]), "platform: 4 given, a Platform expected; legs: "),
-        (lambda: identification.Terms(stribeck="slow"), "stribeck: 'slow' given, a number or"),
+        (lambda: identification.Terms(stribeck="slow"), "stribeck: 'slow' given, a number, a seq"),
         (lambda: motion.MotionLimits(speed=Odd()), "speed: <odd> given, an array expected"),
         (lambda: indices.Tolerances(Odd()), "joints: <odd> given"),
         (lambda: maps.Grid("xy", [], "xy"), "coordinates: 'xy' given, a sequence"),
