@@ -65,13 +65,15 @@ def forces_and_held(robot, state):
 @lru_cache(maxsize=8)
 def small(criterion: str = "condition", space: str = "platform", robot: str = "tripteron"):
     """Return a search small enough for a test."""
+    # One start may end in a local minimum: the Delta's best one gains 1.86, the next one 2.44.
+    two = (criterion, space) == ("condition", "platform") and robot in ("tripteron", "delta")
     return optimal_excitation(
         machine(robot),
         space=space,
         harmonics=2,
         period=4.0,
         criterion=criterion,
-        starts=2 if (criterion, space, robot) == ("condition", "platform", "tripteron") else 1,
+        starts=2 if two else 1,
         draws=6,
         workers=1,
     )

@@ -42,8 +42,8 @@ _ITERATIONS = 200
 _SETTLED = 1e-6
 """Decrease of the measure, a logarithm, below which a step is not worth it."""
 
-_RADIUS = 0.5
-"""Of the first trust region, over the sizes of motions: a small one ends in the nearest minimum."""
+_RADIUS = 0.2
+"""Of the first trust region, over the sizes of motions."""
 
 
 @dataclass(frozen=True)
