@@ -143,7 +143,7 @@ def test_a_grid_that_cannot_be_is_refused(delta, held, ranges, words):
         (lambda _: Axis("w", 0.0, 1.0, 3), "name: 'w' given, one of x, y, z, phi expected"),
         (lambda _: Grid(("x", "x"), (0.0, 0.0), ()), "coordinates: .'x', 'x'. given, some of x, y"),
         (lambda _: Grid(("x", "y"), (0.0,), ()), "pose: 1 numbers given, x y expected"),
-        (lambda _: Grid(("x",), (True,), ()), "pose: .True,. given, a sequence, each a"),
+        (lambda _: Grid(("x",), (True,), ()), "pose: .True,. given, a sequence .each a"),
         (
             lambda _: Grid(("x", "y"), (0.0, 0.0), (Axis("y", 0.0, 1.0, 2),) * 2),
             "axes: .'y', 'y'. given, some of x, y expected, each once and in this order",
