@@ -251,7 +251,7 @@ def test_json_is_one_object_for_a_pose_and_a_list_for_a_table():
 
 
 def test_a_person_sees_a_table_of_60_columns(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("pteron.cli.rows.is_terminal", lambda: True)
+    monkeypatch.setattr("pteron.cli.table_rows.is_terminal", lambda: True)
     text = done("inverse quadrupteron 0.01 0.02 -0.03 0.1")
     assert "rho1 (m)" in text
     assert "-0.030000" in text
@@ -260,7 +260,7 @@ def test_a_person_sees_a_table_of_60_columns(monkeypatch: pytest.MonkeyPatch):
     assert result.stderr == "40 of 100 rows shown; --out FILE writes them all\n"
     assert "row" in result.stdout
     assert max(map(len, result.stdout.splitlines())) <= 60
-    monkeypatch.setattr("pteron.cli.rows.SHOWN_ROWS", 2)
+    monkeypatch.setattr("pteron.cli.table_rows.SHOWN_ROWS", 2)
     text = run("direct quadrupteron 0.03 0.02 0.01 0.02").stdout
     assert "mode" in text
     assert "3.141593" in text
@@ -288,7 +288,7 @@ def test_columns_and_units_are_those_of_the_joints(mixed: str, monkeypatch: pyte
         row = json.loads(done(f"forces {robot} --pose 0.02 -0.01 -0.9 --json"))
         expected = pteron.inverse_dynamics(machine, pose, [0.0] * 3, [0.0] * 3)
         assert [row[name] for name in forces.split()] == expected.tolist()
-    monkeypatch.setattr("pteron.cli.rows.is_terminal", lambda: True)
+    monkeypatch.setattr("pteron.cli.table_rows.is_terminal", lambda: True)
     assert "rho1 (m)  theta2 (rad)" in done(f"inverse {mixed} 0 0 -0.9")
     assert "force1 (N)  torque2 (N m)" in done(f"forces {mixed} --pose 0 0 -0.9")
     assert "is it in millimetres?" in refused("inverse delta 0 0 -900")
@@ -317,7 +317,7 @@ def test_the_row_and_the_line_of_a_failure_are_named(cells: str, words: list[str
 
 
 def test_a_failure_in_a_later_chunk_has_the_row_of_the_table(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("pteron.cli.rows.CHUNK", 4)
+    monkeypatch.setattr("pteron.cli.table_rows.CHUNK", 4)
     poses = np.zeros((18, 4))
     poses[16:, 2] = 0.9
     pl.DataFrame(poses, schema=["x", "y", "z", "phi"]).write_parquet("poses.parquet")
@@ -348,10 +348,10 @@ def test_a_long_table_shows_a_bar_and_has_the_same_result(monkeypatch: pytest.Mo
     motion(100).write_csv("motion.csv")
     line = "forces quadrupteron --table motion.csv"
     expected = done(line)
-    monkeypatch.setattr("pteron.cli.rows.LONG", 99)
-    monkeypatch.setattr("pteron.cli.rows.CHUNK", 7)
+    monkeypatch.setattr("pteron.cli.table_rows.LONG", 99)
+    monkeypatch.setattr("pteron.cli.table_rows.CHUNK", 7)
     assert done(line) == expected
-    monkeypatch.setattr("pteron.cli.screen.is_watched", lambda: True)
+    monkeypatch.setattr("pteron.cli.terminal.is_watched", lambda: True)
     shown = run(line, FORCE_COLOR="1")
     assert shown.stdout == expected
     assert "motion.csv" in shown.stderr
@@ -570,7 +570,7 @@ def test_the_catalog_is_listed():
 def test_a_good_file_is_described(robot: str, mixed: str, monkeypatch: pytest.MonkeyPatch):
     machine = pteron.load(mixed if robot == "mixed" else robot)
     pteron.save(machine, "robot.toml")
-    monkeypatch.setattr("pteron.cli.screen.is_terminal", lambda: True)
+    monkeypatch.setattr("pteron.cli.terminal.is_terminal", lambda: True)
     text = done("check robot.toml")
     assert "This machine can work." in text
     assert max(map(len, text.splitlines())) <= 60
@@ -598,7 +598,7 @@ def driven(robot, **more):
 
 
 def test_drives_are_a_table_and_data(mixed: str, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("pteron.cli.screen.is_terminal", lambda: True)
+    monkeypatch.setattr("pteron.cli.terminal.is_terminal", lambda: True)
     robot = driven(pteron.load("quadrupteron"), stribeck=pteron.Stribeck(1.0, 0.01))
     pteron.save(robot, "robot.toml")
     text = done("check robot.toml")
@@ -818,7 +818,7 @@ def test_a_machine_without_a_common_reach_is_refused():
 
 
 def test_a_report_is_a_page_with_its_numbers(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("pteron.cli.screen.is_terminal", lambda: True)
+    monkeypatch.setattr("pteron.cli.terminal.is_terminal", lambda: True)
     text = done("report tripteron --out one/two --elbows +-+")
     page = Path("one/two/report.html")
     assert page.read_text().lstrip().startswith("<!")
@@ -932,8 +932,8 @@ def test_base_parameters_as_asked_for():
 
 
 def test_a_person_sees_base_parameters_with_values(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("pteron.cli.base.is_terminal", lambda: True)
-    monkeypatch.setattr("pteron.cli.screen.is_terminal", lambda: True)
+    monkeypatch.setattr("pteron.cli.base_parameters.is_terminal", lambda: True)
+    monkeypatch.setattr("pteron.cli.terminal.is_terminal", lambda: True)
     text = done("base quadrupteron")
     assert "26 base parameters of 40" in text
     assert "kg m^2" in text

@@ -25,7 +25,7 @@ from pteron.identification.playback import Playback, playback
 from pteron.motion import Motion, pick_and_place
 from pteron.report import write_motion_page, write_report
 from pteron.report.identification import write_identification
-from pteron.report.scene import frames
+from pteron.report.motion_frames import frames
 from pteron.report.typeset import significant
 from pteron.workspace import home_pose
 

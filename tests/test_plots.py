@@ -46,7 +46,7 @@ from pteron.plots import (
     trajectory_figure,
 )
 from pteron.plots.canvas import PAPER, blank
-from pteron.plots.space import upright
+from pteron.plots.space_axes import upright
 from pteron.workspace import home_pose, reach_slice
 
 IN_SPACE = ["tripteron", "quadrupteron turned", "delta", "random PRR 0", "par4", "delta-4"]

@@ -116,7 +116,7 @@ def test_one_table_may_be_written(driven: str):
 
 
 def test_a_person_sees_tables_within_80_columns(driven: str, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("pteron.cli.outcome.is_terminal", lambda: True)
+    monkeypatch.setattr("pteron.cli.destination.is_terminal", lambda: True)
     Path("motors.csv").write_text(MOTORS, encoding="utf-8")
     text = run(f"size {driven} --motors motors.csv --payload 0.2", COLUMNS="80").stdout
     assert max(map(len, text.splitlines())) <= 80

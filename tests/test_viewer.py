@@ -22,12 +22,12 @@ import pteron
 from pteron.kinematics.condition import jacobian_at
 from pteron.motion import joint_guides, joint_points
 from pteron.plots.canvas import LEG_COLORS
-from pteron.report.joints import readable
+from pteron.report.joint_quantities import readable
 from pteron.report.typeset import fixed
 from pteron.viewer import view
 from pteron.viewer.boundary import allowed
-from pteron.viewer.files import motion_of_file
 from pteron.viewer.guard import is_here
+from pteron.viewer.motion_files import motion_of_file
 from pteron.viewer.readings import readings
 from pteron.viewer.readout import readout
 from pteron.viewer.server import free_port

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from typer import Exit
 
 from pteron.cli.pose_ranges import pose_ranges, pose_text
-from pteron.cli.screen import note, percent, plain, show, show_json, spinner, table
+from pteron.cli.terminal import note, percent, plain, show, show_json, spinner, table
 from pteron.errors import DataError, ModelError
 
 if TYPE_CHECKING:

@@ -12,10 +12,10 @@ from pteron.cli.arguments import (
     option,
     parsed_list,
 )
-from pteron.cli.given_cycle import loaded, replayed
+from pteron.cli.motion_argument import loaded, replayed
 from pteron.cli.motion_table import motion_frame, peaks_table
-from pteron.cli.screen import note, plain, show, show_json, spinner
-from pteron.cli.ways import given_pose, joint_motion, line_motion, standard_motion
+from pteron.cli.planned_motions import given_pose, joint_motion, line_motion, standard_motion
+from pteron.cli.terminal import note, plain, show, show_json, spinner
 from pteron.errors import DataError
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from typer import Argument
 
 from pteron.cli.arguments import Json, option
 from pteron.cli.completion import machines
-from pteron.cli.screen import plain, progress_bar, show, show_json, table
+from pteron.cli.terminal import plain, progress_bar, show, show_json, table
 from pteron.errors import DataError
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from rich.table import Table
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
-from pteron.cli.screen import note, plain, progress_bar, show, show_json, table
+from pteron.cli.terminal import note, plain, progress_bar, show, show_json, table
 from pteron.errors import ModelError
 
 if TYPE_CHECKING:

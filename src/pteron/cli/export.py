@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
 from pteron.cli.completion import functions
-from pteron.cli.screen import note, plain, show, show_json, spinner
+from pteron.cli.terminal import note, plain, show, show_json, spinner
 from pteron.errors import DataError
 
 if TYPE_CHECKING:

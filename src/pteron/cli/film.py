@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from typer import Option
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
-from pteron.cli.given_cycle import CYCLE, STANDARD, cycle_of, loaded
-from pteron.cli.screen import plain, show, show_json, spinner, stages
+from pteron.cli.motion_argument import CYCLE, STANDARD, cycle_of, loaded
+from pteron.cli.terminal import plain, show, show_json, spinner, stages
 from pteron.errors import DataError
 
 if TYPE_CHECKING:

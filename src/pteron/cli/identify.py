@@ -11,8 +11,8 @@ from typer import Argument
 
 from pteron.cli.arguments import Elbows, Json, load_robot, option
 from pteron.cli.completion import machines
-from pteron.cli.screen import is_terminal, note, plain, show, show_json, spinner, stages, table
-from pteron.cli.times import Times
+from pteron.cli.progress import Times
+from pteron.cli.terminal import is_terminal, note, plain, show, show_json, spinner, stages, table
 from pteron.errors import DataError
 
 if TYPE_CHECKING:

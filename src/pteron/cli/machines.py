@@ -12,7 +12,7 @@ from typer import Argument, Exit
 
 from pteron.cli.arguments import Elbows, Json, load_robot, option, signs
 from pteron.cli.completion import machines
-from pteron.cli.screen import complain, note, plain, show, show_json, spinner, table, write
+from pteron.cli.terminal import complain, note, plain, show, show_json, spinner, table, write
 from pteron.errors import ModelError, OutputError, PteronError
 
 if TYPE_CHECKING:

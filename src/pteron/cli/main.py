@@ -14,7 +14,7 @@ from typer import Abort, Context, Exit, Option, Typer, echo
 from typer.core import TyperGroup
 
 from pteron.cli.arguments import Command, NumbersCommand, without_types
-from pteron.cli.base import base, table1
+from pteron.cli.base_parameters import base, table1
 from pteron.cli.cycle import cycle
 from pteron.cli.design import design
 from pteron.cli.excite import excite
@@ -22,13 +22,13 @@ from pteron.cli.export import export
 from pteron.cli.film import film
 from pteron.cli.identify import identify
 from pteron.cli.interrupts import insistent_interrupts
+from pteron.cli.inverse_direct_forces import direct, forces, inverse
 from pteron.cli.machines import catalog, check, new
-from pteron.cli.motions import direct, forces, inverse
 from pteron.cli.play import play
 from pteron.cli.report import report
-from pteron.cli.screen import complain, note
 from pteron.cli.simulate import simulate
 from pteron.cli.size import size
+from pteron.cli.terminal import complain, note
 from pteron.cli.view import view
 from pteron.cli.workspace import workspace
 from pteron.errors import PteronError

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import rich.table
 
 from pteron.cli.pose_ranges import pose_text
-from pteron.cli.screen import percent, plain, show, table
+from pteron.cli.terminal import percent, plain, show, table
 from pteron.errors import DataError
 
 if TYPE_CHECKING:

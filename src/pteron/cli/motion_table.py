@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rich.table import Table
 
-from pteron.cli.screen import table
+from pteron.cli.terminal import table
 
 if TYPE_CHECKING:
     import polars as pl

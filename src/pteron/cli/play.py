@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 from typer import Argument
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
-from pteron.cli.given_cycle import STANDARD, loaded, played
-from pteron.cli.screen import plain, show, show_json, spinner
+from pteron.cli.motion_argument import STANDARD, loaded, played
+from pteron.cli.terminal import plain, show, show_json, spinner
 from pteron.errors import DataError
 
 if TYPE_CHECKING:

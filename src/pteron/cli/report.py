@@ -9,8 +9,8 @@ from typing import Annotated, Any
 from rich.table import Table
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
-from pteron.cli.given_cycle import played
-from pteron.cli.screen import note, plain, show, show_json, spinner, table
+from pteron.cli.motion_argument import played
+from pteron.cli.terminal import note, plain, show, show_json, spinner, table
 
 _SERIES = ("time", "pose", "velocity", "acceleration", "forces")
 """What the report's file holds of each sample of the cycle: nothing to print."""

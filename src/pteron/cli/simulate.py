@@ -9,9 +9,9 @@ from typer import Exit
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
 from pteron.cli.completion import machines
-from pteron.cli.given_cycle import CYCLE, STANDARD, cycle_of, loaded
-from pteron.cli.outcome import Destination
-from pteron.cli.screen import note, plain, show, spinner, table
+from pteron.cli.destination import Destination
+from pteron.cli.motion_argument import CYCLE, STANDARD, cycle_of, loaded
+from pteron.cli.terminal import note, plain, show, spinner, table
 from pteron.errors import DataError
 
 if TYPE_CHECKING:

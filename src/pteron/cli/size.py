@@ -8,9 +8,9 @@ import rich.table
 from typer import Exit
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
-from pteron.cli.given_cycle import CYCLE, STANDARD, cycle_of, loaded
-from pteron.cli.outcome import Destination
-from pteron.cli.screen import note, plain, show, spinner, table
+from pteron.cli.destination import Destination
+from pteron.cli.motion_argument import CYCLE, STANDARD, cycle_of, loaded
+from pteron.cli.terminal import note, plain, show, spinner, table
 
 if TYPE_CHECKING:
     import polars as pl
@@ -152,7 +152,7 @@ def _fits_table(found: Sizing, fits: tuple[Fit, ...]) -> pl.DataFrame:
 def _more(found: Sizing, fits: tuple[Fit, ...]) -> dict[str, str]:
     """Return what a folder has beside the table and the figures."""
     from pteron.plots import svg_file
-    from pteron.report.drives import force_speed, power
+    from pteron.report.drive_figures import force_speed, power
 
     texts = {
         "power.svg": svg_file(power(found)),

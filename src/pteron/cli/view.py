@@ -12,8 +12,8 @@ from typing import Annotated
 from typer import echo
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
-from pteron.cli.given_cycle import STANDARD
-from pteron.cli.screen import note, show_json, spinner
+from pteron.cli.motion_argument import STANDARD
+from pteron.cli.terminal import note, show_json, spinner
 
 _TICK = 0.5
 """s between two looks for Ctrl-C, which some systems deliver only then."""

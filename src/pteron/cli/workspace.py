@@ -13,7 +13,7 @@ from pteron.cli.certify import TOLERANCE, Proofs
 from pteron.cli.completion import indices
 from pteron.cli.map_summary import map_data, map_rows, show_map
 from pteron.cli.pose_ranges import pose_ranges, pose_text
-from pteron.cli.screen import (
+from pteron.cli.terminal import (
     is_terminal,
     note,
     plain,

@@ -25,7 +25,7 @@ from pteron.plots.canvas import (
     remark,
     spot,
 )
-from pteron.plots.joints import joints_of, named, rows
+from pteron.plots.joint_columns import joints_of, named, rows
 
 _ROOM = 1.15
 """The axes' half width over what is drawn."""

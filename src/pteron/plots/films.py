@@ -19,7 +19,7 @@ from pteron.kernels import Array, as_array
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion import Motion
 from pteron.plots.encoders import ENCODERS, checked_encoder
-from pteron.plots.frames import frames
+from pteron.plots.film_frames import frames
 
 _SPEEDS = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
 _LEAST = 2.0

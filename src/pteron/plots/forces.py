@@ -25,7 +25,7 @@ from pteron.plots.canvas import (
     spot,
     stack,
 )
-from pteron.plots.joints import joints_of, named, rows
+from pteron.plots.joint_columns import joints_of, named, rows
 
 _ROOM = 75.0
 """Degrees that a remark takes which says in words what an orientation is."""

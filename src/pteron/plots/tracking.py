@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from pteron.kernels import Array
 from pteron.plots.canvas import MUTED, blank, leg_style, legend, stack
-from pteron.plots.joints import rows
+from pteron.plots.joint_columns import rows
 
 _SCALES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))
 

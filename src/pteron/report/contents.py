@@ -29,7 +29,7 @@ from pteron.motion import (
 from pteron.plots import grid_step
 from pteron.reduction import BaseParameters, base_parameters
 from pteron.report.costs import Cost, costs
-from pteron.report.scene import Frames, frames
+from pteron.report.motion_frames import Frames, frames
 from pteron.workspace import (
     BEYOND_LIMITS,
     REACHABLE,

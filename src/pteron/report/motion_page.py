@@ -16,9 +16,9 @@ from pteron.manipulator import Manipulator
 from pteron.motion import Guide, JointPoints, joint_guides, joint_points, overloads
 from pteron.motion.trajectories.tool import tool_motion
 from pteron.plots import forces_figure, grid_step, power_figure, robot_figure, svg
-from pteron.report.joints import Quantity, coordinate, force, nouns, speed
-from pteron.report.scene import Frames, few, frames
-from pteron.report.stage import stage
+from pteron.report.joint_quantities import Quantity, coordinate, force, nouns, speed
+from pteron.report.motion_frames import Frames, few, frames
+from pteron.report.moving_picture import stage
 from pteron.report.typeset import fixed, resource, template
 from pteron.workspace import JointRanges, joint_ranges
 

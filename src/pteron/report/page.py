@@ -27,10 +27,10 @@ from pteron.plots import (
 from pteron.reduction import BaseParameters
 from pteron.reduction.expressions import html_symbol
 from pteron.report.contents import Report
-from pteron.report.drives import force_speed, power
-from pteron.report.joints import force, nouns, readable, speed
-from pteron.report.scene import few
-from pteron.report.stage import stage
+from pteron.report.drive_figures import force_speed, power
+from pteron.report.joint_quantities import force, nouns, readable, speed
+from pteron.report.motion_frames import few
+from pteron.report.moving_picture import stage
 from pteron.report.typeset import compact, fixed, resource, template, triple
 
 _LONGEST = 200

@@ -18,7 +18,7 @@ from pteron.kinematics import joint_screws
 from pteron.manipulator import Manipulator
 from pteron.motion import Guide, JointPoints, joint_guides, joint_points
 from pteron.plots.canvas import GRID, INK, LEG_COLORS, MUTED, REACH
-from pteron.plots.robot import grid_step
+from pteron.plots.machine_drawing import grid_step
 from pteron.viewer.meshes import Mesh, ball, cube, cylinder, fan
 from pteron.viewer.solids import (
     Copies,

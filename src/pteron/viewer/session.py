@@ -17,7 +17,7 @@ from pteron.kinematics import inverse_kinematics, random_poses
 from pteron.manipulator import Manipulator, working_modes
 from pteron.motion import Motion, pick_and_place
 from pteron.motion.trajectories.checks import check_motion
-from pteron.viewer.files import motion_of_file
+from pteron.viewer.motion_files import motion_of_file
 from pteron.viewer.state import (
     along,
     assembled,

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from pteron.kernels import Array
 from pteron.motion import Guide, JointPoints
 from pteron.plots.canvas import INK, LEG_COLORS, MUTED, PAPER, REACH
-from pteron.plots.robot import base_outline, rods
-from pteron.plots.space import upright
+from pteron.plots.machine_drawing import base_outline, rods
+from pteron.plots.space_axes import upright
 
 _LINK, _ROD, _ARM, _GUIDE, _AXIS, _JOINT = 0.011, 0.006, 0.007, 0.008, 0.003, 0.016
 """Radii as shares of the machine's size."""

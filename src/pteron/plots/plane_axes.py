@@ -11,7 +11,7 @@ from matplotlib.ticker import MultipleLocator
 
 from pteron.kernels import Array
 from pteron.plots.canvas import PAPER, nice_step, plain_axes
-from pteron.plots.drawn import Drawn
+from pteron.plots.machine_axes import MachineAxes
 
 _RIM = 0.06
 """Share of what is drawn that the scales show around it."""
@@ -24,7 +24,7 @@ _LEFT, _BELOW, _TOP = 0.62, 0.46, 0.1
 """Inches of a box that the scales and their names take, and that are free over the axes."""
 
 
-class Sheet(Drawn):
+class PlaneAxes(MachineAxes):
     """Axes with scales in mm, onto which points in space are put where the plane has them."""
 
     def __init__(

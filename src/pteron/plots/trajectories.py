@@ -12,7 +12,7 @@ from pteron.errors import DataError
 from pteron.kernels import Array, as_array
 from pteron.manipulator import RobotLike
 from pteron.plots.canvas import LEG_COLORS, MUTED, blank, leg_style, legend, panels
-from pteron.plots.joints import joints_of
+from pteron.plots.joint_columns import joints_of
 
 _ORDERS = ("", "/s", "/s²", "/s³", "/s⁴")
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from pteron.manipulator import Manipulator
 from pteron.motion import Guide, JointPoints
-from pteron.report.joints import coordinate, force
-from pteron.report.scene import Frames, scene
+from pteron.report.joint_quantities import coordinate, force
+from pteron.report.motion_frames import Frames, scene
 from pteron.report.typeset import embedded, resource
 
 _SHORT = 3.0
@@ -36,7 +36,7 @@ def stage(
     grid: float,
     **words: str,
 ) -> dict[str, Any]:
-    """Return what `stage.html.j2` asks for; its pictures are the page's own affair.
+    """Return what `moving_picture.html.j2` asks for; its pictures are the page's own affair.
 
     The words are what the machine is `doing`, what the `still` picture shows, and the
     `force_title` over the forces of the moment.

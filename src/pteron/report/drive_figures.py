@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 from pteron.motion import Sizing
 from pteron.plots import Ability, force_speed_figure, power_figure
-from pteron.report.scene import few
+from pteron.report.motion_frames import few
 
 
 def force_speed(found: Sizing) -> Figure:

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 from pteron.cli.arguments import parsed_numbers
-from pteron.cli.given_cycle import told_doubts
-from pteron.cli.screen import note
+from pteron.cli.motion_argument import told_doubts
+from pteron.cli.terminal import note
 from pteron.errors import DataError
 
 if TYPE_CHECKING:

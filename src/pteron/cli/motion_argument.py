@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from pteron.cli.arguments import option
-from pteron.cli.screen import note
+from pteron.cli.terminal import note
 from pteron.errors import DataError, PteronError, SingularPose, UnreachablePose
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typer import Exit, echo
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
 from pteron.cli.completion import parameters
-from pteron.cli.screen import is_terminal, plain, show, show_json, spinner, table
+from pteron.cli.terminal import is_terminal, plain, show, show_json, spinner, table
 
 if TYPE_CHECKING:
     from pteron.reduction import BaseParameters

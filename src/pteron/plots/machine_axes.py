@@ -9,7 +9,7 @@ from pteron.kernels import Array
 from pteron.plots.canvas import FONT_SIZE, SMALL
 
 
-class Drawn:
+class MachineAxes:
     """Axes and what was put on them: `things`, in that order."""
 
     def __init__(self, *, small: bool) -> None:

@@ -12,8 +12,8 @@ from pteron.dynamics import drive_forces
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.motion import Guide, JointPoints, Motion, joint_points
-from pteron.plots.robot import APART, base_outline
-from pteron.report.joints import coordinate
+from pteron.plots.machine_drawing import APART, base_outline
+from pteron.report.joint_quantities import coordinate
 
 _A_SECOND = 60.0
 """Frames a second of real time: as many as screens show."""

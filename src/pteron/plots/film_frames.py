@@ -15,8 +15,7 @@ from pteron.manipulator import Manipulator
 from pteron.motion import JointPoints, Motion, joint_guides, joint_points
 from pteron.plots.canvas import FONT_SIZE, INK, MUTED, blank, leg_style, plain_axes
 from pteron.plots.encoders import Picture
-from pteron.plots.machine import gravity_of
-from pteron.plots.robot import (
+from pteron.plots.machine_drawing import (
     Scene,
     draw_directions,
     draw_machine,
@@ -24,8 +23,9 @@ from pteron.plots.robot import (
     draw_surroundings,
     scene_of,
 )
-from pteron.plots.sheet import Sheet
-from pteron.plots.space import Space
+from pteron.plots.machine_figures import gravity_of
+from pteron.plots.plane_axes import PlaneAxes
+from pteron.plots.space_axes import SpaceAxes
 
 _WIDTH = 6.4
 """Inches, however many pixels: letters grow with the picture."""
@@ -82,7 +82,7 @@ def frames(
     _draw_still(sheet, scene, path)
     for k in probes:
         draw_machine(sheet, scene, points.at(k))
-    if isinstance(sheet, Space):
+    if isinstance(sheet, SpaceAxes):
         sheet.fill(angles[probes].tolist() if turns else (0.0,))
     else:
         sheet.fill()
@@ -92,7 +92,7 @@ def frames(
 
 def _drawn(
     figure: Figure,
-    sheet: Space | Sheet,
+    sheet: SpaceAxes | PlaneAxes,
     scene: Scene,
     points: JointPoints,
     path: Array,
@@ -104,7 +104,7 @@ def _drawn(
     turning = bool(angles[-1])
     kept = 0
     for k, time in enumerate(times):
-        if turning and isinstance(sheet, Space):
+        if turning and isinstance(sheet, SpaceAxes):
             sheet.turn(float(angles[k]))
         if turning or not kept:
             _draw_still(sheet, scene, path)
@@ -117,7 +117,7 @@ def _drawn(
         sheet.clear(kept)
 
 
-def _draw_still(sheet: Space | Sheet, scene: Scene, path: Array) -> None:
+def _draw_still(sheet: SpaceAxes | PlaneAxes, scene: Scene, path: Array) -> None:
     draw_surroundings(sheet, scene)
     draw_directions(sheet, scene)
     draw_path(sheet, path)

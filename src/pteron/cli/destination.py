@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pteron.cli.screen import is_terminal, plain, show, show_json, write
+from pteron.cli.terminal import is_terminal, plain, show, show_json, write
 
 if TYPE_CHECKING:
     import polars as pl

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from pteron.cli.arguments import Failure, parsed_numbers
-from pteron.cli.screen import is_terminal, note, progress_bar, show, show_json, table, write
+from pteron.cli.terminal import is_terminal, note, progress_bar, show, show_json, table, write
 from pteron.errors import DataError, OutputError, PteronError, SingularPose, UnreachablePose
 
 if TYPE_CHECKING:

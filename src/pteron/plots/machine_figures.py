@@ -15,7 +15,7 @@ from pteron.kinematics.evaluate import checked
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion import Guide, JointPoints, joint_guides, joint_points
 from pteron.plots.canvas import FONT_SIZE, INK, blank
-from pteron.plots.robot import (
+from pteron.plots.machine_drawing import (
     Scene,
     draw_directions,
     draw_machine,

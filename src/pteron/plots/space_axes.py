@@ -13,7 +13,7 @@ from mpl_toolkits.mplot3d.proj3d import proj_transform  # type: ignore[import-un
 
 from pteron.kernels import Array
 from pteron.plots.canvas import GRID, PAPER
-from pteron.plots.drawn import Drawn
+from pteron.plots.machine_axes import MachineAxes
 
 _ELEVATION, _AZIMUTH = 24.0, -52.0
 """Degrees, from which the machine is seen."""
@@ -31,7 +31,7 @@ def upright(vertical: Array) -> Array:
     return np.array([np.cross(y, z), y, z])
 
 
-class Space(Drawn):
+class SpaceAxes(MachineAxes):
     """Axes onto which segments and faces are put in the order of their distance.
 
     They take a `box` of the figure: left, bottom, width and height, as shares of it.

@@ -19,8 +19,15 @@ from pteron.cli.arguments import (
     option,
     parsed_numbers,
 )
-from pteron.cli.rows import Rows, check_destination, deliver, given_rows, rows_of_table, single_row
-from pteron.cli.screen import note
+from pteron.cli.table_rows import (
+    Rows,
+    check_destination,
+    deliver,
+    given_rows,
+    rows_of_table,
+    single_row,
+)
+from pteron.cli.terminal import note
 from pteron.errors import DataError
 
 if TYPE_CHECKING:

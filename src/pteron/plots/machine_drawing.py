@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from pteron.kernels import Array
 from pteron.motion import Guide, JointPoints, Part
 from pteron.plots.canvas import INK, LEG_COLORS, MUTED, PAPER, REACH, nice_step
-from pteron.plots.sheet import Sheet
-from pteron.plots.space import Space, upright
+from pteron.plots.plane_axes import PlaneAxes
+from pteron.plots.space_axes import SpaceAxes, upright
 
 _PLATFORM_AXES = ("x\u2032", "y\u2032", "z\u2032")
 """x, y and z with a prime."""
@@ -78,11 +78,11 @@ class Scene:
 
     def sheet(
         self, figure: Figure, box: Box | None = None, *, small: bool = False
-    ) -> Space | Sheet:
+    ) -> SpaceAxes | PlaneAxes:
         """Return axes for the machine in a box of a figure: left, bottom, width, height."""
         if self.plane is not None:
-            return Sheet(figure, self.plane, self.step, box, small=small)
-        return Space(figure, self.vertical, box or (0.0, 0.0, 1.0, 1.0), small=small)
+            return PlaneAxes(figure, self.plane, self.step, box, small=small)
+        return SpaceAxes(figure, self.vertical, box or (0.0, 0.0, 1.0, 1.0), small=small)
 
 
 def scene_of(points: JointPoints, guides: Sequence[Guide], gravity: Array | None) -> Scene:
@@ -110,9 +110,9 @@ def scene_of(points: JointPoints, guides: Sequence[Guide], gravity: Array | None
     )
 
 
-def draw_surroundings(sheet: Space | Sheet, scene: Scene) -> None:
+def draw_surroundings(sheet: SpaceAxes | PlaneAxes, scene: Scene) -> None:
     """Draw what does not move: the ground, the base, and the guides."""
-    if isinstance(sheet, Space):
+    if isinstance(sheet, SpaceAxes):
         sheet.ground(scene.low, scene.high, scene.step)
     if len(scene.base) > 1:
         sheet.faces([scene.base], MUTED, 0.18, raised=-0.03)
@@ -121,10 +121,10 @@ def draw_surroundings(sheet: Space | Sheet, scene: Scene) -> None:
         _draw_guide(sheet, guide)
 
 
-def draw_directions(sheet: Space | Sheet, scene: Scene) -> None:
+def draw_directions(sheet: SpaceAxes | PlaneAxes, scene: Scene) -> None:
     """Draw which way the base frame's axes and gravity point."""
     low, high, size = scene.low, scene.high, scene.size
-    if isinstance(sheet, Space):
+    if isinstance(sheet, SpaceAxes):
         # At the near corner of the ground, in the upright frame: beside the machine, not in it.
         near = low + size * np.array([-0.02, -0.10, 0.0])
         corner = sheet.beside_eye(near, (low + high) / 2.0)
@@ -139,7 +139,9 @@ def draw_directions(sheet: Space | Sheet, scene: Scene) -> None:
         _draw_gravity(sheet, start, scene.gravity, size)
 
 
-def draw_machine(sheet: Space | Sheet, scene: Scene, points: JointPoints, angle: str = "") -> None:
+def draw_machine(
+    sheet: SpaceAxes | PlaneAxes, scene: Scene, points: JointPoints, angle: str = ""
+) -> None:
     """Draw what moves, in one pose: sliders, cranks and links, and the platform with its frame.
 
     The `angle` stands, in words, beside the platform frame's x axis.
@@ -151,7 +153,7 @@ def draw_machine(sheet: Space | Sheet, scene: Scene, points: JointPoints, angle:
     _draw_frame(sheet, points, scene.size, angle)
 
 
-def draw_path(sheet: Space | Sheet, path: Array) -> None:
+def draw_path(sheet: SpaceAxes | PlaneAxes, path: Array) -> None:
     """Draw the way (T, 3) of a point in the base frame, m."""
     sheet.line(path, INK, 1.2, raised=1.0, style=(0, (1.5, 1.2)))
 
@@ -190,7 +192,7 @@ def rods(line: Array, bar: Array | None, size: float) -> list[Array]:
     return [one, other, *np.stack([one, other], axis=1)]
 
 
-def _draw_guide(sheet: Space | Sheet, guide: Guide) -> None:
+def _draw_guide(sheet: SpaceAxes | PlaneAxes, guide: Guide) -> None:
     if not guide.slides:
         sheet.line(guide.path, MUTED, 0.9, raised=-0.01, style=(0, (2.0, 2.0)))
         return
@@ -199,7 +201,9 @@ def _draw_guide(sheet: Space | Sheet, guide: Guide) -> None:
         sheet.mark(end, MUTED, MUTED, 3.0, raised=-0.01)
 
 
-def _draw_leg(sheet: Space | Sheet, points: JointPoints, guide: Guide, i: int, size: float) -> None:
+def _draw_leg(
+    sheet: SpaceAxes | PlaneAxes, points: JointPoints, guide: Guide, i: int, size: float
+) -> None:
     color, line = LEG_COLORS[i], points.links[i]
     if guide.slides:
         sheet.faces(_block(line[0], guide.axis, size), color, 0.95)
@@ -228,7 +232,7 @@ def _block(center: Array, along: Array, size: float) -> list[Array]:
     ]
 
 
-def _draw_part(sheet: Space | Sheet, part: Part) -> None:
+def _draw_part(sheet: SpaceAxes | PlaneAxes, part: Part) -> None:
     if len(part.corners) > 2:
         sheet.faces([part.corners], REACH, 0.55)
     for corner in part.corners:
@@ -236,7 +240,7 @@ def _draw_part(sheet: Space | Sheet, part: Part) -> None:
     sheet.mark(part.hub, PAPER, REACH, 5.0)
 
 
-def _draw_frame(sheet: Space | Sheet, points: JointPoints, size: float, angle: str) -> None:
+def _draw_frame(sheet: SpaceAxes | PlaneAxes, points: JointPoints, size: float, angle: str) -> None:
     """Draw the platform's frame and the tool's centre point."""
     p, tool = points.reference, points.tool
     shown = 3 if points.plane is None else 2
@@ -251,7 +255,7 @@ def _draw_frame(sheet: Space | Sheet, points: JointPoints, size: float, angle: s
     sheet.mark(p, INK, PAPER, 5.0, raised=0.6)
 
 
-def _draw_gravity(sheet: Space | Sheet, start: Array, gravity: Array, size: float) -> None:
+def _draw_gravity(sheet: SpaceAxes | PlaneAxes, start: Array, gravity: Array, size: float) -> None:
     down = gravity / np.linalg.norm(gravity)
     tip = start + 0.2 * size * down
     sheet.line(np.array([start, tip]), MUTED, 1.6, raised=1.0)
