@@ -32,6 +32,7 @@ from pteron.identification.excitation import (
     scaled_condition,
     stacked_regressor,
 )
+from pteron.identification.excitation.conditioning import condition_of_long
 from pteron.identification.excitation.draws import within_limits
 from pteron.identification.excitation.limits import UNITS
 from pteron.identification.excitation.program import measure
@@ -342,6 +343,24 @@ def test_the_scaled_condition_number_does_not_depend_on_units():
     assert scaled_condition(np.diag([1.0, 0.0])) == np.inf
 
 
+def test_a_column_that_is_short_beside_others_counts_as_so_much_worse():
+    root = np.linalg.qr(np.random.default_rng(0).normal(size=(40, 5)), mode="r")
+    assert condition_of_long(root, np.zeros(5)) == pytest.approx(scaled_condition(root))
+    root /= np.linalg.norm(root, axis=0)
+    found = condition_of_long(root * [1.0, 1.0, 1e-3, 1.0, 1.0], np.full(5, 0.1))
+    expected = scaled_condition(root) * 1.01**2 * np.sqrt(1.0 + 1e4)
+    assert found == pytest.approx(expected)
+
+
+def test_a_motion_that_moves_everything_is_sought():
+    # A turn of a hundredth of a radian shows the shaft's values as well as any, made length 1.
+    limits = Limits(acceleration=40.0)
+    found = optimal_excitation(
+        "delta-4", harmonics=2, starts=2, draws=30, limits=limits, workers=1, seed=1
+    )
+    assert np.ptp(found.motion.at(found.motion.uniform_times(100)).pose[:, 3]) > 0.1
+
+
 def test_conditioning_is_that_of_the_stacked_regressor():
     motion = drawn("quadrupteron", "joints")
     base = pteron.base_parameters(motion.robot)
@@ -361,7 +380,7 @@ def test_conditioning_is_that_of_the_stacked_regressor():
 def test_the_measure_is_above_the_condition_number_by_no_more_than_it_says(doublings: int):
     matrix = np.random.default_rng(1).normal(size=(30, 6)) * 10.0 ** np.arange(6)
     symbol = ca.MX.sym("M", 6, 6)
-    value = measure(symbol, "condition", doublings)
+    value = measure(symbol, "condition", doublings, [0.0])
     function = ca.Function("f", [symbol], [value, ca.gradient(value, symbol)])
     found, gradient = (np.array(x) for x in function(matrix.T @ matrix))
     exact = np.log(scaled_condition(matrix))
@@ -374,7 +393,7 @@ def test_the_measure_is_above_the_condition_number_by_no_more_than_it_says(doubl
 
 def test_the_measure_of_the_volume_is_the_log_det():
     matrix = np.random.default_rng(1).normal(size=(30, 6)) * 10.0 ** np.arange(6)
-    found = ca.evalf(measure(ca.MX(ca.DM(matrix.T @ matrix)), "logdet", 0))
+    found = ca.evalf(measure(ca.MX(ca.DM(matrix.T @ matrix)), "logdet", 0, [0.0]))
     assert float(found) == pytest.approx(-np.linalg.slogdet(matrix.T @ matrix)[1] / 6)
 
 

@@ -94,21 +94,47 @@ def conditioning(
     ModelError
         If `base` belongs to a machine of another layout.
     """
+    return conditioning_of(information_root(motion, base, samples), base.values(motion.robot))
+
+
+def information_root(
+    motion: FourierMotion, base: BaseParameters, samples: int | None = None
+) -> Array:
+    """Return the triangular root R (p, p) of R^T R = W^T W / T, W being the stacked regressor.
+
+    Scaling columns commutes with it: R has the condition numbers of W, and its columns are as long
+    as those of W are on average. NaN where the machine does not reach.
+    """
     count = samples or 40 * motion.harmonics
     matrix = stacked_regressor(motion, base, motion.uniform_times(count))
     if not np.isfinite(matrix).all():
+        return np.full((base.rank, base.rank), np.nan)
+    return _qr_factor(matrix) / np.sqrt(count)
+
+
+def conditioning_of(root: Array, values: Array) -> Conditioning:
+    """Return the condition numbers of `information_root`, for base parameters of these values."""
+    if not np.isfinite(root).all():
         return Conditioning(np.inf, np.inf, np.inf, -np.inf)
-    # Scaling columns commutes with it: R of W = Q R has the condition numbers of W.
-    factor = _qr_factor(matrix)
-    lengths = np.linalg.norm(factor, axis=0)
-    scaled = scaled_condition(factor)
+    lengths = np.linalg.norm(root, axis=0)
+    scaled = scaled_condition(root)
     logdet = -float("inf")
     if np.isfinite(scaled):
         # Equilibrated first: the columns' sizes differ by more than the digits would bear.
-        values = np.linalg.svd(factor / lengths, compute_uv=False)
-        logdet = float(2.0 * (np.log(values).sum() + np.log(lengths / np.sqrt(count)).sum()))
-    nominal = factor * base.values(motion.robot)
-    return Conditioning(scaled, _condition(factor), _condition(nominal), logdet)
+        singular = np.linalg.svd(root / lengths, compute_uv=False)
+        logdet = float(2.0 * (np.log(singular).sum() + np.log(lengths).sum()))
+    return Conditioning(scaled, _condition(root), _condition(root * values), logdet)
+
+
+def condition_of_long(root: Array, short: Array) -> float:
+    """Return `scaled_condition` times sqrt(1 + (short / length)^2) of every column, `short` (p,).
+
+    The scaled condition number alone does not see that a motion hardly moves a body.
+    """
+    lengths = np.linalg.norm(root, axis=0)
+    if not np.isfinite(lengths).all() or not lengths.all():
+        return float("inf")
+    return scaled_condition(root) * float(np.hypot(1.0, short / lengths).prod())
 
 
 def stacked_regressor(motion: FourierMotion, base: BaseParameters, times: Array) -> Array:

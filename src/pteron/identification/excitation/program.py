@@ -8,6 +8,7 @@ variables, and needs half as many. Gradients are exact (CasADi).
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal
@@ -57,6 +58,8 @@ class Setting:
     period: float
     limits: Limits
     criterion: Criterion
+    short: tuple[float, ...]
+    """Column lengths (p,), root mean square, below which a column is short: `condition_of_long`."""
 
 
 def minimised(
@@ -142,7 +145,7 @@ def _cost(setting: Setting, doublings: int) -> ca.Function:
     along = [ca.mtimes(ca.DM(row), coefficients).T for row in rows]
     blocks = _regressor(setting).map(len(times))(*along)
     information = ca.mtimes(blocks, blocks.T) / len(times)
-    value = measure(information, setting.criterion, doublings)
+    value = measure(information, setting.criterion, doublings, setting.short)
     return ca.Function("cost", [z], [value, ca.gradient(value, z)])
 
 
@@ -220,8 +223,10 @@ def _state(setting: Setting) -> tuple[list[Expression], list[Expression]]:
     return q, [pose, *(rate.T for rate in program(robot, "platform_motion").function(pose, *q[1:]))]
 
 
-def measure(information: Expression, criterion: Criterion, doublings: int) -> Expression:
-    """Return what an optimiser makes small, of the information matrix M = W^T W (p, p).
+def measure(
+    information: Expression, criterion: Criterion, doublings: int, short: Sequence[float]
+) -> Expression:
+    """Return what an optimiser makes small, of the information matrix M = W^T W / T (p, p).
 
     R is M with rows and columns divided by the roots of its diagonal, so that the condition number
     of R is the square of the scaled condition number of W.
@@ -229,7 +234,8 @@ def measure(information: Expression, criterion: Criterion, doublings: int) -> Ex
     ``"logdet"``: -log det M / p. Scaling the columns of W only adds a constant to it.
 
     ``"condition"``: log(tr(R^q) tr(R^-q)) / (2 q), q = 2^doublings. It is smooth, at least the log
-    of the scaled condition number, and at most log(p) / q above it.
+    of the scaled condition number, and at most log(p) / q above it. What short columns count is
+    added: log(1 + (short / length)^2) / 2 of each.
     """
     p = information.shape[0]
     scale = 1.0 / ca.sqrt(ca.diag(information))
@@ -237,7 +243,9 @@ def measure(information: Expression, criterion: Criterion, doublings: int) -> Ex
     inverse, logdet = _inverse(p)(equilibrated)
     if criterion == "logdet":
         return (2.0 * ca.sum1(ca.log(scale)) - logdet) / p
-    return 0.5 * (_log_trace(equilibrated, doublings) + _log_trace(inverse, doublings))
+    shortness = ca.sum1(ca.log1p((ca.DM(short) * scale) ** 2))
+    spread = _log_trace(equilibrated, doublings) + _log_trace(inverse, doublings)
+    return 0.5 * (spread + shortness)
 
 
 def _log_trace(matrix: Expression, doublings: int) -> Expression:

@@ -13,7 +13,12 @@ from typing import NamedTuple, get_args
 import numpy as np
 
 from pteron.errors import DataError
-from pteron.identification.excitation.conditioning import Conditioning, conditioning
+from pteron.identification.excitation.conditioning import (
+    Conditioning,
+    condition_of_long,
+    conditioning_of,
+    information_root,
+)
 from pteron.identification.excitation.draws import random_excitation
 from pteron.identification.excitation.fourier import FourierMotion, Space
 from pteron.identification.excitation.improvement import ROUNDS, Improvement, Round, improved
@@ -22,7 +27,7 @@ from pteron.identification.excitation.limits import Limits
 from pteron.identification.excitation.margins import margins
 from pteron.identification.excitation.program import Criterion, Setting
 from pteron.identification.excitation.result import Excitation, Start
-from pteron.kernels import columns_of
+from pteron.kernels import Array, columns_of
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.reduction import BaseParameters, base_parameters
 from pteron.shapes import Seed, Workers
@@ -37,6 +42,11 @@ _FIRST = 0.6
 
 _ONE_OF = 2
 """One of so many starts, the best after the first round, goes on to the second."""
+
+_SHORT = 0.2
+"""The share of a column's length in random motions below which it counts as short. By columns of
+length 1 alone a motion that all but rests in some direction would be as good as one that moves:
+that of a Delta with a shaft went straight up and down, and left the shaft's values open."""
 
 _SEEN = 0.1
 """The share of the progress that the random motions are."""
@@ -81,7 +91,8 @@ def optimal_excitation(
         What the trajectory keeps at every instant; by default `Limits.of` the machine.
     criterion : {"condition", "logdet"}
         What is made small: the condition number of the base regressor with columns of length 1
-        (see `scaled_condition`), or the volume of the confidence ellipsoid, -log det.
+        (see `scaled_condition`), times what it takes to lengthen columns that are short beside
+        those of random motions; or the volume of the confidence ellipsoid, -log det.
     starts : int
         How many of the random motions, the best ones, are improved: all of them roughly, then the
         better half thoroughly.
@@ -154,7 +165,17 @@ def optimal_excitation(
             search.report(_SEEN * (k + 1) / draws)
             if time.monotonic() - begin > _DRAWING * seconds:
                 break
-        setting = Setting(robot, columns_of(base), space, harmonics, period, limits, criterion)
+        search.short = _SHORT * search.lengths()
+        setting = Setting(
+            robot,
+            columns_of(base),
+            space,
+            harmonics,
+            period,
+            limits,
+            criterion,
+            tuple(search.short),
+        )
         processes = min(starts, workers or min(os.cpu_count() or 1, _MOST_WORKERS))
         search.choose(setting, starts)
         deadline = begin + seconds
@@ -172,6 +193,7 @@ def optimal_excitation(
 class _Candidate(NamedTuple):
     motion: FourierMotion
     conditioning: Conditioning
+    root: Array
 
 
 @dataclass
@@ -181,6 +203,8 @@ class _Search:
     criterion: Criterion
     base: BaseParameters
     progress: Callable[[float], None]
+    short: Array = field(default_factory=lambda: np.zeros(1))
+    """The lengths of columns (p,) below which a parameter is shown too little."""
     drawn: list[_Candidate] = field(default_factory=list)
     starts: list[Start] = field(default_factory=list)
     best: list[_Candidate] = field(default_factory=list)
@@ -191,11 +215,19 @@ class _Search:
     """The share of the work that is done."""
 
     def judged(self, motion: FourierMotion) -> _Candidate:
-        return _Candidate(motion, conditioning(motion, self.base))
+        root = information_root(motion, self.base)
+        return _Candidate(motion, conditioning_of(root, self.base.values(motion.robot)), root)
+
+    def lengths(self) -> Array:
+        """Return the columns' lengths (p,) in the random motions, as root mean squares."""
+        found = np.array([np.linalg.norm(one.root, axis=0) for one in self.drawn])
+        reached = found[np.isfinite(found).all(axis=1)]
+        return np.sqrt((reached**2).mean(axis=0)) if len(reached) else np.zeros(self.base.rank)
 
     def cost(self, one: _Candidate) -> float:
-        found = one.conditioning
-        return found.scaled if self.criterion == "condition" else -found.logdet
+        if self.criterion == "logdet":
+            return -one.conditioning.logdet
+        return condition_of_long(one.root, self.short)
 
     def choose(self, setting: Setting, starts: int) -> None:
         """Choose the best random motions as starts."""
