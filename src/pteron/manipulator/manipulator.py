@@ -20,6 +20,7 @@ from pteron.legs.protocol import breaches
 from pteron.manipulator.names import name_faults
 from pteron.manipulator.radii import Radii
 from pteron.platforms import Platform
+from pteron.platforms.coordinates import COORDINATES, Unit
 from pteron.toml import told
 
 _COINCIDENT = 1e-9
@@ -98,8 +99,27 @@ class Manipulator:
 
     @property
     def freedom(self) -> int:
-        """Number of pose coordinates m, which is also the number of legs n."""
+        """Number of pose coordinates m."""
+        return len(self.coordinates)
+
+    @property
+    def joint_count(self) -> int:
+        """Number of actuated joints n, one a leg."""
         return len(self.legs)
+
+    @property
+    def units(self) -> tuple[Unit, ...]:
+        """Units of the pose's coordinates, "m" or "rad"."""
+        return self.platform.units
+
+    @property
+    def wraps(self) -> NDArray[np.bool_]:
+        """Coordinates (m,) of which a whole turn leads back to the same joint coordinates.
+
+        A platform's angle does, unless it slides the platform's halves or a joint follows it.
+        """
+        around = bool(self.platform.rotation_axes)
+        return self.platform.angular & (around and not any(leg.follows_angle for leg in self.legs))
 
     @property
     def coordinates(self) -> tuple[str, ...]:
@@ -129,7 +149,7 @@ class Manipulator:
             "pose": pose,
             "velocity": tuple(f"d{name}" for name in pose),
             "acceleration": tuple(f"dd{name}" for name in pose),
-            "wrench": tuple("mk" if name == "phi" else f"f{name}" for name in pose),
+            "wrench": tuple(COORDINATES[name].wrench for name in pose),
             "joints": joints,
             "joint_rates": tuple(f"d{name}" for name in joints),
             "joint_accelerations": tuple(f"dd{name}" for name in joints),

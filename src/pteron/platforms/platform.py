@@ -20,11 +20,19 @@ from pteron.bodies.vectors import (
     vector,
 )
 from pteron.errors import ModelError
+from pteron.platforms.coordinates import COORDINATES, Unit, are_angles
 from pteron.toml import told
 
 Motion = Literal["3T", "3T1R", "2T", "2T1R"]
 """3T: the platform only translates. 3T1R: it also turns about its axis (Schoenflies motion). 2T and
 2T1R: the same in the plane across its axis."""
+
+_COORDINATES: dict[Motion, tuple[str, ...]] = {
+    "3T": ("x", "y", "z"),
+    "3T1R": ("x", "y", "z", "phi"),
+    "2T": ("x", "y"),
+    "2T1R": ("x", "y", "phi"),
+}
 
 _BASE_Z: Vector = (0.0, 0.0, 1.0)
 
@@ -171,13 +179,33 @@ class Platform:
 
     @property
     def coordinates(self) -> tuple[str, ...]:
-        """Names of the pose's coordinates, in order."""
-        return ("x", "y", *(() if self.planar else ("z",)), *(("phi",) if self.turns else ()))
+        """Names of the pose's coordinates, in order; see `platforms.coordinates`."""
+        return _COORDINATES[self.motion]
+
+    @property
+    def units(self) -> tuple[Unit, ...]:
+        """Their units: "m" or "rad"."""
+        return tuple(COORDINATES[name].unit for name in self.coordinates)
+
+    @property
+    def angular(self) -> NDArray[np.bool_]:
+        """Whether each of them is an angle, (m,)."""
+        return are_angles(self.coordinates)
 
     @property
     def lengths(self) -> tuple[str, ...]:
-        """Names of those that are lengths, which come first."""
-        return tuple(name for name in self.coordinates if name != "phi")
+        """Names of those that are lengths."""
+        return tuple(name for name in self.coordinates if COORDINATES[name].unit == "m")
+
+    @property
+    def angles(self) -> tuple[str, ...]:
+        """Names of those that are angles; none where the platform does not turn."""
+        return tuple(name for name in self.coordinates if COORDINATES[name].unit == "rad")
+
+    @property
+    def rotation_axes(self) -> tuple[Vector, ...]:
+        """Unit vectors that span the axes about which it turns against its legs."""
+        return (self.axis,) if self.angles and not self.slides else ()
 
     @property
     def directions(self) -> NDArray[np.float64]:

@@ -1,0 +1,61 @@
+"""The coordinates of a pose by name: their units, and how they are written for people."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Unit = Literal["m", "rad"]
+
+
+class Coordinate(NamedTuple):
+    """A coordinate of a pose.
+
+    Parameters
+    ----------
+    unit : {"m", "rad"}
+        Its SI unit.
+    symbol : str
+        The letter that formulas and pictures have for it.
+    wrench : str
+        The name of the force, or the moment, that does work along it.
+    """
+
+    unit: Unit
+    symbol: str
+    wrench: str
+
+    @property
+    def shown_unit(self) -> str:
+        """The unit that people read it in: mm or degrees."""
+        return _SHOWN[self.unit][0]
+
+    @property
+    def shown_factor(self) -> float:
+        """Its value in `shown_unit` over its value in SI units."""
+        return _SHOWN[self.unit][1]
+
+
+_SHOWN = {"m": ("mm", 1e3), "rad": ("°", 180.0 / math.pi)}
+
+COORDINATES: dict[str, Coordinate] = {
+    "x": Coordinate("m", "x", "fx"),
+    "y": Coordinate("m", "y", "fy"),
+    "z": Coordinate("m", "z", "fz"),
+    "phi": Coordinate("rad", "φ", "mk"),
+}
+"""Every coordinate that some platform has, by name."""
+
+
+def coordinate(name: str) -> Coordinate:
+    """Return a coordinate by its name; one that no platform has counts as a length."""
+    return COORDINATES.get(name, Coordinate("m", name, f"f{name}"))
+
+
+def are_angles(names: Iterable[str]) -> NDArray[np.bool_]:
+    """Return, for each of the names of coordinates, whether it is an angle."""
+    return np.array([coordinate(name).unit == "rad" for name in names], dtype=bool)
