@@ -42,7 +42,7 @@ def result(name):
     """Return a result of each kind that a page has words for."""
     if name == "no bodies":
         found = result("quadrupteron")
-        note = "No model of real bodies: cvxpy is missing; pip install pteron[consistency]"
+        note = "No model of real bodies: Clarabel is missing; pip install pteron[consistency]"
         held = (one_sample(found.held_out[0]),)
         return replace(found, consistency=None, notes=(note,), held_out=held)
     if name == "unreal":

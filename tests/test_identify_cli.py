@@ -172,8 +172,8 @@ def test_findings_and_a_bad_verdict_are_said_plainly():
 
 
 @QUICK
-def test_without_cvxpy_there_is_no_model_file(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setitem(sys.modules, "cvxpy", None)
+def test_without_a_solver_there_is_no_model_file(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setitem(sys.modules, "clarabel", None)
     write_log(log("tripteron"), "fit.csv")
     text = done("identify fit.csv --robot tripteron --out out")
     assert sorted(file.name for file in Path("out").iterdir()) == FILES

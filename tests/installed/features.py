@@ -163,7 +163,7 @@ def viewer() -> None:
 
 EXTRAS: dict[str, tuple[Callable[[], None], str]] = {
     "cluster": (cluster, "distributed"),
-    "consistency": (consistency, "cvxpy"),
+    "consistency": (consistency, "clarabel"),
     "design": (design, "pymoo"),
     "film": (film, "imageio_ffmpeg"),
     "gymnasium": (gymnasium, "gymnasium"),

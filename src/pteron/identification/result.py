@@ -38,7 +38,7 @@ class Identification:
     essential : Essential
         The values that the data can show, and the fit of these alone.
     consistency : Consistency or None
-        Real bodies with these base parameters; None where cvxpy is not installed.
+        Real bodies with these base parameters; None where Clarabel is not installed.
     consistency_share : float
         Root mean square of what the real bodies' forces differ from those of the fit, over that of
         its residuals.

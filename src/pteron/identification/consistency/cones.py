@@ -1,4 +1,4 @@
-"""The cone programs, with cvxpy and Clarabel: each body is a second-order cone.
+"""Cone programs over real bodies, solved by Clarabel: each body is a second-order cone.
 
 I m >= hx^2 + hy^2 with m, I >= 0 is |(2 hx, 2 hy, m - I)| <= m + I, in parameters scaled by a mass
 and a length of the body, so that the three numbers are of one size.
@@ -6,14 +6,11 @@ and a length of the body, so that the three numbers are of one size.
 
 from __future__ import annotations
 
-import sys
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
 
 import numpy as np
+from scipy import sparse  # type: ignore[import-untyped]
 
 from pteron.errors import ModelError
 from pteron.extras import install_command
@@ -23,7 +20,8 @@ from pteron.kernels import Array
 _TOLERANCES = (1e-10, 1e-9, 1e-8)
 """The solver's, each where it gives up at the one before: the caller checks the answer alike."""
 
-_SOLVED = ("optimal", "optimal_inaccurate")
+_CONE = 4
+"""Rows of a body that turns: m + I, 2 hx, 2 hy, m - I."""
 
 
 @dataclass(frozen=True)
@@ -38,39 +36,44 @@ class RealBodies:
     matrix: Array
     right: Array
 
-    def hold(self, cp: Any, z: Any, depth: Any) -> list[Any]:
-        """Return the constraints that hold z in the set."""
-        turning, *rows = self.bodies.cones
-        m, hx, hy, inertia = (row @ z for row in rows)
-        inside = self.margins[turning] * depth
-        constraints = [
-            z[self.bodies.masses] >= self.margins * depth,
-            cp.SOC(m + inertia - 2 * inside, cp.vstack([2 * hx, 2 * hy, m - inertia])),
-        ]
-        if len(self.right):
-            constraints.append(self.matrix @ z <= self.right)
-        return constraints
+    @cached_property
+    def rows(self) -> tuple[Array, Array, Array]:
+        """Factors of z and of the depth, and constants, of the rows that hold z in the set.
+
+        Masses and limits come first and are not negative; a cone of each turning body follows.
+        """
+        turning, m, hx, hy, inertia = self.bodies.cones
+        cones = np.stack([m + inertia, 2 * hx, 2 * hy, m - inertia], axis=1)
+        inside = np.zeros(cones.shape[:2])
+        inside[:, 0] = -2 * self.margins[turning]
+        masses = np.eye(cones.shape[2])[self.bodies.masses]
+        return (
+            np.vstack([masses, -self.matrix, np.concatenate(cones)]),
+            np.concatenate([-self.margins, np.zeros(len(self.right)), inside.ravel()]),
+            np.concatenate([np.zeros(len(masses)), self.right, np.zeros(inside.size)]),
+        )
 
 
 def widest(real: RealBodies, start: Array, free: Array, most: float) -> float | None:
     """Return how deep in the set z = start + free @ y can be, at most `most`; None if nowhere."""
-    cp = _cvxpy()
-    y, depth = cp.Variable(free.shape[1]), cp.Variable()
-    constraints = [*real.hold(cp, start + free @ y, depth), depth <= most]
-    if not _solve(cp, cp.Problem(cp.Maximize(depth), constraints)):
-        return None
-    return float(depth.value)
+    of_z, of_depth, constant = real.rows
+    rows = np.column_stack([of_z @ free, of_depth])
+    last = np.eye(rows.shape[1])[-1]
+    right = np.concatenate([[most], constant + of_z @ start])
+    found = _solved(real, np.zeros(len(last)), -last, np.vstack([-last, rows]), right)
+    return None if found is None else float(found[0][-1])
 
 
 def nearest(
     real: RealBodies, start: Array, free: Array, depth: float, matrix: Array, right: Array
 ) -> Array | None:
     """Return z = start + free @ y in the set with the least |matrix @ z - right|, or None."""
-    cp = _cvxpy()
-    y = cp.Variable(free.shape[1])
-    objective = cp.sum_squares((matrix @ free) @ y - (right - matrix @ start))
-    problem = cp.Problem(cp.Minimize(objective), real.hold(cp, start + free @ y, depth))
-    return np.asarray(start + free @ y.value) if _solve(cp, problem) else None
+    of_z, of_depth, constant = real.rows
+    held = constant + of_z @ start + depth * of_depth
+    found = _least_squares(
+        real, matrix @ free, matrix @ start - right, np.eye(len(right)), of_z @ free, held
+    )
+    return None if found is None else np.asarray(start + free @ found[0][: free.shape[1]])
 
 
 def closest(
@@ -80,62 +83,76 @@ def closest(
 
     With z comes how hard each body, then each limit, holds r back: the multipliers' sizes.
     """
-    cp = _cvxpy()
+    of_z, of_depth, constant = real.rows
     size = np.linalg.norm(matrix, axis=1)
     # Relative to what the solver starts from, so that a distance of 1e5 deviations is no problem.
     unit = max(1.0, float(np.linalg.norm(np.linalg.solve(spread, values))) * 1e-4)
-    z, r = cp.Variable(matrix.shape[1]), cp.Variable(len(values))
-    equal = (matrix / size[:, None]) @ z == values / size + (unit * spread / size[:, None]) @ r
-    hold = real.hold(cp, z, depth)
-    if not _solve(cp, cp.Problem(cp.Minimize(cp.sum_squares(r)), [equal, *hold])):
+    found = _least_squares(
+        real,
+        matrix / size[:, None],
+        -values / size,
+        unit * spread / size[:, None],
+        of_z,
+        constant + depth * of_depth,
+    )
+    if found is None:
         return None
-    masses, cones, *limits = (constraint.dual_value for constraint in hold)
-    bodies = np.abs(masses)
-    bodies[real.bodies.cones[0]] += np.abs(cones[0])
-    forces = np.concatenate([bodies, *limits])
-    return np.asarray(z.value), np.abs(forces)
+    answer, multipliers = found
+    turning, count = real.bodies.cones[0], len(real.margins) + len(real.right)
+    forces = np.abs(multipliers[len(size) :])
+    forces[: len(real.margins)][turning] += forces[count::_CONE]
+    return answer[: matrix.shape[1]], forces[:count]
 
 
-def _solve(cp: Any, problem: Any) -> bool:
-    """Solve, and tell whether there is a solution; the caller checks it, not the solver."""
+def _least_squares(
+    real: RealBodies, matrix: Array, shift: Array, spread: Array, rows: Array, right: Array
+) -> tuple[Array, Array] | None:
+    """Return (y, r) with the least |r|, where matrix @ y + shift = spread @ r, and multipliers.
+
+    What holds y in the set are the `rows` of y, and `right`.
+    """
+    count, rest = matrix.shape[1], spread.shape[1]
+    squares = np.repeat([0.0, 1.0], [count, rest])
+    whole = np.block([[matrix, -spread], [rows, np.zeros((len(rows), rest))]])
+    right = np.concatenate([shift, right])
+    return _solved(real, squares, np.zeros(count + rest), whole, right, equal=len(shift))
+
+
+def _solved(
+    real: RealBodies, squares: Array, linear: Array, rows: Array, right: Array, *, equal: int = 0
+) -> tuple[Array, Array] | None:
+    """Return v with the least squares @ v^2 + linear @ v, and multipliers of the rows, or None.
+
+    Of rows @ v + right the first are `equal` to zero, then come those that are not negative, and
+    the cones. The caller checks the answer, not the solver.
+    """
+    try:
+        import clarabel  # type: ignore[import-untyped]
+    except ImportError:
+        raise MissingSolver(
+            f"consistency needs Clarabel, which is not installed; {install_command('consistency')}"
+        ) from None
+    cones = [clarabel.SecondOrderConeT(_CONE)] * len(real.bodies.cones[0])
+    positive = clarabel.NonnegativeConeT(len(rows) - equal - _CONE * len(cones))
+    status = clarabel.SolverStatus
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
     for tolerance in _TOLERANCES:
-        options = dict.fromkeys(("tol_gap_abs", "tol_gap_rel", "tol_feas"), tolerance)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            try:
-                problem.solve(solver=cp.CLARABEL, **options)
-            except cp.SolverError:
-                continue
-        return problem.status in _SOLVED
-    return False
+        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = tolerance
+        found = clarabel.DefaultSolver(
+            sparse.diags(2.0 * squares, format="csc"),
+            linear,
+            sparse.csc_matrix(-rows),
+            right,
+            [clarabel.ZeroConeT(equal), positive, *cones],
+            settings,
+        ).solve()
+        if found.status not in (status.NumericalError, status.InsufficientProgress):
+            break
+    if found.status not in (status.Solved, status.AlmostSolved):
+        return None
+    return np.array(found.x), np.array(found.z)
 
 
 class MissingSolver(ModelError):
-    """The packages that find real bodies are not installed."""
-
-
-def _cvxpy() -> Any:
-    try:
-        import clarabel  # type: ignore[import-untyped]  # noqa: F401
-
-        with _without_jax():
-            import cvxpy
-    except ImportError:
-        raise MissingSolver(
-            "consistency needs cvxpy and Clarabel, which are not installed; "
-            + install_command("consistency")
-        ) from None
-    return cvxpy
-
-
-@contextmanager
-def _without_jax() -> Iterator[None]:
-    """Keep JAX from being imported, which cvxpy tries for a solver of its own: a second or two."""
-    missing = "jax" not in sys.modules
-    if missing:
-        sys.modules["jax"] = None  # type: ignore[assignment]
-    try:
-        yield
-    finally:
-        if missing:
-            del sys.modules["jax"]
+    """The package that finds real bodies is not installed."""

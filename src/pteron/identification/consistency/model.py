@@ -94,7 +94,7 @@ def consistent_model(
     Raises
     ------
     ModelError
-        If no real bodies keep the bounds, a name in them is unknown, or cvxpy is missing.
+        If no real bodies keep the bounds, a name in them is unknown, or Clarabel is missing.
     DataError
         If the values or their covariance are of the wrong shape or no numbers.
 
