@@ -22,11 +22,8 @@ from pteron.kernels.kernel import Port
 
 _PACKAGE = Path(__file__).parent.parent
 
-_SOURCES = (
-    *("bodies", "closures", "equations", "kernels", "kinematics", "legs", "manipulator"),
-    *("platforms", "workspace"),
-)
-"""The packages that what is kept depends on, to the last bit."""
+EQUATIONS = ("bodies", "closures", "equations", "kernels", "legs", "manipulator", "platforms")
+"""The packages that a program depends on, to the last bit."""
 
 
 @dataclass(frozen=True)
@@ -51,10 +48,13 @@ def kept(key: tuple[Any, ...], build: Callable[[], Program]) -> Program:
     return found
 
 
-def name_of(*key: Any) -> str | None:
-    """Return under which name the text of a key is kept, see `cache`; None where it cannot be."""
+def name_of(*key: Any, sources: tuple[str, ...] = EQUATIONS) -> str | None:
+    """Return the name under which the text of a key is kept, see `cache`; None for a foreign leg.
+
+    It changes with the source of each of the packages `sources`.
+    """
     told = _told(key)
-    return None if told is None else cache.digest(told, _source(), ca.__version__)
+    return None if told is None else cache.digest(told, _source(sources), ca.__version__)
 
 
 def _read(text: str) -> Program | None:
@@ -93,9 +93,9 @@ def _told(value: Any) -> str | None:
     return None if None in parts else f"{kind.__module__}.{kind.__qualname__}{parts}"
 
 
-@lru_cache(maxsize=1)
-def _source() -> str:
+@lru_cache
+def _source(packages: tuple[str, ...]) -> str:
     total = hashlib.sha256()
-    for path in sorted(file for name in _SOURCES for file in (_PACKAGE / name).rglob("*.py")):
+    for path in sorted(file for name in packages for file in (_PACKAGE / name).rglob("*.py")):
         total.update(path.read_bytes())
     return total.hexdigest()

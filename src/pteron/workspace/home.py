@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
 from pteron.errors import ModelError
 from pteron.kernels import Array, bare
 from pteron.kernels.cache import find_text, keep_text
-from pteron.kernels.kept import name_of
+from pteron.kernels.kept import EQUATIONS, name_of
 from pteron.kinematics import inverse_kinematics, random_poses, singular_orientations
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -24,6 +24,9 @@ from pteron.workspace.reserve import reserve
 
 _SEARCHES = ((200, 0.3), (200, 0.02), (200, 0.0), (1, 0.0))
 """How many random poses, and their least measures: less where the legs have little common reach."""
+
+_SOURCES = (*EQUATIONS, "kinematics", "workspace")
+"""The packages that a home pose depends on."""
 
 _STARTS = 12
 
@@ -90,7 +93,7 @@ def home_pose(robot: RobotLike) -> Array:
 @lru_cache(maxsize=256)
 def _kept(robot: Manipulator) -> tuple[float, ...]:
     """Return the home pose that was worked out before, in another process too, or a new one."""
-    name = name_of("home_pose", bare(robot))
+    name = name_of("home_pose", bare(robot), sources=_SOURCES)
     text = None if name is None else find_text(name)
     if text is not None:
         return tuple(map(float.fromhex, text.split()))
