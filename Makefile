@@ -7,20 +7,35 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
 QUICK := published kinematics delta family manipulator errors toml passes payload costs
 
-.PHONY: demo quick test lint bench docs first wheels clean
+# One thread of linear algebra a process, and a file's tests in one process: they share what is made.
+PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist loadfile
+
+.PHONY: demo quick test tests clients nightly lint bench docs first wheels clean
 
 demo: $(VENV)/.runtime
 	$(BIN)/pteron report quadrupteron --out demo
 	$(BIN)/pteron table1
 
-# One thread of linear algebra a process: the tests share the cores among themselves.
-test: lint
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist worksteal
+# The gate: lint and tests side by side, some six minutes on two cores; tests/README.md says what waits
+# for `make nightly`.
+test: $(VENV)/.dev
+	+$(MAKE) --no-print-directory --jobs 2 lint tests
+
+tests: $(VENV)/.dev
+	$(PYTEST)
 
 # Under a minute on two cores: the numbers, the files and the messages, for the edit loop.
 quick: $(VENV)/.dev
 	$(BIN)/ruff check
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist worksteal --quiet $(QUICK:%=tests/test_%.py)
+	$(PYTEST) --quiet $(QUICK:%=tests/test_%.py)
+
+# What uses the library as others do: benchmarks, examples, notebooks, other programs, whole ways.
+clients: $(VENV)/.dev
+	$(PYTEST) --dist worksteal -m "clients and not nightly"
+
+# Every test there is, on every machine.
+nightly: $(VENV)/.dev
+	$(PYTEST) -m ""
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check

@@ -1,4 +1,4 @@
-"""Compiled code of a test run is kept apart, and only asked for by the tests that are about it.
+"""Programs are kept from run to run, and compiled code is only asked for by the tests about it.
 
 Pages are tried in the Chromium of the machine; where there is none these tests are left out,
 unless PTERON_BROWSER is set, which then names it.
@@ -8,13 +8,15 @@ import gc
 import os
 import shutil
 import signal
-import tempfile
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-os.environ.setdefault("PTERON_CACHE", tempfile.mkdtemp(prefix="pteron-test-"))
+# What is kept is named after the source that it depends on, see test_kept.
+_CACHE = Path(__file__).parent.parent / ".pytest_cache" / "pteron"
+os.environ.setdefault("PTERON_CACHE", str(_CACHE))
 os.environ.setdefault("PTERON_KERNELS", "vm")
 
 # Graphs of equations are many small objects without cycles: looking for those takes a twentieth.

@@ -5,9 +5,13 @@ from functools import lru_cache
 
 import descriptions
 import numpy as np
+import pytest
 from scipy.spatial.transform import Rotation
 
 import pteron
+
+NIGHTLY = pytest.mark.nightly
+"""Marks a test, or one of its cases, of a claim that the gate tests elsewhere."""
 
 BATCH_SHAPES = [(), (1,), (7,), (3, 5), (0,), (300,)]
 """300 is more than one block of the virtual machine."""
@@ -287,6 +291,35 @@ MECHANISMS = {
     "random PRR 0": random_machine(0, "PRR"),
     "random RPP 0": random_machine(0, "RPP"),
 }
+"""Legs of two links, under a platform that moves in space."""
+
+MACHINES = {
+    **MECHANISMS,
+    "random PRSU 0": random_machine(0, "PRSU"),
+    "random PRSSI 0": random_machine(0, "PRSSI"),
+    "five-bar": CATALOG["five-bar"],
+    "random CCL 0": random_machine(0, "CCL"),
+}
+"""These and one of each other kind of leg, closure and platform."""
+
+GATE = (
+    *("quadrupteron", "tripteron-oblique", "delta", "random PRR 0"),
+    *("random PRSU 0", "random PRSSI 0", "five-bar", "random CCL 0"),
+)
+"""Eight machines that stand for all, see `test_gate`.
+
+One for each closure under each platform that it serves, chosen so that together they have every
+kind of leg, both elbows, legs of one kind and mixed ones, the special geometries of the catalog and
+generic ones, bars and gears, and gravity along the platform's axis and askew. Claims about every
+machine are tested on these by `make test`, and on all others by `make nightly`.
+"""
+
+
+def gated(cases, gate=GATE):
+    """Return the cases of a claim, each once; those not of the gate are for `make nightly`."""
+    every = dict.fromkeys(cases)
+    assert not set(gate).isdisjoint(every)
+    return [case if case in gate else pytest.param(case, marks=NIGHTLY) for case in every]
 
 
 @lru_cache

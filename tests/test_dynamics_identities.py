@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from differences import along, gradient
-from mechanisms import BATCH_SHAPES, CATALOG, MECHANISMS, relative_error, states
+from mechanisms import BATCH_SHAPES, CATALOG, MACHINES, MECHANISMS, gated, relative_error, states
 from scipy.spatial.transform import Rotation
 
 import pteron
@@ -14,7 +14,8 @@ from pteron.equations.machine import Machine
 from pteron.kernels import program
 from pteron.legs.leg import LegEquations
 
-EVERY = pytest.mark.parametrize("name", MECHANISMS)
+EVERY = pytest.mark.parametrize("name", gated(MACHINES))
+TWO_LINKS = pytest.mark.parametrize("name", MECHANISMS)
 FEW = ["quadrupteron-oblique", "delta", "random 3T 0", "random PRR 0"]
 COUNT = 100
 
@@ -38,7 +39,7 @@ def joint_rates(robot, pose, velocity):
 
 @EVERY
 def test_the_regressor_is_linear_in_the_parameters_and_the_papers(name):
-    robot = MECHANISMS[name]
+    robot = MACHINES[name]
     motion = states(robot, COUNT)
     D = pteron.regressor(robot, *motion)
     assert D.shape == (COUNT, robot.freedom, len(pteron.parameter_names(robot)))
@@ -52,7 +53,7 @@ def test_the_regressor_is_linear_in_the_parameters_and_the_papers(name):
 
 @pytest.mark.parametrize("name", FEW)
 def test_the_factors_of_equation_15_multiply_to_the_regressor(name):
-    robot = MECHANISMS[name]
+    robot = MACHINES[name]
     motion = states(robot, COUNT)
     D = pteron.regressor(robot, *motion)
     J, sliders, link_jacobians, links, platform = pteron.compile(robot, "paper_terms")(*motion)
@@ -68,10 +69,10 @@ def test_the_factors_of_equation_15_multiply_to_the_regressor(name):
     np.testing.assert_allclose(link_jacobians, both, atol=1e-12)
 
 
-@EVERY
+@TWO_LINKS
 def test_what_a_leg_needs_is_what_its_bodies_need(name):
     """The leg's own, cheaper form against the sum of J_b^T F_b over its bodies."""
-    robot = MECHANISMS[name]
+    robot = MACHINES[name]
     machine = Machine.of(robot)
     x, dx, ddx = (ca.SX.sym(v, robot.freedom) for v in ("x", "dx", "ddx"))
     state = machine.state(x, dx, ddx)
@@ -98,7 +99,7 @@ def test_what_a_leg_needs_is_what_its_bodies_need(name):
 
 @EVERY
 def test_the_equation_of_motion(name):
-    robot = MECHANISMS[name]
+    robot = MACHINES[name]
     pose, velocity, acceleration = states(robot, COUNT)
     M = pteron.mass_matrix(robot, pose)
     np.testing.assert_allclose(M, transposed(M), rtol=0, atol=1e-14 * np.abs(M).max())
@@ -121,7 +122,7 @@ def test_the_equation_of_motion(name):
 
 @pytest.mark.parametrize("name", FEW)
 def test_the_rate_of_the_mass_matrix_less_twice_c_is_skew(name):
-    robot = MECHANISMS[name]
+    robot = MACHINES[name]
     pose, velocity, _ = states(robot, 20)
     mass = plain(robot, "mass_matrix")
     x, dx = ca.SX.sym("x", robot.freedom), ca.SX.sym("dx", robot.freedom)
@@ -135,7 +136,7 @@ def test_the_rate_of_the_mass_matrix_less_twice_c_is_skew(name):
 
 @EVERY
 def test_energies_power_and_gravity(name):
-    robot = MECHANISMS[name]
+    robot = MACHINES[name]
     pose = pteron.random_poses(robot, 20, seed=6, type_i=0.5, type_ii=0.15)
     rng = np.random.default_rng(6)
     velocity, acceleration = rng.normal(size=pose.shape), 10 * rng.normal(size=pose.shape)
@@ -156,7 +157,7 @@ def test_energies_power_and_gravity(name):
 def test_potential_energy_is_zero_at_the_origin_of_the_base_frame():
     """Moving the whole machine by a metre along gravity costs its weight, exactly."""
     for name in FEW:
-        robot = MECHANISMS[name]
+        robot = MACHINES[name]
         pose = states(robot, 5)[0]
         size = np.linalg.norm(robot.gravity)
         down = np.array(robot.gravity) / size
@@ -173,7 +174,7 @@ def test_potential_energy_is_zero_at_the_origin_of_the_base_frame():
 
 @EVERY
 def test_forward_dynamics_inverts_inverse_dynamics_and_a_wrench_is_held(name):
-    robot = MECHANISMS[name]
+    robot = MACHINES[name]
     pose, velocity, acceleration = states(robot, COUNT)
     wrench = 10 * np.random.default_rng(1).normal(size=pose.shape)
     free = pteron.inverse_dynamics(robot, pose, velocity, acceleration)
@@ -197,9 +198,9 @@ def test_forward_dynamics_needs_no_pose_that_is_held():
     np.testing.assert_allclose(left, right, atol=1e-12 * np.abs(left).max())
 
 
-@EVERY
+@TWO_LINKS
 def test_passive_friction_does_the_work_of_its_joint(name):
-    robot = MECHANISMS[name]
+    robot = MACHINES[name]
     pose, velocity, _ = states(robot, 20)
     columns = pteron.compile(robot, "passive_friction")(pose, velocity)
     moved = pteron.joint_rates(robot, pose, velocity)
@@ -214,7 +215,7 @@ def test_passive_friction_does_the_work_of_its_joint(name):
 
 @EVERY
 def test_the_platforms_motion_from_that_of_the_joints(name):
-    robot = MECHANISMS[name]
+    robot = MACHINES[name]
     motion = states(robot, COUNT)
     rates = joint_rates(robot, *motion[:2])
     accelerations = pteron.joint_accelerations(robot, *motion).actuated
@@ -225,7 +226,7 @@ def test_the_platforms_motion_from_that_of_the_joints(name):
 
 @pytest.mark.parametrize("name", FEW)
 def test_a_machine_turned_with_gravity_feels_the_same_forces(name):
-    robot = MECHANISMS[name]
+    robot = MACHINES[name]
     rotation = Rotation.random(rng=len(name)).as_matrix()
     motion = states(robot, 20)
     moved = [np.concatenate([v[:, :3] @ rotation.T, v[:, 3:]], axis=-1) for v in motion]
@@ -270,7 +271,7 @@ def parts(result):
 @pytest.mark.parametrize("function", [*STATE_FUNCTIONS, "direct_kinematics"])
 @pytest.mark.parametrize("name", ["quadrupteron", "delta", "random PRR 0"])
 def test_a_batch_is_its_single_calls_bit_for_bit(name, function):
-    robot, call = MECHANISMS[name], getattr(pteron, function)
+    robot, call = MACHINES[name], getattr(pteron, function)
     if function == "direct_kinematics":
         arrays = [pteron.inverse_kinematics(robot, states(robot, 300)[0])]
     else:

@@ -35,6 +35,7 @@ def done(line, monkeypatch, capsys):
     return subprocess.run([*command, *words], capture_output=True, text=True, check=True).stdout
 
 
+@pytest.mark.clients
 def test_the_whole_way(tmp_path, monkeypatch, capsys):
     if compiler() is None:
         pytest.skip("no C compiler")

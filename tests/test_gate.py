@@ -1,0 +1,42 @@
+"""The machines of the gate stand for all others; `mechanisms.GATE` says how they were chosen."""
+
+import numpy as np
+from mechanisms import CATALOG, GATE, MACHINES, random_machine
+from test_family import KINDS as MIXTURES
+
+from pteron.closures import KINDS as CLOSURES
+from pteron.equations.machine import Machine
+from pteron.legs import KINDS as LEGS
+from pteron.platforms import equations_class
+
+CHOSEN = [MACHINES[name] for name in GATE]
+
+
+def served(robots):
+    """Return the closures of machines, each with the platform under which it stands."""
+    return {(type(Machine.of(r).closure), equations_class(r.platform)) for r in robots}
+
+
+def test_every_closure_is_there_under_each_platform_that_it_serves():
+    every = [*CATALOG.values(), *MACHINES.values(), *(random_machine(0, k) for k in MIXTURES)]
+    assert served(CHOSEN) == served(every)
+    assert {closure for closure, _ in served(CHOSEN)} == set(CLOSURES)
+
+
+def test_every_kind_of_leg_is_there():
+    assert {leg.type for robot in CHOSEN for leg in robot.legs} == set(LEGS)
+
+
+def test_both_sides_of_each_choice_are_there():
+    choices = {
+        "elbow": lambda robot: {leg.elbow for leg in robot.legs} == {1, -1},
+        "mixed legs": lambda robot: len({leg.type for leg in robot.legs}) > 1,
+        "of the catalog": lambda robot: robot in CATALOG.values(),
+        "bars": lambda robot: bool(robot.platform.bars),
+        "gears": lambda robot: bool(robot.platform.geared),
+        "gravity askew": lambda robot: (
+            np.abs(np.cross(robot.gravity, robot.platform.axis)).max() > 1e-9
+        ),
+    }
+    for choice, of in choices.items():
+        assert {of(robot) for robot in CHOSEN} == {True, False}, choice
