@@ -21,8 +21,8 @@ from test_report import driven
 import pteron
 from pteron.identification import identify
 from pteron.identification.logs import write_log
-from pteron.identification.playback import Playback, playback
 from pteron.motion import Motion, pick_and_place
+from pteron.playback import Playback, playback
 from pteron.report import write_motion_page, write_report
 from pteron.report.identification import write_identification
 from pteron.report.motion_frames import frames

@@ -12,9 +12,9 @@ from pteron.errors import DataError, PteronError, SingularPose, UnreachablePose
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from pteron.identification.playback import Playback
     from pteron.manipulator import Manipulator
     from pteron.motion import Motion
+    from pteron.playback import Playback
     from pteron.shapes import PoseLike
     from pteron.tables import Table
 
@@ -55,7 +55,7 @@ def replayed(robot: Manipulator, file: str, start: PoseLike | None = None) -> Mo
 
 def played(robot: Manipulator, file: str) -> Playback:
     """Return a motion from a table, or a log, as it is shown; what is unlikely in it is told."""
-    from pteron.identification.playback import playback, read_motion
+    from pteron.playback import playback, read_motion
     from pteron.tables import Table
 
     found = read_motion(robot, file)
@@ -66,8 +66,8 @@ def _doubted(robot: Manipulator, rows: Table, start: PoseLike | None = None) -> 
     """Return a motion that is read from a table; what is unlikely in it is told."""
     import numpy as np
 
-    from pteron.identification.playback import of_table
     from pteron.kinematics.unlikely import unlikely_values
+    from pteron.playback import of_table
 
     file = rows.source
     _check_rates(robot, rows)

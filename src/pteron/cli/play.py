@@ -13,8 +13,8 @@ from pteron.cli.terminal import plain, show, show_json, spinner
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
-    from pteron.identification.playback import Playback
     from pteron.manipulator import Manipulator
+    from pteron.playback import Playback
 
 
 def play(
@@ -78,8 +78,8 @@ def play(
 
 def _playback(machine: Manipulator, motion: str) -> Playback:
     """Return a motion by its name, or from a file; what is unlikely in it is told."""
-    from pteron.identification.playback import Playback
     from pteron.motion import pick_and_place
+    from pteron.playback import Playback
 
     if motion == STANDARD and not Path(motion).exists():
         return Playback(pick_and_place(machine))

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from pteron.equations.machine import closure_of
-from pteron.identification.playback import Playback
 from pteron.kernels import Array, numeric
 from pteron.kinematics import singular_orientations
 from pteron.kinematics.condition import JacobianAtPose, jacobian_at
@@ -26,6 +25,7 @@ from pteron.motion import (
     pick_and_place,
     size,
 )
+from pteron.playback import Playback
 from pteron.plots import grid_step
 from pteron.reduction import BaseParameters, base_parameters
 from pteron.report.costs import Cost, costs

@@ -9,12 +9,12 @@ import numpy as np
 
 import pteron
 from pteron.dynamics import drive_forces
-from pteron.identification.playback import Playback
 from pteron.kernels import Array
 from pteron.kinematics import joint_rates
 from pteron.manipulator import Manipulator
 from pteron.motion import Guide, JointPoints, joint_guides, joint_points, overloads
 from pteron.motion.trajectories.tool import tool_motion
+from pteron.playback import Playback
 from pteron.plots import forces_figure, grid_step, power_figure, robot_figure, svg
 from pteron.report.joint_quantities import Quantity, coordinate, force, nouns, speed
 from pteron.report.motion_frames import Frames, few, frames

@@ -13,7 +13,7 @@ from pteron.errors import OutputError, shown
 from pteron.manipulator import RobotLike, as_manipulator
 
 if TYPE_CHECKING:
-    from pteron.identification.playback import Given
+    from pteron.playback import Given
     from pteron.report.contents import Report
 
 _PAGES = (".html", ".htm")
@@ -33,7 +33,7 @@ def write_report(robot: RobotLike, folder: str | Path, *, motion: Given | None =
         Where to write; made if it is missing.
     motion : Motion, Simulation, Table, str or path, optional
         What the page shows, and whose forces it tells, in place of the standard pick-and-place
-        cycle; see `pteron.identification.playback.playback`. The forces are those that the drives
+        cycle; see `pteron.playback.playback`. The forces are those that the drives
         must give for it.
 
     Returns
@@ -55,7 +55,7 @@ def write_report(robot: RobotLike, folder: str | Path, *, motion: Given | None =
     """
     robot = as_manipulator(robot)
     # Matplotlib, SciPy and SymPy are behind these; the table of the paper needs none of them.
-    from pteron.identification.playback import playback
+    from pteron.playback import playback
     from pteron.report.contents import contents
     from pteron.report.page import page
 
@@ -76,7 +76,7 @@ def write_motion_page(robot: RobotLike, motion: Given, path: str | Path) -> Path
         The machine.
     motion : Motion, Simulation, Table, str or path
         What it does: from Python, or a file with a table of the motion, of its joints, or a log;
-        see `pteron.identification.playback.playback`. Forces that come with it are shown; else
+        see `pteron.playback.playback`. Forces that come with it are shown; else
         those that the drives must give.
     path : str or path
         The page, whose name ends in .html; its folder must be there.
@@ -107,7 +107,7 @@ def write_motion_page(robot: RobotLike, motion: Given, path: str | Path) -> Path
     ...     page.stat().st_size < 1_000_000
     True
     """
-    from pteron.identification.playback import playback
+    from pteron.playback import playback
     from pteron.report.motion_page import motion_page
 
     robot, target = as_manipulator(robot), checked_page(path)

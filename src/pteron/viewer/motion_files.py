@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import PurePath
 
 from pteron.errors import DataError, shown
-from pteron.identification.playback import playback, read_content
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.motion import Motion
+from pteron.playback import playback, read_content
 from pteron.tables import ENDINGS
 
 _LARGEST = 100 << 20
@@ -25,7 +25,7 @@ def motion_of_file(robot: Manipulator, name: str, data: bytes, start: Array) -> 
     name : str
         The file's name: its ending says whether it is CSV or Parquet.
     data : bytes
-        What is in it; see `pteron.identification.playback.playback`.
+        What is in it; see `pteron.playback.playback`.
     start : array, shape (m,)
         A pose in the assembly mode of the joints, m and rad.
 

@@ -1,6 +1,6 @@
-"""A motion to be shown: its samples, and the forces that came with them.
+"""Motions to replay in reports and in the viewer, with the forces that came with them.
 
-It comes from Python, from a simulation, or from a file: a table of poses or of joints, or a log,
+They come from Python, from a simulation, or from a file: a table of poses or of joints, or a log,
 whose joints are smoothed as identification does it.
 """
 
@@ -31,7 +31,7 @@ class Playback:
     Attributes
     ----------
     motion : Motion
-        What the platform does.
+        The platform's.
     forces : array, shape (T, n), or None
         N or N m; None where there are none beside the motion.
     source : str
@@ -47,7 +47,7 @@ class Playback:
 
 
 Given = Motion | Simulation | Playback | Table | Log | str | Path
-"""What a motion is given as."""
+"""The kinds of motion that `playback` takes."""
 
 
 def playback(robot: Manipulator, motion: Given, start: PoseLike | None = None) -> Playback:
@@ -79,7 +79,7 @@ def playback(robot: Manipulator, motion: Given, start: PoseLike | None = None) -
     --------
     >>> import pteron
     >>> from pteron.motion import pick_and_place
-    >>> from pteron.identification.playback import playback
+    >>> from pteron.playback import playback
     >>> robot = pteron.load("tripteron")
     >>> cycle = pick_and_place(robot, [0.0, 0.0, 0.0], scale=0.5)
     >>> playback(robot, cycle).forces is None
