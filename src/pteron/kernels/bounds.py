@@ -44,7 +44,7 @@ class Bounded:
 
     @cached_property
     def _graph(self) -> Graph:
-        """Of the outputs, dense, and of all their elements' gradients, (m, R)."""
+        """The graph of the outputs, dense, and of all their elements' gradients, (m, R)."""
         (given,) = self.function.sx_in()
         outputs = [ca.densify(output) for output in self.function.call([given])]
         elements = ca.vertcat(*map(ca.vec, outputs))
@@ -52,7 +52,7 @@ class Bounded:
         return graph_of(ca.Function("bounded", [given], ca.cse([*outputs, slopes])))
 
     def rows(self, name: str) -> range:
-        """Return which elements, counted over all outputs, an output has."""
+        """Return the numbers of an output's elements, counted over all outputs."""
         start = 0
         for port in self.outputs:
             if port.name == name:

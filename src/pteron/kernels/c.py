@@ -111,7 +111,7 @@ def module_of(template: str, values: Mapping[str, Any], dtype: str, block: int =
 
 
 def c_language(dtype: str) -> Language:
-    """Return how modules in C are written."""
+    """Return the notation of modules in C."""
     printed = single_precision(C) if dtype == "float32" else C
     return Language(
         printed

@@ -66,7 +66,7 @@ def directory() -> Path:
 
 @lru_cache(maxsize=1)
 def host() -> str:
-    """Return what compiled code depends on beside its source: processor, Python, NumPy."""
+    """Describe the host, which compiled code depends on: processor, Python, NumPy."""
     processor = platform.processor()
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()

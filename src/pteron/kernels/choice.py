@@ -1,4 +1,4 @@
-"""Which executable serves the public functions: `numeric`, and its policy."""
+"""The executable behind the public functions: `numeric`, and the policy that chooses it."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ _AT_EXIT = 3.0
 """Seconds that a process waits at its end for a compiler in the background: most take less."""
 
 _AT_WORK = threading.Semaphore(1)
-"""One compilation at a time; who comes meanwhile asks again later."""
+"""One compilation at a time; other callers ask again later."""
 
 
 def numeric(
     robot: RobotLike, what: str, *, base: Selects | None = None, wrench: bool = False
 ) -> Adaptive:
-    """Return what evaluates a function for the public functions, by this policy.
+    """Return the kernel that evaluates a function for the public functions, by this policy.
 
     A first call runs at once, on CasADi's virtual machine: about 1 us a state, nothing to compile.
     Once it has spent 0.1 s on a function of a machine's layout, C code for it is read from the
@@ -81,7 +81,7 @@ def guarded(
 
 @lru_cache(maxsize=512)
 def _tier(layout: Manipulator, what: str, columns: Columns | None, wrench: bool) -> Tier:
-    """Return what machines of one layout share; their inertial parameters are left out of it."""
+    """Return the code that machines of one layout share, whatever their inertial parameters."""
     built = program(layout, what, columns, wrench=wrench, guarded=True)
     code = Code(built.name, built.function, built.inputs, built.outputs)
     return Tier(code, math.inf if os.environ.get(VARIABLE) == "vm" else 0.1)
@@ -104,9 +104,9 @@ class Tier:
         self._patience = patience
 
     def fetch(self, *, at_any_cost: bool) -> None:
-        """Have the code ready when this returns, if it is on disk or `at_any_cost`.
+        """Load the code, if it is on disk, or compile it `at_any_cost`; return when it is ready.
 
-        For who is about to ask for millions of states, and would rather wait once.
+        A caller that is about to ask for millions of states would rather wait once.
         """
         if self.ready or os.environ.get(VARIABLE) == "vm" or compiler() is None:
             return
@@ -115,7 +115,7 @@ class Tier:
             self._fetch()
 
     def missed(self, seconds: float) -> None:
-        """Take note that the virtual machine worked so long in its place."""
+        """Count the time of the virtual machine in its place; compile when it is enough."""
         self._patience -= seconds
         if self._patience > 0.0 or not _AT_WORK.acquire(blocking=False):
             return

@@ -69,7 +69,7 @@ def names_of(
     inputs: Callable[[int, int], str],
     constant: Callable[[float], str],
 ) -> list[str]:
-    """Return how each node is written: an input's name, a literal, or `t` and a number."""
+    """Return each node in code: an input's name, a literal, or `t` and a number."""
     names: list[str] = []
     numbers = count(1)
     for node in graph.nodes:
@@ -108,7 +108,7 @@ def used_inputs(graph: Graph) -> list[tuple[int, int]]:
 
 @dataclass(frozen=True)
 class Language:
-    """How a module that evaluates batches is written; see `module_values`."""
+    """The notation of one language for a module that evaluates batches; see `module_values`."""
 
     printed: Mapping[str, str]
     """Operations, to which math functions of numbers that are not vectors belong."""
@@ -120,7 +120,7 @@ class Language:
     pair: str
     """The statement that finds sine and cosine number {0} of {1}."""
     parts: Mapping[str, str]
-    """What they are called."""
+    """The names of the sine and the cosine number {0}."""
     cell: str
     """An element of a block: {0} its row."""
     stored: str
@@ -131,7 +131,7 @@ class Language:
 def module_values(
     name: str, graph: Graph, inputs: Sequence[Port], outputs: Sequence[Port], language: Language
 ) -> dict[str, Any]:
-    """Return what a module's template needs: statements for one state, and for a block of them.
+    """Return the values of a module's template: statements for one state, and for a block.
 
     In a block the inputs' elements have a row each, and behind them an angle's sine and cosine:
     these are found ahead of the long loop, and what depends on shared inputs alone once.

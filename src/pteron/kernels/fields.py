@@ -29,7 +29,7 @@ class NoSquareRoot(PteronError, ArithmeticError):
 
 
 class Field(Protocol, Generic[Element]):
-    """What `evaluate` and the exact linear algebra ask of a field."""
+    """The arithmetic that `evaluate` and the exact linear algebra need."""
 
     def number(self, value: Fraction | int) -> Element:
         """Return a rational number as an element."""

@@ -36,8 +36,8 @@ vector."""
 Outputs = dict[str, Output]
 
 Need = Literal["rows", "reach", "type I", "type II"]
-"""What a pose must be: in reach, not singular of type I, of type II; "rows" asks for the first two
-of those legs alone whose row [dq/dc | dq/dphi] depends on the pose."""
+"""A condition on the pose: in reach, not singular of type I, of type II; "rows" asks for the first
+two of those legs alone whose row [dq/dc | dq/dphi] depends on the pose."""
 
 TYPE_I = 1e-4
 """The type-I measure of a leg below which what is divided by it is refused: the relative error is
@@ -47,17 +47,17 @@ TYPE_II = 1e-9
 """The type-II measure below which what is computed from J^-1 is refused: six digits are left."""
 
 Symbols = dict[str, Any]
-"""What an entry builds with, by name: the inputs, and what a caller puts in place of some."""
+"""The expressions an entry builds with, by name: the inputs, or what a caller puts for them."""
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A function's inputs by name, what builds its outputs, and what it asks of a pose."""
+    """A function: its inputs by name, the equations of its outputs, its conditions on the pose."""
 
     inputs: tuple[str, ...]
     build: Callable[[Machine, Symbols], Outputs]
     needs: tuple[Need, ...] = ()
-    """What a pose must be for the result to count, in the order in which it is told."""
+    """Conditions on the pose for the result to count, in the order of the messages."""
 
 
 def _state(m: Machine, v: Symbols) -> Any:
@@ -289,7 +289,7 @@ def _paper_terms(m: Machine, v: Symbols) -> Outputs:
 
 
 def _controlled(m: Machine, v: Symbols, *, what: str) -> Outputs:
-    """Return what a law of control answers to a sample; an adaptive one takes no parameters."""
+    """Return a control law's forces and next memory; an adaptive law takes no parameters."""
     selection = v.get("selection", ca.SX(len(m.parameters), 0))
     estimates = control.estimated(what, m.freedom, selection.shape[1])
     gains, memory = (
@@ -418,7 +418,7 @@ TABLE: dict[str, Entry] = {
 }
 
 FUNCTIONS = tuple(TABLE)
-"""What `compile` accepts, beside the indices and what they are made of."""
+"""The functions that `compile` accepts, beside the indices and their ingredients."""
 
 _DEFINED = (
     *("condition", "condition_points", "speed_least", "speed_most", "turning_speed"),
@@ -446,5 +446,5 @@ TABLE |= INDICES | {
 
 
 def needs_of(what: str) -> tuple[Need, ...]:
-    """Return what a pose must be for a function's result to count."""
+    """Return the conditions on the pose under which a function's result counts."""
     return TABLE[what].needs

@@ -57,7 +57,7 @@ class Node:
     arguments: tuple[int, ...] = ()
     """Earlier nodes; for an input its port and element."""
     value: float = 0.0
-    """Of a constant."""
+    """The number of a constant."""
     shared: bool = False
     """Whether it depends on shared inputs and constants alone."""
     outlying: bool = False
@@ -140,7 +140,7 @@ def graph_of(function: ca.Function, inputs: tuple[Port, ...] = ()) -> Graph:
 
 
 def expression(node: Node, arguments: Sequence[Expression]) -> Expression:
-    """Return what a node that is no input stands for in CasADi."""
+    """Return the CasADi expression of a node that is no input."""
     if node.operation == CONSTANT:
         return ca.SX(node.value)
     make = ca.SX.unary if len(arguments) == 1 else ca.SX.binary

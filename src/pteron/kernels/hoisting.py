@@ -1,4 +1,4 @@
-"""What depends on one shared input alone, taken out of a function and done once for all states."""
+"""Loop-invariant code motion: what depends on a shared input alone is computed once a batch."""
 
 from __future__ import annotations
 

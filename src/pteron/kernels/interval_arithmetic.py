@@ -29,7 +29,7 @@ Bound = Any
 """An array (B,), or a number that serves the whole batch."""
 
 Mask = NDArray[np.bool_] | None
-"""None where nowhere."""
+"""None: no box."""
 
 _ULP = 2.0**-52
 _UNDERFLOW = 1e-300
@@ -44,11 +44,11 @@ class Interval(NamedTuple):
     low: Bound
     high: Bound
     maybe: Mask = None
-    """Where it is undefined in a part of the box, or in all of it."""
+    """Boxes in which it is undefined, in a part or everywhere."""
     never: Mask = None
-    """Where it is defined nowhere in the box."""
+    """Boxes in which it is defined nowhere."""
     jump: Mask = None
-    """Where it may jump."""
+    """Boxes in which it may jump."""
 
 
 def constant(value: float) -> Interval:
@@ -59,7 +59,7 @@ def constant(value: float) -> Interval:
 
 
 def either(a: Mask, b: Mask) -> Mask:
-    """Return where one of two masks holds."""
+    """Return the boxes of one mask or the other."""
     return b if a is None else a if b is None else a | b
 
 
@@ -333,4 +333,4 @@ RULES: dict[str, Callable[..., Interval]] = {
     "or": one_of,
     "select": select,
 }
-"""What a graph's operations do; a product of equal factors is a `square`."""
+"""The rule of each operation of a graph; a product of equal factors is a `square`."""

@@ -1,4 +1,4 @@
-"""Programs and home poses on disk, so that a second start does not work them out again.
+"""Programs kept on disk, so that a second start reads them instead of building them.
 
 1 ms in the place of 100 or more. What is kept lies under a digest of the machine it is of, of what
 is asked, and of the source of all that it depends on. A leg from outside this package, whose source

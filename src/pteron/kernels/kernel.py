@@ -240,7 +240,7 @@ class ArrayKernel(Kernel):
 def sliced(
     inputs: Sequence[Array], outputs: Sequence[Array], start: int, stop: int
 ) -> tuple[list[Array], list[Array]]:
-    """Return what `_run` takes, for the states from `start` to `stop`."""
+    """Return the inputs and outputs of `_run` for the states from `start` to `stop`."""
     given = [value if value.ndim == 1 else value[start:stop] for value in inputs]
     return given, [value[start:stop] for value in outputs]
 

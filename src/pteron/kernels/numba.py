@@ -68,7 +68,7 @@ class Jitted(ArrayKernel):
         return self.call(*values, **fixed)
 
     def _direct(self) -> Callable[..., Any]:
-        """Return what takes one state of plain arrays to `one`, and all else to `checked`."""
+        """Return the callable: one state of plain arrays goes to `one`, all else to `checked`."""
         one = self._module.one  # which says in a line if Numba is missing
         from numba.core.errors import NumbaError
 

@@ -30,16 +30,16 @@ REDUCIBLE = (
     *("inverse_dynamics", "drive_forces", "feed_forward", "joint_feed_forward"),
     *("pd_gravity", "feed_forward_pd", "computed_torque"),
 )
-"""Forces, which may be asked for from base parameters."""
+"""Functions whose forces may be computed from base parameters."""
 
 LOADED = (
     *("inverse_dynamics", "forward_dynamics"),
     *("drive_forces", "feed_forward", "joint_feed_forward", "drive_accelerations"),
 )
-"""What may take a wrench on the platform as well."""
+"""Functions that may take a wrench on the platform as well."""
 
 SELECTED = ("base_regressor", "adaptive", "adaptive_drives")
-"""What takes a choice of base parameters, but not their values."""
+"""Functions that take a choice of base parameters, but not their values."""
 
 _SHARED = ("geometry", "gains", "parameters", "base_parameters", "drives")
 """Inputs of which one value serves a whole batch."""

@@ -143,7 +143,7 @@ class _Code(Code):
 
 @lru_cache(maxsize=64)
 def _code(layout: Manipulator, wrench: bool, stribeck: bool) -> _Code:
-    """Return what machines of one layout share; their numbers are left out of it."""
+    """Return the code that machines of one layout share, whatever their numbers."""
     built = program(layout, "drive_accelerations", wrench=wrench, guarded=True)
     return _Code(built if stribeck else _without_stribeck(built))
 

@@ -229,7 +229,7 @@ def same_layout(one: RobotLike, other: RobotLike) -> bool:
 
 
 def _layout(robot: Manipulator) -> tuple[Any, ...]:
-    """Return what base parameters depend on: neither inertia, nor guide points, nor elbows."""
+    """Return the data that base parameters depend on: no inertia, guide points or elbows."""
     legs = [
         (
             leg.type,

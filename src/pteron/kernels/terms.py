@@ -128,7 +128,7 @@ class TermGraph:
         return list(order)
 
     def uses(self, roots: Iterable[int]) -> Counter[int]:
-        """Return how often each node is an operand or a root."""
+        """Return the number of times that each node is an operand or a root."""
         roots = list(roots)
         uses = Counter(abs(value) for value in roots)
         for k in self.order(roots):

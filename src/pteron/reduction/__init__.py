@@ -1,4 +1,4 @@
-"""Which inertial parameters count: base parameters, three ways, and the reduced model."""
+"""Base inertial parameters, by three methods, and the dynamic model reduced to them."""
 
 from pteron.arguments import check_arguments
 from pteron.reduction.certificate import (

@@ -1,4 +1,4 @@
-"""What proves a count of base parameters, in terms a reader can check."""
+"""Certificates: the proof of a number of base parameters, in terms that a reader can check."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 ROUNDING = 1e-13
-"""Relative to the largest, what rounding alone leaves of a singular value: 1e-16 to 1e-14."""
+"""Singular values below it, relative to the largest, may be rounding, which is 1e-16 to 1e-14."""
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class NumericalRank:
 
     @property
     def clear(self) -> bool:
-        """Whether all that was dropped is rounding."""
+        """Whether every singular value that was dropped is rounding."""
         return self.largest_dropped <= ROUNDING
 
     def __str__(self) -> str:
@@ -86,7 +86,7 @@ class NumericalCertificate(Certificate):
 
     @property
     def gap(self) -> float:
-        """How many times the smallest value kept exceeds the largest one dropped."""
+        """Ratio of the smallest singular value kept to the largest one dropped."""
         return self.smallest_kept / max(self.largest_dropped, 1e-300)
 
     def summary(self) -> str:

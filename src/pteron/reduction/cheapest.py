@@ -1,4 +1,4 @@
-"""The base parameters that cost least: which columns to keep so that the dynamics are quickest."""
+"""The base parameters with which the inverse dynamics take the fewest operations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which columns depend on which, by Gaussian elimination modulo a prime, and back to fractions."""
+"""Dependent columns by Gaussian elimination modulo a prime, and fractions from their residues."""
 
 from __future__ import annotations
 

@@ -264,8 +264,8 @@ def _annihilate(
 ) -> bool:
     """Say whether every null vector annihilates the rows.
 
-    A relation says which share of the kept columns a column is; under the key -1 stands a null
-    vector as such.
+    A relation gives a column as shares of the kept columns; under the key -1 stands a null vector
+    itself.
     """
     for row in rows:
         for column, terms in relations.items():

@@ -31,10 +31,10 @@ _FINE = 10**12
 """Largest denominator of an approximation: its error is below 1e-12 times 1e-6."""
 
 _NOISE = 1e-14
-"""What rounding leaves of a unit vector; a larger error is reported."""
+"""Error of a unit vector by rounding; a larger one is reported."""
 
 _NEARLY = 1e-5
-"""Angle, rad, within which a relation that does not hold was perhaps meant to."""
+"""Angle, rad, within which a relation that does not hold was perhaps meant to hold."""
 
 ZERO = Surd(Fraction(0))
 
@@ -140,7 +140,7 @@ class ExactGeometry:
 
     @property
     def places(self) -> list[dict[str, slice]]:
-        """Where each leg's quantities stand in that vector, by name."""
+        """For each leg, the slices of that vector that its quantities take, by name."""
         found: list[dict[str, slice]] = []
         start = 0
         for leg in self.legs:
@@ -226,7 +226,7 @@ def _exact_leg(
 
 @dataclass(frozen=True)
 class _Notes:
-    """What was recognised and what approximated, gathered on the way."""
+    """The notes of a conversion to exact numbers: which were recognised, which approximated."""
 
     recognised: list[str]
     approximated: list[str]
@@ -297,7 +297,7 @@ def _best_frame(robot: Manipulator, vectors: list[Array]) -> Array:
 
 
 def _simplicity(frame: Array, vectors: list[Array]) -> int:
-    """Return how many components are simple; zeros count twice, rational ones more than roots."""
+    """Return a score of simple components: 3 for a zero, 2 for a rational, 1 for a root."""
     found = (direction_cosine(float(c)) for vector in vectors for c in frame @ vector)
     return sum(3 if c.q == 0 else 2 if c.s == 1 else 1 for c in found if c is not None)
 

@@ -1,4 +1,4 @@
-"""`base_parameters`: which inertial parameters, and sums of them, act on the actuator forces."""
+"""`base_parameters`: the inertial parameters, and sums of them, that act on the actuator forces."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ from pteron.reduction.cheapest import cheapest_parameters
 from pteron.reduction.result import BaseParameters
 
 Form = Callable[[Expression, Expression, Expression, Expression], Expression]
-"""Of J^-T (n, m), the bracket of Eq. (15) (m, N), selection (N, K) and parameters (K, 1)."""
+"""Forces of J^-T (n, m), the bracket of Eq. (15) (m, N), selection (N, K), parameters (K, 1)."""
 
 
 _GRAPHS: dict[str, Form] = {

@@ -1,4 +1,4 @@
-"""What every method returns: the columns kept, and how the others join them."""
+"""A grouping of columns, the result of every method: those kept, and the shares of the others."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ from pteron.reduction.transfers import Transfer
 Form = Literal["text", "sympy", "latex", "html"]
 
 Symbols = bool | Literal["leg"]
-"""Whether coefficients are in symbols, and whether each leg has its own."""
+"""False: coefficients in numbers. True: in symbols of the geometry. "leg": each leg has its own."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -85,7 +85,7 @@ class BaseParameters:
         )
 
     def __repr__(self) -> str:
-        """Return what was found in a line; `expressions` and `values` have it all."""
+        """Return a summary in a line; `expressions` and `values` have it all."""
         columns, method = len(self.columns), self.certificate.method
         return f"<BaseParameters of {self.robot.name!r}: {self.rank} of {columns}, {method}>"
 
@@ -105,7 +105,7 @@ class BaseParameters:
 
     @property
     def rank(self) -> int:
-        """How many base parameters there are."""
+        """The number of base parameters."""
         return len(self.kept)
 
     @property

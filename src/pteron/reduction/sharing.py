@@ -1,4 +1,4 @@
-"""Which columns there are: each parameter of its own, or one for several identical legs."""
+"""Columns of the regressor: one for each parameter, or for the like parameters of several legs."""
 
 from __future__ import annotations
 

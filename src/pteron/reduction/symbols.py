@@ -16,7 +16,7 @@ from pteron.reduction.transfers import Transfer
 
 
 def named_values(geometry: ExactGeometry) -> dict[str, Any]:
-    """Return what stands for each geometric symbol: a SymPy symbol, minus one, or zero.
+    """Return the value of each geometric symbol: a SymPy symbol, minus one, or zero.
 
     Values that agree but for their sign share the symbol of the first leg that has them, so that
     relations which hold because of it are seen.
