@@ -18,15 +18,11 @@ from pteron.identification.errors import LogError
 from pteron.identification.logs import Log
 from pteron.identification.signals import Preprocessing, States
 from pteron.identification.signals.derivatives import EVEN, FourierFit
-from pteron.identification.signals.fourier import (
-    Projection,
-    fitted_series,
-    fourier_basis,
-    most_harmonics,
-)
+from pteron.identification.signals.fourier import Projection, fitted_series, most_harmonics
 from pteron.identification.signals.samples import BLOCK, Samples, samples
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
+from pteron.motion.trajectories.fourier import fourier_basis
 
 
 class Linear(Protocol):
@@ -257,14 +253,14 @@ def _periodic(
     harmonics = max(min(int(preprocessing.band * period), most_harmonics(log.time, period)), 1)
     series = fit.series(log)
     fine = np.linspace(start, start + period, per_period, endpoint=False)
-    moving = in_motion(series.at(fine, 1), preprocessing.slow, preprocessing.settling, wraps=True)
+    moving = in_motion(series.at(fine)[1], preprocessing.slow, preprocessing.settling, wraps=True)
     count = 2 * harmonics + 1
     kept = np.linspace(start, start + period, count, endpoint=False)
 
     def regressor(time: Array, used: Array, first_row: int) -> Array:
         states = States.of_joints(
             model.robot,
-            (series.at(time), series.at(time, 1), series.at(time, 2)),
+            series.at(time),
             time,
             preprocessing.start,
             payload=None if log.payload is None else np.full(len(time), log.payload[0]),
@@ -279,11 +275,11 @@ def _periodic(
         # All periods have their samples at the same instants: one stands for all.
         matrix = _projected(regressor(fine, moving, log.first_row), count)
         forces = fitted_series(log.time, used * log.forces, period, highest=harmonics / period)
-        rows = forces.at(kept)
+        rows = forces.at(kept)[0]
         noise = _projected_noise(moving, count) * np.sqrt(per_period / log.rows)
     else:
         projection = Projection(log.time, period, harmonics)
-        basis = fourier_basis(kept, period, harmonics)
+        basis = fourier_basis(kept, harmonics, period)
         n, p = used.shape[1], len(model.names)
 
         def sampled(part: slice) -> Array:

@@ -14,8 +14,8 @@ from scipy.stats import chi2, f  # type: ignore[import-untyped]
 from pteron.identification.estimators.covariance import noise_of
 from pteron.identification.estimators.qr import QrFactor
 from pteron.identification.observation import Observations
-from pteron.identification.signals.fourier import row_blocks
 from pteron.kernels import Array
+from pteron.motion.trajectories.fourier import row_blocks
 
 _LAGS = 20
 _LEVEL = 0.01

@@ -16,7 +16,7 @@ from pteron.kernels import Array, as_array
 from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator
 from pteron.motion import Motion
-from pteron.motion.trajectories.fourier import fourier_basis
+from pteron.motion.trajectories.fourier import fourier_curve
 
 Space = Literal["platform", "joints"]
 """Whose coordinates the series are of: the platform's pose, or the joints'."""
@@ -154,9 +154,7 @@ class FourierMotion:
         1/s: q' = dq/dphase rate, and q'' = d2q/dphase2 rate^2 + dq/dphase gain.
         """
         robot = self.robot
-        q, first, second = (
-            rows @ self.coefficients for rows in fourier_basis(phase, self.harmonics, self.period)
-        )
+        q, first, second = fourier_curve(self.coefficients, self.period, phase)
         rate, gain = np.reshape(rate, (-1, 1)), np.reshape(gain, (-1, 1))
         dq, ddq = first * rate, second * rate**2 + first * gain
         if self.space == "platform":

@@ -102,7 +102,7 @@ class _Kept:
         path, slopes, low, high = _path(setting, watched)
         size = sizes(setting.robot, setting.space)
         self._path, self._slopes = path.map(len(times)), slopes.map(len(times))
-        self._rows = np.array(fourier_basis(times, setting.harmonics, setting.period))
+        self._rows = _bases(setting, times)
         self._size, self._low, self._high = size, low, high
         self._above, self._below = np.isfinite(low), np.isfinite(high)
 
@@ -128,6 +128,12 @@ class _Kept:
         return np.concatenate([part.reshape(-1, *part.shape[2:]) for part in parts])
 
 
+def _bases(setting: Setting, times: Array) -> Array:
+    """Return what takes coefficients to q, q' and q'' at instants (T,): (3, T, 2 H + 1)."""
+    shape = setting.harmonics, setting.period
+    return np.array([fourier_basis(times, *shape, derivative) for derivative in range(3)])
+
+
 def _instants(setting: Setting) -> Array:
     """Return the instants (T,) at which the regressor is taken, s."""
     count = max(_SAMPLES * setting.harmonics, 3 * _SAMPLES)
@@ -141,8 +147,7 @@ def _cost(setting: Setting, doublings: int) -> ca.Function:
     n = setting.robot.freedom
     z = ca.MX.sym("z", 2 * setting.harmonics + 1, n)
     coefficients = ca.mtimes(z, ca.diag(ca.DM(sizes(setting.robot, setting.space))))
-    rows = fourier_basis(times, setting.harmonics, setting.period)
-    along = [ca.mtimes(ca.DM(row), coefficients).T for row in rows]
+    along = [ca.mtimes(ca.DM(row), coefficients).T for row in _bases(setting, times)]
     blocks = _regressor(setting).map(len(times))(*along)
     information = ca.mtimes(blocks, blocks.T) / len(times)
     value = measure(information, setting.criterion, doublings, setting.short)

@@ -17,7 +17,7 @@ from pteron.identification.signals.filters import (
     smoothed,
     white_noise,
 )
-from pteron.identification.signals.fourier import FourierSeries, fitted_series
+from pteron.identification.signals.fourier import FittedSeries, fitted_series
 from pteron.identification.signals.preprocessing import Preprocessing, Processing, preprocessing_of
 from pteron.identification.signals.samples import samples
 from pteron.identification.signals.states import States, start_pose
@@ -25,7 +25,7 @@ from pteron.identification.signals.states import States, start_pose
 __all__ = [
     "Decimation",
     "Derivatives",
-    "FourierSeries",
+    "FittedSeries",
     "Preprocessing",
     "Processing",
     "States",

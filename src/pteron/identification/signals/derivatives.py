@@ -25,8 +25,9 @@ from scipy.ndimage import maximum_filter1d  # type: ignore[import-untyped]
 
 from pteron.identification.logs import Log
 from pteron.identification.signals.filters import SETTLING, smoothed
-from pteron.identification.signals.fourier import FourierSeries, fitted_series, fourier_basis
+from pteron.identification.signals.fourier import FittedSeries, fitted_series
 from pteron.kernels import Array
+from pteron.motion.trajectories.fourier import fourier_basis
 
 Derivatives = Literal["periodic", "central", "spline"]
 """The differentiators' names."""
@@ -173,22 +174,21 @@ class FourierFit:
     whole: ClassVar[bool] = True
     edge: ClassVar[int] = 0
 
-    def series(self, log: Log) -> FourierSeries:
+    def series(self, log: Log) -> FittedSeries:
         """Return the series of the log's positions, as the forces are late for them."""
         found = fitted_series(log.time, log.joints, self.period, highest=self.cutoff)
         return found.later(self.delay)
 
     def differentiated(self, block: Log, edge: int) -> Differentiated:
         """Return the log at its own times."""
-        series = self.series(block)
-        motion = series.at(block.time), series.at(block.time, 1), series.at(block.time, 2)
+        motion = self.series(block).at(block.time)
         return Differentiated(block.time, motion, block.forces, np.ones(block.rows, dtype=bool))
 
     def curve(self, log: Log) -> Curve:
         """Return the series at the log's samples."""
         series = self.series(log)
         q, dq, ddq = (
-            sparse.csr_matrix(fourier_basis(log.time, self.period, series.harmonics, k))
+            sparse.csr_matrix(fourier_basis(log.time, series.harmonics, self.period, k))
             for k in range(3)
         )
         return Curve(series.coefficients, (q, dq, ddq), 0)

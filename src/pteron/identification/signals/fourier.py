@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -11,8 +11,7 @@ from scipy.linalg import cho_factor, cho_solve  # type: ignore[import-untyped]
 
 from pteron.errors import DataError
 from pteron.kernels import Array
-
-_BLOCK = 1 << 14
+from pteron.motion.trajectories.fourier import FourierSeries, fourier_basis, row_blocks
 
 _MOST = 120
 """Harmonics that are looked at."""
@@ -26,26 +25,6 @@ _SHARE = 0.4
 
 _ROUNDING = 1e-15
 """Noise relative to a signal's size that is rounding: harmonics below it are not looked for."""
-
-
-def row_blocks(rows: int) -> Iterator[slice]:
-    """Yield so many rows in parts of a bounded size."""
-    for start in range(0, rows, _BLOCK):
-        yield slice(start, min(start + _BLOCK, rows))
-
-
-def fourier_basis(time: Array, period: float, harmonics: int, derivative: int = 0) -> Array:
-    """Return one, and sine and cosine of each harmonic (T, 2 H + 1), or their derivatives."""
-    angle = 2.0 * np.pi / period
-    columns = np.zeros((len(time), 2 * harmonics + 1))
-    columns[:, 0] = float(derivative == 0)
-    phase = np.remainder(time, period) * angle
-    shift = derivative * np.pi / 2.0
-    for h in range(1, harmonics + 1):
-        scale = (h * angle) ** derivative
-        columns[:, 2 * h - 1] = scale * np.sin(h * phase + shift)
-        columns[:, 2 * h] = scale * np.cos(h * phase + shift)
-    return columns
 
 
 @dataclass(frozen=True)
@@ -67,7 +46,7 @@ class Projection:
 
     def basis(self, rows: slice) -> Array:
         """Return the basis functions at some of the samples."""
-        return fourier_basis(self.time[rows], self.period, self.harmonics)
+        return fourier_basis(self.time[rows], self.harmonics, self.period)
 
     def coefficients(self, signal: Callable[[slice], Array], size: int) -> Array:
         """Return the coefficients (2 H + 1, k) of a signal that comes as (rows, k)."""
@@ -78,59 +57,38 @@ class Projection:
 
     def noise(self, used: Array, kept: Array) -> Array:
         """Return what is left at times `kept` of unit white noise on samples (T, n) that are 1."""
-        at = cho_solve(self._normal, fourier_basis(kept, self.period, self.harmonics).T)
+        at = cho_solve(self._normal, fourier_basis(kept, self.harmonics, self.period).T)
         variance = np.zeros((len(kept), used.shape[1]))
         for rows in row_blocks(len(self.time)):
             variance += ((self.basis(rows) @ at) ** 2).T @ used[rows]
         return np.asarray(np.sqrt(variance))
 
 
-@dataclass(frozen=True)
-class FourierSeries:
-    """A Fourier series of k signals.
+@dataclass(frozen=True, eq=False)
+class FittedSeries(FourierSeries):
+    """The Fourier series of k signals, fitted to samples.
 
     Attributes
     ----------
-    period : float
-        The time after which the signals repeat, s.
-    coefficients : array, shape (2 H + 1, k)
-        The mean, then sine and cosine of each harmonic.
     noise : array, shape (k,)
-        Standard deviation of what the fit leaves of the samples.
+        Standard deviation of the samples about the series.
     """
 
-    period: float
-    coefficients: Array
     noise: Array
 
-    @property
-    def harmonics(self) -> int:
-        """How many harmonics there are, H."""
-        return len(self.coefficients) // 2
-
-    def at(self, time: Array, derivative: int = 0) -> Array:
-        """Return the signals (T, k) at times, or their derivatives."""
-        parts = (
-            fourier_basis(time[rows], self.period, self.harmonics, derivative)
-            for rows in row_blocks(len(time))
-        )
-        return np.concatenate([part @ self.coefficients for part in parts])
-
-    def later(self, delay: float) -> FourierSeries:
+    def later(self, delay: float) -> FittedSeries:
         """Return the series of the same signals, late by a delay, s."""
         if not delay:
             return self
         turn = delay * 2.0 * np.pi / self.period * np.arange(1, self.harmonics + 1)[:, None]
         cos, sin = np.cos(turn), np.sin(turn)
-        found = self.coefficients.copy()
-        sines, cosines = self.coefficients[1::2], self.coefficients[2::2]
-        found[1::2], found[2::2] = cos * sines + sin * cosines, cos * cosines - sin * sines
-        return replace(self, coefficients=found)
+        a, b = np.array(self.cosines), np.array(self.sines)
+        return replace(self, cosines=cos * a - sin * b, sines=cos * b + sin * a)
 
 
 def fitted_series(
     time: Array, signal: Array, period: float, *, highest: float | None = None
-) -> FourierSeries:
+) -> FittedSeries:
     """Return the series fitted to samples by least squares, with the harmonics that show.
 
     All periods count alike, so that noise is averaged over them, and samples (T, k) may stand at
@@ -156,16 +114,17 @@ def fitted_series(
     noise = np.sqrt(squares / max(len(time) - len(found), 1))
     noise = np.maximum(noise, _ROUNDING * np.abs(signal).max(axis=0))
     if highest is None:
-        amplitudes = np.hypot(found[1::2], found[2::2])
+        amplitudes = np.hypot(found[1 : most + 1], found[most + 1 :])
         # Of one period only: the rounding of an encoder comes again in every period.
         samples = min(rate * period, len(time))
         shown = amplitudes > _SIGNIFICANT * noise * np.sqrt(2.0 / samples)
         last = int(np.flatnonzero(shown.any(axis=1)).max(initial=0)) + 1
-        found = found[: 2 * last + 1]
+        found = np.vstack([found[: last + 1], found[most + 1 : most + 1 + last]])
         if last < most:
             # Uneven samples mix harmonics a little: what is kept is fitted by itself.
             found, _ = _fitted(time, signal, period, last)
-    return FourierSeries(period, found, noise)
+    last = len(found) // 2
+    return FittedSeries(found[0], found[1 : last + 1], found[last + 1 :], period, noise)  # type: ignore[arg-type]
 
 
 def most_harmonics(time: Array, period: float) -> int:

@@ -27,7 +27,7 @@ from pteron.identification.signals.filters import (
     smoothed,
     white_noise,
 )
-from pteron.identification.signals.fourier import FourierSeries, fitted_series
+from pteron.identification.signals.fourier import FittedSeries, fitted_series
 from pteron.identification.signals.states import start_pose
 from pteron.kernels import Array
 from pteron.manipulator import RobotLike, as_manipulator
@@ -264,9 +264,7 @@ def preprocessing_of(
     else:
         order = np.arange(1, series.harmonics + 1)
         frequencies = order / series.period
-        power = (order**2)[:, None] * (
-            series.coefficients[1::2] ** 2 + series.coefficients[2::2] ** 2
-        )
+        power = (order**2)[:, None] * (np.square(series.cosines) + np.square(series.sines))
     edge = float(frequencies[min(bins_below(power, _POWER), len(frequencies) - 1)])
     band = wanted.band or min(_PRODUCTS * edge, rate / 2.0)
     if wanted.band is None and cutoff is not None and series is None:
@@ -294,7 +292,7 @@ def _longest_part(log: Log) -> Log:
     return log.part(longest.start, min(longest.stop, longest.start + _LOOK))
 
 
-def _checked_series(log: Log, period: float | None) -> FourierSeries:
+def _checked_series(log: Log, period: float | None) -> FittedSeries:
     """Return the series of the positions; refuse a period that is not that of the motion."""
     if period is None:
         raise LogError(
@@ -324,7 +322,7 @@ def _checked_series(log: Log, period: float | None) -> FourierSeries:
     return series
 
 
-def _is_series(series: FourierSeries, joints: Array) -> bool:
+def _is_series(series: FittedSeries, joints: Array) -> bool:
     """Say whether a Fourier series leaves noise alone: jumps of acceleration take more terms."""
     least = _ROUNDING * np.ptp(joints, axis=0)
     return bool((series.noise <= np.maximum(_NOISE_ALONE * position_noise(joints), least)).all())

@@ -1,7 +1,8 @@
-"""Periodic motions of the platform as finite Fourier series."""
+"""Finite Fourier series: their basis, their sums, and periodic motions of the platform."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,9 @@ from pteron.motion.trajectories.checks import check_motion
 from pteron.motion.trajectories.time_law import STEP, sampled
 from pteron.motion.trajectories.tool import Curve
 
+_BLOCK = 1 << 14
+"""Rows of a basis that are held at a time."""
+
 
 @dataclass(frozen=True)
 class FourierSeries:
@@ -23,7 +27,7 @@ class FourierSeries:
     Attributes
     ----------
     center : tuple of float
-        The pose in the middle (m,), m and rad.
+        The pose in the middle, the mean (m,), m and rad.
     cosines, sines : tuple of tuple of float
         Coefficients a_h and b_h, (H, m) each, of the harmonics 1 to H; m and rad.
     period : float
@@ -63,29 +67,53 @@ class FourierSeries:
             rows = np.asarray(getattr(self, name), dtype=float).tolist()
             object.__setattr__(self, name, tuple(tuple(row) for row in rows))
 
+    @property
+    def harmonics(self) -> int:
+        """Number of harmonics, H."""
+        return len(self.cosines)
+
+    @property
+    def coefficients(self) -> Array:
+        """Center, cosines and sines as one array (2 H + 1, m)."""
+        return np.vstack([self.center, self.cosines, self.sines])
+
     def at(self, time: ArrayLike) -> Curve:
         """Return pose, velocity and acceleration, (T, m) each, at times (T,), s."""
-        coefficients = np.vstack([self.center, self.cosines, self.sines])
-        times = np.asarray(time, dtype=float)
-        pose, velocity, acceleration = (
-            rows @ coefficients for rows in fourier_basis(times, len(self.cosines), self.period)
+        return fourier_curve(self.coefficients, self.period, np.asarray(time, dtype=float))
+
+
+def fourier_curve(coefficients: Array, period: float, times: Array) -> Curve:
+    """Return the sums of coefficients (2 H + 1, m) at times (T,), s, and two derivatives."""
+    harmonics = len(coefficients) // 2
+    value, first, second = (
+        np.concatenate(
+            [
+                fourier_basis(times[rows], harmonics, period, derivative) @ coefficients
+                for rows in row_blocks(len(times))
+            ]
         )
-        return pose, velocity, acceleration
+        for derivative in range(3)
+    )
+    return value, first, second
 
 
-def fourier_basis(times: Array, harmonics: int, period: float) -> tuple[Array, Array, Array]:
-    """Return what takes coefficients (2 H + 1, m) to x, x' and x'' (T, m): (T, 2 H + 1) each.
+def fourier_basis(times: Array, harmonics: int, period: float, derivative: int = 0) -> Array:
+    """Return 1, the cosine and the sine of each harmonic, or a derivative of them, (T, 2 H + 1).
 
-    The coefficients are those of 1, then of the cosines, then of the sines.
+    The columns are those of 1, then of all cosines, then of all sines.
     """
     w = 2.0 * np.pi / period * np.arange(1, harmonics + 1)
-    cosines, sines = np.cos(np.outer(times, w)), np.sin(np.outer(times, w))
-    one, zero = np.ones((len(times), 1)), np.zeros((len(times), 1))
-    return (
-        np.hstack([one, cosines, sines]),
-        np.hstack([zero, -w * sines, w * cosines]),
-        np.hstack([zero, -w * w * cosines, -w * w * sines]),
-    )
+    angles = np.outer(np.remainder(times, period), w)
+    cosines, sines = np.cos(angles), np.sin(angles)
+    for _ in range(derivative):
+        cosines, sines = -w * sines, w * cosines
+    return np.hstack([np.full((len(times), 1), float(derivative == 0)), cosines, sines])
+
+
+def row_blocks(rows: int) -> Iterator[slice]:
+    """Yield the rows in blocks of bounded size; one empty block where there are none."""
+    for start in range(0, max(rows, 1), _BLOCK):
+        yield slice(start, min(start + _BLOCK, rows))
 
 
 def fourier_motion(robot: RobotLike, series: FourierSeries, step: float = STEP) -> Motion:
