@@ -20,10 +20,12 @@ from pteron.design import (
     proved_cube,
     read_spec,
     search,
+    start_design,
     survey,
 )
 from pteron.design.masses import stretched
 from pteron.design.paths import places
+from pteron.design.rows import evaluated
 from pteron.design.variables import geometry_slopes
 from pteron.equations.machine import numbers
 from pteron.errors import DataError, ModelError, OutputError
@@ -100,15 +102,13 @@ def test_a_stretched_link_is_that_of_a_longer_bar():
 
 
 def test_slopes_of_the_conditions_are_those_of_differences(task):
-    geometry, side = task.first.geometry, np.array([1.0])
+    geometry = start_design(task).geometry
     poses = pteron.random_poses("quadrupteron", 3, type_i=0.2)
-    _, by_geometry, by_pose = task.conditions.derivatives(geometry, poses, 1.0)
+    _, by_pose, by_geometry = task.conditions.slopes(geometry, poses, 1.0, by_geometry=True)
     way, step = np.random.default_rng(0).normal(size=len(geometry)), 1e-6
     ends = [task.conditions.rows(geometry + s * step * way, poses, 1.0) for s in (1.0, -1.0)]
     np.testing.assert_allclose(by_geometry @ way, (ends[0] - ends[1]) / (2 * step), atol=1e-7)
-    np.testing.assert_allclose(
-        by_pose, task.conditions.pose_slopes(poses, geometry=geometry, side=side)[1]
-    )
+    np.testing.assert_allclose(by_pose, task.conditions.slopes(geometry, poses, 1.0)[1])
     moved = poses + step * np.array([0.3, -0.5, 0.7, 0.2])
     change = task.conditions.rows(geometry, moved, 1.0) - task.conditions.rows(geometry, poses, 1.0)
     np.testing.assert_allclose(by_pose @ (moved - poses)[0], change, atol=1e-10)
@@ -140,7 +140,7 @@ def test_the_cube_is_that_of_the_proved_search(name):
     lengths = [{"moves": "legs.upper_length", "by": "factor", "range": (0.9, 1.1)}]
     floors = {"type_i": 0.0, "type_ii": 0.0}
     asked = spec_of(robot=name, variables=lengths, floors=floors, requirements=[])
-    cube = Task.of(asked).first.cube
+    cube = start_design(Task.of(asked)).cube
     known = largest_cube(robot, np.zeros(robot.freedom), proved=False)
     assert cube.edge == pytest.approx(known.edge, rel=0.005)
 
@@ -148,7 +148,7 @@ def test_the_cube_is_that_of_the_proved_search(name):
 def test_a_tube_between_the_points_is_no_part_of_the_cube():
     """The Tripteron's links are equally long: they fold, unreachable, onto a line through it."""
     asked = spec_of(robot="tripteron", variables=LENGTHS[:1], requirements=[])
-    design = Task.of(asked).first
+    design = start_design(Task.of(asked))
     cube = proved_cube(design)
     assert cube is not None
     assert cube.edge > 0.99 * design.cube.edge
@@ -193,15 +193,15 @@ def test_a_workspace_that_fails_between_its_points_is_missed():
     """The line onto which equal links of a Tripteron's first leg cannot fold, within a box."""
     box = {"low": (-0.03, 0.2, -0.03), "high": (0.04, 0.26, 0.04), "samples": 2}
     task = Task.of(workspace_spec(robot="tripteron", workspace=box, angles=None))
-    missed = [task.evaluated([0.25, 0.25], proofs=p)["misses workspace"] for p in (False, True)]
+    missed = [evaluated(task, [0.25, 0.25], proofs=p)["misses workspace"] for p in (False, True)]
     assert missed[0] == 0.0 < missed[1]
-    with pytest.raises(ModelError, match=r"leg 1: type-I measure, at pose \[0.005, 0.23, 0.005\]"):
+    with pytest.raises(ModelError, match=r"leg 1: near type I, at pose \[0.005, 0.23, 0.005\]"):
         search(task.spec)
 
 
 def test_a_search_finds_a_larger_proved_cube_with_links_no_longer(found):
     front, _ = found
-    start = proved_cube(front.task.first)
+    start = proved_cube(start_design(front.task))
     best = Design(front.task, front.robot(0))
     cube = proved_cube(best)
     assert cube.edge > 1.3 * start.edge

@@ -139,6 +139,7 @@ def _write(summary: Summary, folder: Path) -> list[Path]:
 
 
 def _figure(summary: Summary) -> Figure:
+    from pteron.design import start_design
     from pteron.plots import front_figure
 
     front = summary.front
@@ -147,7 +148,7 @@ def _figure(summary: Summary) -> Figure:
         front.objectives,
         names,
         [front.task.unit(name) for name in names],
-        start=[front.task.first.quantity(name) for name in names],
+        start=[start_design(front.task).quantity(name) for name in names],
         chosen=front.chosen,
     )
 

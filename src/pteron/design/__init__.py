@@ -10,6 +10,7 @@ from pteron.design.proofs import (
     cube_proofs,
     proved,
     proved_cube,
+    start_design,
     workspace_proofs,
 )
 from pteron.design.quantities import Quantity, quantities
@@ -38,6 +39,7 @@ __all__ = [
     "quantities",
     "read_spec",
     "search",
+    "start_design",
     "survey",
     "workspace_proofs",
 ]

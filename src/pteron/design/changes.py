@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pteron.design.design import Design
+from pteron.design.proofs import start_design
 from pteron.design.task import Task
 from pteron.manipulator import Manipulator
 from pteron.manipulator.manipulator import told_legs
@@ -90,7 +91,7 @@ def quantity_changes(design: Design) -> list[Change]:
     """Return the quantities that were asked for, of the machine to begin with and of a design."""
     task = design.task
     return [
-        Change(name, task.first.quantity(name), design.quantity(name), task.unit(name))
+        Change(name, start_design(task).quantity(name), design.quantity(name), task.unit(name))
         for name in task.asked
     ]
 

@@ -3,30 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import product
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from pteron.design.cube import Cube, largest
-from pteron.design.exchange import cube_samples
 from pteron.design.quantities import quantities
 from pteron.design.region import workspace_poses
+from pteron.design.task import Task
 from pteron.equations.drives import drive_numbers
 from pteron.equations.machine import numbers
 from pteron.kernels import Array
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, parameters
-
-if TYPE_CHECKING:
-    from pteron.design.task import Task
+from pteron.workspace.fit import UNKNOWN, Fit, largest_fit
+from pteron.workspace.samples import cube, shape_samples
 
 _IN_CUBE = 5
 """Poses along each edge of the cube, where that is the workspace."""
-
-UNKNOWN = -1e-6
-"""What stands for a row that is NaN, or of which no proof says whether it is kept."""
 
 
 class DriveMotion(NamedTuple):
@@ -46,7 +41,7 @@ class Design:
         The search.
     robot : Manipulator
         The machine.
-    known : Cube, optional
+    known : Fit, optional
         Its largest cube, where that is proved.
     least : float
         The least row of the conditions over the required workspace that a proof has shown.
@@ -54,7 +49,7 @@ class Design:
 
     task: Task
     robot: Manipulator
-    known: Cube | None = None
+    known: Fit | None = None
     least: float = np.inf
 
     @cached_property
@@ -71,17 +66,17 @@ class Design:
         return np.asarray(found[0] if isinstance(found, tuple) else found)
 
     @cached_property
-    def cube(self) -> Cube:
+    def cube(self) -> Fit:
         """The largest cube: found, and proved where it is known."""
         if self.known is not None:
             return self.known
         return self.cube_without(np.empty((0, self.robot.freedom)))
 
-    def cube_without(self, failing: Array) -> Cube:
+    def cube_without(self, failing: Array) -> Fit:
         """Return the largest cube that holds none of the poses (F, m), which are known to fail."""
-        ball = search_ball(self.robot)
-        task = self.task
-        return largest(task.conditions, self.geometry, task.orientations, ball, failing)
+        task, ball = self.task, search_ball(self.robot)
+        shape = cube(len(ball[0]))
+        return largest_fit(task.conditions, self.geometry, task.orientations, ball, failing, shape)
 
     @cached_property
     def poses(self) -> Array:
@@ -92,27 +87,14 @@ class Design:
         spec = self.task.spec
         if spec.workspace is not None:
             return workspace_poses(spec.workspace, self.task.orientations, samples)
-        count = samples or _IN_CUBE
-        lattice = cube_samples(self.task.orientations, len(self.cube.center), count)
+        shape = cube(len(self.cube.center))
+        lattice = shape_samples(shape, self.task.orientations, samples or _IN_CUBE)
         return lattice.at(self.cube.center, self.cube.edge)
 
     @cached_property
     def joints(self) -> Array:
         """Joint coordinates (N, n) over these poses, m or rad."""
         return self.values("joint_coordinates")
-
-    @property
-    def start_strokes(self) -> Array:
-        """Each joint's way (n,) by which `stroke` is measured, m or rad."""
-        first = self.task.first
-        own = first.joints.max(axis=0) - first.joints.min(axis=0)
-        limits = [leg.limits for leg in first.robot.legs]
-        return np.array(
-            [
-                way if pair is None else pair[1] - pair[0]
-                for way, pair in zip(own, limits, strict=True)
-            ]
-        )
 
     @cached_property
     def drive_motion(self) -> DriveMotion:
@@ -144,7 +126,7 @@ class Design:
     def _sides(self) -> dict[float, float]:
         """The least row of the conditions over the required workspace, by the measure's sign."""
         found = {}
-        for side in (1.0, -1.0):
+        for side in self.task.conditions.sides:
             rows = self.task.conditions.rows(self.geometry, self.poses, side)
             least = float(np.nanmin(rows))
             # A row that is NaN fails, though not as clearly as one that says by how much.
@@ -159,10 +141,10 @@ class Design:
         return max(self._sides, key=self._sides.__getitem__)
 
     @property
-    def reserve(self) -> float:
+    def margin(self) -> float:
         """The least row of the conditions over the workspace; below 0 where one fails."""
         if self.task.spec.workspace is None:
-            return self.cube.reserve
+            return self.cube.margin
         return min(max(self._sides.values()), self.least)
 
     def quantity(self, name: str) -> float:
@@ -171,3 +153,26 @@ class Design:
             own = quantities()[name].of_machine
             return own(self.robot) if own is not None else float("nan")
         return float(quantities()[name].of(self))
+
+    @cached_property
+    def strokes(self) -> Array:
+        """The way of each joint (n,) over these poses, m or rad."""
+        return np.ptp(self.joints, axis=0)
+
+    @property
+    def reference_strokes(self) -> Array:
+        """The ways (n,) by which `stroke` is measured: the limits' width, or those at the start."""
+        limits = [leg.limits for leg in self.task.robot.legs]
+        if all(limits):
+            return np.ptp(limits, axis=1)
+        return np.array(
+            [
+                way if pair is None else pair[1] - pair[0]
+                for way, pair in zip(_start(self.task).strokes, limits, strict=True)
+            ]
+        )
+
+
+@lru_cache(maxsize=8)
+def _start(task: Task) -> Design:
+    return Design(task, task.robot)

@@ -11,6 +11,7 @@ import numpy as np
 
 from pteron.design.design import Design
 from pteron.design.proofs import counterexamples
+from pteron.design.rows import MISSES
 from pteron.design.task import Task
 from pteron.errors import ModelError
 from pteron.kernels import Array
@@ -18,8 +19,6 @@ from pteron.manipulator import Manipulator
 
 if TYPE_CHECKING:
     import polars as pl
-
-_MISSES = "misses "
 
 
 @dataclass(frozen=True, repr=False)
@@ -180,7 +179,7 @@ def front_of_parts(task: Task, parts: Iterable[pl.DataFrame]) -> Front:
 
 def _missed(designs: pl.DataFrame) -> Array:
     """Return how much each design misses, all in all."""
-    names = [name for name in designs.columns if name.startswith(_MISSES)]
+    names = [name for name in designs.columns if name.startswith(MISSES)]
     return np.asarray(designs.select(names).to_numpy().sum(axis=1))
 
 
@@ -202,8 +201,8 @@ def _impossible(task: Task, nearest: pl.DataFrame, evaluated: int) -> ModelError
     """Return what is said where no design keeps all that is asked."""
     row = nearest.row(0, named=True)
     told = []
-    for name in (name for name in nearest.columns if name.startswith(_MISSES) and row[name] > 0.0):
-        if name == f"{_MISSES}workspace":
+    for name in (name for name in nearest.columns if name.startswith(MISSES) and row[name] > 0.0):
+        if name == f"{MISSES}workspace":
             machine = task.machine([row[v.name] for v in task.variables])
             what = "the workspace" if task.spec.workspace else "a cube"
             told.append(f"{what} is not kept ({_worst_condition(Design(task, machine))})")

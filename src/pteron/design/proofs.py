@@ -8,23 +8,19 @@ to the search for the cube, as a pose that it must not hold, until what it finds
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
-from pteron.design.cube import Cube
-from pteron.design.design import UNKNOWN, Design
-from pteron.design.exchange import Samples, fixed_samples
+from pteron.design.design import Design
+from pteron.design.task import Task
 from pteron.kernels import Array
 from pteron.workspace import Box, Cylinder, Proof, Region, prove
+from pteron.workspace.fit import UNKNOWN, Fit, proved_fit
+from pteron.workspace.samples import Samples, cube, fixed_samples
 
 _SHARES = (0.9999, 0.999, 0.995, 0.98, 0.95, 0.9, 0.75, 0.5, 0.25, 0.1)
 """Of the edge that was found: at the whole of it a condition is zero somewhere, and undecided."""
-
-_RIM = 0.98
-"""A counterexample further out, over the cube's half edge, is avoided by a smaller share."""
-
-_EXCHANGES = 20
-"""Counterexamples that go back to the search; what is found then is made smaller instead."""
 
 _MOST = 200_000
 """Boxes after which a proof is given up."""
@@ -87,37 +83,39 @@ class Proved:
 
 def proved(design: Design) -> Proved:
     """Return a design with its proofs, and with the cube that they leave it."""
-    cube = proved_cube(design) if design.task.seeks_cube and design.cube.edge > 0.0 else None
+    known, found = None, None
+    if design.task.seeks_cube:
+        known, found = design.cube, proved_cube(design)
+        if found is not None:
+            known = Fit(found.center, found.edge, found.side, 0.0)
+        elif known.edge > 0.0:
+            known = replace(known, edge=0.0, margin=UNKNOWN)
     workspace = workspace_proofs(design)
-    known = design.cube if design.task.seeks_cube else None
-    if cube is not None:
-        known = Cube(cube.center, cube.edge, cube.side, 0.0)
-    elif known is not None and known.edge > 0.0:
-        known = Cube(known.center, 0.0, known.side, UNKNOWN)
     least = min((_least(design, one) for one in workspace if not one.holds), default=np.inf)
-    return Proved(replace(design, known=known, least=least), cube, workspace)
+    return Proved(replace(design, known=known, least=least), found, workspace)
+
+
+@lru_cache(maxsize=8)
+def start_design(task: Task) -> Design:
+    """Return the machine that a search begins with, as it is, as far as it is proved."""
+    return proved(Design(task, task.robot)).design
 
 
 def proved_cube(design: Design) -> ProvedCube | None:
     """Return the largest cube of a design that is found and proved; None where none is."""
-    cube, failing = design.cube, np.empty((0, design.robot.freedom))
-    while cube.edge > 0.0:
-        counterexample = None
-        for share in _SHARES:
-            edge = share * cube.edge
-            proofs = cube_proofs(design, cube.center, edge)
-            if all(proof.holds for proof in proofs):
-                return ProvedCube(cube.center, edge, design.cube.edge, proofs, cube.side)
-            counterexample = proofs[-1].counterexample
-            if counterexample is not None and len(failing) < _EXCHANGES:
-                away = np.abs(counterexample[: len(cube.center)] - cube.center).max()
-                if away < 0.5 * _RIM * cube.edge:
-                    break
-        else:
-            return None
-        failing = np.vstack([failing, counterexample])
-        cube = design.cube_without(failing)
-    return None
+
+    def search(failing: Array) -> Fit:
+        return design.cube_without(failing) if len(failing) else design.cube
+
+    def proofs(fit: Fit) -> tuple[Proof, ...]:
+        return cube_proofs(design, fit.center, fit.edge)
+
+    shape = cube(len(design.robot.platform.lengths))
+    found = proved_fit(search, proofs, shape, _SHARES, design.robot.freedom)
+    if found is None:
+        return None
+    fit, proved = found
+    return ProvedCube(fit.center, fit.edge, design.cube.edge, proved, fit.side)
 
 
 def cube_proofs(design: Design, center: Array, edge: float) -> tuple[Proof, ...]:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -14,9 +14,6 @@ from pteron.errors import shown
 from pteron.indices import INDICES, Index
 from pteron.manipulator import Manipulator
 from pteron.workspace import clearance
-
-if TYPE_CHECKING:
-    from pteron.design.design import Design
 
 
 @dataclass(frozen=True)
@@ -38,7 +35,7 @@ class Quantity:
 
     unit: str
     about: str
-    of: Callable[[Design], float]
+    of: Callable[[Any], float]
     of_machine: Callable[[Manipulator], float] | None = None
 
 
@@ -58,7 +55,7 @@ def _moving_mass(robot: Manipulator) -> float:
     return float(legs + robot.platform.inertia.mass + carried)
 
 
-def _size(design: Design) -> float:
+def _size(design: Any) -> float:
     points = design.values("joint_points")
     points = points.reshape(-1, 3)
     points = points[np.isfinite(points).all(axis=-1)]
@@ -67,37 +64,36 @@ def _size(design: Design) -> float:
     return float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
 
 
-def _type_i(design: Design) -> float:
+def _type_i(design: Any) -> float:
     squares = design.values("squared_type_i")
     least = float(squares.min())
     return float(np.sqrt(least)) if least >= 0.0 else float("nan")
 
 
-def _type_ii(design: Design) -> float:
+def _type_ii(design: Any) -> float:
     measures = design.values("type_ii")
     crossed = measures.min() < 0.0 < measures.max()
     return 0.0 if crossed else float(np.abs(measures).min())
 
 
-def _clearance(design: Design) -> float:
+def _clearance(design: Any) -> float:
     distances = clearance(design.robot, design.poses, on_failure="nan").distances
     return float(distances.min(initial=np.inf))
 
 
-def _stroke(design: Design) -> float:
-    joints = design.joints
-    return float(((joints.max(axis=0) - joints.min(axis=0)) / design.start_strokes).max())
+def _stroke(design: Any) -> float:
+    return float((design.strokes / design.reference_strokes).max())
 
 
-def _speed(design: Design) -> float:
+def _speed(design: Any) -> float:
     return float(np.abs(design.drive_motion.rates).max())
 
 
-def _force(design: Design) -> float:
+def _force(design: Any) -> float:
     return float(np.abs(design.drive_motion.forces).max())
 
 
-def _drive_load(design: Design) -> float:
+def _drive_load(design: Any) -> float:
     """Return the greatest share of what drives can do, force or speed."""
     found, shares = design.drive_motion, [0.0]
     for i, leg in enumerate(design.robot.legs):

@@ -8,14 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from pteron.design.design import Design
-from pteron.design.exchange import LATTICE, Program, Samples, cube_samples, fixed_samples, improved
 from pteron.design.proofs import counterexamples, proved
 from pteron.design.quantities import quantities
-from pteron.design.task import ROUNDING, Task
+from pteron.design.rows import ROUNDING
+from pteron.design.task import Task
 from pteron.design.variables import geometry_slopes, slopes_of
 from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kinematics.sampling import search_ball
+from pteron.workspace.exchange import POINTS, Program, improved
+from pteron.workspace.samples import Samples, cube, fixed_samples, shape_samples
 
 _EXCHANGES = 8
 """How often counterexamples of the proof of what was found join its conditions."""
@@ -47,7 +49,7 @@ def refined(task: Task, values: Sequence[float], objective: int) -> list[float]:
         design = proved(Design(task, task.machine(values))).design
         slopes = _Slopes(task, design, start)
         wanted = slopes.of(asked.quantity)
-        if wanted is None or not wanted.any() or design.reserve < -ROUNDING:
+        if wanted is None or not wanted.any() or design.margin < -ROUNDING:
             return list(values)
         geometry = geometry_slopes(task.robot, task.variables, values)
     except ModelError:  # at the end of what can be made
@@ -55,23 +57,26 @@ def refined(task: Task, values: Sequence[float], objective: int) -> list[float]:
     center, radius = search_ball(design.robot)
     lengths = len(center)
     seeks = task.seeks_cube
-    cube = np.append(design.cube.center, design.cube.edge) if seeks else np.zeros(lengths + 1)
-    held = [(float(z), float(z)) for z in cube]
-    moving = [(float(c) - radius, float(c) + radius) for c in center] + [(0.0, 2.0 * radius)]
-    z0 = np.append(start, cube)
+    fit, reach = np.zeros(lengths + 1), np.zeros((lengths + 1, 2))
+    if seeks:
+        fit = np.append(design.cube.center, design.cube.edge)
+        reach = np.append(center, radius)[:, None] + [-radius, radius]
+    z0 = np.append(start, fit)
     program = Program(
         task.conditions,
         design.cube.side if seeks else design.side,
+        z0,
         design.geometry,
         geometry,
         asked.sign * wanted,
-        [*map(tuple, task.ranges.T.tolist()), *(moving if seeks else held)],
+        np.vstack([task.ranges.T, reach]),
+        cube(lengths),
         task.orientations if seeks else task.orientations[:0],
         tuple(slopes.bounds(objective, z0)),
     )
-    first, dense = (_asked_at(design, lengths, count) for count in (_FIRST, LATTICE))
+    first, dense = (_asked_at(design, lengths, count) for count in (_FIRST, POINTS))
     for _ in range(_EXCHANGES):
-        z = improved(program, first, dense, z0)
+        z = improved(program, first, dense)
         found: list[float] = z[: len(start)].tolist()
         missed = counterexamples(Design(task, task.machine(found)), z[len(start) : -1], z[-1])
         if not len(missed.inside):
@@ -83,11 +88,11 @@ def refined(task: Task, values: Sequence[float], objective: int) -> list[float]:
 def _asked_at(design: Design, lengths: int, count: int) -> Samples:
     """Return poses of the workspace, of the cube, or of both, as the search asks for them."""
     task = design.task
-    cube = cube_samples(task.orientations, lengths, count)
+    moving = shape_samples(cube(lengths), task.orientations, count)
     if task.spec.workspace is None:
-        return cube
+        return moving
     fixed = fixed_samples(design.poses, lengths)
-    return fixed.joined(cube) if task.seeks_cube else fixed
+    return fixed.joined(moving) if task.seeks_cube else fixed
 
 
 @dataclass(frozen=True)

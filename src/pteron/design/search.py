@@ -20,8 +20,9 @@ import numpy as np
 from pteron.design.extras import Evolution, one_thread
 from pteron.design.front import Front, Proofs
 from pteron.design.refine import refined
+from pteron.design.rows import FAILED, MISSES, columns
 from pteron.design.spec import Spec
-from pteron.design.task import FAILED, Task
+from pteron.design.task import Task
 from pteron.errors import DataError, ModelError
 from pteron.extras import install_command
 from pteron.kernels import Array
@@ -154,7 +155,7 @@ def rows_with_proofs(task: Task, designs: list[list[float]]) -> pl.DataFrame:
     import polars as pl
 
     with one_thread():
-        return pl.DataFrame(task.table(np.array(designs), proofs=True))
+        return pl.DataFrame(columns(task, np.array(designs), proofs=True))
 
 
 def first_designs(task: Task, count: int, seed: int) -> Array:
@@ -173,7 +174,7 @@ def worked(task: Task, jobs: list[tuple[list[float], int]]) -> pl.DataFrame:
 
     with one_thread():
         designs = [values if k < 0 else refined(task, values, k) for values, k in jobs]
-        return pl.DataFrame(task.table(np.array(designs)))
+        return pl.DataFrame(columns(task, np.array(designs)))
 
 
 def _promising(
@@ -199,7 +200,7 @@ def _costs(task: Task, found: pl.DataFrame) -> tuple[Array, Array]:
     """Return what is minimised (N, M), and what must not be above zero (N, C)."""
     signs = np.array([o.sign for o in task.spec.objectives])
     costs = found.select([o.quantity for o in task.spec.objectives]).to_numpy() * signs
-    misses = found.select([c for c in found.columns if c.startswith("misses ")]).to_numpy()
+    misses = found.select([c for c in found.columns if c.startswith(MISSES)]).to_numpy()
     return np.where(np.isfinite(costs), costs, FAILED), misses
 
 

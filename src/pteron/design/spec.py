@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, Field, PrivateAttr, field_validator, model_validator
 
 from pteron.bodies.tables import Count, Number, Table, Two
+from pteron.design.quantities import known
 from pteron.errors import DataError, shown
 from pteron.toml import read_toml, validated
 
@@ -30,12 +31,6 @@ def _rising(pair: tuple[float, float]) -> tuple[float, float]:
     if not low < high:
         raise ValueError(f"[{low:g}, {high:g}] given, whose range is empty; give [low, high]")
     return pair
-
-
-def _known_quantity(name: str) -> str:
-    from pteron.design.quantities import known
-
-    return known(name)
 
 
 class VariableTable(Table):
@@ -145,7 +140,7 @@ class ObjectiveTable(Table):
     @field_validator("maximise", "minimise")
     @classmethod
     def _known(cls, name: str | None) -> str | None:
-        return name and _known_quantity(name)
+        return name and known(name)
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
@@ -174,7 +169,7 @@ class RequirementTable(Table):
     @field_validator("quantity")
     @classmethod
     def _known(cls, name: str) -> str:
-        return _known_quantity(name)
+        return known(name)
 
     @model_validator(mode="after")
     def _bounded(self) -> Self:

@@ -12,6 +12,7 @@ from scipy.stats import qmc  # type: ignore[import-untyped]
 
 from pteron.design.extras import one_thread
 from pteron.design.front import Front, Proofs
+from pteron.design.rows import columns
 from pteron.design.search import swept_proofs
 from pteron.design.spec import Spec
 from pteron.design.task import Task
@@ -107,7 +108,7 @@ def surveyed(task: Task, chunk: tuple[int, int]) -> pl.DataFrame:
     import polars as pl
 
     with one_thread():
-        return pl.DataFrame(task.table(survey_designs(task, *chunk)))
+        return pl.DataFrame(columns(task, survey_designs(task, *chunk)))
 
 
 def survey_designs(task: Task, first: int, count: int) -> Array:

@@ -1,4 +1,4 @@
-"""A search with what every design of it shares: the machine to begin with, its variables."""
+"""The task of a search: what all its designs share, checked against the machine it begins with."""
 
 from __future__ import annotations
 
@@ -10,9 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from pteron.design.conditions import Conditions, conditions_of
-from pteron.design.design import Design
-from pteron.design.proofs import proved
 from pteron.design.quantities import quantities
 from pteron.design.region import orientations_of, workspace_poses
 from pteron.design.spec import Spec
@@ -24,15 +21,11 @@ from pteron.kinematics.unlikely import unlikely_values
 from pteron.manipulator import Manipulator, load
 from pteron.manipulator.saving import text_of
 from pteron.toml import told
-
-FAILED = 1e6
-"""How much a requirement is missed by a design that is no machine, or has no such quantity."""
-
-ROUNDING = 1e-9
-"""A condition that is missed by no more is kept."""
+from pteron.workspace.conditions import conditions
+from pteron.workspace.smooth_conditions import SmoothConditions, smooth_conditions
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Task:
     """A search, checked against the machine that it begins with.
 
@@ -83,10 +76,11 @@ class Task:
         return {"robot": text_of(self.robot), "spec": spec, "pteron": version("pteron")}
 
     @cached_property
-    def conditions(self) -> Conditions:
-        """What must hold at every pose."""
+    def conditions(self) -> SmoothConditions:
+        """The conditions at every pose, as functions of the geometry."""
         floors = self.spec.floors
-        return conditions_of(self.robot, floors.type_i, floors.type_ii)
+        given = conditions(self.robot, type_i=floors.type_i, type_ii=floors.type_ii)
+        return smooth_conditions(self.robot, given)
 
     @cached_property
     def orientations(self) -> Array:
@@ -115,11 +109,6 @@ class Task:
         """The variables' values in the machine to begin with (V,), moved into their ranges."""
         return np.clip([v.start for v in self.variables], *self.ranges)
 
-    @cached_property
-    def first(self) -> Design:
-        """The machine to begin with, as it is, as far as it is proved."""
-        return proved(Design(self, self.robot)).design
-
     def unit(self, name: str) -> str:
         """Return the unit of a quantity, for this machine's joints."""
         joint = self.robot.legs[0].joint
@@ -141,33 +130,6 @@ class Task:
         """
         stretch = self.spec.masses == "per length"
         return moved(self.robot, self.variables, values, stretch=stretch)
-
-    def evaluated(self, values: Sequence[float], *, proofs: bool = False) -> dict[str, float]:
-        """Return what a design is worth, as a row of a table: quantities, and what it misses.
-
-        With proofs its cube is the proved one, and a workspace that is not proved is missed.
-
-        "misses workspace" is how far the least condition is below 0, and "misses 1 links" how far
-        the first requirement, of `links`, is missed over its bound; 0 where it is kept.
-        """
-        try:
-            design = Design(self, self.machine(values))
-            if proofs:
-                design = proved(design).design
-            found = {name: design.quantity(name) for name in self.asked}
-            reserve = design.reserve
-        except ModelError:
-            found, reserve = dict.fromkeys(self.asked, float("nan")), -FAILED
-        misses = {"misses workspace": 0.0 if reserve >= -ROUNDING else -reserve}
-        for k, one in enumerate(self.spec.requirements, start=1):
-            misses[f"misses {k} {one.quantity}"] = one.missed_by(found[one.quantity], FAILED)
-        return found | misses
-
-    def table(self, values: Array, *, proofs: bool = False) -> dict[str, list[float]]:
-        """Return the columns of a table of designs (N, V): variables, then what they are worth."""
-        rows = [self.evaluated(row, proofs=proofs) for row in values.tolist()]
-        found = {v.name: values[:, k].tolist() for k, v in enumerate(self.variables)}
-        return found | {name: [row[name] for row in rows] for name in rows[0]}
 
 
 def _misfits(spec: Spec, robot: Manipulator) -> Iterator[str]:

@@ -3,30 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy import ndimage  # type: ignore[import-untyped]
 
+from pteron.equations.machine import numbers
 from pteron.errors import DataError, ModelError
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import checked_one
+from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike
-from pteron.workspace.conditions import Condition, conditions, kept, rooms_left
-from pteron.workspace.growth import Growth
-from pteron.workspace.paving import paving
+from pteron.workspace.conditions import Condition, conditions
+from pteron.workspace.fit import Fit, largest_fit, proved_fit
 from pteron.workspace.proofs import Proof, prove
 from pteron.workspace.regions import Box, Cylinder, Region
-
-_COARSE = 0.5
-"""Tolerance of the paving that says where to look."""
-
-_POINTS = 32
-"""Positions along the longest side of the lattice in which the search starts."""
+from pteron.workspace.samples import Shape, cube
+from pteron.workspace.smooth_conditions import smooth_conditions
 
 _STARTS = 3
-_EXCHANGES = 60
+
+_SHARES = 40
+"""How often a shape is made smaller by the tolerance until it is proved."""
 
 
 @dataclass(frozen=True)
@@ -102,17 +100,13 @@ def largest_cube(
     robot = as_manipulator(robot)
     at = checked_one(robot, pose, "pose")
     count = len(robot.platform.lengths)
-    template = np.array(list(np.ndindex(*(5,) * count))) / 2.0 - 1.0
 
     def region(center: Array, size: float) -> Region:
         half = np.zeros(len(at))
         half[:count] = size
         return Box(tuple(center - half), tuple(center + half))
 
-    def gauge(ways: Array) -> Array:
-        return np.asarray(np.abs(ways).max(axis=-1))
-
-    return _largest(robot, at, template, gauge, region, tolerance, proved, given)
+    return _largest(robot, at, cube(count), region, tolerance, proved, given)
 
 
 def largest_cylinder(
@@ -162,8 +156,7 @@ def largest_cylinder(
     turns = 2.0 * np.pi * np.arange(24) / 24
     ring = np.cos(turns)[:, None] * across[0] + np.sin(turns)[:, None] * across[1]
     heights = ratio * np.linspace(-1.0, 1.0, 5)
-    surface = [share * ring + h * unit for h in heights for share in (1.0, 0.5)]
-    surface.append(heights[:, None] * unit)
+    rim = np.concatenate([ring + h * unit for h in heights])
 
     def region(center: Array, size: float) -> Region:
         return Cylinder(tuple(center), size, 2.0 * ratio * size, axis)
@@ -173,80 +166,43 @@ def largest_cylinder(
         away = np.linalg.norm(ways - along[..., None] * unit, axis=-1)
         return np.asarray(np.maximum(away, np.abs(along) / ratio))
 
-    template = np.concatenate(surface)
-    return _largest(robot, at, template, gauge, region, tolerance, proved, given)
+    half = np.array(region(np.zeros(3), 1.0).box[1])
+    return _largest(robot, at, Shape(half, gauge, rim), region, tolerance, proved, given)
 
 
 def _largest(
     robot: Manipulator,
     at: Array,
-    template: Array,
-    gauge: Callable[[Array], Array],
+    shape: Shape,
     region: Callable[[Array, float], Region],
     tolerance: float,
     proved: bool,
     given: tuple[Condition, ...] | None,
 ) -> Inscribed:
-    """Return the largest shape; of size 1 its points that matter are `template` (T, k)."""
     asked = conditions(robot) if given is None else given
-    count = template.shape[1]
+    smooth, geometry = smooth_conditions(robot, asked), np.array(numbers(robot))
+    lengths = len(robot.platform.lengths)
 
-    def whole(positions: Array) -> Array:
-        poses = np.broadcast_to(at, (*positions.shape[:-1], len(at))).copy()
-        poses[..., :count] = positions
-        return poses
+    def inscribed(fit: Fit, proof: Proof | None) -> Inscribed:
+        center = np.append(fit.center, at[lengths:])
+        return Inscribed(center, 0.5 * fit.edge, region(center, 0.5 * fit.edge), proof)
 
-    search = Growth(lambda p: rooms_left(robot, asked, whole(p)), template, gauge)
-    found = [search.improved(*place) for place in _starts(robot, at, asked, whole)]
-    for _ in range(_EXCHANGES if found else 0):
-        center, size = found.pop(max(range(len(found)), key=lambda k: found[k][1]))
-        if size <= 0.0:
-            break
-        middle, least = whole(center), (1.0 - tolerance) * size
-        shape = region(middle, least)
-        proof = prove(robot, shape, given=asked) if proved else None
-        if proof is None or proof.holds:
-            return Inscribed(middle, least, shape, proof)
-        if proof.counterexample is None:
-            found.append((center, least))
-        else:
-            # A point that the template has not, perhaps in a gap between the sizes that were tried.
-            search.learn(proof.counterexample[:count], center)
-            found.append(search.improved(center, search.size_at(center, size)))
+    def search(failing: Array) -> Fit:
+        return largest_fit(smooth, geometry, at[None], search_ball(robot), failing, shape, _STARTS)
+
+    def proofs(fit: Fit) -> tuple[Proof, ...]:
+        return (prove(robot, inscribed(fit, None).region, given=asked),)
+
+    if proved:
+        shares = (1.0 - tolerance) ** np.arange(1, _SHARES + 1)
+        found = proved_fit(search, proofs, shape, shares.tolist(), len(at))
+        if found is not None:
+            return inscribed(found[0], *found[1])
+    else:
+        fit = search(np.empty((0, len(at))))
+        if fit.edge > 0.0:
+            return inscribed(replace(fit, edge=(1.0 - tolerance) * fit.edge), None)
     raise ModelError(
         f"no shape of any size is found in the workspace at the orientation of pose {at.tolist()}",
         subject=robot.name,
     )
-
-
-def _starts(
-    robot: Manipulator,
-    at: Array,
-    asked: tuple[Condition, ...],
-    whole: Callable[[Array], Array],
-) -> list[tuple[Array, float]]:
-    """Return the centres of the largest cubes of a lattice, and half their edges."""
-    coarse = paving(robot, at, tolerance=_COARSE, given=asked)
-    if not len(coarse.inner):
-        return []
-    boxes = np.concatenate([coarse.inner, coarse.boundary])
-    low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
-    step = float((high - low).max()) / (_POINTS - 1)
-    sides = [np.arange(a, b + step, step) for a, b in zip(low, high, strict=True)]
-    lattice = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1)
-    inside = np.pad(kept(robot, asked, whole(lattice)), 1)
-    depth = ndimage.distance_transform_cdt(inside, metric="chessboard")
-    depth = depth[(slice(1, -1),) * depth.ndim].astype(float)
-    found: list[tuple[Array, float]] = []
-    for _ in range(_STARTS):
-        best = np.unravel_index(depth.argmax(), depth.shape)
-        if depth[best] <= 0.0:
-            break
-        found.append((lattice[best], 0.5 * step * float(depth[best])))
-        near = tuple(slice(max(i - int(depth[best]), 0), i + int(depth[best]) + 1) for i in best)
-        depth[near] = 0.0
-    if not found:  # thinner than the lattice
-        center = 0.5 * (coarse.inner[:, 0] + coarse.inner[:, 1])
-        widest = (coarse.inner[:, 1] - coarse.inner[:, 0]).min(axis=1)
-        found.append((center[widest.argmax()], 0.25 * float(widest.max())))
-    return found

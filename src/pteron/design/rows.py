@@ -1,0 +1,48 @@
+"""Rows of a table of designs: the quantities that are asked for, and by how much each is missed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pteron.design.design import Design
+from pteron.design.proofs import proved
+from pteron.design.task import Task
+from pteron.errors import ModelError
+from pteron.kernels import Array
+
+MISSES = "misses "
+"""Beginning of the names of columns that say by how much something asked is missed."""
+
+FAILED = 1e6
+"""How much a requirement is missed by a design that is no machine, or has no such quantity."""
+
+ROUNDING = 1e-9
+"""A condition that is missed by no more is kept."""
+
+
+def evaluated(task: Task, values: Sequence[float], *, proofs: bool = False) -> dict[str, float]:
+    """Return the row of a design: quantities, and by how much it misses what is asked.
+
+    "misses workspace" is how far the least condition is below 0, and "misses 1 links" how far
+    the first requirement, of `links`, is missed over its bound; 0 where it is kept. With proofs the
+    cube is the proved one, and a workspace that is not proved is missed.
+    """
+    try:
+        design = Design(task, task.machine(values))
+        if proofs:
+            design = proved(design).design
+        found = {name: design.quantity(name) for name in task.asked}
+        margin = design.margin
+    except ModelError:
+        found, margin = dict.fromkeys(task.asked, float("nan")), -FAILED
+    misses = {f"{MISSES}workspace": 0.0 if margin >= -ROUNDING else -margin}
+    for k, one in enumerate(task.spec.requirements, start=1):
+        misses[f"{MISSES}{k} {one.quantity}"] = one.missed_by(found[one.quantity], FAILED)
+    return found | misses
+
+
+def columns(task: Task, values: Array, *, proofs: bool = False) -> dict[str, list[float]]:
+    """Return the columns of a table of designs (N, V): variables, then quantities and misses."""
+    rows = [evaluated(task, row, proofs=proofs) for row in values.tolist()]
+    found = {v.name: values[:, k].tolist() for k, v in enumerate(task.variables)}
+    return found | {name: [row[name] for row in rows] for name in rows[0]}

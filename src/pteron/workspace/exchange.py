@@ -1,0 +1,266 @@
+"""Largest shapes and better geometry by gradients, with conditions at ever more points of a region.
+
+A shape's conditions are infinitely many, a row for every point in it. They are asked at a few
+points, the program is solved, and the points where the solution fails join them: the exchange
+method for semi-infinite programs (R. Hettich and K. O. Kortanek, SIAM Review 35(3), 1993). Within
+a round the geometry is taken as affine in the variables, which it is for lengths and points.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from scipy.optimize import minimize  # type: ignore[import-untyped]
+
+from pteron.kernels import Array
+from pteron.workspace.lattice_minima import failing_between
+from pteron.workspace.samples import Samples, Shape, lattice
+from pteron.workspace.smooth_conditions import SmoothConditions
+
+_PER_ROW = 3
+"""Points at which a round's worst values of each row join its conditions."""
+
+_ROUNDS = 12
+
+_ROUNDING = 1e-12
+"""How far below 0 a row may be where it counts as kept."""
+
+_FIRST_STEP = 0.25
+"""Share of the unknowns' bounds within which the first round looks."""
+
+_FULL = 0.95
+"""A round that may go so far of its step may go further in the next."""
+
+_GAIN = 1e-5
+"""A smaller gain, over the objective, ends the rounds."""
+
+_HALVINGS = 12
+
+_CUTS = 8
+"""How often a step that leads over what fails between the points is made shorter."""
+
+POINTS = 13
+"""Points along each edge of a shape's box at which it is looked at."""
+
+
+@dataclass(frozen=True)
+class Program:
+    """A semi-infinite program: an affine objective, conditions at all points, affine bounds.
+
+    The unknowns are variables of the geometry (V,), perhaps none, then the shape's centre (k,) and
+    edge.
+
+    Attributes
+    ----------
+    conditions : SmoothConditions
+        The rows.
+    side : float
+        Sign of the type-II measure.
+    start : array, shape (V + k + 1,)
+        The unknowns to begin with.
+    geometry, slopes : array, shape (G,) and (G, V)
+        Of the machine, at the start.
+    objective : array, shape (V + k + 1,)
+        What is minimised is its product with the unknowns.
+    bounds : array, shape (V + k + 1, 2)
+        Of each unknown.
+    shape : Shape
+        Which shape.
+    orientations : array, shape (A, m)
+        Of the shape; none where none is sought.
+    above : tuple of (array, float)
+        Each: a row (V + k + 1,) whose product with the unknowns is at least a number.
+    failing : array, shape (F, m), optional
+        Poses at which some geometry is known to fail.
+    """
+
+    conditions: SmoothConditions
+    side: float
+    start: Array
+    geometry: Array
+    slopes: Array
+    objective: Array
+    bounds: Array
+    shape: Shape
+    orientations: Array
+    above: tuple[tuple[Array, float], ...] = ()
+    failing: Array | None = None
+
+    def parts(self, z: Array) -> tuple[Array, Array, float]:
+        """Return the geometry (G,), and the shape's centre (k,) and edge, at unknowns z."""
+        count = self.slopes.shape[1]
+        return self.geometry + self.slopes @ (z - self.start)[:count], z[count:-1], float(z[-1])
+
+    def rows(self, samples: Samples, z: Array) -> Array:
+        """Return the rows (N, R) at unknowns z."""
+        geometry, center, edge = self.parts(z)
+        return self.conditions.rows(geometry, samples.at(center, edge), self.side)
+
+    def keeps(self, samples: Samples, z: Array) -> bool:
+        """Return whether all rows are kept; one that is NaN, out of reach, is not."""
+        return bool((self.rows(samples, z) >= -_ROUNDING).all())
+
+    def between(self, z: Array) -> Samples:
+        """Return points of the shape that fail between those of a lattice that do not.
+
+        Known ones are among them, where the shape holds them and they still fail.
+        """
+        geometry, center, edge = self.parts(z)
+        units, poses = [np.empty((0, len(center)))], [self.orientations[:0]]
+        for fixed in self.orientations if edge > 0.0 else ():
+            axes = center[:, None] + 0.5 * edge * lattice(self.shape, POINTS)
+            _, places = self.on_lattice(geometry, axes, fixed)
+            at = (places - center) / (0.5 * edge)
+            units.append(at[self.shape.gauge(at) <= 1.0])
+            poses.append(_turned(np.zeros_like(units[-1]), fixed))
+        every = np.concatenate(units)
+        return Samples(np.concatenate(poses), every, np.ones(len(every)))
+
+    def on_lattice(
+        self, geometry: Array, axes: Sequence[Array] | Array, fixed: Array
+    ) -> tuple[Array, Array]:
+        """Return the rows (n1, ..., nk, R) on a lattice, and positions (F, k) that fail.
+
+        Those are between its points, or known. Its orientation is that of a pose.
+        """
+        count = len(axes)
+
+        def slopes(places: Array) -> tuple[Array, Array]:
+            poses = _turned(places, fixed)
+            rows, slopes = self.conditions.slopes(geometry, poses, self.side)
+            return rows, slopes[..., :count]
+
+        grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+        rows = self.conditions.rows(geometry, _turned(grid, fixed), self.side)
+        known = self.failing if self.failing is not None else self.orientations[:0]
+        known = known[(known[:, count:] == fixed[count:]).all(axis=1)]
+        fails = self.conditions.rows(geometry, known, self.side) > _ROUNDING
+        known = known[~fails.all(axis=-1), :count]
+        return rows, np.concatenate([failing_between(slopes, axes, rows), known])
+
+
+def improved(program: Program, samples: Samples, dense: Samples) -> Array:
+    """Return unknowns of a smaller objective, which keep the conditions at all samples.
+
+    Each round goes towards the solution of a program with few conditions as far as all of them are
+    kept, so that what it has reached can always be used.
+
+    Parameters
+    ----------
+    program : Program
+        What is minimised, and its conditions.
+    samples, dense : Samples
+        Where conditions are asked at first, and where the solution is looked at.
+
+    Returns
+    -------
+    array, shape (V + k + 1,)
+        The start, where that does not keep the conditions itself.
+    """
+    everywhere, good = samples.joined(dense), program.start
+    if not program.keeps(everywhere, good):
+        return good
+    pairs, share = _worst(program.rows(everywhere, good)), _FIRST_STEP
+    for _ in range(_ROUNDS):
+        z = _solved(program, everywhere, sorted(pairs), good, share)
+        pairs |= _worst(program.rows(everywhere, z))
+        length = _feasible_step(program, everywhere, good, z)
+        missed = program.between(good + length * (z - good))
+        if len(missed.inside):
+            known = len(everywhere.inside)
+            everywhere = everywhere.joined(missed)
+            failing = program.rows(missed, good + length * (z - good)).argmin(axis=1)
+            pairs |= {(known + i, int(row)) for i, row in enumerate(failing)}
+            length = _cut_step(program, everywhere, good, z, length)
+        gain = float(program.objective @ (good - z))
+        good = good + length * (z - good)
+        share = min(2.0 * share, 1.0) if length > _FULL else 0.5 * share
+        if length > _FULL and gain < _GAIN * abs(float(program.objective @ good)):
+            break
+    return good
+
+
+def _turned(positions: Array, fixed: Array) -> Array:
+    """Return poses (..., m) at positions (..., k), the other coordinates those of a pose."""
+    count = positions.shape[-1]
+    rest = np.broadcast_to(fixed[count:], (*positions.shape[:-1], len(fixed) - count))
+    return np.concatenate([positions, rest], axis=-1)
+
+
+def _feasible_step(program: Program, samples: Samples, good: Array, z: Array) -> float:
+    """Return how far one may go from good unknowns to others, as a share of the step."""
+    if program.keeps(samples, z):
+        return 1.0
+    low, high = 0.0, 1.0
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (
+            (middle, high) if program.keeps(samples, good + middle * (z - good)) else (low, middle)
+        )
+    return low
+
+
+def _cut_step(program: Program, samples: Samples, good: Array, z: Array, length: float) -> float:
+    """Return a shorter step, at whose end nothing fails between the samples either."""
+    for _ in range(_CUTS):
+        length *= 0.6
+        at = good + length * (z - good)
+        if program.keeps(samples, at) and not len(program.between(at).inside):
+            return length
+    return 0.0
+
+
+def _worst(values: Array) -> set[tuple[int, int]]:
+    """Return points and rows: of each row the points where it is least."""
+    ordered = np.argsort(np.nan_to_num(values, nan=np.inf), axis=0, kind="stable")[:_PER_ROW]
+    return {(int(i), r) for r in range(values.shape[1]) for i in ordered[:, r]}
+
+
+def _solved(
+    program: Program, samples: Samples, pairs: Sequence[tuple[int, int]], good: Array, share: float
+) -> Array:
+    """Return the solution with conditions at some points alone, near good unknowns."""
+    lengths = samples.units.shape[1]
+    points, where = np.unique([i for i, _ in pairs], return_inverse=True)
+    rows = np.array([r for _, r in pairs])
+    chosen = Samples(samples.poses[points], samples.units[points], samples.inside[points])
+    above = np.array([row for row, _ in program.above]).reshape(-1, len(good))
+    least = np.array([number for _, number in program.above])
+
+    @lru_cache(maxsize=1)
+    def found(key: bytes) -> tuple[Array, Array]:
+        z = np.frombuffer(key)
+        geometry, center, edge = program.parts(z)
+        values, by_pose, *by_geometry = program.conditions.slopes(
+            geometry, chosen.at(center, edge), program.side, by_geometry=program.slopes.size > 0
+        )
+        by_center = by_pose[..., :lengths] * chosen.inside[:, None, None]
+        by_edge = 0.5 * np.einsum("irl,il->ir", by_center, chosen.units)[..., None]
+        by_variables = [part @ program.slopes for part in by_geometry]
+        slopes = np.concatenate([*by_variables, by_center, by_edge], axis=-1)[where, rows]
+        values = values[where, rows]
+        # A row that is NaN counts as kept: a row before it says what is wrong.
+        values = np.where(np.isfinite(values), values, 1.0)
+        return np.append(values, above @ z - least), np.vstack([slopes, above])
+
+    low, high = program.bounds.T
+    step = share * (high - low)
+    low, high = np.maximum(low, good - step), np.minimum(high, good + step)
+    solution = minimize(
+        lambda z: float(program.objective @ z),
+        good,
+        jac=lambda z: program.objective,
+        method="SLSQP",
+        bounds=np.column_stack([low, high]),
+        constraints={
+            "type": "ineq",
+            "fun": lambda z: found(z.tobytes())[0],
+            "jac": lambda z: found(z.tobytes())[1],
+        },
+        options={"maxiter": 60, "ftol": 1e-10},
+    )
+    z = np.clip(solution.x, low, high)
+    return z if np.isfinite(z).all() else good

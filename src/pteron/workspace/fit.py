@@ -1,0 +1,216 @@
+"""The largest shape in which a machine works at given orientations: found, then proved."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.ndimage import distance_transform_cdt  # type: ignore[import-untyped]
+
+from pteron.kernels import Array
+from pteron.workspace.exchange import POINTS, Program, improved
+from pteron.workspace.proofs import Proof
+from pteron.workspace.samples import Shape, shape_samples
+from pteron.workspace.smooth_conditions import SmoothConditions
+
+_COARSE = 25
+"""Steps along the longest side of a grid."""
+
+_FIRST = 5
+"""Points along each edge at which conditions are asked at first."""
+
+_SHRINKINGS = 30
+
+UNKNOWN = -1e-6
+"""What stands for a row that is NaN, or of which no proof says whether it is kept."""
+
+_RIM = 0.98
+"""A counterexample further out, over half the edge, is avoided by a smaller share."""
+
+_EXCHANGES = 20
+"""Counterexamples that go back to the search; what is found then is made smaller instead."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Where a shape is, and how large.
+
+    Attributes
+    ----------
+    center : array, shape (k,)
+        m.
+    edge : float
+        m; 0 where there is none.
+    side : float
+        Sign of the type-II measure in it.
+    margin : float
+        The least row at its points; below 0 where there is none: how far the best pose fails.
+    """
+
+    center: Array
+    edge: float
+    side: float
+    margin: float
+
+
+def largest_fit(
+    conditions: SmoothConditions,
+    geometry: Array,
+    orientations: Array,
+    ball: tuple[Array, float],
+    failing: Array,
+    shape: Shape,
+    starts: int = 1,
+) -> Fit:
+    """Return the largest shape whose poses all keep the conditions, at every orientation.
+
+    A grid finds where it is and about how large; then its centre and edge are unknowns of a program
+    with exact slopes. At 13 points along each edge all conditions are kept, and so far as slopes
+    tell between them.
+
+    Parameters
+    ----------
+    conditions : SmoothConditions
+        What must hold.
+    geometry : array, shape (G,)
+        Of the machine.
+    orientations : array, shape (A, m)
+        Poses whose orientations count.
+    ball : (array, float)
+        Centre (k,) and radius that hold every position in reach, m.
+    failing : array, shape (F, m)
+        Poses that are known to fail, which it must not hold: counterexamples of its proof.
+    shape : Shape
+        Which shape.
+    starts : int
+        Places of the grid from which the program is solved.
+    """
+    lengths, size = len(ball[0]), ball[1]
+
+    def program(fit: Fit) -> Program:
+        return Program(
+            conditions,
+            fit.side,
+            np.append(fit.center, fit.edge),
+            geometry,
+            np.zeros((len(geometry), 0)),
+            np.append(np.zeros(lengths), -1.0),
+            np.append(fit.center, size)[:, None] + [-size, size],
+            shape,
+            orientations,
+            failing=failing,
+        )
+
+    fits = [fit for side in conditions.sides for fit in _on_grid(program, ball, side, starts)]
+    fits.sort(key=lambda fit: (fit.edge, fit.margin), reverse=True)
+    samples, dense = (shape_samples(shape, orientations, n) for n in (_FIRST, POINTS))
+
+    def grown(fit: Fit) -> Fit:
+        for _ in range(_SHRINKINGS):
+            one = program(fit)
+            if _least(one.rows(dense, one.start)) >= 0.0 and not len(one.between(one.start).inside):
+                break
+            fit = replace(fit, edge=0.8 * fit.edge)
+        else:
+            one = program(replace(fit, edge=0.0))
+        z = improved(one, samples, dense)
+        return Fit(z[:-1], float(z[-1]), fit.side, _least(one.rows(dense, z)))
+
+    if fits[0].edge == 0.0:
+        return fits[0]
+    return max(map(grown, fits[:starts]), key=lambda fit: fit.edge)
+
+
+def proved_fit(
+    search: Callable[[Array], Fit],
+    prove: Callable[[Fit], tuple[Proof, ...]],
+    shape: Shape,
+    shares: Iterable[float],
+    freedom: int,
+) -> tuple[Fit, tuple[Proof, ...]] | None:
+    """Return the largest fit that is found and proved, with its proofs; None where there is none.
+
+    Parameters
+    ----------
+    search : callable
+        Takes poses (F, m) that fail, returns the largest fit that holds none of them.
+    prove : callable
+        Takes a fit, returns its proofs: the last one does not hold, or all do.
+    shape : Shape
+        Which shape.
+    shares : iterable of float
+        Of the edge that was found, the largest first: at the whole of it a condition is zero
+        somewhere, and undecided.
+    freedom : int
+        Size m of a pose.
+    """
+    failing = np.empty((0, freedom))
+    fit = search(failing)
+    while fit.edge > 0.0:
+        counterexample = None
+        for share in shares:
+            smaller = replace(fit, edge=share * fit.edge)
+            proofs = prove(smaller)
+            if all(proof.holds for proof in proofs):
+                return smaller, proofs
+            counterexample = proofs[-1].counterexample
+            if counterexample is not None and len(failing) < _EXCHANGES:
+                away = counterexample[: len(fit.center)] - fit.center
+                if shape.gauge(away) < 0.5 * _RIM * fit.edge:
+                    break
+        else:
+            return None
+        failing = np.vstack([failing, counterexample])
+        fit = search(failing)
+    return None
+
+
+def _least(rows: Array) -> float:
+    """Return the least row; a NaN, which is out of reach, is below 0."""
+    return float(np.nan_to_num(rows, nan=-1.0).min())
+
+
+def _on_grid(
+    program: Callable[[Fit], Program], ball: tuple[Array, float], side: float, most: int
+) -> list[Fit]:
+    """Return about the largest cubes: their middles are the grid's points furthest from failure."""
+    low, high = ball[0] - ball[1], ball[0] + ball[1]
+    found = [Fit(ball[0], 0.0, side, -np.inf)]
+    asked = program(found[0])
+    for _ in range(2):
+        step = float((high - low).max()) / _COARSE
+        axes = [
+            a + step * np.arange(int(np.ceil((b - a) / step)) + 1)
+            for a, b in zip(low, high, strict=True)
+        ]
+        grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+        least = np.full(grid.shape[:-1], np.inf)
+        for fixed in asked.orientations:
+            rows, failing = asked.on_lattice(asked.geometry, axes, fixed)
+            # A row that is NaN fails, though not as clearly as one that says by how much.
+            rows = np.where(np.isnan(rows), UNKNOWN, rows)
+            least = np.minimum(least, rows.min(axis=-1))
+            nearby = np.rint((failing - low) / step).astype(int)
+            nearby = nearby[((nearby >= 0) & (nearby < least.shape)).all(axis=1)]
+            at = tuple(nearby.T)
+            least[at] = np.minimum(least[at], UNKNOWN)
+        inside = least >= 0.0
+        if not inside.any():
+            # What is thin may lie between the points: look closer where they fail by least.
+            at = np.unravel_index(int(least.argmax()), least.shape)
+            found = [Fit(grid[at], 0.0, side, float(least[at]))]
+            low, high = grid[at] - 2.0 * step, grid[at] + 2.0 * step
+            continue
+        far = distance_transform_cdt(np.pad(inside, 1), metric="chessboard")
+        far = far[(slice(1, -1),) * inside.ndim]
+        found = []
+        while len(found) < most and far.any():
+            at = np.unravel_index(int(far.argmax()), far.shape)
+            depth = int(far[at])
+            edge = max(2.0 * (depth - 1.0), 0.5) * step
+            found.append(Fit(grid[at], edge, side, float(least[at])))
+            far[tuple(slice(max(i - depth, 0), i + depth + 1) for i in at)] = 0
+        places = grid[inside]
+        low, high = places.min(axis=0) - step, places.max(axis=0) + step
+    return found

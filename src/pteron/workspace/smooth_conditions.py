@@ -1,0 +1,109 @@
+"""Conditions on a pose as smooth rows, with exact slopes by the pose and by the geometry.
+
+The rows are the machine's own functions in which the geometry is an input, so that one compilation
+serves a whole search for a better geometry. A row is 0 or more where its condition holds. The
+measure of type II is taken with one sign: a region in which it vanishes nowhere has one.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property, lru_cache
+
+import casadi as ca
+import numpy as np
+
+from pteron.kernels import TARGETS, Array, Kernel, Port, bare, general_program
+from pteron.kernels.c import compiler
+from pteron.manipulator import Manipulator
+from pteron.workspace.conditions import Condition
+
+
+class SmoothConditions:
+    """The rows of a topology: all machines that differ in their geometry alone.
+
+    Parameters
+    ----------
+    robot : Manipulator
+        One of the machines.
+    given : tuple of Condition
+        What a pose must keep.
+    """
+
+    def __init__(self, robot: Manipulator, given: tuple[Condition, ...]) -> None:
+        self.names = tuple(map(str, given))
+        self.sides = (1.0, -1.0) if any(condition.sized for condition in given) else (1.0,)
+        """Signs that the type-II measure may have."""
+        programs = {what: general_program(robot, what) for what in {c.what for c in given}}
+        size = next(iter(programs.values())).inputs[0].size
+        pose, side = ca.SX.sym("pose", robot.freedom), ca.SX.sym("side")
+        self._symbols = pose, side, ca.SX.sym("geometry", size)
+        outputs = {}
+        for what, program in programs.items():
+            values = program.function.call([self._symbols[2], pose])
+            outputs |= {
+                (what, port.name): ca.vec(ca.densify(value))
+                for port, value in zip(program.outputs, values, strict=True)
+            }
+        self._rows = ca.vertcat(
+            *(
+                outputs[c.what, c.output][c.element] * (side if c.sized else 1.0) - c.floor
+                for c in given
+            )
+        )
+
+    def rows(self, geometry: Array, poses: Array, side: float) -> Array:
+        """Return the rows (..., R); NaN where a leg does not reach and its joint has no place."""
+        found: Array = self._values(poses, geometry=geometry, side=np.array([side]))
+        return found
+
+    def slopes(
+        self, geometry: Array, poses: Array, side: float, *, by_geometry: bool = False
+    ) -> tuple[Array, ...]:
+        """Return rows (..., R) and d rows / d pose (..., R, m); with d rows / d geometry on demand.
+
+        Slopes are finite everywhere: a row that is NaN, or rises without end, counts as level.
+        """
+        kernel = self._all_slopes if by_geometry else self._pose_slopes
+        rows, *slopes = kernel(poses, geometry=geometry, side=np.array([side]))
+        lost = ~np.isfinite(rows)[..., None]
+        return rows, *(np.where(lost | ~np.isfinite(part), 0.0, part) for part in slopes)
+
+    @cached_property
+    def _values(self) -> Kernel:
+        return self._kernel("vm" if compiler() is None else "c", "condition_rows", 0)
+
+    @cached_property
+    def _pose_slopes(self) -> Kernel:
+        return self._kernel("vm", "condition_pose_slopes", 1)
+
+    @cached_property
+    def _all_slopes(self) -> Kernel:
+        return self._kernel("vm", "condition_slopes", 2)
+
+    def _kernel(self, target: str, name: str, slopes: int) -> Kernel:
+        pose, _, geometry = self._symbols
+        by = (pose, geometry)[:slopes]
+        outputs = [self._rows, *(ca.jacobian(self._rows, symbol) for symbol in by)]
+        dense = ca.cse([ca.densify(output).T for output in outputs])
+        ports = (
+            Port("pose", pose.shape[:1]),
+            Port("side", (1,), shared=True),
+            Port("geometry", geometry.shape[:1], shared=True),
+        )
+        found = tuple(
+            Port(f"out{k}", output.shape if k else output.shape[:1])
+            for k, output in enumerate(outputs)
+        )
+        fixed = {"side": np.ones(1), "geometry": np.zeros(geometry.shape[0])}
+        function = ca.Function(name, list(self._symbols), dense)
+        return TARGETS[target](name, function, ports, found, fixed)
+
+
+def smooth_conditions(robot: Manipulator, given: tuple[Condition, ...]) -> SmoothConditions:
+    """Return the rows of conditions for all machines that have the topology of one."""
+    return _known(bare(robot), given)
+
+
+@lru_cache(maxsize=16)
+def _known(robot: Manipulator, given: tuple[Condition, ...]) -> SmoothConditions:
+    return SmoothConditions(robot, given)
