@@ -1,4 +1,4 @@
-"""Controllers: laws that turn what is wanted and what is measured into forces of the drives."""
+"""Controllers: laws from the wanted motion and the measured joints to forces of the drives."""
 
 from pteron.arguments import check_arguments
 from pteron.controllers.adaptive import Adaptive

@@ -1,4 +1,4 @@
-"""What a controller is: its gains and its period, and from them a law for a machine."""
+"""The base of all controllers: gains and a period, and from them a law for a machine."""
 
 from __future__ import annotations
 

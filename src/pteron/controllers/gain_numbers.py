@@ -1,4 +1,4 @@
-"""The numbers of a controller, checked: above zero, one for all joints or one for each."""
+"""Checks of a controller's numbers: above zero, one for all joints or one for each."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ PerJoint = float | Sequence[float]
 """One number for all joints, or one for each."""
 
 _SLOWEST = 0.1
-"""A longer period, s, is taken for a rate."""
+"""Longest period, s; a larger number is taken for a rate."""
 
 
 def above_zero(name: str, value: PerJoint | None) -> float | tuple[float, ...] | None:

@@ -1,4 +1,4 @@
-"""How heavy a machine is at each of its joints, by which forces of feedback are scaled."""
+"""Effective mass of a machine at each of its joints, which scales the gains of feedback."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ _LEAST = (0.1, 0.01)
 """Least measures of type I and type II of these poses; less where there are none."""
 
 _SHARE = 0.1
-"""The share of them at which a joint is lighter."""
+"""Share of the poses at which a joint is lighter."""
 
 
 def joint_masses(robot: RobotLike) -> Array:
-    """Return what a joint's force accelerates while the other joints are free, at light poses.
+    """Return the mass that each joint's force moves while the others are free, at light poses.
 
     It is 1 / (J M^-1 J^T)_ii with the motors' inertia in M. Of n joints whose stiffness is w^2
     times it, the squares of the natural frequencies have the mean w^2, so that none is above

@@ -1,4 +1,4 @@
-"""A law of control for one machine, as something to be called at every sample."""
+"""The law of a controller for one machine, called at every sample."""
 
 from __future__ import annotations
 
@@ -142,7 +142,7 @@ class Law:
 
     @property
     def gain_names(self) -> tuple[str, ...]:
-        """What the gains are: "proportional_1" for joint 1, and so on."""
+        """Names of the gains: "proportional_1" for joint 1, and so on."""
         joints = range(1, self.model.freedom + 1)
         estimates: tuple[str, ...] = () if self.base is None else self.base.names
         if self.what == "adaptive_drives":

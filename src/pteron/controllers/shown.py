@@ -1,4 +1,4 @@
-"""What a motion shows of the parameters, and by how much they may be off: scales of adaptation."""
+"""Scales of adaptation: how strongly a motion excites each parameter, and how large each may be."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ _TURNS = 10
 """Directions at each of its poses."""
 
 _HARDLY = 1e-3
-"""The share of the best seen combination below which another counts as not seen."""
+"""Share of the best excited combination below which another counts as not excited."""
 
 _NEAR = 0.1
 """Share by which velocities and accelerations are disturbed at most: what errors call for counts
 too. Bounded, as one far sample would slow down all learning."""
 
 _SAMPLES = 400
-"""Of a motion, at least."""
+"""Samples of a motion that are used, at least."""
 
 _DRIVES = 0.1
 """The share of a joint's typical force, and of its mass, that a drive may take in any case."""
@@ -41,7 +41,7 @@ _DRIVES = 0.1
 
 @dataclass(frozen=True)
 class Shown:
-    """What a motion of a machine shows of its base parameters and of its drives."""
+    """The excitation of a machine's base parameters and drives by a motion."""
 
     robot: Manipulator
     base: BaseParameters
@@ -118,7 +118,7 @@ class Moves(Protocol):
 
 
 def shown(robot: Manipulator, motion: Moves | None) -> Shown:
-    """Return what a motion shows of a machine, or the typical one."""
+    """Return the excitation by a motion, or by the typical one."""
     if motion is None:
         return typical(robot)
     if np.shape(motion.pose)[-1:] != (robot.freedom,):
@@ -141,7 +141,7 @@ def shown(robot: Manipulator, motion: Moves | None) -> Shown:
 
 @lru_cache(maxsize=32)
 def typical(robot: Manipulator) -> Shown:
-    """Return what a typical motion shows of a machine, the same for the same machine.
+    """Return the excitation by a typical motion, the same for the same machine.
 
     It is random: the poses among many in which the legs are bent best, at 0.5 m/s and 5 m/s^2.
     """
@@ -156,7 +156,7 @@ def typical(robot: Manipulator) -> Shown:
 
 
 def _units(robot: Manipulator) -> Array:
-    """Return how much of each of the pose's coordinates (m,) moves a platform point by 1 m."""
+    """Return the change of each coordinate of the pose (m,) that moves a platform point by 1 m."""
     lever = max(float(np.linalg.norm(leg.platform_point)) for leg in robot.legs)
     unit = np.ones(robot.freedom)
     if robot.platform.turns and lever > 0.0:

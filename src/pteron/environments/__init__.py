@@ -19,7 +19,7 @@ from pteron.environments.single import PteronEnv
 from pteron.environments.world import World
 
 REACH = "pteron/Reach-v0"
-"""What the environment is called: ``gymnasium.make(REACH, robot="delta")``."""
+"""Name of the registered environment: ``gymnasium.make(REACH, robot="delta")``."""
 
 EPISODE = 300
 """Steps after which an episode is truncated."""

@@ -1,4 +1,4 @@
-"""The world of a machine, made from what a user says."""
+"""Construction of a machine's `World` from a user's arguments."""
 
 from __future__ import annotations
 

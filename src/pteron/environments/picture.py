@@ -1,4 +1,4 @@
-"""Pictures of an environment's machine as arrays of colours."""
+"""Pictures of an environment's machine as arrays of pixels."""
 
 from __future__ import annotations
 

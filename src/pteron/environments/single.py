@@ -17,7 +17,7 @@ from pteron.manipulator import RobotLike
 from pteron.motion import Motion
 
 Numbers = NDArray[Any]
-"""Of observations and actions: float32."""
+"""Arrays of observations and actions: float32."""
 
 
 class PteronEnv(gymnasium.Env[Numbers, Numbers]):
@@ -37,7 +37,7 @@ class PteronEnv(gymnasium.Env[Numbers, Numbers]):
     Parameters
     ----------
     robot : Manipulator, name or path
-        A machine of the catalog, a TOML file, or a machine. What an action of 1 gives is each
+        A machine of the catalog, a TOML file, or a machine. An action of 1 gives each
         drive's max_force, or enough to move briskly.
     motion : Motion, optional
         What is to be followed, again and again; by default a random pose is to be reached.

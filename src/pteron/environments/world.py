@@ -1,4 +1,4 @@
-"""What an environment does, for any number of machines at once: states, forces, reward, ends."""
+"""The dynamics of an environment for many machines at once: states, forces, reward, ends."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from pteron.motion import Motion, advance
 from pteron.workspace import reserve
 
 LEVER = 0.1
-"""Metres that count as much as a radian in distances."""
+"""Length that counts as much as a radian in distances, m."""
 
 SPEED, TURN = 10.0, 100.0
-"""m/s and rad/s that the platform never has: faster, and the episode ends."""
+"""Largest speeds of the platform, m/s and rad/s: faster, and the episode ends."""
 
 EFFORT = 0.01
-"""What the mean square of the action takes from the reward."""
+"""Weight of the mean square of the action in the reward."""
 
 ENDS = 0.02
 """Reserve below which an episode ends."""

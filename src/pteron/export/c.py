@@ -144,7 +144,7 @@ def c_texts(
 
 @dataclass(frozen=True)
 class Printer:
-    """How numbers, comments and functions are written."""
+    """Writes numbers, comments and functions in C."""
 
     prefix: str
     real: Real

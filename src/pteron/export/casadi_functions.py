@@ -39,7 +39,7 @@ _NAMES = {
     "inverse_dynamics": "inverse_dynamics",
     "forward_dynamics": "forward_dynamics",
 }
-"""What is exported, and the function of the library that it is."""
+"""Names of the exported functions, and of the library's that they are."""
 
 _LOADED = ("inverse_dynamics", "forward_dynamics")
 

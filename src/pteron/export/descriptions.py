@@ -1,4 +1,4 @@
-"""What generated code says of its functions, their inputs and outputs, and the numbers in it."""
+"""Texts in generated code: summaries of functions, meanings of inputs and outputs, tables."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ SUMMARIES = {
     "adaptive_drives": "Slotine and Li's adaptive control in base parameters and in those of the "
     "drives: what the drives are to give until the next sample, and what is learnt at this one.",
 }
-"""What functions return; of others, what the library's function of that name returns."""
+"""Summaries of functions; the others have that of the library's function of the same name."""
 
 MODES = " Each row is one assembly mode throughout: a motion between singularities keeps its row."
 
@@ -86,7 +86,7 @@ def banner(robot: Manipulator, language: str) -> list[str]:
 
 
 def meaning(robot: Manipulator, port: Port, output: Output) -> str:
-    """Return what an input or an output means, with its unit."""
+    """Return the meaning of an input or an output, with its unit."""
     lengths = ", ".join(name for name in robot.platform.coordinates if name != "phi")
     units = [leg.joint.unit for leg in robot.legs]
     joints = _by_leg(units)
@@ -122,7 +122,7 @@ def meaning(robot: Manipulator, port: Port, output: Output) -> str:
 
 
 def law_meanings(what: str, texts: Mapping[str, str]) -> dict[str, str]:
-    """Return what the inputs and outputs of a law of control mean, from what they are elsewhere."""
+    """Return the meanings of a control law's inputs and outputs, from those elsewhere."""
     remembered = ", ".join(MEMORY_TEXTS[name] for name in MEMORY[what])
     wanted = ("pose", "velocity", "acceleration")
     return {

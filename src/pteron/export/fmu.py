@@ -52,10 +52,10 @@ _CALL = {
     "parameters": "values->parameters",
     "drives": "values->drives",
 }
-"""What of the C code's values each input of `drive_accelerations` is."""
+"""The expression in C for each input of `drive_accelerations`."""
 
 _DATES = (1980, 1, 1, 0, 0, 0)
-"""Of the files inside, so that the same machine gives the same bytes."""
+"""Date of the files inside, fixed so that the same machine gives the same bytes."""
 
 
 def export_fmu(

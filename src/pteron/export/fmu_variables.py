@@ -29,7 +29,7 @@ _UNITS = {
 """The units of the variables by the powers of SI's base units, as FMI wants them."""
 
 Kind = Literal["TIME", "STATE", "START", "INPUT", "RESULT"]
-"""How the C code treats a block: START is set before the simulation begins, and never after."""
+"""Kind of a block in the C code: START is set before the simulation begins, and never after."""
 
 _XML: dict[Kind, dict[str, str]] = {
     "TIME": {"causality": "independent", "variability": "continuous"},
@@ -60,7 +60,7 @@ class Block:
     """The value reference of the first of them."""
     kind: Kind
     place: str
-    """Where they are in the C code: a byte offset, or which result it is."""
+    """Their place in the C code: a byte offset, or the name of a result."""
     variables: tuple[Variable, ...]
     rate_of: str = ""
     """The block whose rates these are."""
@@ -83,7 +83,7 @@ class Layout:
 
     @property
     def count(self) -> int:
-        """How many variables there are."""
+        """Number of variables."""
         return sum(len(block.variables) for block in self.blocks)
 
     @property

@@ -1,4 +1,4 @@
-"""What is exported: functions by name, with their numbers, what they mean, and examples."""
+"""The functions to export: their graphs, tables of numbers, meanings and examples."""
 
 from __future__ import annotations
 
@@ -54,17 +54,17 @@ FUNCTIONS = (
     "forward_dynamics",
     "regressor",
 )
-"""What is exported unless a choice is given; direct kinematics where it has a closed form, and
-what `FEED` names too of a machine with drives."""
+"""Functions exported by default; direct kinematics where it has a closed form, and
+those of `FEED` too for a machine with drives."""
 
 FEED = ("feed_forward", "joint_feed_forward")
-"""What a controller adds to its feedback, from the platform's motion or from the joints'."""
+"""Feed-forward for a controller, from the platform's motion or from the joints'."""
 
 Asked = str | Controller | Sequence[str | Controller]
 """A choice of functions, by name, and of controllers, whose laws they are."""
 
 _BASE = "_base"
-"""What ends the name of a function of base parameters."""
+"""Suffix of the name of a function of base parameters."""
 
 
 @dataclass(frozen=True)
@@ -94,11 +94,11 @@ class Exported:
     summary: str
     graph: Graph
     names: dict[int, str]
-    """How the nodes of the graph that compute something are called."""
+    """Names of the graph's nodes that compute something."""
     inputs: tuple[Port, ...]
     outputs: tuple[Port, ...]
     meanings: dict[str, str]
-    """What the inputs and outputs mean, with their units."""
+    """Meanings of inputs and outputs, with their units."""
     tables: tuple[Table, ...]
     examples: tuple[Example, ...]
 
@@ -133,7 +133,7 @@ def chosen(
     output: Output,
     base: str | Path | None,
 ) -> tuple[Exported, ...]:
-    """Return what is to be written: the `usual` unless a choice is given.
+    """Return the functions to export: the `usual` unless a choice is given.
 
     Without a closed form for every pose that joints have, there is the step from the last one.
 

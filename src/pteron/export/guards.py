@@ -40,7 +40,7 @@ INPUT_POWER, _DIVISOR, _FACTOR = 6, -20, 30
 """Powers of ten: inputs and factors are not larger, divisors not smaller."""
 
 _EXPONENT = "69.0"
-"""Whose power of e is smaller than 10^`_FACTOR`."""
+"""Exponent of e below which the power is smaller than 10^`_FACTOR`."""
 
 _ZERO = "0.0"
 
@@ -77,7 +77,7 @@ class Statements:
         self.flags: set[str] = set()
         self.temporaries: list[str] = []
         self.names: list[str] = []
-        """How each node is written; NaN is not."""
+        """Each node as text; empty for NaN."""
         self._spare, self._largest = names, largest
         self._labels = {k: names.new(labels[k]) for k in sorted(labels)}
         self._sizes: list[float] = []
@@ -92,13 +92,13 @@ class Statements:
                 self.names.append(self._state(k))
 
     def number(self, k: int) -> str:
-        """Return how a node is written, which is a number."""
+        """Return a node that is a number as text."""
         if not self.names[k] or self.graph.nodes[k].operation == "less":
             raise ValueError("NaN and truth values have their place in a selection alone")
         return self.names[k]
 
     def _state(self, k: int) -> str:
-        """Add the statement of a node, and return how the node is written from then on."""
+        """Add the statement of a node, and return the text that stands for it from then on."""
         node = self.graph.nodes[k]
         if node.operation == "select":
             return self._select(k)
@@ -193,7 +193,7 @@ class Statements:
         return max(sizes)
 
     def _divisor(self, k: int) -> str:
-        """Return how a node is written as a divisor, with its guard where it needs one."""
+        """Return a node as a divisor, with its guard where it needs one."""
         node = self.graph.nodes[k]
         if node.operation == CONSTANT and node.value != 0.0:
             return self.names[k]
@@ -221,7 +221,7 @@ class Statements:
 
 
 def element(port: Port, j: int) -> str:
-    """Return how an element of a port is written."""
+    """Return an element of a port as text."""
     if not port.shape:
         return port.name
     return f"{port.name}[{', '.join(str(i) for i in np.unravel_index(j, port.shape))}]"

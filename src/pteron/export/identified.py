@@ -35,7 +35,7 @@ class Identified:
     base: BaseParameters
     values: Array
     comments: tuple[str, ...]
-    """What each value is, and its unit."""
+    """The expression of each value, and its unit."""
     grade: str = ""
     """The verdict of the identification."""
 
@@ -47,7 +47,7 @@ class Identified:
 
 
 def read_identified(robot: Manipulator, path: str | Path) -> Identified:
-    """Read what `pteron identify` found of a machine: base parameters, friction, offsets.
+    """Read the base parameters, friction and offsets that `pteron identify` found for a machine.
 
     What a drive's file says of the motor and its limits stays; a rotor's inertia is in the base
     parameters that it joins, or among the values.
@@ -129,7 +129,7 @@ def _driven(robot: Manipulator, found: list[Drive]) -> Manipulator:
 
 
 def _comments(base: BaseParameters, expressions: Sequence[str]) -> tuple[str, ...]:
-    """Return what stands beside the values; a file's text must not end the comment it stands in."""
+    """Return the comments beside the values; a file's text must not end the comment around it."""
     units = (base.parameters[k].unit for k in base.kept)
     safe = (
         "".join(c if c.isascii() and c.isprintable() and c != "*" else "?" for c in text)

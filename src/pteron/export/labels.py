@@ -25,7 +25,7 @@ Quantity = tuple[str, int, Expression]
 """A name, the leg (from 1) whose quantity it is, or 0, and a scalar or a vector."""
 
 _AXES = {1: [""], 2: ["_a", "_b"], 3: ["_x", "_y", "_z"]}
-"""How components are told apart: a leg's plane has axes a and b."""
+"""Suffixes of components: a leg's plane has axes a and b."""
 
 
 def node_names(
@@ -56,7 +56,7 @@ def node_names(
 
 
 def _quantities(machine: Machine, inputs: dict[str, Expression]) -> Iterator[Quantity]:
-    """Yield what may have a name, those that are preferred first."""
+    """Yield the quantities with names, preferred ones first."""
     if "found" in inputs:  # the pose given is but where Newton's method begins
         moving = [inputs.get(f"joint_{name}") for name in ("rates", "accelerations")]
         pose = inputs["found"]
@@ -77,7 +77,7 @@ def _quantities(machine: Machine, inputs: dict[str, Expression]) -> Iterator[Qua
 
 
 def _motion(machine: Machine, pose: Expression, *rates: Expression) -> Iterator[Quantity]:
-    """Yield the motion of the platform's points, and what the legs answer to it."""
+    """Yield the motion of the platform's points, and that of the legs."""
     state = machine.state(pose, *rates)
     platform = state.platform
     for name, coordinate in zip(machine.platform.coordinates, ca.vertsplit(pose), strict=True):

@@ -47,7 +47,7 @@ class _Axis:
 
     letter: str
     field: str
-    """Of EmcPose."""
+    """Field of EmcPose."""
     name: str
     scale: float
     """LinuxCNC's units, mm or degrees, per m or rad; negative where it counts the other way."""
@@ -69,7 +69,7 @@ class _Joint:
 
 @dataclass(frozen=True)
 class _Arm:
-    """The way from P to the tool, m along the pose's lengths: still + cos phi a + sin phi b."""
+    """The vector from P to the tool, m along the pose's lengths: still + cos phi a + sin phi b."""
 
     still: Array
     cosine: Array
@@ -199,7 +199,7 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
 
 
 def _component(prefix: str) -> str:
-    """Return the name of a module that LinuxCNC can load and has none of its own by."""
+    """Return a module name that LinuxCNC can load and does not use itself."""
     if prefix in _THEIRS or len(prefix) > _LONGEST:
         prefix = marked(prefix, prefix, _LONGEST)
     return f"{prefix}kins"

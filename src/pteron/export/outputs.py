@@ -1,4 +1,4 @@
-"""What the drives are told: forces at the joints, torques of the motors, or per cent of rated."""
+"""Units of the drives' commands: joint forces, motor torques, or per cent of rated torque."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ DRIVEN = ("drive_forces", "feed_forward", "joint_feed_forward", *LAWS)
 """The functions whose forces are those of the drives."""
 
 NAMES = {"force": "forces", "torque": "motor_torques", "percent": "percent_of_rated"}
-"""How the output is called."""
+"""Names of the output."""
 
 _NEEDS = {"force": (), "torque": ("ratio",), "percent": ("ratio", "rated_torque")}
-"""What it takes of every drive."""
+"""Keys of the drive that each output needs."""
 
 
 def factors(robot: Manipulator, output: Output) -> tuple[float, ...]:
-    """Return what each joint's force is multiplied by.
+    """Return the factor on each joint's force.
 
     A motor whose angle is `ratio` times the joint's coordinate gives force / ratio: friction and
     the rotor's inertia are at the joint already.
@@ -59,7 +59,7 @@ _HINTS = {
 
 
 def in_units(given: Program, robot: Manipulator, output: Output) -> Program:
-    """Return a program whose forces are what the drives are told."""
+    """Return a program whose forces are in the units of the drives' commands."""
     if output == "force":
         return given
     symbols, ports = given.function.sx_in(), list(given.outputs)
@@ -74,7 +74,7 @@ def in_units(given: Program, robot: Manipulator, output: Output) -> Program:
 
 
 def told_meaning(robot: Manipulator, output: Output) -> str:
-    """Return what the drives are told, with its unit and where it comes from."""
+    """Return the meaning of the drives' commands, with unit and origin."""
     drives = [leg.drive or Drive() for leg in robot.legs]
     ratios = _listed([drive.gear for drive in drives])
     if output == "torque":

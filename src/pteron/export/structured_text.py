@@ -22,7 +22,7 @@ from pteron.kernels.code import rendered
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _BLOCKS = ("inverse_kinematics", "inverse_dynamics")
-"""What is exported unless a choice is given."""
+"""Functions exported by default."""
 
 _LREAL = 300
 """Power of ten that no number may exceed: LREAL ends at 1.8E+308."""
@@ -30,7 +30,7 @@ _LREAL = 300
 _WIDTH = 96
 
 _STATUSES = (("Usable", 3), ("Reachable", 1), ("Regular", 2))
-"""What must hold, in the order in which it is asked, and the status where it does not."""
+"""The conditions in the order in which they are tested, and the status where one fails."""
 
 
 def export_st(

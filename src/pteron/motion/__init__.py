@@ -1,4 +1,4 @@
-"""Motions of the platform, what they ask of the drives, and simulation of the machine."""
+"""Motions of the platform, the forces that they need, and simulation of the machine."""
 
 from pteron.arguments import check_arguments
 from pteron.motion.joint_points import Guide, JointPoints, Part, joint_guides, joint_points

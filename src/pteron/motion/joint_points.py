@@ -1,4 +1,4 @@
-"""Where the joints of a machine and the parts of its platform are, for pictures of it."""
+"""Points of a machine's joints and of its platform's parts, for pictures."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PerJoint, PoseLike
 
 _SAME = 1e-9
-"""Share of a leg's extent, from end to end, within which two of its joints are at one point."""
+"""Distance within which two joints of a leg count as one point, over the leg's extent."""
 
 _COINCIDENT = 1e-9
-"""m between points of the platform that are taken for one."""
+"""Distance within which two points of the platform count as one, m."""
 
 _SPARE = 0.25
 """Length of a guide without limits, beyond what poses use, as a share of the leg's size."""
@@ -93,7 +93,7 @@ class JointPoints:
 
 @dataclass(frozen=True)
 class Guide:
-    """Where an actuated joint lets its body go.
+    """The path along which an actuated joint guides its body.
 
     Attributes
     ----------
@@ -102,7 +102,7 @@ class Guide:
     axis : array, shape (3,)
         Unit vector along which the slider moves, or about which the crank turns.
     path : array, shape (K, 3)
-        The way of the slider, or of the crank's end, from one limit to the other, m; of a joint
+        The path of the slider, or of the crank's end, from one limit to the other, m; of a joint
         that only turns the platform, where it is, K = 1.
     """
 
@@ -112,7 +112,7 @@ class Guide:
 
 
 def joint_points(robot: RobotLike, pose: PoseLike) -> JointPoints:
-    """Return where the joints are.
+    """Return the points of the joints and of the platform.
 
     Parameters
     ----------
@@ -213,7 +213,7 @@ def _distinct(points: Array) -> Array:
 
 
 def joint_guides(robot: RobotLike, poses: PoseLike) -> tuple[Guide, ...]:
-    """Return where each actuated joint lets its body go, for pictures.
+    """Return the path along which each actuated joint guides its body, for pictures.
 
     Within the joints' limits; a guide without limits is a little longer than the poses need, a
     crank without limits goes all the way round.

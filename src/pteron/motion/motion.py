@@ -1,4 +1,4 @@
-"""A motion of the platform as samples in time, and what it is between them."""
+"""A motion of the platform: samples in time, and interpolation between them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a motion asks more of the drives than they can do."""
+"""Forces and speeds of a motion beyond the limits of the drives."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pteron.manipulator import RobotLike, as_manipulator
 
 
 def overloads(robot: RobotLike, forces: ArrayLike, speeds: ArrayLike) -> tuple[str, ...]:
-    """Return which drives a motion exceeds, one line each; nothing where a leg has no limit.
+    """Return the limits of drives that a motion exceeds, one line each.
 
     Parameters
     ----------

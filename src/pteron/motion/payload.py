@@ -10,11 +10,11 @@ from pteron.errors import DataError, ModelError
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _HEAVY = 20.0
-"""How many times the machine's moving mass a payload may be before its unit is doubted."""
+"""Payload over the machine's moving mass above which its unit is unlikely."""
 
 
 def payload_doubt(robot: Manipulator, mass: float) -> str:
-    """Return what is unlikely about a payload, kg, as a clause; empty where nothing is."""
+    """Return a warning about an unlikely payload, kg, as a clause; else an empty text."""
     bodies = [body for leg in robot.legs for body in leg.bodies.values()]
     moving = sum(body.values[0] for body in (*bodies, robot.platform.joined))
     if mass <= _HEAVY * moving:

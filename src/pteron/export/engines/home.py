@@ -18,10 +18,10 @@ _GOOD = 0.1
 """The least measure from singularities with which the middle of the joints' ranges will do."""
 
 _SEARCHES = ((200, 0.3), (200, 0.02), (200, 0.0))
-"""How many random poses, and their least measures."""
+"""Numbers of random poses, and their least measures."""
 
 _ALIKE = 1e-9
-"""Measures that differ by less are the same."""
+"""Difference below which two measures count as equal."""
 
 
 def chosen_home(robot: Manipulator, home: PoseLike | None) -> Array:

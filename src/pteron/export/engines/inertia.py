@@ -34,7 +34,7 @@ _TINY = 2e-14
 """kg m^2; engines refuse less."""
 
 SHARE = 1e-10
-"""Of a body's mass and moments, what a link between its joints has."""
+"""Share of a body's mass and moments that a link between its joints has."""
 
 
 def about_center(inertia: Inertia) -> tuple[float, Array, float]:

@@ -1,4 +1,4 @@
-"""Shapes as URDF and SDF have them: in a link's frame, turned by roll, pitch and yaw."""
+"""Shapes for URDF and SDF: in a link's frame, turned by roll, pitch and yaw."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def look_of(shape: Shape, body: TreeBody | None) -> Look:
 def roll_pitch_yaw(turn: Array) -> Array:
     """Return the angles (3,) of a rotation about fixed x, then y, then z, rad.
 
-    Where pitch is half a turn's half, yaw is what rounding makes it, and roll goes with it.
+    At a pitch of a quarter turn roll and yaw are not unique; rounding chooses.
     """
     yaw = np.arctan2(turn[1, 0], turn[0, 0])
     s, c = np.sin(yaw), np.cos(yaw)

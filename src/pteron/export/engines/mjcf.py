@@ -137,7 +137,7 @@ def mjcf(opened: Tree, *, step: float = STEP) -> str:
 
 
 def _notes(opened: Tree) -> list[str]:
-    """Return what the file cannot hold of this machine, and how its shaft is driven."""
+    """Return notes on what the file cannot hold, and on how a shaft is driven."""
     kept = ("inertia", "viscous", "coulomb", "offset", "max_force")
     shafts = [motor.name for motor in opened.motors if motor.name != motor.joint]
     said = [f"{name} turns phi; its actuator's gear is the shaft's ratio." for name in shafts]

@@ -51,7 +51,7 @@ class TreeJoint:
 
 @dataclass(frozen=True)
 class Shape:
-    """What a body looks like: a round bar from one point to another, or a box along them.
+    """The shape of a body: a round bar from one point to another, or a box along them.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class TreeBody:
     Attributes
     ----------
     name : str
-        What it is: "leg1_crank".
+        Such as "leg1_crank".
     parent : int
         The body before, or `BASE`.
     joints : tuple of TreeJoint
@@ -93,7 +93,7 @@ class TreeBody:
     color : int
         The leg it belongs to, from 1; 0 for the platform's.
     shapes : tuple of Shape
-        What it looks like.
+        Its shapes in pictures.
     """
 
     name: str
@@ -130,7 +130,7 @@ class Closing:
 
 @dataclass(frozen=True)
 class Motor:
-    """What drives a joint of the tree.
+    """The drive of a joint of the tree.
 
     Attributes
     ----------
@@ -193,7 +193,7 @@ class Tree:
 
 
 def place(tree: Tree, coordinates: Mapping[str, float]) -> list[Array]:
-    """Return how each body has moved from the home pose, (4, 4), for joint coordinates by name."""
+    """Return each body's displacement from the home pose, (4, 4), for joint coordinates by name."""
     found: list[Array] = []
     for body in tree.bodies:
         moved = np.eye(4) if body.parent == BASE else found[body.parent]
@@ -233,7 +233,7 @@ def at_zero(tree: Tree) -> tuple[TreeBody, ...]:
 
 
 def displacement(joint: TreeJoint, by: float) -> Array:
-    """Return the motion (4, 4) of what a joint carries that moves by m or rad."""
+    """Return the displacement (4, 4) of a body whose joint moves by so many m or rad."""
     moved = np.eye(4)
     if joint.slides:
         moved[:3, 3] = by * joint.axis

@@ -24,10 +24,10 @@ from pteron.manipulator import Manipulator
 from pteron.platforms import Platform
 
 _COINCIDENT = 1e-9
-"""m between hinges that are taken for one; m/rad where the platform slides."""
+"""Distance within which two hinges count as one, m; m/rad where the platform slides."""
 
 _SIDE = 0.05
-"""m: the side of a cube that stands for a part that does not turn."""
+"""Side of the cube that stands for a part that does not turn, m."""
 
 Pieces = tuple[list[TreeBody], list[int], list[Closing]]
 """Bodies; which of them each leg carries; where parts of the platform close with it."""

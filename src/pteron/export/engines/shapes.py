@@ -1,4 +1,4 @@
-"""What the machine looks like at its home pose: bars, boxes, guides and axles."""
+"""Shapes of the machine at its home pose: bars, boxes, guides and axles."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _SAME = 1e-6
 
 
 def dressed(opened: Tree) -> Tree:
-    """Return the tree with a shape for each body, and for what stands on the base."""
+    """Return the tree with a shape for each body, and for guides and axles on the base."""
     thick = _THICK * opened.size
     looks: list[list[Shape]] = [[] for _ in opened.bodies]
     base: list[tuple[int, Shape]] = []
@@ -71,7 +71,7 @@ def _leg(
 
 
 def _stand(first: TreeBody, size: float) -> list[Shape]:
-    """Return what of a leg's first joint stands on the base: a guide, or an axle."""
+    """Return the fixed part of a leg's first joint: a guide, or an axle."""
     joint, thick = first.joints[0], _THICK * size
     if joint.slides:
         low, high = joint.limits or (joint.home - _SPARE * size, joint.home + _SPARE * size)

@@ -27,7 +27,7 @@ from pteron.manipulator import RobotLike, as_manipulator
 from pteron.shapes import PoseLike
 
 _NONE = 1e-9
-"""Sine between directions that are taken for one."""
+"""Sine between two directions below which they count as parallel."""
 
 
 def tree(robot: RobotLike, home: PoseLike | None = None) -> Tree:

@@ -35,10 +35,10 @@ from pteron.manipulator import RobotLike, as_manipulator
 from pteron.shapes import PoseLike
 
 _MOST = 1e6
-"""What stands for no limit of effort (N, N m) or velocity, which URDF wants to be told."""
+"""Stands for no limit of effort (N, N m) or velocity, which URDF requires."""
 
 _FAR = 1e3
-"""What stands for no limit of a joint that slides, m."""
+"""Stands for no limit of a joint that slides, m."""
 
 
 def export_urdf(

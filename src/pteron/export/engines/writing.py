@@ -1,4 +1,4 @@
-"""How numbers, frames and names are written in the engines' files."""
+"""Formatting of numbers, frames and headers in the engines' files."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pteron.export.engines.parts import BASE, Tree, TreeBody
 from pteron.kernels import Array
 
 _DIGITS = 15
-"""After the point; what is beyond is rounding. m, rad, or parts of a unit vector."""
+"""Decimals written: beyond them is rounding. m, rad, or components of a unit vector."""
 
 COLORS = (
     "0.13 0.47 0.71 1",
@@ -23,7 +23,7 @@ COLORS = (
     "0.17 0.55 0.24 1",
     "0.55 0.35 0.64 1",
 )
-"""Of the legs, by turns."""
+"""Colours of the legs, in turn."""
 
 PLATFORM_COLOR = "0.78 0.66 0.21 1"
 
@@ -46,7 +46,7 @@ def row(values: Sequence[float] | Array) -> str:
 
 
 def look(values: Sequence[float] | Array | float) -> str:
-    """Return numbers that nothing but a picture depends on."""
+    """Return numbers of a shape, to six decimals."""
     return " ".join(f"{round(float(value), 6) + 0.0:g}" for value in np.ravel(values))
 
 
@@ -76,12 +76,12 @@ def parent_frame(opened: Tree, body: TreeBody) -> Array:
 
 
 def material(body: TreeBody) -> str:
-    """Return what a body's looks are of."""
+    """Return the name of a body's material."""
     return f"leg{body.color}" if body.color else "platform"
 
 
 def left_out(opened: Tree, kept: Sequence[str]) -> list[str]:
-    """Return what of a machine's drives and passive joints a file has not; `kept` it has."""
+    """Return a note on numbers of drives and passive joints that a file lacks; `kept` it has."""
     drives = {
         "inertia": "the motors' inertia",
         "viscous": "viscous friction",
@@ -103,7 +103,7 @@ def left_out(opened: Tree, kept: Sequence[str]) -> list[str]:
 
 
 def head(opened: Tree, language: str) -> list[str]:
-    """Return the lines that begin every file: what it is, and what was completed."""
+    """Return the first lines of every file: its machine, and what was completed."""
     robot = opened.robot
     name = re.sub(r"[^\w ,.+-]|--+", "?", " ".join(robot.name.split()))
     pairs = zip(robot.coordinates, opened.home, strict=True)

@@ -1,4 +1,4 @@
-"""Where Klipper's z begins: at a bed that a Delta reaches well."""
+"""The bed, at which Klipper's z is 0: a level that a Delta reaches well."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 
 _BELOW = 1e-3
-"""Metres below the bed from where rotary_delta.py says that a machine comes when it homes."""
+"""Depth below the bed from which rotary_delta.py takes a machine to home, m."""
 
 _GOOD = 0.05
 """The measure, of type I or twice that of type II, that every pose at the bed has at least."""
@@ -51,7 +51,7 @@ def bed(robot: Manipulator, reach: float, low: float, high: float) -> tuple[floa
 
 
 def told_bed(robot: Manipulator, level: float, good: float, most: float) -> tuple[str, ...]:
-    """Return what is said of a bed: where it is, and how much of what Klipper allows is good."""
+    """Return comments on the bed: its place, and the share of Klipper's range that is good."""
     tool = tool_of(robot)
     who = "the tool's" if tool.any() else "the pose's"
     told = [f"Klipper's z = 0, the bed, is {who} z = {1000.0 * (level + tool[2]) + 0.0:.6g} mm."]

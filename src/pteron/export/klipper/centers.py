@@ -1,4 +1,4 @@
-"""What Klipper asks of a Delta: where the spheres are that its platform moves on."""
+"""The spheres on which a Delta's platform moves, as Klipper describes them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SAME = 1e-6
 
 @dataclass(frozen=True)
 class Center:
-    """Where the centre of the sphere that P moves on is while a joint q is held.
+    """The centre of the sphere on which P moves while a joint q is held.
 
     It is at + q along, or at + along cos(q) + across sin(q); P is the platform's reference point.
     """
@@ -88,7 +88,7 @@ def degrees(point: Array) -> float:
 
 
 def end_stop(end: str | None, what: str) -> tuple[str, ...]:
-    """Return what is said of an end stop's position, if it is given."""
+    """Return the comment on an end stop's position, if it is given."""
     if end is None:
         return ()
     return (f"position_endstop: the {what} at its upper limit; measure it on the machine.",)

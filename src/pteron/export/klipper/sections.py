@@ -1,4 +1,4 @@
-"""Sections of a Klipper configuration, and what stands in them."""
+"""Sections of a Klipper configuration, and their texts."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Section:
 
 
 SPEEDS: tuple[tuple[str, None], ...] = (("max_velocity", None), ("max_accel", None))
-"""What Klipper asks of every printer."""
+"""Settings of every printer."""
 
 PINS: tuple[tuple[str, None], ...] = (
     ("step_pin", None),
@@ -29,11 +29,11 @@ PINS: tuple[tuple[str, None], ...] = (
     ("enable_pin", None),
     ("microsteps", None),
 )
-"""What it asks of every stepper."""
+"""Settings of every stepper."""
 
 
 def differs(robot: Manipulator, leg: int, told: str, kind: str) -> ModelError:
-    """Return the refusal of a machine because of what is told of one of its legs."""
+    """Return the error that refuses a machine because of one of its legs."""
     return ModelError(f"{robot.name}: Klipper's {kind} does not fit leg {leg}: {told}; {INSTEAD}")
 
 

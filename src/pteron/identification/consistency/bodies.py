@@ -22,7 +22,7 @@ _SMALL_PLATFORM = 0.25
 
 _MARGIN = 1e-3
 _LEAST_MARGIN = 1e-6
-"""How far inside its cone a body is kept, relative to its mass; a uniform rod is 0.067 inside."""
+"""Margins of a body inside its cone, relative to its mass; a uniform rod has 0.067."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Bodies:
 
     @cached_property
     def places(self) -> dict[str, dict[str, int]]:
-        """Where the parameters of each body stand, by its name and their kind."""
+        """Columns of the parameters of each body, by its name and their kind."""
         return body_places(self.columns)
 
     @property

@@ -1,4 +1,4 @@
-"""What is known of the bodies beforehand: limits of parameters, boxes that hold the bodies."""
+"""Prior knowledge of the bodies: limits of parameters, boxes that hold the bodies."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `consistent_model` returns: a machine of real bodies, and how far the fit was from one."""
+"""The result of `consistent_model`: a machine of real bodies, and its distance from the fit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Covariance of values whose residuals hang together, in time and between actuators.
+"""Covariance of values whose residuals are correlated, in time and between actuators.
 
 Newey and West's sandwich estimates p x p numbers at each lag from a few hundred rows: its small
 eigenvalues come out far too small, and with them regions of several values. Here the noise of each
@@ -24,10 +24,10 @@ _MOST_REFLECTION = 0.5
 """Largest reflection coefficient at these lags: what is left is nearly white."""
 
 _ROUNDS = 3
-"""How often the noise is found anew with what the fit has taken from it."""
+"""Rounds in which the noise is found anew, corrected for the fit's leverage."""
 
 _FEW = 200
-"""Equations for each value from which what the fit takes of the residuals does not count: 0.5 %."""
+"""Equations per value above which leverage is negligible: 0.5 %."""
 
 _LEVEL = 0.01
 """Chance at which independent noise of the actuators would be taken for shared."""
@@ -174,7 +174,7 @@ def _parzen(share: Array) -> Array:
 
 
 def _shared(noise: Noise, residuals: Array, used: NDArray[np.bool_]) -> Noise:
-    """Return noise whose innovations hang together as those of the residuals, if these do."""
+    """Return the noise with the correlation between actuators of the residuals' innovations."""
     parts = [lfilter(one, [1.0], residuals[:, i]) for i, one in enumerate(noise.polynomials)]
     innovations = np.stack(parts, axis=1) * used
     together = used.T.astype(float) @ used

@@ -1,4 +1,4 @@
-"""What every estimator returns: values, how far they may be trusted, and what was left over."""
+"""The result of every estimator: values, their covariance, and the residuals."""
 
 from __future__ import annotations
 

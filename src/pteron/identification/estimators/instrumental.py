@@ -24,7 +24,7 @@ _SETTLED = 1e-3
 """Change of a value, in standard deviations, and of the noise, relative, that does not matter."""
 
 _DEGREE = 5
-"""Of the spline through every other sample."""
+"""Degree of the spline through every other sample."""
 
 Instruments = Observations | Callable[[Array], Observations]
 """Observations of states without the noise of those to be solved; or what makes them of values."""

@@ -16,7 +16,7 @@ BLOCK = 1 << 14
 """Rows that are factorised at a time."""
 
 _UNSEEN = 1e-10
-"""Singular value, relative to the largest, below which a combination of values is not seen."""
+"""Singular value, relative to the largest, below which a combination of values is not excited."""
 
 _TAKES_PART = 0.05
 """Share in an unseen combination that makes a value one of those it concerns."""
@@ -41,7 +41,7 @@ class QrFactor:
     """Equations that went in."""
     names: tuple[str, ...]
     source: str
-    """What messages call the log."""
+    """The log's name in messages."""
 
     @property
     def condition(self) -> float:

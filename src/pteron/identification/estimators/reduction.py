@@ -13,15 +13,15 @@ from pteron.identification.observation import Observations
 from pteron.kernels import Array
 
 TOLERANCE = 1e-8
-"""What columns of length one have of their own, relative to the first, that is rounding."""
+"""Independent part of a column of length one, relative to the first, that counts as rounding."""
 
 _ROUNDING = 1e-12
-"""Length of a column, relative to the longest, that is."""
+"""Length of a column, relative to the longest, that counts as zero."""
 
 
 @dataclass(frozen=True)
 class Reduced:
-    """Which columns of a regressor are independent, and what the others join.
+    """The independent columns of a regressor, and the others as combinations of them.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Reduced:
 
     @property
     def expressions(self) -> tuple[str, ...]:
-        """What each value is, such as "I1 + 0.25 m2"."""
+        """Expression of each value, such as "I1 + 0.25 m2"."""
         found = []
         for name, row in zip(self.names, self.shares, strict=True):
             text = name

@@ -36,7 +36,7 @@ class SmallestCorrections(NamedTuple):
     sizes: Array
     """The singular values, in units of the noise."""
     share: float
-    """That of the forces in the last right singular vector; the values are wrong where it is 0."""
+    """Share of the forces in the last right singular vector; the values are wrong where it is 0."""
 
 
 def smallest_corrections(upper: Array, exact: int, noise: Array) -> SmallestCorrections:

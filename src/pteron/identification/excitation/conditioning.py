@@ -1,4 +1,4 @@
-"""How well a motion shows the base parameters: condition numbers of the stacked base regressor."""
+"""Condition numbers of a motion's stacked base regressor."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ several, on a machine that is busy, can take a hundred times as long."""
 
 @dataclass(frozen=True)
 class Conditioning:
-    """How well the base parameters can be told apart from the forces of a motion.
+    """Condition numbers: how well a motion's forces tell the base parameters apart.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Random Fourier motions, each as large as the limits allow: what optimised ones must beat."""
+"""Random Fourier motions, each as large as the limits allow: the yardstick of optimised ones."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ _FINE = 800
 """Samples in a period of the highest harmonic at which the limits are checked."""
 
 _CLEAR = 2e-4
-"""By what share of its size every limit is kept clear at those samples: more than a margin can dip
+"""Safety margin of every limit at those samples, over its size: more than a margin can dip
 between two of them."""
 
 _COARSE = 50
 """Samples in a period of the highest harmonic while the scale is sought."""
 
 _COARSE_CLEAR = 2e-3
-"""By what share limits are kept clear there, so that the finer look seldom finds fault."""
+"""Safety margin there, over the limit's size, so that the finer check seldom fails."""
 
 _SPREAD = 0.2
-"""How far random centers are from home, as a share of the working space's size."""
+"""Distance of random centers from home, over the size of the working space."""
 
 _SCALES = (1.0, 0.998, 0.99, 0.97, 0.9, 0.75, 0.5)
 """Scales to which a motion that violates a limit is shrunk, until it does not."""
 
 _RESOLUTION = 0.1
-"""To what share of the shrinkage the scale is then refined."""
+"""Share of the shrinkage to which the scale is then refined."""
 
 _HALVINGS = 12
 _BISECTIONS = 14
@@ -126,7 +126,7 @@ def sizes(robot: Manipulator, space: Space) -> Array:
 
 
 def is_clear(motion: Movement, limits: Limits, samples: int, clear: float = _CLEAR) -> bool:
-    """Say whether all limits are kept at so many samples, and how clearly is given."""
+    """Return whether all limits are kept at so many samples, by a share of their sizes."""
     found = relative_margins(motion, limits, np.linspace(0.0, motion.duration, samples))
     return all(float(values.min()) >= clear for values in found.values())
 

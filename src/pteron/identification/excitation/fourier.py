@@ -97,7 +97,7 @@ class FourierMotion:
 
     @property
     def harmonics(self) -> int:
-        """How many harmonics there are, H."""
+        """Number of harmonics, H."""
         return len(self.cosines)
 
     @property

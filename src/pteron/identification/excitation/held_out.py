@@ -21,7 +21,7 @@ from pteron.motion.trajectories.cycle import Cycle, moves
 
 _LEAST_CYCLES = 4
 _LEAST_DURATION = 10.0
-"""How many cycles there are, and how long they take together, s, at least."""
+"""Least number of cycles, and least time that they take together, s."""
 
 _DIRECTIONS = 12
 """Directions across that are tried, all round."""
@@ -30,13 +30,13 @@ _SAMPLES = 4000
 """Samples of a cycle at which limits are looked at."""
 
 _CLEAR = 1e-4
-"""By what share of its size a limit is kept clear at those samples."""
+"""Safety margin of a limit at those samples, over its size."""
 
 _SMALLER, _SLOWER = 0.9, 1.05
 """Factors on size and duration of a cycle, until it keeps the limits."""
 
 _SMALLEST = 0.02
-"""Scale below which a cycle is none."""
+"""Least scale of a cycle."""
 
 _AT_REST = 1e4
 """Duration of a cycle in which nothing but gravity is felt, s."""
@@ -65,7 +65,7 @@ class RepeatedCycle:
 
     @property
     def duration(self) -> float:
-        """How long they take together, s."""
+        """Duration of all cycles, s."""
         return self.count * self.length
 
     def states(self, times: Array) -> State:
@@ -74,7 +74,7 @@ class RepeatedCycle:
         return state_of_platform(self.robot, pose, first / self.length, second / self.length**2)
 
     def margins(self, limits: Limits, rate: float = 1000.0) -> Margins:
-        """Return how far a cycle stays from its limits, at ten times as many samples a second."""
+        """Return the margins of a cycle, at ten times as many samples a second."""
         once = replace(self, count=1)
         return margins(once, limits, max(round(10.0 * rate * self.length), _SAMPLES))
 

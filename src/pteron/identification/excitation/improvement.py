@@ -22,7 +22,7 @@ from pteron.identification.excitation.program import Setting, minimised
 from pteron.kernels import Array
 
 _NEAR = 0.5
-"""A limit whose least margin at the start is above that share of its size is not watched, until it
+"""Share of a limit's size above which its margin at the start leaves it unwatched until it
 is violated: it would cost time."""
 
 _CHECKED = 200
@@ -43,7 +43,7 @@ class Round:
 
     @property
     def stages(self) -> int:
-        """How many stages it has, exchanges included."""
+        """Number of stages, exchanges included."""
         return len(self.doublings) + self.exchanges
 
 
@@ -56,7 +56,7 @@ ROUNDS = {
 
 @dataclass(frozen=True, eq=False)
 class Improvement:
-    """How far the improvement of one start has come."""
+    """The state of the improvement of one start."""
 
     number: int
     setting: Setting
@@ -64,15 +64,15 @@ class Improvement:
     safe: FourierMotion
     """The last motion found that keeps all limits; the start at first."""
     seconds: float
-    """What is left of its time."""
+    """Time left, s."""
     stage: int = 0
-    """How many stages are done."""
+    """Number of stages done."""
     current: FourierMotion | None = None
-    """Where the next stage begins: it need not keep the limits; None for `safe`."""
+    """The motion from which the next stage begins: it need not keep the limits; None for `safe`."""
     watched: tuple[str, ...] = ()
     """The limits that the program keeps, by name."""
     instants: Array = field(default_factory=lambda: np.empty(0))
-    """Where it keeps them beside its own samples (E,), s."""
+    """Instants at which it keeps them beside its own samples (E,), s."""
     improved: bool = False
     """Whether the last stage found a motion that keeps all limits."""
     ended: bool = False

@@ -1,4 +1,4 @@
-"""How a motion is written for a controller: which columns, in which units, in what kind of CSV."""
+"""Layout of a motion's file for a controller: columns, units, and the dialect of CSV."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from pteron.manipulator import Manipulator
 from pteron.tables import Dialect
 
 Contents = Literal["all", "joints", "poses"]
-"""What a file holds beside time: everything, the joint coordinates, or the poses."""
+"""Contents of a file beside time: everything, the joint coordinates, or the poses."""
 
 _PER_UNIT: dict[str, float] = {**PER_SECOND, "mm": 1e3, "um": 1e6, "deg": 180.0 / math.pi}
 _MOST_SAMPLES = 10_000_000
@@ -79,7 +79,7 @@ class Layout:
 
     @property
     def dialect(self) -> Dialect | None:
-        """How a CSV file is written; None as usual, so that a log's own dialect can be found."""
+        """Dialect of CSV; None as usual, so that a log's own dialect can be found."""
         if self.separator is None and self.decimal == ".":
             return None
         separator = self.separator or (";" if self.decimal == "," else ",")

@@ -1,4 +1,4 @@
-"""Lead-in and lead-out: the exciting motion sets off from rest, and comes to rest, on its own way.
+"""Lead-in and lead-out: the exciting motion sets off from rest, and comes to rest, on its own path.
 
 The machine goes along the closed curve of the periodic motion from the first sample to the last;
 only how fast it does so changes. Its places are thus those of the periodic motion, and with them
@@ -39,14 +39,14 @@ _FINE = 800
 """Samples in a period of the highest harmonic: for the choice, and for the proof."""
 
 _CLEAR = 1e-4
-"""By what share of its size a limit is kept clear there; the periodic motion keeps twice that."""
+"""Safety margin of a limit there, over its size; the periodic motion keeps twice that."""
 
 _TRIED = 4
 """Phases of a length that are looked at finely, the best ones."""
 
 
 class Lead(NamedTuple):
-    """How a motion sets off from rest.
+    """The lead-in of a motion from rest.
 
     Attributes
     ----------
@@ -111,7 +111,7 @@ class LedMotion:
 
     @property
     def duration(self) -> float:
-        """How long it takes from rest to rest, s."""
+        """Duration from rest to rest, s."""
         return self.end + self.lead.duration
 
     def at(self, time: ArrayLike) -> Motion:
@@ -131,7 +131,7 @@ class LedMotion:
         return self.motion.states(phase, rate_in * rate_out, gain_in - gain_out)
 
     def margins(self, limits: Limits, rate: float = 1000.0) -> Margins:
-        """Return how far it stays from its limits, at ten times as many samples a second.
+        """Return its margins, at ten times as many samples a second.
 
         One of its periods is looked at, as they are all alike.
         """

@@ -1,4 +1,4 @@
-"""What an exciting motion must keep at every instant: limits that are given, or the drives' own."""
+"""Limits of an exciting motion at every instant: those given, or the drives' own."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ PER_JOINT = ("speed", "acceleration", "force")
 """Those that may be given for each joint."""
 
 _SPEED = 1.0
-"""Of joints whose drives do not say more, m/s or rad/s."""
+"""Speed limit of joints whose drives have none, m/s or rad/s."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What a trajectory must keep at every instant.
+    """Limits of a trajectory at every instant.
 
     Attributes
     ----------
@@ -157,7 +157,7 @@ def _number(name: str, value: object) -> float:
 
 
 class DriveLoad(NamedTuple):
-    """What the drives need beside the rigid bodies' forces, (n,) each.
+    """Forces that the drives need beside those of the rigid bodies, (n,) each.
 
     inertia q'' + viscous q' + offset, and `dry` friction against the motion, at most.
     """
@@ -169,7 +169,7 @@ class DriveLoad(NamedTuple):
 
 
 def drive_load(robot: Manipulator) -> DriveLoad:
-    """Return what the drives of a machine need; nothing, of a leg without one."""
+    """Return the load of a machine's drives; zero at a leg without one."""
     drives = Drives(*np.split(drive_numbers(robot), len(Drives._fields)))
     dry = drives.coulomb + drives.stribeck
     return DriveLoad(drives.inertia, drives.viscous, drives.offset, dry)

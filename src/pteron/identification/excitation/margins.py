@@ -1,4 +1,4 @@
-"""How far a motion stays from its limits, at its tightest instants."""
+"""Margins of a motion to its limits at its tightest instants."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _REFINED = 33
 
 @dataclass(frozen=True)
 class Margin:
-    """How near a motion comes to one limit.
+    """The least margin of a motion to one limit.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ class Margins:
 
 
 def margins(motion: Movement, limits: Limits, samples: int = 4000) -> Margins:
-    """Return how far a motion stays from its limits.
+    """Return the least margins of a motion to its limits.
 
     Parameters
     ----------

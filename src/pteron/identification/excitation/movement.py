@@ -1,4 +1,4 @@
-"""What can be asked of every movement here: how platform and joints move at any instant of it."""
+"""The movement protocol: the motion of platform and joints at any instant."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Movement(Protocol):
 
     @property
     def duration(self) -> float:
-        """How long it lasts, s."""
+        """Duration, s."""
 
     def states(self, times: Array, /) -> State:
         """Return the motion of platform and joints at times (T,), s."""

@@ -29,7 +29,7 @@ from pteron.manipulator import Manipulator, parameters
 from pteron.motion.trajectories.fourier import fourier_basis
 
 Criterion = Literal["condition", "logdet"]
-"""What is made small: the scaled condition number, or the volume of the confidence ellipsoid."""
+"""The cost: the scaled condition number, or the volume of the confidence ellipsoid."""
 
 _SAMPLES = 20
 """Samples in a period of the highest harmonic. The limits are kept where the regressor is taken:
@@ -44,12 +44,12 @@ _SETTLED = 1e-6
 """Decrease of the measure, a logarithm, below which a step is not worth it."""
 
 _RADIUS = 0.2
-"""Of the first trust region, over the sizes of motions."""
+"""Radius of the first trust region, over the sizes of motions."""
 
 
 @dataclass(frozen=True)
 class Setting:
-    """What is optimised: all that does not depend on where the search starts."""
+    """The setting of an optimisation: all that does not depend on where the search starts."""
 
     robot: Manipulator
     columns: Columns

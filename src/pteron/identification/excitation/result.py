@@ -25,12 +25,12 @@ from pteron.kinematics import assembly_mode
 from pteron.tables import write_table
 
 _SLOWER = 5.0
-"""How many times slower than the trajectory its slow passages are at their fastest."""
+"""Factor by which slow passages, at their fastest, are slower than the trajectory."""
 
 
 @dataclass(frozen=True)
 class Start:
-    """What became of one start.
+    """The history of one start.
 
     Attributes
     ----------
@@ -95,7 +95,7 @@ class Excitation:
 
     @property
     def gain(self) -> float:
-        """How many times the scaled condition number of the best random motion is larger."""
+        """Scaled condition number of the best random motion over that of the trajectory."""
         return self.random.scaled / self.conditioning.scaled
 
     def with_leads(self, periods: int = 1) -> LedMotion:

@@ -198,7 +198,7 @@ class _Candidate(NamedTuple):
 
 @dataclass
 class _Search:
-    """What is known so far."""
+    """The state of the search."""
 
     criterion: Criterion
     base: BaseParameters

@@ -41,7 +41,7 @@ _FELT = 1e-3
 
 @dataclass(frozen=True)
 class Program:
-    """What is made small, and what must be 0 or more, of variables (v,).
+    """A nonlinear program: its cost, and margins that must be 0 or more, of variables (v,).
 
     Attributes
     ----------

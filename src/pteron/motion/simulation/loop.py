@@ -1,4 +1,4 @@
-"""From sample to sample: forces are asked for, limited and delayed, and the plant goes on."""
+"""The simulation's loop: at each sample forces are asked for, limited, delayed and integrated."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ from pteron.motion.simulation.stops import (
 )
 
 _WHOLE = 1e-9
-"""Share of a sample that is none."""
+"""Share of a sample below which a delay counts as whole samples: rounding."""
 
 
 @runtime_checkable
 class Law(Protocol):
-    """What a controller does for one machine; `pteron.controllers` has some."""
+    """A controller's law for one machine; `pteron.controllers` has some."""
 
     def memory(self, pose: Array, velocity: Array) -> Array:
-        """Return what it knows at the start, (K,)."""
+        """Return its memory at the start, (K,)."""
 
     def __call__(
         self,
@@ -45,17 +45,17 @@ class Law(Protocol):
         joint_rates: Array,
         memory: Array,
     ) -> tuple[Array, Array]:
-        """Return forces (n,) and what it knows next, of the reference and the measured joints."""
+        """Return forces (n,) and the next memory, from the reference and the measured joints."""
 
 
 @runtime_checkable
 class Source(Protocol):
-    """Where forces come from, sample by sample."""
+    """A source of forces, sample by sample."""
 
     memory: Array
 
     def forces(self, k: int, joints: Array, rates: Array) -> Array:
-        """Return what is asked of the drives, (n,), at sample k."""
+        """Return the forces asked of the drives, (n,), at sample k."""
 
 
 class Given:
@@ -94,7 +94,7 @@ class Controlled:
 
 @dataclass(frozen=True)
 class Loads:
-    """What the platform carries, and what else acts on it, at each sample."""
+    """The payload and the wrench on the platform at each sample."""
 
     masses: Array
     machines: Mapping[float, Manipulator]

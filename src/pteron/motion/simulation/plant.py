@@ -1,4 +1,4 @@
-"""The machine that is simulated: its state goes on under the forces of its drives."""
+"""Integration of a machine's equations of motion under the forces of its drives."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _STABLE = 2.0
 """Runge and Kutta's method of fourth order is stable up to a decay of 2.78 within a step."""
 
 _SHORTEST = 1e-8
-"""s; what asks for shorter steps is a mistake in the file."""
+"""Steps shorter than this, s, point to a mistake in the drives' numbers."""
 
 
 def advance(
@@ -35,7 +35,7 @@ def advance(
     count: int,
     wrench: PoseLike | None = None,
 ) -> tuple[Array, Array, Any]:
-    """Return where machines are after some steps of Runge and Kutta's method of fourth order.
+    """Return the states of machines after some steps of Runge and Kutta's method of fourth order.
 
     The equations are those of `drive_accelerations`: friction and the motors' inertia count. Where
     there is a C compiler the steps are one loop of machine code, which is compiled when it is first
@@ -60,7 +60,7 @@ def advance(
     Returns
     -------
     pose, velocity : array, shape (..., m)
-        At the end; of a machine that cannot go on, where it came to.
+        At the end; of a machine that cannot go on, its last state.
     status : array of bool, shape (...)
         Whether all steps were made: not where a leg is out of reach or singular (type I).
 
@@ -110,11 +110,11 @@ _FINEST = 100.0 * float(np.finfo(float).eps)
 """The smallest relative error of a step that SciPy serves."""
 
 _LEAST = 1e-9
-"""Share of a span in which a method of adaptive steps that makes such short ones goes nowhere."""
+"""Adaptive steps shorter than this share of a span count as stuck."""
 
 
 class Plant:
-    """A machine's state, which goes on from sample to sample, until it cannot."""
+    """A machine's state, integrated from sample to sample."""
 
     def __init__(
         self, pose: Array, velocity: Array, method: Method, step: float, tolerance: float

@@ -1,4 +1,4 @@
-"""What a simulation was: its samples, and why it ended."""
+"""The result of a simulation: its samples, and why it ended."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ class Simulation:
 
     @property
     def motion(self) -> Motion:
-        """What the platform did."""
+        """Motion of the platform."""
         return Motion(self.time, self.pose, self.velocity, self.acceleration)
 
     @property

@@ -1,4 +1,4 @@
-"""What a controller is told of its joints: encoders, and the rates that are made of them."""
+"""Encoders of the joints, and the rates computed from their readings."""
 
 from __future__ import annotations
 

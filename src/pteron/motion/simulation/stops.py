@@ -1,4 +1,4 @@
-"""Why a simulation ends before its time, in a sentence."""
+"""Reasons why a simulation ends before its time, in a sentence each."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from pteron.manipulator import Manipulator
 from pteron.shapes import PerJoint
 
 _FAST = 1e3
-"""Speeds, m/s or rad/s, that no machine has: the numbers diverge."""
+"""Speed, m/s or rad/s, beyond which the numbers count as diverging."""
 
 _ROUNDING = 1e-9
-"""m or rad beyond a limit that are none."""
+"""Distance beyond a joint's limit that counts as rounding, m or rad."""
 
 
 def why_not_further(robot: Manipulator, pose: Array, velocity: Array) -> str:
@@ -63,12 +63,12 @@ def first_singular(robot: Manipulator, poses: Array) -> int | None:
 
 
 def told_singular(_: Manipulator, pose: Array) -> str:
-    """Return what is said of a singularity of type II."""
+    """Return the sentence for a singularity of type II."""
     return (
         f"singular (type II) at pose {told_pose(pose)}: the actuators no longer hold the platform"
     )
 
 
 def told_pose(pose: Array) -> str:
-    """Return a pose as people read it."""
+    """Return a pose in brackets, four digits a number."""
     return f"[{', '.join(f'{value:.4g}' for value in pose)}]"

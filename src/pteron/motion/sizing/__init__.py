@@ -1,1 +1,1 @@
-"""What a cycle asks of each drive, and which motors and ratios serve."""
+"""Sizing of drives: forces, speeds and energy over a cycle, and the motors and ratios that serve."""

@@ -17,7 +17,7 @@ from pteron.motion.sizing.result import Sizing
 from pteron.shapes import PerJoint
 
 _STILL = 1e-9
-"""Share of the fastest joint's acceleration below which a joint stands still, but for rounding."""
+"""Share of the fastest joint's acceleration below which a joint counts as still: rounding."""
 
 
 class Span(NamedTuple):

@@ -1,4 +1,4 @@
-"""Which motors of a list can drive which joint, at what ratio, and with what to spare."""
+"""Choice of motors: those of a list that can drive a joint, their ratios and their margins."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from pteron.motion.sizing.result import Sizing
 
 @dataclass(frozen=True)
 class Fit:
-    """How a motor suits a joint over a cycle.
+    """A motor at a joint over a cycle: the ratios at which it serves, and its margins.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class Fit:
 
     @property
     def scarcest(self) -> str:
-        """What the least margin is of: "rated torque", "peak torque" or "speed"."""
+        """The limit with the least margin: "rated torque", "peak torque" or "speed"."""
         margins = self._margins
         return min(margins, key=lambda name: margins[name])
 
@@ -126,7 +126,7 @@ def choose(sizing: Sizing, motors: Sequence[Motor], *, margin: float = 1.0) -> t
 
 
 def _place(fit: Fit) -> tuple[bool, float]:
-    """Return what fits are sorted by."""
+    """Return the sort key of a fit."""
     size = fit.motor.rated_torque * fit.motor.max_speed
     return not fit.fits, size if fit.fits else -fit.margin
 

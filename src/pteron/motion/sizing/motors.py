@@ -15,10 +15,10 @@ from pteron.tables import read_table
 from pteron.toml import read_toml, told, validated
 
 _FASTEST = 3000.0
-"""rad/s above which a motor's speed is doubted: 29 000 revolutions per minute."""
+"""Speed above which a motor is unlikely, rad/s: 29 000 revolutions per minute."""
 
 _SLUGGISH = 30.0
-"""Rated torque over rotor inertia, rad/s^2, below which they are doubted: servo motors have
+"""Rated torque over rotor inertia, rad/s^2, below which they are unlikely: servo motors have
 hundreds to tens of thousands."""
 
 _NUMBERS = ("rotor_inertia", "rated_torque", "peak_torque", "max_speed")
@@ -70,7 +70,7 @@ class Motor:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """What is possible but unlikely in it, most often a wrong unit, one line each."""
+        """Warnings of unlikely numbers, most often in a wrong unit, one line each."""
         found = []
         if self.max_speed > _FASTEST:
             found.append(

@@ -1,4 +1,4 @@
-"""What the drives do over a cycle: forces, speeds, power, energy, and inertia."""
+"""Forces, speeds, power, energy and inertia at the drives over a cycle."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     import polars as pl
 
 _NONE = 1e-9
-"""Share of the energy given that is none."""
+"""Share of the energy given below which the net energy counts as zero."""
 
 
 @dataclass(frozen=True, repr=False)
 class Sizing:
-    """What the drives of a machine do over one cycle: a motion, and perhaps a rest after it.
+    """The load on a machine's drives over one cycle: a motion, and perhaps a rest after it.
 
     Everything is at the joints, per leg: N and m/s of a slider, N m and rad/s of a crank, but for
     what is said to be at the motor. Forces are those of the drives: rigid bodies, friction, offset
@@ -139,22 +139,22 @@ class Sizing:
 
     @cached_property
     def given_energy(self) -> PerJoint:
-        """What each drive gives over the cycle while it drives, J."""
+        """Energy that each drive gives over the cycle while it drives, J."""
         return self.integral(np.maximum(self.power, 0.0))
 
     @cached_property
     def braked_energy(self) -> PerJoint:
-        """What each drive takes back over the cycle while it brakes, J, as a positive number."""
+        """Energy that each drive takes back over the cycle while it brakes, J, as a positive number."""
         return self.integral(np.maximum(-self.power, 0.0))
 
     @property
     def energy(self) -> PerJoint:
-        """What each drive gives over the cycle, less what it takes back, J."""
+        """Energy that each drive gives over the cycle, less what it takes back, J."""
         return np.asarray(self.given_energy - self.braked_energy)
 
     @property
     def net_energy(self) -> float:
-        """What all drives together give over the cycle, less what they take back, J.
+        """Energy that all drives together give over the cycle, less what they take back, J.
 
         It is what friction takes, and the motion leaves; 0 where it is none but for rounding.
         """
@@ -173,7 +173,7 @@ class Sizing:
 
     @property
     def drives(self) -> tuple[Drive, ...]:
-        """The drives; one that says nothing where the file has none."""
+        """The drives; an empty one where the file has none."""
         return tuple(leg.drive or Drive() for leg in self.robot.legs)
 
     @property
@@ -197,7 +197,7 @@ class Sizing:
 
     @cached_property
     def overloads(self) -> tuple[str, ...]:
-        """What is more than the drives can do, a line each: which leg, what, and by how much."""
+        """Loads beyond the drives' limits, a line each: which leg, which limit, and by how much."""
         found = list(overloads(self.robot, [self.peak_forces], self.speeds))
         legs = zip(self.robot.legs, self.drives, self.rms_forces, strict=True)
         for i, (leg, drive, rms) in enumerate(legs, start=1):

@@ -1,1 +1,1 @@
-"""Where the platform goes, and when: paths, time laws, cycles, and whether the machine can."""
+"""Trajectories of the platform: paths, time laws, cycles, and checks that the machine can follow."""

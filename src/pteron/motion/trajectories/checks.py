@@ -1,6 +1,6 @@
-"""Whether a machine can go a way at all: its reach, its joints' limits, and singularities between.
+"""Checks that a machine can follow a path: reach, limits of joints, and singularities.
 
-The way is a continuous one: its measures are followed between samples too, so that it does not jump
+The path is continuous: its measures are followed between samples too, so that none jumps
 over a place where it fails.
 """
 
@@ -28,14 +28,14 @@ _SAMPLES = 1001
 """Poses of a path that are looked at before its measures are followed between them."""
 
 _ROUNDING = 1e-9
-"""m, or rad, by which a joint may be beyond its limit: a pose on it is within."""
+"""Distance beyond a joint's limit that counts as rounding, m or rad."""
 
 _MILLIMETRES = 20.0
-"""A way that misses a leg's reach by so many times its size was perhaps given in millimetres."""
+"""Misses of a leg's reach by so many times its size suggest millimetres."""
 
 
 def check_path(robot: RobotLike, path: Path) -> None:
-    """Refuse a path that the machine cannot go.
+    """Refuse a path that the machine cannot follow.
 
     Parameters
     ----------
@@ -103,9 +103,9 @@ def check_way(
     marks: Array,
     place: Callable[[float], str],
 ) -> None:
-    """Refuse a way of poses (K, m) at a parameter (K,), by where it first fails.
+    """Refuse a curve of poses (K, m) over a parameter (K,), by its first failure.
 
-    `marks` are where it is looked at first, and `place` says in words where a parameter is.
+    `marks` are the parameters checked first, and `place` says in words where a parameter is.
     """
     expect_regular(robot)
     way = _Way(robot, poses, place)
@@ -123,7 +123,7 @@ def check_way(
 
 
 class _Way(NamedTuple):
-    """The way of a machine: poses (K, m) at a parameter (K,), and words for where that is."""
+    """A curve of poses (K, m) over a parameter (K,), and words for a place on it."""
 
     robot: Manipulator
     poses: Callable[[Array], Array]
@@ -140,7 +140,7 @@ class _Way(NamedTuple):
 
 
 class _Failure(NamedTuple):
-    """Where a way fails, and what is said of it."""
+    """The place where a curve fails, and the error that says so."""
 
     at: float
     error: PteronError

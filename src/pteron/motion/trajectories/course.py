@@ -1,4 +1,4 @@
-"""What moves in time, and can be slowed as a whole: a path by its time laws, or a curve."""
+"""Motions as functions of time that can be slowed as a whole: a path with time laws, or a curve."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from pteron.motion.trajectories.tool import Curve
 
 @dataclass(frozen=True)
 class Course:
-    """A path gone in time, from rest to rest to rest.
+    """A path traversed in time, from rest to rest.
 
     Attributes
     ----------
     path : Path
-        The way.
+        The path.
     durations : tuple of float
         Of each stretch between two rests, s.
     laws : tuple of Progress
-        How each of them is gone.
+        The time law of each of them.
     """
 
     path: Path
@@ -34,7 +34,7 @@ class Course:
 
     @property
     def duration(self) -> float:
-        """Of all stretches, s."""
+        """Duration of all stretches together, s."""
         return float(sum(self.durations))
 
     def slowed(self, factor: float) -> Course:
@@ -60,7 +60,7 @@ class Course:
 
 @dataclass(frozen=True)
 class Timed:
-    """A curve of poses over one unit of time, gone in so many seconds.
+    """A curve of poses over one unit of time, traversed in a given duration.
 
     Attributes
     ----------
@@ -85,11 +85,11 @@ class Timed:
 
 @runtime_checkable
 class InTime(Protocol):
-    """What moves, and can be slowed: a `Course`, or a curve that is `Timed`."""
+    """A motion in time that can be slowed: a `Course`, or a curve that is `Timed`."""
 
     @property
     def duration(self) -> float:
-        """How long it takes, s."""
+        """Duration, s."""
 
     def at(self, time: Array, /) -> Curve:
         """Return poses, velocities and accelerations, (T, m) each, at times (T,), s."""

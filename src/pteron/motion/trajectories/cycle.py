@@ -24,13 +24,13 @@ ACROSS = 0.305
 """Width of the standard cycle, m."""
 
 _LIFT_ENDS = 0.4
-"""Share of one way in which the platform rises, and again in which it sinks."""
+"""Share of the path out in which the platform rises, and again in which it sinks."""
 
 _ACROSS_BEGINS = 0.15
-"""Share of one way after which it sets off across: it rounds the corners, and saves time."""
+"""Share of the path out after which it sets off across: that rounds the corners and saves time."""
 
 _NONE = 1e-9
-"""A part of a vector, over the whole, that is none but for rounding."""
+"""Share of a vector below which a component counts as zero."""
 
 
 def quintic(tau: Array, begin: float, end: float) -> tuple[Array, Array, Array]:
@@ -93,7 +93,7 @@ class Cycle:
     scale: float
 
     def path(self, tau: Array) -> tuple[Array, Array, Array]:
-        """Return where the tool is from its middle (T, k), and two derivatives by tau.
+        """Return the tool's displacement from the middle (T, k), and two derivatives by tau.
 
         k is the number of the pose's lengths, tau (T,) in [0, 1].
         """
@@ -129,7 +129,7 @@ _Shares = tuple[Array, Array, Array]
 
 
 def _shares(tau: Array) -> tuple[_Shares, _Shares]:
-    """Return how far the way across and the lift are from half, and two derivatives by tau.
+    """Return the shares of the move across and of the lift, less a half, and two derivatives by tau.
 
     The first half of the time is the way out, the second the same path back.
     """

@@ -1,4 +1,4 @@
-"""The way of a pick-and-place cycle without its time, by its length."""
+"""The path of a pick-and-place cycle as a function of its length."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from pteron.motion.trajectories.path import path_weights
 from pteron.motion.trajectories.tool import Curve, pose_motion, tool_motion
 
 _EDGE = 1e-3
-"""Share of a cycle's move, at its ends, that is a straight line but for rounding."""
+"""Share of a cycle's move, at each end, that counts as a straight line."""
 
 _NODES = 2001
 
 
 class CyclePath:
-    """The way of a pick-and-place cycle from its one end to the other, by its length.
+    """The path of a pick-and-place cycle from one end to the other, as a function of its length.
 
     Parameters
     ----------
     cycle : Cycle
-        The cycle in time, of which the first half is the way out.
+        The cycle in time, whose first half is the path out.
     """
 
     def __init__(self, cycle: Cycle) -> None:
@@ -78,5 +78,5 @@ class CyclePath:
         return tau
 
     def place(self, s: float) -> str:
-        """Return where s is, as words."""
+        """Return in words where on the path s is."""
         return f"{s:.4g} m along its way of {self.length:.4g} m"

@@ -1,4 +1,4 @@
-"""What a curve of poses asks of joints and drives, whatever time it takes, and how fast it may be.
+"""Joint rates and drive forces along a curve of poses, and the largest speed within limits.
 
 Along a curve x(p) the drives' forces are c + a p'' + b p'^2, and what friction needs: dry friction
 by the sign of the joint's motion, viscous friction by its speed.
@@ -23,7 +23,7 @@ from pteron.motion.trajectories.tool import Curve, tool_motion
 _ROUNDING = 1e-12
 
 _CREEP = 1e-30
-"""The rate of a joint that reverses: next to none, either way."""
+"""Rate that stands for a joint that reverses, with either sign."""
 
 _HALVINGS = 50
 
@@ -38,7 +38,7 @@ _WORDS = {
 
 
 class Demand(NamedTuple):
-    """What K poses on a curve ask for, (K, n) each but for the tool's."""
+    """Joint motion and forces that K poses on a curve need, (K, n) each but for the tool's."""
 
     first: Array
     """dq/dp and d2q/dp2 of the joints."""
@@ -69,7 +69,7 @@ class Demand(NamedTuple):
 
 
 def demand(robot: Manipulator, pose: Array, first: Array, second: Array) -> Demand:
-    """Return what poses (K, m) on a curve, with these derivatives by p, ask for."""
+    """Return the demand of poses (K, m) on a curve with these derivatives by p."""
     rest = np.zeros_like(pose)
     weight = unchecked(robot, "inverse_dynamics", pose, rest, rest)
     rates = unchecked(robot, "joint_rates", pose, first)[0]
@@ -94,7 +94,7 @@ def demand(robot: Manipulator, pose: Array, first: Array, second: Array) -> Dema
 def demand_between(
     robot: Manipulator, states: Callable[[Array], Curve], at: Array
 ) -> tuple[Array, Demand, Array]:
-    """Return places on a curve, what they ask for and their poses (K, m): also where joints turn.
+    """Return places on a curve, their demand and poses (K, m): also where joints reverse.
 
     `states` gives the curve at places, which ascend. Where a joint reverses between two of them dry
     friction changes its sign, and a force jumps: that place is there twice, moving either way.
@@ -156,7 +156,7 @@ def most_rate(
     limited = np.isfinite(limits.force)
     if not limited.any():
         return least
-    # What each side of a drive's force has left: square p'^2 + root p' <= room.
+    # The margin on each side of a drive's force: square p'^2 + root p' <= margin.
     rows = []
     for dry in asked.dry:
         still = asked.still + dry * np.sign(asked.first)
@@ -185,7 +185,7 @@ def most_rate(
 
 
 def _expect_strength(robot: Manipulator, still: Array, limits: MotionLimits, poses: Array) -> None:
-    """Refuse a curve on which a drive is too weak to move as slowly as one likes."""
+    """Refuse a curve on which a drive cannot even creep."""
     over = np.abs(still) - limits.force
     if not (over >= 0.0).any():
         return
@@ -245,7 +245,7 @@ def peaks(
     pose, velocity, acceleration : array, shape (T, m)
         The motion; m, rad and s.
     limits : MotionLimits
-        What stands beside them.
+        The limits beside them.
 
     Returns
     -------

@@ -54,8 +54,8 @@ def jerk_limited(
     jerk : float or sequence of n floats
         Most change of the joints' accelerations, m/s^3 or rad/s^3.
     limits : MotionLimits, optional
-        What joints, drives and tool can do; every joint needs an acceleration. By default what the
-        machine's drives say.
+        Of joints, drives and tool; every joint needs an acceleration. By default those of the
+        machine's drives.
     step : float
         Time between samples, s.
 

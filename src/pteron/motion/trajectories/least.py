@@ -1,4 +1,4 @@
-"""Where measures of a way are least, between its samples too, and where they first go too low."""
+"""Minima of measures along a path, between samples too, and the first place below a bound."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import numpy as np
 from pteron.kernels import Array
 
 _VALLEYS = 3
-"""How many of a measure's lowest places are looked into more closely."""
+"""Number of a measure's lowest local minima that are refined."""
 
 _FINER = 33
 _ZOOMS = 4
-"""Each time the place of a least value is known 16 times as well."""
+"""Points and rounds of the refinement: a round narrows the interval 16 times."""
 
 _HALVINGS = 50
 
@@ -21,7 +21,7 @@ _HALVINGS = 50
 def least_along(
     measure: Callable[[Array], Array], marks: Array, enough: float
 ) -> tuple[Array, Array]:
-    """Return where each column of a measure (K, c) is least along a way, and how much: (c,) each.
+    """Return where each column of a measure (K, c) is least along a path, and its value, (c,) each.
 
     Its lowest valleys among the marks are looked into, finer and finer, if it may go below
     `enough` there: between two marks it changes by no more than twice what it does elsewhere.
@@ -49,7 +49,7 @@ def least_along(
 def first_below(
     measure: Callable[[Array], Array], marks: Array, least: float
 ) -> tuple[float, int, float] | None:
-    """Return where a measure (K, c) first goes below a value, of which column, and its value."""
+    """Return where a measure (K, c) first goes below a bound, in which column, and its value."""
     places, lowest = least_along(measure, marks, least)
     columns = np.flatnonzero(lowest < least)
     if not len(columns):

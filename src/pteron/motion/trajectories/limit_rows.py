@@ -1,4 +1,4 @@
-"""The limits of a motion along a path, as what is linear in s'' and s'^2 but for friction."""
+"""The limits of a motion along a path as rows linear in s'' and s'^2, but for friction."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ class LimitRows(NamedTuple):
     most: Array
 
     def used(self, u: Array, x: Array) -> Array:
-        """Return the share of each limit that s'' and s'^2, (K,) each, take, (K, R)."""
+        """Return the share of each limit that s'' and s'^2, (K,) each, use, (K, R)."""
         u, x = u[:, None], x[:, None]
         return np.asarray(self.a * u + self.b * x + self.c + self.v * np.sqrt(x))
 
 
 def limit_rows(asked: Demand, limits: MotionLimits, unit: float) -> LimitRows:
-    """Return what a stretch asks at points of it, its limits taken as 1, times in `unit`."""
+    """Return the demand at points of a stretch over its limits, with times in `unit`."""
     count = len(asked.first)
     none = np.zeros((count, 0))
     a, b, c, v = [none], [none], [none], [none]

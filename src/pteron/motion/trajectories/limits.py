@@ -1,4 +1,4 @@
-"""What a motion must keep: limits of the joints, of the drives, and of the tool."""
+"""Limits of a motion: of the joints, of the drives, and of the tool."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ PerJointLimit = float | Sequence[float] | Array | None
 
 @dataclass(frozen=True, eq=False)
 class MotionLimits:
-    """Largest sizes of what moves; infinite where there is no limit. Made by `limits_of`.
+    """Largest speeds, accelerations and forces, infinite without a limit. Made by `limits_of`.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class MotionLimits:
 
     @property
     def bounds_acceleration(self) -> bool:
-        """Whether anything keeps accelerations finite."""
+        """Whether any limit bounds the acceleration."""
         finite = np.isfinite([*self.acceleration, *self.force, self.tool_acceleration])
         return bool(finite.any())
 

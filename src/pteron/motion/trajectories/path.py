@@ -22,35 +22,35 @@ from pteron.motion.trajectories.tool import Curve, pose_motion, tool_motion
 from pteron.platforms import Platform
 
 TURN = 0.1
-"""Metres of a path that a radian counts as."""
+"""Length of path that one radian of the platform's rotation counts as, m."""
 
 _SAME = 1e-9
-"""Metres of a path that are none."""
+"""Lengths of path below this count as zero, m."""
 
 _SHARP = -0.9
 """Cosine between the directions before and after a corner below which the platform stops there."""
 
 _STRAIGHT = 1.0 - 1e-12
-"""The same, above which there is no corner."""
+"""Cosine above which the path counts as straight there."""
 
 
 @runtime_checkable
 class Path(Protocol):
-    """A way of the platform, by the metres s that the tool has gone on it."""
+    """A path of the platform as a function of s, the metres that the tool has moved along it."""
 
     @property
     def length(self) -> float:
-        """Where it ends, m."""
+        """Its length, m."""
 
     @property
     def rests(self) -> tuple[float, ...]:
-        """Where the platform stops, ascending: 0, the length, and what is between them."""
+        """The values of s where the platform stops, ascending, from 0 to the length."""
 
     def at(self, s: Array) -> Curve:
         """Return poses (T, m) at s (T,), and two derivatives by s."""
 
     def place(self, s: float) -> str:
-        """Return where s is, as words."""
+        """Return in words where on the path s is."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class LinePath:
 
     @property
     def length(self) -> float:
-        """Where it ends, m."""
+        """Its length, m."""
         return float(self.knots[-1])
 
     def at(self, s: Array) -> Curve:
@@ -96,7 +96,7 @@ class LinePath:
         return pose_motion(self.platform, *curve)
 
     def place(self, s: float) -> str:
-        """Return where s is, as words."""
+        """Return in words where on the path s is."""
         k = int(np.clip(np.searchsorted(self.corners, s, side="right"), 1, len(self.corners) - 1))
         between = f", between poses {k} and {k + 1}" if len(self.corners) > 2 else ""
         return f"{s:.4g} m along its {self.length:.4g} m{between}"
@@ -163,7 +163,7 @@ def line_path(robot: RobotLike, poses: ArrayLike, corner: float = 0.0) -> LinePa
 
 
 def path_weights(platform: Platform) -> Array:
-    """Return metres of a path (m,) that a unit of each of the pose's coordinates counts as."""
+    """Return the length of path (m,) that a unit of each coordinate counts as: m/m or m/rad."""
     return np.array([TURN if name == "phi" else 1.0 for name in platform.coordinates])
 
 
@@ -200,12 +200,12 @@ def _rounded(
 
 
 class BackPath:
-    """A path and the same way back.
+    """A path, and the same path back.
 
     Parameters
     ----------
     out : Path
-        The way out.
+        The path out.
     """
 
     def __init__(self, out: Path) -> None:
@@ -221,14 +221,14 @@ class BackPath:
         return pose, np.where(back[:, None], -first, first), second
 
     def place(self, s: float) -> str:
-        """Return where s is, as words."""
+        """Return in words where on the path s is."""
         if s <= self._out.length:
             return self._out.place(s)
         return f"{self._out.place(self.length - s)}, on the way back"
 
 
 def there_and_back(path: Path) -> BackPath:
-    """Return the path and, after a rest at its end, the same way back."""
+    """Return the path and, after a rest at its end, the same path back."""
     return BackPath(path)
 
 

@@ -22,12 +22,12 @@ from pteron.shapes import PoseLike
 from pteron.workspace import home_pose
 
 PEAK_ACCELERATION = 10.0
-"""Of the tool's centre point, where no duration is given, m/s^2."""
+"""Largest acceleration of the tool's centre point where no duration is given, m/s^2."""
 
 
 @dataclass(frozen=True, repr=False)
 class PickAndPlace(Motion):
-    """A pick-and-place cycle: up, across and down, and the same way back.
+    """A pick-and-place cycle: up, across and down, and the same path back.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ def pick_and_place(
 ) -> PickAndPlace:
     """Return the standard pick-and-place cycle: 25 mm up, 305 mm across, 25 mm down, and back.
 
-    It is the way of the tool's centre point, `platform.tool`; P goes along where that needs it. Up
+    It is the path of the tool's centre point, `platform.tool`; P follows where that needs it. Up
     is against gravity, or along the platform's axis where there is none. A planar machine goes the
     cycle in its plane: up is then against what gravity does there or, in a horizontal plane, at a
     right angle to across. Each move is a quintic in time; they overlap, so that the corners are
@@ -145,7 +145,7 @@ def pick_and_place(
 
 
 def cycle_path(found: PickAndPlace) -> BackPath:
-    """Return the way of a pick-and-place cycle, out and back, without its time.
+    """Return the path of a pick-and-place cycle, out and back, without its time.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How a stretch is gone with piecewise constant acceleration, and with that averaged."""
+"""Time laws of piecewise constant acceleration, and their averages over a window."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pteron.kernels import Array
 
 
 class Profile(NamedTuple):
-    """s(t) of constant accelerations between nodes (K,): what TOPP-RA finds."""
+    """s(t) with constant accelerations between nodes (K,), as TOPP-RA finds it."""
 
     time: Array
     s: Array
@@ -30,7 +30,7 @@ class Profile(NamedTuple):
 
     @property
     def duration(self) -> float:
-        """From rest to rest, in units."""
+        """Duration from rest to rest, in units."""
         return float(self.time[-1])
 
     def spread(self, h: float) -> Callable[[Array], tuple[Array, Array, Array]]:
@@ -61,7 +61,7 @@ class Profile(NamedTuple):
         )
 
     def _moments(self, t: Array, h: float) -> tuple[Array, Array, Array]:
-        """Return what s'' from t to t + h, h of either sign, adds to s(t + h) and its integrals.
+        """Return the parts of s(t + h) and its integrals due to s'' between t and t + h, h of any sign.
 
         The integrals of (h - r)^k / k! s''(t + r) over r, k = 1, 2 and 3: small where h is, so that
         averages are exact to rounding however little they take in.

@@ -28,11 +28,11 @@ TURN = np.pi / 3.0
 
 _DIRECTIONS = 12
 _SAMPLES = 501
-"""Poses checked on the way across; the way back is the same path."""
+"""Poses checked on the path out; the path back is the same."""
 
 _DIP = 1e-4
-"""By how much, in units of the reserve, m and rad, a limit is kept clear: more than a reserve or a
-joint can dip between two checked poses."""
+"""Safety margin between checked poses, in units of the reserve, m and rad: more than a reserve or a
+joint can dip between two of them."""
 
 _STEPS = 1000
 """The scale is a multiple of one thousandth."""

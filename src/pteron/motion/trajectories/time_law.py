@@ -1,4 +1,4 @@
-"""Motions along a path: by a polynomial between rests, in a given time or the shortest."""
+"""Time laws: a path or a curve traversed in a given duration, or the shortest within limits."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ _LOOK = 2001
 """Samples of a motion at which the shortest time for it is decided."""
 
 KEPT = 1.0 + 1e-9
-"""Share of a limit that counts as kept, for rounding."""
+"""Share of a limit up to which it counts as kept: rounding."""
 
 _FINER = 10
-"""How much finer than its samples a motion is checked."""
+"""Points at which a motion is checked, over its samples."""
 
 _TRIES = 8
-"""How often a motion is slowed until it keeps its limits: once or twice, but for rounding."""
+"""Most times that a motion is slowed until it keeps its limits: rounding aside once or twice."""
 
 
 def shortest(
@@ -130,7 +130,7 @@ def along(
         Of the whole, s, shared among the stretches between rests as their shortest ones are; by
         default the shortest that keeps the limits, each stretch its own.
     limits : MotionLimits, optional
-        What joints, drives and tool can do; by default what the machine's drives say.
+        Of joints, drives and tool; by default those of the machine's drives.
     law : {"quintic", "seventh"}
         The polynomial's degree; see `polynomial`.
     step : float
@@ -202,7 +202,7 @@ def stretch_times(
 
 
 def too_short(robot: Manipulator, course: InTime, limits: MotionLimits, least: float) -> DataError:
-    """Return what is said of a duration in which limits are passed: which joint's, by how much."""
+    """Return the error for a duration that is too short: the worst limit, and by how much."""
     time = np.linspace(0.0, course.duration, _LOOK)
     worst = max(peaks(robot, *course.at(time), limits), key=lambda peak: peak.share)
     return DataError(

@@ -43,11 +43,11 @@ _EVEN = 0.3
 """Share of the grid's spacing that is even."""
 
 _PASSES = 4
-"""How often a stretch is solved, each time with less room where the time before exceeds a limit."""
+"""Passes over a stretch, each with tighter limits where the pass before exceeds one."""
 
 _AHEAD = (math.inf, 4.0, 2.0, 1.4, 1.2, 1.1, 1.05)
-"""With viscous friction it is solved before, each time no faster than so many times the s'^2 of the
-time before: the chord is then the closer."""
+"""With viscous friction passes come before, each bounded by so many times the s'^2 of the
+pass before: the chord is then the closer."""
 
 _SLOWER = (1.0, 0.5, 0.25, 0.1)
 """Speeds over the quintic's from which on it is: one so slow that less friction helps to brake."""
@@ -62,14 +62,14 @@ _SHARE = 0.02
 """The same, as the share of a stretch's time that it is at most."""
 
 _SPARE = 1e-3
-"""Share of a limit that is left for what is between samples."""
+"""Share of a limit that is kept as a margin between samples."""
 
 _LOOK = 2001
-"""Points of a stretch at which its limits are held against it."""
+"""Points of a stretch at which its limits are checked."""
 
 _NOTHING = 1e-6
-"""Share of a limit, for s'' or s'^2 of 1, that the solver takes for neither nothing nor something;
-what it is to nothing is held against the limit afterwards."""
+"""Coefficients below this are set to zero for the solver, which cannot tell them from zero;
+the limits are checked with them afterwards."""
 
 _SLOWEST = 1e-4
 """Share of the largest s'^2 below which no tangent of its root is taken."""
@@ -111,7 +111,7 @@ def time_optimal(
     path : Path
         Such as `line_path` makes.
     limits : MotionLimits, optional
-        What joints, drives and tool can do; by default what the machine's drives say.
+        Of joints, drives and tool; by default those of the machine's drives.
     step : float
         Time between samples, s.
 
@@ -158,13 +158,13 @@ def time_optimal(
 
 
 class _Stretch(NamedTuple):
-    """How a stretch between two rests is gone, its duration, and TOPP-RA's, s."""
+    """The time law of a stretch between two rests, its duration, and TOPP-RA's, s."""
 
     progress: Callable[[Array], tuple[Array, Array, Array]]
     duration: float
     bound: float
     slower: float
-    """By what its limits, where it exceeds them, slow it."""
+    """Factor by which it must be slowed to keep its limits; 1 where it does."""
 
 
 def _fastest(
@@ -176,7 +176,7 @@ def _fastest(
     step: float,
     toppra: Any,
 ) -> _Stretch:
-    """Return how a stretch is gone fastest; times are counted in `unit`, s, and s in its length."""
+    """Return the fastest time law of a stretch; times are counted in `unit`, s, and s in its length."""
     begin, end = path.rests[j : j + 2]
     # Denser towards the rests, where the motion stays long; much denser, and TOPP-RA loses digits.
     even = np.linspace(0.0, 1.0, _GRID + 1)

@@ -1,4 +1,4 @@
-"""The tool's centre point: its motion from the platform's, and the platform's from its."""
+"""Motion of the tool's centre point from that of the platform, and the inverse."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def tool_motion(platform: Platform, pose: Array, first: Array, second: Array) ->
 
 
 def pose_motion(platform: Platform, place: Array, first: Array, second: Array) -> Curve:
-    """Return the poses whose tool moves so: the inverse of `tool_motion`."""
+    """Return the poses from the motion of the tool: the inverse of `tool_motion`."""
     return _moved(platform, (place, first, second), -1.0)
 
 
@@ -38,7 +38,7 @@ def _moved(platform: Platform, curve: Curve, side: float) -> Curve:
 
 
 def turning_arm(platform: Platform, angle: Array) -> tuple[Array, Array]:
-    """Return what of the way from P to the tool turns, at angles (..., 1), and d/d angle."""
+    """Return the arm from P to the tool that turns, at angles (..., 1), and its derivative."""
     x, y = (platform.directions @ axis for axis in platform.frame[:2])
     a, b = (
         platform.tool[0] * x + platform.tool[1] * y,
