@@ -144,7 +144,7 @@ class Sizing:
 
     @cached_property
     def braked_energy(self) -> PerJoint:
-        """Energy that each drive takes back over the cycle while it brakes, J, as a positive number."""
+        """Energy that each drive takes back over the cycle while it brakes, J, 0 or more."""
         return self.integral(np.maximum(-self.power, 0.0))
 
     @property

@@ -1,1 +1,1 @@
-"""Trajectories of the platform: paths, time laws, cycles, and checks that the machine can follow."""
+"""Trajectories of the platform: paths, time laws, cycles, and checks of them."""

@@ -129,9 +129,9 @@ _Shares = tuple[Array, Array, Array]
 
 
 def _shares(tau: Array) -> tuple[_Shares, _Shares]:
-    """Return the shares of the move across and of the lift, less a half, and two derivatives by tau.
+    """Return the shares of the moves across and up, less a half, and two derivatives by tau.
 
-    The first half of the time is the way out, the second the same path back.
+    The first half of the time is the path out, the second the same path back.
     """
     way = np.where(tau <= 0.5, 2.0 * tau, 2.0 - 2.0 * tau)
     rate = np.where(tau <= 0.5, 2.0, -2.0)

@@ -61,7 +61,7 @@ class Profile(NamedTuple):
         )
 
     def _moments(self, t: Array, h: float) -> tuple[Array, Array, Array]:
-        """Return the parts of s(t + h) and its integrals due to s'' between t and t + h, h of any sign.
+        """Return the parts of s(t + h) and its integrals due to s'' from t to t + h, h of any sign.
 
         The integrals of (h - r)^k / k! s''(t + r) over r, k = 1, 2 and 3: small where h is, so that
         averages are exact to rounding however little they take in.

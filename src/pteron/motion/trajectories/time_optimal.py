@@ -176,7 +176,7 @@ def _fastest(
     step: float,
     toppra: Any,
 ) -> _Stretch:
-    """Return the fastest time law of a stretch; times are counted in `unit`, s, and s in its length."""
+    """Return the fastest time law of a stretch; times are in `unit`, s in its length."""
     begin, end = path.rests[j : j + 2]
     # Denser towards the rests, where the motion stays long; much denser, and TOPP-RA loses digits.
     even = np.linspace(0.0, 1.0, _GRID + 1)
