@@ -1,4 +1,4 @@
-"""Arguments and options that several subcommands share, and the numbers and machines in them."""
+"""Arguments and options that several subcommands share, and how they are read."""
 
 from __future__ import annotations
 
@@ -18,9 +18,12 @@ if TYPE_CHECKING:
 
 
 def option(name: str, help: str, metavar: str | None = None, **more: Any) -> Any:  # noqa: A002
-    """Return an option by what it is called, what its help says, and what stands for its value."""
+    """Return an option with its name, its help, and the word that stands for its value there."""
     return Option(f"--{name}", help=help, metavar=metavar, **more)
 
+
+STANDARD = "adept"
+"""The name of the pick-and-place cycle of 25, 305 and 25 mm."""
 
 Robot = Annotated[
     str,
@@ -37,16 +40,35 @@ TableFile = Annotated[
     option("table", "Take a .csv or .parquet file's rows; - is CSV on standard input.", "FILE"),
 ]
 Failure = Literal["raise", "nan"]
-"""What becomes of a row that cannot be served."""
+"""Whether a row that fails ends the command or is left empty."""
 OnFailure = Annotated[
     Failure, option("on-failure", "Stop at a row that fails, or leave its results empty.")
 ]
 Elbows = Annotated[
     str | None, option("elbows", "The working mode, one sign a leg, such as ++-+.", "SIGNS")
 ]
+Payload = Annotated[float, option("payload", "At the tool's centre point, kg.")]
+Cycle = Annotated[
+    str,
+    option(
+        "cycle", f"{STANDARD}, the standard pick-and-place cycle, or a table of a motion.", "CYCLE"
+    ),
+]
+Duration = Annotated[
+    float | None,
+    option("duration", "Of the standard cycle, s.", show_default="10 m/s^2 at the tool"),
+]
+Scheduler = Annotated[
+    str | None,
+    option(
+        "scheduler",
+        "A Dask cluster that does the work, tcp://host:8786; it has no lock of its own.",
+        "ADDRESS",
+    ),
+]
 
 MOTION = ("--pose", "--velocity", "--acceleration", "--wrench")
-"""The parts of a state that is typed."""
+"""The options that give a state."""
 
 VECTORS = (*MOTION, "--from", "--to", "--around", "--speed", "--force", "--jerk")
 """The options that take as many numbers as follow them."""
@@ -178,6 +200,12 @@ def load_robot(name_or_path: str, elbows: str | None = None) -> Manipulator:
             f"leg of {robot.name}, such as {signs(robot)}"
         )
     return with_elbows(robot, [int(f"{sign}1") for sign in elbows])
+
+
+def check_rate(rate: float) -> None:
+    """Refuse a rate that is none."""
+    if not 0.0 < rate < math.inf:
+        raise DataError(f"--rate: {rate:g} given, samples a second above 0 expected")
 
 
 def signs(robot: Manipulator) -> str:

@@ -8,7 +8,8 @@ from typer import Exit, echo
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
 from pteron.cli.completion import parameters
-from pteron.cli.terminal import is_terminal, plain, show, show_json, spinner, table
+from pteron.cli.progress import spinner
+from pteron.cli.terminal import is_terminal, plain, show, show_json, table
 
 if TYPE_CHECKING:
     from pteron.reduction import BaseParameters
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 Format = Literal["text", "sympy", "latex", "booktabs", "json"]
 
 _COMMENTS = {"sympy": "#", "latex": "%", "booktabs": "%"}
-"""What begins a line that is for the reader, not for SymPy or LaTeX."""
+"""Signs before a comment."""
 
 
 def base(
@@ -73,8 +74,7 @@ def base(
         if format == "booktabs":
             echo(found.to_latex(symbols=written))
         else:
-            for expression in found.expressions(format, symbols=written):
-                echo(str(expression))
+            echo("\n".join(map(str, found.expressions(format, symbols=written))))
         for line in _closing(found, written):
             echo(f"{_COMMENTS[format]} {line}")
 
@@ -85,15 +85,13 @@ def _show(found: BaseParameters, symbols: Symbols) -> None:
     if not is_terminal():
         show(*(plain(line) for line in expressions), "", *closing)
         return
-    made = table("", "base parameter", "value", "unit", numbers=("", "value"))
-    for i, (line, value, column) in enumerate(
-        zip(expressions, found.values(), found.kept, strict=True), start=1
-    ):
-        made.add_row(str(i), plain(line), f"{value:.5g}", found.parameters[column].unit)
+    units = [found.parameters[column].unit for column in found.kept]
+    columns = zip(expressions, found.values(), units, strict=True)
+    rows = ((str(i), plain(e), f"{v:.5g}", u) for i, (e, v, u) in enumerate(columns, start=1))
     show(
         f"[bold]{plain(found.robot.name)}[/bold]: {found.rank} base parameters of "
         f"{len(found.columns)} inertial parameters",
-        made,
+        table("", "base parameter", "value", "unit", rows=rows, numbers=("", "value")),
         *closing,
     )
 
@@ -103,7 +101,7 @@ def _geometry(found: BaseParameters, symbols: Symbols) -> dict[str, float]:
 
 
 def _closing(found: BaseParameters, symbols: Symbols) -> list[str]:
-    """Return what the symbols stand for, if there are any, and the proof."""
+    """Return the values of the symbols, if there are any, and the proof."""
     lines = []
     if symbols:
         given = _geometry(found, symbols)
@@ -125,20 +123,21 @@ def _closing(found: BaseParameters, symbols: Symbols) -> list[str]:
 def table1(json: Json = False) -> None:
     """Print the paper's Table 1, as printed and as computed; exit with 1 if they disagree."""
     with spinner("Computing Table 1"):
-        from pteron.report.table1 import rows
+        from pteron.report.table1 import rows as computed
 
-        found = rows()
+        found = computed()
     wrong = sum(not row.agrees for row in found)
     if json:
         names = ("parameter", "kept", "printed", "computed", "agrees", "restored")
         show_json([{name: getattr(row, name) for name in names} for row in found])
     else:
-        made = table("", "printed", "computed", "agrees")
-        for row in found:
-            verdict = "yes" if row.agrees else "[bold red]NO[/bold red]"
-            verdict += " *" if row.restored else ""
-            made.add_row(row.parameter, plain(row.printed), plain(row.computed), verdict)
+        verdicts = {True: "yes", False: "[bold red]NO[/bold red]"}
+        rows = (
+            (r.parameter, *map(plain, (r.printed, r.computed)), verdicts[r.agrees] + " *" * r.restored)
+            for r in found
+        )
         note = "* damaged in the scan of the paper; restored from its legible rows"
-        show(made, f"{len(found) - wrong} of {len(found)} rows agree.", note)
+        agree = f"{len(found) - wrong} of {len(found)} rows agree."
+        show(table("", "printed", "computed", "agrees", rows=rows), agree, note)
     if wrong:
         raise Exit(1)

@@ -1,4 +1,4 @@
-"""What a shell completes: machines, parameters and functions; files it completes by itself."""
+"""Completion in the shell: machines, parameters, functions and indices; files it has itself."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from pathlib import Path
 
 from typer import Context
 
+from pteron.cli.exported_functions import FUNCTIONS
 from pteron.errors import PteronError
 
 
@@ -28,8 +29,6 @@ def machines(incomplete: str) -> list[str]:
 
 def functions(incomplete: str) -> list[str]:
     """Return the functions that can be exported and begin so."""
-    from pteron.cli.export import FUNCTIONS
-
     return [name for name in FUNCTIONS if name.startswith(incomplete)]
 
 

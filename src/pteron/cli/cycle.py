@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pteron.cli.arguments import (
     Elbows,
     Json,
+    Payload,
     Robot,
+    check_rate,
     load_robot,
     option,
     parsed_list,
 )
-from pteron.cli.motion_argument import loaded, replayed
+from pteron.cli.motion_argument import given_pose, loaded, replayed
 from pteron.cli.motion_table import motion_frame, peaks_table
-from pteron.cli.planned_motions import given_pose, joint_motion, line_motion, standard_motion
-from pteron.cli.terminal import note, plain, show, show_json, spinner
+from pteron.cli.planned_motions import joint_motion, line_motion, standard_motion
+from pteron.cli.progress import spinner
+from pteron.cli.terminal import note, show, show_json, written
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
@@ -25,105 +29,74 @@ if TYPE_CHECKING:
 Kind = Literal["adept", "line", "joints", "replay"]
 
 _ROUNDING = 1e-6
+"""Share of a limit by which a motion may exceed it without a note."""
 
 _DENSE = 10
-"""How much finer than its samples a motion's peaks are sought."""
+"""Moments per sample at which a motion's peaks are sought."""
 
-
-def _poses(name: str, text: str) -> Any:
-    return option(name, text, "POSE", show_default=False, rich_help_panel="Way")
-
-
-def _limit(name: str, text: str, **more: Any) -> Any:
-    return option(name, text, "NUMBERS", rich_help_panel="Limits", **more)
-
-
-def _of_drives(name: str, text: str, default: str) -> Any:
-    return _limit(name, text, show_default=default)
+_way, _time, _limit = (partial(option, rich_help_panel=p) for p in ("Way", "Time", "Limits"))
+_pose = partial(_way, metavar="POSE", show_default=False)
+_numbers = partial(_limit, metavar="NUMBERS")
 
 
 def cycle(
     robot: Robot,
     kind: Annotated[
         Kind | None,
-        option(
+        _way(
             "kind",
             "The pick-and-place cycle, straight lines, the joints' own way, or a table's motion.",
             show_default="adept, or what --to, --via or --table says",
-            rich_help_panel="Way",
         ),
     ] = None,
     from_: Annotated[
-        str | None, _poses("from", "Where it begins; the home pose if left out.")
+        str | None, _pose("from", "Where it begins; the home pose if left out.")
     ] = None,
-    to: Annotated[str | None, _poses("to", "Where it ends.")] = None,
+    to: Annotated[str | None, _pose("to", "Where it ends.")] = None,
     via: Annotated[
-        str | None,
-        option("via", "Poses to pass, a .csv or .parquet file.", "FILE", rich_help_panel="Way"),
+        str | None, _way("via", "Poses to pass, a .csv or .parquet file.", "FILE")
     ] = None,
     corner: Annotated[
-        float,
-        option(
-            "corner",
-            "Metres before a pose at which its corner is rounded; 0 stops there.",
-            rich_help_panel="Way",
-        ),
+        float, _way("corner", "Metres before a pose at which its corner is rounded; 0 stops there.")
     ] = 0.0,
-    back: Annotated[bool, option("back", "And the same way back.", rich_help_panel="Way")] = False,
+    back: Annotated[bool, _way("back", "And the same way back.")] = False,
     around: Annotated[
-        str | None, _poses("around", "The middle of adept; the home pose if left out.")
+        str | None, _pose("around", "The middle of adept; the home pose if left out.")
     ] = None,
     scale: Annotated[
         float | None,
-        option(
-            "scale",
-            "Of adept, 25 x 305 mm at 1.",
-            show_default="the largest that fits",
-            rich_help_panel="Way",
-        ),
+        _way("scale", "Of adept, 25 x 305 mm at 1.", show_default="the largest that fits"),
     ] = None,
     file: Annotated[
-        str | None,
-        option(
-            "table", "A motion to replay: t and poses, or joints.", "FILE", rich_help_panel="Way"
-        ),
+        str | None, _way("table", "A motion to replay: t and poses, or joints.", "FILE")
     ] = None,
     duration: Annotated[
         float | None,
-        option(
-            "duration",
-            "Of all of it, s.",
-            show_default="the shortest within the limits",
-            rich_help_panel="Time",
-        ),
+        _time("duration", "Of all of it, s.", show_default="the shortest within the limits"),
     ] = None,
-    optimal: Annotated[
-        bool, option("optimal", "As fast as the limits allow.", rich_help_panel="Time")
-    ] = False,
+    optimal: Annotated[bool, _time("optimal", "As fast as the limits allow.")] = False,
     law: Annotated[
-        Literal["quintic", "seventh"],
-        option("law", "Of a line, by the polynomial's degree.", rich_help_panel="Time"),
+        Literal["quintic", "seventh"], _time("law", "Of a line, by the polynomial's degree.")
     ] = "quintic",
-    rate: Annotated[float, option("rate", "Samples a second.", rich_help_panel="Time")] = 1000.0,
+    rate: Annotated[float, _time("rate", "Samples a second.")] = 1000.0,
     speed: Annotated[
-        str | None, _of_drives("speed", "Of the joints, m/s or rad/s.", "the drives'")
+        str | None,
+        _numbers("speed", "Of the joints, m/s or rad/s.", show_default="the drives'"),
     ] = None,
     acceleration: Annotated[
-        str | None, _limit("acceleration", "Of the joints, the same per s.", show_default=False)
+        str | None, _numbers("acceleration", "Of the joints, the same per s.", show_default=False)
     ] = None,
     force: Annotated[
-        str | None, _of_drives("force", "Of the drives, N or N m.", "the drives'")
+        str | None, _numbers("force", "Of the drives, N or N m.", show_default="the drives'")
     ] = None,
     jerk: Annotated[
-        str | None, _limit("jerk", "Of joints, with --kind joints.", show_default=False)
+        str | None, _numbers("jerk", "Of joints, with --kind joints.", show_default=False)
     ] = None,
-    tool_speed: Annotated[
-        float | None, option("tool-speed", "Of the tool, m/s.", rich_help_panel="Limits")
-    ] = None,
+    tool_speed: Annotated[float | None, _limit("tool-speed", "Of the tool, m/s.")] = None,
     tool_acceleration: Annotated[
-        float | None, option("tool-acceleration", "Of the tool, m/s^2.", rich_help_panel="Limits")
+        float | None, _limit("tool-acceleration", "Of the tool, m/s^2.")
     ] = None,
-    payload: Annotated[float, option("payload", "A mass at the tool's centre point, kg.")] = 0.0,
+    payload: Payload = 0.0,
     out: Annotated[
         str | None, option("out", "Write its samples to a .csv or .parquet file.", "FILE")
     ] = None,
@@ -144,8 +117,7 @@ def cycle(
     from pteron.motion import limits_of
 
     machine = loaded(load_robot(robot, elbows), payload)
-    if not 0.0 < rate < float("inf"):
-        raise DataError(f"--rate: {rate} given, samples a second above 0 expected")
+    check_rate(rate)
     if out is not None:
         from pteron.tables import check_output
 
@@ -182,9 +154,8 @@ def cycle(
         if way == "replay":
             if file is None:
                 raise DataError("no motion given; give --table FILE")
-            motion = replayed(
-                machine, file, None if from_ is None else given_pose(machine, from_, "--from")
-            )
+            start = None if from_ is None else given_pose(machine, from_, "--from")
+            motion = replayed(machine, file, start)
         elif way == "joints":
             motion = joint_motion(machine, from_, to, parsed_list(jerk, "--jerk"), limits, step)
         elif way == "line":
@@ -197,7 +168,7 @@ def cycle(
 
 
 def _expect_fitting(way: str, given: dict[str, tuple[Any, tuple[str, ...]]]) -> None:
-    """Refuse options that a kind of motion has no use for."""
+    """Refuse options of another kind of motion."""
     for name, (value, kinds) in given.items():
         if value not in (None, False, 0.0) and way not in kinds:
             raise DataError(
@@ -220,10 +191,9 @@ def _deliver(
 
     from pteron.motion import peaks
 
-    fine = motion.at(
-        np.linspace(float(motion.time[0]), float(motion.time[-1]), _DENSE * len(motion.time) - 9)
-    )
-    found = peaks(machine, *fine, limits)
+    count = _DENSE * (len(motion.time) - 1) + 1
+    fine = np.linspace(float(motion.time[0]), float(motion.time[-1]), count)
+    found = peaks(machine, *motion.at(fine), limits)
     for peak in found:
         if peak.share > 1.0 + _ROUNDING:  # of a motion that came in a table
             note(f"Note: {peak.told()}")
@@ -233,39 +203,26 @@ def _deliver(
         write_table(motion_frame(machine, motion), out)
     bound = getattr(motion, "polynomial", None)
     if as_json:
-        show_json(
-            {
-                "robot": machine.name,
-                "kind": way,
-                "payload": payload,
-                "duration": motion.duration,
-                "samples": len(motion.time),
-                "start": motion.pose[0].tolist(),
-                "end": motion.pose[-1].tolist(),
-                "quintic_duration": bound,
-                "scale": getattr(motion, "scale", None),
-                "peaks": [
-                    {
-                        "quantity": peak.name,
-                        "leg": peak.leg or None,
-                        "size": peak.size,
-                        "unit": peak.unit,
-                        "limit": peak.limit if np.isfinite(peak.limit) else None,
-                        "share": peak.share,
-                    }
-                    for peak in found
-                ],
-                "file": out,
-            }
-        )
+        keys = ("quantity", "leg", "size", "unit", "limit", "share")
+        rows = ((p.name, p.leg or None, p.size, p.unit, p.limit, p.share) for p in found)
+        data = {
+            "robot": machine.name,
+            "kind": way,
+            "payload": payload,
+            "duration": motion.duration,
+            "samples": len(motion.time),
+            "start": motion.pose[0].tolist(),
+            "end": motion.pose[-1].tolist(),
+            "quintic_duration": bound,
+            "scale": getattr(motion, "scale", None),
+            "peaks": [dict(zip(keys, row, strict=True)) for row in rows],
+            "file": out,
+        }
+        show_json(data)
         return
-    show(_told(motion, bound), peaks_table(found), *([f"Written: {plain(out)}"] if out else []))
-    if out is None:
-        note("Note: no file is written; to have the motion, add --out FILE.csv")
-
-
-def _told(motion: Motion, bound: float | None) -> str:
     text = f"{motion.duration:.4g} s, {len(motion.time)} samples"
     if bound is not None:
         text += f"; a polynomial in time along the same path takes {bound:.4g} s"
-    return text
+    show(text, peaks_table(found), *written(*([out] if out else [])))
+    if out is None:
+        note("Note: no file is written; to have the motion, add --out FILE.csv")

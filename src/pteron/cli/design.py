@@ -1,29 +1,26 @@
-"""`pteron design`: which dimensions are best for a workspace, its indices and its drives."""
+"""`pteron design`: the search for the best dimensions, from a TOML file to a folder of results."""
 
 from __future__ import annotations
 
 import json as json_module
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
-import rich.table
 from typer import Argument
 
-from pteron.cli.arguments import Json, option
+from pteron.cli.arguments import Json, Scheduler, option
 from pteron.cli.completion import machines
-from pteron.cli.terminal import plain, progress_bar, show, show_json, table
+from pteron.cli.progress import progress_bar
+from pteron.cli.terminal import plain, show, show_json, table, written
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from pteron.design import Front, Spec, Summary, Told
-    from pteron.design.search import Progress
+    from pteron.design import Front, Spec, Summary
 
 _GENERATIONS, _SURVEY = "generations", "survey"
-"""Folders in that of the results, for what is evaluated."""
+"""Folders of the evaluated designs, in that of the results."""
 
 
 def design(
@@ -44,14 +41,7 @@ def design(
         int | None,
         option("workers", "Processes that do the work.", show_default="this one"),
     ] = None,
-    scheduler: Annotated[
-        str | None,
-        option(
-            "scheduler",
-            "A Dask cluster that does it, tcp://host:8786; it has no lock of its own.",
-            "ADDRESS",
-        ),
-    ] = None,
+    scheduler: Scheduler = None,
     json: Json = False,
 ) -> None:
     """Search for the dimensions of a machine that are best for what is asked of it.
@@ -85,7 +75,7 @@ def design(
         show_json(summary.data() | ({"files": [str(file) for file in files]} if files else {}))
         return
     _show(summary)
-    show(*(f"Written: {plain(str(file))}" for file in files))
+    show(*written(*files))
 
 
 def _found(
@@ -93,31 +83,14 @@ def _found(
 ) -> Front:
     from pteron.design import search, survey
 
+    work: dict[str, Any] = {"workers": workers, "scheduler": scheduler}
     if count is not None:
-        with progress_bar(f"Evaluating {count} designs", 1000) as advance:
-            done = 0
-
-            def tell(finished: int, chunks: int) -> None:
-                nonlocal done
-                advance(1000 * finished // chunks - done)
-                done = 1000 * finished // chunks
-
-            folder = Path(str(out)) / _SURVEY
-            return survey(spec, count, folder, workers=workers, scheduler=scheduler, progress=tell)
-    with _generations(spec) as told:
-        return search(
-            spec,
-            folder=None if out is None else Path(out) / _GENERATIONS,
-            workers=workers,
-            scheduler=scheduler,
-            progress=told,
-        )
-
-
-@contextmanager
-def _generations(spec: Spec) -> Iterator[Progress]:
-    with progress_bar("Searching", spec.search.generations) as advance:
-        yield lambda number, count, best: advance(1)
+        with progress_bar(f"Evaluating {count} designs") as tell:
+            work["progress"] = lambda done, chunks: tell(done / chunks)
+            return survey(spec, count, Path(str(out)) / _SURVEY, **work)
+    with progress_bar("Searching") as tell:
+        work["progress"] = lambda number, generations, best: tell(number / generations)
+        return search(spec, folder=None if out is None else Path(out) / _GENERATIONS, **work)
 
 
 def _write(summary: Summary, folder: Path) -> list[Path]:
@@ -160,17 +133,12 @@ def _show(summary: Summary) -> None:
         f"{front.kept} keep all that is asked, {len(front)} on the front",
     )
     show(*(f"To begin with: {plain(line)}" for line in summary.start.proofs))
+    numbers = ("to begin with", "now", "change")
     for told in summary.chosen:
-        show("", f"[bold]{plain(told.name.replace('-', ' '))}[/bold]", _changes(told))
-        show(*(plain(line) for line in told.proofs))
-
-
-def _changes(told: Told) -> rich.table.Table:
-    made = table(
-        *("what", "to begin with", "now", "change"), numbers=("to begin with", "now", "change")
-    )
-    for change in told.changes:
-        made.add_row(
-            plain(change.what), change.told(change.before), change.told(change.after), change.by
+        rows = ((plain(c.what), c.told(c.before), c.told(c.after), c.by) for c in told.changes)
+        show(
+            "",
+            f"[bold]{plain(told.name.replace('-', ' '))}[/bold]",
+            table("what", *numbers, rows=rows, numbers=numbers),
+            *(plain(line) for line in told.proofs),
         )
-    return made

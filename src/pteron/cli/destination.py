@@ -1,4 +1,4 @@
-"""Where an outcome goes, a table with figures and pictures: to a file, a folder, or a person."""
+"""The destination of a result with figures and pictures: a file, a folder, a pipe or a person."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pteron.cli.terminal import is_terminal, plain, show, show_json, write
+from pteron.cli.terminal import is_terminal, show, show_json, write, written
 
 if TYPE_CHECKING:
     import polars as pl
@@ -18,14 +18,14 @@ _TABLES = (".csv", ".parquet")
 
 @dataclass(frozen=True)
 class Destination:
-    """What `--out` names: a folder for everything, the file of a table, or nothing.
+    """The value of `--out`: a folder for everything, the file of a table, or nothing.
 
     Attributes
     ----------
     out : str or None
         As it was given.
     name : str
-        What the folder's table and figures are called, without their endings.
+        Name of the table and the figures in a folder, without their endings.
     """
 
     out: str | None
@@ -37,7 +37,7 @@ class Destination:
         return self.out is not None and Path(self.out).suffix.lower() in _TABLES
 
     def check(self) -> None:
-        """Refuse, before the work begins, where nothing can be written."""
+        """Refuse, before the work begins, a place where nothing can be written."""
         if self.is_table:
             from pteron.tables import check_output
 
@@ -80,4 +80,4 @@ class Destination:
             person()
         elif self.out is None:
             write(table.write_csv())
-        show(*(f"Written: {plain(str(file))}" for file in files))
+        show(*written(*files))

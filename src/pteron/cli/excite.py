@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from rich.table import Table
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
-from pteron.cli.terminal import note, plain, progress_bar, show, show_json, table
+from pteron.cli.progress import progress_bar
+from pteron.cli.terminal import note, show, show_json, table, written
 from pteron.errors import ModelError
 
 if TYPE_CHECKING:
@@ -22,19 +22,9 @@ _MEASURES = {
     "passive_clearance": "passive clearance (of half the range)",
 }
 
-_STEPS = 1000
-"""Steps of the progress bar."""
-
-_SIGNS = {"tab": "\t"}
-"""Separators by name."""
-
-
-def _in(panel: str) -> Callable[..., Any]:
-    """Return what makes the options of a panel of the help."""
-    return lambda *given, **more: option(*given, rich_help_panel=panel, **more)
-
-
-_motion, _limit, _search, _file = map(_in, ("Motion", "Limits", "Search", "File"))
+_motion, _limit, _search, _file = (
+    partial(option, rich_help_panel=panel) for panel in ("Motion", "Limits", "Search", "File")
+)
 
 
 def excite(
@@ -134,7 +124,7 @@ def excite(
         length_unit,
         angle_unit,
         time_unit,
-        _SIGNS.get(separator or "", separator),
+        "\t" if separator == "tab" else separator,
         decimal,
     )
     layout.description(machine)
@@ -152,7 +142,7 @@ def excite(
     )
     if out is None and not json:
         note("Note: no file will be written; to have the trajectory, add --out FILE.csv")
-    with _progress(f"Exciting {machine.name}") as progress:
+    with progress_bar(f"Exciting {machine.name}") as progress:
         found = optimal_excitation(
             machine,
             space=space,
@@ -183,17 +173,9 @@ def excite(
             )
     files = [] if out is None else found.write(out, rate, periods, layout, cycles, slow)
     if json:
-        show_json(
-            {
-                **found.as_dict(),
-                "start": led.start,
-                "end": led.end,
-                "duration": led.duration,
-                "held_out": cycles and cycles.as_dict(),
-                "slow": slow and slow.duration,
-                "files": [str(path) for path in files],
-            }
-        )
+        more = {"start": led.start, "end": led.end, "duration": led.duration}
+        more |= {"held_out": cycles and cycles.as_dict(), "slow": slow and slow.duration}
+        show_json({**found.as_dict(), **more, "files": [str(path) for path in files]})
         return
     show(_quality(found), _margins(left))
     show(
@@ -207,25 +189,11 @@ def excite(
         )
     if slow is not None:
         show(f"Slowly: the same way in {slow.duration:g} s, for friction that falls with speed.")
-    show(*(f"Written: {plain(str(path))}" for path in files))
-
-
-@contextmanager
-def _progress(title: str) -> Iterator[Callable[[float], None]]:
-    """Show a progress bar, and give what moves it on to a share of the work."""
-    with progress_bar(title, _STEPS) as advance:
-        done = 0
-
-        def progress(share: float) -> None:
-            nonlocal done
-            advance(round(_STEPS * share) - done)
-            done = round(_STEPS * share)
-
-        yield progress
+    show(*written(*files))
 
 
 def _held_out(found: Excitation, rate: float) -> RepeatedCycle | None:
-    """Return the motion to be held out, or say why there is none."""
+    """Return the motion to be held out; None, with a note, where there is none."""
     try:
         return found.held_out(rate)
     except ModelError as error:
@@ -239,14 +207,14 @@ def _quality(found: Excitation) -> Table:
     caption = None
     if not math.isfinite(best.nominal):
         caption = "-: no number, as a base parameter's nominal value is 0"
-    made = table("condition number, columns", *headings, numbers=headings, caption=caption)
-    for name, one, other in (
+    numbers = (
         ("of length 1", best.scaled, random.scaled),
         ("times nominal values", best.nominal, random.nominal),
         ("in SI units", best.unscaled, random.unscaled),
-    ):
-        made.add_row(name, _number(one, 4), _number(other, 4), _number(other / one, 3))
-    return made
+    )
+    rows = ((n, _number(a, 4), _number(b, 4), _number(b / a, 3)) for n, a, b in numbers)
+    title = "condition number, columns"
+    return table(title, *headings, rows=rows, numbers=headings, caption=caption)
 
 
 def _number(value: float, digits: int) -> str:

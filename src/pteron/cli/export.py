@@ -2,109 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import partial
 from importlib import import_module
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
 from pteron.cli.completion import functions
-from pteron.cli.terminal import note, plain, show, show_json, spinner
+from pteron.cli.exported_functions import FUNCTIONS
+from pteron.cli.progress import spinner
+from pteron.cli.terminal import note, show, show_json, written
 from pteron.errors import DataError
-
-if TYPE_CHECKING:
-    from pteron.manipulator import Manipulator
-
-FUNCTIONS = (
-    "adaptive",
-    "adaptive_drives",
-    "bias_forces",
-    "clearances",
-    "closure_poses",
-    "closure_rows",
-    "computed_torque",
-    "computed_torque_base",
-    "constraint",
-    "coriolis_matrix",
-    "direct_kinematics",
-    "direct_step",
-    "discriminants",
-    "drive_accelerations",
-    "drive_forces",
-    "drive_forces_base",
-    "feed_forward",
-    "feed_forward_base",
-    "feed_forward_pd",
-    "feed_forward_pd_base",
-    "followed_step",
-    "forward_dynamics",
-    "gravity_forces",
-    "inverse_dynamics",
-    "inverse_dynamics_base",
-    "inverse_kinematics",
-    "jacobian",
-    "joint_accelerations",
-    "joint_coordinates",
-    "joint_feed_forward",
-    "joint_feed_forward_base",
-    "joint_points",
-    "joint_rates",
-    "joint_screws",
-    "kinetic_energy",
-    "least_clearances",
-    "link_jacobians",
-    "link_vectors",
-    "mass_matrix",
-    "newton_step",
-    "paper_regressor",
-    "paper_terms",
-    "passive_friction",
-    "passive_room",
-    "pd_gravity",
-    "pd_gravity_base",
-    "platform_motion",
-    "platform_points",
-    "potential_energy",
-    "reach",
-    "regressor",
-    "room",
-    "squared_type_i",
-    "type_ii",
-    "type_ii_distances",
-)
-"""Written out: help is shown before CasADi is loaded. A test holds it against what there is."""
 
 _TRUSTED = "trustworthy"
 
 Output = Literal["force", "torque", "percent"]
 """The library's own, which is slow to import."""
 
+_target = partial(option, metavar="DIR")
+
 _TARGETS = ("c", "st", "mjcf", "sdf", "urdf", "pinocchio", "casadi", "fmu", "klipper", "linuxcnc")
-"""The options that say what to write; each but the first two is `pteron.export.export_NAME`."""
+"""The options for what to write; each but the first two calls `pteron.export.export_NAME`."""
 
 
 def export(
     robot: Robot,
-    c: Annotated[str | None, option("c", "Write C99 to this folder.", "DIR")] = None,
-    st: Annotated[str | None, option("st", "Write Structured Text to this folder.", "DIR")] = None,
-    mjcf: Annotated[str | None, option("mjcf", "Write MuJoCo's MJCF.", "DIR")] = None,
-    sdf: Annotated[str | None, option("sdf", "Write SDF, for Gazebo.", "DIR")] = None,
-    urdf: Annotated[
-        str | None, option("urdf", "Write URDF of the tree, and its closures.", "DIR")
-    ] = None,
+    c: Annotated[str | None, _target("c", "Write C99 to this folder.")] = None,
+    st: Annotated[str | None, _target("st", "Write Structured Text to this folder.")] = None,
+    mjcf: Annotated[str | None, _target("mjcf", "Write MuJoCo's MJCF.")] = None,
+    sdf: Annotated[str | None, _target("sdf", "Write SDF, for Gazebo.")] = None,
+    urdf: Annotated[str | None, _target("urdf", "Write URDF of the tree, and its closures.")] = None,
     pinocchio: Annotated[
-        str | None, option("pinocchio", "Write a module that makes Pinocchio's model.", "DIR")
+        str | None, _target("pinocchio", "Write a module that makes Pinocchio's model.")
     ] = None,
     casadi: Annotated[
-        str | None, option("casadi", "Write CasADi functions, for acados and the like.", "DIR")
+        str | None, _target("casadi", "Write CasADi functions, for acados and the like.")
     ] = None,
-    fmu: Annotated[str | None, option("fmu", "Write an FMU of FMI 3.0.", "DIR")] = None,
+    fmu: Annotated[str | None, _target("fmu", "Write an FMU of FMI 3.0.")] = None,
     klipper: Annotated[
-        str | None, option("klipper", "Write the kinematics of a Klipper configuration.", "DIR")
+        str | None, _target("klipper", "Write the kinematics of a Klipper configuration.")
     ] = None,
-    linuxcnc: Annotated[
-        str | None, option("linuxcnc", "Write kinematics for LinuxCNC.", "DIR")
-    ] = None,
+    linuxcnc: Annotated[str | None, _target("linuxcnc", "Write kinematics for LinuxCNC.")] = None,
     function: Annotated[
         list[str] | None,
         option(
@@ -172,31 +109,23 @@ def export(
         grade = read_identified(machine, base).grade if base is not None else _TRUSTED
         if c is not None:
             real: Real = "float" if single else "double"
-            files += export_c(
-                machine,
-                function,
-                c,
-                real=real,
-                specialised=specialised,
-                wrench=wrench,
-                output=output,
-                base=base,
-            )
+            look = {"real": real, "specialised": specialised}
+            files += export_c(machine, function, c, **look, wrench=wrench, output=output, base=base)
         if st is not None:
             files += export_st(machine, function, st, wrench=wrench, output=output, base=base)
         for name, folder in asked.items():
             if name not in ("c", "st"):
-                files += _exporter(name)(machine, folder)
+                files += getattr(import_module("pteron.export"), f"export_{name}")(machine, folder)
     if grade != _TRUSTED:
         note(f"Warning: {base}: the verdict on these values is: {grade}")
     if json:
         show_json({"robot": machine.name, "files": [str(path) for path in files]})
         return
-    show(*(f"Written: {plain(str(path))}" for path in files))
+    show(*written(*files))
 
 
 def _check(asked: dict[str, str], options: list[str]) -> None:
-    """Refuse what is not one thing to write, and options that do not go with it."""
+    """Refuse more or less than one thing to write, and options that do not go with it."""
     if not asked:
         names = ", ".join(f"--{name}" for name in _TARGETS)
         raise DataError(f"{names}: none given; say what to write, such as --c controller")
@@ -210,10 +139,3 @@ def _check(asked: dict[str, str], options: list[str]) -> None:
     if "float" in options and "c" not in asked:
         raise DataError("--float: goes with --c; Structured Text has LREAL alone")
 
-
-def _exporter(name: str) -> Callable[[Manipulator, str], list[Path]]:
-    """Return `pteron.export.export_NAME`."""
-    found: Callable[[Manipulator, str], list[Path]] = getattr(
-        import_module("pteron.export"), f"export_{name}"
-    )
-    return found

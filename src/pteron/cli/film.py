@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from typer import Option
 
-from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
-from pteron.cli.motion_argument import CYCLE, STANDARD, cycle_of, loaded
-from pteron.cli.terminal import plain, show, show_json, spinner, stages
+from pteron.cli.arguments import STANDARD, Cycle, Duration, Elbows, Json, Robot, load_robot, option
+from pteron.cli.motion_argument import cycle_of, loaded
+from pteron.cli.progress import progress_bar, spinner
+from pteron.cli.terminal import plain, show, show_json, written
 from pteron.errors import DataError
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from pteron.manipulator import Manipulator
-    from pteron.motion import Motion
 
 _OUT = Option(
     *("--out", "-o"), help="The film: .mp4 (H.264) or .gif.", metavar="FILE", show_default=False
@@ -25,11 +20,8 @@ _OUT = Option(
 def film(
     robot: Robot,
     out: Annotated[str, _OUT],
-    cycle: Annotated[str, CYCLE] = STANDARD,
-    duration: Annotated[
-        float | None,
-        option("duration", "Of the standard cycle, s.", show_default="10 m/s^2 at the tool"),
-    ] = None,
+    cycle: Cycle = STANDARD,
+    duration: Duration = None,
     speed: Annotated[
         float | None,
         option(
@@ -59,6 +51,7 @@ def film(
     slides play it, and needs FFmpeg, which the extra film brings.
     """
     machine = load_robot(robot, elbows)
+    from pteron.dynamics import drive_forces
     from pteron.plots import film as filmed
     from pteron.plots.films import checked_film
 
@@ -67,20 +60,11 @@ def film(
     carrying = loaded(machine, payload)
     with spinner(f"A cycle of {machine.name}"):
         motion = cycle_of(machine, cycle, duration)
-        drawn = _drive_forces(carrying, motion) if forces else None
-    task = f"Filming {machine.name}"
-    with stages(task, 1) as tell:
-        made = filmed(
-            machine,
-            motion,
-            out,
-            fps=fps,
-            speed=speed,
-            size=sides,
-            turns=turns,
-            forces=drawn,
-            progress=lambda done, total: tell(task, done, total),
-        )
+        state = motion.pose, motion.velocity, motion.acceleration
+        drawn = drive_forces(carrying, *state, smooth=True) if forces else None
+    look = {"fps": fps, "speed": speed, "size": sides, "turns": turns}
+    with progress_bar(f"Filming {machine.name}") as tell:
+        made = filmed(machine, motion, out, **look, forces=drawn, progress=tell)
     data = {
         "robot": machine.name,
         "cycle": cycle,
@@ -98,7 +82,7 @@ def film(
     show(
         f"{motion.duration:.4g} s of {plain(machine.name)} {pace}: {made.duration:.3g} s, "
         f"{made.frames} frames of {made.size[0]}x{made.size[1]}",
-        f"Written: {plain(str(made.path))}",
+        *written(made.path),
     )
 
 
@@ -113,8 +97,3 @@ def _sides(text: str) -> tuple[int, int]:
         ) from None
     return width, height
 
-
-def _drive_forces(machine: Manipulator, motion: Motion) -> NDArray[Any]:
-    from pteron.dynamics import drive_forces
-
-    return drive_forces(machine, motion.pose, motion.velocity, motion.acceleration, smooth=True)

@@ -11,8 +11,8 @@ from typer import Argument
 
 from pteron.cli.arguments import Elbows, Json, load_robot, option
 from pteron.cli.completion import machines
-from pteron.cli.progress import Times
-from pteron.cli.terminal import is_terminal, note, plain, show, show_json, spinner, stages, table
+from pteron.cli.progress import Times, spinner, stages
+from pteron.cli.terminal import is_terminal, note, plain, show, show_json, table, written
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from pteron.report.identification import Written
 
 _NARROW = 56
-"""Width of a terminal below which tables leave out what the page has anyway."""
+"""Columns of a terminal below which tables are shortened: the page has all of it."""
 
 _COLORS = {"trustworthy": "green", "usable with care": "yellow", "not trustworthy": "red"}
 
@@ -132,18 +132,9 @@ def identify(
     folder = checked_folder(out)
     with stages(f"Identifying {machine.name}", rows) as tell:
         times = Times(tell)
-        result = identified(
-            machine,
-            fit,
-            held_out=check,
-            terms=terms,
-            shared=shared,
-            estimator=estimator,
-            processing=processing,
-            cad=drawn,
-            bounds=bounds,
-            progress=times,
-        )
+        model: dict[str, Any] = {"terms": terms, "shared": shared, "cad": drawn, "bounds": bounds}
+        how: dict[str, Any] = {"estimator": estimator, "processing": processing}
+        result = identified(machine, fit, held_out=check, **model, **how, progress=times)
     with spinner("Drawing the report"):
         times("Drawing the report", 0, 0)
         files = write_identification(result, folder, sources=sources)
@@ -231,7 +222,7 @@ def _show(result: Identification, files: Written) -> None:
         _values(result),
         *(plain(text) for text in (*verdict.reasons, *verdict.next_steps, *_bodies(result))),
         *(f"[yellow]Note:[/yellow] {plain(one.message)}" for one in result.findings),
-        *(f"Written: {plain(str(path))}" for path in files.paths),
+        *written(*files.paths),
     )
 
 
@@ -239,14 +230,13 @@ def _errors(result: Identification) -> Table:
     from pteron.report.typeset import significant
 
     headings = ("held-out NRMS (%)", "noise", "no friction")[: 2 if _narrow() else 3]
-    made = table("actuator", *headings, numbers=headings)
-    several = len(result.held_out) > 1
+    rows = []
     for prediction in result.held_out:
+        where = f" in {prediction.source}" if len(result.held_out) > 1 else ""
         columns = prediction.nrms, prediction.floor, prediction.nrms_without_friction
         for i, values in enumerate(zip(*columns[: len(headings)], strict=True), start=1):
-            where = f" in {prediction.source}" if several else ""
-            made.add_row(plain(f"{i}{where}"), *(significant(value) for value in values))
-    return made
+            rows.append((plain(f"{i}{where}"), *map(significant, values)))
+    return table("actuator", *headings, rows=rows, numbers=headings)
 
 
 def _values(result: Identification) -> Table:

@@ -12,7 +12,8 @@ from typer import Argument, Exit
 
 from pteron.cli.arguments import Elbows, Json, load_robot, option, signs
 from pteron.cli.completion import machines
-from pteron.cli.terminal import complain, note, plain, show, show_json, spinner, table, write
+from pteron.cli.progress import spinner
+from pteron.cli.terminal import complain, note, plain, show, show_json, table, write
 from pteron.errors import ModelError, OutputError, PteronError
 
 if TYPE_CHECKING:
@@ -40,11 +41,10 @@ def _list(json: bool) -> None:
     if json:
         show_json(found)
         return
-    made = table("name", "motion", "pose", "legs", "elbows")
-    for one in found:
-        pose, legs = " ".join(one["coordinates"]), " ".join(one["types"])
-        made.add_row(one["name"], one["motion"], pose, legs, one["working_mode"])
-    show(made)
+    keys = ("name", "motion", "coordinates", "types", "working_mode")
+    cells = ((one[key] for key in keys) for one in found)
+    rows = (tuple(c if isinstance(c, str) else " ".join(c) for c in row) for row in cells)
+    show(table("name", "motion", "pose", "legs", "elbows", rows=rows))
 
 
 def new(
@@ -172,16 +172,15 @@ def _leg(leg: LegKind) -> dict[str, Any]:
 
 
 def _show(robot: Manipulator, found: dict[str, Any]) -> None:
-    made = table("leg", "type", "joint's axis", "lengths (m)", "limits", numbers=("leg",))
-    for i, leg in enumerate(found["legs"], start=1):
-        limits = leg["limits"]
-        made.add_row(
-            str(i),
-            leg["type"],
-            _vector(leg["axis"], 2),
+    rows = (
+        (
+            *(str(i), leg["type"], _vector(leg["axis"], 2)),
             ", ".join(f"{length:g}" for length in leg["lengths"].values()) or "-",
-            "none" if limits is None else "{:g} to {:g} {}".format(*limits, leg["unit"]),
+            "{:g} to {:g} {}".format(*leg["limits"], leg["unit"]) if leg["limits"] else "none",
         )
+        for i, leg in enumerate(found["legs"], start=1)
+    )
+    headings = ("leg", "type", "joint's axis", "lengths (m)", "limits")
     angles = ", ".join(f"{math.degrees(angle):.4g}" for angle in found["singular_orientations"])
     where = "" if found["singular_at_every_position"] or not angles else " at the home position"
     singular = [f"Singular orientations{where}: {f'{angles} deg' if angles else 'none'}"]
@@ -195,7 +194,7 @@ def _show(robot: Manipulator, found: dict[str, Any]) -> None:
         f"[bold]{plain(robot.name)}[/bold]: a {robot.platform.motion} machine with "
         f"{len(robot.legs)} legs, pose {' '.join(robot.coordinates)}, "
         f"working mode {signs(robot)}",
-        made,
+        table(*headings, rows=rows, numbers=("leg",)),
         *_drives(robot),
         *singular,
         f"Home pose: {_vector(found['home_pose'])}, reserve {found['home_reserve']:.2f} of 1",
@@ -206,28 +205,26 @@ def _show(robot: Manipulator, found: dict[str, Any]) -> None:
 
 
 def _drives(robot: Manipulator) -> list[Table]:
-    """Return what drives the joints, where the file says it."""
+    """Return the drives of the joints, where the file has them."""
     from pteron.legs.drive_rows import drive_rows
 
     legs = tuple(f"leg {i}" for i in range(1, robot.freedom + 1))
-    made = table("drive", *legs, numbers=legs)
     rows = drive_rows(robot.legs)
-    for name, texts in rows:
-        made.add_row(name, *texts)
-    return [made] if rows else []
+    cells = ((name, *texts) for name, texts in rows)
+    return [table("drive", *legs, rows=cells, numbers=legs)] if rows else []
 
 
 def _passive(joints: list[dict[str, Any]]) -> list[Table]:
-    """Return where the passive joints that have limits are at home."""
+    """Return the passive joints with limits, in the home pose."""
     from pteron.workspace import LimitedJoint
 
-    passive = [joint for joint in joints if not joint["actuated"]]
-    made = table("leg", "passive joint", "at home", "limits", numbers=("leg", "at home"))
-    for joint in passive:
-        of = LimitedJoint(**joint).told_limits(lambda value, unit: f"{value:.4g}")
-        told = f"{joint['value']:.4g}", f"{of} {joint['unit']}"
-        made.add_row(str(joint["leg"] or ""), joint["noun"], *told)
-    return [made] if passive else []
+    rows = []
+    for joint in (joint for joint in joints if not joint["actuated"]):
+        limits = LimitedJoint(**joint).told_limits(lambda value, unit: f"{value:.4g}")
+        at, unit = f"{joint['value']:.4g}", joint["unit"]
+        rows.append((str(joint["leg"] or ""), joint["noun"], at, f"{limits} {unit}"))
+    headings = ("leg", "passive joint", "at home", "limits")
+    return [table(*headings, rows=rows, numbers=("leg", "at home"))] if rows else []
 
 
 def _vector(values: Any, places: int = 4) -> str:

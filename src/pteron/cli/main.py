@@ -1,4 +1,4 @@
-"""The command `pteron`: its subcommands, and how it ends: with an exit code, and no traceback."""
+"""The command `pteron`: its subcommands, and the exit code that each ends with."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ _INTERRUPTED = 130
 _PIPE_CLOSED = 1
 
 
-class Program(TyperGroup):
-    """The group of all subcommands; it turns errors into lines and exit codes."""
+class CommandGroup(TyperGroup):
+    """All subcommands; errors become lines on standard error and exit codes."""
 
     def get_params(self, ctx: Any) -> list[Any]:
         """Return the parameters, flags without a type in the help."""
@@ -98,45 +98,101 @@ def _usage(error: Any) -> str:
 
 
 def _close_standard_output() -> None:
-    """Send Python's last flush nowhere: who read the output has left, or its disk is full."""
+    """Discard Python's last flush: the reader of the output has left, or its disk is full."""
     with suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 app = Typer(
-    name="pteron",
-    cls=Program,
-    rich_markup_mode="rich",
-    pretty_exceptions_enable=False,
+    name="pteron", cls=CommandGroup, rich_markup_mode="rich", pretty_exceptions_enable=False
 )
 
 
-def _examples(*lines: str) -> str:
-    return "\n\n".join(["[bold]Examples[/bold]", *lines])
+_COMMANDS: dict[str, tuple[Callable[..., None], ...]] = {
+    "Machines": (catalog, new, check, report),
+    "See it": (view, play, film, workspace),
+    "Compute": (inverse, direct, forces, base, table1),
+    "Move": (cycle, simulate, size),
+    "Design": (design,),
+    "From a log to a controller": (excite, identify, export),
+}
+"""The subcommands of each panel of the help."""
+
+_NUMERIC = (inverse, direct, forces, cycle)
+"""Those whose arguments may be negative numbers."""
+
+_EXAMPLES = """\
+pteron catalog --json
+pteron new
+pteron new delta --out robot.toml
+pteron check robot.toml
+pteron report quadrupteron --out report
+pteron report quadrupteron --motion motion.csv --out report
+pteron view delta
+pteron view quadrupteron --motion adept --payload 0.5
+pteron view robot.toml --motion log.csv --port 9000 --no-browser
+pteron play quadrupteron
+pteron play quadrupteron motion.csv --out motion.html
+pteron play my-robot.toml log.parquet --out log.html
+pteron film delta -o cycle.mp4
+pteron film quadrupteron --speed 0.4 --forces --turns 0.5 -o slow.mp4
+pteron film robot.toml --cycle motion.csv --size 640x480 -o motion.gif
+pteron workspace delta
+pteron workspace quadrupteron --index kappa --slice z=0,phi=0 --out kappa.png
+pteron workspace quadrupteron --index condition --slice phi=0 --out condition.vtk
+pteron workspace robot.toml --index kappa --slice z=0 --points 400 --out kappa.zarr
+pteron workspace delta --certify
+pteron workspace delta --prove x=-0.2:0.2,y=-0.2:0.2,z=-1.0:-0.8
+pteron inverse quadrupteron 0.01 0.02 -0.03 0.1
+pteron inverse tripteron --table poses.csv --out joints.csv
+pteron direct quadrupteron 0.03 0.02 0.01 0.02
+pteron direct quadrupteron --table log.csv --out poses.parquet
+pteron forces quadrupteron --pose 0.01 0.02 -0.03 0.1 --velocity 0 0 0.5 0
+pteron forces quadrupteron --table motion.csv --out forces.csv
+pteron base quadrupteron --symbols
+pteron base quadrupteron --keep I_l1,m_l4 --format latex
+pteron table1
+pteron cycle quadrupteron
+pteron cycle my-robot.toml --optimal --force 60 --payload 0.5 --out cycle.csv
+pteron cycle tripteron --to 0.1 0 0.05 --back --acceleration 10 --out line.csv
+pteron cycle delta --via poses.csv --corner 0.02 --duration 2 --out path.csv
+pteron simulate delta --payload 1.0
+pteron simulate robot.toml --controller adaptive --model drawing.toml --cycles 10 --out run
+pteron simulate quadrupteron --cycle motion.csv --encoder 1e-6 --delay 5e-4 --out run.csv
+pteron size delta --payload 1.0
+pteron size robot.toml --motors motors.csv --dwell 0.2 --out sizing
+pteron size quadrupteron --cycle motion.csv --out sizing.csv
+pteron design search.toml --out best
+pteron design search.toml --out best --seed 7 --workers 4
+pteron design search.toml --out all --sweep 100000 --scheduler tcp://host:8786
+pteron excite quadrupteron --out exciting.csv
+pteron excite my-robot.toml --out exciting.csv --period 5 --speed 0.5 --force 60
+pteron excite delta --out exciting.csv --angle-unit deg --time-unit ms --decimal ,
+pteron identify log.csv --robot quadrupteron --out identified
+pteron identify a.csv b.csv --held-out c.csv --robot my-robot.toml --out identified
+pteron export quadrupteron --c controller
+pteron export my-robot.toml --c controller --float --function inverse_kinematics
+pteron export quadrupteron --st plc
+pteron export quadrupteron --fmu models
+pteron export linear-delta --klipper printer
+pteron export robot.toml --base result/identification.json --c controller
+"""
+
+_FIRST_EXAMPLES = """\
+pteron catalog
+pteron new delta --out robot.toml
+pteron report quadrupteron --out report
+pteron inverse quadrupteron 0.01 0.02 -0.03 0.1
+"""
 
 
-def _add(
-    panel: str, function: Callable[..., None], *examples: str, cls: type[Command] = Command
-) -> None:
-    # One line a paragraph, for the terminal to cut.
-    paragraphs = (" ".join(part.split()) for part in cleandoc(function.__doc__ or "").split("\n\n"))
-    app.command(
-        cls=cls,
-        help="\n\n".join(paragraphs),
-        epilog=_examples(*examples),
-        rich_help_panel=panel,
-    )(function)
+def _examples(lines: str, command: str = "") -> str:
+    """Return the end of a help: the lines for a subcommand, or all."""
+    own = [line for line in lines.splitlines() if line.split()[1] == command or not command]
+    return "\n\n".join(["[bold]Examples[/bold]", *own])
 
 
-@app.callback(
-    invoke_without_command=True,
-    epilog=_examples(
-        "pteron catalog",
-        "pteron new delta --out robot.toml",
-        "pteron report quadrupteron --out report",
-        "pteron inverse quadrupteron 0.01 0.02 -0.03 0.1",
-    ),
-)
+@app.callback(invoke_without_command=True, epilog=_examples(_FIRST_EXAMPLES))
 def pteron(
     context: Context,
     version: Annotated[bool, Option("--version", help="Print the version and exit.")] = False,
@@ -155,156 +211,16 @@ def pteron(
         raise Exit
 
 
-_MACHINES = "Machines"
-_add(
-    _MACHINES,
-    catalog,
-    "pteron catalog --json",
-)
-_add(
-    _MACHINES,
-    new,
-    "pteron new",
-    "pteron new delta --out robot.toml",
-)
-_add(
-    _MACHINES,
-    check,
-    "pteron check robot.toml",
-)
-_add(
-    _MACHINES,
-    report,
-    "pteron report quadrupteron --out report",
-    "pteron report quadrupteron --motion motion.csv --out report",
-)
-
-_SEE = "See it"
-_add(
-    _SEE,
-    view,
-    "pteron view delta",
-    "pteron view quadrupteron --motion adept --payload 0.5",
-    "pteron view robot.toml --motion log.csv --port 9000 --no-browser",
-)
-_add(
-    _SEE,
-    play,
-    "pteron play quadrupteron",
-    "pteron play quadrupteron motion.csv --out motion.html",
-    "pteron play my-robot.toml log.parquet --out log.html",
-)
-_add(
-    _SEE,
-    film,
-    "pteron film delta -o cycle.mp4",
-    "pteron film quadrupteron --speed 0.4 --forces --turns 0.5 -o slow.mp4",
-    "pteron film robot.toml --cycle motion.csv --size 640x480 -o motion.gif",
-)
-
-_add(
-    _SEE,
-    workspace,
-    "pteron workspace delta",
-    "pteron workspace quadrupteron --index kappa --slice z=0,phi=0 --out kappa.png",
-    "pteron workspace quadrupteron --index condition --slice phi=0 --out condition.vtk",
-    "pteron workspace robot.toml --index kappa --slice z=0 --points 400 --out kappa.zarr",
-    "pteron workspace delta --certify",
-    "pteron workspace delta --prove x=-0.2:0.2,y=-0.2:0.2,z=-1.0:-0.8",
-)
-
-_COMPUTE = "Compute"
-_add(
-    _COMPUTE,
-    inverse,
-    "pteron inverse quadrupteron 0.01 0.02 -0.03 0.1",
-    "pteron inverse tripteron --table poses.csv --out joints.csv",
-    cls=NumbersCommand,
-)
-_add(
-    _COMPUTE,
-    direct,
-    "pteron direct quadrupteron 0.03 0.02 0.01 0.02",
-    "pteron direct quadrupteron --table log.csv --out poses.parquet",
-    cls=NumbersCommand,
-)
-_add(
-    _COMPUTE,
-    forces,
-    "pteron forces quadrupteron --pose 0.01 0.02 -0.03 0.1 --velocity 0 0 0.5 0",
-    "pteron forces quadrupteron --table motion.csv --out forces.csv",
-    cls=NumbersCommand,
-)
-_add(
-    _COMPUTE,
-    base,
-    "pteron base quadrupteron --symbols",
-    "pteron base quadrupteron --keep I_l1,m_l4 --format latex",
-)
-_add(
-    _COMPUTE,
-    table1,
-    "pteron table1",
-)
-
-_MOVE = "Move"
-_add(
-    _MOVE,
-    cycle,
-    "pteron cycle quadrupteron",
-    "pteron cycle my-robot.toml --optimal --force 60 --payload 0.5 --out cycle.csv",
-    "pteron cycle tripteron --to 0.1 0 0.05 --back --acceleration 10 --out line.csv",
-    "pteron cycle delta --via poses.csv --corner 0.02 --duration 2 --out path.csv",
-    cls=NumbersCommand,
-)
-_add(
-    _MOVE,
-    simulate,
-    "pteron simulate delta --payload 1.0",
-    "pteron simulate robot.toml --controller adaptive --model drawing.toml --cycles 10 --out run",
-    "pteron simulate quadrupteron --cycle motion.csv --encoder 1e-6 --delay 5e-4 --out run.csv",
-)
-_add(
-    _MOVE,
-    size,
-    "pteron size delta --payload 1.0",
-    "pteron size robot.toml --motors motors.csv --dwell 0.2 --out sizing",
-    "pteron size quadrupteron --cycle motion.csv --out sizing.csv",
-)
-
-_DESIGN = "Design"
-_add(
-    _DESIGN,
-    design,
-    "pteron design search.toml --out best",
-    "pteron design search.toml --out best --seed 7 --workers 4",
-    "pteron design search.toml --out all --sweep 100000 --scheduler tcp://host:8786",
-)
-
-_LOG = "From a log to a controller"
-_add(
-    _LOG,
-    excite,
-    "pteron excite quadrupteron --out exciting.csv",
-    "pteron excite my-robot.toml --out exciting.csv --period 5 --speed 0.5 --force 60",
-    "pteron excite delta --out exciting.csv --angle-unit deg --time-unit ms --decimal ,",
-)
-_add(
-    _LOG,
-    identify,
-    "pteron identify log.csv --robot quadrupteron --out identified",
-    "pteron identify a.csv b.csv --held-out c.csv --robot my-robot.toml --out identified",
-)
-_add(
-    _LOG,
-    export,
-    "pteron export quadrupteron --c controller",
-    "pteron export my-robot.toml --c controller --float --function inverse_kinematics",
-    "pteron export quadrupteron --st plc",
-    "pteron export quadrupteron --fmu models",
-    "pteron export linear-delta --klipper printer",
-    "pteron export robot.toml --base result/identification.json --c controller",
-)
+for _panel, _functions in _COMMANDS.items():
+    for _function in _functions:
+        # One line a paragraph, for the terminal to cut.
+        _text = cleandoc(_function.__doc__ or "").split("\n\n")
+        app.command(
+            cls=NumbersCommand if _function in _NUMERIC else Command,
+            help="\n\n".join(" ".join(part.split()) for part in _text),
+            epilog=_examples(_EXAMPLES, _function.__name__),
+            rich_help_panel=_panel,
+        )(_function)
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""What is said of a map: data for a program, rows for a pipe, a table for a person."""
+"""The summary of a map: data for a program, rows for a pipe, a table for a person."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ if TYPE_CHECKING:
     from pteron.workspace import ReachVolume
 
 _ALIKE = 1e-9
-"""Relative differences that count as none."""
+"""Relative difference below which the best and the worst value are one."""
+
+_AXIS = ("name", "unit", "least", "greatest", "count")
+_SUMMARY = ("best", "best_pose", "worst", "worst_pose", "mean", "median")
 
 
 def map_data(
@@ -27,16 +30,7 @@ def map_data(
     return {
         "robot": found.robot,
         "held": grid.held,
-        "varies": [
-            {
-                "name": axis.name,
-                "unit": axis.unit,
-                "least": axis.least,
-                "greatest": axis.greatest,
-                "count": axis.count,
-            }
-            for axis in grid.axes
-        ],
+        "varies": [{key: getattr(axis, key) for key in _AXIS} for axis in grid.axes],
         "poses": grid.size,
         "in_reach": found.share,
         "causes": found.causes,
@@ -62,24 +56,11 @@ def _index_data(found: Map, name: str) -> dict[str, Any]:
     try:
         summary = found.summary(name)
     except DataError:
-        keys = ("best", "best_pose", "worst", "worst_pose", "mean", "median")
-        return {
-            **about,
-            **dict.fromkeys(keys),
-            "poses": 0,
-            "undetermined": int(found.reachable.sum()),
-        }
-    return {
-        **about,
-        "best": summary.best,
-        "best_pose": summary.best_pose.tolist(),
-        "worst": summary.worst,
-        "worst_pose": summary.worst_pose.tolist(),
-        "mean": summary.mean,
-        "median": summary.median,
-        "poses": summary.count,
-        "undetermined": summary.infinite,
-    }
+        undetermined = int(found.reachable.sum())
+        return {**about, **dict.fromkeys(_SUMMARY), "poses": 0, "undetermined": undetermined}
+    values = {key: getattr(summary, key) for key in _SUMMARY}
+    poses = {key: pose.tolist() for key, pose in values.items() if key.endswith("pose")}
+    return {**about, **values, **poses, "poses": summary.count, "undetermined": summary.infinite}
 
 
 def map_rows(data: Mapping[str, Any]) -> Any:

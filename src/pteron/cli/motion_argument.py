@@ -1,11 +1,11 @@
-"""The cycles that subcommands are given: the standard one, or one from a file."""
+"""Motions, poses and payloads that are given to a subcommand, with notes on unlikely values."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from pteron.cli.arguments import option
+from pteron.cli.arguments import STANDARD, parsed_numbers
 from pteron.cli.terminal import note
 from pteron.errors import DataError, PteronError, SingularPose, UnreachablePose
 
@@ -18,18 +18,11 @@ if TYPE_CHECKING:
     from pteron.shapes import PoseLike
     from pteron.tables import Table
 
-STANDARD = "adept"
-"""What the pick-and-place cycle of 25, 305 and 25 mm is called."""
-
-CYCLE = option(
-    "cycle", f"{STANDARD}, the standard pick-and-place cycle, or a table of a motion.", "CYCLE"
-)
-
 _SLOW = 0.5
-"""s between samples that is unlikely."""
+"""s between samples: more is unlikely."""
 
 _UNLIKE = 3.0
-"""How many times as far a motion may go by its poses as by its velocities, or the inverse."""
+"""Greatest ratio of the ways of a motion by its poses and by its velocities."""
 
 
 def cycle_of(robot: Manipulator, cycle: str, duration: float | None) -> Motion:
@@ -44,26 +37,26 @@ def cycle_of(robot: Manipulator, cycle: str, duration: float | None) -> Motion:
 
 
 def replayed(robot: Manipulator, file: str, start: PoseLike | None = None) -> Motion:
-    """Return a motion from a table; what is unlikely in it is told.
+    """Return a motion from a table.
 
     A table of joints alone is followed from a pose to start from, the home pose if none is given.
     """
     from pteron.tables import read_table
 
-    return _doubted(robot, read_table(file), start).motion
+    return _of_table(robot, read_table(file), start).motion
 
 
 def played(robot: Manipulator, file: str) -> Playback:
-    """Return a motion from a table, or a log, as it is shown; what is unlikely in it is told."""
+    """Return a motion from a table, or a log, as it is shown."""
     from pteron.playback import playback, read_motion
     from pteron.tables import Table
 
     found = read_motion(robot, file)
-    return _doubted(robot, found) if isinstance(found, Table) else playback(robot, found)
+    return _of_table(robot, found) if isinstance(found, Table) else playback(robot, found)
 
 
-def _doubted(robot: Manipulator, rows: Table, start: PoseLike | None = None) -> Playback:
-    """Return a motion that is read from a table; what is unlikely in it is told."""
+def _of_table(robot: Manipulator, rows: Table, start: PoseLike | None = None) -> Playback:
+    """Return the motion of a table, after notes on its unlikely values."""
     import numpy as np
 
     from pteron.kinematics.unlikely import unlikely_values
@@ -80,14 +73,27 @@ def _doubted(robot: Manipulator, rows: Table, start: PoseLike | None = None) -> 
         if not unlikely or (isinstance(error, UnreachablePose) and error.millimetres):
             raise
         raise PteronError(f"{error}; {file}: {unlikely}") from None
-    told_doubts(robot, names, values, file)
+    note_unlikely(robot, names, values, file)
     if float(np.median(np.diff(found.motion.time))) >= _SLOW:
         note(f"Note: {file}: t in steps of {found.motion.time[1]:g}: are these ms? s are expected")
     return found
 
 
+def given_pose(machine: Manipulator, text: str | None, name: str) -> NDArray[Any]:
+    """Return the pose (m,) of an option, or the home pose."""
+    import numpy as np
+
+    from pteron.workspace import home_pose
+
+    if text is None:
+        return home_pose(machine)
+    values = np.array(parsed_numbers([text], machine.coordinates, name))
+    note_unlikely(machine, machine.coordinates, values, name)
+    return values
+
+
 def loaded(robot: Manipulator, payload: float) -> Manipulator:
-    """Return a machine with a payload, kg; what is unlikely in it is told."""
+    """Return a machine with a payload, kg."""
     from pteron.motion import with_payload
     from pteron.motion.payload import payload_doubt
 
@@ -96,10 +102,10 @@ def loaded(robot: Manipulator, payload: float) -> Manipulator:
     return with_payload(robot, payload)
 
 
-def told_doubts(
+def note_unlikely(
     robot: Manipulator, columns: Sequence[str], values: NDArray[Any], source: str
 ) -> None:
-    """Tell what is possible but unlikely in numbers that are given."""
+    """Note values that are possible but unlikely."""
     from pteron.kinematics.unlikely import unlikely_values
 
     for text in unlikely_values(robot, columns, values):
@@ -118,7 +124,7 @@ def _check_rates(robot: Manipulator, rows: Table) -> None:
     poses, rates = values[:, 1 : 1 + len(names)], values[:, 1 + len(names) :]
     means = np.abs(rates[1:] + rates[:-1]) / 2.0
     far, meant = np.abs(np.diff(poses, axis=0)).sum(), (np.diff(values[:, 0]) @ means).sum()
-    # A time that does not ascend is told as that.
+    # A time that does not ascend has a message of its own.
     if meant > 0.0 and not _UNLIKE * far >= meant >= far / _UNLIKE:
         raise DataError(
             f"{rows.source}: its poses go {far:.3g} m or rad, its velocities {meant:.3g} in the "

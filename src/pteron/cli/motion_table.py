@@ -1,4 +1,4 @@
-"""A motion as a table of its samples, and what it asks of joints and drives as one for a person."""
+"""Tables of a motion: its samples, and its peaks beside their limits."""
 
 from __future__ import annotations
 
@@ -16,34 +16,22 @@ if TYPE_CHECKING:
     from pteron.manipulator import Manipulator
     from pteron.motion import Motion, Peak
 
-_QUANTITIES = {
-    "speed": "speed",
-    "acceleration": "acceleration",
-    "force": "force",
-    "tool_speed": "tool speed",
-    "tool_acceleration": "tool acceleration",
-}
-
 _BINDS = 0.98
-"""Share of a limit from which on it is said to bind."""
+"""Share from which a limit is said to bind."""
 
 
 def peaks_table(found: Sequence[Peak]) -> Table:
     """Return a table of the largest sizes in a motion, beside their limits."""
-    made = table(
-        "largest", "leg", "size", "limit", "share", numbers=("leg", "size", "limit", "share")
-    )
-    for peak in found:
-        limited = math.isfinite(peak.limit)
-        mark = " (binds)" if peak.share >= _BINDS else ""
-        made.add_row(
-            f"{_QUANTITIES[peak.name]} ({peak.unit}){mark}",
-            str(peak.leg) if peak.leg else "",
-            f"{peak.size:.4g}",
-            f"{peak.limit:.4g}" if limited else "-",
-            f"{peak.share:.0%}" if limited else "-",
+    numbers = ("leg", "size", "limit", "share")
+    rows = (
+        (
+            f"{peak.name.replace('_', ' ')} ({peak.unit})" + " (binds)" * (peak.share >= _BINDS),
+            *(str(peak.leg or ""), f"{peak.size:.4g}"),
+            *((f"{peak.limit:.4g}", f"{peak.share:.0%}") if math.isfinite(peak.limit) else "--"),
         )
-    return made
+        for peak in found
+    )
+    return table("largest", *numbers, rows=rows, numbers=numbers)
 
 
 def motion_frame(machine: Manipulator, motion: Motion) -> pl.DataFrame:

@@ -1,33 +1,17 @@
-"""The motions that `pteron cycle` makes: a cycle, lines through poses, the joints' own way."""
+"""Motions that `pteron cycle` plans: the standard cycle, straight lines, motions of the joints."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
-from pteron.cli.arguments import parsed_numbers
-from pteron.cli.motion_argument import told_doubts
+from pteron.cli.motion_argument import given_pose, note_unlikely
 from pteron.cli.terminal import note
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pteron.manipulator import Manipulator
     from pteron.motion import Motion, MotionLimits
-
-
-def given_pose(machine: Manipulator, text: str | None, name: str) -> NDArray[Any]:
-    """Return the pose (m,) of an option, or the home pose; what is unlikely in it is told."""
-    import numpy as np
-
-    from pteron.workspace import home_pose
-
-    if text is None:
-        return home_pose(machine)
-    values = np.array(parsed_numbers([text], machine.coordinates, name))
-    told_doubts(machine, machine.coordinates, values, name)
-    return values
 
 
 def standard_motion(
@@ -86,7 +70,7 @@ def line_motion(
         from pteron.tables import read_table
 
         passed = read_table(via).numbers(machine.coordinates)
-        told_doubts(machine, machine.coordinates, passed, via)
+        note_unlikely(machine, machine.coordinates, passed, via)
         poses += list(passed)
     if to is not None:
         poses.append(given_pose(machine, to, "--to"))

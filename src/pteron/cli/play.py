@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument
 
-from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
-from pteron.cli.motion_argument import STANDARD, loaded, played
-from pteron.cli.terminal import plain, show, show_json, spinner
+from pteron.cli.arguments import STANDARD, Elbows, Json, Payload, Robot, load_robot, option
+from pteron.cli.motion_argument import loaded, played
+from pteron.cli.progress import spinner
+from pteron.cli.terminal import plain, show, show_json
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ def play(
             show_default=False,
         ),
     ] = None,
-    payload: Annotated[float, option("payload", "At the tool's centre point, kg.")] = 0.0,
+    payload: Payload = 0.0,
     elbows: Elbows = None,
     json: Json = False,
 ) -> None:

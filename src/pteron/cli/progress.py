@@ -1,16 +1,93 @@
-"""How long each stage of long work takes."""
+"""The progress of long work, on standard error: a spinner, a bar, and how long each stage took."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from time import perf_counter
+from typing import TYPE_CHECKING
 
-_LEAST = 0.05
-"""Time that is not worth a word, s."""
+from rich.console import Console
+
+from pteron.cli.terminal import plain
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+_SHORT = 0.05
+"""s below which a stage's time is not told."""
+
+
+def is_watched() -> bool:
+    """Say whether a person watches standard error.
+
+    Rich takes FORCE_COLOR for one, which Jupyter and build servers set: colours are meant, not
+    pictures that move.
+    """
+    return sys.stderr.isatty()
+
+
+@contextmanager
+def spinner(task: str) -> Iterator[None]:
+    """Show a person that work of unknown length goes on."""
+    if not is_watched():
+        yield
+        return
+    with Console(stderr=True).status(plain(task)):
+        yield
+
+
+@contextmanager
+def progress_bar(task: str) -> Iterator[Callable[[float], None]]:
+    """Show a person how much of long work is done: the callable takes the share, from 0 to 1."""
+    with _bar() as progress:
+        number = progress.add_task(plain(task), total=1.0)
+        yield lambda share: progress.update(number, completed=share)
+
+
+@contextmanager
+def stages(task: str, rows: int) -> Iterator[Callable[[str, int, int], None]]:
+    """Show a bar for each stage of long work, and between them that the work goes on.
+
+    The callable takes a stage's name, how many of its rows are done, and how many there are: no
+    more than are done where the stage does not know, which then has `rows`.
+    """
+    with _bar() as progress:
+        number = progress.add_task(plain(task), total=None)
+        stage, before = "", 0
+
+        def tell(name: str, done: int, total: int) -> None:
+            nonlocal before, stage
+            if name != stage:
+                progress.reset(number, total=max(total, rows), description=plain(name))
+                stage, before = name, 0
+            # The rows of a stage's next file are counted anew.
+            progress.update(number, advance=done - before if done >= before else done)
+            before = done
+            if done >= max(total, rows):
+                progress.reset(number, total=None, description=plain(task))
+                stage = ""
+
+        yield tell
+
+
+def _bar() -> Progress:
+    from rich import progress
+
+    return progress.Progress(
+        progress.TextColumn("{task.description}"),
+        progress.BarColumn(),
+        progress.TaskProgressColumn(),
+        progress.TimeRemainingColumn(),
+        console=Console(stderr=True),
+        disable=not is_watched(),
+        transient=True,
+    )
 
 
 class Times:
-    """Passes on what is told of stages, and keeps how long each takes."""
+    """The times of the stages of long work, of which it is told as a bar is."""
 
     def __init__(self, tell: Callable[[str, int, int], None]) -> None:
         self._tell = tell
@@ -27,7 +104,7 @@ class Times:
     def told(self) -> str:
         """Return the stages with their times, in a line."""
         self._end("")
-        found = ((name, spent) for name, spent in self._spent.items() if name and spent > _LEAST)
+        found = ((name, spent) for name, spent in self._spent.items() if name and spent > _SHORT)
         return f"Time: {', '.join(f'{name.lower()} {spent:.1f} s' for name, spent in found)}"
 
     def _end(self, name: str) -> None:

@@ -10,10 +10,11 @@ from rich.table import Table
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
 from pteron.cli.motion_argument import played
-from pteron.cli.terminal import note, plain, show, show_json, spinner, table
+from pteron.cli.progress import spinner
+from pteron.cli.terminal import note, plain, show, show_json, table
 
 _SERIES = ("time", "pose", "velocity", "acceleration", "forces")
-"""What the report's file holds of each sample of the cycle: nothing to print."""
+"""Keys of the report's file with a value for each sample of the cycle, too long to print."""
 
 
 def report(
@@ -75,16 +76,14 @@ def _legs(cycle: dict[str, Any], joints: list[dict[str, str]]) -> Table:
     force = " or ".join(dict.fromkeys(joint["force"] for joint in joints))
     headings = ("leg", f"peak {force}", f"RMS {force}", "peak speed")
     of = "Of the drives, with friction." if cycle["with_drives"] else "Of the bodies, no friction."
-    made = table(*headings, numbers=headings, caption=of)
+    rows = []
     columns = (cycle[key] for key in ("peak_forces", "rms_forces", "peak_speeds"))
     for i, (peak, rms, speed) in enumerate(zip(*columns, strict=True), start=1):
         unit, rate = joints[i - 1]["force_unit"], f"{joints[i - 1]['unit']}/s"
-        made.add_row(str(i), f"{peak:.3f} {unit}", f"{rms:.3f} {unit}", f"{speed:.3f} {rate}")
-    return made
+        rows.append((str(i), f"{peak:.3f} {unit}", f"{rms:.3f} {unit}", f"{speed:.3f} {rate}"))
+    return table(*headings, rows=rows, numbers=headings, caption=of)
 
 
 def _costs(costs: list[dict[str, Any]]) -> Table:
-    made = table("inverse dynamics as", "operations", numbers=("operations",))
-    for cost in costs:
-        made.add_row(plain(cost["form"]), str(cost["operations"]))
-    return made
+    rows = ((plain(cost["form"]), str(cost["operations"])) for cost in costs)
+    return table("inverse dynamics as", "operations", rows=rows, numbers=("operations",))

@@ -7,11 +7,23 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from typer import Exit
 
-from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
+from pteron.cli.arguments import (
+    STANDARD,
+    Cycle,
+    Duration,
+    Elbows,
+    Json,
+    Payload,
+    Robot,
+    check_rate,
+    load_robot,
+    option,
+)
 from pteron.cli.completion import machines
 from pteron.cli.destination import Destination
-from pteron.cli.motion_argument import CYCLE, STANDARD, cycle_of, loaded
-from pteron.cli.terminal import note, plain, show, spinner, table
+from pteron.cli.motion_argument import cycle_of, loaded
+from pteron.cli.progress import spinner
+from pteron.cli.terminal import note, plain, show, table
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
@@ -24,22 +36,17 @@ _ENDED = 1
 
 Name = Literal["computed-torque", "feed-forward", "pd", "adaptive", "adaptive-drives"]
 
-_UNITS = {"m": (1e6, "um"), "rad": (1e6, "urad")}
-
 
 def simulate(
     robot: Robot,
-    cycle: Annotated[str, CYCLE] = STANDARD,
+    cycle: Cycle = STANDARD,
     controller: Annotated[
         Name,
         option("controller", "What makes the machine follow the cycle; see docs/controllers.md."),
     ] = "computed-torque",
-    payload: Annotated[float, option("payload", "At the tool's centre point, kg.")] = 0.0,
+    payload: Payload = 0.0,
     cycles: Annotated[int, option("cycles", "How many, one after the other.")] = 1,
-    duration: Annotated[
-        float | None,
-        option("duration", "Of a standard cycle, s.", show_default="10 m/s^2 at the tool"),
-    ] = None,
+    duration: Duration = None,
     rate: Annotated[float, option("rate", "Samples of the controller a second.")] = 1000.0,
     bandwidth: Annotated[
         float | None,
@@ -92,8 +99,7 @@ def simulate(
 
     if cycles < 1:
         raise DataError(f"--cycles: {cycles} given, 1 or more expected")
-    if not 0.0 < rate < float("inf"):
-        raise DataError(f"--rate: {rate:g} given, samples a second above 0 expected")
+    check_rate(rate)
     destination = Destination(out, "simulation")
     destination.check()
     carrying = loaded(machine, payload)
@@ -108,16 +114,9 @@ def simulate(
                 f"{'; '.join(overloads)}; give a smaller payload or a longer --duration, or see "
                 "what happens with --anyway"
             )
+        sensors, how = Sensors(encoder=encoder), {"delay": delay, "step": step, "method": method}
         found = simulated(
-            machine,
-            motion,
-            acts,
-            model=believed,
-            payload=payload,
-            sensors=Sensors(encoder=encoder),
-            delay=delay,
-            step=step,
-            method=method,
+            machine, motion, acts, model=believed, payload=payload, sensors=sensors, **how
         )
     for text in overloads:
         note(f"Warning: {text}")
@@ -132,7 +131,7 @@ def simulate(
 
 
 def _model(machine: Manipulator, name: str, elbows: str | None) -> Manipulator:
-    """Return what a controller takes a machine for: one that moves as it does, in its mode."""
+    """Return the controller's model of a machine: one that moves as it does, in its mode."""
     model = load_robot(name, elbows)
     for what, own, other in (
         ("pose is", machine.coordinates, model.coordinates),
@@ -147,7 +146,7 @@ def _model(machine: Manipulator, name: str, elbows: str | None) -> Manipulator:
 
 
 def _controller(name: Name, motion: Motion, period: float, bandwidth: float | None) -> Controller:
-    """Return a controller; an adaptive one learns what the motion shows."""
+    """Return a controller; an adaptive one learns the parameters that the motion excites."""
     from pteron.controllers import Adaptive, ComputedTorque, FeedForwardPD, PDGravity
 
     made: dict[str, Any] = {
@@ -162,7 +161,7 @@ def _controller(name: Name, motion: Motion, period: float, bandwidth: float | No
 
 
 def _overloads(loaded: Manipulator, motion: Motion) -> tuple[str, ...]:
-    """Return which drives the motion asks too much of."""
+    """Return the drives' limits that the motion exceeds."""
     from pteron.dynamics import drive_forces
     from pteron.kinematics import joint_rates
     from pteron.motion import overloads
@@ -178,6 +177,9 @@ def _data(found: Simulation, controller: str, cycle: str, payload: float) -> dic
 
     robot, error = found.robot, found.error
     power = found.forces * found.joint_rates
+    sizes = {"force": found.forces, "speed": found.joint_rates, "power": power}
+    peaks = {name: np.abs(values).max(axis=0).tolist() for name, values in sizes.items()}
+    rms = np.sqrt(np.mean(found.forces**2, axis=0)).tolist()
     return {
         "robot": robot.name,
         "cycle": cycle,
@@ -198,13 +200,13 @@ def _data(found: Simulation, controller: str, cycle: str, payload: float) -> dic
         "drives": [
             {
                 "leg": i + 1,
-                "peak_force": float(np.abs(found.forces[:, i]).max()),
-                "rms_force": float(np.sqrt(np.mean(found.forces[:, i] ** 2))),
-                "peak_speed": float(np.abs(found.joint_rates[:, i]).max()),
-                "peak_power": float(np.abs(power[:, i]).max()),
+                "peak_force": peaks["force"][i],
+                "rms_force": rms[i],
+                "peak_speed": peaks["speed"][i],
+                "peak_power": peaks["power"][i],
                 "at_its_limit": float(found.saturated[i]),
             }
-            for i in range(robot.freedom)
+            for i in range(len(robot.legs))
         ],
     }
 
@@ -222,28 +224,24 @@ def _pictures(found: Simulation) -> dict[str, str]:
 def _show(found: Simulation, data: dict[str, Any]) -> None:
     """Print for a person: how well it follows, and what its drives do."""
     robot = found.robot
+    units = ["rad" if name == "phi" else "m" for name in robot.coordinates]
     carried = f" with {data['payload']:g} kg" if data["payload"] else ""
     steps = "DOP853" if data["step"] is None else f"steps of {data['step'] * 1e3:.3g} ms"
-    errors = table("error", "largest", "RMS", numbers=("largest", "RMS"))
-    for row in data["tracking"]:
-        factor, unit = _UNITS["rad" if row["coordinate"] == "phi" else "m"]
-        cells = (f"{factor * row[key]:.3g} {unit}" for key in ("largest", "rms"))
-        errors.add_row(row["coordinate"], *cells)
-    names = ("peak force", "RMS force", "peak speed", "peak power", "at its limit")
-    drives = table("leg", *names, numbers=("leg", *names))
+    errors = (
+        (row["coordinate"], *(f"{1e6 * row[key]:.3g} u{unit}" for key in ("largest", "rms")))
+        for row, unit in zip(data["tracking"], units, strict=True)
+    )
+    drives = []
     for leg, row in zip(robot.legs, data["drives"], strict=True):
         force, speed = leg.joint.force_unit, f"{leg.joint.unit}/s"
-        drives.add_row(
-            str(row["leg"]),
-            f"{row['peak_force']:.4g} {force}",
-            f"{row['rms_force']:.4g} {force}",
-            f"{row['peak_speed']:.4g} {speed}",
-            f"{row['peak_power']:.4g} W",
-            f"{row['at_its_limit']:.1%}" if leg.drive and leg.drive.max_force else "-",
-        )
+        quantities = {"peak_force": force, "rms_force": force, "peak_speed": speed}
+        sizes = (f"{row[key]:.4g} {unit}" for key, unit in (quantities | {"peak_power": "W"}).items())
+        limited = leg.drive and leg.drive.max_force
+        drives.append((str(row["leg"]), *sizes, f"{row['at_its_limit']:.1%}" if limited else "-"))
+    names = ("leg", "peak force", "RMS force", "peak speed", "peak power", "at its limit")
     show(
         f"[bold]{plain(robot.name)}[/bold]{carried}, cycle {plain(data['cycle'])}, "
         f"{plain(data['controller'])}: {data['duration']:.4g} s in {steps}",
-        errors,
-        drives,
+        table("error", "largest", "RMS", rows=errors, numbers=("largest", "RMS")),
+        table(*names, rows=drives, numbers=names),
     )

@@ -11,9 +11,9 @@ from typing import Annotated
 
 from typer import echo
 
-from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
-from pteron.cli.motion_argument import STANDARD
-from pteron.cli.terminal import note, show_json, spinner
+from pteron.cli.arguments import STANDARD, Elbows, Json, Payload, Robot, load_robot, option
+from pteron.cli.progress import spinner
+from pteron.cli.terminal import note, show_json
 
 _TICK = 0.5
 """s between two looks for Ctrl-C, which some systems deliver only then."""
@@ -30,7 +30,7 @@ def view(
             "CYCLE",
         ),
     ] = None,
-    payload: Annotated[float, option("payload", "At the tool's centre point, kg.")] = 0.0,
+    payload: Payload = 0.0,
     host: Annotated[
         str, option("host", "The address to serve at; by default this machine alone.")
     ] = "127.0.0.1",
