@@ -351,7 +351,7 @@ def test_a_long_table_shows_a_bar_and_has_the_same_result(monkeypatch: pytest.Mo
     monkeypatch.setattr("pteron.cli.table_rows.LONG", 99)
     monkeypatch.setattr("pteron.cli.table_rows.CHUNK", 7)
     assert done(line) == expected
-    monkeypatch.setattr("pteron.cli.terminal.is_watched", lambda: True)
+    monkeypatch.setattr("pteron.cli.progress.is_watched", lambda: True)
     shown = run(line, FORCE_COLOR="1")
     assert shown.stdout == expected
     assert "motion.csv" in shown.stderr

@@ -18,7 +18,7 @@ from test_report import Reader, strict
 
 import pteron
 from pteron.cli import identify as command
-from pteron.cli.terminal import stages
+from pteron.cli.progress import stages
 from pteron.extras import install_command
 from pteron.identification import METHODS, write_log
 from pteron.identification.model import Passive
@@ -244,7 +244,7 @@ def test_each_stage_shows_a_bar(monkeypatch: pytest.MonkeyPatch):
     write_log(log("tripteron"), "fit.csv")
     line = "identify fit.csv --robot tripteron --out out"
     assert run(line, FORCE_COLOR="1").stderr == ""
-    monkeypatch.setattr("pteron.cli.terminal.is_watched", lambda: True)
+    monkeypatch.setattr("pteron.cli.progress.is_watched", lambda: True)
     shown = run(line, FORCE_COLOR="1")
     assert shown.exit_code == 0
     assert "Reading" in shown.stderr

@@ -132,10 +132,9 @@ def table1(json: Json = False) -> None:
         show_json([{name: getattr(row, name) for name in names} for row in found])
     else:
         verdicts = {True: "yes", False: "[bold red]NO[/bold red]"}
-        rows = (
-            (r.parameter, *map(plain, (r.printed, r.computed)), verdicts[r.agrees] + " *" * r.restored)
-            for r in found
-        )
+        texts = ((r.parameter, plain(r.printed), plain(r.computed)) for r in found)
+        marks = (verdicts[r.agrees] + " *" * r.restored for r in found)
+        rows = ((*text, mark) for text, mark in zip(texts, marks, strict=True))
         note = "* damaged in the scan of the paper; restored from its legible rows"
         agree = f"{len(found) - wrong} of {len(found)} rows agree."
         show(table("", "printed", "computed", "agrees", rows=rows), agree, note)

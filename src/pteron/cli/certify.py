@@ -1,4 +1,4 @@
-"""`pteron workspace --certify` and `--prove`: what is proved of a workspace, by intervals."""
+"""`pteron workspace --certify` and `--prove`: proofs about a workspace, by intervals."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from typer import Exit
 
-from pteron.cli.pose_ranges import pose_ranges, pose_text
-from pteron.cli.terminal import note, percent, plain, show, show_json, spinner, table
+from pteron.cli.pose_ranges import pose_ranges, pose_text, span_text
+from pteron.cli.progress import spinner
+from pteron.cli.terminal import note, percent, plain, show, show_json, table
 from pteron.errors import DataError, ModelError
 
 if TYPE_CHECKING:
@@ -18,10 +19,10 @@ if TYPE_CHECKING:
     from pteron.workspace import Box, Inscribed, Paving, Proof
 
 _NOT_PROVED = 1
-"""Exit code where a region is not proved."""
+"""Exit code for a region that is not proved."""
 
 TOLERANCE = 0.05
-"""Greatest undecided share of a volume, if no other is asked for: some seconds."""
+"""Default of the greatest undecided share of a volume: it takes some seconds."""
 
 _MAY_BE_SINGULAR = (
     "Reach and limits count; poses may be singular. --type-ii FLOOR leaves out those that are near."
@@ -30,7 +31,7 @@ _MAY_BE_SINGULAR = (
 
 @dataclass(frozen=True)
 class Proofs:
-    """What is asked to be proved.
+    """The proofs that the options ask for.
 
     Parameters
     ----------
@@ -61,7 +62,7 @@ class Proofs:
         return {"type_i": self.type_i or 0.0, "type_ii": self.type_ii or 0.0}
 
     def check(self, maps: Mapping[str, object], slice_: str | None) -> None:
-        """Refuse options that do nothing beside others, and numbers that are none."""
+        """Refuse options that do nothing beside others, and numbers out of range."""
         own = {"tolerance": self.tolerance, "type-i": self.type_i, "type-ii": self.type_ii}
         if self.prove is not None:
             _expect_none({**maps, "slice": slice_, "certify": self.certify or None}, "--prove")
@@ -78,7 +79,7 @@ class Proofs:
     def deliver(
         self, robot: Manipulator, slice_: str | None, warnings: list[str], *, as_json: bool
     ) -> None:
-        """Prove it, and print what is proved; exit with 1 if a box is not."""
+        """Prove it and print the result; exit with 1 if a box is not proved."""
         if self.prove is None:
             self._certify(robot, _orientation(robot, slice_), warnings, as_json)
             return
@@ -139,9 +140,12 @@ def _orientation(robot: Manipulator, slice_: str | None) -> Array:
 
     held, ranges = pose_ranges(slice_, "--slice")
     expect_coordinates(robot, held, ranges)
-    if set(held) - {"phi"} or ranges:
-        raise DataError("--slice: with --certify only phi=VALUE, the orientation, is expected")
-    return np.array([0.0] * (robot.freedom - 1) + [held["phi"]]) if held else home_pose(robot)
+    angles = robot.platform.angles or ("phi",)
+    if set(held) - set(angles) or ranges:
+        expected = ",".join(f"{name}=VALUE" for name in angles)
+        raise DataError(f"--slice: with --certify only {expected}, the orientation, is expected")
+    given = np.array([held.get(name, 0.0) for name in robot.coordinates])
+    return given if held else home_pose(robot)
 
 
 def _region(robot: Manipulator, text: str) -> Box:
@@ -169,10 +173,9 @@ def _certified(
     shares: dict[str, float],
     cube: Inscribed | None,
 ) -> dict[str, Any]:
-    angle = {"phi": float(pose[-1])} if robot.platform.turns else {}
     return {
         "robot": robot.name,
-        "held": angle,
+        "held": _angles(robot, pose),
         "floors": floors,
         "inner": found.inner_volume,
         "outer": found.outer_volume,
@@ -212,12 +215,12 @@ def _show(
     shares: dict[str, float],
     cube: Inscribed | None,
 ) -> None:
-    where = f" at {pose_text('phi', pose[-1])}" if robot.platform.turns else ""
+    where = ", ".join(pose_text(name, angle) for name, angle in _angles(robot, pose).items())
     kept = [f"{name} {value:g}" for name, value in floors.items() if value]
     noun = "area" if found.unit == "m^2" else "volume"
     shape = "square" if robot.platform.planar else "cube"
     show(
-        f"[bold]{plain(robot.name)}[/bold]{where}"
+        f"[bold]{plain(robot.name)}[/bold]{f' at {where}' if where else ''}"
         + (f", with floors {', '.join(kept)}" if kept else ""),
     )
     if not found.outer_volume:
@@ -231,27 +234,29 @@ def _show(
     if cube is None:
         show(f"No {shape} of any size was found in it.")
     else:
-        told = ", ".join(
-            pose_text(name, value)
-            for name, value in zip(robot.coordinates, cube.center.round(6).tolist(), strict=True)
-            if name != "phi"
-        )
+        center = zip(robot.coordinates, cube.center.round(6).tolist(), strict=True)
+        lengths = robot.platform.lengths
+        told = ", ".join(pose_text(name, value) for name, value in center if name in lengths)
         show(f"Largest {shape} that was found, proved: edge {cube.edge:.4g} m about {told}")
-    made = table("what ends it", "share of the boundary", numbers=("share of the boundary",))
-    for cause, share in shares.items():
-        made.add_row(plain(cause), percent(share))
     rest = 1.0 - sum(shares.values())
-    if rest > 0.0:
-        made.add_row("several, not told apart", percent(rest))
-    show(made)
+    causes = {plain(cause): share for cause, share in shares.items()}
+    causes |= {"several, not told apart": rest} if rest > 0.0 else {}
+    rows = ((cause, percent(share)) for cause, share in causes.items())
+    number = "share of the boundary"
+    show(table("what ends it", number, rows=rows, numbers=(number,)))
     if not floors["type_ii"]:
         show(_MAY_BE_SINGULAR)
 
 
+def _angles(robot: Manipulator, pose: Array) -> dict[str, float]:
+    """Return the angles of a pose by name."""
+    pairs = zip(robot.coordinates, pose.tolist(), strict=True)
+    return {name: value for name, value in pairs if name in robot.platform.angles}
+
+
 def _spans(robot: Manipulator, region: Box) -> str:
+    spans = zip(robot.coordinates, region.low, region.high, strict=True)
     return ", ".join(
-        pose_text(name, low)
-        if low == high
-        else f"{name} {low + 0.0:.4g} to {high + 0.0:.4g} {'rad' if name == 'phi' else 'm'}"
-        for name, low, high in zip(robot.coordinates, region.low, region.high, strict=True)
+        pose_text(name, low) if low == high else span_text(name, low + 0.0, high + 0.0)
+        for name, low, high in spans
     )

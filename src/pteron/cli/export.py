@@ -18,7 +18,7 @@ _TRUSTED = "trustworthy"
 Output = Literal["force", "torque", "percent"]
 """The library's own, which is slow to import."""
 
-_target = partial(option, metavar="DIR")
+_to = partial(option, metavar="DIR")
 
 _TARGETS = ("c", "st", "mjcf", "sdf", "urdf", "pinocchio", "casadi", "fmu", "klipper", "linuxcnc")
 """The options for what to write; each but the first two calls `pteron.export.export_NAME`."""
@@ -26,22 +26,22 @@ _TARGETS = ("c", "st", "mjcf", "sdf", "urdf", "pinocchio", "casadi", "fmu", "kli
 
 def export(
     robot: Robot,
-    c: Annotated[str | None, _target("c", "Write C99 to this folder.")] = None,
-    st: Annotated[str | None, _target("st", "Write Structured Text to this folder.")] = None,
-    mjcf: Annotated[str | None, _target("mjcf", "Write MuJoCo's MJCF.")] = None,
-    sdf: Annotated[str | None, _target("sdf", "Write SDF, for Gazebo.")] = None,
-    urdf: Annotated[str | None, _target("urdf", "Write URDF of the tree, and its closures.")] = None,
+    c: Annotated[str | None, _to("c", "Write C99 to this folder.")] = None,
+    st: Annotated[str | None, _to("st", "Write Structured Text to this folder.")] = None,
+    mjcf: Annotated[str | None, _to("mjcf", "Write MuJoCo's MJCF.")] = None,
+    sdf: Annotated[str | None, _to("sdf", "Write SDF, for Gazebo.")] = None,
+    urdf: Annotated[str | None, _to("urdf", "Write URDF of the tree, and its closures.")] = None,
     pinocchio: Annotated[
-        str | None, _target("pinocchio", "Write a module that makes Pinocchio's model.")
+        str | None, _to("pinocchio", "Write a module that makes Pinocchio's model.")
     ] = None,
     casadi: Annotated[
-        str | None, _target("casadi", "Write CasADi functions, for acados and the like.")
+        str | None, _to("casadi", "Write CasADi functions, for acados and the like.")
     ] = None,
-    fmu: Annotated[str | None, _target("fmu", "Write an FMU of FMI 3.0.")] = None,
+    fmu: Annotated[str | None, _to("fmu", "Write an FMU of FMI 3.0.")] = None,
     klipper: Annotated[
-        str | None, _target("klipper", "Write the kinematics of a Klipper configuration.")
+        str | None, _to("klipper", "Write the kinematics of a Klipper configuration.")
     ] = None,
-    linuxcnc: Annotated[str | None, _target("linuxcnc", "Write kinematics for LinuxCNC.")] = None,
+    linuxcnc: Annotated[str | None, _to("linuxcnc", "Write kinematics for LinuxCNC.")] = None,
     function: Annotated[
         list[str] | None,
         option(
@@ -138,4 +138,3 @@ def _check(asked: dict[str, str], options: list[str]) -> None:
         raise DataError(f"{names}: goes with --c and --st, not with --{others[0]}; leave it out")
     if "float" in options and "c" not in asked:
         raise DataError("--float: goes with --c; Structured Text has LREAL alone")
-

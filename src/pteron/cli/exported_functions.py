@@ -4,17 +4,16 @@ They are written out, since help and completion are shown before CasADi is loade
 against those of the library.
 """
 
-FUNCTIONS = tuple(
-    """
-    adaptive adaptive_drives bias_forces clearances closure_poses closure_rows computed_torque
-    computed_torque_base constraint coriolis_matrix direct_kinematics direct_step discriminants
-    drive_accelerations drive_forces drive_forces_base feed_forward feed_forward_base
-    feed_forward_pd feed_forward_pd_base followed_step forward_dynamics gravity_forces
-    inverse_dynamics inverse_dynamics_base inverse_kinematics jacobian joint_accelerations
-    joint_coordinates joint_feed_forward joint_feed_forward_base joint_points joint_rates
-    joint_screws kinetic_energy least_clearances link_jacobians link_vectors mass_matrix newton_step
-    paper_regressor paper_terms passive_friction passive_room pd_gravity pd_gravity_base
-    platform_motion platform_points potential_energy reach regressor room squared_type_i type_ii
-    type_ii_distances
-    """.split()
-)
+_NAMES = """\
+adaptive adaptive_drives bias_forces clearances closure_poses closure_rows computed_torque
+computed_torque_base constraint coriolis_matrix direct_kinematics direct_step discriminants
+drive_accelerations drive_forces drive_forces_base feed_forward feed_forward_base feed_forward_pd
+feed_forward_pd_base followed_step forward_dynamics gravity_forces inverse_dynamics
+inverse_dynamics_base inverse_kinematics jacobian joint_accelerations joint_coordinates
+joint_feed_forward joint_feed_forward_base joint_points joint_rates joint_screws kinetic_energy
+least_clearances link_jacobians link_vectors mass_matrix newton_step paper_regressor paper_terms
+passive_friction passive_room pd_gravity pd_gravity_base platform_motion platform_points
+potential_energy reach regressor room squared_type_i type_ii type_ii_distances
+"""
+
+FUNCTIONS = tuple(_NAMES.split())

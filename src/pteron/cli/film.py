@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from typer import Option
 
@@ -96,4 +96,3 @@ def _sides(text: str) -> tuple[int, int]:
             f"--size: {text!r} given, width and height in pixels expected, such as 960x720"
         ) from None
     return width, height
-

@@ -180,7 +180,7 @@ def forces(
     from pteron.motion import overloads
 
     machine = load_robot(robot, elbows)
-    m = machine.freedom
+    m, n = machine.freedom, machine.joint_count
     names = machine.column_names
     loads = names["wrench"]
     motion = [*names["pose"], *names["velocity"], *names["acceleration"]]
@@ -210,8 +210,8 @@ def forces(
         return np.concatenate([given, driven, rates], axis=-1)
 
     served = rows.served(machine, serve, columns, on_failure)
-    found = served[:, :m]
-    for text in overloads(machine, served[:, m : 2 * m], served[:, 2 * m :]) if limited else ():
+    found = served[:, :n]
+    for text in overloads(machine, served[:, n : 2 * n], served[:, 2 * n :]) if limited else ():
         note(f"Note: {text}")
     result = rows.table.extended(dict(zip(added, found.T, strict=True)))
     deliver(machine, result, added, out=out, as_json=json, single=rows.single)

@@ -184,7 +184,7 @@ def _show(robot: Manipulator, found: dict[str, Any]) -> None:
     angles = ", ".join(f"{math.degrees(angle):.4g}" for angle in found["singular_orientations"])
     where = "" if found["singular_at_every_position"] or not angles else " at the home position"
     singular = [f"Singular orientations{where}: {f'{angles} deg' if angles else 'none'}"]
-    singular = singular if robot.platform.turns else []
+    singular = singular if robot.platform.angles else []
     tool = [f"Tool: {_vector(found['tool'])} m from P, in the platform frame"]
     tool = tool if any(found["tool"]) else []
     work = "[green]This machine can work.[/green]"
@@ -208,7 +208,7 @@ def _drives(robot: Manipulator) -> list[Table]:
     """Return the drives of the joints, where the file has them."""
     from pteron.legs.drive_rows import drive_rows
 
-    legs = tuple(f"leg {i}" for i in range(1, robot.freedom + 1))
+    legs = tuple(f"leg {i}" for i in range(1, robot.joint_count + 1))
     rows = drive_rows(robot.legs)
     cells = ((name, *texts) for name, texts in rows)
     return [table("drive", *legs, rows=cells, numbers=legs)] if rows else []

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import rich.table
 
-from pteron.cli.pose_ranges import pose_text
+from pteron.cli.pose_ranges import pose_text, span_text
 from pteron.cli.terminal import percent, plain, show, table
 from pteron.errors import DataError
+from pteron.platforms.coordinates import COORDINATES, are_angles, coordinate
 
 if TYPE_CHECKING:
     from pteron.maps import Map
@@ -67,8 +68,7 @@ def map_rows(data: Mapping[str, Any]) -> Any:
     """Return a table of the indices, a row each."""
     import polars as pl
 
-    coordinates = [*data["held"], *(axis["name"] for axis in data["varies"])]
-    names = [name for name in ("x", "y", "z", "phi") if name in coordinates]
+    names = sorted([*data["held"], *(a["name"] for a in data["varies"])], key=[*COORDINATES].index)
     rows = []
     for one in data["indices"]:
         row = {key: one[key] for key in ("index", "unit", "best", "worst", "mean", "median")}
@@ -86,22 +86,18 @@ def show_map(found: Map, volume: ReachVolume | None, data: Mapping[str, Any]) ->
         f"[bold]{plain(found.robot)}[/bold]{f' at {held}' if held else ''}"
     ]
     if volume is not None:
-        names = [name for name in found.grid.coordinates if name != "phi"]
-        spans = ", ".join(
-            f"{name} {low:.4g} to {high:.4g} m"
-            for name, low, high in zip(names, *volume.box.tolist(), strict=True)
-        )
+        names = [name for name in found.grid.coordinates if coordinate(name).unit == "m"]
+        box = zip(names, *volume.box.tolist(), strict=True)
+        spans = ", ".join(span_text(name, low, high) for name, low, high in box)
         noun = "area" if volume.unit == "m^2" else "volume"
-        angle = found.grid.held.get("phi")
-        where = "" if angle is None else f" at {pose_text('phi', angle)}"
+        angles = {n: angle for n, angle in found.grid.held.items() if n not in names}
+        at = ", ".join(pose_text(name, angle) for name, angle in angles.items())
+        size = f"{noun} {volume.volume:.4g} {volume.unit}"
         lines.append(
-            f"Reach{where}: {spans}; {noun} {volume.volume:.4g} {volume.unit} "
+            f"Reach{f' at {at}' if at else ''}: {spans}; {size} "
             f"(standard error {volume.standard_error:.1g})"
         )
-    varying = ", ".join(
-        f"{axis.name} {axis.least:.4g} to {axis.greatest:.4g} {axis.unit}"
-        for axis in found.grid.axes
-    )
+    varying = ", ".join(span_text(a.name, a.least, a.greatest) for a in found.grid.axes)
     lines.append(f"Map: {varying}: {found.grid.size} poses, {percent(found.share)} in reach")
     if found.causes:
         told = sorted(found.causes.items(), key=lambda pair: -pair[1])
@@ -125,6 +121,6 @@ def show_map(found: Map, volume: ReachVolume | None, data: Mapping[str, Any]) ->
             share = one["undetermined"] / found.grid.size
             made.add_row("", "singular", "-", f"{percent(share)} of the poses")
     made.caption = f"Where: {' '.join(found.grid.coordinates)}, m" + (
-        " and rad" if "phi" in found.grid.coordinates else ""
+        " and rad" if are_angles(found.grid.coordinates).any() else ""
     )
     show(*lines, made)

@@ -1,14 +1,15 @@
-"""Coordinates of poses as a person types them: some held, some between two values."""
+"""Coordinates of poses as a person types and reads them: some held, some between two values."""
 
 from __future__ import annotations
 
 from pteron.errors import DataError
+from pteron.platforms.coordinates import coordinate
 
 
 def pose_ranges(
     text: str | None, option: str
 ) -> tuple[dict[str, float], dict[str, tuple[float, ...]]]:
-    """Return what is held, and what ranges, in the text of an option.
+    """Return the coordinates that an option holds, and the ranges of others.
 
     Examples
     --------
@@ -40,4 +41,9 @@ def pose_ranges(
 
 def pose_text(name: str, value: float) -> str:
     """Return a coordinate's value with its name and unit."""
-    return f"{name} = {value + 0.0:.4g} {'rad' if name == 'phi' else 'm'}"
+    return f"{name} = {value + 0.0:.4g} {coordinate(name).unit}"
+
+
+def span_text(name: str, low: float, high: float) -> str:
+    """Return a coordinate's range with its name and unit."""
+    return f"{name} {low:.4g} to {high:.4g} {coordinate(name).unit}"

@@ -12,6 +12,7 @@ from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
 from pteron.cli.motion_argument import played
 from pteron.cli.progress import spinner
 from pteron.cli.terminal import note, plain, show, show_json, table
+from pteron.platforms.coordinates import coordinate
 
 _SERIES = ("time", "pose", "velocity", "acceleration", "forces")
 """Keys of the report's file with a value for each sample of the cycle, too long to print."""
@@ -59,17 +60,20 @@ def _machine(found: dict[str, Any]) -> Table:
     home, reach, base = found["home"], found["reach"], found["base_parameters"]
     singular = ", ".join(f"{math.degrees(a):.4g}" for a in found["singular_orientations"] or ())
     factor, unit = (1e3, "litres") if reach["unit"] == "m^3" else (1e2, "dm^2")
-    made = table(plain(found["robot"]), "")
-    made.add_row("home pose", " ".join(f"{value:.4g}" for value in home["pose"]))
-    made.add_row("reserve there", f"{home['reserve']:.3f} of 1")
-    made.add_row("condition number there", f"{home['condition_number']:.4g}")
-    if "phi" in found["coordinates"]:
-        made.add_row("singular phi there", f"{singular} deg" if singular else "none")
-    made.add_row("reach", f"{factor * reach['volume']:.4g} {unit}")
-    shown = "cycle" if found["cycle"]["standard"] else "motion"
-    made.add_row(shown, f"{found['cycle']['duration']:.3g} s")
-    made.add_row("base parameters", f"{base['rank']} of {base['of']}")
-    return made
+    angles = [name for name in found["coordinates"] if coordinate(name).unit == "rad"]
+    told = {
+        "home pose": " ".join(f"{value:.4g}" for value in home["pose"]),
+        "reserve there": f"{home['reserve']:.3f} of 1",
+        "condition number there": f"{home['condition_number']:.4g}",
+    }
+    if len(angles) == 1:
+        told[f"singular {angles[0]} there"] = f"{singular} deg" if singular else "none"
+    told |= {
+        "reach": f"{factor * reach['volume']:.4g} {unit}",
+        "cycle" if found["cycle"]["standard"] else "motion": f"{found['cycle']['duration']:.3g} s",
+        "base parameters": f"{base['rank']} of {base['of']}",
+    }
+    return table(plain(found["robot"]), "", rows=told.items())
 
 
 def _legs(cycle: dict[str, Any], joints: list[dict[str, str]]) -> Table:

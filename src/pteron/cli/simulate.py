@@ -179,7 +179,7 @@ def _data(found: Simulation, controller: str, cycle: str, payload: float) -> dic
     power = found.forces * found.joint_rates
     sizes = {"force": found.forces, "speed": found.joint_rates, "power": power}
     peaks = {name: np.abs(values).max(axis=0).tolist() for name, values in sizes.items()}
-    rms = np.sqrt(np.mean(found.forces**2, axis=0)).tolist()
+    rms = [float(np.sqrt(np.mean(force**2))) for force in found.forces.T]
     return {
         "robot": robot.name,
         "cycle": cycle,
@@ -224,18 +224,17 @@ def _pictures(found: Simulation) -> dict[str, str]:
 def _show(found: Simulation, data: dict[str, Any]) -> None:
     """Print for a person: how well it follows, and what its drives do."""
     robot = found.robot
-    units = ["rad" if name == "phi" else "m" for name in robot.coordinates]
     carried = f" with {data['payload']:g} kg" if data["payload"] else ""
     steps = "DOP853" if data["step"] is None else f"steps of {data['step'] * 1e3:.3g} ms"
     errors = (
         (row["coordinate"], *(f"{1e6 * row[key]:.3g} u{unit}" for key in ("largest", "rms")))
-        for row, unit in zip(data["tracking"], units, strict=True)
+        for row, unit in zip(data["tracking"], robot.units, strict=True)
     )
     drives = []
     for leg, row in zip(robot.legs, data["drives"], strict=True):
         force, speed = leg.joint.force_unit, f"{leg.joint.unit}/s"
-        quantities = {"peak_force": force, "rms_force": force, "peak_speed": speed}
-        sizes = (f"{row[key]:.4g} {unit}" for key, unit in (quantities | {"peak_power": "W"}).items())
+        units = {"peak_force": force, "rms_force": force, "peak_speed": speed, "peak_power": "W"}
+        sizes = (f"{row[key]:.4g} {unit}" for key, unit in units.items())
         limited = leg.drive and leg.drive.max_force
         drives.append((str(row["leg"]), *sizes, f"{row['at_its_limit']:.1%}" if limited else "-"))
     names = ("leg", "peak force", "RMS force", "peak speed", "peak power", "at its limit")

@@ -1,4 +1,4 @@
-"""`pteron size`: what a cycle asks of each drive, and which motors serve."""
+"""`pteron size`: the load of each drive over a cycle, and a choice of motors."""
 
 from __future__ import annotations
 
@@ -7,10 +7,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 import rich.table
 from typer import Exit
 
-from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
+from pteron.cli.arguments import (
+    STANDARD,
+    Cycle,
+    Duration,
+    Elbows,
+    Json,
+    Payload,
+    Robot,
+    load_robot,
+    option,
+)
 from pteron.cli.destination import Destination
-from pteron.cli.motion_argument import CYCLE, STANDARD, cycle_of, loaded
-from pteron.cli.terminal import note, plain, show, spinner, table
+from pteron.cli.motion_argument import cycle_of, loaded
+from pteron.cli.progress import spinner
+from pteron.cli.terminal import note, plain, show, table
 
 if TYPE_CHECKING:
     import polars as pl
@@ -19,17 +30,14 @@ if TYPE_CHECKING:
 
 _OVERLOADED = 1
 _BEST = 3
-"""Motors a joint that a person is shown."""
+"""Motors of each joint that a person is shown."""
 
 
 def size(
     robot: Robot,
-    cycle: Annotated[str, CYCLE] = STANDARD,
-    payload: Annotated[float, option("payload", "At the tool's centre point, kg.")] = 0.0,
-    duration: Annotated[
-        float | None,
-        option("duration", "Of the standard cycle, s.", show_default="10 m/s^2 at the tool"),
-    ] = None,
+    cycle: Cycle = STANDARD,
+    payload: Payload = 0.0,
+    duration: Duration = None,
     dwell: Annotated[float, option("dwell", "Rest after each cycle, s.")] = 0.0,
     motors: Annotated[
         str | None,
@@ -93,9 +101,9 @@ def size(
 
 
 def _unserved(found: Sizing, fits: tuple[Fit, ...]) -> list[str]:
-    """Return for which joints no motor of the list serves, and what the best of them lacks."""
+    """Return the joints that no motor of the list serves, and what the best of them lacks."""
     lines = []
-    for leg in range(1, found.robot.freedom + 1):
+    for leg in range(1, found.robot.joint_count + 1):
         own = [fit for fit in fits if fit.leg == leg]
         if own and not own[0].fits:
             best = own[0]
@@ -150,7 +158,7 @@ def _fits_table(found: Sizing, fits: tuple[Fit, ...]) -> pl.DataFrame:
 
 
 def _more(found: Sizing, fits: tuple[Fit, ...]) -> dict[str, str]:
-    """Return what a folder has beside the table and the figures."""
+    """Return the further files of a folder."""
     from pteron.plots import svg_file
     from pteron.report.drive_figures import force_speed, power
 
@@ -180,75 +188,53 @@ def _show(found: Sizing, fits: tuple[Fit, ...], cycle: str, payload: float) -> N
 
 
 def _loads(found: Sizing) -> rich.table.Table:
-    names = ("peak force", "RMS force", "peak speed", "RMS speed")
-    made = table("leg", *names, numbers=("leg", *names))
+    names = ("leg", "peak force", "RMS force", "peak speed", "RMS speed")
     columns = found.peak_forces, found.rms_forces, found.peak_speeds, found.rms_speeds
+    rows = []
     for i, leg in enumerate(found.robot.legs):
         units = [leg.joint.force_unit] * 2 + [f"{leg.joint.unit}/s"] * 2
         cells = (f"{v[i]:.4g} {unit}" for v, unit in zip(columns, units, strict=True))
-        made.add_row(str(i + 1), *cells)
-    return made
+        rows.append((str(i + 1), *cells))
+    return table(*names, rows=rows, numbers=names)
 
 
 def _powers(found: Sizing) -> rich.table.Table:
-    names = ("peak (W)", "mean (W)", "brakes (W)", "gives (J)", "takes back (J)")
-    made = table("leg", *names, numbers=("leg", *names))
-    columns = (
-        *(found.peak_power, found.mean_power, found.peak_braking),
-        *(found.given_energy, found.braked_energy),
-    )
-    for i in range(found.robot.freedom):
-        made.add_row(str(i + 1), *(f"{values[i]:.4g}" for values in columns))
-    return made
+    names = ("leg", "peak (W)", "mean (W)", "brakes (W)", "gives (J)", "takes back (J)")
+    powers = (found.peak_power, found.mean_power, found.peak_braking)
+    columns = zip(*powers, found.given_energy, found.braked_energy, strict=True)
+    rows = ((str(i), *(f"{v:.4g}" for v in values)) for i, values in enumerate(columns, start=1))
+    return table(*names, rows=rows, numbers=names)
 
 
 def _rotors(found: Sizing) -> list[rich.table.Table]:
-    """Return what the motors of the machine's file have to do, where it says enough."""
+    """Return the loads of the motors of the machine's file, where it says enough."""
     if not any(drive.ratio or drive.rotor_inertia for drive in found.drives):
         return []
-    names = ("load", "rotor", "load/rotor", "ratio", "best ratio", "RMS at motor")
-    made = table(
-        "leg", *names, numbers=("leg", *names), caption="Inertia at the joint, the load's greatest."
-    )
-    cells = found.table().to_dicts()
-    for leg, row in zip(found.robot.legs, cells, strict=True):
-        unit = "kg" if leg.joint.unit == "m" else "kg m^2"
-        made.add_row(
-            str(row["leg"]),
-            *(
-                "-" if row[key] is None else f"{row[key]:.3g}{own}"
-                for key, own in (
-                    ("greatest_load_inertia", f" {unit}"),
-                    ("rotor_inertia", f" {unit}"),
-                    ("inertia_ratio", ""),
-                    ("ratio", ""),
-                    ("best_ratio", f" rad/{leg.joint.unit}"),
-                    ("rms_motor_torque", " N m"),
-                )
-            ),
-        )
-    return [made]
+    names = ("leg", "load", "rotor", "load/rotor", "ratio", "best ratio", "RMS at motor")
+    rows = []
+    for leg, row in zip(found.robot.legs, found.table().to_dicts(), strict=True):
+        inertia = " kg" if leg.joint.unit == "m" else " kg m^2"
+        units = {"greatest_load_inertia": inertia, "rotor_inertia": inertia, "inertia_ratio": ""}
+        units |= {"ratio": "", "best_ratio": f" rad/{leg.joint.unit}", "rms_motor_torque": " N m"}
+        cells = ("-" if row[k] is None else f"{row[k]:.3g}{unit}" for k, unit in units.items())
+        rows.append((str(row["leg"]), *cells))
+    caption = "Inertia at the joint, the load's greatest."
+    return [table(*names, rows=rows, numbers=names, caption=caption)]
 
 
 def _choice(found: Sizing, fits: tuple[Fit, ...]) -> list[rich.table.Table]:
     """Return the best motors of the list for each joint."""
     if not fits:
         return []
-    names = ("ratio", "from", "to", "rated", "peak", "speed")
-    made = table(
-        *("leg", "motor", *names),
-        numbers=("leg", *names),
-        caption="Ratios that serve, the best first; then margins at it: rated, peak torque, speed.",
-    )
-    for i in range(found.robot.freedom):
-        own = [fit for fit in fits if fit.leg == i + 1][:_BEST]
+    rows = []
+    for i, leg in enumerate(found.robot.legs, start=1):
+        own = [fit for fit in fits if fit.leg == i][:_BEST]
         for fit in own:
-            span = fit.span if fit.fits else None
-            made.add_row(
-                str(fit.leg) if fit is own[0] else "",
-                plain(fit.motor.name),
-                f"{fit.ratio:.4g} rad/{found.robot.legs[i].joint.unit}",
-                *(("none", "") if span is None else (f"{end:.4g}" for end in span)),
-                *(f"{v:.2f}" for v in (fit.rated_margin, fit.peak_margin, fit.speed_margin)),
-            )
-    return [made]
+            ratio = f"{fit.ratio:.4g} rad/{leg.joint.unit}"
+            span = [f"{end:.4g}" for end in fit.span] if fit.fits else ["none", ""]
+            margins = (f"{v:.2f}" for v in (fit.rated_margin, fit.peak_margin, fit.speed_margin))
+            first = str(i) if fit is own[0] else ""
+            rows.append((first, plain(fit.motor.name), ratio, *span, *margins))
+    names = ("ratio", "from", "to", "rated", "peak", "speed")
+    caption = "Ratios that serve, the best first; then margins at it: rated, peak torque, speed."
+    return [table("leg", "motor", *names, rows=rows, numbers=("leg", *names), caption=caption)]

@@ -1,4 +1,4 @@
-"""The rows a subcommand works on, the work in chunks, and where its results go."""
+"""The rows of a table that a subcommand works on in chunks, and the table of its results."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from pteron.cli.arguments import Failure, parsed_numbers
-from pteron.cli.terminal import is_terminal, note, progress_bar, show, show_json, table, write
+from pteron.cli.progress import progress_bar
+from pteron.cli.terminal import is_terminal, note, show, show_json, table, write
 from pteron.errors import DataError, OutputError, PteronError, SingularPose, UnreachablePose
 
 if TYPE_CHECKING:
@@ -19,18 +20,18 @@ if TYPE_CHECKING:
     from pteron.tables import Table
 
 CHUNK = 50_000
-"""Rows served at once: enough to be fast, few enough to show how far the work is."""
+"""Rows served at once: enough to be fast, few enough for a progress bar."""
 LONG = 200_000
-"""More rows than that are worth a progress bar."""
+"""Rows above which a progress bar is shown."""
 SHOWN_ROWS = 40
-"""More rows than that are no reading for a person."""
+"""Most rows that a person is shown."""
 
 _DECIMALS = {"m": 6, "rad": 6, "N": 4, "N m": 4}
 
 
 @dataclass(frozen=True)
 class Rows:
-    """A table, or the one row that was typed, so that no message speaks of rows."""
+    """A table, or a single row that was typed: messages about it speak of no rows."""
 
     table: Table
     single: bool = False
@@ -56,10 +57,10 @@ class Rows:
                 parts = list(self._chunks(serve, values, unlikely))
             else:
                 parts = []
-                with progress_bar(self.table.source, len(values)) as advance:
+                with progress_bar(self.table.source) as tell:
                     for part in self._chunks(serve, values, unlikely):
                         parts.append(part)
-                        advance(len(part))
+                        tell(min(len(parts) * CHUNK / len(values), 1.0))
         if unlikely:
             note(f"Note: {self.table.source}: {unlikely}")
         return np.concatenate(parts)
@@ -189,13 +190,14 @@ def _show(robot: Manipulator, result: Table, shown: Sequence[str], *, single: bo
     known = column_units(robot)
     units = [known.get(name, "") for name in shown]
     headings = [f"{n} ({unit})" if unit else n for n, unit in zip(shown, units, strict=True)]
-    numbered = ["row"] if not single and "mode" not in shown else []
-    made = table(*numbered, *headings, numbers=("row", *headings))
-    rows = result.frame.select(shown).head(SHOWN_ROWS).iter_rows()
-    for i, cells in enumerate(rows, start=1):
-        texts = (_text(cell, unit) for cell, unit in zip(cells, units, strict=True))
-        made.add_row(*(str(i) for _ in numbered), *texts)
-    show(made)
+    rows = [
+        [str(i), *map(_text, cells, units)]
+        for i, cells in enumerate(result.frame.select(shown).head(SHOWN_ROWS).iter_rows(), start=1)
+    ]
+    if single or "mode" in shown:
+        show(table(*headings, rows=(row[1:] for row in rows), numbers=tuple(headings)))
+    else:
+        show(table("row", *headings, rows=rows, numbers=("row", *headings)))
     if len(result) > SHOWN_ROWS:
         note(f"{SHOWN_ROWS} of {_count(len(result))} shown; --out FILE writes them all")
 
@@ -204,7 +206,7 @@ def column_units(robot: Manipulator) -> dict[str, str]:
     """Return the units of a machine's pose coordinates, joint coordinates and forces."""
     joints = [leg.joint for leg in robot.legs]
     return {
-        **{name: "rad" if name == "phi" else "m" for name in robot.coordinates},
+        **dict(zip(robot.coordinates, robot.units, strict=True)),
         **{name: j.unit for name, j in zip(robot.joint_names, joints, strict=True)},
         **{name: j.force_unit for name, j in zip(robot.force_names, joints, strict=True)},
     }

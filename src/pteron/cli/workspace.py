@@ -1,29 +1,23 @@
-"""`pteron workspace`: where a machine reaches, and how good it is there, as maps."""
+"""`pteron workspace`: maps of the reach and of indices of performance, and proofs by intervals."""
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from typer import Option
 
-from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
+from pteron.cli.arguments import Elbows, Json, Robot, Scheduler, load_robot, option
 from pteron.cli.certify import TOLERANCE, Proofs
 from pteron.cli.completion import indices
 from pteron.cli.map_summary import map_data, map_rows, show_map
 from pteron.cli.pose_ranges import pose_ranges, pose_text
-from pteron.cli.terminal import (
-    is_terminal,
-    note,
-    plain,
-    show,
-    show_json,
-    spinner,
-    stages,
-    write,
-)
+from pteron.cli.progress import progress_bar, spinner
+from pteron.cli.terminal import is_terminal, note, show, show_json, write, written
 from pteron.errors import DataError, ModelError, OutputError
+from pteron.platforms.coordinates import coordinate
 
 if TYPE_CHECKING:
     from pteron.manipulator import Manipulator
@@ -87,14 +81,7 @@ def workspace(
     workers: Annotated[
         int | None, option("workers", "Processes of this computer that share the work.")
     ] = None,
-    scheduler: Annotated[
-        str | None,
-        option(
-            "scheduler",
-            "A Dask cluster that does the work, tcp://host:8786; it has no lock of its own.",
-            "ADDRESS",
-        ),
-    ] = None,
+    scheduler: Scheduler = None,
     certify: Annotated[
         bool,
         option("certify", "Prove how large the workspace is, what ends it, and a cube in it."),
@@ -169,8 +156,7 @@ def workspace(
         volume = _volume(machine, grid)
     for text in (outside := _outside(grid, volume)):
         note(f"Warning: {text}")
-    task = f"Mapping {machine.name}"
-    with stages(task, 1) as tell:
+    with progress_bar(f"Mapping {machine.name}") as tell:
         found = map_index(
             machine,
             names,
@@ -179,7 +165,7 @@ def workspace(
             out=out if ending in (*_DATA, *_SURFACES) else None,
             scheduler=scheduler,
             workers=workers,
-            progress=lambda done, total: tell(task, done, total),
+            progress=lambda done, total: tell(done / total),
         )
     if out is not None and ending in (*_PICTURES, *_FILMS):
         _draw(found, out, ending)
@@ -191,7 +177,7 @@ def workspace(
     else:
         write(map_rows(data).write_csv())
     if out is not None and not json:
-        line = f"Written: {plain(out)}"
+        line = written(out)[0]
         show(line) if is_terminal() else note(line)
 
 
@@ -238,28 +224,24 @@ def _checked_out(out: str | None) -> str:
 
 
 def _warnings(robot: Manipulator) -> list[str]:
-    """Return what there is to say of the machine's geometry before anything else."""
+    """Return warnings about the machine's geometry."""
     from pteron.kinematics.architecture import is_singular_everywhere, singular_everywhere
 
     return [str(singular_everywhere(robot))] if is_singular_everywhere(robot) else []
 
 
 def _grid(robot: Manipulator, text: str | None, points: int | None, ending: str) -> Grid:
-    """Return the poses, by what is asked for and what the file can hold."""
+    """Return the poses that are asked for, as many as the file can hold."""
     from pteron.maps import pose_grid
 
     names = robot.coordinates
     held, ranges = pose_ranges(text, "--slice")
     if ending in _FILMS:
         points = points or _FILM_POINTS
-        last = "phi" if "phi" in names else names[-1]
         if text is None:
-            from pteron.workspace import home_pose
-
-            home = dict(zip(names, home_pose(robot).tolist(), strict=True))
-            held = {name: home[name] for name in names if name not in ("x", "y", last)}
+            held = _home(robot, [name for name in names[:-1] if name not in ("x", "y")])
     elif ending in _SURFACES and text is None and len(names) > 3:
-        held = {"phi": _home_angle(robot)}
+        held = _home(robot, robot.platform.angles)
     fixed = held if text is not None or ending in (*_FILMS, *_SURFACES) else None
     grid = pose_grid(robot, fixed, ranges, points=points, rim=_RIM if ending else 0.0)
     count = len(grid.axes)
@@ -274,10 +256,12 @@ def _grid(robot: Manipulator, text: str | None, points: int | None, ending: str)
     return grid
 
 
-def _home_angle(robot: Manipulator) -> float:
+def _home(robot: Manipulator, names: Collection[str]) -> dict[str, float]:
+    """Return coordinates of the home pose by name."""
     from pteron.workspace import home_pose
 
-    return float(home_pose(robot)[-1])
+    pairs = zip(robot.coordinates, home_pose(robot).tolist(), strict=True)
+    return {name: value for name, value in pairs if name in names}
 
 
 def _with_frames(grid: Grid) -> Grid:
@@ -292,7 +276,7 @@ def _volume(robot: Manipulator, grid: Grid) -> ReachVolume | None:
     """Return the reach at the grid's orientation; None where that varies, or nothing is in it."""
     from pteron.workspace import reach_volume
 
-    if any(axis.name == "phi" for axis in grid.axes):
+    if any(axis.unit == "rad" for axis in grid.axes):
         return None
     try:
         return reach_volume(robot, grid.pose)
@@ -301,10 +285,11 @@ def _volume(robot: Manipulator, grid: Grid) -> ReachVolume | None:
 
 
 def _outside(grid: Grid, volume: ReachVolume | None) -> list[str]:
-    """Return which lengths are held where nothing is in reach."""
+    """Return the held lengths at which nothing is in reach."""
     if volume is None:
         return []
-    spans = zip((n for n in grid.coordinates if n != "phi"), *volume.box.tolist(), strict=True)
+    lengths = [name for name in grid.coordinates if coordinate(name).unit == "m"]
+    spans = zip(lengths, *volume.box.tolist(), strict=True)
     return [
         f"nothing is in reach at {pose_text(name, grid.held[name])}: {name} goes from {low:.4g} to "
         f"{high:.4g} m at this orientation"
@@ -320,11 +305,5 @@ def _draw(found: Map, out: str, ending: str) -> None:
         with spinner(f"Drawing {found.robot}"):
             save_figure(map_figure(found), out, dpi=_DPI)
         return
-    task = f"Filming {found.robot}"
-    with stages(task, 1) as tell:
-        map_film(
-            found,
-            next(iter(found.values)),
-            out,
-            progress=lambda done, total: tell(task, done, total),
-        )
+    with progress_bar(f"Filming {found.robot}") as tell:
+        map_film(found, next(iter(found.values)), out, progress=tell)

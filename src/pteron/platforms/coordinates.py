@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 
 Unit = Literal["m", "rad"]
 
+SHOWN: dict[str, tuple[str, float]] = {"m": ("mm", 1e3), "rad": ("°", 180.0 / math.pi)}
+"""The unit in which people read lengths and angles, by their SI unit, and how many make one."""
+
 
 class Coordinate(NamedTuple):
     """A coordinate of a pose.
@@ -32,15 +35,13 @@ class Coordinate(NamedTuple):
     @property
     def shown_unit(self) -> str:
         """The unit that people read it in: mm or degrees."""
-        return _SHOWN[self.unit][0]
+        return SHOWN[self.unit][0]
 
     @property
     def shown_factor(self) -> float:
         """Its value in `shown_unit` over its value in SI units."""
-        return _SHOWN[self.unit][1]
+        return SHOWN[self.unit][1]
 
-
-_SHOWN = {"m": ("mm", 1e3), "rad": ("°", 180.0 / math.pi)}
 
 COORDINATES: dict[str, Coordinate] = {
     "x": Coordinate("m", "x", "fx"),

@@ -21,10 +21,11 @@ from pteron.plots.drives import Ability, force_speed_figure, power_figure
 from pteron.plots.films import Film, film
 from pteron.plots.forces import forces_figure, regularity_figure
 from pteron.plots.front import front_figure
-from pteron.plots.index_maps import map_figure, map_film
+from pteron.plots.index_maps import map_figure
 from pteron.plots.jacobian_maps import condition_figure, singularities_figure
 from pteron.plots.machine_drawing import grid_step
 from pteron.plots.machine_figures import draw, poses_figure, robot_figure
+from pteron.plots.map_films import map_film
 from pteron.plots.printing import WIDTHS, resized, save_figure
 from pteron.plots.reach import measure_figure, reach_figure
 from pteron.plots.row_figures import operations_figure, parameters_figure

@@ -1,4 +1,4 @@
-"""What makes the file of a film from its frames: H.264 in MP4, and GIF."""
+"""The encoders of films: H.264 in MP4, and GIF."""
 
 from __future__ import annotations
 
@@ -15,26 +15,25 @@ from PIL import Image
 from pteron.errors import PteronError
 from pteron.extras import install_command
 
-Picture = NDArray[np.uint8]
-"""(height, width, 3): red, green and blue."""
+Pixels = NDArray[np.uint8]
+"""A picture (height, width, 3): red, green and blue."""
 
 _QUALITY = 7.0
-"""Of 10: lines on white stay sharp."""
+"""FFmpeg's quality, of 10, at which lines on white stay sharp."""
 
 _SHORTEST = 2
 """Hundredths of a second: browsers show shorter frames of a GIF slowly."""
 
-
 _PALETTE = 96
 
 _GIF_PIXELS = 6e8
-"""Of all frames of a GIF, which are held in memory."""
+"""Most pixels of a GIF's frames, all of which are held in memory."""
 
 
 class Writer(Protocol):
     """A film that is being written."""
 
-    def add(self, picture: Picture) -> None:
+    def add(self, picture: Pixels) -> None:
         """Write one more frame."""
 
     def close(self) -> None:
@@ -67,7 +66,7 @@ class Mp4:
         )
         self._pipe.send(None)
 
-    def add(self, picture: Picture) -> None:
+    def add(self, picture: Pixels) -> None:
         """Write one more frame."""
         self._pipe.send(np.ascontiguousarray(picture))
 
@@ -83,7 +82,7 @@ class Gif:
         self._path, self._delay = path, round(1000.0 / fps)
         self._frames: list[Image.Image] = []
 
-    def add(self, picture: Picture) -> None:
+    def add(self, picture: Pixels) -> None:
         """Write one more frame."""
         coarse = _coarse(picture)
         if not self._frames:
@@ -102,7 +101,7 @@ class Gif:
             )
 
 
-def _coarse(picture: Picture) -> NDArray[np.uint16]:
+def _coarse(picture: Pixels) -> NDArray[np.uint16]:
     """Return each colour's number among those of 5, 6 and 5 bits."""
     red, green, blue = (picture[..., k] >> bits for k, bits in enumerate((3, 2, 3)))
     return np.asarray(red.astype(np.uint16) << 11 | green.astype(np.uint16) << 5 | blue)

@@ -14,7 +14,7 @@ from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.motion import JointPoints, Motion, joint_guides, joint_points
 from pteron.plots.canvas import FONT_SIZE, INK, MUTED, blank, leg_style, plain_axes
-from pteron.plots.encoders import Picture
+from pteron.plots.encoders import Pixels
 from pteron.plots.machine_drawing import (
     Scene,
     draw_directions,
@@ -55,7 +55,7 @@ def frames(
     turns: float,
     forces: Array | None,
     corner: str,
-) -> Iterator[Picture]:
+) -> Iterator[Pixels]:
     """Yield the pictures of a machine at times (K,), s, width and height in pixels.
 
     The eye goes round it so many turns from the first to the last. Forces (T, n) at the motion's
@@ -99,7 +99,7 @@ def _drawn(
     angles: Array,
     times: Array,
     now: Sequence[Line2D] | None,
-) -> Iterator[Picture]:
+) -> Iterator[Pixels]:
     canvas: Any = figure.canvas
     turning = bool(angles[-1])
     kept = 0

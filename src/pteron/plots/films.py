@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import closing
 from dataclasses import dataclass
 from html import escape
@@ -18,7 +18,7 @@ from pteron.errors import DataError, OutputError, shown
 from pteron.kernels import Array, as_array
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion import Motion
-from pteron.plots.encoders import ENCODERS, checked_encoder
+from pteron.plots.encoders import ENCODERS, Pixels, checked_encoder
 from pteron.plots.film_frames import frames
 
 _SPEEDS = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
@@ -87,7 +87,7 @@ def film(
     size: tuple[int, int] = (960, 720),
     turns: float = 0.0,
     forces: ArrayLike | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> Film:
     """Write a film of a machine that goes through a motion.
 
@@ -114,7 +114,7 @@ def film(
     forces : array, shape (T, n), optional
         Forces of the legs at the motion's samples, N or N m: their curves are drawn below.
     progress : callable, optional
-        Is told how many frames are done, and of how many, after each.
+        Is told the share that is done, from 0 to 1, after each frame.
 
     Returns
     -------
@@ -175,16 +175,28 @@ def film(
             ".mp4, a smaller size, a higher speed or fewer frames a second"
         )
     pictures = frames(robot, motion, times, sides, turns=turns, forces=drawn, corner=_told(speed))
+    write_film(target, pictures, len(times), sides, rate, progress)
+    return Film(target, len(times), rate, speed, sides)
+
+
+def write_film(
+    target: Path,
+    pictures: Iterable[Pixels],
+    count: int,
+    size: tuple[int, int],
+    rate: float,
+    progress: Callable[[float], None] | None,
+) -> None:
+    """Write so many pictures of a size as a film, whole or not at all."""
     # Made elsewhere: a film that is not finished leaves nothing behind.
     with TemporaryDirectory(prefix="pteron-film-") as folder:
         made = Path(folder) / f"film{target.suffix.lower()}"
-        with closing(encoder.writer(made, sides, rate)) as writer:
+        with closing(ENCODERS[target.suffix.lower()].writer(made, size, rate)) as writer:
             for done, picture in enumerate(pictures, start=1):
                 writer.add(picture)
                 if progress is not None:
-                    progress(done, len(times))
+                    progress(done / count)
         write_bytes(target, made.read_bytes())
-    return Film(target, len(times), rate, speed, sides)
 
 
 def checked_film(path: str | Path) -> Path:
@@ -219,7 +231,7 @@ def _expect_number(name: str, value: float, low: float, high: float) -> None:
 
 def _checked_forces(forces: ArrayLike, motion: Motion, robot: Manipulator) -> Array:
     found = as_array(forces, "forces", ())
-    expected = len(motion.time), robot.freedom
+    expected = len(motion.time), robot.joint_count
     if found.shape != expected:
         raise DataError(
             f"forces: shape {found.shape} given, {expected} expected, as the motion has"

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing
-from pathlib import Path
-from tempfile import TemporaryDirectory
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,11 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, NullFormatter
-from matplotlib.transforms import Bbox
-from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt  # type: ignore[import-untyped]
 
-from pteron.atomic import write_bytes
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.maps import Axis, Map, Summary
@@ -35,8 +29,6 @@ from pteron.plots.canvas import (
     plain_axes,
     spot,
 )
-from pteron.plots.encoders import ENCODERS
-from pteron.plots.films import Film, checked_film
 from pteron.workspace import BEYOND_LIMITS, REACHABLE
 
 _WIDTH = 5.0
@@ -59,9 +51,6 @@ _LAST = 99.0
 
 _BELOW = 4.5
 """Sizes of a letter from the axes to the legend: the scale's numbers and its name stand there."""
-
-_FPS = 10.0
-_DPI = 160
 
 
 def map_figure(given: Map, *names: str) -> Figure:
@@ -100,90 +89,9 @@ def map_figure(given: Map, *names: str) -> Figure:
         if name not in given.values:
             raise DataError(f"{name}: is not in this map; it has {', '.join(given.values)}")
     planes = _planes(given)
-    scales = {name: _normalised(given, name) for name in chosen}
+    scales = {name: color_scale(given, name) for name in chosen}
     panels = [(plane, name) for plane in planes for name in chosen]
-    return _drawn(panels, scales, {}, len(chosen) if len(planes) > 1 else 1)
-
-
-def map_film(
-    given: Map,
-    name: str,
-    path: str | Path,
-    *,
-    fps: float = _FPS,
-    progress: Callable[[int, int], None] | None = None,
-) -> Film:
-    """Write a film that goes through the last coordinate of a map over three.
-
-    Its colours mean the same in all frames.
-
-    Parameters
-    ----------
-    given : Map
-        Over three coordinates.
-    name : str
-        The index.
-    path : str or Path
-        The file: .mp4 or .gif.
-    fps : float
-        Frames, that is values of the last coordinate, a second.
-    progress : callable, optional
-        Is told how many frames are done, and of how many.
-
-    Returns
-    -------
-    Film
-
-    Raises
-    ------
-    DataError
-        If the map has not three coordinates, or not such an index.
-    OutputError
-        If the file cannot be written, or its ending is neither .mp4 nor .gif.
-    PteronError
-        If the encoder of MP4 files is not there: ``pip install 'pteron[film]'`` brings it.
-    """
-    target = checked_film(path)
-    if len(given.grid.axes) != 3 or name not in given.values:
-        raise DataError("a film needs a map over three coordinates, and an index that is in it")
-    last, scales = given.grid.axes[-1], {name: _normalised(given, name)}
-    encoder = ENCODERS[target.suffix.lower()]
-    rate = encoder.rate(fps)
-    values = last.values.tolist()
-    figure = _drawn([(given.at(last.name, values[0]), name)], scales, given.causes)
-    size = _even(figure)
-    figure.draw_without_rendering()
-    places = [axes.get_position() for axes in figure.axes]
-    with TemporaryDirectory(prefix="pteron-film-") as folder:
-        made = Path(folder, f"film{target.suffix.lower()}")
-        with closing(encoder.writer(made, size, rate)) as writer:
-            for done, value in enumerate(values, start=1):
-                figure = _drawn([(given.at(last.name, value), name)], scales, given.causes)
-                writer.add(_picture(figure, size, places))
-                if progress is not None:
-                    progress(done, len(values))
-        write_bytes(target, made.read_bytes())
-    return Film(target, last.count, rate, 1.0, size)
-
-
-def _even(figure: Figure) -> tuple[int, int]:
-    """Return a figure's width and height, pixels, made even, as films want them."""
-    width, height = (2 * round(_DPI * float(side) / 2.0) for side in figure.get_size_inches())
-    figure.set_dpi(_DPI)
-    figure.set_size_inches(width / _DPI, height / _DPI)
-    return width, height
-
-
-def _picture(figure: Figure, size: tuple[int, int], places: Sequence[Bbox]) -> NDArray[np.uint8]:
-    """Return the picture (height, width, 3) of a figure, its axes in the same places as ever."""
-    figure.set_layout_engine("none")
-    figure.set_dpi(_DPI)
-    figure.set_size_inches(size[0] / _DPI, size[1] / _DPI)
-    for axes, place in zip(figure.axes, places, strict=True):
-        axes.set_position(place)
-    canvas: Any = figure.canvas
-    canvas.draw()
-    return np.asarray(canvas.buffer_rgba())[..., :3]
+    return map_panels(panels, scales, {}, len(chosen) if len(planes) > 1 else 1)
 
 
 def _planes(given: Map) -> list[Map]:
@@ -205,7 +113,7 @@ def _planes(given: Map) -> list[Map]:
     ]
 
 
-def _normalised(given: Map, name: str) -> Normalize:
+def color_scale(given: Map, name: str) -> Normalize:
     """Return how the values of an index become colours."""
     factor = _SCALES.get(ALL[name].unit, (1.0, ""))[0]
     known = factor * given.values[name][given.reachable & np.isfinite(given.values[name])]
@@ -220,7 +128,7 @@ def _normalised(given: Map, name: str) -> Normalize:
     return Normalize(low, last if ALL[name].better == "less" and high > 3.0 * last else high)
 
 
-def _drawn(
+def map_panels(
     panels: Sequence[tuple[Map, str]],
     scales: Mapping[str, Normalize],
     causes: Mapping[str, Any],

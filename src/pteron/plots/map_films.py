@@ -1,0 +1,97 @@
+"""Films through the last coordinate of a map of an index over three."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
+
+from pteron.errors import DataError
+from pteron.maps import Map
+from pteron.plots.encoders import ENCODERS, Pixels
+from pteron.plots.films import Film, checked_film, write_film
+from pteron.plots.index_maps import color_scale, map_panels
+
+_FPS = 10.0
+_DPI = 160
+
+
+def map_film(
+    given: Map,
+    name: str,
+    path: str | Path,
+    *,
+    fps: float = _FPS,
+    progress: Callable[[float], None] | None = None,
+) -> Film:
+    """Write a film that goes through the last coordinate of a map over three.
+
+    Its colours mean the same in all frames.
+
+    Parameters
+    ----------
+    given : Map
+        Over three coordinates.
+    name : str
+        The index.
+    path : str or Path
+        The file: .mp4 or .gif.
+    fps : float
+        Frames, that is values of the last coordinate, a second.
+    progress : callable, optional
+        Is told the share that is done, from 0 to 1.
+
+    Returns
+    -------
+    Film
+
+    Raises
+    ------
+    DataError
+        If the map has not three coordinates, or not such an index.
+    OutputError
+        If the file cannot be written, or its ending is neither .mp4 nor .gif.
+    PteronError
+        If the encoder of MP4 files is not there: ``pip install 'pteron[film]'`` brings it.
+    """
+    target = checked_film(path)
+    if len(given.grid.axes) != 3 or name not in given.values:
+        raise DataError("a film needs a map over three coordinates, and an index that is in it")
+    last, scales = given.grid.axes[-1], {name: color_scale(given, name)}
+    rate = ENCODERS[target.suffix.lower()].rate(fps)
+
+    def drawn(value: float) -> Figure:
+        return map_panels([(given.at(last.name, value), name)], scales, given.causes)
+
+    values = last.values.tolist()
+    figure = drawn(values[0])
+    size = _even(figure)
+    figure.draw_without_rendering()
+    places = [axes.get_position() for axes in figure.axes]
+    pictures = (_pixels(drawn(value), size, places) for value in values)
+    write_film(target, pictures, len(values), size, rate, progress)
+    return Film(target, last.count, rate, 1.0, size)
+
+
+def _even(figure: Figure) -> tuple[int, int]:
+    """Return a figure's width and height, pixels, made even, as films want them."""
+    width, height = (2 * round(_DPI * float(side) / 2.0) for side in figure.get_size_inches())
+    figure.set_dpi(_DPI)
+    figure.set_size_inches(width / _DPI, height / _DPI)
+    return width, height
+
+
+def _pixels(figure: Figure, size: tuple[int, int], places: Sequence[Bbox]) -> Pixels:
+    """Return the pixels of a figure whose axes are put at places."""
+    figure.set_layout_engine("none")
+    figure.set_dpi(_DPI)
+    figure.set_size_inches(size[0] / _DPI, size[1] / _DPI)
+    for axes, place in zip(figure.axes, places, strict=True):
+        axes.set_position(place)
+    canvas: Any = figure.canvas
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())[..., :3]
