@@ -133,8 +133,11 @@ def test_without_the_encoder_the_extra_is_named(monkeypatch):
 
 @pytest.mark.parametrize("ending", ["mp4", "gif"])
 def test_an_interrupted_film_leaves_what_was_there(ending):
-    def stop(done, total):
-        if done == 3:
+    done = []
+
+    def stop(share):
+        done.append(share)
+        if len(done) == 3:
             raise KeyboardInterrupt
 
     target = Path(f"cycle.{ending}")

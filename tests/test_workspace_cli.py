@@ -11,7 +11,7 @@ import pytest
 from test_cli import done, refused, run
 
 import pteron
-from pteron.cli import screen
+from pteron.cli import terminal
 from pteron.cli import workspace as command
 from pteron.indices import evaluate
 from pteron.maps import load_map
@@ -43,7 +43,7 @@ def test_a_pipe_gets_a_row_an_index_and_json_all_that_is_known():
 
 
 def test_a_person_reads_the_reach_what_ends_it_and_each_index(monkeypatch):
-    for module in (command, screen):
+    for module in (command, terminal):
         monkeypatch.setattr(module, "is_terminal", lambda: True)
     text = done(f"workspace five-bar --index condition {SLICE}")
     assert max(map(len, text.splitlines())) <= 60

@@ -10,7 +10,6 @@ import rich.table
 from pteron.cli.pose_ranges import pose_text, span_text
 from pteron.cli.terminal import percent, plain, show, table
 from pteron.errors import DataError
-from pteron.platforms.coordinates import COORDINATES, are_angles, coordinate
 
 if TYPE_CHECKING:
     from pteron.maps import Map
@@ -68,6 +67,8 @@ def map_rows(data: Mapping[str, Any]) -> Any:
     """Return a table of the indices, a row each."""
     import polars as pl
 
+    from pteron.platforms.coordinates import COORDINATES
+
     names = sorted([*data["held"], *(a["name"] for a in data["varies"])], key=[*COORDINATES].index)
     rows = []
     for one in data["indices"]:
@@ -81,6 +82,8 @@ def map_rows(data: Mapping[str, Any]) -> Any:
 
 def show_map(found: Map, volume: ReachVolume | None, data: Mapping[str, Any]) -> None:
     """Print for a person: the reach, what ends it, and each index."""
+    from pteron.platforms.coordinates import are_angles, coordinate
+
     held = ", ".join(pose_text(name, value) for name, value in found.grid.held.items())
     lines: list[str | rich.table.Table] = [
         f"[bold]{plain(found.robot)}[/bold]{f' at {held}' if held else ''}"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pteron.errors import DataError
-from pteron.platforms.coordinates import coordinate
 
 
 def pose_ranges(
@@ -41,9 +40,15 @@ def pose_ranges(
 
 def pose_text(name: str, value: float) -> str:
     """Return a coordinate's value with its name and unit."""
-    return f"{name} = {value + 0.0:.4g} {coordinate(name).unit}"
+    return f"{name} = {value + 0.0:.4g} {_unit(name)}"
 
 
 def span_text(name: str, low: float, high: float) -> str:
     """Return a coordinate's range with its name and unit."""
-    return f"{name} {low:.4g} to {high:.4g} {coordinate(name).unit}"
+    return f"{name} {low:.4g} to {high:.4g} {_unit(name)}"
+
+
+def _unit(name: str) -> str:
+    from pteron.platforms.coordinates import coordinate
+
+    return coordinate(name).unit

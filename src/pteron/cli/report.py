@@ -12,7 +12,6 @@ from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
 from pteron.cli.motion_argument import played
 from pteron.cli.progress import spinner
 from pteron.cli.terminal import note, plain, show, show_json, table
-from pteron.platforms.coordinates import coordinate
 
 _SERIES = ("time", "pose", "velocity", "acceleration", "forces")
 """Keys of the report's file with a value for each sample of the cycle, too long to print."""
@@ -57,6 +56,8 @@ def report(
 
 
 def _machine(found: dict[str, Any]) -> Table:
+    from pteron.platforms.coordinates import coordinate
+
     home, reach, base = found["home"], found["reach"], found["base_parameters"]
     singular = ", ".join(f"{math.degrees(a):.4g}" for a in found["singular_orientations"] or ())
     factor, unit = (1e3, "litres") if reach["unit"] == "m^3" else (1e2, "dm^2")

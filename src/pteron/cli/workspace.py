@@ -17,7 +17,6 @@ from pteron.cli.pose_ranges import pose_ranges, pose_text
 from pteron.cli.progress import progress_bar, spinner
 from pteron.cli.terminal import is_terminal, note, show, show_json, write, written
 from pteron.errors import DataError, ModelError, OutputError
-from pteron.platforms.coordinates import coordinate
 
 if TYPE_CHECKING:
     from pteron.manipulator import Manipulator
@@ -286,6 +285,8 @@ def _volume(robot: Manipulator, grid: Grid) -> ReachVolume | None:
 
 def _outside(grid: Grid, volume: ReachVolume | None) -> list[str]:
     """Return the held lengths at which nothing is in reach."""
+    from pteron.platforms.coordinates import coordinate
+
     if volume is None:
         return []
     lengths = [name for name in grid.coordinates if coordinate(name).unit == "m"]

@@ -156,7 +156,7 @@ def checked_folder(path: str | Path) -> Path:
 
 def numbers(report: Report) -> dict[str, Any]:
     """Return the numbers of a report as plain data in SI units and radians."""
-    robot, cycle, ranges = report.robot, report.cycle, report.joint_quantities
+    robot, cycle, ranges = report.robot, report.cycle, report.joints
     standard = report.standard
     orientations = report.orientations
     return {
