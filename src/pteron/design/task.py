@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -20,6 +19,7 @@ from pteron.kernels import Array, Kernel, compile
 from pteron.kinematics.unlikely import unlikely_values
 from pteron.manipulator import Manipulator, load
 from pteron.manipulator.saving import text_of
+from pteron.maps.plan import RESULTS
 from pteron.toml import told
 from pteron.workspace.conditions import conditions
 from pteron.workspace.smooth_conditions import SmoothConditions, smooth_conditions
@@ -71,9 +71,9 @@ class Task:
 
     @property
     def plan(self) -> dict[str, Any]:
-        """What makes its results what they are: the spec, the machine, and Pteron's version."""
+        """What its results follow from: the spec, the machine, and the version of the results."""
         spec = self.spec.model_dump(mode="json", exclude={"robot"})
-        return {"robot": text_of(self.robot), "spec": spec, "pteron": version("pteron")}
+        return {"robot": text_of(self.robot), "spec": spec, "pteron": RESULTS}
 
     @cached_property
     def conditions(self) -> SmoothConditions:

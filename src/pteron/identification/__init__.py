@@ -6,6 +6,8 @@ real bodies, `excitation` makes the motions worth recording. `estimate` takes a 
 robot.
 """
 
+from typing import TYPE_CHECKING
+
 from pteron.arguments import check_arguments
 from pteron.identification import consistency, estimators, excitation, logs, signals
 from pteron.identification.consistency import Bounds, Consistency, consistent_model
@@ -45,6 +47,7 @@ from pteron.identification.regressor import Fit, estimate
 from pteron.identification.result import Identification
 from pteron.identification.signals import Preprocessing, Processing, States, preprocessing_of
 from pteron.identification.verdict import Verdict
+from pteron.renamed import former_names
 
 __all__ = [
     "Bounds",
@@ -103,6 +106,9 @@ __all__ = [
     "write_log",
 ]
 check_arguments(__name__, classes=("Bounds", "Terms"))
+
+if not TYPE_CHECKING:
+    __getattr__ = former_names(__name__)
 
 
 def __dir__() -> list[str]:

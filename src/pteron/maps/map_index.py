@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from functools import lru_cache, partial
-from importlib.metadata import version
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Literal, get_args
@@ -22,6 +21,7 @@ from pteron.maps.accelerated import accelerated
 from pteron.maps.files import checked_map_file, save_map
 from pteron.maps.grid import Grid, Region, pose_grid
 from pteron.maps.map import MARGIN, Map
+from pteron.maps.plan import RESULTS
 from pteron.maps.stores import MapStore, MemoryStore
 from pteron.maps.surfaces import ENDINGS as SURFACES
 from pteron.maps.sweep import cores, sweep
@@ -148,7 +148,7 @@ def _folder() -> TemporaryDirectory[str]:
 
 
 def _plan(robot: Manipulator, engine: str) -> dict[str, Any]:
-    return {"robot": text_of(robot), "engine": engine, "pteron": version("pteron")}
+    return {"robot": text_of(robot), "engine": engine, "pteron": RESULTS}
 
 
 def _computed(

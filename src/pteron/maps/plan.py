@@ -10,6 +10,12 @@ from typing import Any
 
 from pteron.errors import OutputError, shown
 
+RESULTS = "0.1.0"
+"""The first version whose maps and searches have this one's numbers: it goes on with its stores.
+
+It is raised where a number of them changes.
+"""
+
 _LONG = 40
 _MANY = 2
 """Differences of each part of a plan that are told."""

@@ -4,6 +4,8 @@ Positions are smoothed and differentiated in joint space, where they were measur
 velocities and accelerations of the platform follow from them by exact kinematics.
 """
 
+from typing import TYPE_CHECKING
+
 from pteron.identification.signals.derivatives import (
     Derivatives,
     central_differences,
@@ -21,6 +23,7 @@ from pteron.identification.signals.fourier import FittedSeries, fitted_series
 from pteron.identification.signals.preprocessing import Preprocessing, Processing, preprocessing_of
 from pteron.identification.signals.samples import samples
 from pteron.identification.signals.states import States, start_pose
+from pteron.renamed import former_names
 
 __all__ = [
     "Decimation",
@@ -41,6 +44,9 @@ __all__ = [
     "uniform",
     "white_noise",
 ]
+
+if not TYPE_CHECKING:
+    __getattr__ = former_names(__name__)
 
 
 def __dir__() -> list[str]:

@@ -1,0 +1,66 @@
+"""Former public names: each answers for one release, with a warning that has the new line.
+
+A name that is renamed gets a line in `RENAMED`, and its package, if it has none yet, the lines
+
+    if not TYPE_CHECKING:
+        __getattr__ = former_names(__name__)
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from pkgutil import resolve_name
+from typing import Any
+
+RENAMED = {
+    "pteron.identification": {"playback": "pteron.playback"},
+    "pteron.identification.signals": {
+        "FourierSeries": "pteron.identification.signals.FittedSeries",
+    },
+}
+"""Names of version 0.1 by package, and where each of them is now."""
+
+UNTIL = "0.3"
+"""The first version without them."""
+
+
+def former_names(package: str) -> Callable[[str], Any]:
+    """Return the ``__getattr__`` of a package, which answers to the package's former names.
+
+    Parameters
+    ----------
+    package : str
+        Its ``__name__``.
+
+    Returns
+    -------
+    callable
+        It takes a name, and returns what is now called otherwise, with a `DeprecationWarning` that
+        has the line to write instead; AttributeError for any other name.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> from pteron.identification import signals
+    >>> with warnings.catch_warnings(record=True) as told:
+    ...     warnings.simplefilter("always")
+    ...     series = signals.FourierSeries
+    >>> print(told[0].message)
+    pteron.identification.signals.FourierSeries goes with version 0.3; write
+    from pteron.identification.signals import FittedSeries
+    """
+
+    def __getattr__(name: str) -> Any:  # noqa: N807
+        present = RENAMED.get(package, {}).get(name)
+        if present is None:
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        module, _, own = present.rpartition(".")
+        warnings.warn(
+            f"{package}.{name} goes with version {UNTIL}; write from {module} import {own}",
+            DeprecationWarning,
+            stacklevel=2,
+        )
+        return resolve_name(present)
+
+    return __getattr__

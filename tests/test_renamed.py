@@ -1,0 +1,40 @@
+"""Former public names: each answers with what it is called now, and says so."""
+
+import importlib
+from pkgutil import resolve_name
+
+import pytest
+
+import pteron
+from pteron.renamed import RENAMED, UNTIL
+
+NAMES = [(package, old, new) for package, names in RENAMED.items() for old, new in names.items()]
+
+
+@pytest.mark.parametrize(("package", "old", "new"), NAMES)
+def test_a_former_name_answers_with_a_line_that_runs(package, old, new):
+    """The warning is of the user's own line."""
+    with pytest.warns(DeprecationWarning, match=rf"^{package}\.{old} goes with version") as told:
+        found = getattr(importlib.import_module(package), old)
+    assert found is resolve_name(new)
+    assert told[0].filename == __file__
+    space = {}
+    exec(str(told[0].message).partition("; write ")[2], space)
+    assert found in space.values()
+
+
+@pytest.mark.parametrize(("package", "old"), [(package, old) for package, old, _ in NAMES])
+def test_a_former_name_is_not_listed(package, old):
+    module = importlib.import_module(package)
+    assert old not in dir(module)
+    assert old not in module.__all__
+
+
+@pytest.mark.parametrize("package", RENAMED)
+def test_another_name_is_unknown(package):
+    with pytest.raises(AttributeError, match=f"module '{package}' has no attribute 'speling'"):
+        _ = importlib.import_module(package).speling
+
+
+def test_former_names_are_gone_when_their_release_is_over():
+    assert [*map(int, pteron.__version__.split(".")[:2])] < [*map(int, UNTIL.split("."))]
