@@ -26,7 +26,11 @@ MADE = ("_build", "gallery", "measured", "functions", "inside", "modules")
 """Folders of docs that `make docs` fills."""
 
 PAGES = sorted(
-    (ROOT / "README.md", *(p for p in DOCS.rglob("*.md") if not {*p.parts} & {*MADE})),
+    (
+        *ROOT.glob("[!C]*.md"),
+        ROOT / "CONTRIBUTING.md",
+        *(p for p in DOCS.rglob("*.md") if not {*p.parts} & {*MADE}),
+    ),
 )
 TEXTS = {str(page.relative_to(ROOT)): page.read_text(encoding="utf-8") for page in PAGES}
 NAMES = pytest.mark.parametrize("name", TEXTS)
