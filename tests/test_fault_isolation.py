@@ -7,7 +7,7 @@ import pytest
 from logs_of_motions import log_of
 from test_faults import RATE, brisk, clean, found, late_by, noisy
 
-from pteron.identification import LogError, Processing, Terms, Trial, identify
+from pteron.identification import FaultIsolation, LogError, Processing, Terms, identify
 from pteron.identification.logs import Description, KnownPayload
 from pteron.identification.verdict import verdict_of
 from pteron.motion import with_payload
@@ -50,7 +50,7 @@ def test_a_wild_sample_of_a_joint_is_no_wrap():
     robot, log, _ = clean("linear-delta")
     joints = log.joints.copy()
     joints[1000:1003, 0] += 1.5 * np.ptp(joints[:, 0])
-    assert found(robot, replace(log, joints=joints)).trial.tried
+    assert found(robot, replace(log, joints=joints)).fault_isolation.tried
 
 
 def test_drives_at_their_limit_are_named():
@@ -138,9 +138,12 @@ def test_a_factor_of_all_forces_is_told_by_a_known_payload():
     terms = Terms(payload=True)
     right = found(robot, log, terms=terms)
     assert right.verdict.grade == "trustworthy"
-    assert "gain" not in (*right.trial.hidden, *(one.fault for one in right.trial.suspicions))
+    assert "gain" not in (
+        *right.fault_isolation.hidden,
+        *(one.fault for one in right.fault_isolation.faults),
+    )
     more = found(robot, replace(log, forces=1.1 * log.forces), terms=terms)
-    (gain,) = more.trial.suspicions
+    (gain,) = more.fault_isolation.faults
     assert gain.fault == "gain"
     assert gain.sizes[0] == pytest.approx(0.1, abs=0.02)
     assert "All forces are" in gain.message
@@ -150,7 +153,7 @@ def test_a_factor_of_all_forces_is_told_by_a_known_payload():
 def test_a_factor_of_all_forces_that_no_log_can_show_is_said():
     robot, log, _ = clean("delta")
     result = identify(robot, replace(noisy(log), forces=0.5 * noisy(log).forces))
-    assert result.trial.hidden == ("gain",)
+    assert result.fault_isolation.hidden == ("gain",)
     assert any("cannot show a factor that all forces" in one for one in result.verdict.reasons)
     assert any("0.5 times those drawn" in one for one in result.verdict.next_steps)
 
@@ -159,12 +162,12 @@ def test_a_factor_of_all_forces_that_no_log_can_show_is_said():
 def test_a_slow_clock_is_named_where_weight_tells_it(name):
     robot, log, _ = clean(name)
     result = found(robot, noisy(replace(log, time=0.97 * log.time)))
-    named = {one.fault: one for one in result.trial.suspicions}
+    named = {one.fault: one for one in result.fault_isolation.faults}
     if name == "five-bar":
-        assert "clock" in result.trial.hidden
+        assert "clock" in result.fault_isolation.hidden
         assert any("cannot show a clock" in one for one in result.verdict.reasons)
         return
-    assert "clock" not in result.trial.hidden
+    assert "clock" not in result.fault_isolation.hidden
     assert 1.0 + named["clock"].sizes[0] == pytest.approx(0.97**-2, abs=0.03)
     assert "clock runs" in named["clock"].message
     assert result.verdict.grade != "trustworthy"
@@ -179,7 +182,7 @@ def test_rotors_heavier_than_what_is_there_are_not_trusted():
     assert result.verdict.reasons[0].startswith("No real bodies have these values")
 
 
-# Where the trial is run ------------------------------------------------------------------------
+# Where fault isolation is run ------------------------------------------------------
 
 
 def test_a_fault_shows_in_a_log_with_two_phases_too_long_to_be_looked_at_whole():
@@ -194,8 +197,8 @@ def test_a_fault_shows_in_a_log_with_two_phases_too_long_to_be_looked_at_whole()
         payload=late.payload[rows],
     )
     result = found(robot, late, terms=Terms(payload=True))
-    assert result.trial.tried
-    assert "delay" in [one.fault for one in result.trial.suspicions]
+    assert result.fault_isolation.tried
+    assert "delay" in [one.fault for one in result.fault_isolation.faults]
     mended = found(robot, late, terms=Terms(payload=True), processing=Processing(delay="auto"))
     assert mended.preprocessing[0].delay == pytest.approx(6e-3, abs=5e-4)
 
@@ -205,17 +208,17 @@ def test_a_fault_shows_that_is_in_the_second_log_alone():
     other = log_of(robot, friction=friction, seed=5, **brisk(robot))
     late = noisy(replace(other, source="late.csv", forces=late_by(other, 8e-3)), seed=1)
     result = found(robot, [noisy(log), late])
-    assert result.trial.suspicions[0].matters
+    assert result.fault_isolation.faults[0].matters
     assert result.verdict.grade != "trustworthy"
 
 
-def test_where_the_trial_was_not_run_nothing_is_trusted():
+def test_where_fault_isolation_was_not_run_nothing_is_trusted():
     robot, log, _ = clean("delta")
     held = found(robot, noisy(log)).held_out
     nothing = np.full(3, np.nan)
-    verdict = verdict_of(held, Trial((), (), nothing, nothing, "too short"), repeats=False)
+    verdict = verdict_of(held, FaultIsolation((), (), nothing, nothing, "too short"), repeats=False)
     assert verdict.grade == "usable with care"
-    assert "The trial of faults was not run: too short." in verdict.reasons
+    assert "Fault isolation was not run: too short." in verdict.reasons
 
 
 def motion_of(robot):
@@ -231,7 +234,7 @@ def test_forces_held_from_sample_to_sample_are_no_fault(name):
     robot, log, friction = clean(name)
     later = log_of(robot, time=log.time + 0.5 / RATE, friction=friction, **motion_of(robot))
     result = found(robot, replace(log, forces=later.forces))
-    assert not any(one.matters for one in result.trial.suspicions)
-    assert [one.fault for one in result.trial.suspicions] == ["delay"]
-    assert "half a sample" in result.trial.suspicions[0].message
+    assert not any(one.matters for one in result.fault_isolation.faults)
+    assert [one.fault for one in result.fault_isolation.faults] == ["delay"]
+    assert "half a sample" in result.fault_isolation.faults[0].message
     assert result.verdict.grade == "trustworthy"

@@ -11,9 +11,9 @@ from scipy.interpolate import make_interp_spline
 
 import pteron
 from pteron.identification import Processing, Terms, identification_model, identify
-from pteron.identification.faults import trial
-from pteron.identification.faults.moved import Moved, lengths_of
-from pteron.identification.faults.suspects import Suspects, families_of
+from pteron.identification.faults import isolate_faults
+from pteron.identification.faults.columns import FaultColumns, families_of
+from pteron.identification.faults.fitted_motion import FittedMotion, lengths_of
 from pteron.identification.recordings import recording
 from pteron.identification.signals import States
 from pteron.legs import Drive, Stribeck
@@ -55,7 +55,7 @@ def named(robot, log):
     """Return the first fault that is named, and all that is said."""
     result = found(robot, log)
     assert result.verdict.grade != "trustworthy"
-    first = result.trial.suspicions[0]
+    first = result.fault_isolation.faults[0]
     assert first.message in result.verdict.reasons
     return first, result
 
@@ -64,8 +64,8 @@ def named(robot, log):
 def test_no_fault_is_named_where_there_is_none(name):
     robot, log, _ = clean(name)
     result = found(robot, noisy(log))
-    assert result.trial.suspicions == ()
-    assert (result.trial.spoiled == 0.0).all()
+    assert result.fault_isolation.faults == ()
+    assert (result.fault_isolation.spoiled == 0.0).all()
 
 
 @pytest.mark.parametrize(("name", "delay"), [("delta", 3e-3), ("quadrupteron", 8e-3)])
@@ -77,7 +77,7 @@ def test_a_delay_is_measured_and_taken_out(name, delay):
     assert first.sizes[0] == pytest.approx(delay, abs=5.0 * first.deviations[0])
     assert f"{1e3 * first.sizes[0]:.3g} ms" in first.message
     mended = found(robot, late, processing=Processing(delay="auto"))
-    assert not any(one.fault == "delay" for one in mended.trial.suspicions)
+    assert not any(one.fault == "delay" for one in mended.fault_isolation.faults)
     assert mended.preprocessing[0].delay == pytest.approx(delay, abs=3e-4)
 
 
@@ -143,7 +143,7 @@ def test_friction_that_falls_with_speed_is_named_and_then_identified():
     assert first.fault == "stribeck"
     assert "--stribeck auto" in first.message
     result = found(robot, log, terms=Terms(stribeck="auto"))
-    assert "stribeck" not in result.trial.tried
+    assert "stribeck" not in result.fault_isolation.tried
     # The motion is fast: not every joint shows near rest what its friction does.
     seen = np.flatnonzero(np.isfinite(result.unknowns.speeds))
     assert len(seen)
@@ -213,13 +213,16 @@ def test_small_motion_is_not_accused_of_flipped_signs(seed):
 
 @pytest.mark.parametrize("name", ["quadrupteron", "delta", "par4", "mixed"])
 def test_columns_are_what_a_fault_does_to_the_forces(name):
-    """Moved joints and lengths, against the machine built anew."""
+    """Other joints and lengths, against the machine built anew."""
     robot, log, _ = clean(name)
     part = log.part(100, 140)
     curve = make_interp_spline(log.time, log.joints, k=7)
     motion = tuple(curve(part.time, k) for k in range(3))
     states = States.of_joints(robot, motion, part.time, home_pose(robot))
-    moved = Moved(robot, pteron.parameters(robot), states)
+    n, rows = len(robot.legs), len(part.time)
+    model = identification_model(robot, Terms(coulomb=False, viscous=False, offset=False))
+    values = model.base.values(robot)
+    fitted = FittedMotion(model, values, states, np.ones(n), np.zeros(rows))
     here = pteron.inverse_dynamics(robot, states.pose, states.velocity, states.acceleration)
     size = np.abs(here).max()
 
@@ -231,7 +234,7 @@ def test_columns_are_what_a_fault_does_to_the_forces(name):
     other = replace(robot, legs=tuple(legs))
     s = States.of_joints(other, motion, part.time, tuple(states.pose[0]))
     there = pteron.inverse_dynamics(other, s.pose, s.velocity, s.acceleration)
-    columns = moved.lengths(step)
+    columns = fitted.by_lengths()
     assert columns.shape[-1] == len(lengths_of(robot))
     wanted = (there - here) / step
     assert np.abs(columns[..., place] - wanted).max() < 1e-5 * size / 0.1
@@ -241,7 +244,7 @@ def test_columns_are_what_a_fault_does_to_the_forces(name):
     s = States.of_joints(robot, shifted, part.time, tuple(states.pose[0]))
     there = pteron.inverse_dynamics(robot, s.pose, s.velocity, s.acceleration)
     wanted = (there - here) / step
-    given = moved.give(behind, 1e-6)[..., 1]
+    given = fitted.by_give(behind)[..., 1]
     assert np.abs(given - wanted).max() < 1e-3 * np.abs(wanted).max() + 1e-5 * size
 
 
@@ -249,15 +252,15 @@ def test_every_family_names_its_columns():
     robot = machine("par4")
     model = identification_model(robot)
     values = np.ones(len(model.names))
-    suspects = Suspects(model, values, np.ones(4), 0.0, 1.0, families_of(robot))
-    assert len(suspects.names) == len(suspects.units) == len(suspects.kinds)
-    assert suspects.places[-1][-1] == len(suspects.names) - 1
+    columns = FaultColumns(model, values, np.ones(4), 0.0, 1.0, families_of(robot))
+    assert len(columns.names) == len(columns.units) == len(columns.kinds)
+    assert columns.places[-1].stop == len(columns.names)
 
 
-def test_a_log_too_short_for_the_trial_is_not_refused():
+def test_a_log_too_short_for_fault_isolation_is_not_refused():
     robot, log, _ = clean("delta")
     result = found(robot, noisy(log))
     (how,) = result.preprocessing
     slow = replace(how, derivatives="central", cutoff=0.5)  # its edges leave nothing
-    shown = trial(result.model, result.estimate, [recording(log.part(0, 1000))], [slow])
-    assert (shown.tried, shown.suspicions) == ((), ())
+    shown = isolate_faults(result.model, result.estimate, [recording(log.part(0, 1000))], [slow])
+    assert (shown.tried, shown.faults) == ((), ())

@@ -15,10 +15,10 @@ import pteron
 from pteron.bodies.parameters import body_places
 from pteron.cli.interrupts import insistent_interrupts
 from pteron.identification import (
+    FaultIsolation,
     Log,
     Processing,
     Terms,
-    Trial,
     huber,
     identification_model,
     identify,
@@ -357,7 +357,7 @@ def test_a_sound_log_is_not_accused():
     robot = random_machine(1, False)
     log = noisy(robot, size=0.03, turn=0.2, period=1.7)
     found = identify(robot, log)
-    assert found.trial.suspicions == ()
+    assert found.fault_isolation.faults == ()
     assert found.verdict.grade != "not trustworthy"
 
 
@@ -508,7 +508,7 @@ def test_the_grade_is_that_of_the_worst_actuator(error, noise, grade):
 def test_what_is_left_open_of_a_cycle_counts(uncertain, spoiled, grade):
     good, shares = prediction((0.01, 0.01), (0.01, 0.01)), np.array([[0.1, 0.1]] * 2)
     shares[:, 1] = uncertain, spoiled
-    verdict = verdict_of([good], Trial(("delay",), (), *shares), repeats=False)
+    verdict = verdict_of([good], FaultIsolation(("delay",), (), *shares), repeats=False)
     assert verdict.grade == grade
     steps = " ".join(verdict.next_steps)
     assert ("leaves such a cycle's forces open" in steps) == (uncertain == 4.0)

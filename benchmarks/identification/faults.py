@@ -42,7 +42,7 @@ from pteron.identification import (
     random_excitation,
 )
 from pteron.identification.excitation import FourierMotion
-from pteron.identification.faults.cycle import Cycle, Extent
+from pteron.identification.faults.cycle import Extent, ReferenceCycle
 from pteron.identification.logs import Description, KnownPayload
 from pteron.kernels import Array
 from pteron.legs import Drive, Stribeck
@@ -404,7 +404,7 @@ def judged(name: str, fault: str, seed: int) -> Said:
     _, rates, seconds = commanded(case)
     pose = case.motion.at(case.time).pose.mean(axis=0)
     extent = Extent(pose, np.abs(rates).max(axis=0), np.abs(seconds).max(axis=0))
-    cycle = Cycle.within(case.motion.robot, extent, size=_SIZE)
+    cycle = ReferenceCycle.within(case.motion.robot, extent, size=_SIZE)
     assert cycle is not None
     assert found.machine is not None
     s = cycle.states
@@ -412,13 +412,13 @@ def judged(name: str, fault: str, seed: int) -> Said:
     true = States.of_joints(case.robot, joints, s.time, home_pose(case.robot))
     forces = pteron.drive_forces(case.robot, true.pose, true.velocity, true.acceleration)
     told = pteron.drive_forces(found.machine, s.pose, s.velocity, s.acceleration)
-    named: tuple[str, ...] = tuple(one.fault for one in found.trial.suspicions if one.matters)
+    named: tuple[str, ...] = tuple(one.fault for one in found.fault_isolation.faults if one.matters)
     if any("stays at its" in reason for reason in found.verdict.reasons):
         named = (*named, "saturation")
     if any((one.outliers > 0.0).any() for one in found.held_out):
         named = (*named, "outliers")
     off = float(cycle.share(told - forces, forces).max())
-    return Said(found.verdict.grade, named, off, found.trial.hidden)
+    return Said(found.verdict.grade, named, off, found.fault_isolation.hidden)
 
 
 def simulated(name: str) -> Said:
@@ -432,8 +432,13 @@ def simulated(name: str) -> Said:
         symbols = tuple(leg.joint for leg in robot.legs)
         logs.append(Log(f"log-{seed}", found.time, found.joints, found.forces, symbols=symbols))
     result = identify(robot, logs[0], held_out=logs[1])
-    named = tuple(one.fault for one in result.trial.suspicions if one.matters)
-    return Said(result.verdict.grade, named, float(result.trial.off.max()), result.trial.hidden)
+    named = tuple(one.fault for one in result.fault_isolation.faults if one.matters)
+    return Said(
+        result.verdict.grade,
+        named,
+        float(result.fault_isolation.off.max()),
+        result.fault_isolation.hidden,
+    )
 
 
 def cell(said: list[Said]) -> str:

@@ -35,7 +35,7 @@ from pteron.identification.excitation import (
     optimal_excitation,
     random_excitation,
 )
-from pteron.identification.faults import Suspicion, Trial
+from pteron.identification.faults import FaultIsolation, IsolatedFault
 from pteron.identification.fitting import METHODS
 from pteron.identification.identify import identify
 from pteron.identification.logs import Log, open_log, read_log, write_log
@@ -56,9 +56,11 @@ __all__ = [
     "Essential",
     "Estimate",
     "Excitation",
+    "FaultIsolation",
     "Fit",
     "FourierMotion",
     "Identification",
+    "IsolatedFault",
     "Limits",
     "Log",
     "LogError",
@@ -71,9 +73,7 @@ __all__ = [
     "Processing",
     "Reduced",
     "States",
-    "Suspicion",
     "Terms",
-    "Trial",
     "Verdict",
     "column_errors",
     "consistency",

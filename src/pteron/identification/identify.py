@@ -17,7 +17,7 @@ from pteron.identification.estimators import (
     essential_parameters,
     weighted,
 )
-from pteron.identification.faults import delay_of, trial
+from pteron.identification.faults import delay_of, isolate_faults
 from pteron.identification.fitting import (
     METHODS,
     balanced,
@@ -201,8 +201,8 @@ def identify(
             too_little_motion(model, hidden, estimate, preprocessing, fit[0]), whole
         )
     report("Looking for faults", 0, 0)
-    shown = trial(model, estimate, fit, preprocessing, _reflected(rotors))
-    verdict = verdict_of(held, shown, repeats=not others, limits=limits)
+    faults = isolate_faults(model, estimate, fit, preprocessing, _reflected(rotors))
+    verdict = verdict_of(held, faults, repeats=not others, limits=limits)
     fitted = tuple(
         predict(model, estimate.values, one.beginning(), how, _reader(report, "Predicting"))
         for one, how in zip(fit, preprocessing, strict=True)
@@ -236,7 +236,7 @@ def identify(
         fitted=fitted,
         held_out=tuple(held),
         preprocessing=preprocessing,
-        trial=shown,
+        fault_isolation=faults,
         verdict=replace(verdict, next_steps=(*verdict.next_steps, *advice)),
         unseen=hidden,
         findings=tuple(f for one in (*whole, *others) for f in one.findings),

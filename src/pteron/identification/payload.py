@@ -13,7 +13,7 @@ from pteron.bodies.parameters import PLATFORM_KINDS
 from pteron.errors import DataError
 from pteron.identification.errors import LogError
 from pteron.identification.estimators import Estimate, weighted
-from pteron.identification.faults import Trial, trial
+from pteron.identification.faults import FaultIsolation, isolate_faults
 from pteron.identification.fitting import (
     balanced,
     check_columns,
@@ -58,7 +58,7 @@ class Payload:
         The fit of everything: base parameters, friction and offsets first, the payload last.
     residual : array, shape (n,)
         Standard deviation of what is left of each actuator's forces, N or N m, before the filter.
-    trial : Trial
+    fault_isolation : FaultIsolation
         Faults of the logs or the machine that the residuals show, and what they spoil.
     findings : tuple of Finding
         What was noticed in the logs, such as uneven time stamps.
@@ -71,7 +71,7 @@ class Payload:
     covariance: Array = field(repr=False)
     estimate: Estimate = field(repr=False)
     residual: Array
-    trial: Trial = field(repr=False)
+    fault_isolation: FaultIsolation = field(repr=False)
     findings: tuple[Finding, ...] = ()
 
     @property
@@ -112,7 +112,7 @@ class Payload:
     @property
     def allowed_for(self) -> bool:
         """Whether no fault that matters shows, so that the values' errors are as stated."""
-        return not any(one.matters for one in self.trial.suspicions)
+        return not self.fault_isolation.matters
 
     def summary(self) -> str:
         """Return what was found, for people, as lines of text."""
@@ -127,7 +127,7 @@ class Payload:
         if hidden:
             lines.append(f"Not felt by the actuators: {', '.join(hidden)}.")
         lines.append(self._opinion())
-        lines += [one.message for one in self.trial.suspicions if one.matters]
+        lines += [one.message for one in self.fault_isolation.faults if one.matters]
         if not self.allowed_for:
             lines.append("The stated errors do not allow for that.")
         lines += [f"Note: {one.message}" for one in self.findings]
@@ -158,7 +158,7 @@ class Payload:
             "felt": self.felt,
             "real": self.real,
             "residual": self.residual.tolist(),
-            "trial": self.trial.as_dict(),
+            "trial": self.fault_isolation.as_dict(),
             "findings": [asdict(one) for one in self.findings],
         }
 
@@ -236,7 +236,7 @@ def identify_payload(
         covariance=estimate.covariance[np.ix_(chosen, chosen)],
         estimate=estimate,
         residual=estimate.noise,
-        trial=trial(model, estimate, fit, plans),
+        fault_isolation=isolate_faults(model, estimate, fit, plans),
         findings=tuple(finding for one in fit for finding in one.findings),
     )
 

@@ -11,7 +11,7 @@ import numpy as np
 from pteron.html_table import Column, html_table
 from pteron.identification.consistency import Consistency
 from pteron.identification.estimators import Essential, Estimate
-from pteron.identification.faults import Trial
+from pteron.identification.faults import FaultIsolation
 from pteron.identification.logs import Finding
 from pteron.identification.model import Model
 from pteron.identification.prediction import Prediction
@@ -46,7 +46,7 @@ class Identification:
         How well the values predict the recordings that were fitted, and those that were not.
     preprocessing : tuple of Preprocessing
         How the fitted recordings were preprocessed.
-    trial : Trial
+    fault_isolation : FaultIsolation
         Faults of the log or the machine that the residuals show, and what they spoil.
     verdict : Verdict
         Whether the model can be trusted.
@@ -71,7 +71,7 @@ class Identification:
     fitted: tuple[Prediction, ...]
     held_out: tuple[Prediction, ...]
     preprocessing: tuple[Preprocessing, ...]
-    trial: Trial
+    fault_isolation: FaultIsolation
     verdict: Verdict
     unseen: tuple[str, ...]
     findings: tuple[Finding, ...]
@@ -110,7 +110,7 @@ class Identification:
     @property
     def understated(self) -> bool:
         """Whether a fault that matters shows, for which the values' stated errors do not allow."""
-        return any(one.matters for one in self.trial.suspicions)
+        return self.fault_isolation.matters
 
     @cached_property
     def machine(self) -> Manipulator | None:
@@ -209,7 +209,7 @@ class Identification:
                 "parameters": consistency.parameters.tolist(),
                 "summary": consistency.summary().splitlines(),
             },
-            "trial": self.trial.as_dict(),
+            "trial": self.fault_isolation.as_dict(),
             "fitted": [prediction.as_dict() for prediction in self.fitted],
             "held_out": [prediction.as_dict() for prediction in self.held_out],
             "preprocessing": [

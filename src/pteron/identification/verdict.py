@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from pteron.identification.consistency import Consistency
-from pteron.identification.faults import Trial
+from pteron.identification.faults import FaultIsolation
 from pteron.identification.model import Model
 from pteron.identification.prediction import Prediction, predict
 from pteron.identification.recordings import Recording
@@ -106,7 +106,7 @@ class _Opinion:
 
 def verdict_of(
     held_out: Sequence[Prediction],
-    trial: Trial | None = None,
+    faults: FaultIsolation | None = None,
     *,
     repeats: bool,
     limits: Sequence[str] = (),
@@ -117,8 +117,8 @@ def verdict_of(
     ----------
     held_out : sequence of Prediction
         How it predicts recordings that were not fitted.
-    trial : Trial, optional
-        What the residuals of the fit show.
+    faults : FaultIsolation, optional
+        The faults that the residuals of the fit show.
     repeats : bool
         Whether what was held out repeats the motion that was fitted.
     limits : sequence of str
@@ -127,8 +127,8 @@ def verdict_of(
     """
     opinions = [_Opinion("usable with care", list(limits), [])] if limits else []
     opinions += [_of_prediction(one) for one in held_out]
-    if trial is not None:
-        opinions.append(_of_trial(trial))
+    if faults is not None:
+        opinions.append(_of_faults(faults))
     reasons = [reason for one in opinions for reason in one.reasons]
     steps = [step for one in opinions for step in one.steps]
     if repeats:
@@ -240,31 +240,31 @@ def _of_prediction(prediction: Prediction) -> _Opinion:
     return found
 
 
-def _of_trial(trial: Trial) -> _Opinion:
-    found = _Opinion("trustworthy", [one.message for one in trial.suspicions], [])
-    if any(one.matters for one in trial.suspicions):
+def _of_faults(shown: FaultIsolation) -> _Opinion:
+    found = _Opinion("trustworthy", [one.message for one in shown.faults], [])
+    if shown.matters:
         found.grade = "usable with care"
         found.reasons.append("The stated errors of the values do not allow for that.")
-    if not trial.tried:
+    if not shown.tried:
         found.grade = "usable with care"
-        found.reasons.append(f"The trial of faults was not run: {trial.why_not}.")
-    elif not trial.suspicions:
-        found.reasons.append(f"No fault shows in the residuals; tried: {', '.join(trial.tried)}.")
-    for fault in trial.hidden:
+        found.reasons.append(f"Fault isolation was not run: {shown.why_not}.")
+    elif not shown.faults:
+        found.reasons.append(f"No fault shows in the residuals; tried: {', '.join(shown.tried)}.")
+    for fault in shown.hidden:
         reason, step = _HIDDEN[fault]
         found.reasons.append(reason)
         found.steps.append(step)
-    if np.isnan(trial.off).any():
+    if np.isnan(shown.off).any():
         return found
-    worst = int(np.argmax(trial.off))
-    off = float(trial.off[worst])
+    worst = int(np.argmax(shown.off))
+    off = float(shown.off[worst])
     found.grade = max(found.grade, _graded(off, CYCLE), key=_ORDER.index)
     found.reasons.append(
         f"A pick-and-place cycle as fast as this motion is expected to be up to {off:.2g} % off "
         f"in its forces (actuator {worst + 1}); up to {CYCLE:g} % is trusted, above {LARGE:g} % "
         "not."
     )
-    if found.grade != "trustworthy" and trial.uncertain[worst] > trial.spoiled[worst]:
+    if found.grade != "trustworthy" and shown.uncertain[worst] > shown.spoiled[worst]:
         found.steps.append(
             "The motion leaves such a cycle's forces open: record a motion from pteron excite, "
             "faster or longer."

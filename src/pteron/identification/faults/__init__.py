@@ -1,9 +1,9 @@
-"""Faults of logs and machines that the residuals of a fit show by name, and what they spoil."""
+"""Fault isolation: faults of logs and machines that a fit's residuals show, and what they spoil."""
 
-from pteron.identification.faults.suspicion import Suspicion
-from pteron.identification.faults.trial import Trial, delay_of, trial
+from pteron.identification.faults.fault import IsolatedFault
+from pteron.identification.faults.isolation import FaultIsolation, delay_of, isolate_faults
 
-__all__ = ["Suspicion", "Trial", "delay_of", "trial"]
+__all__ = ["FaultIsolation", "IsolatedFault", "delay_of", "isolate_faults"]
 
 
 def __dir__() -> list[str]:

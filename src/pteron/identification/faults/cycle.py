@@ -1,7 +1,4 @@
-"""A pick-and-place cycle as fast as a log's motion: on it errors of a model are told.
-
-The trial of faults measures on it what each of them spoils.
-"""
+"""The reference cycle: a pick-and-place cycle as fast as a log's motion, to tell errors by."""
 
 from __future__ import annotations
 
@@ -22,10 +19,10 @@ from pteron.motion import Motion, pick_and_place
 _SAMPLES = 201
 
 _MOVES = 0.02
-"""Share of a joint's largest rate below which its dry friction is uncertain: such do not count."""
+"""Share of a joint's largest rate below which its dry friction is uncertain: samples that do not count."""
 
 _LEAST = 0.1
-"""Of the forces' largest standard deviation, what that of an actuator counts as at least."""
+"""Least standard deviation that an actuator's force counts as having, over the largest."""
 
 
 class Extent(NamedTuple):
@@ -37,7 +34,7 @@ class Extent(NamedTuple):
 
     @classmethod
     def of(cls, states: list[States]) -> Extent:
-        """Return that of a motion in blocks."""
+        """Return the extent of a motion in blocks."""
         return cls(
             np.mean([s.pose.mean(axis=0) for s in states], axis=0),
             np.max([np.abs(s.joint_rates).max(axis=0) for s in states], axis=0),
@@ -46,17 +43,19 @@ class Extent(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Cycle:
+class ReferenceCycle:
     """States of a cycle, and where each joint moves (R, n)."""
 
     states: States
     moves: NDArray[np.bool_]
 
     @classmethod
-    def within(cls, robot: Manipulator, extent: Extent, *, size: float = 1.0) -> Cycle | None:
+    def within(
+        cls, robot: Manipulator, extent: Extent, *, size: float = 1.0
+    ) -> ReferenceCycle | None:
         """Return the cycle about a motion's mean pose, or home, as fast as the motion itself.
 
-        `size` is over the largest size that fits. None where the machine has no room for one.
+        `size` is over the largest size that fits; None where none does.
         """
         for around in (extent.pose, np.array(home(robot))):
             try:

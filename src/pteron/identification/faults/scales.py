@@ -16,8 +16,8 @@ from scipy.stats import norm  # type: ignore[import-untyped]
 
 from pteron.bodies.parameters import PLATFORM_KINDS
 from pteron.identification.estimators import Estimate
-from pteron.identification.faults.suspects import Suspects
-from pteron.identification.faults.suspicion import Fault
+from pteron.identification.faults.columns import FaultColumns
+from pteron.identification.faults.fault import FaultName
 from pteron.identification.model import Model
 from pteron.identification.observation import Observations
 from pteron.identification.recordings import Recording
@@ -40,7 +40,7 @@ _INDEPENDENT = 1e-3
 
 
 class Factor(NamedTuple):
-    """By what all forces are multiplied, and its standard deviation."""
+    """The factor of all forces, and its standard deviation."""
 
     value: float
     deviation: float
@@ -61,14 +61,14 @@ class Factor(NamedTuple):
 
     @property
     def chance(self) -> float:
-        """That it seems so far from one where it is not."""
+        """Probability that it seems so far from one where it is one."""
         return float(2.0 * norm.sf(abs(self.value - 1.0) / max(self.deviation, 1e-300)))
 
 
 def known_values(
     model: Model, recordings: Sequence[Recording], rotors: Mapping[str, float]
 ) -> dict[str, float]:
-    """Return what is known of the values, by name: a declared payload, rotors that join nothing."""
+    """Return the values that are known, by name: of a declared payload, of rotors."""
     found = dict(rotors)
     for one in recordings:
         if (payload := one.head().description.payload) is not None:
@@ -90,7 +90,9 @@ def factor_of_forces(model: Model, fit: Estimate, known: Mapping[str, float]) ->
     return Factor(float(weights @ fit.values[places]) / power, power**-0.5)
 
 
-def cannot_be_told(suspects: Suspects, observations: Observations, noise: Array) -> list[Fault]:
+def cannot_be_told(
+    model: FaultColumns, observations: Observations, noise: Array
+) -> list[FaultName]:
     """Return which of the clock and the scale of one force the equations leave open.
 
     A fault is left open whose column the model's columns make, but for less than noise (n,) of
@@ -98,11 +100,11 @@ def cannot_be_told(suspects: Suspects, observations: Observations, noise: Array)
     """
     weights = 1.0 / np.maximum(noise, _NOISELESS * noise.max() + 1e-300)
     flat = (weights[:, None] * observations.matrix).reshape(-1, observations.matrix.shape[-1])
-    known = flat[:, : len(suspects.model.names)]
+    known = flat[:, : len(model.model.names)]
     lengths = np.linalg.norm(known, axis=0)
     basis = np.linalg.qr(known / np.where(lengths > 0.0, lengths, 1.0))[0]
-    found: dict[Fault, None] = {}
-    for family, places in zip(suspects.families, suspects.places, strict=True):
+    found: dict[FaultName, None] = {}
+    for family, places in zip(model.families, model.places, strict=True):
         if family.name not in ("clock", "scale"):
             continue
         columns = flat[:, places]

@@ -1,7 +1,4 @@
-"""Which faults residuals show: columns of suspects are taken in, the clearest first.
-
-Only the trial uses it.
-"""
+"""The search for faults that residuals show: columns of faults are taken in, the clearest first."""
 
 from __future__ import annotations
 
@@ -14,12 +11,12 @@ from scipy.stats import chi2  # type: ignore[import-untyped]
 
 from pteron.identification.estimators import Estimate, weighted
 from pteron.identification.estimators.qr import actuator_factors
-from pteron.identification.faults.suspects import Family, Suspects
+from pteron.identification.faults.columns import Family, FaultColumns
 from pteron.identification.observation import Observations
 from pteron.kernels import Array
 
 _CHANCE = 1e-6
-"""Chance that a fault is named where there is none, each."""
+"""Probability that a fault is named where there is none, each."""
 
 _SEEN = 1e-3
 """Share of a mixture of columns that the model's cannot make, from which it counts."""
@@ -50,11 +47,25 @@ _MOST = 3
 
 
 @dataclass(frozen=True)
-class Named:
+class FoundFault:
     """A family that was taken in, the fit with it, and the families in before it.
 
-    `mix` is of its columns what is seen, and `sizes` are what they are multiplied by; a share
-    `likely` of what they explain is explained by sizes as usual errors have.
+    Parameters
+    ----------
+    family : Family
+        The family.
+    mix : array, shape (k, q)
+        The mixtures of its columns that are seen.
+    sizes, deviations : array, shape (k,)
+        Factors of its columns, and their standard deviations.
+    chance : float
+        Probability that they seem so large by chance.
+    fit : Estimate
+        The fit.
+    likely : float
+        Share of what they explain that errors of a usual size explain too.
+    others : tuple of (Family, array)
+        The families before it, and their sizes in this fit.
     """
 
     family: Family
@@ -68,26 +79,26 @@ class Named:
 
 
 def searched(
-    suspects: Suspects, observations: Observations, families: Sequence[Family] | None = None
-) -> tuple[Estimate, list[Named]]:
-    """Return the fit of the model without faults, and the faults that the observations show.
+    model: FaultColumns, observations: Observations, families: Sequence[Family] | None = None
+) -> tuple[Estimate, list[FoundFault]]:
+    """Return the fit of the model without faults, and the faults that its observations show.
 
-    Looked for are those of all `families` that are given, by default of all.
+    Only `families` are looked for, by default all of them.
     """
-    p = len(suspects.model.names)
-    named: list[Named] = []
+    p = len(model.model.names)
+    found: list[FoundFault] = []
     first = 0.0
-    wanted = suspects.families if families is None else families
+    wanted = model.families if families is None else families
     # Fits ask for products of columns, and the columns' triangles have the same.
     triangles = actuator_factors(observations)
     plain = weighted(observations.columns(range(p)), triangles=triangles.columns(range(p)))
-    while len(named) < _MOST:
+    while len(found) < _MOST:
         clear = []
-        for k, family in enumerate(suspects.families):
-            if family not in wanted or family.name in (one.family.name for one in named):
+        for k, family in enumerate(model.families):
+            if family not in wanted or family.name in (one.family.name for one in found):
                 continue
-            one, wald = _taken_in(suspects, observations, triangles, named, k)
-            if one is not None and one.chance < _CHANCE and _is_possible(one, suspects):
+            one, wald = _taken_in(model, observations, triangles, found, k)
+            if one is not None and one.chance < _CHANCE and _is_possible(one, model):
                 clear.append((wald, one))
         best = max((wald for wald, _ in clear), default=0.0)
         first = first or best
@@ -99,51 +110,47 @@ def searched(
             (item for item in clear if item[0] >= _AS_WELL * best),
             key=lambda item: (len(item[1].sizes), -item[0]),
         )
-        named.append(one)
-    return plain, named
+        found.append(one)
+    return plain, found
 
 
 def _taken_in(
-    suspects: Suspects,
+    model: FaultColumns,
     observations: Observations,
     triangles: Observations,
-    before: Sequence[Named],
+    before: Sequence[FoundFault],
     k: int,
-) -> tuple[Named | None, float]:
+) -> tuple[FoundFault | None, float]:
     """Return a family, by its place, as it is seen beside those before it; and Wald's statistic.
 
     Mixtures of its columns that are at right angles to the model's and to each other are tried
     together. Those whose sizes are clear are then kept, and fitted alone: the others are noise.
     `triangles` are the `actuator_factors` of the observations.
     """
-    p = len(suspects.model.names)
-    flat = triangles.matrix.reshape(-1, triangles.matrix.shape[-1])
-    known = _scaled(flat[:, :p])[0]
-    taken = [suspects.families.index(one.family) for one in before]
+    p, family = len(model.model.names), model.families[k]
+    places = [model.places[model.families.index(one.family)] for one in before]
     mixes = [one.mix for one in before]
-    made = [flat[:, suspects.places[j]] @ mix for j, mix in zip(taken, mixes, strict=True)]
-    known = np.linalg.qr(np.hstack([known, *(_scaled(part)[0] for part in made)]))[0]
-    columns, lengths = _scaled(flat[:, suspects.places[k]])
-    _, seen, ways = np.linalg.svd(columns - known @ (known.T @ columns), full_matrices=False)
-    mix = ways[seen > _SEEN].T / lengths[:, None]
+    flat = triangles.matrix.reshape(-1, triangles.matrix.shape[-1])
+    made = [flat[:, place] @ mix for place, mix in zip(places, mixes, strict=True)]
+    known = np.linalg.qr(np.hstack([_scaled(part)[0] for part in (flat[:, :p], *made)]))[0]
+    columns, lengths = _scaled(flat[:, model.places[k]])
+    _, seen, right = np.linalg.svd(columns - known @ (known.T @ columns), full_matrices=False)
+    mix = right[seen > _SEEN].T / lengths[:, None]
     q = mix.shape[1]
     if q == 0 or observations.rows < _ENOUGH * (p + q):
         return None, 0.0
 
     def fitted(mix: Array) -> tuple[Estimate, Array, Array]:
         """Return the fit with these mixtures, their sizes, and the sizes' covariance."""
-        places = [suspects.places[j] for j in (*taken, k)]
+        chosen = [*zip(places, mixes, strict=True), (model.places[k], mix)]
 
-        def chosen(rows: Observations) -> Observations:
-            parts = [
-                rows.matrix[..., place] @ one
-                for place, one in zip(places, (*mixes, mix), strict=True)
-            ]
+        def mixed(rows: Observations) -> Observations:
+            parts = [rows.matrix[..., place] @ one for place, one in chosen]
             matrix = np.concatenate([rows.matrix[..., :p], *parts], axis=-1)
             names = tuple(map(str, range(matrix.shape[-1])))
             return replace(rows, matrix=matrix, names=names, units=names, kinds=())
 
-        fit = weighted(chosen(observations), triangles=chosen(triangles))
+        fit = weighted(mixed(observations), triangles=mixed(triangles))
         last = slice(len(fit.values) - mix.shape[1], None)
         return fit, fit.values[last], fit.covariance[last, last]
 
@@ -162,14 +169,13 @@ def _taken_in(
     # Without noise a size may be known exactly: its variance is rounding, of either sign.
     variances = np.einsum("ij,jk,ik->i", mix, covariance, mix)
     deviations = np.sqrt(np.maximum(variances, 0.0))
-    family = suspects.families[k]
-    usual = _likely(size, covariance, mix, suspects) if family.unit == "m" else 1.0
-    return Named(family, mix, mix @ size, deviations, chance, fit, usual, tuple(others)), wald
+    usual = _likely(size, covariance, mix, model) if family.unit == "m" else 1.0
+    return FoundFault(family, mix, mix @ size, deviations, chance, fit, usual, tuple(others)), wald
 
 
-def _likely(size: Array, covariance: Array, mix: Array, suspects: Suspects) -> float:
+def _likely(size: Array, covariance: Array, mix: Array, model: FaultColumns) -> float:
     """Return what share of Wald's statistic lengths explain that are off by usual errors alone."""
-    spread = _LENGTH * float(np.mean([leg.size for leg in suspects.robot.legs]))
+    spread = _LENGTH * float(np.mean([leg.size for leg in model.robot.legs]))
     back = spread * np.linalg.pinv(mix)
     both = back @ back.T + covariance
     # The most likely sizes leave C (C0 + C)^-1 of what was found.
@@ -186,12 +192,12 @@ def _wald(size: Array, covariance: Array) -> float:
     return float(standard @ np.linalg.lstsq(correlation, standard, rcond=None)[0])
 
 
-def _is_possible(one: Named, suspects: Suspects) -> bool:
+def _is_possible(one: FoundFault, model: FaultColumns) -> bool:
     """Say whether sizes can be those of the fault: friction brakes, errors of lengths are small."""
     family = one.family
     largest = family.largest
     if family.speed is not None:
-        dry = suspects.model.per_joint("coulomb", np.abs(suspects.values))
+        dry = model.model.per_joint("coulomb", np.abs(model.values))
         largest = np.inf if dry is None else _TIMES * float(dry.max())
     if family.positive and not (one.sizes / np.maximum(one.deviations, 1e-300)).sum() > 0.0:
         return False

@@ -1,4 +1,4 @@
-"""The trial of a fit: which faults its residuals show by name, how large, and what they spoil."""
+"""Fault isolation: which faults a fit's residuals show by name, how large, and what they spoil."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ import numpy as np
 
 from pteron.identification.errors import LogError
 from pteron.identification.estimators import Estimate
-from pteron.identification.faults.cycle import Cycle, Extent
+from pteron.identification.faults.columns import DELAY, Family, FaultColumns, families_of
+from pteron.identification.faults.cycle import Extent, ReferenceCycle
+from pteron.identification.faults.fault import FaultName, IsolatedFault
 from pteron.identification.faults.scales import cannot_be_told, factor_of_forces, known_values
-from pteron.identification.faults.search import Named, searched
-from pteron.identification.faults.suspects import DELAY, Family, Suspects, families_of
-from pteron.identification.faults.suspicion import Fault, Suspicion
+from pteron.identification.faults.search import FoundFault, searched
 from pteron.identification.logs import Log
 from pteron.identification.model import Model
-from pteron.identification.observation import Observations, observations_of, stacked
+from pteron.identification.observation import observations_of, stacked
 from pteron.identification.recordings import Recording
 from pteron.identification.signals import (
     Preprocessing,
@@ -30,7 +30,7 @@ from pteron.identification.signals import (
 from pteron.identification.signals.preprocessing import LATEST
 from pteron.kernels import Array
 
-_LOOK, _MORE = 20_000, 100_000
+_ROWS, _MORE = 20_000, 100_000
 """Rows of all logs that are looked at, those in which the joints move most; and where these are too
 little motion."""
 
@@ -52,20 +52,20 @@ has no noise, and the sampling itself makes them."""
 
 
 @dataclass(frozen=True)
-class Trial:
-    """What a fit's residuals show.
+class FaultIsolation:
+    """The faults that a fit's residuals show.
 
     Attributes
     ----------
     tried : tuple of str
         The faults that were tried; none where the logs do not suffice for that.
-    suspicions : tuple of Suspicion
-        Those that show, the clearest first. What changes a cycle by less than 0.05 % is none.
+    faults : tuple of IsolatedFault
+        Those that show, the clearest first, and change a reference cycle by 0.05 % or more.
     uncertain : array, shape (n,)
-        What the values' covariance leaves open of a pick-and-place cycle's forces, in percent of
-        their standard deviation; NaN where the machine has no room for a cycle.
+        Error of a pick-and-place cycle's forces that the values' covariance leaves open, percent of
+        their standard deviation; NaN where no cycle fits into the machine's workspace.
     spoiled : array, shape (n,)
-        What all suspicions together spoil of it, likewise.
+        Error that all faults together make in it, likewise.
     why_not : str
         Why nothing was tried, where that is so.
     hidden : tuple of {"gain", "clock", "scale"}
@@ -74,16 +74,21 @@ class Trial:
     """
 
     tried: tuple[str, ...]
-    suspicions: tuple[Suspicion, ...]
+    faults: tuple[IsolatedFault, ...]
     uncertain: Array
     spoiled: Array
     why_not: str = ""
-    hidden: tuple[Fault, ...] = ()
+    hidden: tuple[FaultName, ...] = ()
 
     @property
     def off(self) -> Array:
         """By how much such a cycle's forces are expected to be off, in percent (n,)."""
         return np.asarray(np.hypot(self.uncertain, self.spoiled))
+
+    @property
+    def matters(self) -> bool:
+        """Whether a fault shows for which the values' stated errors do not allow."""
+        return any(one.matters for one in self.faults)
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
@@ -92,7 +97,7 @@ class Trial:
             "tried": list(self.tried),
             "why_not": self.why_not,
             "cannot_be_told": list(self.hidden),
-            "faults": [one.as_dict() for one in self.suspicions],
+            "faults": [one.as_dict() for one in self.faults],
             "cycle_percent": {
                 name: None if np.isnan(values).any() else values.tolist()
                 for name, values in shares.items()
@@ -101,107 +106,103 @@ class Trial:
 
 
 @dataclass(frozen=True)
-class _Look:
-    """A part of a recording that is looked at, how it is preprocessed, and what is tried on it."""
+class _Part:
+    """A part of a recording that is looked at, its states, its model and its preprocessing."""
 
-    suspects: Suspects
+    model: FaultColumns
     log: Log
     how: Preprocessing
     states: list[States]
 
-    def late(self, delay: float) -> _Look:
-        """Return the same for forces that are late by so much more, s."""
-        later = float(np.clip(self.how.delay + delay, -LATEST, LATEST))
-        return replace(self, how=replace(self.how, delay=later))
 
-
-def trial(
+def isolate_faults(
     model: Model,
     estimate: Estimate,
     recordings: Sequence[Recording],
     preprocessing: Sequence[Preprocessing],
     rotors: Mapping[str, float] | None = None,
-) -> Trial:
-    """Try a fit's residuals for faults of the logs and of the machine.
+) -> FaultIsolation:
+    """Return the faults of logs and machine that a fit's residuals show.
 
     Each fault adds columns to the regressor (`families_of`). Those whose sizes the data tell from
-    zero are taken in one after the other, the clearest first. What they spoil is worked out on a
-    pick-and-place cycle as fast as the logs' own motion.
+    zero are taken in one after the other, the clearest first. The errors that they make are worked
+    out on a pick-and-place cycle as fast as the logs' own motion.
 
     Parameters
     ----------
     model, estimate : Model, Estimate
         The fit.
     recordings : sequence of Recording
-        What was fitted; 20 000 rows in all are looked at, with and without payload.
+        The fitted ones; 20 000 rows in all are looked at, with and without payload.
     preprocessing : sequence of Preprocessing
         How each was preprocessed.
     rotors : mapping of str to float, optional
-        What rotors are known to weigh on the joints, by the name of the value, SI units.
+        Inertia that rotors are known to add at the joints, by the name of the value, SI units.
     """
     known, why_not = known_values(model, recordings, rotors or {}), ""
-    for rows in (_LOOK, _MORE):
+    for rows in (_ROWS, _MORE):
         try:
-            looks = _looks(model, estimate, recordings, preprocessing, rows)
-            return _tried(looks, model, estimate, known)
+            parts = _parts(model, estimate, recordings, preprocessing, rows)
+            return _isolated(parts, model, estimate, known)
         except LogError as error:
             why_not = str(error)
         if sum(one.rows for one in recordings) <= rows:
             break
-    nothing = np.full(len(model.robot.legs), np.nan)
-    return Trial((), (), nothing, nothing, why_not)
+    nothing = np.full(model.robot.joint_count, np.nan)
+    return FaultIsolation((), (), nothing, nothing, why_not)
 
 
-def _tried(
-    looks: list[_Look], model: Model, estimate: Estimate, known: Mapping[str, float]
-) -> Trial:
-    nothing = np.full(len(model.robot.legs), np.nan)
-    suspects = looks[0].suspects
-    tried = tuple(dict.fromkeys(family.name for family in suspects.families))
-    largest = max(float(np.abs(look.log.forces).max()) for look in looks)
+def _isolated(
+    parts: list[_Part], model: Model, estimate: Estimate, known: Mapping[str, float]
+) -> FaultIsolation:
+    nothing = np.full(model.robot.joint_count, np.nan)
+    columns = parts[0].model
+    largest = max(float(np.abs(part.log.forces).max()) for part in parts)
 
     # Which faults the residuals show
-    observations = _observed(looks)
-    noise = np.mean([look.how.force_noise for look in looks], axis=0)
-    left_open = cannot_be_told(suspects, observations, noise)
+    observations = stacked([observations_of(part.model, part.log, part.how) for part in parts])
+    noise = np.mean([part.how.force_noise for part in parts], axis=0)
+    left_open = cannot_be_told(columns, observations, noise)
     exact = np.abs(estimate.residuals).max() < _EXACT * largest
-    plain, named = searched(suspects, observations, () if exact else suspects.families)
-    if any(one.family is DELAY for one in named):
+    plain, found = searched(columns, observations, () if exact else None)
+    if any(one.family is DELAY for one in found):
         # A long delay is no small one: the rest is told once forces are where they belong.
-        late, shifted = _delay(looks)
-        fit, named = _searched_beside(shifted, DELAY)
+        late, shifted = _delay(parts)
+        rest = tuple(one for one in columns.families if one is not DELAY)
+        fit, found = _searched_for(shifted, rest)
         if late is not None:
-            named.insert(0, replace(late, fit=fit))
+            found.insert(0, replace(late, fit=fit))
 
-    # What they spoil
+    # The errors that they make on a cycle
     p = len(model.names)
-    cycle = Cycle.within(model.robot, Extent.of([s for look in looks for s in look.states]))
-    uncertain, spoiled, each = nothing, nothing, [nothing for _ in named]
+    cycle = ReferenceCycle.within(
+        model.robot, Extent.of([s for part in parts for s in part.states])
+    )
+    uncertain, spoiled, each = nothing, nothing, [nothing for _ in found]
     if cycle is not None:
-        later = np.full(len(cycle.states), 0.5)
-        motion = suspects.motion(cycle.states, later)
+        motion = columns.motion(cycle.states, np.full(len(cycle.states), 0.5))
         matrix = motion.matrix
-        told = [matrix @ plain.values]
-        for one in named:
-            forces = matrix @ one.fit.values[:p]
+        forces = [matrix @ plain.values]
+        for one in found:
+            with_fault = matrix @ one.fit.values[:p]
             for family, sizes in (*one.others, (one.family, one.sizes)):
                 if family.of_machine:
-                    forces = forces + family.of_cycle(motion) @ sizes
-            told.append(forces)
-        each = [cycle.share(b - a, told[0]) for a, b in pairwise(told)]
-        spoiled = cycle.share(told[-1] - told[0], told[0])
+                    with_fault = with_fault + family.of_cycle(motion) @ sizes
+            forces.append(with_fault)
+        each = [cycle.share(b - a, forces[0]) for a, b in pairwise(forces)]
+        spoiled = cycle.share(forces[-1] - forces[0], forces[0])
         # Unnamed, a fault is in the residuals, and with them in the covariance.
-        covariance = named[-1].fit.covariance[:p, :p] if named else estimate.covariance
+        covariance = found[-1].fit.covariance[:p, :p] if found else estimate.covariance
         variance = np.einsum("rnp,pq,rnq->rn", matrix, covariance, matrix, optimize=True)
-        uncertain = cycle.share(np.sqrt(np.maximum(variance, 0.0)), told[0])
-    fits = [plain, *(one.fit for one in named)]
+        uncertain = cycle.share(np.sqrt(np.maximum(variance, 0.0)), forces[0])
+    fits = [plain, *(one.fit for one in found)]
     shifts = [
         float(np.abs((b.values[:p] - a.values[:p]) / b.deviations[:p]).max())
         for a, b in pairwise(fits)
     ]
-    step = 1.0 / max(look.how.rate for look in looks)
-    suspicions = [
-        Suspicion(
+    step = 1.0 / max(part.how.rate for part in parts)
+    faults = [
+        IsolatedFault(
             one.family.name,
             tuple(one.family.sizes(model)),
             one.sizes,
@@ -209,34 +210,39 @@ def _tried(
             one.chance,
             shift,
             spoils,
-            None if one.family.speed is None else one.family.speed * suspects.usual,
+            None if one.family.speed is None else one.family.speed * columns.usual,
             step,
         )
-        for one, shift, spoils in zip(named, shifts, each, strict=True)
+        for one, shift, spoils in zip(found, shifts, each, strict=True)
         if not (spoils < _NAMED).all()
     ]
 
-    # What the residuals cannot show: scales of all forces and of time
+    # The scales of all forces and of time, which the residuals cannot show
+    tried = tuple(dict.fromkeys(family.name for family in columns.families))
     factor = factor_of_forces(model, fits[-1], known)
-    # By a slow clock all inertia is too small, what is known as well.
-    slow = [1.0 + float(one.sizes[0]) for one in suspicions if one.fault == "clock"]
-    if factor is not None and factor.wrong and all(factor.times(s).wrong for s in slow):
-        off = factor.value - 1.0
-        wrong = np.full(len(nothing), 100.0 * abs(1.0 - 1.0 / factor.value))
-        size, deviation = np.array([off]), np.array([factor.deviation])
-        shift = abs(off) / factor.deviation
-        labels = tuple(known)
-        suspicions.insert(
-            0, Suspicion("gain", labels, size, deviation, factor.chance, shift, wrong)
-        )
-        spoiled = np.hypot(spoiled, wrong)
-    if factor is None or not factor.told:
-        left_open.insert(0, "gain")
-    shown = {one.fault for one in suspicions}
-    hidden = tuple(fault for fault in left_open if fault not in shown)
     if factor is not None:
         tried = (*tried, "gain")
-    return Trial(tried, tuple(suspicions), uncertain, spoiled, hidden=hidden)
+        # By a slow clock all inertia is too small, what is known as well.
+        slow = [1.0 + float(one.sizes[0]) for one in faults if one.fault == "clock"]
+        if factor.wrong and all(factor.times(s).wrong for s in slow):
+            off = factor.value - 1.0
+            wrong = np.full(len(nothing), 100.0 * abs(1.0 - 1.0 / factor.value))
+            gain = IsolatedFault(
+                "gain",
+                tuple(known),
+                np.array([off]),
+                np.array([factor.deviation]),
+                factor.chance,
+                abs(off) / factor.deviation,
+                wrong,
+            )
+            faults.insert(0, gain)
+            spoiled = np.hypot(spoiled, wrong)
+    if factor is None or not factor.told:
+        left_open.insert(0, "gain")
+    shown = {one.fault for one in faults}
+    hidden = tuple(fault for fault in left_open if fault not in shown)
+    return FaultIsolation(tried, tuple(faults), uncertain, spoiled, hidden=hidden)
 
 
 def delay_of(
@@ -246,36 +252,36 @@ def delay_of(
     preprocessing: Sequence[Preprocessing],
 ) -> float:
     """Return the delay of recordings' forces that suits a fit best, s, beside that assumed."""
-    looks = _looks(model, estimate, recordings, preprocessing)
-    _, shifted = _delay(looks)
-    return shifted[0].how.delay - looks[0].how.delay
+    parts = _parts(model, estimate, recordings, preprocessing)
+    _, shifted = _delay(parts)
+    return shifted[0].how.delay - parts[0].how.delay
 
 
-def _looks(
+def _parts(
     model: Model,
     estimate: Estimate,
     recordings: Sequence[Recording],
     preprocessing: Sequence[Preprocessing],
-    most: int = _LOOK,
-) -> list[_Look]:
-    """Return the parts of recordings that are tried, `most` rows in all."""
+    most: int = _ROWS,
+) -> list[_Part]:
+    """Return the parts of recordings that are looked at, `most` rows in all."""
     rows = most // len(recordings)
-    parts = [
+    chosen = [
         (log, _unaveraged(model, log, how), part)
         for one, how in zip(recordings, preprocessing, strict=True)
         for log in [one.head()]
         for part in _moving_most(log, rows)
     ]
-    states = [[b.states for b in samples(model.robot, part, how)] for _, how, part in parts]
+    states = [[b.states for b in samples(model.robot, part, how)] for _, how, part in chosen]
     rates = np.concatenate([s.joint_rates for blocks in states for s in blocks])
     usual = np.sqrt((rates**2).mean(axis=0))
     families = families_of(model.robot)
     if model.terms.stribeck == "auto":  # its speeds are found already
         families = tuple(one for one in families if one.name != "stribeck")
     found = []
-    for (log, how, part), blocks in zip(parts, states, strict=True):
+    for (log, how, part), blocks in zip(chosen, states, strict=True):
         fastest = max(how.cutoff or 0.0, how.band)
-        suspects = Suspects(
+        columns = FaultColumns(
             model,
             estimate.values,
             usual,
@@ -285,7 +291,7 @@ def _looks(
             max(int(how.rate / (_POINTS * fastest)), 1),
             _MOTION * how.band,
         )
-        found.append(_Look(suspects, part, how, blocks))
+        found.append(_Part(columns, part, how, blocks))
     return found
 
 
@@ -294,7 +300,7 @@ def _moving_most(log: Log, rows: int) -> list[Log]:
     if log.rows <= rows:
         return [log]
     steps = (np.diff(log.joints, axis=0) ** 2).sum(axis=1)
-    way = np.concatenate([[0.0], np.cumsum(steps)])
+    travel = np.concatenate([[0.0], np.cumsum(steps)])
     phase = np.zeros(log.rows) if log.payload is None else log.payload
     edges = [0, *(np.flatnonzero(np.diff(phase)) + 1).tolist(), log.rows]
     phases = sorted(pairwise(edges), key=lambda part: part[0] - part[1])
@@ -304,7 +310,7 @@ def _moving_most(log: Log, rows: int) -> list[Log]:
     for start, stop in longest.values():
         starts = np.arange(start, max(stop - size, start) + 1, max(size // 2, 1))
         ends = np.minimum(starts + size, stop)
-        best = int(np.argmax(way[ends - 1] - way[starts]))
+        best = int(np.argmax(travel[ends - 1] - travel[starts]))
         found.append(log.part(int(starts[best]), int(ends[best])))
     return found
 
@@ -318,32 +324,33 @@ def _unaveraged(model: Model, log: Log, how: Preprocessing) -> Preprocessing:
     return replace(again, slow=how.slow, delay=how.delay)
 
 
-def _observed(looks: Sequence[_Look]) -> Observations:
-    return stacked([observations_of(look.suspects, look.log, look.how) for look in looks])
+def _searched_for(
+    parts: Sequence[_Part], families: tuple[Family, ...]
+) -> tuple[Estimate, list[FoundFault]]:
+    """Return the fit of parts without faults, and which of some faults they show."""
+    models = [replace(part.model, families=families) for part in parts]
+    each = zip(models, parts, strict=True)
+    observations = stacked([observations_of(model, part.log, part.how) for model, part in each])
+    return searched(models[0], observations)
 
 
-def _with(look: _Look, families: tuple[Family, ...]) -> _Look:
-    return replace(look, suspects=replace(look.suspects, families=families))
-
-
-def _searched_beside(looks: Sequence[_Look], known: Family) -> tuple[Estimate, list[Named]]:
-    """Return the fit, and the faults that show, but for one that is taken out."""
-    rest = tuple(one for one in looks[0].suspects.families if one is not known)
-    without = [_with(look, rest) for look in looks]
-    return searched(without[0].suspects, _observed(without))
-
-
-def _delay(looks: Sequence[_Look]) -> tuple[Named | None, list[_Look]]:
+def _delay(parts: Sequence[_Part]) -> tuple[FoundFault | None, list[_Part]]:
     """Return the whole delay of logs' forces, and the parts with it taken out."""
-    late, shifted = None, list(looks)
+    late, shifted = None, list(parts)
     for _ in range(_ROUNDS):
-        only = [_with(look, (DELAY,)) for look in shifted]
-        _, left = searched(only[0].suspects, _observed(only))
-        if not left:
+        _, found = _searched_for(shifted, (DELAY,))
+        if not found:
             break
-        first, late = late or left[0], left[0]
-        shifted = [look.late(float(late.sizes[0])) for look in shifted]
+        first, late = late or found[0], found[0]
+        more = float(late.sizes[0])
+        shifted = [
+            replace(
+                part,
+                how=replace(part.how, delay=float(np.clip(part.how.delay + more, -LATEST, LATEST))),
+            )
+            for part in shifted
+        ]
     if late is not None:
-        whole = np.array([shifted[0].how.delay - looks[0].how.delay])
+        whole = np.array([shifted[0].how.delay - parts[0].how.delay])
         late = replace(late, sizes=whole, chance=first.chance)
     return late, shifted

@@ -1,0 +1,243 @@
+"""Columns that faults of a log, or of a machine, add to its forces F = W beta.
+
+A small fault adds its size times a column that the fit itself tells: a delay of the forces, for
+one, adds its time times minus their derivative. `FaultColumns` puts them behind the model's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from itertools import chain, pairwise
+
+import numpy as np
+
+from pteron.equations.friction import passive_joints
+from pteron.identification.faults.fault import FaultName
+from pteron.identification.faults.fitted_motion import FittedMotion, lengths_of
+from pteron.identification.model import Model
+from pteron.identification.signals import States
+from pteron.identification.signals.filters import smoothed
+from pteron.kernels import Array
+from pteron.kinematics.evaluate import unchecked
+from pteron.manipulator import Manipulator
+
+_STRIBECK = (0.05, 0.15, 0.4)
+"""Speeds at which friction may fall, over each joint's root mean square: all are tried."""
+
+_DRY = ("coulomb", "stribeck")
+"""Terms that jump where a joint turns."""
+
+
+@dataclass(frozen=True)
+class Family:
+    """The columns of one fault.
+
+    Parameters
+    ----------
+    name : str
+        The fault.
+    unit : str
+        Unit of the sizes that columns are multiplied by.
+    sizes : callable
+        Returns their labels, k of them, for a model.
+    columns : callable
+        Returns the columns (R, n, k) at a motion.
+    of_machine : bool
+        Whether the machine itself has the fault, so that feed-forward should know it; else only the
+        log has it.
+    positive : bool
+        Whether sizes below zero are none of this fault.
+    largest : float
+        Sizes beyond it are another fault, told badly.
+    speed : float, optional
+        Of friction that falls with speed: the speed, over the usual one.
+    effect : callable, optional
+        Returns how the machine's forces change, where that is otherwise than those of the log: by a
+        clock that is off all inertia is, and with it the mass that weighs.
+    """
+
+    name: FaultName
+    unit: str
+    sizes: Callable[[Model], Sequence[str]]
+    columns: Callable[[FittedMotion], Array]
+    of_machine: bool = True
+    positive: bool = False
+    largest: float = np.inf
+    speed: float | None = None
+    effect: Callable[[FittedMotion], Array] | None = None
+
+    def of_cycle(self, motion: FittedMotion) -> Array:
+        """Return the columns (R, n, k) by which the machine differs from the model without it."""
+        return (self.effect or self.columns)(motion)
+
+
+def _forces(model: Model) -> Sequence[str]:
+    return model.robot.force_names
+
+
+def _each(signal: Array) -> Array:
+    """Return signals (R, n) as columns (R, n, n), one for each actuator."""
+    return np.asarray(signal[..., None] * np.eye(signal.shape[-1]))
+
+
+def _load(m: FittedMotion) -> Array:
+    return m.forces(of=["base"])
+
+
+def _stribeck(share: float, m: FittedMotion) -> Array:
+    return _each(m.direction * np.exp(-((m.states.joint_rates / (share * m.usual)) ** 2)))
+
+
+def _elasticity(m: FittedMotion) -> Array:
+    # The motor, where friction mostly is, is ahead of its joint by what the load deflects: the
+    # joint is that much behind what was measured.
+    load = _load(m)
+    pace = (len(load) - 1) / float(np.ptp(m.states.time))
+    if m.cutoff is not None and 2.0 * m.cutoff < pace:
+        # Noise of the accelerations would be in both, the residuals and the column.
+        load = smoothed(load, pace, m.cutoff)
+    rate = m.rate(load)
+    return m.by_give([load, rate, m.rate(rate)])
+
+
+def _drift(m: FittedMotion) -> Array:
+    later = m.along[:, None]
+    return np.concatenate([_each(later * m.direction), _each(later + 0.0 * m.direction)], axis=-1)
+
+
+def _weight(m: FittedMotion) -> Array:
+    rest = {
+        name: np.zeros_like(getattr(m.states, name))
+        for name in ("joint_rates", "joint_accelerations", "velocity", "acceleration")
+    }
+    still = replace(m, states=replace(m.states, **rest))
+    return still.forces(of=["base", "payload"])[..., None]
+
+
+def _passive_legs(model: Model) -> Sequence[str]:
+    return [
+        "the platform" if j.leg is None else f"leg {j.leg}" for j in passive_joints(model.robot)
+    ]
+
+
+def _passive(m: FittedMotion) -> Array:
+    s = m.states
+    return np.asarray(unchecked(m.model.robot, "passive_friction", s.pose, s.velocity))
+
+
+DELAY = Family(
+    "delay",
+    "s",
+    lambda m: ["delay"],
+    lambda m: -m.rate(m.forces(without=_DRY))[..., None],
+    of_machine=False,
+)
+
+_OTHERS = (
+    Family("gravity", "rad", lambda m: ["tilt", "tilt"], FittedMotion.by_tilt, largest=0.2),
+    Family(
+        "clock",
+        "",
+        lambda m: ["weight"],
+        _weight,
+        largest=3.0,
+        effect=lambda m: _load(m)[..., None],
+    ),
+    Family(
+        "geometry",
+        "m",
+        lambda m: [f"leg {leg + 1}" for leg, _ in lengths_of(m.robot)],
+        FittedMotion.by_lengths,
+    ),
+    *(
+        Family("stribeck", "N", _forces, partial(_stribeck, share), positive=True, speed=share)
+        for share in _STRIBECK
+    ),
+    Family("elasticity", "m/N", _forces, _elasticity, positive=True),
+    Family("drift", "N", lambda m: [*_forces(m), *_forces(m)], _drift),
+    Family("load", "", _forces, lambda m: _each(m.direction * np.abs(_load(m))), positive=True),
+    Family("passive", "N m s", _passive_legs, _passive, positive=True),
+)
+
+
+def families_of(robot: Manipulator) -> tuple[Family, ...]:
+    """Return the faults that are told by name; a wrong scale is one actuator's, each is tried."""
+    return (DELAY, *map(_scale, range(robot.joint_count)), *_OTHERS)
+
+
+def _scale(i: int) -> Family:
+    one = slice(i, i + 1)
+    return Family(
+        "scale",
+        "",
+        lambda model: _forces(model)[one],
+        lambda m: _each(m.forces())[..., one],
+        of_machine=False,
+        largest=1.0,
+    )
+
+
+@dataclass(frozen=True)
+class FaultColumns:
+    """A model with the columns of faults behind its own; `observations_of` takes it as a model.
+
+    `values` (p,) are those of the fit, `begin` and `end` the times of the log, s; `usual` (n,),
+    `stride` and `cutoff` are those of `FittedMotion`.
+    """
+
+    model: Model
+    values: Array
+    usual: Array
+    begin: float
+    end: float
+    families: tuple[Family, ...]
+    stride: int = 1
+    cutoff: float | None = None
+
+    @property
+    def robot(self) -> Manipulator:
+        """The machine."""
+        return self.model.robot
+
+    @cached_property
+    def sizes(self) -> tuple[Sequence[str], ...]:
+        """Labels of the sizes of each family."""
+        return tuple(family.sizes(self.model) for family in self.families)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of all columns."""
+        return (*self.model.names, *chain.from_iterable(self.sizes))
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Of all columns' sizes."""
+        return (*self.model.units, *self._repeated([family.unit for family in self.families]))
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """The model's kinds, and the fault of each other column."""
+        return (*self.model.kinds, *self._repeated([family.name for family in self.families]))
+
+    def _repeated(self, told: Sequence[str]) -> list[str]:
+        found = zip(told, self.sizes, strict=True)
+        return [text for text, sizes in found for _ in sizes]
+
+    @cached_property
+    def places(self) -> tuple[slice, ...]:
+        """Columns of each family among all."""
+        ends = np.cumsum([len(self.model.names), *map(len, self.sizes)]).tolist()
+        return tuple(slice(a, b) for a, b in pairwise(ends))
+
+    def motion(self, states: States, along: Array, stride: int = 1) -> FittedMotion:
+        """Return the motion that columns are made of, at times `along` (R,)."""
+        return FittedMotion(self.model, self.values, states, self.usual, along, stride, self.cutoff)
+
+    def matrix(self, states: States) -> Array:
+        """Return all columns (R, n, p + k)."""
+        along = (states.time - self.begin) / (self.end - self.begin) - 0.5
+        motion = self.motion(states, along, self.stride)
+        columns = [family.columns(motion) for family in self.families]
+        return np.concatenate([motion.matrix, *columns], axis=-1)

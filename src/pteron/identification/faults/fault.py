@@ -1,0 +1,167 @@
+"""A fault that the residuals of a fit show: its name, its size, and the sentence a person reads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from pteron.kernels import Array
+
+FaultName = Literal[
+    "delay",
+    "scale",
+    "gain",
+    "gravity",
+    "clock",
+    "geometry",
+    "stribeck",
+    "elasticity",
+    "drift",
+    "load",
+    "passive",
+]
+"""Faults by name: forces that are late, the scale of one force, that of all forces, the direction
+of gravity, its size or the rate of the clock, lengths, friction that falls with speed, drives that
+give, friction or offsets that drift, friction that grows with the load, friction in passive joints.
+"""
+
+_SHIFT = 1.0
+_CYCLE = 1.0
+"""Standard deviations of a value, and percent of a cycle's forces, above which a fault matters."""
+
+_HALF_STEP = 0.6
+"""Steps of the log up to which a delay is one of sampling: a force that is held from one sample to
+the next belongs to the instant between them."""
+
+_CYCLE_OF_SAMPLING = 3.0
+"""Percent of a cycle's forces above which such a delay matters all the same."""
+
+_CLEAREST = {
+    "geometry": "Lengths or points of the geometry are off, most clearly in",
+    "stribeck": "Friction falls with speed, most clearly at",
+    "elasticity": "The drives give, most clearly under",
+    "drift": "Friction or offset changes during the log, most clearly at",
+    "load": "Friction grows with the load, most clearly at",
+    "passive": "Passive joints have friction, most clearly in",
+}
+"""Sentences that end in the label of the size that is clearest."""
+
+_REMEDY: dict[FaultName, str] = {
+    "delay": "--delay auto takes it out",
+    "scale": "check that drive's gain, or its torque constant",
+    "gravity": "level the machine, or correct gravity in its file",
+    "gain": "check gains, rated torque and gear ratio, and the payload's mass",
+    "clock": "check the log's time, and gravity and the unit of lengths in the machine's file",
+    "geometry": "measure them again, or calibrate",
+    "stribeck": "--stribeck auto finds its speeds, and adds it to the model; slow passages, which "
+    "pteron excite --stribeck writes, show them best. It hides a delay: take --delay auto with it",
+    "elasticity": "measure positions behind the drive, or move more slowly",
+    "drift": "warm the machine up, or record shorter",
+    "load": "no term of the model has it: keep to loads like those of the log",
+    "passive": "--joints each adds it to the model",
+}
+
+
+@dataclass(frozen=True)
+class IsolatedFault:
+    """A fault that the residuals show.
+
+    Attributes
+    ----------
+    fault : str
+        One of `FaultName`.
+    labels : tuple of str
+        The force or the leg of each size.
+    sizes, deviations : array, shape (k,)
+        By how much they are off, in s, rad, m, N or m/N, and its standard deviation.
+    chance : float
+        Probability that residuals show it so clearly without it.
+    shift : float
+        By how much the value that it changes most is off, in its standard deviations.
+    cycle : array, shape (n,)
+        Error that it makes in a pick-and-place cycle's forces, percent of their standard deviation;
+        NaN where no cycle fits into the machine's workspace.
+    speeds : array, shape (n,), optional
+        Of Stribeck's friction: the speed of each joint with which it falls.
+    step : float
+        From one sample of the log to the next, s.
+    """
+
+    fault: FaultName
+    labels: tuple[str, ...]
+    sizes: Array
+    deviations: Array
+    chance: float
+    shift: float
+    cycle: Array
+    speeds: Array | None = None
+    step: float = 0.0
+
+    @property
+    def of_sampling(self) -> bool:
+        """Whether it is the half step by which forces that are held differ from positions."""
+        return self.fault == "delay" and abs(self.sizes[0]) <= _HALF_STEP * self.step
+
+    @property
+    def matters(self) -> bool:
+        """Whether values or forces are off by more than their stated errors allow for."""
+        if self.of_sampling:
+            return bool((self.cycle > _CYCLE_OF_SAMPLING).any())
+        return self.shift > _SHIFT or bool((self.cycle > _CYCLE).any())
+
+    @property
+    def message(self) -> str:
+        """The fault, and its remedy, in a sentence."""
+        return f"{self._sentence()}; {_REMEDY[self.fault]}."
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return {
+            "fault": self.fault,
+            "message": self.message,
+            "labels": list(self.labels),
+            "sizes": self.sizes.tolist(),
+            "standard_deviations": self.deviations.tolist(),
+            "chance": self.chance,
+            "shift": self.shift,
+            "matters": self.matters,
+            "cycle_percent": [None if np.isnan(v) else float(v) for v in self.cycle],
+            "speeds": None if self.speeds is None else self.speeds.tolist(),
+        }
+
+    def _sentence(self) -> str:
+        first, size, error = self.sizes[0], abs(self.sizes[0]), self.deviations[0]
+        percent = f"{100.0 * size:.2g} % (+- {100.0 * error:.1g})"
+        more = "large" if first > 0.0 else "small"
+        match self.fault:
+            case "delay":
+                late, early = ("forces", "positions")[:: 1 if first > 0.0 else -1]
+                if self.of_sampling:
+                    return (
+                        f"The {late} are half a sample ({1e3 * size:.3g} ms) late for the {early}, "
+                        "as where forces are held from sample to sample"
+                    )
+                error = f"+- {1e3 * error:.1g}"
+                return f"The {late} are {1e3 * size:.3g} ms ({error}) late for the {early}"
+            case "scale":
+                return f"{self.labels[0]} is {percent} too {more} beside the others"
+            case "gravity":
+                tilt, error = np.degrees([np.linalg.norm(self.sizes), self.deviations.max()])
+                return (
+                    f"Gravity is {tilt:.2g} degrees (+- {error:.1g}) off the direction in the model"
+                )
+            case "gain":
+                size, error = 100.0 * size, 100.0 * error
+                return f"All forces are {size:.3g} % (+- {error:.1g}) too {more} for what is known"
+            case "clock":
+                if first <= -1.0:
+                    return "The weight acts the other way: gravity has the wrong sign"
+                rate = (1.0 + first) ** -0.5 - 1.0
+                return (
+                    f"The weight is {percent} too {more} for the inertia, as where the log's clock "
+                    f"runs {100.0 * abs(rate):.2g} % {'slow' if rate < 0.0 else 'fast'}"
+                )
+        clearest = int(np.argmax(np.abs(self.sizes) / np.maximum(self.deviations, 1e-300)))
+        return f"{_CLEAREST[self.fault]} {self.labels[clearest]}"

@@ -1,0 +1,174 @@
+"""A motion with a fit's forces, and how these change with the machine: lengths, gravity, joints."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import make_interp_spline  # type: ignore[import-untyped]
+
+from pteron.equations.machine import numbers
+from pteron.identification.model import Model
+from pteron.identification.signals import States
+from pteron.kernels import Array, Kernel
+from pteron.kernels.targets import compile
+from pteron.manipulator import Manipulator, parameters
+
+_STEP = 1e-6
+"""Change over which forces are differenced: m, rad, or a share of a joint's range."""
+
+_FEWEST = 8
+"""States at which costly columns are worked out, at least."""
+
+
+def lengths_of(robot: Manipulator) -> list[tuple[int, int]]:
+    """Return leg, from 0, and place in the vector of `numbers`, of each number that is in m."""
+    found, place = [], 0
+    for i, leg in enumerate(robot.legs):
+        for quantity in leg.quantities:
+            size = len(quantity.value)
+            if quantity.role in ("point", "length"):
+                found += [(i, place + k) for k in range(size)]
+            place += size
+        found += [(i, place + k) for k in range(3)]  # the platform point; then the fixed offset
+        place += 6
+    return found
+
+
+@dataclass(frozen=True)
+class FittedMotion:
+    """States, and the forces of a fit there.
+
+    Parameters
+    ----------
+    model : Model
+        The model.
+    values : array, shape (p,)
+        Its values, by the fit.
+    states : States
+        R states.
+    usual : array, shape (n,)
+        Root mean square rate of each joint in the log.
+    along : array, shape (R,)
+        The time, from -0.5 at the log's beginning to 0.5 at its end.
+    stride : int
+        Changes with the machine, which are smooth and costly, are worked out at every so many
+        states, and interpolated.
+    cutoff : float, optional
+        Of loads that are to be differentiated, Hz.
+    """
+
+    model: Model
+    values: Array
+    states: States
+    usual: Array
+    along: Array
+    stride: int = 1
+    cutoff: float | None = None
+
+    @cached_property
+    def matrix(self) -> Array:
+        """The model's own columns (R, n, p)."""
+        return self.model.matrix(self.states)
+
+    def forces(self, *, of: Sequence[str] | None = None, without: Sequence[str] = ()) -> Array:
+        """Return forces of the fit (R, n): `of` some kinds of terms only, or without some."""
+        chosen = [(of is None or kind in of) and kind not in without for kind in self.model.kinds]
+        return np.asarray(self.matrix @ np.where(chosen, self.values, 0.0))
+
+    @property
+    def direction(self) -> Array:
+        """The sign of each joint's rate (R, n)."""
+        return np.sign(self.states.joint_rates)
+
+    def rate(self, signal: Array) -> Array:
+        """Return the derivative by time of signals (R, n)."""
+        return np.asarray(np.gradient(signal, self.states.time, axis=0, edge_order=2))
+
+    # How the rigid bodies' forces change with the machine
+
+    def by_lengths(self) -> Array:
+        """Return slopes (R, n, k) of forces by each of `lengths_of`, the joints being measured."""
+        unit = np.eye(len(self._geometry))
+        return self._along(unit[[place for _, place in lengths_of(self.model.robot)]])
+
+    def by_tilt(self) -> Array:
+        """Return slopes (R, n, 2) of forces as gravity tilts about two axes."""
+        g = np.array(self.model.robot.gravity)
+        size = float(np.linalg.norm(g))
+        changes = np.zeros((2, len(self._geometry)))
+        if size > 0.0:
+            changes[:, -3:] = size * np.linalg.svd(g[None, :])[2][1:]
+        return self._along(changes)
+
+    def by_give(self, motion: Sequence[Array]) -> Array:
+        """Return slopes (R, n, n) of forces as each joint is behind what was measured.
+
+        Joints are behind by a `motion`: its coordinates, rates and accelerations, (R, n) each.
+        """
+        behind = [one[self._some] for one in motion]
+        columns = []
+        for i, size in enumerate(_STEP * np.ptp(self._rigid[0].joints, axis=0)):
+            part = np.zeros(behind[0].shape[1])
+            part[i] = -size / max(float(np.abs(behind[0][:, i]).max()), np.finfo(float).tiny)
+            changed = self._forces_at(self._geometry, *(part * one for one in behind))
+            columns.append((changed - self._unchanged) / -part[i])
+        return self._at_all(np.stack(columns, axis=-1))
+
+    def _along(self, changes: Array) -> Array:
+        columns = [
+            (self._forces_at(self._geometry + _STEP * change) - self._unchanged) / _STEP
+            for change in changes
+        ]
+        return self._at_all(np.stack(columns, axis=-1))
+
+    def _at_all(self, columns: Array) -> Array:
+        rows = len(self.states)
+        if len(self._some) == rows:
+            return columns
+        return np.asarray(make_interp_spline(self._some, columns, k=3)(np.arange(rows)))
+
+    @cached_property
+    def _some(self) -> NDArray[np.int64]:
+        """Rows of every `stride`-th state, the first and the last among them."""
+        rows = len(self.states)
+        count = max(rows // self.stride, min(rows, _FEWEST))
+        return np.unique(np.linspace(0, rows - 1, count).astype(int))
+
+    @cached_property
+    def _geometry(self) -> Array:
+        return np.array(numbers(self.model.robot))
+
+    @cached_property
+    def _rigid(self) -> tuple[States, Array]:
+        """Some of the states, and parameters as drawn but with the base parameters of the fit."""
+        base, drawn = self.model.base, parameters(self.model.robot)
+        change = self.values[: base.rank] - base.grouping @ drawn
+        return self.states.part(self._some), drawn + base.selection @ change
+
+    @cached_property
+    def _kernels(self) -> tuple[Kernel, ...]:
+        wanted = "newton_step", "platform_motion", "inverse_dynamics"
+        return tuple(compile(self.model.robot, what, "vm", grade="general") for what in wanted)
+
+    @cached_property
+    def _unchanged(self) -> Array:
+        return self._forces_at(self._geometry)
+
+    def _forces_at(self, geometry: Array, *added: Array) -> Array:
+        """Return the forces by another geometry, and with some motion added to the joints'.
+
+        Another geometry puts the platform elsewhere, as the joints are what was measured.
+        """
+        s, inertia = self._rigid
+        q, dq, ddq = added or (0.0, 0.0, 0.0)
+        newton_step, platform_motion, inverse_dynamics = self._kernels
+        # One step of Newton's: its error is of second order in a change that is small.
+        pose, _ = newton_step(s.joints + q, s.pose, geometry=geometry)
+        moves = platform_motion(
+            pose, s.joint_rates + dq, s.joint_accelerations + ddq, geometry=geometry
+        )
+        return np.asarray(inverse_dynamics(pose, *moves, geometry=geometry, parameters=inertia))
