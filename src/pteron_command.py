@@ -16,7 +16,7 @@ _INTERRUPTED = 130
 _THREADS = "OPENBLAS_NUM_THREADS"
 """Read once, when NumPy is imported."""
 
-_ALIVE = 100_000
+_ALIVE = 1_000_000
 """Objects made before Python looks for cycles among them: imports make many, and no garbage."""
 
 

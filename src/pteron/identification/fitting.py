@@ -23,8 +23,7 @@ from pteron.identification.estimators import (
 )
 from pteron.identification.logs import Log
 from pteron.identification.logs.at_motor import per_cent_advice
-from pteron.identification.logs.recorded import at_limits, check_recorded
-from pteron.identification.logs.sizes import check_forces as check_strength
+from pteron.identification.logs.recorded import at_limits, check_forces, check_recorded
 from pteron.identification.model import Model
 from pteron.identification.observation import Linear, Observations, observations_of, stacked
 from pteron.identification.plausibility import left_over
@@ -58,7 +57,7 @@ def check_recordings(
     for one in (*whole, *others):
         # What is no force at all would hide how much the others change.
         if isinstance(one.log, Log):
-            check_strength(one.log.forces, one.log.force_names, one.source, one.log.first_row)
+            check_forces(one.log.forces, one.log.force_names, one.source, one.log.first_row)
         check_recorded(one.head())
         unit = one.head().description.force_unit
         if unit != "N":

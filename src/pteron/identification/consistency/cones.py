@@ -20,6 +20,10 @@ from pteron.kernels import Array
 _TOLERANCES = (1e-10, 1e-9, 1e-8)
 """The solver's, each where it gives up at the one before: the caller checks the answer alike."""
 
+_UNITS = (1e-4, 1e-3, 1e-2)
+"""Units of residuals, over the values' distance from zero: with the first 1e5 standard deviations
+are no problem, and where the solver gives up one of the others is in its range."""
+
 _CONE = 4
 """Rows of a body that turns: m + I, 2 hx, 2 hy, m - I."""
 
@@ -85,17 +89,19 @@ def closest(
     """
     of_z, of_depth, constant = real.rows
     size = np.linalg.norm(matrix, axis=1)
-    # Relative to what the solver starts from, so that a distance of 1e5 deviations is no problem.
-    unit = max(1.0, float(np.linalg.norm(np.linalg.solve(spread, values))) * 1e-4)
-    found = _least_squares(
-        real,
-        matrix / size[:, None],
-        -values / size,
-        unit * spread / size[:, None],
-        of_z,
-        constant + depth * of_depth,
-    )
-    if found is None:
+    distance = float(np.linalg.norm(np.linalg.solve(spread, values)))
+    for share in _UNITS:
+        found = _least_squares(
+            real,
+            matrix / size[:, None],
+            -values / size,
+            max(1.0, share * distance) * spread / size[:, None],
+            of_z,
+            constant + depth * of_depth,
+        )
+        if found is not None:
+            break
+    else:
         return None
     answer, multipliers = found
     turning, count = real.bodies.cones[0], len(real.margins) + len(real.right)

@@ -19,7 +19,8 @@ from pteron.motion import Motion, pick_and_place
 _SAMPLES = 201
 
 _MOVES = 0.02
-"""Share of a joint's largest rate below which its dry friction is uncertain: samples that do not count."""
+"""Share of a joint's largest rate below which its dry friction is uncertain, so that samples do
+not count."""
 
 _LEAST = 0.1
 """Least standard deviation that an actuator's force counts as having, over the largest."""

@@ -1,4 +1,4 @@
-"""What the machine's drives tell of logs that were taken at the motors: turns, counts, per cent."""
+"""Logs taken at the motors, in turns, counts or per cent, converted by the machine's drives."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 _Recorded = TypeVar("_Recorded", bound="Log | LogFile")
 
 _NEEDS = {"turns": ("ratio",), "counts": ("ratio", "counts_per_turn")}
-"""What the drives must tell, by the unit of the joints."""
+"""Values of a drive that are needed, by the unit of the joints."""
 
 _RATED = ("ratio", "rated_torque")
-"""What they must tell of per cent."""
+"""Those that forces in per cent need."""
 
 
 def joint_factors(joints: Group, robot: Manipulator, source: str) -> NDArray[np.float64]:
-    """Return what turns, or counts, of the motors are multiplied by (n,); 1 for other units.
+    """Return factors (n,) from turns, or counts, of the motors to joints; 1 for other units.
 
     Raises
     ------

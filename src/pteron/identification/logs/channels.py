@@ -15,7 +15,7 @@ _CLIPPED_RUNS = 2
 """A force is clipped that holds its extreme for this many rows, this many times."""
 _FROZEN_ROWS = 1000
 _MOVED = 0.01
-"""A channel is frozen that stays for over so many rows while another joint moves this part of
+"""A channel is frozen that stays for over so many rows while another joint moves by this share of
 its span."""
 _RESTED = 10.0
 """How many times as far others may move while a channel rests at an end of the log: a motion sets
@@ -38,7 +38,7 @@ class _Run:
 
 @dataclass
 class _Tally:
-    """How often something was seen, and in which row and with what first."""
+    """A count of an event, with the row and values of the first."""
 
     count: int = 0
     row: int = 0
@@ -52,7 +52,7 @@ class _Tally:
 
 @dataclass
 class _Extreme:
-    """How often the greatest value so far, or the least, was held."""
+    """A count of the runs that hold the greatest value so far, or the least."""
 
     word: str
     sign: float
@@ -67,7 +67,7 @@ class _Extreme:
 
 
 class Channel:
-    """What has been seen of one force, or of the coordinate of `joint`, counted from 0.
+    """The record of one force, or of the coordinate of `joint`, counted from 0.
 
     The travel of each joint is compared with `spans`, (n,); `limits` are a force's, as declared.
     """
@@ -97,8 +97,8 @@ class Channel:
             extreme.look(values)
         if self._limits is not None:
             low, high = self._limits
-            room = _ROUNDING * max(abs(low), abs(high))
-            beyond = (values <= low + room) | (values >= high - room)
+            rounding = _ROUNDING * max(abs(low), abs(high))
+            beyond = (values <= low + rounding) | (values >= high - rounding)
             self._beyond.add(int(beyond.sum()), self._rows + int(np.argmax(beyond)))
         starts = np.flatnonzero(np.diff(values, prepend=np.nan))
         lengths = np.diff(starts, append=len(values))

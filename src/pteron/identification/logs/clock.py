@@ -32,7 +32,7 @@ _DATES: dict[str, TimeFormat] = {
     r"\d\d?/\d\d?/\d{2,4}": "DD/MM/YYYY hh:mm:ss",
     "": "hh:mm:ss",
 }
-"""What dates look like, with their format; with slashes the month may come first too."""
+"""Formats of dates, by their pattern; with slashes the month may come first too."""
 _DATE = ("YYYY", "MM", "DD")
 _MONTH_FIRST: TimeFormat = "MM/DD/YYYY hh:mm:ss"
 _TEXT = (
@@ -57,9 +57,9 @@ class Clock:
     columns : tuple of str
         The column of the times, or those of whole seconds and of their nanoseconds.
     unit : {"s", "ms", "us", "ns", "100 ns"}
-        Of numbers.
+        Unit of numbers.
     format : TimeFormat, optional
-        Of text.
+        Format of text.
     guessed : bool
         Whether the size of the numbers alone tells their unit.
     """
@@ -157,9 +157,9 @@ def find_clock(
     columns : tuple of str
         As of `Clock`.
     unit : str, optional
-        What is declared, or what the file says.
+        As declared, or as the file says.
     declared : TimeFormat, optional
-        What is declared about text.
+        As declared, for text.
 
     Raises
     ------

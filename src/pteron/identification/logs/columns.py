@@ -1,16 +1,23 @@
-"""Which columns of a file hold what, and in which unit: declared, documented or taken by name."""
+"""A log's columns in a file, with their units: declared, documented or taken by name."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from pteron.errors import DataError
+import numpy as np
+
+from pteron.errors import DataError, shown
+from pteron.identification.logs.clock import Clock
 from pteron.identification.logs.description import Description, joint_symbols
 from pteron.identification.logs.log import Finding
-from pteron.identification.logs.search import Group, Search, Wanted
+from pteron.identification.logs.names import called, means
+from pteron.identification.logs.search import ColumnSearch, Group, Wanted
 from pteron.manipulator import Manipulator
-from pteron.tables import listed
+from pteron.tables import Table, listed
+
+_ONCE = ("rho", "theta", "force", "torque")
+"""Words for columns of which a leg has one."""
 
 
 class Columns(NamedTuple):
@@ -46,7 +53,7 @@ def find_columns(
     needed = [d.time_column or "t"]
     needed += d.joint_columns or [f"{one.coordinate}{i}" for i, one in enumerate(joints, 1)]
     needed += d.force_columns or [f"{one.force}{i}" for i, one in enumerate(joints, 1)]
-    search = Search(tuple(names), units, len(joints), needed, source, hint)
+    search = ColumnSearch(tuple(names), units, len(joints), needed, source, hint)
     travels = [
         Wanted("joints", one.coordinate, f"{one.noun}s", one.unit, unit)
         for one, unit in zip(joints, d.joint_units(robot), strict=True)
@@ -71,11 +78,88 @@ def find_columns(
             f"{source}: {listed(forces.names)} are in {', '.join(forces.units)}; give all in their "
             "SI units, or all in one unit of the drives"
         )
+    declared = {"m": d.length_unit, "rad": d.angle_unit}
     pose = [
-        Wanted("pose", one, "pose", "rad", d.angle_unit)
-        if one == "phi"
-        else Wanted("pose", one, "pose", "m", d.length_unit)
-        for one in robot.coordinates
+        Wanted("pose", name, "pose", unit, declared[unit])
+        for name, unit in zip(robot.coordinates, robot.units, strict=True)
     ]
     measured, payload = search.pose(pose, d.pose_columns), search.payload(d.payload_column)
     return Columns(time, coordinates, forces, measured, payload, tuple(search.findings))
+
+
+def check_names(repeated: Mapping[str, str], source: str) -> None:
+    """Raise a `DataError` where a file has a column of a joint or a force twice."""
+    for name in repeated.values():
+        parts = called(name)
+        if parts and any(means(parts.word, stem) for stem in _ONCE):
+            raise _twice(name, source)
+
+
+class RepeatedTimes:
+    """The columns of times beside the first, of the same name, where each channel has its own.
+
+    `repeated` are the names that a file has more than once, as they are told apart.
+
+    Raises
+    ------
+    DataError
+        If another column that is used has its name twice.
+    """
+
+    def __init__(self, repeated: Mapping[str, str], columns: Columns, source: str) -> None:
+        times = columns.time.names
+        used = [name for group in columns[1:5] for name in group.names]
+        for name in repeated.values():
+            if name in used:
+                raise _twice(name, source)
+        self.names = tuple(new for new, name in repeated.items() if name in times)
+        self._first = times[0]
+
+    def check(self, table: Table) -> None:
+        """Raise a `DataError` where a channel was sampled at another time than the first."""
+        first = self._first
+        for name in self.names:
+            apart = (table.frame[name] != table.frame[first]).fill_null(value=True)
+            if apart.any():
+                row = int(np.argmax(apart.to_numpy()))
+                one, other = (shown(str(table.frame[key][row])) for key in (first, name))
+                raise DataError(
+                    f"{table.place(row)}: its channels were not sampled at one time: {first} is "
+                    f"{one}, {name} is {other}; record all channels with one sample time, or "
+                    "export them with one time column"
+                )
+
+
+def as_read(
+    source: str,
+    found: Sequence[str],
+    columns: Columns,
+    description: Description,
+    clock: Clock,
+    again: RepeatedTimes,
+) -> tuple[Finding, ...]:
+    """Return how a file was read, in one finding, where that is neither documented nor declared.
+
+    `found` is what is unlike a plain CSV file.
+    """
+    parts = list(found)
+    time = columns.time.in_words("time")
+    if clock.format is not None:
+        time = f"{time.removesuffix(' in s')} as text, {clock.format}"
+    elif clock.guessed:
+        time = f"{time.removesuffix(' in s')} in {clock.unit} (guessed from its size)"
+    if columns.time.told or clock.guessed or (clock.format and not description.time_format):
+        parts.append(time)
+    if again.names:
+        parts.append(f"{len(again.names) + 1} equal columns of times")
+    groups = {"joints": columns.joints, "forces": columns.forces, "pose": columns.pose}
+    parts += [group.in_words(noun) for noun, group in groups.items() if group.told]
+    if not parts:
+        return ()
+    guessed = any(group.guessed for group in (columns.time, *groups.values()))
+    advice = "; columns are taken by name: declare them in its TOML file to be sure" * guessed
+    return (Finding("read", f"{source}: read as: {', '.join(parts)}{advice}"),)
+
+
+def _twice(name: str, source: str) -> DataError:
+    return DataError(f"{source}: two columns are called {shown(name)}; rename or remove one")

@@ -1,4 +1,4 @@
-"""What is known about a log beside its numbers."""
+"""The description of a log: names and units of its columns, and facts beside the numbers."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ LengthUnit = Literal["m", "mm", "um"]
 AngleUnit = Literal["rad", "deg"]
 ForceUnit = Literal["N", "N m", "A", "V", "%"]
 MotorUnit = Literal["turns", "counts"]
-"""Of positions at the motor: its turns, or the counts of its encoder."""
+"""Units of positions at the motor: its turns, or the counts of its encoder."""
 JointUnit = Literal["m", "mm", "um", "rad", "deg", "turns", "counts"]
 
 _ROUNDING = 1e-12
@@ -91,7 +91,7 @@ def _raises_data_errors(cls: _Class) -> _Class:
 
 
 def joint_symbols(robot: Manipulator) -> tuple[ActuatedJoint, ...]:
-    """Return how the actuated joint of each leg is spoken of."""
+    """Return the names and units of each leg's actuated joint."""
     return tuple(leg.joint for leg in robot.legs)
 
 
@@ -170,26 +170,24 @@ class Description:
     joint_angle_unit : {"rad", "deg"}, optional
         Unit of the cranks' coordinates where there are both.
     length_unit : {"m", "mm", "um"}, optional
-        Unit of x, y and z.
+        Unit of the pose's lengths.
     angle_unit : {"rad", "deg"}, optional
-        Unit of phi.
+        Unit of the pose's angles.
     column_force_unit : {"N", "N m", "A", "V", "%"}, optional
         Unit of the force columns, before the gains.
     gains : tuple of float, optional
-        Newtons (at a crank: newton metres) per unit of the force columns, one a joint.
+        Newtons, at a crank newton metres, per unit of the force columns, one a joint.
     limits : tuple of (float, float), optional
         Saturation of the forces in `force_unit`: one pair for all joints, or one each.
     payload : KnownPayload, optional
-        What is carried in phase 1.
+        The payload in phase 1.
     period : float, optional
         Period of the excitation, s.
     start, end : float, optional
-        Where in the motion its periodic part begins and ends, s from where it sets off: before and
-        after, it leads in and out. The log may begin earlier or later: the part that repeats is
-        found in it.
+        Begin and end of the motion's periodic part, s from where it sets off, between lead-in and
+        lead-out. The log may begin earlier or later: the part that repeats is found in it.
     assembly_mode : int, optional
-        Which pose of `direct_kinematics` the machine is in at the first sample, counted from 1 as a
-        person counts.
+        The pose of `direct_kinematics` that the machine has at the first sample, counted from 1.
     rotor_inertia : tuple of float, optional
         Of each joint's motor, kg m^2.
     ratio : tuple of float, optional
@@ -311,7 +309,7 @@ class Description:
                     f"{key}: {unit} given, but on this machine it is one of "
                     f"{', '.join(dict.fromkeys(known))}"
                 )
-        if self.payload is not None and "phi" in robot.coordinates and not self.payload.inertia:
+        if self.payload is not None and robot.platform.angles and not self.payload.inertia:
             raise DataError(
                 "payload: only its mass is given, but the machine turns its platform; give "
                 "center_of_mass (or first_moment) and inertia about P"

@@ -17,13 +17,11 @@ from pteron.errors import DataError
 from pteron.identification.logs.description import Description
 from pteron.identification.logs.gaps import gaps
 from pteron.legs.kind import SLIDER, ActuatedJoint
+from pteron.platforms.coordinates import COORDINATES
 from pteron.shapes import PerCoordinate, PerJoint, Series
 from pteron.tables import write_table
 
 _ARRAYS = ("time", "joints", "forces", "pose", "payload")
-_POSE = ("x", "y", "z", "phi")
-"""What the coordinates of a measured pose are called where nothing else is said."""
-
 _Phases = Int[np.ndarray, "*batch"]
 
 
@@ -37,21 +35,20 @@ looks wrong, which rows repeat."""
 
 @dataclass(frozen=True)
 class Finding:
-    """Something about a log that a person should know; nothing was repaired.
+    """An oddity of a log that a person should know; nothing was repaired.
 
     Parameters
     ----------
     kind : str
         One of `Kind`.
     message : str
-        One line: what, where and how much.
+        One line: the oddity, its place and its size.
     row : int or None
-        The data row, from 1, where it is first seen.
+        Its first data row, from 1.
     column : str or None
         The column, as the file calls it.
     count : int
-        How often it occurs: gaps, uneven steps, clipped rows, frozen stretches, samples that stand
-        out, or columns.
+        Number of gaps, uneven steps, clipped rows, frozen stretches, spikes or columns.
     """
 
     kind: Kind
@@ -68,7 +65,7 @@ class Log:
     Parameters
     ----------
     source : str
-        What messages call the file.
+        Name of the file in messages.
     time : array, shape (T,)
         s, rising.
     joints : array, shape (T, n)
@@ -81,18 +78,18 @@ class Log:
     payload : array of int, shape (T,), optional
         1 where the payload is carried, 0 where not.
     description : Description
-        What is known beside the numbers.
+        Names, units and facts beside the numbers.
     findings : tuple of Finding
-        What was noticed and left as it is.
+        Oddities that were left as they are.
     first_row : int
         Index from 0 of the first sample among the data rows of its file.
     step : float, optional
         The usual time step of the file, s; the median step of these samples if it is not given.
     symbols : tuple of ActuatedJoint, optional
-        What the joint of each leg is called; they are sliders if it is not given.
+        Names of each leg's joint; they are sliders if it is not given.
     coordinates : tuple of str, optional
-        What the coordinates of the measured pose are called; x, y, z, phi, as many as there are, if
-        it is not given.
+        Names of the measured pose's coordinates; if it is not given x, y, z, phi, as many as there
+        are.
     rows_in_file : array of int, shape (T,), optional
         Index from 0 of each sample among the data rows of its file, where some are left out.
 
@@ -241,7 +238,7 @@ def write_log(log: Log, path: str | Path) -> Path:
         stem = f"current{j + 1}" if unit == "A" else name
         columns[stem + (f" ({unit})" if unit in ("V", "%") else "")] = log.forces[:, j]
     if log.pose is not None:
-        names = log.coordinates or _POSE[: log.pose.shape[1]]
+        names = log.coordinates or tuple(COORDINATES)[: log.pose.shape[1]]
         columns |= dict(zip(names, log.pose.T, strict=True))
     if log.payload is not None:
         columns["payload"] = log.payload

@@ -12,17 +12,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.errors import DataError, shown
-from pteron.identification.logs.as_read import RepeatedTimes, as_read, check_names
 from pteron.identification.logs.at_motor import joint_factors
 from pteron.identification.logs.channels import Channel
 from pteron.identification.logs.clock import Clock, find_clock
-from pteron.identification.logs.columns import find_columns
+from pteron.identification.logs.columns import (
+    RepeatedTimes,
+    as_read,
+    check_names,
+    find_columns,
+)
 from pteron.identification.logs.description import Description, joint_symbols
-from pteron.identification.logs.description_file import find_description, read_description
+from pteron.identification.logs.description_file import (
+    find_description,
+    read_description,
+    told_at_once,
+)
 from pteron.identification.logs.log import Finding, Log, joined
+from pteron.identification.logs.recorded import check_forces
 from pteron.identification.logs.sizes import (
     check_bounds,
-    check_forces,
     check_step,
     joint_bounds,
     joint_spans,
@@ -31,7 +39,6 @@ from pteron.identification.logs.sizes import (
 )
 from pteron.identification.logs.spikes import MARGIN, Spikes
 from pteron.identification.logs.time_stamps import TimeStamps
-from pteron.identification.logs.undeclared import told_at_once
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.tables import CsvFile, Dialect, ParquetFile, open_table
 
@@ -49,13 +56,13 @@ class LogFile:
     Attributes
     ----------
     source : str
-        What messages call the file.
+        Name of the file in messages.
     description : Description
-        What is known about it; its force unit is that of the columns found.
+        Its description; the force unit is that of the columns found.
     rows_estimate : int or None
         About how many rows it has, for a progress bar; exact in Parquet.
     findings : tuple of Finding
-        How it was read and, after a full pass, all that was noticed.
+        How it was read and, after a full pass, its oddities.
     rows_in_memory : int
         Rows up to which `identify` reads it whole: 2 million, 150 MB for four joints.
     rows_in_piece : int
@@ -154,7 +161,7 @@ class LogFile:
         """Yield the file in pieces, in SI units; all findings but spikes stand behind the last."""
         stamps = TimeStamps(self._step, self._columns.time.shown[0], self.source)
         channels = self._channels()
-        n = self._robot.freedom
+        n = self._robot.joint_count
         low, high = np.full(n, np.inf), np.full(n, -np.inf)
         first = 0
         for values in self._values(self.rows_in_piece):
@@ -318,7 +325,7 @@ def read_log(
     robot : Manipulator, name or path
         The machine it belongs to.
     description : Description or path, optional
-        What is known beside the numbers; the TOML file of the same stem where it is not given.
+        The description; the TOML file of the same stem where it is not given.
     progress : callable, optional
         Called with the number of rows just read.
 

@@ -21,7 +21,7 @@ UNITS = {
 
 _POSITION = ("position", "actpos", "actposition", "actualposition", "istposition", "istlage")
 RATED = ("acttorque", "actualtorque", "istmoment", "istdrehmoment")
-"""Words for what drives write in per cent, in per mille or in N m: their unit must be said."""
+"""Words for torques, which drives write in per cent, per mille or N m: their unit must be said."""
 _EFFORT = ("effort", "actcurrent", "actualcurrent", "iststrom", *RATED)
 _WORDS: dict[str, tuple[str, ...]] = {
     "t": ("t", "time", "timestamp", "zeit"),
@@ -30,7 +30,7 @@ _WORDS: dict[str, tuple[str, ...]] = {
     "force": ("force", "f", "tau", "current", "i", "actforce", "actualforce", *_EFFORT),
     "torque": ("torque", "moment", "tau", "current", "i", *_EFFORT),
 }
-"""What columns are called, by the documented word; small letters without blanks and lines."""
+"""Names of columns, by the documented word; small letters without blanks and lines."""
 CURRENTS = ("current", "i", "actcurrent", "actualcurrent", "iststrom")
 """Words that say amperes."""
 
@@ -60,7 +60,7 @@ _STAMP = re.compile(r"(?:.*[./])?header[./]stamp(?P<part>[./](?:secs?|nsecs?|nan
 
 
 class Called(NamedTuple):
-    """What a name says."""
+    """The parts of a column's name."""
 
     word: str
     """In small letters, without blanks and lines."""
@@ -72,7 +72,7 @@ class Called(NamedTuple):
 
 
 def called(name: str) -> Called | None:
-    """Return what a name says, or None where it is no word with a number and a unit, or without.
+    """Return the parts of a name, or None where it is no word with a number and a unit, or without.
 
     Examples
     --------

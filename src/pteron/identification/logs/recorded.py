@@ -8,10 +8,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from pteron.errors import DataError
 from pteron.identification.errors import LogError
 from pteron.identification.logs.gaps import gaps
 from pteron.identification.logs.log import Log
 from pteron.identification.logs.spikes import LONGEST
+
+_STRONGEST = 1e9
+"""Force that no actuator has, N."""
 
 _SPAN = 0.9
 """Share of a joint's span that it jumps by where its encoder wraps."""
@@ -20,7 +24,7 @@ _STILL = 0.1
 """Largest step beside such a jump, over it: a joint that is as fast as that does not wrap."""
 
 _ALIKE = 0.02
-"""By how much a turn and the jumps of one encoder differ at most, over the jump."""
+"""Largest difference between a turn and the jumps of one encoder, over the jump."""
 
 _TIES = 1e-9
 """Difference of two forces, over their span, below which they are one."""
@@ -29,10 +33,23 @@ _LEAST = 0.005
 """Share of the samples at an extreme from which a force is at its limit."""
 
 _LEVEL = 8.0
-"""How many times rarer the next value is: a round top of a coarse channel has it half as often."""
+"""Factor by which the next value is rarer: a round top of a coarse channel has it half as often."""
 
 _MOVES = 0.02
 """Speed, over the joint's largest, from which a force that stays is not that of a joint at rest."""
+
+
+def check_forces(
+    forces: NDArray[np.float64], columns: tuple[str, ...], source: str, first_row: int
+) -> None:
+    """Raise a `DataError` where forces, (rows, n), are larger than any actuator's."""
+    beyond = ~(np.abs(forces) <= _STRONGEST)
+    if beyond.any():
+        i, j = (int(k) for k in np.argwhere(beyond)[0])
+        raise DataError(
+            f"{source}: row {first_row + i + 1}, column {columns[j]}: {forces[i, j]:g} is no "
+            f"force; up to {_STRONGEST:g} is expected; correct the value, or leave the row out"
+        )
 
 
 def check_recorded(log: Log) -> None:

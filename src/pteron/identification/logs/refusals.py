@@ -1,4 +1,4 @@
-"""What is said where columns are missing or could each be meant, with what to declare."""
+"""Errors for columns that are missing or could each be meant, with lines to declare."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ from pteron.identification.logs.refusals import ambiguous, incomplete
 from pteron.tables import declaration, listed
 
 _NO_UNIT = ("", "-", "1", "none")
-"""What a line of units has where there is none."""
+"""Cells of a line of units that hold none."""
 
 
 class Group(NamedTuple):
@@ -32,7 +32,7 @@ class Group(NamedTuple):
     said: bool = True
     """Whether the file or its description says the units."""
     told: bool = False
-    """Whether names or units come from the file's own words, which the user should know."""
+    """Whether names or units come from the file's own words, which is told."""
     guessed: bool = False
     """Whether the columns are taken by names that are not the documented ones."""
 
@@ -58,8 +58,8 @@ class Wanted(NamedTuple):
 
 
 @dataclass
-class Search:
-    """The names of a file, and what was found out about them so far."""
+class ColumnSearch:
+    """The search for a log's columns among the names of a file; those `taken` have a meaning."""
 
     names: tuple[str, ...]
     units: Mapping[str, str]

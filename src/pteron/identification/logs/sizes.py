@@ -20,8 +20,6 @@ from pteron.tables import declaration
 _BEYOND = 3.0
 """How far beyond the machine's size a coordinate may lie; encoders have their own zero."""
 _TURNS = 4.0 * math.pi
-_STRONGEST = 1e9
-"""Force that no actuator has, N."""
 _LONGEST_STEP = 0.2
 _LIKELY = (("ms", 1e2), ("us", 5e4))
 """Units of steps that are too long for seconds, each with what is too long for it."""
@@ -30,16 +28,16 @@ _SMALLER = ((1e3, "mm"), (1e6, "um"))
 
 
 class Bound(NamedTuple):
-    """How large a coordinate may be: a few times its usual size, m; two turns if it is None.
+    """A bound on a coordinate: a few times its usual size, m; two turns if that is None.
 
-    What turns without end has an infinite size.
+    Joints that turn without end have an infinite size.
     """
 
     usual: float | None
     owner: str
-    """What has that size, for messages."""
+    """The part of the machine that has that size, for messages."""
     key: str
-    """Of its unit, in the description."""
+    """The key of its unit in the description."""
 
 
 def joint_bounds(robot: Manipulator) -> list[Bound]:
@@ -50,10 +48,7 @@ def joint_bounds(robot: Manipulator) -> list[Bound]:
     joint that turns the platform makes any number.
     """
     owner, key = "the joint of this machine travels", "[joints] unit"
-    return [
-        Bound(_travel_of(leg, robot) if leg.joint.unit == "m" else _turns_of(leg), owner, key)
-        for leg in robot.legs
-    ]
+    return [Bound(_travel_of(leg, robot), owner, key) for leg in robot.legs]
 
 
 def pose_bounds(robot: Manipulator) -> list[Bound]:
@@ -62,9 +57,12 @@ def pose_bounds(robot: Manipulator) -> list[Bound]:
     limits = [leg.limits for leg in robot.legs if leg.joint.unit == "m"]
     size = _size_of(robot) + far + max(map(_farthest, limits), default=0.0)
     length = Bound(size, "the machine extends", "[pose] length_unit")
-    endless = any(leg.follows_angle for leg in robot.legs)
-    angle = Bound(math.inf if endless else None, "", "[pose] angle_unit")
-    return [angle if one == "phi" else length for one in robot.coordinates]
+    key = "[pose] angle_unit"
+    # A joint that turns with the platform makes any number of turns.
+    endless = robot.platform.angular & ~robot.wraps & bool(robot.platform.rotation_axes)
+    angles = [Bound(math.inf if turns else None, "", key) for turns in endless]
+    each = zip(angles, robot.platform.angular, strict=True)
+    return [angle if angular else length for angle, angular in each]
 
 
 def check_bounds(
@@ -88,19 +86,6 @@ def check_bounds(
             if peak / factor <= _BEYOND * usual:
                 advice = _declare(smaller, key, smaller)
         raise DataError(f"{place} m, read as {unit}, but {owner} about {usual:.2g} m; {advice}")
-
-
-def check_forces(
-    forces: NDArray[np.float64], columns: tuple[str, ...], source: str, first_row: int
-) -> None:
-    """Raise a `DataError` where forces, (rows, n), are larger than any actuator's."""
-    beyond = ~(np.abs(forces) <= _STRONGEST)
-    if beyond.any():
-        i, j = (int(k) for k in np.argwhere(beyond)[0])
-        raise DataError(
-            f"{source}: row {first_row + i + 1}, column {columns[j]}: {forces[i, j]:g} is no "
-            f"force; up to {_STRONGEST:g} is expected; correct the value, or leave the row out"
-        )
 
 
 def check_step(step: float, column: str, source: str) -> None:
@@ -151,7 +136,7 @@ def standstill(
 
 
 def joint_spans(robot: Manipulator) -> NDArray[np.float64]:
-    """Return what a travel of each joint is compared with, (n,): the machine's size, m; 1 rad."""
+    """Return the usual travel of each joint (n,): the machine's size, m; 1 rad."""
     size = _size_of(robot)
     return np.array([size if leg.joint.unit == "m" else 1.0 for leg in robot.legs])
 
@@ -166,15 +151,13 @@ def _size_of(robot: Manipulator) -> float:
     return float(apart + reach)
 
 
-def _travel_of(leg: LegKind, robot: Manipulator) -> float:
+def _travel_of(leg: LegKind, robot: Manipulator) -> float | None:
+    if leg.joint.unit == "rad":
+        return None if leg.goes_round else math.inf
     if leg.limits is not None or leg.reach_bound is None:
         return _farthest(leg.limits)
     # Along a guide that is oblique to the leg's reach the slider travels farther.
     return _size_of(robot) * max(leg.reach_bound.radius / leg.size, 1.0)
-
-
-def _turns_of(leg: LegKind) -> float | None:
-    return math.inf if leg.follows_angle else None
 
 
 def _farthest(limits: tuple[float, float] | None) -> float:

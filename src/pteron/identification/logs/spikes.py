@@ -15,26 +15,25 @@ MARGIN = 64
 _WINDOW = 21
 """Differences whose median is the motion's own: the jumps of a group are fewer than half."""
 _USUAL = 20.0
-"""How large a jump is, in what nineteen of twenty differences leave of the motion's."""
+"""Least jump, over the 95th percentile of differences beside the motion's own."""
 _SHARE_OF_JOINT, _SHARE_OF_FORCE = 0.01, 0.5
 """Least jump, as a share of a channel's span; friction and stops make forces jump."""
 _FASTER = 3.0
 """Least jump of a joint, in its differences nearby: a fast move is no jump."""
 _BACK = 0.25
-"""What may be missing from the way back, as a share of the largest distance."""
+"""Largest distance from the motion after a spike, as a share of the largest in it."""
 _SUDDEN = 0.5
 """Share of that distance that the first jump and the last have at least: an edge, not a slope."""
 _REVERSING = 0.05
 """Speed, as a share of a joint's usual one, below which friction may turn."""
 _BEYOND = 0.1
-"""How far beyond its usual values, in their span, a force is that no turn of friction explains."""
+"""Outlier threshold of a force beyond its usual values, in their span, where friction may turn."""
 _UNUSUAL = 3.0
-"""How much more a joint is accelerated by a stop than before and after, in what nine of ten times
-have at most."""
+"""Least acceleration of a stop beside those before and after, over that of nine of ten times."""
 _RESTS, _MOVES = 0.1, 0.2
-"""Way of the joints at rest at most, and in motion at least, as a share of their usual one."""
+"""Largest travel of joints at rest, and least in motion, as a share of their usual one."""
 _MOST = 0.01
-"""Share of the rows that are left out at most: where spikes are more, they are no exception."""
+"""Largest share of the rows that is left out: where spikes are more, they are no exception."""
 _SPAN = (1.0, 99.0)
 _TOLD = 5
 """Groups whose rows are named."""
@@ -70,10 +69,10 @@ def force_spikes(values: Values, joints: Values, own: int) -> Mask:
     speed = np.abs(np.gradient(joints[:, own]))
     turns = speed < _REVERSING * np.percentile(speed, 95.0)
     low, high = np.percentile(values, _SPAN)
-    room = _BEYOND * (high - low)
-    usual = (values > low - room) & (values < high + room)
+    far = _BEYOND * (high - low)
+    usual = (values > low - far) & (values < high + far)
     turns = maximum_filter1d(turns.astype(np.int8), 5) > 0
-    motion = _Motion(joints)
+    motion = _JointMotion(joints)
     for start, stop in _runs(found):
         group = slice(start, stop)
         turned = turns[group].any() and usual[group].all()
@@ -82,8 +81,8 @@ def force_spikes(values: Values, joints: Values, own: int) -> Mask:
     return found
 
 
-class _Motion:
-    """The joints (T, n) of a piece, and what is usual for them."""
+class _JointMotion:
+    """The motion of a piece's joints (T, n), and its usual sizes."""
 
     def __init__(self, joints: Values) -> None:
         self._steps = np.diff(joints, axis=0)
@@ -200,7 +199,7 @@ class Spikes:
         return out
 
     def findings(self) -> tuple[Finding, ...]:
-        """Return what was found, and what became of it."""
+        """Return a finding for each channel with spikes, and whether they are left out."""
         found = []
         fate = "left out like a gap, not repaired"
         if self._too_many:

@@ -17,7 +17,7 @@ _JITTER = 0.01
 
 
 class TimeStamps:
-    """What has been seen of a log's time stamps; `step` is the usual one, s."""
+    """The record of a log's time stamps; `step` is the usual one, s."""
 
     def __init__(self, step: float, column: str, source: str) -> None:
         self._step, self._column, self._source = step, column, source
@@ -75,7 +75,7 @@ class TimeStamps:
         self._rows += len(time)
 
     def findings(self) -> tuple[Finding, ...]:
-        """Return what was found in the pieces taken so far."""
+        """Return the findings of the pieces taken so far."""
         found = []
         if self._gaps:
             row, start, step = self._first_gap
