@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
-from copy import copy
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pteron.errors import DataError
-from pteron.identification.logs.log import Finding, Log
+from pteron.identification.logs.description import Description
+from pteron.identification.logs.log import Finding
 from pteron.identification.logs.search import Group
 from pteron.legs import Drive
 from pteron.manipulator import Manipulator
 
-if TYPE_CHECKING:
-    from pteron.identification.logs.log_file import LogFile
 
-_Recorded = TypeVar("_Recorded", bound="Log | LogFile")
+class Recorded(Protocol):
+    """A log, or a file of one, whose forces may be multiplied by gains."""
+
+    source: str
+    description: Description
+
+    def with_gains(self, description: Description, finding: Finding) -> Self:
+        """Return it with the gains of a description, which a finding tells."""
+
+
+_Recorded = TypeVar("_Recorded", bound=Recorded)
 
 _NEEDS = {"turns": ("ratio",), "counts": ("ratio", "counts_per_turn")}
 """Values of a drive that are needed, by the unit of the joints."""
@@ -72,13 +80,7 @@ def by_rated_torque(log: _Recorded, robot: Manipulator) -> _Recorded:
         f"{log.source}: forces in per cent of the motors' rated torque: by ratio and rated_torque "
         f"of the robot's drives 100 % are {whole}",
     )
-    described = replace(about, gains=gains)
-    if isinstance(log, Log):
-        found = (*log.findings, finding)
-        return replace(log, forces=log.forces * gains, description=described, findings=found)
-    again = copy(log)
-    again.describe(described, finding)
-    return again
+    return log.with_gains(replace(about, gains=gains), finding)
 
 
 def per_cent_advice(robot: Manipulator) -> str:

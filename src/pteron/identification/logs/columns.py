@@ -9,10 +9,11 @@ import numpy as np
 
 from pteron.errors import DataError, shown
 from pteron.identification.logs.clock import Clock
+from pteron.identification.logs.column_names import Wanted
 from pteron.identification.logs.description import Description, joint_symbols
 from pteron.identification.logs.log import Finding
 from pteron.identification.logs.names import called, means
-from pteron.identification.logs.search import ColumnSearch, Group, Wanted
+from pteron.identification.logs.search import ColumnSearch, Group
 from pteron.manipulator import Manipulator
 from pteron.tables import Table, listed
 

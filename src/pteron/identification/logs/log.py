@@ -187,6 +187,12 @@ class Log:
             first = int(self.rows_in_file[start])
         return replace(self, **changed, first_row=first)
 
+    def with_gains(self, description: Description, finding: Finding) -> Log:
+        """Return the log with the gains of a description, which a finding tells."""
+        forces = self.forces * np.array(description.gains)
+        found = (*self.findings, finding)
+        return replace(self, forces=forces, description=description, findings=found)
+
     def without(self, rows: NDArray[np.bool_]) -> Log:
         """Return the samples without some, (T,): where they were is a gap."""
         kept = np.flatnonzero(~rows)

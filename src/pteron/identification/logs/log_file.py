@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from copy import copy
 from dataclasses import replace
 from itertools import chain, cycle, pairwise
 from pathlib import Path
@@ -98,11 +99,13 @@ class LogFile:
         )
         self.findings = self._read
 
-    def describe(self, description: Description, finding: Finding) -> None:
-        """Take another description of the same columns, which a finding tells."""
-        self.description = description
-        self._read = (*self._read, finding)
-        self.findings = (*self.findings, finding)
+    def with_gains(self, description: Description, finding: Finding) -> LogFile:
+        """Return the file with the gains of a description, which a finding tells."""
+        again = copy(self)
+        again.description = description
+        again._read = (*self._read, finding)
+        again.findings = (*self.findings, finding)
+        return again
 
     def pieces(
         self, rows: int | None = None, progress: Callable[[int], None] | None = None

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from pteron.errors import DataError, shown
+from pteron.identification.logs.column_names import ColumnNames, Wanted
 from pteron.identification.logs.log import Finding
 from pteron.identification.logs.names import (
     CURRENTS,
@@ -17,7 +18,6 @@ from pteron.identification.logs.names import (
     stamp_columns,
     unit_called,
 )
-from pteron.identification.logs.refusals import ambiguous, incomplete
 from pteron.tables import declaration, listed
 
 _NO_UNIT = ("", "-", "1", "none")
@@ -47,28 +47,9 @@ class Group(NamedTuple):
         return f"{noun} {listed(self.names)} in {unit}"
 
 
-class Wanted(NamedTuple):
-    """A column looked for: its table, documented name, word for messages, SI and declared unit."""
-
-    table: str
-    stem: str
-    noun: str
-    unit: str
-    declared: str | None
-
-
 @dataclass
-class ColumnSearch:
-    """The search for a log's columns among the names of a file; those `taken` have a meaning."""
-
-    names: tuple[str, ...]
-    units: Mapping[str, str]
-    legs: int
-    needed: Sequence[str]
-    source: str
-    hint: str
-    findings: list[Finding] = field(default_factory=list)
-    taken: set[str] = field(default_factory=set)
+class ColumnSearch(ColumnNames):
+    """The search for the columns of a log."""
 
     def time(self, kind: Wanted, declared: str | None) -> Group:
         """Return the column of the times, or those of seconds and nanoseconds."""
@@ -81,9 +62,7 @@ class ColumnSearch:
         elif len(stamps) == 1:
             columns = stamps[0]
         elif stamps:
-            raise ambiguous(
-                self.source, self.legs, kind.table, kind.noun, [list(one[:1]) for one in stamps]
-            )
+            raise self.ambiguous(kind, [one[:1] for one in stamps])
         else:
             columns = tuple(self.family(kind, [0])[0])
         named = self.unit_of(columns[0], kind) if len(columns) == 1 else None
@@ -150,22 +129,10 @@ class ColumnSearch:
         known = set(range(self.legs + 1))
         complete = [key for key, one in families.items() if set(numbers) <= one.keys() <= known]
         if not complete:
-            raise incomplete(
-                self.source,
-                self.legs,
-                kind.table,
-                kind.stem,
-                kind.noun,
-                numbers,
-                list(families.values()),
-                names=self.names,
-                taken=self.taken,
-                needed=self.needed,
-                hint=self.hint,
-            )
+            raise self.incomplete(kind, numbers, list(families.values()))
         if len(complete) > 1:
             several = [[one[i] for i in sorted(one)] for one in map(families.get, complete) if one]
-            raise ambiguous(self.source, self.legs, kind.table, kind.noun, several)
+            raise self.ambiguous(kind, several)
         columns = [families[complete[0]][number] for number in numbers]
         return columns, complete[0] != exact
 
@@ -192,7 +159,7 @@ class ColumnSearch:
         told = {one.unit: unit for one, unit in reversed([*zip(wanted, named, strict=True)])}
         guessed = declared is None and columns != stems
         if any(unit != told[one.unit] for one, unit in zip(wanted, named, strict=True)):
-            raise ambiguous(self.source, self.legs, "pose", "pose", [columns])
+            raise self.ambiguous(wanted[0], [columns])
         units = {si: self.unit(one, told[si]) for si, one in kinds.items()}
         heard = guessed or any(told[si] and not one.declared for si, one in kinds.items())
         return Group(
@@ -203,9 +170,7 @@ class ColumnSearch:
         """Return the column without a number that may be meant, if any."""
         found = [name for name, parts in self.matches(kind) if parts.number is None]
         if len(found) > 1:
-            raise ambiguous(
-                self.source, self.legs, kind.table, kind.noun, [[name] for name in found]
-            )
+            raise self.ambiguous(kind, [[name] for name in found])
         return found
 
     def payload(self, declared: str | None) -> Group:
@@ -215,9 +180,7 @@ class ColumnSearch:
             found = self.declared("payload", [declared])
         if len(found) > 1:
             kind = Wanted("payload", "payload", "payload", "", None)
-            raise ambiguous(
-                self.source, self.legs, kind.table, kind.noun, [[name] for name in found]
-            )
+            raise self.ambiguous(kind, [[name] for name in found])
         return Group(tuple(found), ("",) * len(found))
 
     def unit_of(self, name: str, kind: Wanted) -> str | None:

@@ -1,0 +1,97 @@
+"""The column names of a file, and the errors that ask which of them hold a part of a log."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from pteron.errors import DataError
+from pteron.identification.logs.log import Finding
+from pteron.identification.logs.names import called, means
+from pteron.tables import declaration, listed
+
+_LONGEST = 60
+"""A name longer than this is in no example."""
+
+_STEMS = ("t", "rho", "theta", "force", "torque", "payload")
+
+
+class Wanted(NamedTuple):
+    """A column looked for: its table, documented name, word for messages, SI and declared unit."""
+
+    table: str
+    stem: str
+    noun: str
+    unit: str
+    declared: str | None
+
+
+@dataclass
+class ColumnNames:
+    """The names of a file; those `taken` have a meaning already, those `needed` are documented."""
+
+    names: tuple[str, ...]
+    units: Mapping[str, str]
+    legs: int
+    needed: Sequence[str]
+    source: str
+    hint: str
+    findings: list[Finding] = field(default_factory=list)
+    taken: set[str] = field(default_factory=set)
+
+    def incomplete(
+        self, kind: Wanted, numbers: Sequence[int], families: Sequence[Mapping[int, str]]
+    ) -> DataError:
+        """Return the error for columns that a file has not, or has not for all legs.
+
+        `families` are columns that are called alike, by number.
+        """
+        example = self._example(kind)
+        needed = listed(self.needed)
+        others = next((one for one in families if numbers[0] in one), None)
+        if others is None:
+            return DataError(
+                f"{self.source}: no columns for the {kind.noun} (found: {listed(self.names)}; "
+                f"needed: {needed}); {self.hint}, or declare the file's own names in a TOML file "
+                f"beside it{example}"
+            )
+        given = [others[i] for i in sorted(others)]
+        word = others[numbers[0]].removesuffix(str(numbers[0]))
+        absent = [f"{word}{i}" for i in numbers if i not in others]
+        fault = f"without {listed(absent)}, or " if absent else ""
+        return DataError(
+            f"{self.source}: the columns {listed(given)} are for {len(given)} {kind.noun}, but the "
+            f"machine has {self.legs} legs (needed: {needed}); {fault}perhaps it is the log of "
+            f"another machine; else declare the columns in a TOML file beside it{example}"
+        )
+
+    def ambiguous(self, kind: Wanted, choices: Sequence[Sequence[str]]) -> DataError:
+        """Return the error for columns that are as good as others; the first are shown declared."""
+        names = [one[0] for one in choices] if len(choices) > 1 else choices[0]
+        single = kind.table in ("time", "payload")
+        entry = {"column": choices[0][0]} if single else {"columns": list(choices[0])}
+        if kind.table == "pose" or (not single and len(choices[0]) != self.legs):
+            example = f", under [{kind.table}]"
+        else:
+            example = ", such as" + declaration(kind.table, **entry)
+        return DataError(
+            f"{self.source}: {listed(names)} could each be meant for the {kind.noun}; say which in "
+            f"a TOML file beside it{example}"
+        )
+
+    def _example(self, kind: Wanted) -> str:
+        """Return a declaration with columns that are called like nothing else."""
+        others = [stem for stem in _STEMS if stem != kind.stem]
+        free = [
+            name
+            for name in self.names
+            if name not in self.taken and name.isprintable() and len(name) < _LONGEST
+            if (one := called(name)) is None or not any(means(one.word, s) for s in others)
+        ]
+        if kind.table == "time":
+            return ", such as" + declaration("time", column=free[0]) if free else ""
+        if len(free) < self.legs:
+            return f": [{kind.table}] columns, one for each leg"
+        columns = declaration(kind.table, columns=free[: self.legs])
+        return f", in the order of the legs, such as{columns}"
