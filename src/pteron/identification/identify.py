@@ -272,10 +272,10 @@ def _rotors(robot: Manipulator, fit: Sequence[Recording]) -> tuple[tuple[float, 
     description = fit[0].head().description
     if description.rotor_inertia is not None and description.ratio is not None:
         return tuple(zip(description.rotor_inertia, description.ratio, strict=True))
-    drives = [leg.drive or Drive() for leg in robot.legs]
-    if any(drive.rotor_inertia for drive in drives):
-        return tuple((drive.rotor_inertia, drive.gear) for drive in drives)
-    return None
+    drives = [leg.drive for leg in robot.legs]
+    if not any(drive and drive.rotor_inertia for drive in drives):
+        return None
+    return tuple((d.rotor_inertia, d.gear) for d in (drive or Drive() for drive in drives))
 
 
 def _reflected(rotors: tuple[tuple[float, float], ...] | None) -> dict[str, float]:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
+from scipy.stats import norm  # type: ignore[import-untyped]
 
+from pteron.bodies.parameters import PLATFORM_KINDS
 from pteron.identification.consistency import Consistency
 from pteron.identification.consistency.bodies import bodies_of
 from pteron.identification.estimators import Estimate
 from pteron.identification.model import Model
 from pteron.identification.observation import Observations
+from pteron.identification.recordings import Recording
 from pteron.identification.signals import Preprocessing
 from pteron.kernels import Array
 from pteron.kinematics import random_poses
@@ -56,6 +60,15 @@ _POSITIVE = ("coulomb", "viscous", "passive", "rotor")
 
 _CHANCE = 1e-3
 """Probability below which infeasible values are not chance."""
+
+CLEAR = 5.0
+"""Standard deviations from which a scale is told from one."""
+
+WANTED = 0.05
+"""Share of the forces, or of the weight, that a log must be able to tell."""
+
+_USUAL_ERROR = 0.02
+"""Error of a payload's mass, or of a rotor's inertia, that is usual."""
 
 
 def doubts(
@@ -121,6 +134,57 @@ def common_factor(model: Model, estimate: Estimate, known: Array, drawn: Array) 
     factor = float(np.median(ratios))
     spread = float(np.median(np.abs(ratios - factor)))
     return factor if spread < _TOLD * abs(factor) else 1.0
+
+
+class Factor(NamedTuple):
+    """The factor of all forces, and its standard deviation."""
+
+    value: float
+    deviation: float
+
+    @property
+    def told(self) -> bool:
+        """Whether a factor that matters would be seen."""
+        return CLEAR * self.deviation < WANTED
+
+    def times(self, number: float) -> Factor:
+        """Return the factor of forces that are so many times as large."""
+        return Factor(number * self.value, abs(number) * self.deviation)
+
+    @property
+    def wrong(self) -> bool:
+        """Whether it is not one, by more than what is known may be off."""
+        return abs(self.value - 1.0) > max(CLEAR * self.deviation, _USUAL_ERROR)
+
+    @property
+    def chance(self) -> float:
+        """Probability that it seems so far from one where it is one."""
+        return float(2.0 * norm.sf(abs(self.value - 1.0) / max(self.deviation, 1e-300)))
+
+
+def known_values(
+    model: Model, recordings: Sequence[Recording], rotors: Mapping[str, float]
+) -> dict[str, float]:
+    """Return the values that are known, by name: of a declared payload, of rotors."""
+    found = dict(rotors)
+    for one in recordings:
+        if (payload := one.head().description.payload) is not None:
+            inertia = (payload.mass, *payload.first_moment, payload.inertia)
+            found |= zip((f"{kind}_L" for kind in PLATFORM_KINDS), inertia, strict=True)
+    return {name: value for name, value in found.items() if name in model.names and value}
+
+
+def factor_of_forces(model: Model, fit: Estimate, known: Mapping[str, float]) -> Factor | None:
+    """Return the factor that all forces have, by what is known of the values; None without that."""
+    if not known:
+        return None
+    places = [model.names.index(name) for name in known]
+    true = np.array(list(known.values()))
+    weights = np.linalg.pinv(fit.covariance[np.ix_(places, places)], hermitian=True) @ true
+    power = float(weights @ true)
+    if not power > 0.0:
+        return None
+    return Factor(float(weights @ fit.values[places]) / power, power**-0.5)
 
 
 def left_over(estimate: Estimate, preprocessing: Sequence[Preprocessing]) -> str:

@@ -10,7 +10,7 @@ that of the values comes with the steps.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -66,7 +66,7 @@ class Unknowns:
         With which each joint's friction falls, m/s or rad/s; infinite where it is not seen to fall.
     delay : float
         By how much forces are late for positions, s.
-    speed_deviations : array, shape (n,)
+    speed_deviations : array, shape (n,), optional
         Standard deviations of the speeds' logarithms.
     delay_deviation : float
         s.
@@ -74,7 +74,7 @@ class Unknowns:
 
     speeds: Array | None = None
     delay: float = 0.0
-    speed_deviations: Array = field(default_factory=lambda: np.zeros(0))
+    speed_deviations: Array | None = None
     delay_deviation: float = 0.0
 
     def speed_intervals(self) -> tuple[Array, Array]:

@@ -14,11 +14,11 @@ from pteron.identification.estimators import Estimate
 from pteron.identification.faults.columns import DELAY, Family, FaultColumns, families_of
 from pteron.identification.faults.cycle import Extent, ReferenceCycle
 from pteron.identification.faults.fault import FaultName, IsolatedFault
-from pteron.identification.faults.scales import cannot_be_told, factor_of_forces, known_values
-from pteron.identification.faults.search import FoundFault, searched
+from pteron.identification.faults.search import FoundFault, cannot_be_told, searched
 from pteron.identification.logs import Log
 from pteron.identification.model import Model
 from pteron.identification.observation import observations_of, stacked
+from pteron.identification.plausibility import factor_of_forces, known_values
 from pteron.identification.recordings import Recording
 from pteron.identification.signals import (
     Preprocessing,

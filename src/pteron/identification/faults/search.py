@@ -12,7 +12,9 @@ from scipy.stats import chi2  # type: ignore[import-untyped]
 from pteron.identification.estimators import Estimate, weighted
 from pteron.identification.estimators.qr import actuator_factors
 from pteron.identification.faults.columns import Family, FaultColumns
+from pteron.identification.faults.fault import FaultName
 from pteron.identification.observation import Observations
+from pteron.identification.plausibility import CLEAR, WANTED
 from pteron.kernels import Array
 
 _CHANCE = 1e-6
@@ -44,6 +46,12 @@ _TIMES = 3.0
 
 _MOST = 3
 """Faults that are named at most."""
+
+_NOISELESS = 1e-9
+"""Noise of a force, over that of the noisiest, that counts as at least."""
+
+_INDEPENDENT = 1e-3
+"""Share of a column that the model's cannot make, from which it can be told from them."""
 
 
 @dataclass(frozen=True)
@@ -112,6 +120,30 @@ def searched(
         )
         found.append(one)
     return plain, found
+
+
+def cannot_be_told(
+    model: FaultColumns, observations: Observations, noise: Array
+) -> list[FaultName]:
+    """Return which of the clock and the scale of one force the equations leave open.
+
+    A fault is left open whose column the model's columns make, but for less than noise (n,) of
+    the forces hides.
+    """
+    weights = 1.0 / np.maximum(noise, _NOISELESS * noise.max() + 1e-300)
+    flat = (weights[:, None] * observations.matrix).reshape(-1, observations.matrix.shape[-1])
+    known = flat[:, : len(model.model.names)]
+    basis = np.linalg.qr(_scaled(known)[0])[0]
+    found: dict[FaultName, None] = {}
+    for family, places in zip(model.families, model.places, strict=True):
+        if family.name not in ("clock", "scale"):
+            continue
+        columns = flat[:, places]
+        left = float(np.linalg.norm(columns - basis @ (basis.T @ columns)))
+        independent = left > _INDEPENDENT * float(np.linalg.norm(columns))
+        if not (independent and WANTED * left > CLEAR):
+            found[family.name] = None
+    return list(found)
 
 
 def _taken_in(

@@ -10,8 +10,8 @@ from pteron.identification.logs.description_file import (
     read_description,
     write_description,
 )
-from pteron.identification.logs.log import Finding, Log, joined, write_log
-from pteron.identification.logs.log_file import LogFile, open_log, read_log
+from pteron.identification.logs.log import Finding, Log, joined
+from pteron.identification.logs.log_file import LogFile, open_log, read_log, write_log
 
 __all__ = [
     "Description",

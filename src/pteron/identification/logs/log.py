@@ -1,25 +1,32 @@
-"""A log: the recorded motion of a machine, in SI units; joined, divided, written."""
+"""A log: the recorded motion of a machine, in SI units; joined, divided, and the gaps in it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-import polars as pl
 from jaxtyping import Int
 from numpy.typing import NDArray
 
 from pteron.errors import DataError
 from pteron.identification.logs.description import Description
-from pteron.identification.logs.gaps import gaps
 from pteron.legs.kind import SLIDER, ActuatedJoint
-from pteron.platforms.coordinates import COORDINATES
 from pteron.shapes import PerCoordinate, PerJoint, Series
-from pteron.tables import write_table
+
+_WIDE = 1.5
+"""Usual steps in a step of time, beyond which a sample may be missing."""
+
+_SURELY = 2.5
+"""Beyond which one is, however uneven the stamps are."""
+
+_AROUND = 16
+"""Rows on each side whose usual place tells the two apart."""
+
+_LATER = 0.5
+"""Usual steps by which all that follows a gap is later, at least."""
 
 _ARRAYS = ("time", "joints", "forces", "pose", "payload")
 _Phases = Int[np.ndarray, "*batch"]
@@ -225,27 +232,31 @@ def _rows_of(log: Log) -> NDArray[np.int64]:
     return log.first_row + np.arange(log.rows)
 
 
-def write_log(log: Log, path: str | Path) -> Path:
-    """Write a log to a CSV or Parquet file, whole or not at all, at full precision.
+def gaps(time: NDArray[np.float64], step: float) -> NDArray[np.bool_]:
+    """Return which steps (T - 1,) of rising times (T,), s, have samples missing in them.
 
-    The columns are t (s), rho1.. (m), force1.. (N) or current1.. (A), the pose's coordinates (m,
-    rad) and payload; at a crank theta (rad) and torque (N m). Forces in volts or per cent say so in
-    their names. The description is not written: it speaks of the columns of the file that the log
-    came from.
+    A missing sample makes all later ones late by the usual `step`; a stamp that is late by itself
+    does not.
 
-    Raises
-    ------
-    OutputError
-        If the file cannot be written; one that was there is left as it was.
+    Examples
+    --------
+    >>> import numpy as np
+    >>> even = np.arange(8.0)
+    >>> gaps(np.delete(even, 4), 1.0).nonzero()
+    (array([3]),)
+    >>> gaps(even + [0, 0, 0, -0.3, 0.3, 0, 0, 0], 1.0).any()
+    np.False_
     """
-    unit = log.description.force_unit
-    columns = {"t": log.time} | dict(zip(log.joint_names, log.joints.T, strict=True))
-    for j, name in enumerate(log.force_names):
-        stem = f"current{j + 1}" if unit == "A" else name
-        columns[stem + (f" ({unit})" if unit in ("V", "%") else "")] = log.forces[:, j]
-    if log.pose is not None:
-        names = log.coordinates or tuple(COORDINATES)[: log.pose.shape[1]]
-        columns |= dict(zip(names, log.pose.T, strict=True))
-    if log.payload is not None:
-        columns["payload"] = log.payload
-    return write_table(pl.DataFrame(columns), path)
+    found = np.diff(time) > _WIDE * step
+    late = time / step - np.arange(len(time))
+    for i in np.flatnonzero(found & (np.diff(time) <= _SURELY * step)):
+        before = float(np.median(late[max(i + 1 - _AROUND, 0) : i + 1]))
+        after = float(np.median(late[i + 1 : i + 1 + _AROUND]))
+        found[i] = after - before > _LATER
+    return found
+
+
+def are_apart(before: NDArray[np.float64], after: NDArray[np.float64], step: float) -> bool:
+    """Say whether samples are missing between times and those that follow."""
+    near = before[-_AROUND:]
+    return bool(gaps(np.concatenate([near, after[:_AROUND]]), step)[len(near) - 1])

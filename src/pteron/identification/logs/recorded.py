@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from pteron.errors import DataError
 from pteron.identification.errors import LogError
-from pteron.identification.logs.gaps import gaps
-from pteron.identification.logs.log import Log
+from pteron.identification.logs.log import Log, gaps
 from pteron.identification.logs.spikes import LONGEST
 
 _STRONGEST = 1e9

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.errors import DataError
-from pteron.identification.logs.gaps import gaps
-from pteron.identification.logs.log import Finding
+from pteron.identification.logs.log import Finding, gaps
 
 _CONTEXT = 32
 """Rows of the piece before that are kept."""
