@@ -15,7 +15,6 @@ from pteron.identification.estimators.covariance import noise_of
 from pteron.identification.estimators.qr import QrFactor
 from pteron.identification.observation import Observations
 from pteron.kernels import Array
-from pteron.motion.trajectories.fourier import row_blocks
 
 _LAGS = 20
 _LEVEL = 0.01
@@ -172,10 +171,7 @@ class Estimate:
 
 def residuals_of(observations: Observations, values: Array) -> Array:
     """Return F - W values (R, n)."""
-    rest = np.empty_like(observations.forces)
-    for rows in row_blocks(len(rest)):
-        rest[rows] = observations.forces[rows] - observations.matrix[rows] @ values
-    return rest
+    return np.asarray(observations.forces - observations.matrix @ values)
 
 
 def estimate_of(
