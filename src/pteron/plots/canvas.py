@@ -1,4 +1,4 @@
-"""Empty figures in the style of all pictures, their colours, and figures as SVG text.
+"""Empty figures and axes in the style of all pictures, their colours, and figures as SVG text.
 
 The legs' four colours are Okabe and Ito's, which the colour-blind can tell apart. `svg` writes each
 colour as a CSS variable with this value as its default, so that one picture serves a light and a
@@ -8,10 +8,11 @@ dark page.
 from __future__ import annotations
 
 import re
+from collections.abc import Hashable, Iterable, Sequence
 from html import escape
 from io import BytesIO, StringIO
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import matplotlib as mpl
 import numpy as np
@@ -22,7 +23,11 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
+from pteron.kernels import Array
+from pteron.platforms.coordinates import SHOWN, coordinate
 from pteron.plots.fonts import no_word_of_glyphs, take_fonts, warn_of_absent
+
+Kind = TypeVar("Kind", bound=Hashable)
 
 LEG_COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7")
 _LEG_STYLES = ("-", (0, (6, 1.5)), (0, (2, 1.2)), (0, (6, 1.5, 1.5, 1.5)))
@@ -52,7 +57,6 @@ SMALL = 0.6
 """Width of lines in small pictures of a machine, over that in large ones."""
 
 _NO_METADATA = dict.fromkeys(("Creator", "Date", "Format", "Type"))
-
 
 _NOTEBOOK_DPI = 144
 """Dots an inch of a picture in a notebook, which shows it at 96."""
@@ -154,7 +158,8 @@ def panels(figure: Figure, xlabel: str, ylabels: list[list[str]]) -> list[list[A
 
 def leg_style(i: int, width: float) -> dict[str, Any]:
     """Return the colour and style of a leg's line, with its width in points."""
-    return {"color": LEG_COLORS[i], "linestyle": _LEG_STYLES[i], "linewidth": width}
+    k = i % len(LEG_COLORS)
+    return {"color": LEG_COLORS[k], "linestyle": _LEG_STYLES[k], "linewidth": width}
 
 
 def legend(figure: Figure, columns: int) -> None:
@@ -169,6 +174,54 @@ def legend(figure: Figure, columns: int) -> None:
         columnspacing=1.2,
         handletextpad=0.5,
     )
+
+
+def shown_unit(unit: str) -> tuple[float, str]:
+    """Return the factor to, and the name of, the unit of a picture for an SI unit."""
+    name, factor = SHOWN.get(unit, (unit, 1.0))
+    return factor, "degrees" if name == "\u00b0" else name
+
+
+def axis_label(name: str) -> str:
+    """Return a coordinate's symbol with its unit in a picture."""
+    found = coordinate(name)
+    return f"{found.symbol} ({shown_unit(found.unit)[1]})"
+
+
+def leg_curves(
+    axes: Axes,
+    time: Array,
+    values: Array,
+    columns: Iterable[int],
+    width: float,
+    labels: Sequence[str] = (),
+) -> None:
+    """Draw columns of values (T, n), each in its leg's style, over all of the time (T,)."""
+    for i in columns:
+        label = labels[i] if labels else None
+        axes.plot(time, values[:, i], label=label, **leg_style(i, width))
+    axes.set_xlim(float(time[0]), float(time[-1]))
+
+
+def leg_labels(count: int) -> list[str]:
+    """Return the names of legs in a legend."""
+    return [f"leg {i}" for i in range(1, count + 1)]
+
+
+def zero_line(axes: Axes) -> None:
+    """Draw a thin line at zero."""
+    axes.axhline(0.0, color=MUTED, linewidth=0.8)
+
+
+def groups_of(kinds: Sequence[Kind]) -> dict[Kind, list[int]]:
+    """Return the columns of each kind, such as a unit, in the order of the kinds.
+
+    Examples
+    --------
+    >>> groups_of(["m", "m", "rad"])
+    {'m': [0, 1], 'rad': [2]}
+    """
+    return {kind: [i for i, own in enumerate(kinds) if own == kind] for kind in kinds}
 
 
 def nice_step(least: float) -> float:

@@ -26,6 +26,7 @@ from pteron.plots.canvas import (
     legend,
     plain_axes,
     spot,
+    zero_line,
 )
 
 _CERTAIN = 1.96
@@ -77,7 +78,7 @@ def autocorrelation_figure(correlations: Array, bound: Array) -> Figure:
     lags = np.arange(1, len(correlations) + 1)
     edge = float(bound.max())
     axes.axhspan(-edge, edge, color=GRID, alpha=0.8, linewidth=0.0, zorder=0.5)
-    axes.axhline(0.0, color=MUTED, linewidth=0.8)
+    zero_line(axes)
     for i, column in enumerate(correlations.T):
         line = leg_style(i, 1.4)
         axes.plot(lags, column, marker="o", markersize=2.6, label=f"actuator {i + 1}", **line)

@@ -1,4 +1,4 @@
-"""Forces that were measured against forces that were predicted, and what is left of them."""
+"""Measured against predicted forces, and their residuals."""
 
 from __future__ import annotations
 
@@ -25,17 +25,18 @@ from pteron.plots.canvas import (
     plain_axes,
     spot,
     stack,
+    zero_line,
 )
 
 _TICKS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0)
 
 _COLUMNS = 360
-"""Points of the curve over a whole recording: what is finer than a line is an envelope."""
+"""Points of the curve over a whole recording, each the envelope of its samples."""
 
 _DOTS = 600
 _BINS = 30
 _FEWEST = 8
-"""Samples in a bin whose mean says something."""
+"""Least samples in a bin whose mean is drawn."""
 
 
 def comparison_figure(
@@ -61,11 +62,11 @@ def comparison_figure(
     forces.plot(time, measured, color=MUTED, alpha=0.45, linewidth=4.0, solid_capstyle="round")
     forces.plot(time, without_friction, color=MUTED, linewidth=1.0, linestyle=(0, (2.5, 1.8)))
     forces.plot(time, predicted, color=color, linewidth=1.3)
-    rest.axhline(0.0, color=MUTED, linewidth=0.8)
+    zero_line(rest)
     missed = measured - predicted
     rest.plot(time, missed, color=MUTED, linewidth=0.6)
     rest.plot(time, np.where(used, missed, np.nan), color=color, linewidth=0.8)
-    # What does not count may be far out: it must not flatten what does.
+    # Samples that do not count may be far out: they must not flatten the others.
     size = float(np.abs(np.where(used, missed, 0.0)).max()) or 1.0
     rest.set_ylim(-1.2 * size, 1.2 * size)
     edges = np.flatnonzero(np.diff(np.r_[False, ~used, False].astype(int))).reshape(-1, 2)
@@ -127,7 +128,7 @@ def residual_time_figure(
     starts = edges[:-1]
     middle = np.add.reduceat(time, starts) / np.diff(edges)
     for i, axes in enumerate(panels):
-        axes.axhline(0.0, color=MUTED, linewidth=0.8)
+        zero_line(axes)
         counted = np.where(used[:, i], residuals[:, i], np.nan)
         for values, color in ((residuals[:, i], MUTED), (counted, LEG_COLORS[i])):
             low, high = (f.reduceat(values, starts) for f in (np.fmin, np.fmax))
@@ -156,7 +157,7 @@ def residual_speed_figure(
     figure = blank(3.1, 2.4)
     words = f"{joint.noun} speed ({joint.unit}/s)", f"residual ({joint.force_unit})"
     axes = plain_axes(figure, *words)
-    axes.axhline(0.0, color=MUTED, linewidth=0.8)
+    zero_line(axes)
     step = max(len(speed) // _DOTS, 1)
     some = slice(step // 2, None, step)
     for chosen, color in ((~used[some], MUTED), (used[some], LEG_COLORS[leg])):
@@ -164,7 +165,7 @@ def residual_speed_figure(
     middle, mean = _means(speed[used], residuals[used])
     axes.plot(middle, mean, color=PAPER, linewidth=4.2, solid_capstyle="round", zorder=4)
     axes.plot(middle, mean, color=INK, linewidth=1.8, solid_capstyle="round", zorder=5)
-    # What does not count may lie outside: a stuck joint would make the rest a line.
+    # Samples that do not count may lie outside: a stuck joint would make the rest a line.
     counted = residuals[used] if used.any() else residuals
     size = float(np.quantile(np.abs(counted), 0.998)) or 1.0
     axes.set_ylim(-2.0 * size, 2.0 * size)

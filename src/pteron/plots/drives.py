@@ -1,4 +1,4 @@
-"""What drives do: force against speed within what they can do, and power over time."""
+"""Forces of the drives over their speeds, within their limits; and their power over time."""
 
 from __future__ import annotations
 
@@ -19,11 +19,15 @@ from pteron.plots.canvas import (
     MUTED,
     PAPER,
     blank,
+    groups_of,
+    leg_curves,
+    leg_labels,
     leg_style,
     legend,
     plain_axes,
     remark,
     spot,
+    zero_line,
 )
 from pteron.plots.joint_columns import joints_of, named, rows
 
@@ -35,7 +39,7 @@ _FAR = 3.0
 
 
 class Ability(NamedTuple):
-    """What a drive can do, each None where that is not known; N and m/s, or N m and rad/s."""
+    """The limits of a drive, None where one is not known; N and m/s, or N m and rad/s."""
 
     speed: float | None
     force: float | None
@@ -52,7 +56,7 @@ def force_speed_figure(
     rms: tuple[Array, Array] | None = None,
     robot: RobotLike | None = None,
 ) -> Figure:
-    """Return each drive's force over its speed, within what it can do.
+    """Return each drive's force over its speed, within its limits.
 
     A drive brakes in the quadrants where force and speed have different signs.
 
@@ -76,15 +80,14 @@ def force_speed_figure(
     abilities = abilities or _abilities(robot) or [Ability(None, None, None)] * len(units)
     if rms is None:
         rms = np.sqrt((speeds**2).mean(axis=0)), np.sqrt((forces**2).mean(axis=0))
-    groups = list(dict.fromkeys(units))
+    groups = groups_of(units)
     figure = blank(5.4, 3.4 * len(groups))
-    for k, (rate, unit) in enumerate(groups):
+    for k, ((rate, unit), own) in enumerate(groups.items()):
         word = "torque" if unit == "N m" else "force"
         axes = plain_axes(figure, f"speed ({rate})", f"{word} ({unit})")
         axes.set_subplotspec(figure.add_gridspec(len(groups), 1)[k])
-        axes.axhline(0.0, color=MUTED, linewidth=0.8)
+        zero_line(axes)
         axes.axvline(0.0, color=MUTED, linewidth=0.8)
-        own = [i for i, one in enumerate(units) if one == (rate, unit)]
         sizes = []
         for values, key in ((speeds, "speed"), (forces, "force")):
             used = float(np.abs(values[:, own]).max()) or 1.0
@@ -106,26 +109,23 @@ def force_speed_figure(
 
 
 def _abilities(robot: RobotLike | None) -> list[Ability]:
-    """Return what the drives of a machine can do, as its file says."""
+    """Return the limits of a machine's drives."""
     legs = () if robot is None else as_manipulator(robot).legs
     drives = [leg.drive or Drive() for leg in legs]
     return [Ability(drive.max_speed, drive.max_force, drive.rated_force) for drive in drives]
 
 
 def _box(axes: Axes, ability: Ability, sizes: Sequence[float], color: str) -> None:
-    """Draw what a drive can do, as far as the axes show it."""
+    """Draw a drive's limits, as far as the axes show them."""
     x = min(ability.speed or sizes[0], sizes[0])
     y = min(ability.force or sizes[1], sizes[1])
     look: dict[str, Any] = {"color": color, "linewidth": 1.0, "linestyle": (0, (4, 2))}
-    if ability.force is not None:
-        for side in (-ability.force, ability.force):
-            axes.plot([-x, x], [side, side], **look)
-    if ability.speed is not None:
-        for side in (-ability.speed, ability.speed):
-            axes.plot([side, side], [-y, y], **look)
-    if ability.rated is not None:
-        for side in (-ability.rated, ability.rated):
-            axes.plot([-x, x], [side, side], color=color, linewidth=1.0, linestyle=(0, (1, 1.6)))
+    for sign in (-1.0, 1.0) if ability.force is not None else ():
+        axes.plot([-x, x], [sign * ability.force] * 2, **look)
+    for sign in (-1.0, 1.0) if ability.speed is not None else ():
+        axes.plot([sign * ability.speed] * 2, [-y, y], **look)
+    for sign in (-1.0, 1.0) if ability.rated is not None else ():
+        axes.plot([-x, x], [sign * ability.rated] * 2, **look | {"linestyle": (0, (1, 1.6))})
 
 
 def power_figure(time: ArrayLike, power: ArrayLike) -> Figure:
@@ -133,10 +133,9 @@ def power_figure(time: ArrayLike, power: ArrayLike) -> Figure:
     time, power = rows(time, power, "power")
     figure = blank(5.4, 3.3)
     axes = plain_axes(figure, "time (s)", "power (W)")
-    axes.axhline(0.0, color=MUTED, linewidth=0.8)
+    zero_line(axes)
     axes.plot(time, power.sum(axis=1), label="all", color=INK, linewidth=2.0)
-    for i, one in enumerate(power.T):
-        axes.plot(time, one, label=f"leg {i + 1}", **leg_style(i, 1.4))
-    axes.set_xlim(float(time[0]), float(time[-1]))
-    legend(figure, power.shape[1] + 1)
+    count = power.shape[1]
+    leg_curves(axes, time, power, range(count), 1.4, leg_labels(count))
+    legend(figure, count + 1)
     return figure

@@ -13,8 +13,18 @@ from matplotlib.lines import Line2D
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.motion import JointPoints, Motion, joint_guides, joint_points
-from pteron.plots.canvas import FONT_SIZE, INK, MUTED, blank, leg_style, plain_axes
+from pteron.plots.canvas import (
+    FONT_SIZE,
+    INK,
+    MUTED,
+    blank,
+    groups_of,
+    leg_curves,
+    plain_axes,
+    zero_line,
+)
 from pteron.plots.encoders import Pixels
+from pteron.plots.machine_axes import MachineAxes
 from pteron.plots.machine_drawing import (
     Scene,
     draw_directions,
@@ -24,7 +34,6 @@ from pteron.plots.machine_drawing import (
     scene_of,
 )
 from pteron.plots.machine_figures import gravity_of
-from pteron.plots.plane_axes import PlaneAxes
 from pteron.plots.space_axes import SpaceAxes
 
 _WIDTH = 6.4
@@ -40,10 +49,10 @@ _BELOW, _ABOVE = 0.42, 0.08
 """Inches below and above them."""
 
 _PROBES = 24
-"""Poses, and views round the machine, that say how much room the picture needs."""
+"""Poses, and views round the machine, that the size of the picture is taken from."""
 
 _WAY = 1000
-"""Points of the tool's way."""
+"""Points of the tool's path."""
 
 
 def frames(
@@ -92,7 +101,7 @@ def frames(
 
 def _drawn(
     figure: Figure,
-    sheet: SpaceAxes | PlaneAxes,
+    sheet: MachineAxes,
     scene: Scene,
     points: JointPoints,
     path: Array,
@@ -117,7 +126,7 @@ def _drawn(
         sheet.clear(kept)
 
 
-def _draw_still(sheet: SpaceAxes | PlaneAxes, scene: Scene, path: Array) -> None:
+def _draw_still(sheet: MachineAxes, scene: Scene, path: Array) -> None:
     draw_surroundings(sheet, scene)
     draw_directions(sheet, scene)
     draw_path(sheet, path)
@@ -126,23 +135,20 @@ def _draw_still(sheet: SpaceAxes | PlaneAxes, scene: Scene, path: Array) -> None
 def _strip(
     figure: Figure, robot: Manipulator, motion: Motion, forces: Array, share: float
 ) -> list[Line2D]:
-    """Draw the forces at the foot of a figure; return the lines that say when it is.
+    """Draw the forces at the foot of a figure; return the lines that mark the time.
 
     Legs of other units have axes of their own, beside the first.
     """
-    units = [leg.joint.force_unit for leg in robot.legs]
-    groups = list(dict.fromkeys(units))
+    groups = groups_of([leg.joint.force_unit for leg in robot.legs])
     wide, tall = (float(side) for side in figure.get_size_inches())
     each = wide / len(groups)
     found = []
-    for k, unit in enumerate(groups):
+    for k, (unit, own) in enumerate(groups.items()):
         axes: Axes = plain_axes(figure, "time (s)", f"drives ({unit})")
         room = each - sum(_SIDES)
         box = ((k * each + _SIDES[0]) / wide, _BELOW / tall, room / wide)
         axes.set_position((*box, share - (_BELOW + _ABOVE) / tall))
-        axes.axhline(0.0, color=MUTED, linewidth=0.8)
-        for i in (i for i, own in enumerate(units) if own == unit):
-            axes.plot(motion.time, forces[:, i], **leg_style(i, 1.4))
-        axes.set_xlim(float(motion.time[0]), float(motion.time[-1]))
+        zero_line(axes)
+        leg_curves(axes, motion.time, forces, own, 1.4)
         found.append(axes.axvline(float(motion.time[0]), color=INK, linewidth=1.2, clip_on=False))
     return found

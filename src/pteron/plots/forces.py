@@ -1,4 +1,4 @@
-"""Quantities of the legs over time, and how well the joints hold the platform over its angle."""
+"""Forces and other quantities of the legs over time, and the type-II measure over the angle."""
 
 from __future__ import annotations
 
@@ -18,17 +18,20 @@ from pteron.plots.canvas import (
     REACH,
     WARNING,
     blank,
-    leg_style,
+    groups_of,
+    leg_curves,
+    leg_labels,
     legend,
     plain_axes,
     remark,
     spot,
     stack,
+    zero_line,
 )
 from pteron.plots.joint_columns import joints_of, named, rows
 
 _ROOM = 75.0
-"""Degrees that a remark takes which says in words what an orientation is."""
+"""Degrees between singular orientations from which each is named in words."""
 
 
 def forces_figure(
@@ -48,22 +51,17 @@ def forces_figure(
     joints = joints_of(robot, forces)
     time, forces = rows(time, named(robot, forces, "forces"), "forces", len(joints))
     words = [ylabel or f"actuator {joint.force} ({joint.force_unit})" for joint in joints]
-    groups = list(dict.fromkeys(words))
+    groups = groups_of(words)
     figure = blank(5.4, 3.3 if len(groups) == 1 else 1.2 + 1.6 * len(groups))
-    found = stack(figure, "time (s)", groups)
-    for axes in found:
-        axes.axhline(0.0, color=MUTED, linewidth=0.8)
-    for i, (force, word) in enumerate(zip(forces.T, words, strict=True)):
-        axes = found[groups.index(word)]
-        axes.plot(time, force, label=f"leg {i + 1}", **leg_style(i, 1.8))
-    start, end = float(time[0]), float(time[-1])
-    for axes in found:
-        axes.set_xlim(start, end)
+    found = stack(figure, "time (s)", list(groups))
+    for axes, own in zip(found, groups.values(), strict=True):
+        zero_line(axes)
+        leg_curves(axes, time, forces, own, 1.8, leg_labels(len(joints)))
         if turning_point is not None:
             axes.axvline(turning_point, color=MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
     if turning_point is not None:
-        remark(found[0], "out", (start + turning_point) / 2.0, inf, MUTED, 3.0)
-        remark(found[0], "back", (turning_point + end) / 2.0, inf, MUTED, 3.0)
+        remark(found[0], "out", (float(time[0]) + turning_point) / 2.0, inf, MUTED, 3.0)
+        remark(found[0], "back", (turning_point + float(time[-1])) / 2.0, inf, MUTED, 3.0)
     legend(figure, forces.shape[1])
     return figure
 
@@ -76,10 +74,10 @@ def regularity_figure(
     home: float | None = None,
     used: tuple[float, float] | None = None,
 ) -> Figure:
-    """Return the size of the type-II measure over phi, NaN where it has none.
+    """Return the size of the type-II measure over the platform's angle, NaN where it has none.
 
-    The angles (A,) ascend; the singular orientations, phi of the home pose, and the least and
-    greatest phi that a motion uses are marked. All are in rad.
+    The angles (A,) ascend; the singular orientations, the angle of the home pose, and the least and
+    greatest angle of a motion are marked. All are in rad.
     """
     figure = blank(5.4, 2.9)
     axes = plain_axes(figure, "orientation φ (degrees)", "type-II measure")

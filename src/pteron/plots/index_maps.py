@@ -1,4 +1,4 @@
-"""Maps of indices over poses: coloured where a pose serves, hatched where it does not, and why."""
+"""Maps of indices over poses: coloured within the reach, hatched by its causes outside it."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.maps import Axis, Map, Summary
 from pteron.maps.map import ALL, MARGIN, cause
+from pteron.platforms.coordinates import coordinate
 from pteron.plots.canvas import (
     FONT_SIZE,
     GRID,
@@ -25,29 +26,28 @@ from pteron.plots.canvas import (
     LEG_COLORS,
     MUTED,
     PAPER,
+    axis_label,
     blank,
     plain_axes,
+    shown_unit,
     spot,
 )
 from pteron.workspace import BEYOND_LIMITS, REACHABLE
 
 _WIDTH = 5.0
-"""Inches: what is written stays legible on a phone."""
-
-_SCALES = {"m": (1e3, "mm"), "rad": (180.0 / np.pi, "degrees")}
-"""What people read in place of m and rad."""
+"""Inches: texts stay legible on a phone."""
 
 _HATCHES = {BEYOND_LIMITS: "....", 1: "////", 2: "\\\\\\\\", 3: "xxxx", 4: "----"}
 _WIDE = 20.0
-"""From that ratio of the greatest value to the middle one on, colours go by the logarithm."""
+"""Ratio of the greatest value to the median above which colours are logarithmic."""
 
 _ALIKE = 1e-6
-"""Relative differences that are none to see."""
+"""Relative difference below which two values look alike."""
 
 _TINY = 1e-12
 
 _LAST = 99.0
-"""Percent of the values that have a colour of their own where a few are far off."""
+"""Percentile of the last colour where a few values are far off."""
 
 _BELOW = 4.5
 """Sizes of a letter from the axes to the legend: the scale's numbers and its name stand there."""
@@ -114,8 +114,8 @@ def _planes(given: Map) -> list[Map]:
 
 
 def color_scale(given: Map, name: str) -> Normalize:
-    """Return how the values of an index become colours."""
-    factor = _SCALES.get(ALL[name].unit, (1.0, ""))[0]
+    """Return the scale of colours for the values of an index."""
+    factor = shown_unit(ALL[name].unit)[0]
     known = factor * given.values[name][given.reachable & np.isfinite(given.values[name])]
     if not len(known):
         return Normalize(0.0, 1.0)
@@ -139,7 +139,7 @@ def map_panels(
     figure = blank(columns * _WIDTH, sum(heights))
     grid = GridSpec(len(heights), columns, figure=figure, height_ratios=heights)
     for k, (plane, name) in enumerate(panels):
-        labels = [_label(axis) for axis in plane.grid.axes]
+        labels = [axis_label(axis.name) for axis in plane.grid.axes]
         axes = plain_axes(figure, labels[0], labels[1] if len(labels) > 1 else _named(name))
         axes.set_subplotspec(grid[divmod(k, columns)])
         axes.set_title(_title(plane), fontsize=FONT_SIZE, color=INK, loc="left")
@@ -172,7 +172,7 @@ def _plane(
     """Draw an index over two coordinates."""
     axes.grid(visible=False)
     first, second = (_shown(axis) for axis in plane.grid.axes)
-    factor = _SCALES.get(ALL[name].unit, (1.0, ""))[0]
+    factor = shown_unit(ALL[name].unit)[0]
     values = factor * np.ma.masked_invalid(plane.values[name].T)
     drawn = np.ma.masked_where(plane.status.T != REACHABLE, values)
     better = ALL[name].better == "more"
@@ -218,7 +218,7 @@ def _plane(
 
 
 def _extended(drawn: Any, scale: Normalize) -> str:
-    """Return at which ends of its colours a picture has values beyond."""
+    """Return the ends of a scale that a picture's values exceed, as matplotlib names them."""
     low, high = float(scale.vmin or 0.0), float(scale.vmax or 0.0)
     slack = _ALIKE * (high - low)
     under = drawn.count() > 0 and float(drawn.min()) < low - slack
@@ -227,7 +227,7 @@ def _extended(drawn: Any, scale: Normalize) -> str:
 
 
 def _hatched(axes: Axes, plane: Map, name: str, causes: Mapping[str, Any]) -> list[Any]:
-    """Draw where poses do not serve, and return what stands for it in the legend."""
+    """Hatch the poses that do not serve, and return the entries of the legend."""
     first, second = (_shown(axis) for axis in plane.grid.axes)
     status, told = plane.status.T, name == MARGIN.name
     handles: dict[str, Any] = {}
@@ -264,9 +264,9 @@ def _best(axes: Axes, plane: Map, name: str, handles: list[Any]) -> None:
     found = plane.summary(name)
     if _alike(found):
         return
-    factor = _SCALES.get(found.unit, (1.0, ""))[0]
+    factor = shown_unit(found.unit)[0]
     at = [
-        _SCALES[axis.unit][0] * found.best_pose[plane.grid.coordinates.index(axis.name)]
+        shown_unit(axis.unit)[0] * found.best_pose[plane.grid.coordinates.index(axis.name)]
         for axis in plane.grid.axes
     ]
     label = f"best here: {factor * found.best:.4g} {_unit(name)}".rstrip()
@@ -281,7 +281,7 @@ def _alike(found: Summary) -> bool:
 def _curve(axes: Axes, given: Map, name: str) -> None:
     """Draw an index over one coordinate."""
     place = _shown(given.grid.axes[0])
-    factor = _SCALES.get(ALL[name].unit, (1.0, ""))[0]
+    factor = shown_unit(ALL[name].unit)[0]
     serves = given.reachable
     axes.plot(place, np.where(serves, factor * given.values[name], np.nan), color=INK)
     axes.set(xlim=(place[0], place[-1]))
@@ -307,11 +307,7 @@ def _light(color: str) -> str:
 
 
 def _shown(axis: Axis) -> Array:
-    return _SCALES[axis.unit][0] * axis.values
-
-
-def _label(axis: Axis) -> str:
-    return f"{'φ' if axis.name == 'phi' else axis.name} ({_SCALES[axis.unit][1]})"
+    return coordinate(axis.name).shown_factor * axis.values
 
 
 def _named(name: str) -> str:
@@ -321,15 +317,14 @@ def _named(name: str) -> str:
 
 def _unit(name: str) -> str:
     """Return the unit in which an index is shown."""
-    return _SCALES.get(ALL[name].unit, (1.0, ALL[name].unit))[1]
+    return shown_unit(ALL[name].unit)[1]
 
 
 def _title(given: Map) -> str:
     """Return the machine's name, and the coordinates that are held."""
-    units = {name: "rad" if name == "phi" else "m" for name in given.grid.held}
-    held = [
-        f"{'φ' if name == 'phi' else name} = {_SCALES[units[name]][0] * value + 0.0:.4g}"
-        f"{'°' if name == 'phi' else ' mm'}"
-        for name, value in given.grid.held.items()
-    ]
+    pairs = ((coordinate(name), value) for name, value in given.grid.held.items())
+    held = (
+        f"{c.symbol} = {c.shown_factor * value + 0.0:.4g}{' ' * (c.unit == 'm')}{c.shown_unit}"
+        for c, value in pairs
+    )
     return "  ".join([given.robot, *held])

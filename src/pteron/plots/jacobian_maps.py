@@ -1,4 +1,4 @@
-"""Maps of what Jacobians say over a grid of poses: condition numbers, and singularities."""
+"""Maps of Jacobians over two coordinates: condition numbers, and singularities."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from scipy.ndimage import distance_transform_edt  # type: ignore[import-untyped]
 
 from pteron.errors import DataError
 from pteron.kernels import Array, as_array
+from pteron.platforms.coordinates import are_angles, coordinate
 from pteron.plots.canvas import (
     FONT_SIZE,
     GRID,
@@ -17,6 +18,7 @@ from pteron.plots.canvas import (
     MUTED,
     REACH,
     WARNING,
+    axis_label,
     blank,
     plain_axes,
     remark,
@@ -25,11 +27,11 @@ from pteron.plots.canvas import (
 _LEVELS = np.array([1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0, 100.0, 1000.0])
 
 _NAMED = 6
-"""So many of them get lines with their names: beyond, lines run together."""
+"""Levels with lines and names: beyond, lines run together."""
 
 _WIDTH = 4.2
 _MARGIN = 0.6
-"""Inches of the figure, and of what the scales take of its height."""
+"""Inches of the figure's width, and of the scales in its height."""
 
 
 def condition_figure(
@@ -51,7 +53,7 @@ def condition_figure(
         1 or more; NaN or infinite where there is none. Numbers of unlike units, such as of x and
         phi, are to be made alike first: else their condition number says nothing.
     names : (str, str)
-        What the coordinates are; lengths are shown in mm, "phi" in degrees.
+        What the coordinates are; lengths are shown in mm, angles in degrees.
 
     Returns
     -------
@@ -105,7 +107,7 @@ def singularities_figure(
     determinant : array, shape (B, A)
         Of any unit; NaN where there is none.
     names : (str, str)
-        What the coordinates are; lengths are shown in mm, "phi" in degrees.
+        What the coordinates are; lengths are shown in mm, angles in degrees.
 
     Returns
     -------
@@ -157,14 +159,13 @@ def _map(
         numbers = as_array(given, name, ())
         if numbers.ndim != 1 or len(numbers) < 2 or not (np.diff(numbers) > 0.0).all():
             raise DataError(f"{name}: two or more numbers expected that ascend, m or rad")
-        turns = name == "phi"
-        scaled.append(np.degrees(numbers) if turns else 1e3 * numbers)
-        labels.append("φ (degrees)" if turns else f"{name} (mm)")
+        scaled.append(coordinate(name).shown_factor * numbers)
+        labels.append(axis_label(name))
     x, y = scaled
     found = np.asarray(values, dtype=float)
     if found.shape != (len(y), len(x)):
         raise DataError(f"values: shape {found.shape} given, ({len(y)}, {len(x)}) expected")
-    alike = "phi" not in names
+    alike = len(set(are_angles(names).tolist())) == 1
     height = _MARGIN + (_WIDTH - _MARGIN) * (float(np.ptp(y) / np.ptp(x)) if alike else 0.75)
     figure = blank(_WIDTH, min(max(height, 1.8), 6.0))
     axes = plain_axes(figure, *labels)

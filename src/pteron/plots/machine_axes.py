@@ -1,26 +1,50 @@
-"""What was drawn on axes: all of it to be held by their scales, the last of it to be taken away."""
+"""Axes on which a machine is drawn: lines, marks, faces and texts at points in space."""
 
 from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
 
 from pteron.kernels import Array
-from pteron.plots.canvas import FONT_SIZE, SMALL
+from pteron.plots.canvas import FONT_SIZE, PAPER, SMALL
+
+Style = str | tuple[float, tuple[float, ...]]
+"""A line's style, as matplotlib has it."""
 
 
-class MachineAxes:
-    """Axes and what was put on them: `things`, in that order."""
+class MachineAxes(ABC):
+    """Axes and the `things` on them, in the order in which they were drawn."""
 
-    def __init__(self, *, small: bool) -> None:
+    def __init__(self, axes: Any, *, small: bool) -> None:
         """Begin with nothing; `small` axes have thinner lines and smaller letters."""
+        axes.patch.set_alpha(0.0)
+        self.axes = axes
         self._weight = SMALL if small else 1.0
         self._font = FONT_SIZE - 2.0 if small else FONT_SIZE
         self.things: list[Artist] = []
         self._drawn: list[Array] = []
 
+    @abstractmethod
+    def _placed(self, points: Array, *, held: bool = True) -> Array:
+        """Return points (..., 3) in the base frame as the axes have them; `fill` holds them."""
+
+    @abstractmethod
+    def _order(self, points: Array) -> float:
+        """Return the drawing order of what is at points (K, d) of the axes."""
+
+    @abstractmethod
+    def _polygons(self, faces: list[Array], **look: Any) -> Artist:
+        """Add polygons with corners as the axes have them."""
+
+    @abstractmethod
+    def beside(self, away: Array, along: Array) -> Array:
+        """Return the unit vector in the picture's plane, across a line, nearest to `away`."""
+
     def clear(self, kept: int) -> None:
-        """Take away what was drawn last, all but so many things."""
+        """Remove all but the first things."""
         for thing in self.things[kept:]:
             thing.remove()
         del self.things[kept:]
@@ -28,9 +52,40 @@ class MachineAxes:
 
     @property
     def drawn(self) -> Array:
-        """Return the points (K, 2) or (K, 3) of what was drawn, as the axes have them."""
+        """The points (K, 2) or (K, 3) of all things, as the axes have them."""
         return np.vstack(self._drawn)
 
     def hold(self, drawn: Array) -> None:
-        """Let `fill` leave room for points, (K, 2) or (K, 3), that other axes hold."""
+        """Let `fill` leave space for points, (K, 2) or (K, 3), of other axes."""
         self._drawn.append(drawn)
+
+    def line(
+        self, points: Array, color: str, width: float, *, raised: float = 0.0, style: Style = "-"
+    ) -> None:
+        """Draw a line through points (K, 3)."""
+        p = self._placed(points)
+        look: dict[str, Any] = {"color": color, "linewidth": self._weight * width}
+        look |= {"linestyle": style, "solid_capstyle": "round"}
+        self.things += self.axes.plot(*p.T, zorder=self._order(p) + raised, **look)
+
+    def mark(self, point: Array, face: str, edge: str, size: float, raised: float = 0.03) -> None:
+        """Draw a ring at a point."""
+        p = self._placed(point[None], held=False)
+        look: dict[str, Any] = {"marker": "o", "markersize": self._weight * size}
+        look |= {"markeredgewidth": 1.4 * self._weight, "linestyle": "none"}
+        look |= {"markerfacecolor": face, "markeredgecolor": edge}
+        self.things += self.axes.plot(*p.T, zorder=self._order(p) + raised, **look)
+
+    def faces(self, faces: list[Array], color: str, alpha: float, raised: float = 0.0) -> None:
+        """Draw polygons, all in one place of the order."""
+        placed = [self._placed(face, held=False) for face in faces]
+        look: dict[str, Any] = {"facecolors": color, "edgecolors": PAPER, "linewidths": 0.6}
+        order = self._order(np.vstack(placed)) + raised
+        self.things.append(self._polygons(placed, alpha=alpha, zorder=order, **look))
+
+    def text(self, point: Array, text: str, color: str, *, bold: bool = False) -> None:
+        """Write beside a point, over everything."""
+        look: dict[str, Any] = {"fontsize": self._font, "fontweight": "bold" if bold else "normal"}
+        look |= {"ha": "center", "va": "center", "zorder": 30.0}
+        p = self._placed(point[None])[0]
+        self.things.append(self.axes.text(*p, text, color=color, **look))

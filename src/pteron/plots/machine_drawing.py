@@ -1,4 +1,4 @@
-"""How a machine is drawn, in space or in its plane: guides, cranks, links, platform and frames."""
+"""The drawing of a machine, in space or in its plane: guides, cranks, links, platform, frames."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from pteron.kernels import Array
 from pteron.motion import Guide, JointPoints, Part
 from pteron.plots.canvas import INK, LEG_COLORS, MUTED, PAPER, REACH, nice_step
+from pteron.plots.machine_axes import MachineAxes
 from pteron.plots.plane_axes import PlaneAxes
 from pteron.plots.space_axes import SpaceAxes, upright
 
@@ -31,25 +32,25 @@ Box = tuple[float, float, float, float]
 """Left, bottom, width and height, as shares of a figure."""
 
 _NONE = 1e-9
-"""A part of gravity, over the whole, that is none but for rounding."""
+"""Share of gravity in the plane below which the plane has none."""
 
 
 @dataclass(frozen=True)
 class Scene:
-    """What is the same in all pictures of a machine.
+    """The parts of a picture that all pictures of a machine share.
 
     Attributes
     ----------
     guides : tuple of Guide
-        Where each actuated joint lets its body go.
+        The guides of the actuated joints.
     plane : array, shape (2, 3), or None
         Of a planar machine: the unit vectors along which its poses count.
     gravity : array, shape (3,), or None
-        Where it is to be seen.
+        m/s^2; None where no picture shows it.
     vertical : array, shape (3,)
-        What points up in space.
+        The direction that points up in space.
     low, high : array, shape (3,) or (2,)
-        What the machine takes of the upright frame, or of its plane, m.
+        The machine's box in the upright frame, or in its plane, m.
     step : float
         Side of the squares behind it, m.
     base : array, shape (k, 3)
@@ -76,9 +77,7 @@ class Scene:
         wide, tall = self.high - self.low
         return float(tall / wide)
 
-    def sheet(
-        self, figure: Figure, box: Box | None = None, *, small: bool = False
-    ) -> SpaceAxes | PlaneAxes:
+    def sheet(self, figure: Figure, box: Box | None = None, *, small: bool = False) -> MachineAxes:
         """Return axes for the machine in a box of a figure: left, bottom, width, height."""
         if self.plane is not None:
             return PlaneAxes(figure, self.plane, self.step, box, small=small)
@@ -110,8 +109,8 @@ def scene_of(points: JointPoints, guides: Sequence[Guide], gravity: Array | None
     )
 
 
-def draw_surroundings(sheet: SpaceAxes | PlaneAxes, scene: Scene) -> None:
-    """Draw what does not move: the ground, the base, and the guides."""
+def draw_surroundings(sheet: MachineAxes, scene: Scene) -> None:
+    """Draw the ground, the base and the guides."""
     if isinstance(sheet, SpaceAxes):
         sheet.ground(scene.low, scene.high, scene.step)
     if len(scene.base) > 1:
@@ -121,8 +120,8 @@ def draw_surroundings(sheet: SpaceAxes | PlaneAxes, scene: Scene) -> None:
         _draw_guide(sheet, guide)
 
 
-def draw_directions(sheet: SpaceAxes | PlaneAxes, scene: Scene) -> None:
-    """Draw which way the base frame's axes and gravity point."""
+def draw_directions(sheet: MachineAxes, scene: Scene) -> None:
+    """Draw the directions of the base frame's axes and of gravity."""
     low, high, size = scene.low, scene.high, scene.size
     if isinstance(sheet, SpaceAxes):
         # At the near corner of the ground, in the upright frame: beside the machine, not in it.
@@ -134,15 +133,13 @@ def draw_directions(sheet: SpaceAxes | PlaneAxes, scene: Scene) -> None:
         start = near + size * np.array([-0.16, -0.02, 0.30])
         start = sheet.beside_eye(start, (low + high) / 2.0)
     else:
-        start = np.array([low[0] - 0.06 * size, high[1]]) @ sheet.plane
+        start = np.array([low[0] - 0.06 * size, high[1]]) @ scene.plane
     if scene.gravity is not None:
         _draw_gravity(sheet, start, scene.gravity, size)
 
 
-def draw_machine(
-    sheet: SpaceAxes | PlaneAxes, scene: Scene, points: JointPoints, angle: str = ""
-) -> None:
-    """Draw what moves, in one pose: sliders, cranks and links, and the platform with its frame.
+def draw_machine(sheet: MachineAxes, scene: Scene, points: JointPoints, angle: str = "") -> None:
+    """Draw sliders, cranks, links and the platform with its frame in one pose.
 
     The `angle` stands, in words, beside the platform frame's x axis.
     """
@@ -153,7 +150,7 @@ def draw_machine(
     _draw_frame(sheet, points, scene.size, angle)
 
 
-def draw_path(sheet: SpaceAxes | PlaneAxes, path: Array) -> None:
+def draw_path(sheet: MachineAxes, path: Array) -> None:
     """Draw the way (T, 3) of a point in the base frame, m."""
     sheet.line(path, INK, 1.2, raised=1.0, style=(0, (1.5, 1.2)))
 
@@ -185,14 +182,14 @@ def base_outline(points: JointPoints, guides: Sequence[Guide]) -> Array:
 
 
 def rods(line: Array, bar: Array | None, size: float) -> list[Array]:
-    """Return what a leg's last link is drawn as: its line (2, 3), or two and the bars between."""
+    """Return the lines of a leg's last link: one (2, 3), or two and the bars between them."""
     if bar is None:
         return [line[-2:]]
     one, other = (line[-2:] + side * APART * size * bar for side in (1.0, -1.0))
     return [one, other, *np.stack([one, other], axis=1)]
 
 
-def _draw_guide(sheet: SpaceAxes | PlaneAxes, guide: Guide) -> None:
+def _draw_guide(sheet: MachineAxes, guide: Guide) -> None:
     if not guide.slides:
         sheet.line(guide.path, MUTED, 0.9, raised=-0.01, style=(0, (2.0, 2.0)))
         return
@@ -201,9 +198,7 @@ def _draw_guide(sheet: SpaceAxes | PlaneAxes, guide: Guide) -> None:
         sheet.mark(end, MUTED, MUTED, 3.0, raised=-0.01)
 
 
-def _draw_leg(
-    sheet: SpaceAxes | PlaneAxes, points: JointPoints, guide: Guide, i: int, size: float
-) -> None:
+def _draw_leg(sheet: MachineAxes, points: JointPoints, guide: Guide, i: int, size: float) -> None:
     color, line = LEG_COLORS[i], points.links[i]
     if guide.slides:
         sheet.faces(_block(line[0], guide.axis, size), color, 0.95)
@@ -232,7 +227,7 @@ def _block(center: Array, along: Array, size: float) -> list[Array]:
     ]
 
 
-def _draw_part(sheet: SpaceAxes | PlaneAxes, part: Part) -> None:
+def _draw_part(sheet: MachineAxes, part: Part) -> None:
     if len(part.corners) > 2:
         sheet.faces([part.corners], REACH, 0.55)
     for corner in part.corners:
@@ -240,7 +235,7 @@ def _draw_part(sheet: SpaceAxes | PlaneAxes, part: Part) -> None:
     sheet.mark(part.hub, PAPER, REACH, 5.0)
 
 
-def _draw_frame(sheet: SpaceAxes | PlaneAxes, points: JointPoints, size: float, angle: str) -> None:
+def _draw_frame(sheet: MachineAxes, points: JointPoints, size: float, angle: str) -> None:
     """Draw the platform's frame and the tool's centre point."""
     p, tool = points.reference, points.tool
     shown = 3 if points.plane is None else 2
@@ -255,7 +250,7 @@ def _draw_frame(sheet: SpaceAxes | PlaneAxes, points: JointPoints, size: float, 
     sheet.mark(p, INK, PAPER, 5.0, raised=0.6)
 
 
-def _draw_gravity(sheet: SpaceAxes | PlaneAxes, start: Array, gravity: Array, size: float) -> None:
+def _draw_gravity(sheet: MachineAxes, start: Array, gravity: Array, size: float) -> None:
     down = gravity / np.linalg.norm(gravity)
     tip = start + 0.2 * size * down
     sheet.line(np.array([start, tip]), MUTED, 1.6, raised=1.0)

@@ -1,16 +1,17 @@
-"""Axes in the plane of a planar machine, which is seen along the plane's normal."""
+"""Axes in the plane of a planar machine, which is seen along its normal."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from pteron.kernels import Array
-from pteron.plots.canvas import PAPER, nice_step, plain_axes
+from pteron.plots.canvas import nice_step, plain_axes
 from pteron.plots.machine_axes import MachineAxes
 
 _RIM = 0.06
@@ -25,7 +26,7 @@ _LEFT, _BELOW, _TOP = 0.62, 0.46, 0.1
 
 
 class PlaneAxes(MachineAxes):
-    """Axes with scales in mm, onto which points in space are put where the plane has them."""
+    """Axes with scales in mm, onto which points in space are projected."""
 
     def __init__(
         self,
@@ -41,8 +42,8 @@ class PlaneAxes(MachineAxes):
         They take a box of the figure (left, bottom, width, height, shares of it), or all of it;
         `small` ones have no scales.
         """
-        super().__init__(small=small)
         axes = plain_axes(figure, "x (mm)", "y (mm)")
+        super().__init__(axes, small=small)
         axes.set_aspect("equal")
         if box is not None:
             figure.set_layout_engine("none")
@@ -57,62 +58,24 @@ class PlaneAxes(MachineAxes):
             axes.set(xlabel="", ylabel="")
             for spine in axes.spines.values():
                 spine.set_visible(False)
-        self._small, self._step = small, step
-        self.axes, self.plane = axes, plane
+        self._small, self._step, self.plane = small, step, plane
 
-    def _flat(self, points: Array) -> Array:
-        flat = 1e3 * points @ self.plane.T
-        self._drawn.append(flat.reshape(-1, 2))
-        return np.asarray(flat)
+    def _placed(self, points: Array, *, held: bool = True) -> Array:
+        flat = np.asarray(1e3 * points @ self.plane.T)
+        self._drawn.append(flat)
+        return flat
+
+    def _order(self, points: Array) -> float:
+        return 10.0
+
+    def _polygons(self, faces: list[Array], **look: Any) -> Artist:
+        return self.axes.add_collection(PolyCollection(faces, **look))
 
     def beside(self, away: Array, along: Array) -> Array:
         """Return the unit vector in the plane, across a line, nearest to `away`."""
         x, y = self.plane @ along
         across = np.array([-y, x]) / max(float(np.hypot(x, y)), 1e-12)
         return np.asarray(np.copysign(1.0, across @ self.plane @ away) * across @ self.plane)
-
-    def line(
-        self,
-        points: Array,
-        color: str,
-        width: float,
-        *,
-        raised: float = 0.0,
-        style: str | tuple[float, tuple[float, ...]] = "-",
-    ) -> None:
-        """Draw a line through points (K, 3)."""
-        look: dict[str, Any] = {
-            "color": color,
-            "linewidth": self._weight * width,
-            "linestyle": style,
-        }
-        x, y = self._flat(points).T
-        self.things += self.axes.plot(x, y, zorder=10.0 + raised, solid_capstyle="round", **look)
-
-    def mark(self, point: Array, face: str, edge: str, size: float, raised: float = 0.03) -> None:
-        """Draw a ring at a point."""
-        x, y = self._flat(point)
-        look: dict[str, Any] = {
-            "marker": "o",
-            "markersize": self._weight * size,
-            "markeredgewidth": 1.4 * self._weight,
-        }
-        look |= {"markerfacecolor": face, "markeredgecolor": edge}
-        self.things += self.axes.plot([x], [y], zorder=10.0 + raised, linestyle="none", **look)
-
-    def faces(self, faces: list[Array], color: str, alpha: float, raised: float = 0.0) -> None:
-        """Draw polygons."""
-        flat = [self._flat(face) for face in faces]
-        look: dict[str, Any] = {"facecolors": color, "edgecolors": PAPER, "linewidths": 0.6}
-        polygons = PolyCollection(flat, alpha=alpha, zorder=10.0 + raised, **look)
-        self.things.append(self.axes.add_collection(polygons))
-
-    def text(self, point: Array, text: str, color: str, *, bold: bool = False) -> None:
-        """Write beside a point, over everything."""
-        x, y = self._flat(point)
-        look: dict[str, Any] = {"fontsize": self._font, "fontweight": "bold" if bold else "normal"}
-        look |= {"ha": "center", "va": "center", "zorder": 30.0}
-        self.things.append(self.axes.text(x, y, text, color=color, **look))
 
     def fill(self) -> None:
         """Let the scales end a rim beyond what was drawn."""

@@ -1,4 +1,4 @@
-"""Three-dimensional axes on which what is nearer to the eye hides what is farther away."""
+"""Three-dimensional axes on which nearer things hide those farther away."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.proj3d import proj_transform  # type: ignore[import-untyped]
 
 from pteron.kernels import Array
-from pteron.plots.canvas import GRID, PAPER
+from pteron.plots.canvas import GRID
 from pteron.plots.machine_axes import MachineAxes
 
 _ELEVATION, _AZIMUTH = 24.0, -52.0
@@ -45,14 +46,12 @@ class SpaceAxes(MachineAxes):
         *,
         small: bool = False,
     ) -> None:
-        super().__init__(small=small)
         axes = figure.add_subplot(projection="3d", computed_zorder=False)
         assert isinstance(axes, Axes3D)
-        axes.patch.set_alpha(0.0)
+        super().__init__(axes, small=small)
         axes.set_axis_off()
         axes.set_proj_type("persp", focal_length=1.6)
         self.figure = figure
-        self.axes = axes
         self.rotation = upright(vertical)
         self._box = box
         self.turn(0.0)
@@ -60,7 +59,7 @@ class SpaceAxes(MachineAxes):
     def turn(self, angle: float) -> None:
         """Look from another side: the eye goes round the vertical by an angle from the first, rad.
 
-        What is drawn from then on is put in the order of its distance from there.
+        From then on things are drawn in the order of their distance from there.
         """
         self.angle = angle
         azimuth, elevation = np.radians(_AZIMUTH) + angle, np.radians(_ELEVATION)
@@ -70,8 +69,19 @@ class SpaceAxes(MachineAxes):
             [across * np.cos(azimuth), across * np.sin(azimuth), np.sin(elevation)]
         )
 
-    def _order(self, points: Array, raised: float) -> float:
-        return 10.0 + float(points.mean(axis=0) @ self._towards_eye) + raised
+    def _placed(self, points: Array, *, held: bool = True) -> Array:
+        placed = np.asarray(points @ self.rotation.T)
+        if held:
+            self._drawn.append(placed)
+        return placed
+
+    def _order(self, points: Array) -> float:
+        return 10.0 + float(points.mean(axis=0) @ self._towards_eye)
+
+    def _polygons(self, faces: list[Array], **look: Any) -> Artist:
+        polygons = Poly3DCollection(faces, **look)
+        self.axes.add_collection3d(polygons)
+        return polygons
 
     def beside(self, away: Array, along: Array) -> Array:
         """Return the unit vector in the picture's plane, across a line, nearest to `away`."""
@@ -86,60 +96,10 @@ class SpaceAxes(MachineAxes):
         moved = np.array([cos * x - sin * y - x, sin * x + cos * y - y, 0.0])
         return np.asarray(self.rotation.T @ (point + moved))
 
-    def line(
-        self,
-        points: Array,
-        color: str,
-        width: float,
-        *,
-        raised: float = 0.0,
-        style: str | tuple[float, tuple[float, ...]] = "-",
-    ) -> None:
-        """Draw a line through points (K, 3)."""
-        p = points @ self.rotation.T
-        self._drawn.append(p)
-        look = {
-            "color": color,
-            "linewidth": self._weight * width,
-            "linestyle": style,
-            "solid_capstyle": "round",
-        }
-        self.things += self.axes.plot(*p.T, zorder=self._order(p, raised), **look)
-
-    def mark(self, point: Array, face: str, edge: str, size: float, raised: float = 0.03) -> None:
-        """Draw a ring at a point."""
-        p = (point @ self.rotation.T)[None]
-        look = {
-            "marker": "o",
-            "markersize": self._weight * size,
-            "markeredgewidth": 1.4 * self._weight,
-            "linestyle": "none",
-        }
-        colors = {"markerfacecolor": face, "markeredgecolor": edge}
-        self.things += self.axes.plot(*p.T, zorder=self._order(p, raised), **look, **colors)
-
-    def faces(self, faces: list[Array], color: str, alpha: float, raised: float = 0.0) -> None:
-        """Draw polygons, at one distance."""
-        turned = [f @ self.rotation.T for f in faces]
-        collection = Poly3DCollection(
-            turned, facecolors=color, edgecolors=PAPER, linewidths=0.6, alpha=alpha
-        )
-        collection.set_zorder(self._order(np.vstack(turned), raised))
-        self.axes.add_collection3d(collection)
-        self.things.append(collection)
-
-    def text(self, point: Array, text: str, color: str, *, bold: bool = False) -> None:
-        """Write beside a point, over everything."""
-        p = point @ self.rotation.T
-        self._drawn.append(p[None])
-        look: dict[str, Any] = {"fontsize": self._font, "fontweight": "bold" if bold else "normal"}
-        look |= {"ha": "center", "va": "center", "zorder": 30.0}
-        self.things.append(self.axes.text(*p, text, color=color, **look))
-
     def fill(self, angles: Sequence[float] = (0.0,)) -> None:
-        """Place the axes so that what was drawn fills the box, seen from any of the angles, rad.
+        """Place the axes so that all things fill the box, seen from any of the angles, rad.
 
-        What is drawn later leaves them where they are.
+        Later things leave them where they are.
         """
         drawn = self.drawn
         low, high = drawn.min(axis=0), drawn.max(axis=0)

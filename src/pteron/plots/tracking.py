@@ -1,4 +1,4 @@
-"""How well a simulated machine follows what it is told."""
+"""The tracking errors of a simulated machine."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from pteron.kernels import Array
-from pteron.plots.canvas import MUTED, blank, leg_style, legend, stack
+from pteron.platforms.coordinates import coordinate
+from pteron.plots.canvas import blank, groups_of, leg_curves, legend, stack, zero_line
 from pteron.plots.joint_columns import rows
 
 _SCALES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))
@@ -18,24 +19,17 @@ _SCALES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))
 def tracking_figure(time: ArrayLike, error: ArrayLike, names: Sequence[str]) -> Figure:
     """Return the errors (T, m) of the pose over time (T,), s.
 
-    `names` are its coordinates; the angle "phi", in rad, gets axes of its own, lengths are in m.
+    `names` are its coordinates; angles, in rad, have axes of their own, lengths are in m.
     """
     time, error = rows(time, error, "error", len(names))
-    lengths = [i for i, name in enumerate(names) if name != "phi"]
-    angles = [i for i, name in enumerate(names) if name == "phi"]
-    groups = [(own, unit) for own, unit in ((lengths, "m"), (angles, "rad")) if own]
-    scales = [_scale(error[:, own]) for own, _ in groups]
-    labels = [
-        f"error ({prefix}{unit})" for (_, unit), (_, prefix) in zip(groups, scales, strict=True)
-    ]
+    groups = groups_of([coordinate(name).unit for name in names])
+    scales = [_scale(error[:, own]) for own in groups.values()]
+    labels = [f"error ({scales[k][1]}{unit})" for k, unit in enumerate(groups)]
     figure = blank(5.4, 1.6 + 1.6 * len(groups))
-    for axes, (own, _), (factor, _) in zip(
-        stack(figure, "time (s)", labels), groups, scales, strict=True
-    ):
-        axes.axhline(0.0, color=MUTED, linewidth=0.8)
-        for i in own:
-            axes.plot(time, factor * error[:, i], label=names[i], **leg_style(i, 1.4))
-        axes.set_xlim(float(time[0]), float(time[-1]))
+    found = stack(figure, "time (s)", labels)
+    for axes, own, (factor, _) in zip(found, groups.values(), scales, strict=True):
+        zero_line(axes)
+        leg_curves(axes, time, factor * error, own, 1.4, names)
     legend(figure, len(names))
     return figure
 

@@ -1,8 +1,9 @@
-"""Courses over time: of the platform and of the joints, with their derivatives below."""
+"""Trajectories of the platform and of the joints over time, with their derivatives below."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -11,7 +12,8 @@ from numpy.typing import ArrayLike
 from pteron.errors import DataError
 from pteron.kernels import Array, as_array
 from pteron.manipulator import RobotLike
-from pteron.plots.canvas import LEG_COLORS, MUTED, blank, leg_style, legend, panels
+from pteron.platforms.coordinates import coordinate
+from pteron.plots.canvas import blank, groups_of, leg_curves, leg_labels, legend, panels, zero_line
 from pteron.plots.joint_columns import joints_of
 
 _ORDERS = ("", "/s", "/s²", "/s³", "/s⁴")
@@ -26,7 +28,7 @@ _WIDE, _TALL, _HEAD = 5.4, 1.35, 0.75
 def trajectory_figure(time: ArrayLike, *courses: ArrayLike, names: Sequence[str]) -> Figure:
     """Return a motion of the platform: pose, velocity, acceleration and jerk over time.
 
-    Lengths and the angle stand beside each other, derivatives below what they are derivatives of.
+    Lengths and angles stand beside each other, derivatives below them.
 
     Parameters
     ----------
@@ -35,7 +37,7 @@ def trajectory_figure(time: ArrayLike, *courses: ArrayLike, names: Sequence[str]
     *courses : array, shape (T, m)
         The pose and, as many as there are, its derivatives; m, rad and s.
     names : sequence of str
-        The pose's coordinates, `robot.coordinates`: "phi" is the angle, in rad.
+        The pose's coordinates, `robot.coordinates`.
 
     Returns
     -------
@@ -58,9 +60,9 @@ def trajectory_figure(time: ArrayLike, *courses: ArrayLike, names: Sequence[str]
     >>> [axes.get_ylabel() for axes in figure.axes]
     ['pose (m)', 'velocity (m/s)']
     """
-    told = ["\u03c6" if name == "phi" else name for name in names]
-    groups = _groups(["rad" if name == "phi" else "m" for name in names])
-    return _courses_figure(time, courses, told, groups, _OF_POSE)
+    told = [coordinate(name) for name in names]
+    groups = groups_of([one.unit for one in told])
+    return _courses_figure(time, courses, [one.symbol for one in told], groups, _OF_POSE)
 
 
 def joints_figure(time: ArrayLike, *courses: ArrayLike, robot: RobotLike | None = None) -> Figure:
@@ -96,22 +98,15 @@ def joints_figure(time: ArrayLike, *courses: ArrayLike, robot: RobotLike | None 
     """
     known = courses and np.ndim(courses[0]) == 2
     units = [joint.unit for joint in joints_of(robot, courses[0] if known else np.empty((0, 0)))]
-    names = [f"leg {i + 1}" for i in range(len(units))]
-    return _courses_figure(time, courses, names, _groups(units), _OF_JOINTS)
-
-
-def _groups(units: Sequence[str]) -> dict[str, list[int]]:
-    """Return which columns have each unit."""
-    return {
-        unit: [i for i, own in enumerate(units) if own == unit] for unit in dict.fromkeys(units)
-    }
+    groups = groups_of(units)
+    return _courses_figure(time, courses, leg_labels(len(units)), groups, _OF_JOINTS)
 
 
 def _courses_figure(
     time: ArrayLike,
     courses: Sequence[ArrayLike],
     names: Sequence[str],
-    groups: dict[str, list[int]],
+    groups: Mapping[Any, list[int]],
     words: Sequence[str],
 ) -> Figure:
     t = as_array(time, "time", ())
@@ -124,12 +119,8 @@ def _courses_figure(
     figure = blank(_WIDE, _HEAD + _TALL * len(values))
     for row, course in zip(panels(figure, "time (s)", labels), values, strict=True):
         for axes, own in zip(row, groups.values(), strict=True):
-            axes.axhline(0.0, color=MUTED, linewidth=0.8)
-            for i in own:
-                look = leg_style(i % len(LEG_COLORS), 1.6)
-                label = names[i] if course is values[0] else None
-                axes.plot(t, course[:, i], label=label, **look)
-            axes.set_xlim(float(t[0]), float(t[-1]))
+            zero_line(axes)
+            leg_curves(axes, t, course, own, 1.6, names if course is values[0] else ())
     legend(figure, len(names))
     return figure
 
