@@ -22,7 +22,7 @@ import pteron
 from pteron.kinematics.condition import jacobian_at
 from pteron.motion import joint_guides, joint_points
 from pteron.plots.canvas import LEG_COLORS
-from pteron.report.joint_quantities import readable
+from pteron.report.quantities import readable
 from pteron.report.typeset import fixed
 from pteron.viewer import view
 from pteron.viewer.boundary import allowed

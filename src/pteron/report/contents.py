@@ -1,4 +1,4 @@
-"""What a report holds: all that Pteron knows of one machine, computed once."""
+"""The contents of a report: all that Pteron knows of one machine, computed once."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ from pteron.workspace.reach import Plane, slice_planes
 _ANGLES = 361
 
 _CONSTANT = 1e-6
-"""The type-II measure's change over the orientation that is none but for rounding."""
+"""Change of the type-II measure below which it is constant."""
 
 _RIM = 0.08
 """Share of the reach's greatest width that the slices show around it."""
@@ -63,12 +63,14 @@ _FINE = 121
 
 @dataclass(frozen=True)
 class Orientations:
-    """The type-II measure (A,) over phi, as a share of its best; NaN out of reach.
+    """The type-II measure (A,) over the platform's angle, as a share of its best; NaN out of reach.
 
-    `singular` has the type-II singular orientations; angles are in rad. They are those of every
-    position, or, if not `everywhere`, of the home position.
+    `coordinate` is the place of the angle in a pose, `singular` has the type-II singular
+    orientations; angles are in rad. They are those of every position, or, if not `everywhere`, of
+    the home position.
     """
 
+    coordinate: int
     angles: Array
     type_ii: Array
     singular: Array
@@ -94,7 +96,7 @@ class Measures:
 
 @dataclass(frozen=True)
 class Report:
-    """All that a page says about a machine; the cycle has T samples.
+    """The contents of a machine's page; the cycle has T samples.
 
     The cycle is the standard one, which keeps the reserve `least`, or a motion that was given, from
     `source`; `shown` are the moments of it that the moving picture has. `sizing` is what it asks of
@@ -211,7 +213,7 @@ def _extent(box: Array, plane: str, half: Sequence[float]) -> tuple[float, float
 
 
 def _reached(cut: ReachSlice) -> tuple[float, float, float, float]:
-    """Return the sides of a rectangle about what a slice shows in reach, with a rim."""
+    """Return the sides of a rectangle about the reach in a slice, with a rim."""
     inside = cut.status == REACHABLE
     sides: list[float] = []
     for values, axis in ((cut.first, 0), (cut.second, 1)):
@@ -242,16 +244,18 @@ def _measures(robot: Manipulator, home: Array, box: Array) -> Measures | None:
 
 
 def _orientations(robot: Manipulator, home: Array) -> Orientations | None:
-    """Return the type-II measure over phi at home, where it depends on that."""
-    if not robot.platform.turns:
+    """Return the type-II measure over a single angle at home, where it depends on that."""
+    if len(robot.platform.angles) != 1:
         return None
+    (turn,) = np.flatnonzero(robot.platform.angular).tolist()
     poses = np.tile(home, (_ANGLES, 1))
-    poses[:, -1] = angles = np.linspace(-np.pi, np.pi, _ANGLES)
+    poses[:, turn] = angles = np.linspace(-np.pi, np.pi, _ANGLES)
     measure = _type_ii(robot, poses)
     if np.nanmax(measure) - np.nanmin(measure) <= _CONSTANT:
         return None
-    singular = singular_orientations(robot, home[:-1])
-    return Orientations(angles, measure, singular, closure_of(robot).orientation is not None)
+    singular = singular_orientations(robot, home[~robot.platform.angular])
+    everywhere = closure_of(robot).orientation is not None
+    return Orientations(turn, angles, measure, singular, everywhere)
 
 
 def _type_ii(robot: Manipulator, poses: Array) -> Array:

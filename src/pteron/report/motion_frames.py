@@ -1,4 +1,4 @@
-"""The machine in motion as plain data: what `view.js` draws in a page."""
+"""The machine in motion as plain data, which `view.js` draws in a page."""
 
 from __future__ import annotations
 
@@ -12,30 +12,31 @@ from pteron.dynamics import drive_forces
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.motion import Guide, JointPoints, Motion, joint_points
+from pteron.platforms.coordinates import SHOWN
 from pteron.plots.machine_drawing import APART, base_outline
-from pteron.report.joint_quantities import coordinate
+from pteron.report.quantities import coordinate
 
 _A_SECOND = 60.0
 """Frames a second of real time: as many as screens show."""
 
 _FEWEST, _MOST = 240, 2400
-"""Frames: a short motion is shown slowed down, and a page of a long one is still sent by mail."""
+"""Frames: a short motion may be slowed down, and the page of a long one may be sent by mail."""
 
 _DRAWN = 1000
-"""Samples of a line in a picture, about."""
+"""Samples of a line in a picture, about that many."""
 
 _DECIMALS = 6
 
 _SAME = 1e-6
-"""Share of a motion's size, and of its speed, by which both ends of a closed one may differ."""
+"""Share of its size, and of its speed, by which the ends of a closed motion may differ."""
 
 _LITTLE = 1e-3
-"""m or rad, and the same per s, of a motion that hardly moves."""
+"""Least size, m or rad, and least speed, the same per s, of which that share is taken."""
 
 
 @dataclass(frozen=True)
 class Frames:
-    """A motion as F moments that are drawn.
+    """F moments of a motion, to be drawn.
 
     Attributes
     ----------
@@ -111,7 +112,7 @@ def is_closed(motion: Motion) -> bool:
 
 
 def few(count: int) -> slice:
-    """Return which of so many samples a picture of a line needs."""
+    """Return the slice of so many samples that a line in a picture needs."""
     return slice(None, None, max(1, count // _DRAWN))
 
 
@@ -158,7 +159,7 @@ def scene(
         "tool": seen(points.tool) if any(robot.platform.tool) else None,
         "time": _plain(shown.time),
         "pose": _plain(shown.pose),
-        "scales": [180.0 / np.pi if name == "phi" else 1e3 for name in robot.coordinates],
+        "scales": [SHOWN[unit][1] for unit in robot.units],
         "axes": _plain(points.axes @ turn.T),
         "chains": [list(legs) for legs in zip(*lines, strict=True)],
         "coordinates": _plain(points.coordinates),

@@ -1,4 +1,4 @@
-"""A motion as one HTML page: the machine in 3-D, and what its joints and drives do over time."""
+"""The HTML page of a motion: the machine in 3-D, and its joints and drives over time."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from pteron.motion import Guide, JointPoints, joint_guides, joint_points, overlo
 from pteron.motion.trajectories.tool import tool_motion
 from pteron.playback import Playback
 from pteron.plots import forces_figure, grid_step, power_figure, robot_figure, svg
-from pteron.report.joint_quantities import Quantity, coordinate, force, nouns, speed
 from pteron.report.motion_frames import Frames, few, frames
 from pteron.report.moving_picture import stage
-from pteron.report.typeset import fixed, resource, template
+from pteron.report.quantities import JointQuantity, angles_text, coordinate, force, nouns, speed
+from pteron.report.typeset import resource, template
 from pteron.workspace import JointRanges, joint_ranges
 
 
 @dataclass(frozen=True)
-class Shown:
-    """What the page says of a motion with T samples.
+class ShownMotion:
+    """The contents of the page of a motion with T samples.
 
     Forces (T, n), N or N m, are those that came with the motion (`given`), or what the drives must
     give for it; rates (T, n) are those of the joints, and `tool_speed` (T,), m/s, is the tool's.
@@ -54,8 +54,8 @@ class Shown:
         return any(leg.drive is not None for leg in self.robot.legs)
 
 
-def shown(robot: Manipulator, recorded: Playback) -> Shown:
-    """Return what the page says of a motion that the machine can do."""
+def shown(robot: Manipulator, recorded: Playback) -> ShownMotion:
+    """Return the contents of the page of a motion that the machine can do."""
     motion = recorded.motion
     forces = recorded.forces
     if forces is None:
@@ -65,7 +65,7 @@ def shown(robot: Manipulator, recorded: Playback) -> Shown:
     tool = tool_motion(robot.platform, motion.pose, motion.velocity, motion.acceleration)[1]
     moments = frames(robot, motion, forces)
     start, guides = joint_points(robot, motion.pose[0]), joint_guides(robot, moments.pose)
-    return Shown(
+    return ShownMotion(
         robot=robot,
         playback=recorded,
         frames=moments,
@@ -118,7 +118,7 @@ def motion_page(robot: Manipulator, recorded: Playback) -> str:
     )
 
 
-def _forces_told(found: Shown) -> tuple[str, str]:
+def _forces_told(found: ShownMotion) -> tuple[str, str]:
     """Return whose forces the page shows: in a word, and in a clause."""
     if found.given and found.playback.log:
         return "Measured", "as they were measured."
@@ -129,17 +129,16 @@ def _forces_told(found: Shown) -> tuple[str, str]:
     return "Actuator", "what the bodies take; friction is left out."
 
 
-def _figures(found: Shown) -> dict[str, Any]:
+def _figures(found: ShownMotion) -> dict[str, Any]:
     """Return the pictures as SVG, by their names in the template."""
     robot, motion, at = found.robot, found.playback.motion, found.frames
     gravity = np.array(robot.gravity)
-    angle = fixed(float(np.degrees(motion.pose[0, -1])), 0)
     machine = robot_figure(
         found.start,
         found.guides,
         gravity=gravity if gravity.any() else None,
         path=at.points.tool,
-        angle=f"φ = {angle}°" if robot.platform.turns else "",
+        angle=angles_text(robot, motion.pose[0]),
     )
     joints = [leg.joint for leg in robot.legs]
     some = few(len(motion.time))
@@ -161,6 +160,6 @@ def _figures(found: Shown) -> dict[str, Any]:
     }
 
 
-def _over_time(time: Array, values: Array, quantity: Quantity, name: str) -> Any:
+def _over_time(time: Array, values: Array, quantity: JointQuantity, name: str) -> Any:
     figure = forces_figure(time, values * np.array(quantity.factors), ylabel=quantity.axis)
     return svg(figure, name=name, title=f"Joint {name} over time")

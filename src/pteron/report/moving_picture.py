@@ -9,8 +9,8 @@ import numpy as np
 
 from pteron.manipulator import Manipulator
 from pteron.motion import Guide, JointPoints
-from pteron.report.joint_quantities import coordinate, force
 from pteron.report.motion_frames import Frames, scene
+from pteron.report.quantities import coordinate, force
 from pteron.report.typeset import embedded, resource
 
 _SHORT = 3.0

@@ -16,6 +16,7 @@ from pteron.errors import ModelError
 from pteron.legs import LegKind
 from pteron.legs.drive_rows import drive_rows
 from pteron.manipulator import Manipulator
+from pteron.platforms.coordinates import COORDINATES
 from pteron.plots import (
     forces_figure,
     measure_figure,
@@ -28,9 +29,9 @@ from pteron.reduction import BaseParameters
 from pteron.reduction.expressions import html_symbol
 from pteron.report.contents import Report
 from pteron.report.drive_figures import force_speed, power
-from pteron.report.joint_quantities import force, nouns, readable, speed
 from pteron.report.motion_frames import few
 from pteron.report.moving_picture import stage
+from pteron.report.quantities import SYMBOLS, angles_text, force, nouns, readable, speed
 from pteron.report.typeset import compact, fixed, resource, template, triple
 
 _LONGEST = 200
@@ -69,6 +70,7 @@ def page(report: Report) -> str:
         standard=standard,
         way=way,
         kinds=kinds(robot),
+        followers=_followers(robot),
         geometry=geometry(robot),
         drives=drive_rows(robot.legs),
         bodies=bodies(robot),
@@ -96,7 +98,9 @@ def page(report: Report) -> str:
 def lettered(text: str) -> Markup:
     """Return an account of a leg with its vectors bold and its Greek letters Greek."""
     safe = str(escape(text)).replace(" . ", " \u00b7 ").replace(" - ", " \u2212 ")
-    safe = safe.replace("rho", "\u03c1").replace("theta", "\u03b8").replace("phi", "\u03c6")
+    greek = {name: found.symbol for name, found in COORDINATES.items()} | SYMBOLS
+    for name, symbol in greek.items():
+        safe = safe.replace(name, symbol)
     safe = re.sub(r"(?<![;'])\b([rdekps])\b", r"<b>\1</b>", safe)
     return Markup(re.sub(r"\bs0\b", "<b>s</b><sub>0</sub>", safe))
 
@@ -178,14 +182,14 @@ def _reasons(robot: Manipulator) -> list[str]:
         for leg in robot.legs
         for letter in leg.equations_class.rides
     ]
-    still = [] if robot.platform.turns else ["the platform does not turn"]
+    still = [] if robot.platform.angles else ["the platform does not turn"]
     return list(dict.fromkeys(reason.format("") for reason in (*own, *rides, *still)))
 
 
 def _weighed(report: Report) -> list[str]:
     """Return how what is no length is measured in the condition number of the Jacobian."""
     legs, radius = report.robot.legs, report.jacobian.radius
-    followers = [leg.joint.noun for leg in legs if leg.follows_angle]
+    followers = [legs[i].joint.noun for i in _followers(report.robot)]
     found = []
     if any(leg.goes_round for leg in legs):
         found.append("a crank's angle measured as the way of its end")
@@ -196,6 +200,11 @@ def _weighed(report: Report) -> list[str]:
         found.append(f"the platform's angle \u03c6 as the way of {way} of the platform points)")
     found += [f"the {noun}'s angle as \u03c6, whatever its ratio" for noun in followers]
     return found
+
+
+def _followers(robot: Manipulator) -> list[int]:
+    """Return the legs, from 0, whose joint follows the platform's angle: they reach everywhere."""
+    return [i for i, leg in enumerate(robot.legs) if leg.joint.unit == "rad" and not leg.goes_round]
 
 
 def _figures(report: Report) -> dict[str, Any]:
@@ -210,9 +219,7 @@ def _figures(report: Report) -> dict[str, Any]:
         report.guides,
         gravity=gravity if gravity.any() else None,
         path=shown.points.tool[out],
-        angle=f"φ = {fixed(float(np.degrees(report.home[-1])), 0)}°"
-        if robot.platform.turns
-        else "",
+        angle=angles_text(robot, report.home),
     )
     whose = "drive" if report.driven else "actuator"
     label = f"{whose} {force([leg.joint for leg in robot.legs]).axis}"
@@ -236,9 +243,9 @@ def _figures(report: Report) -> dict[str, Any]:
         ],
     }
     if at is not None:
-        turns = cycle.pose[:, -1]
+        turns = cycle.pose[:, at.coordinate]
         used = (float(turns.min()), float(turns.max())) if standard else None
-        home = float(report.home[-1])
+        home = float(report.home[at.coordinate])
         figure = regularity_figure(at.angles, at.type_ii, at.singular, home=home, used=used)
         title = "The type-II measure over the orientation"
         made["orientations"] = svg(figure, name="orientations", title=title)

@@ -11,6 +11,8 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
+from pteron.platforms.coordinates import coordinate
+
 _MINUS = "\u2212"
 _NARROW = "\u202f"
 
@@ -85,6 +87,7 @@ def template(name: str, **filters: Callable[..., Any]) -> jinja2.Template:
         "fixed": fixed,
         "mm": _millimetres,
         "significant": significant,
+        "symbol": lambda name: coordinate(name).symbol,
         "unit": lambda text: text.replace(" ", _NARROW).replace("^2", "²"),
         **filters,
     }

@@ -11,7 +11,7 @@ from pteron.kernels import Array, numeric
 from pteron.kinematics import follow, inverse_kinematics
 from pteron.kinematics.limits import limited_joints
 from pteron.manipulator import Manipulator
-from pteron.report.joint_quantities import readable
+from pteron.report.quantities import readable
 from pteron.report.typeset import fixed
 from pteron.workspace.reserve import clearances, room_to_limits
 

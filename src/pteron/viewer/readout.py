@@ -7,7 +7,7 @@ from html import escape
 import numpy as np
 
 from pteron.plots.canvas import LEG_COLORS
-from pteron.report.joint_quantities import nouns, readable
+from pteron.report.quantities import nouns, readable
 from pteron.report.typeset import fixed, significant
 from pteron.viewer.readings import Level, Readings, level
 from pteron.viewer.state import State

@@ -27,7 +27,7 @@ from pteron.plots import (
 )
 from pteron.report.identification.contents import Contents, Shown, contents
 from pteron.report.identification.values import measured
-from pteron.report.joint_quantities import force, nouns
+from pteron.report.quantities import force, nouns
 from pteron.report.typeset import resource, significant, template
 
 _COMMAND = r"pteron [a-z]+ ROBOT(?: --[a-z-]+ [\w.]*\w)+"

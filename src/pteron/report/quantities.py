@@ -1,0 +1,100 @@
+"""Quantities of the joints and angles of the platform as people read them, with their units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from pteron.kernels import Array
+from pteron.legs.kind import ActuatedJoint
+from pteron.manipulator import Manipulator
+from pteron.platforms.coordinates import SHOWN
+from pteron.platforms.coordinates import coordinate as pose_coordinate
+from pteron.report.typeset import fixed
+
+_NARROW = "\u202f"
+SYMBOLS = {"rho": "\u03c1", "theta": "\u03b8"}
+"""Letters for the coordinates of joints."""
+
+
+@dataclass(frozen=True)
+class JointQuantity:
+    """A quantity of n joints: its name, their units, and the factors from SI units to these."""
+
+    name: str
+    units: tuple[str, ...]
+    factors: tuple[float, ...]
+
+    @property
+    def shared(self) -> str:
+        """The unit, if all have the same."""
+        return self.units[0] if len(set(self.units)) == 1 else ""
+
+    @property
+    def heading(self) -> str:
+        """The name, with the unit if all have the same."""
+        unit = self.shared.replace(" ", _NARROW)
+        return f"{self.name} ({unit})" if unit else self.name
+
+    @property
+    def axis(self) -> str:
+        """The name with all units, for the axis of a figure."""
+        return f"{self.name} ({', '.join(dict.fromkeys(self.units))})"
+
+    def own(self, i: int) -> str:
+        """Return the unit of leg i, from 0, if the heading does not have it."""
+        return "" if self.shared else f" {self.units[i]}"
+
+
+def coordinate(joints: Sequence[ActuatedJoint]) -> JointQuantity:
+    """Return the joint coordinates, as people read them."""
+    names = _distinct(joint.coordinate for joint in joints)
+    name = ", ".join(SYMBOLS.get(one, one) for one in names)
+    shown = [SHOWN[joint.unit] for joint in joints]
+    return JointQuantity(
+        name, tuple(unit for unit, _ in shown), tuple(factor for _, factor in shown)
+    )
+
+
+def force(joints: Sequence[ActuatedJoint]) -> JointQuantity:
+    """Return the actuator forces."""
+    name = " or ".join(_distinct(joint.force for joint in joints))
+    return JointQuantity(name, tuple(joint.force_unit for joint in joints), (1.0,) * len(joints))
+
+
+def speed(joints: Sequence[ActuatedJoint]) -> JointQuantity:
+    """Return the joint speeds."""
+    return JointQuantity(
+        "speed", tuple(f"{joint.unit}/s" for joint in joints), (1.0,) * len(joints)
+    )
+
+
+def nouns(joints: Sequence[ActuatedJoint]) -> str:
+    """Return the nouns of the actuated joints: "slider", or "slider or crank"."""
+    return " or ".join(_distinct(joint.noun for joint in joints))
+
+
+def readable(value: float, unit: str, places: int = 1) -> str:
+    """Return a coordinate of a joint or a pose as people read it.
+
+    Examples
+    --------
+    >>> readable(0.5, "rad"), readable(0.12, "m")
+    ('28.6°', '120.0 mm')
+    """
+    shown, factor = SHOWN[unit]
+    return f"{fixed(factor * float(value), places)}{shown if shown == '°' else ' ' + shown}"
+
+
+def angles_text(robot: Manipulator, pose: Array) -> str:
+    """Return the angles of a pose (m,) with their symbols; empty where the platform has none."""
+    pairs = zip(robot.coordinates, pose, strict=True)
+    return ", ".join(
+        f"{pose_coordinate(name).symbol} = {readable(value, 'rad', 0)}"
+        for name, value in pairs
+        if name in robot.platform.angles
+    )
+
+
+def _distinct(words: Iterable[str]) -> list[str]:
+    return list(dict.fromkeys(words))
