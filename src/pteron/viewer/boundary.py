@@ -1,4 +1,4 @@
-"""How far a machine can go on its way to a pose, and what stops it there."""
+"""The boundary that stops a machine on its way to a pose, and the leg or limit that it is."""
 
 from __future__ import annotations
 
@@ -12,25 +12,24 @@ from pteron.kinematics import follow, inverse_kinematics
 from pteron.kinematics.limits import limited_joints
 from pteron.manipulator import Manipulator
 from pteron.report.quantities import readable
-from pteron.report.typeset import fixed
 from pteron.workspace.reserve import clearances, room_to_limits
 
 LEAST_TYPE_I = 0.01
-"""The type-I measure at which a leg is at its end: forces still have most of their digits."""
+"""The type-I measure at the end of a leg's reach: forces still have most of their digits."""
 
 _ENDS = 2.0 * LEAST_TYPE_I
-"""The measure below which it is the leg that stops the machine, seen from before and beyond."""
+"""The measure below which a leg stops the machine, on either side of the boundary."""
 
 _ROUNDING = 1e-9
-"""m by which a joint may be beyond its limit: a pose on it is within."""
+"""m or rad by which a joint may be beyond its limit: a pose on it is within."""
 
 _PIECES = 32
-"""Into how many pieces a way is divided, again and again, to find its end."""
+"""Pieces into which a path is divided in each round of the search for its end."""
 
 _ROUNDS = 5
 
 _STEPS = 8
-"""Pieces of a way of the joints; the platform is followed along each."""
+"""Pieces of a path of the joints, along each of which the platform is followed."""
 
 _SAME_JOINT = 1e-6
 
@@ -124,7 +123,7 @@ def _narrowed(
 
 
 def what_stops(robot: Manipulator, beyond: Array) -> str:
-    """Return which leg, or limit, forbids a pose (m,), as a sentence without its full stop.
+    """Return the leg or limit that forbids a pose (m,), as a sentence without its full stop.
 
     A pose that nothing forbids is one at which an assembly mode ends.
     """
@@ -150,11 +149,9 @@ def what_stops(robot: Manipulator, beyond: Array) -> str:
 
 
 def told_rest(robot: Manipulator, last: Array, target: Array) -> str:
-    """Return how far a pose (m,) is from the one that was asked for, in words."""
-    count = len(robot.platform.lengths)
-    way = float(np.linalg.norm(target[:count] - last[:count]))
-    parts = [f"{fixed(1e3 * way)} mm"] if way > 0.0 else []
-    if robot.platform.turns:
-        angle = abs(float(np.degrees(target[-1] - last[-1])))
-        parts += [f"{fixed(angle)}°"] if angle > 0.0 else []
-    return " and ".join(parts) or "0.0 mm"
+    """Return the distance of a pose (m,) from the one that was asked for, in words."""
+    way = float(np.linalg.norm((target - last)[~robot.platform.angular]))
+    angles = np.abs((target - last)[robot.platform.angular]).tolist()
+    parts = [readable(way, "m")] * (way > 0.0)
+    parts += [readable(angle, "rad") for angle in angles if angle > 0.0]
+    return " and ".join(parts) or readable(0.0, "m")

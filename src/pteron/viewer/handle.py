@@ -10,7 +10,7 @@ import numpy as np
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.viewer.solids import quaternion
-from pteron.viewer.state import State
+from pteron.viewer.state import ViewerState
 
 if TYPE_CHECKING:
     import viser
@@ -47,7 +47,7 @@ class Handle:
         )
         self._watch(self._mover, self._moved)
         self._turner: Any = None
-        if platform.turns and not platform.slides:
+        if len(platform.rotation_axes) == 1:
             self._turner = scene.add_transform_controls(
                 "/machine/ring",
                 scale=_SIZE * size,
@@ -70,7 +70,7 @@ class Handle:
         """Return the pose that the arrows are at."""
         pose = self._pose.copy()
         directions = self._robot.platform.directions
-        pose[: len(directions)] = directions @ self._mover.position
+        pose[~self._robot.platform.angular] = directions @ self._mover.position
         return pose
 
     def _turned(self) -> Array:
@@ -80,12 +80,11 @@ class Handle:
             [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)]
         )
         angle = float(np.arctan2(self._frame[1] @ first, self._frame[0] @ first))
-        pose = self._pose.copy()
-        turn = 2.0 * np.pi
-        pose[-1] += (angle - pose[-1] + np.pi) % turn - np.pi
+        pose, angular = self._pose.copy(), self._robot.platform.angular
+        pose[angular] += (angle - pose[angular] + np.pi) % (2.0 * np.pi) - np.pi
         return pose
 
-    def show(self, state: State) -> None:
+    def show(self, state: ViewerState) -> None:
         """Follow the platform; a handle that someone holds is left where the pointer is."""
         self._pose = state.pose
         if self._held:

@@ -1,9 +1,8 @@
-"""The controls beside the picture: each tells the viewer what is wanted, and shows what is."""
+"""The controls beside the picture: each shows the machine's state, and sends changes of it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import pi
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +10,7 @@ import numpy as np
 
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
+from pteron.platforms.coordinates import SHOWN
 from pteron.report.typeset import fixed
 from pteron.viewer.readings import Readings
 from pteron.viewer.readout import readout, status
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import viser
 
 Post = Callable[[str, Callable[[], object]], None]
-"""Tells the viewer to do something; of those under one name only the last counts."""
+"""Sends an action to the viewer; of those under one name only the last counts."""
 
 _STEP = 0.1
 """mm or degrees."""
@@ -33,11 +33,10 @@ _SHORT = 0.01
 _NO_MODE = "none of them"
 
 _HELD = 0.2
-"""s for which a control that a person moves is left alone: an answer to what it was a moment ago
-would pull it back."""
+"""s for which a control that a person moves is left alone: an older answer would pull it back."""
 
 _SAME = 1e-6
-"""mm, degrees or s between a slider and what it is to show that are rounding."""
+"""mm, degrees or s by which a slider may differ from its value."""
 
 
 class Panel:
@@ -65,7 +64,7 @@ class Panel:
         self._factors = pose_factors(robot)
         self._coordinates = []
         for i, name in enumerate(robot.coordinates):
-            label = "phi (°)" if name == "phi" else f"{name} (mm)"
+            label = f"{name} ({SHOWN[robot.units[i]][0]})"
             low, high = self._factors[i] * session.pose_range[:, i]
             value = float(self._factors[i] * session.state.pose[i])
             slider = self._slider(gui, label, low, high, value)
@@ -80,11 +79,10 @@ class Panel:
         self._button(gui, "Home", session.go_home)
         self._joints, self._joint_factors = [], []
         for i, leg in enumerate(robot.legs):
-            rad = leg.joint.unit == "rad"
-            factor = 180.0 / pi if rad else 1e3
+            unit, factor = SHOWN[leg.joint.unit]
             low, high = factor * session.joint_range[:, i]
             value = float(factor * session.state.joints[i])
-            label = f"{leg.joint.noun} {i + 1} ({'°' if rad else 'mm'})"
+            label = f"{leg.joint.noun} {i + 1} ({unit})"
             slider = self._slider(gui, label, low, high, value)
             self._on(slider, f"joint{i}", self._to_joint(i, factor))
             self._joints.append(slider)
@@ -259,11 +257,9 @@ class Panel:
                 slider.min, slider.max = _round_out(float(low), float(high))
 
     def _told_pose(self, k: int, pose: Array) -> str:
-        names = self._session.state.robot.coordinates
-        parts = [
-            f"{fixed(value)}°" if name == "phi" else fixed(value)
-            for name, value in zip(names, self._factors * pose, strict=True)
-        ]
+        turns = self._session.state.robot.platform.angular
+        values = zip(self._factors * pose, turns, strict=True)
+        parts = [fixed(value) + "°" * bool(angle) for value, angle in values]
         return f"{k}: {' '.join(parts)}"
 
 

@@ -1,4 +1,4 @@
-"""What the panel says of a machine: forces, condition, and how far it is from its ends."""
+"""The readings of the panel: forces, condition number, and margins to singularities and limits."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pteron.dynamics import drive_forces
 from pteron.errors import PteronError
 from pteron.kernels import Array
 from pteron.kinematics.condition import jacobian_at
-from pteron.viewer.state import State
+from pteron.viewer.state import ViewerState
 from pteron.workspace import reserve
 
 Level = Literal["far", "near", "close"]
@@ -55,10 +55,10 @@ class Readings:
     fault: str = ""
 
 
-def readings(state: State) -> Readings:
+def readings(state: ViewerState) -> Readings:
     """Return the numbers of a state, each as the library has it."""
     robot, fault = state.robot, ""
-    unknown = np.full(robot.freedom, np.nan)
+    unknown = np.full(robot.joint_count, np.nan)
     try:
         forces: Array = drive_forces(state.loaded, state.pose, state.velocity, state.acceleration)
     except PteronError as error:
@@ -83,7 +83,7 @@ def readings(state: State) -> Readings:
 
 
 def level(value: float) -> Level:
-    """Return how near a reserve, 1 at best, is to its end.
+    """Return the level of a reserve, 1 at best.
 
     Examples
     --------

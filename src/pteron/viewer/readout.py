@@ -10,7 +10,7 @@ from pteron.plots.canvas import LEG_COLORS
 from pteron.report.quantities import nouns, readable
 from pteron.report.typeset import fixed, significant
 from pteron.viewer.readings import Level, Readings, level
-from pteron.viewer.state import State
+from pteron.viewer.state import ViewerState
 
 _COLORS: dict[Level, tuple[str, str]] = {
     "far": ("#d9efe3", "#0b5a34"),
@@ -43,7 +43,7 @@ def status(message: str, *, empty: str) -> str:
     )
 
 
-def readout(state: State, found: Readings) -> str:
+def readout(state: ViewerState, found: Readings) -> str:
     """Return the numbers of a state as HTML."""
     robot = state.robot
     limited = not np.isnan(found.shares).all()

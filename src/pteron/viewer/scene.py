@@ -29,7 +29,7 @@ from pteron.viewer.solids import (
     rgb,
     still_solids,
 )
-from pteron.viewer.state import State
+from pteron.viewer.state import ViewerState
 
 if TYPE_CHECKING:
     import viser
@@ -37,15 +37,15 @@ if TYPE_CHECKING:
 _SCREW = 0.09
 _FORCE = 0.3
 _FORCE_RADIUS = 0.011
-"""Lengths and radii of arrows as shares of the machine's size: of the largest force in view."""
+"""Lengths and radii of arrows, as shares of the machine's size; the largest force has the first."""
 
 _MOST = 2.0
-"""How many times the force that its scale is of an arrow may grow."""
+"""Longest arrow, in lengths of the force that its scale is made for."""
 
 _DOWN = 0.2
 
 _NONE = 1e-9
-"""m/s^2 of gravity that are none."""
+"""m/s^2 below which there is no gravity."""
 
 _TURNING, _SLIDING = (0.0035, INK), (0.0095, "#d9a400")
 """Radius and colour of joints' screws: those that slide are thicker than their guides."""
@@ -74,15 +74,15 @@ class Scene:
             self._add_copies("blocks", cube(), moving.blocks)
         for k, outline in enumerate(moving.faces):
             self._add_mesh(f"face{k}", fan(outline), REACH, 0.5)
-        count = robot.freedom * points.chain.shape[-2]
-        for name, most in (("screws", count), ("forces", robot.freedom)):
+        count = robot.joint_count * points.chain.shape[-2]
+        for name, most in (("screws", count), ("forces", robot.joint_count)):
             none = np.zeros((most, 3))
             shafts, heads = arrows(none, none, [1.0] * most, [INK] * most)
             self._add_copies(name, cylinder(), shafts, visible=False)
             self._add_copies(f"{name}-heads", cylinder(0.0), heads, visible=False)
         self._aim(points)
 
-    def show(self, state: State, forces: Array, scale: Array) -> None:
+    def show(self, state: ViewerState, forces: Array, scale: Array) -> None:
         """Show a state of the machine; arrows are as long as forces (n,) over a scale (n,)."""
         points = joint_points(state.robot, state.pose)
         moving = moving_solids(points, self._guides, self.size)
@@ -240,7 +240,7 @@ class Scene:
             self._place(one, copies)
             self._nodes[one].batched_colors = _linear(copies.colors)
 
-    def _screws(self, state: State, points: JointPoints) -> tuple[Copies, Copies]:
+    def _screws(self, state: ViewerState, points: JointPoints) -> tuple[Copies, Copies]:
         """Return the axes of all joints as arrows; those of sliding joints in another colour."""
         try:
             screws = joint_screws(state.robot, state.pose)

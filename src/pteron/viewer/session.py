@@ -1,4 +1,4 @@
-"""What goes on in one viewer: a machine's state, the motion that plays, and every action on them.
+"""The session of one viewer: a machine's state, the motion that plays, every action on them.
 
 It knows nothing of a browser. All of it runs in one thread.
 """
@@ -35,14 +35,14 @@ from pteron.viewer.state import (
 from pteron.workspace import bounding_box
 
 SPEEDS = {"1/10": 0.1, "1/4": 0.25, "1/2": 0.5, "real time": 1.0, "2 x": 2.0}
-"""What a motion's speed is called, and how many seconds of it a second shows."""
+"""Names of a motion's speeds, and the seconds of it that one second shows."""
 
 STANDARD = "standard pick-and-place cycle"
 
 _DRAWN = 200
-_ROOM = 0.08
+_MARGIN = 0.08
 _RIM = 0.05
-"""Shares of a range that sliders have beyond it."""
+"""Shares of a range by which sliders extend it: of the pose, and of the joints."""
 
 
 class Session:
@@ -50,7 +50,7 @@ class Session:
 
     Attributes
     ----------
-    state : State
+    state : ViewerState
         The machine now.
     motion : Motion or None
         What may be played, and its `title`.
@@ -81,17 +81,14 @@ class Session:
         with suppress(ModelError):
             drawn = random_poses(robot, _DRAWN, type_i=0.0, type_ii=0.0)
             self.examples = np.vstack([home, drawn])
-        count = len(robot.platform.lengths)
+        lengths, platform = ~robot.platform.angular, robot.platform
         low, high = self.examples.min(axis=0), self.examples.max(axis=0)
         with suppress(ModelError):  # guides without limits: a reach without end
-            low[:count], high[:count] = bounding_box(robot, home)
-        room = _ROOM * (high - low)
-        low, high = low - room, high + room
-        if robot.platform.turns:
-            limits = robot.platform.limits or (-np.pi, np.pi)
-            if robot.platform.slides:
-                limits = float(low[-1]), float(high[-1])
-            low[-1], high[-1] = limits
+            low[lengths], high[lengths] = bounding_box(robot, home)
+        margin = _MARGIN * (high - low)
+        low, high = low - margin, high + margin
+        if platform.rotation_axes:
+            low[~lengths], high[~lengths] = platform.limits or (-np.pi, np.pi)
         self.pose_range = np.array([low, high])
         joints = inverse_kinematics(robot, self.examples)
         low, high = joints.min(axis=0), joints.max(axis=0)

@@ -21,7 +21,7 @@ NONE = "none"
 
 
 def choices(robot: Manipulator) -> tuple[str, ...]:
-    """Return what slices a machine has: none, or a plane."""
+    """Return the choices of a slice: none, or a plane."""
     return (NONE, *slice_planes(robot))
 
 
@@ -61,6 +61,6 @@ def slice_meshes(
 def _in_space(robot: Manipulator, pose: Array, i: int, j: int, flat: Array) -> NDArray[np.float64]:
     """Return points (V, 2) of a slice in the base frame, (V, 3)."""
     directions = robot.platform.directions
-    lengths = np.tile(pose[: len(directions)], (len(flat), 1))
+    lengths = np.tile(pose[~robot.platform.angular], (len(flat), 1))
     lengths[:, i], lengths[:, j] = flat[:, 0], flat[:, 1]
     return np.asarray(lengths @ directions)

@@ -1,15 +1,16 @@
 """The machine in one pose as simple bodies: bars, balls and blocks, ready to be drawn together.
 
 A bar is a cylinder from one point to another; all bars of a machine are copies of one mesh, and so
-are all balls and all blocks, so that a browser draws each kind at one stroke.
+are all balls and all blocks, so that a browser draws each kind at once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,12 @@ _FRAME = 0.13
 
 _BLOCK = np.array([0.04, 0.04, 0.072])
 """The sides of a slider's block, along its guide last."""
+
+
+_Bar = tuple[Array, Array, float, str]
+_Ball = tuple[Array, float, str]
+_Block = tuple[Array, Array, str]
+"""Ends or middle, m, radius or guide, and colour."""
 
 
 def rgb(color: str) -> tuple[int, int, int]:
@@ -74,53 +81,53 @@ def machine_size(points: JointPoints, guides: Sequence[Guide]) -> float:
 
 
 def moving_solids(points: JointPoints, guides: Sequence[Guide], size: float) -> Solids:
-    """Return what moves: the legs and the platform, of points in one pose."""
-    bars, balls, blocks = _Bars(), _Balls(), []
+    """Return the moving bodies, the legs and the platform, of points in one pose."""
+    bars, balls, blocks = list[_Bar](), list[_Ball](), list[_Block]()
     for i, (line, guide) in enumerate(zip(points.links, guides, strict=True)):
         color = LEG_COLORS[i]
         for start, end in pairwise(line[:-1]):
-            bars.add(start, end, _LINK * size, color)
+            bars.append((start, end, _LINK * size, color))
         single = points.bars[i] is None
         for start, end in rods(line, points.bars[i], size):
-            bars.add(start, end, (_LINK if single else _ROD) * size, color)
+            bars.append((start, end, (_LINK if single else _ROD) * size, color))
         for joint in line:
-            balls.add(joint, _JOINT * size, color)
+            balls.append((joint, _JOINT * size, color))
         if guide.slides:
             blocks.append((line[0], guide.axis, color))
     for part in points.parts:
         for corner in part.corners:
-            bars.add(part.hub, corner, _ARM * size, REACH)
-        balls.add(part.hub, _JOINT * size, REACH)
+            bars.append((part.hub, corner, _ARM * size, REACH))
+        balls.append((part.hub, _JOINT * size, REACH))
     for axis in points.axes:
-        bars.add(points.reference, points.reference + _FRAME * size * axis, _AXIS * size, INK)
-    bars.add(points.reference, points.tool, _ROD * size, REACH)
-    balls.add(points.tool, 0.8 * _JOINT * size, INK)
-    balls.add(points.reference, 0.8 * _JOINT * size, PAPER)
+        bars.append((points.reference, points.reference + _FRAME * size * axis, _AXIS * size, INK))
+    bars.append((points.reference, points.tool, _ROD * size, REACH))
+    balls.append((points.tool, 0.8 * _JOINT * size, INK))
+    balls.append((points.reference, 0.8 * _JOINT * size, PAPER))
     faces = tuple(part.corners for part in points.parts if len(part.corners) > 2)
-    return Solids(bars.made(), balls.made(), _blocks(blocks, size), faces)
+    return Solids(_bars(bars), _balls(balls), _blocks(blocks, size), faces)
 
 
 def still_solids(
     points: JointPoints, guides: Sequence[Guide], size: float, corner: Array
 ) -> Solids:
-    """Return what stands still: guides, the cranks' axles and ways, the base and its frame."""
-    bars, balls = _Bars(), _Balls()
+    """Return the still bodies: guides, the cranks' axles and circles, the base and its frame."""
+    bars, balls = list[_Bar](), list[_Ball]()
     for line, guide in zip(points.links, guides, strict=True):
         thick = _GUIDE if guide.slides else _AXIS
         for start, end in pairwise(guide.path):
-            bars.add(start, end, thick * size, MUTED)
+            bars.append((start, end, thick * size, MUTED))
         if guide.slides:
             for end in guide.path[[0, -1]]:
-                balls.add(end, 1.3 * _GUIDE * size, MUTED)
+                balls.append((end, 1.3 * _GUIDE * size, MUTED))
         else:
             axle = _AXLE * size * guide.axis
-            bars.add(line[0] - axle, line[0] + axle, _JOINT * size, MUTED)
+            bars.append((line[0] - axle, line[0] + axle, _JOINT * size, MUTED))
     base = base_outline(points, guides)
     for start, end in zip(base, np.roll(base, -1, axis=0), strict=True):
-        bars.add(start, end, _ARM * size, MUTED)
+        bars.append((start, end, _ARM * size, MUTED))
     for axis in np.eye(3):
-        bars.add(corner, corner + _FRAME * size * axis, _AXIS * size, INK)
-    return Solids(bars.made(), balls.made(), _blocks([], size), (base,) if len(base) > 2 else ())
+        bars.append((corner, corner + _FRAME * size * axis, _AXIS * size, INK))
+    return Solids(_bars(bars), _balls(balls), _blocks([], size), (base,) if len(base) > 2 else ())
 
 
 def arrows(
@@ -136,69 +143,47 @@ def arrows(
     units = np.divide(ways, lengths[:, None], out=np.zeros_like(ways), where=lengths[:, None] > 0.0)
     necks = starts + (lengths - heads)[:, None] * units
     tips = starts + ways
-    shafts, cones = _Bars(), _Bars()
+    shafts, cones = list[_Bar](), list[_Bar]()
     for i, (radius, color) in enumerate(zip(radii, colors, strict=True)):
-        shafts.add(starts[i], necks[i], radius, color)
-        cones.add(necks[i], tips[i], 2.6 * radius, color)
-    return shafts.made(), cones.made()
+        shafts.append((starts[i], necks[i], radius, color))
+        cones.append((necks[i], tips[i], 2.6 * radius, color))
+    return _bars(shafts), _bars(cones)
 
 
-class _Bars:
-    """Bars as they are found."""
-
-    def __init__(self) -> None:
-        self._ends: list[tuple[Array, Array]] = []
-        self._radii: list[float] = []
-        self._colors: list[tuple[int, int, int]] = []
-
-    def add(self, start: Array, end: Array, radius: float, color: str) -> None:
-        """Add one; of no length it is not seen."""
-        self._ends.append((start, end))
-        self._radii.append(radius)
-        self._colors.append(rgb(color))
-
-    def made(self) -> Copies:
-        """Return them as copies of a cylinder of radius and length 1 about its middle, along z."""
-        ends = np.array(self._ends, dtype=float).reshape(-1, 2, 3)
-        ways = ends[:, 1] - ends[:, 0]
-        lengths = np.linalg.norm(ways, axis=-1)
-        radii = np.where(lengths > 0.0, self._radii, 0.0)
-        scales = np.stack([radii, radii, lengths], axis=-1)
-        return Copies(ends.mean(axis=1), from_z(ways), scales, _colors(self._colors))
+def _bars(found: Sequence[_Bar]) -> Copies:
+    """Return bars as copies of a cylinder of radius and length 1 about its middle, along z."""
+    starts, ends, radii, colors = _columns(found, 4)
+    ways = ends.reshape(-1, 3) - starts.reshape(-1, 3)
+    lengths = np.linalg.norm(ways, axis=-1)
+    # One of no length is not seen.
+    radii = np.where(lengths > 0.0, radii, 0.0)
+    scales = np.stack([radii, radii, lengths], axis=-1)
+    return Copies(starts.reshape(-1, 3) + ways / 2.0, from_z(ways), scales, _colors(colors))
 
 
-class _Balls:
-    """Balls as they are found."""
-
-    def __init__(self) -> None:
-        self._centers: list[Array] = []
-        self._radii: list[float] = []
-        self._colors: list[tuple[int, int, int]] = []
-
-    def add(self, center: Array, radius: float, color: str) -> None:
-        """Add one."""
-        self._centers.append(center)
-        self._radii.append(radius)
-        self._colors.append(rgb(color))
-
-    def made(self) -> Copies:
-        """Return them as copies of a ball of radius 1."""
-        centers = np.array(self._centers, dtype=float).reshape(-1, 3)
-        turns = np.tile([1.0, 0.0, 0.0, 0.0], (len(centers), 1))
-        scales = np.repeat(np.array(self._radii)[:, None], 3, axis=1)
-        return Copies(centers, turns, scales, _colors(self._colors))
+def _balls(found: Sequence[_Ball]) -> Copies:
+    """Return balls as copies of one of radius 1."""
+    centers, radii, colors = _columns(found, 3)
+    turns = np.tile([1.0, 0.0, 0.0, 0.0], (len(found), 1))
+    scales = np.repeat(radii[:, None], 3, axis=1)
+    return Copies(centers.reshape(-1, 3), turns, scales, _colors(colors))
 
 
-def _blocks(found: Sequence[tuple[Array, Array, str]], size: float) -> Copies:
+def _blocks(found: Sequence[_Block], size: float) -> Copies:
     """Return blocks as copies of a cube of side 1."""
     centers = np.array([center for center, _, _ in found]).reshape(-1, 3)
     turns = np.array([_turn_to(tuple(axis.tolist())) for _, axis, _ in found]).reshape(-1, 4)
     scales = np.tile(size * _BLOCK, (len(found), 1))
-    return Copies(centers, turns, scales, _colors([rgb(color) for _, _, color in found]))
+    return Copies(centers, turns, scales, _colors([color for _, _, color in found]))
 
 
-def _colors(found: Sequence[tuple[int, int, int]]) -> NDArray[np.uint8]:
-    return np.array(found, dtype=np.uint8).reshape(-1, 3)
+def _columns(found: Sequence[tuple[Any, ...]], count: int) -> list[Any]:
+    """Return the columns of rows as arrays; so many empty ones where there are no rows."""
+    return [np.array(column) for column in zip(*found, strict=True)] or [np.empty(0)] * count
+
+
+def _colors(found: Iterable[str]) -> NDArray[np.uint8]:
+    return np.array([rgb(color) for color in found], dtype=np.uint8).reshape(-1, 3)
 
 
 def from_z(ways: Array) -> Array:

@@ -1,4 +1,4 @@
-"""What the viewer shows of a machine, as a value, and what each action makes of it."""
+"""The state of a machine in the viewer, as a value, and the state that follows each action."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from pteron.manipulator import Manipulator
 from pteron.manipulator.variants import with_elbows
 from pteron.motion import Motion, with_payload
 from pteron.motion.payload import payload_doubt
+from pteron.platforms.coordinates import SHOWN
 from pteron.viewer.boundary import allowed, farthest, followed, told_rest, what_stops
 from pteron.workspace import home_pose
 
@@ -23,7 +24,7 @@ _SAME_POSE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class ViewerState:
     """A machine in a pose, moving or at rest, with what it carries.
 
     Attributes
@@ -35,7 +36,7 @@ class State:
     payload : float
         At the tool's centre point, kg.
     message : str
-        What became of the last action, where it did not do all that was asked; else empty.
+        The reason why the last action was not done in full; else empty.
     """
 
     robot: Manipulator
@@ -57,7 +58,7 @@ class State:
         return with_payload(self.robot, self.payload) if self.payload else self.robot
 
 
-def at_rest(robot: Manipulator, pose: Array | None = None) -> State:
+def at_rest(robot: Manipulator, pose: Array | None = None) -> ViewerState:
     """Return a machine at rest in a pose, by default its home pose.
 
     Raises
@@ -68,10 +69,10 @@ def at_rest(robot: Manipulator, pose: Array | None = None) -> State:
         If it is singular at every pose.
     """
     found = home_pose(robot) if pose is None else pose
-    return State(robot, found, np.zeros_like(found), np.zeros_like(found))
+    return ViewerState(robot, found, np.zeros_like(found), np.zeros_like(found))
 
 
-def moved(state: State, target: Array) -> State:
+def moved(state: ViewerState, target: Array) -> ViewerState:
     """Return the machine at rest in another pose (m,), or as near to it as it can go straight."""
     if not np.isfinite(target).all():
         return replace(state, message="The pose is to have finite numbers.")
@@ -83,7 +84,7 @@ def moved(state: State, target: Array) -> State:
     return _rest(state, last, f"{why}. The platform stops {rest} before the pose asked for.")
 
 
-def joint_moved(state: State, i: int, value: float) -> State:
+def joint_moved(state: ViewerState, i: int, value: float) -> ViewerState:
     """Return the machine with one joint, from 0, elsewhere; the platform keeps its assembly mode.
 
     It stops where a leg, a limit or the end of the assembly mode stops it.
@@ -99,7 +100,7 @@ def joint_moved(state: State, i: int, value: float) -> State:
     return _rest(state, last, f"{why}. The {leg.joint.noun} of leg {i + 1} stops there.")
 
 
-def assembly_poses(state: State) -> Array:
+def assembly_poses(state: ViewerState) -> Array:
     """Return the poses (K, m) with the same joint coordinates, in the robot's working mode."""
     try:
         poses = direct_kinematics(state.robot, state.joints)
@@ -108,17 +109,16 @@ def assembly_poses(state: State) -> Array:
     return np.asarray(poses[~np.isnan(poses).any(axis=-1)])
 
 
-def current_assembly(state: State, poses: Array) -> int | None:
+def current_assembly(state: ViewerState, poses: Array) -> int | None:
     """Return which of the assembly modes' poses the machine is in; None if in none of them."""
     apart = np.abs(poses - state.pose)
-    if state.robot.platform.turns and not state.robot.platform.slides and len(poses):
-        turn = 2.0 * np.pi
-        apart[:, -1] = np.abs((apart[:, -1] + np.pi) % turn - np.pi)
+    around = np.abs((apart + np.pi) % (2.0 * np.pi) - np.pi)
+    apart = np.where(state.robot.wraps, around, apart)
     near = np.flatnonzero((apart <= _SAME_POSE).all(axis=-1))
     return int(near[0]) if len(near) else None
 
 
-def assembled(state: State, pose: Array) -> State:
+def assembled(state: ViewerState, pose: Array) -> ViewerState:
     """Return the machine in another assembly mode, that of a pose with the same joints."""
     if not allowed(state.robot, pose):
         why = what_stops(state.robot, pose)
@@ -126,7 +126,7 @@ def assembled(state: State, pose: Array) -> State:
     return _rest(state, pose)
 
 
-def in_working_mode(state: State, elbows: Sequence[int]) -> State:
+def in_working_mode(state: ViewerState, elbows: Sequence[int]) -> ViewerState:
     """Return the machine with its elbows on given sides, in its pose or, failing that, at home."""
     robot = with_elbows(state.robot, elbows)
     other = replace(state, robot=robot)
@@ -139,12 +139,12 @@ def in_working_mode(state: State, elbows: Sequence[int]) -> State:
     return _rest(other, home, "The pose is out of reach in this working mode: here is its home.")
 
 
-def at_home(state: State) -> State:
+def at_home(state: ViewerState) -> ViewerState:
     """Return the machine at rest in its home pose."""
     return _rest(state, home_pose(state.robot))
 
 
-def carrying(state: State, text: str) -> State:
+def carrying(state: ViewerState, text: str) -> ViewerState:
     """Return the machine with a payload that is typed in kg; one that cannot be changes nothing."""
     try:
         mass = _number(text, "payload", "a mass of 0 kg or more")
@@ -174,7 +174,7 @@ def typed_pose(robot: Manipulator, text: str) -> Array:
     if len(words) != robot.freedom:
         raise DataError(
             f"pose: {len(words)} numbers given, {robot.freedom} expected: {names}, in mm"
-            f"{' and degrees' if robot.platform.turns else ''}, with blanks between them"
+            f"{' and degrees' if robot.platform.angles else ''}, with blanks between them"
         )
     factors = pose_factors(robot)
     pairs = zip(words, robot.coordinates, strict=True)
@@ -182,8 +182,8 @@ def typed_pose(robot: Manipulator, text: str) -> Array:
 
 
 def pose_factors(robot: Manipulator) -> Array:
-    """Return what turns a pose (m,) into mm and degrees."""
-    return np.array([180.0 / np.pi if name == "phi" else 1e3 for name in robot.coordinates])
+    """Return the factors (m,) from a pose in SI units to mm and degrees."""
+    return np.array([SHOWN[unit][1] for unit in robot.units])
 
 
 def _number(text: str, name: str, wanted: str) -> float:
@@ -197,17 +197,17 @@ def _number(text: str, name: str, wanted: str) -> float:
     return value
 
 
-def along(state: State, motion: Motion, time: float) -> State:
+def along(state: ViewerState, motion: Motion, time: float) -> ViewerState:
     """Return the machine as it is at a time of a motion, s from its beginning."""
     pose, velocity, acceleration = motion.at(motion.time[0] + time)
     return replace(state, pose=pose, velocity=velocity, acceleration=acceleration, message="")
 
 
-def stopped(state: State, message: str = "") -> State:
+def stopped(state: ViewerState, message: str = "") -> ViewerState:
     """Return the machine at rest where it is."""
     return _rest(state, state.pose, message)
 
 
-def _rest(state: State, pose: Array, message: str = "") -> State:
+def _rest(state: ViewerState, pose: Array, message: str = "") -> ViewerState:
     still = np.zeros_like(pose)
     return replace(state, pose=pose, velocity=still, acceleration=still, message=message)

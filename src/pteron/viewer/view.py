@@ -24,7 +24,7 @@ from pteron.viewer.scene import Scene
 from pteron.viewer.server import serve, stop
 from pteron.viewer.session import Session
 from pteron.viewer.slices import NONE, slice_meshes
-from pteron.viewer.state import State, stopped
+from pteron.viewer.state import ViewerState, stopped
 
 _FRAME = 1.0 / 30.0
 """s between two pictures of a motion."""
@@ -93,7 +93,7 @@ class Viewer:
         return int(self._server.get_port())
 
     @property
-    def state(self) -> State:
+    def state(self) -> ViewerState:
         """What is shown now."""
         return self._session.state
 
