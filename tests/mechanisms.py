@@ -315,6 +315,10 @@ machine are tested on these by `make test`, and on all others by `make nightly`.
 """
 
 
+LARGE = ("clearances", "least_clearances", "adaptive", "adaptive_drives", "paper_terms")
+"""Functions that take a C compiler seconds; the gate compiles the others."""
+
+
 def gated(cases, gate=GATE):
     """Return the cases of a claim, each once; those not of the gate are for `make nightly`."""
     every = dict.fromkeys(cases)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import sympy
 from counted_modes import count_modes
-from mechanisms import CATALOG, random_machine, with_elbows
+from mechanisms import CATALOG, gated, random_machine, with_elbows
 
 import pteron
 from pteron.equations.machine import closure_of
@@ -70,7 +70,7 @@ def well_held(robot, poses):
     return np.abs(measure) > 0.02
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", gated(range(2), [0]))
 @pytest.mark.parametrize("kinds", MOST)
 def test_direct_inverts_inverse(kinds, seed):
     robot = random_machine(seed, kinds)
@@ -96,7 +96,7 @@ def test_direct_inverts_inverse(kinds, seed):
     np.testing.assert_allclose(one, own[7], rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", gated(range(4), [0]))
 @pytest.mark.parametrize("kinds", OPEN)
 def test_modes_counted_another_way(kinds, seed):
     robot = random_machine(100 + seed, kinds)
@@ -280,7 +280,9 @@ def test_without_a_closed_form_there_is_the_step(tmp_path):
 
 
 @pytest.mark.parametrize("target", ["vm", "c"])
-@pytest.mark.parametrize("kinds", ["RRRR", "RPPP", "CCC", "RRRU", "PPPP", "RRR"])
+@pytest.mark.parametrize(
+    "kinds", gated(["RRRR", "RPPP", "CCC", "RRRU", "PPPP", "RRR"], ["CCC", "RRRU", "RRR"])
+)
 def test_a_step_from_a_pose_that_is_near(kinds, target):
     robot = random_machine(0, kinds)
     step = pteron.compile(robot, "direct_step", target)
@@ -393,7 +395,7 @@ def test_one_joint_is_followed_from_the_origin(name, leg):
     np.testing.assert_allclose(pteron.inverse_kinematics(robot, poses), joints, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["par4", "h4", "3-rrr", "delta"])
+@pytest.mark.parametrize("name", gated(["par4", "h4", "3-rrr", "delta"], ["3-rrr", "delta"]))
 def test_far_samples_are_followed_as_near_ones_are(name):
     robot = pteron.load(name)
     ends = pteron.random_poses(robot, 60, type_i=0.1, type_ii=0.02, seed=3)

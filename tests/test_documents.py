@@ -173,7 +173,13 @@ def blocks(text):
 WITH_BLOCKS = [name for name, text in TEXTS.items() if name != "README.md" and blocks(text)]
 
 
-@pytest.mark.parametrize("name", WITH_BLOCKS)
+SLOW = {"docs/plots.md", "docs/play.md", "docs/how-to/prove-a-workspace.md"}
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=pytest.mark.clients if n in SLOW else ()) for n in WITH_BLOCKS],
+)
 def test_python_runs(name, tmp_path, monkeypatch):
     """In order, in one session; what follows `>>>` is compared with what is shown."""
     monkeypatch.chdir(tmp_path)

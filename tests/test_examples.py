@@ -15,7 +15,17 @@ EXAMPLES = sorted(FOLDER.glob("*.py"))
 GALLERY = sorted((FOLDER / "gallery").glob("*.py"))
 
 
-@pytest.mark.parametrize("script", EXAMPLES, ids=lambda path: path.name)
+SLOW = {"base_parameters.py", "identify.py", "platform_size.py"}
+
+
+@pytest.mark.parametrize(
+    "script",
+    [
+        pytest.param(path, marks=pytest.mark.clients if path.name in SLOW else ())
+        for path in EXAMPLES
+    ],
+    ids=lambda path: path.name,
+)
 def test_it_runs(script, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("sys.argv", [str(script)])

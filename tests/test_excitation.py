@@ -16,7 +16,7 @@ import numpy as np
 import polars as pl
 import pytest
 from logs_of_motions import machine
-from mechanisms import CATALOG, random_machine, with_elbows
+from mechanisms import CATALOG, NIGHTLY, gated, random_machine, with_elbows
 from typer.testing import CliRunner
 
 import pteron
@@ -129,7 +129,7 @@ def test_every_machine_has_motions_that_keep_the_limits(name: str):
         assert margins(joints, limits).kept
 
 
-@pytest.mark.parametrize("name", ["five-bar", "par4"])
+@pytest.mark.parametrize("name", gated(["five-bar", "par4"]))
 def test_a_motion_of_every_machine_can_be_improved(name: str):
     found = optimal_excitation(
         CATALOG[name],
@@ -404,8 +404,8 @@ def test_the_measure_of_the_volume_is_the_log_det():
     ("robot", "space", "gain"),
     [
         ("tripteron", "platform", 2.0),
-        ("quadrupteron", "joints", 3),
-        ("delta", "platform", 2.0),
+        pytest.param("quadrupteron", "joints", 3, marks=NIGHTLY),
+        pytest.param("delta", "platform", 2.0, marks=NIGHTLY),
         ("mixed", "joints", 3.0),
     ],
 )

@@ -14,7 +14,7 @@ from tempfile import mkdtemp
 import numpy as np
 import pytest
 from logs_of_motions import Friction, log_of, motion
-from mechanisms import CATALOG, states, with_elbows
+from mechanisms import CATALOG, LARGE, NIGHTLY, gated, states, with_elbows
 from typer.testing import CliRunner
 
 import pteron
@@ -87,10 +87,16 @@ def run(folder):
 @pytest.mark.parametrize(
     ("name", "real", "compiler"),
     [
-        *((name, "float", "gcc") for name in ROBOTS),
+        ("five_bar", "float", "gcc"),
         ("delta", "double", "g++"),
-        ("delta", "double", "clang"),
-        ("quadrupteron", "float", "g++"),
+        *(
+            pytest.param(*case, marks=NIGHTLY)
+            for case in (
+                *((name, "float", "gcc") for name in ROBOTS if name != "five_bar"),
+                ("delta", "double", "clang"),
+                ("quadrupteron", "float", "g++"),
+            )
+        ),
     ],
 )
 def test_its_test_program_passes(tmp_path, name, real, compiler):
@@ -107,8 +113,9 @@ def test_its_test_program_passes(tmp_path, name, real, compiler):
     assert run(tmp_path) == (0, "all functions agree with the library\n")
 
 
-def test_every_function_can_be_exported_and_the_test_program_can_fail(tmp_path):
-    names = [name for name in pteron.kernels.FUNCTIONS if name != "base_regressor"]
+@pytest.mark.parametrize("left_out", gated([(), LARGE], [LARGE]), ids=len)
+def test_every_function_can_be_exported_and_the_test_program_can_fail(tmp_path, left_out):
+    names = [n for n in pteron.kernels.FUNCTIONS if n not in ("base_regressor", *left_out)]
     pteron.export_c(DELTA, names, tmp_path)
     build(tmp_path, ["delta.c", "test_delta.c"])
     assert run(tmp_path)[0] == 0
@@ -189,7 +196,7 @@ def stiff(robot, **more):
     return replace(robot, legs=tuple(legs))
 
 
-@pytest.mark.parametrize("name", ["quadrupteron-oblique", "delta", "par4", "five-bar"])
+@pytest.mark.parametrize("name", gated(["quadrupteron-oblique", "delta", "par4", "five-bar"]))
 def test_a_motion_of_the_joints_becomes_torques_of_the_motors(tmp_path, name):
     """Each call begins with the pose that the last one found; the first with a pose 1 mm off."""
     robot = stiff(CATALOG[name])
@@ -255,8 +262,8 @@ def test_what_a_drive_lacks_for_the_output_is_told_by_leg_and_key(tmp_path):
 @pytest.mark.parametrize(
     ("name", "shared"),
     [
-        ("quadrupteron", False),
-        ("quadrupteron-oblique", False),
+        pytest.param("quadrupteron", False, marks=NIGHTLY),
+        pytest.param("quadrupteron-oblique", False, marks=NIGHTLY),
         ("delta", True),
         ("five-bar", False),
     ],

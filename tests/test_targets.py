@@ -15,7 +15,17 @@ import casadi as ca
 import mpmath
 import numpy as np
 import pytest
-from mechanisms import CATALOG, MECHANISMS, NEAREST, random_machine, relative_error, states
+from mechanisms import (
+    CATALOG,
+    LARGE,
+    MECHANISMS,
+    NEAREST,
+    NIGHTLY,
+    gated,
+    random_machine,
+    relative_error,
+    states,
+)
 
 import pteron
 from pteron.controllers import CONTROLLERS
@@ -146,7 +156,7 @@ def assert_agrees(robot, what, target, **options):
 
 
 @needs_compiler
-@pytest.mark.parametrize("what", FUNCTIONS)
+@pytest.mark.parametrize("what", gated(FUNCTIONS, {*FUNCTIONS}.difference(LARGE)))
 def test_c_returns_the_same_bits(what):
     assert_agrees(ROBOT, what, "c")
 
@@ -163,11 +173,11 @@ def test_c_on_other_modes_layouts_and_gravity(name):
 @pytest.mark.parametrize(
     ("name", "what"),
     [
-        ("quadrupteron-oblique", "direct_kinematics"),
-        ("quadrupteron-oblique", DYNAMICS),
+        pytest.param("quadrupteron-oblique", "direct_kinematics", marks=NIGHTLY),
+        pytest.param("quadrupteron-oblique", DYNAMICS, marks=NIGHTLY),
         ("tripteron", DYNAMICS),
         ("delta", "direct_kinematics"),
-        ("random PRR 0", DYNAMICS),
+        pytest.param("random PRR 0", DYNAMICS, marks=NIGHTLY),
     ],
 )
 def test_numba_returns_the_same_bits(name, what):
