@@ -1,7 +1,11 @@
 """The machines of the gate stand for all others; `mechanisms.GATE` says how they were chosen."""
 
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
-from mechanisms import CATALOG, GATE, MACHINES, random_machine
+from mechanisms import CATALOG, GATE, MACHINES, NIGHTLY, random_machine
 from test_family import KINDS as MIXTURES
 
 from pteron.closures import KINDS as CLOSURES
@@ -40,3 +44,12 @@ def test_both_sides_of_each_choice_are_there():
     }
     for choice, of in choices.items():
         assert {of(robot) for robot in CHOSEN} == {True, False}, choice
+
+
+@NIGHTLY
+def test_the_table_says_which_cases_wait():
+    code = "import waiting; print(waiting.parts()[1] == waiting.table())"
+    run = [sys.executable, "-c", code]
+    folder = Path(__file__).parent
+    done = subprocess.run(run, cwd=folder, capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "True", "run python tests/waiting.py"
