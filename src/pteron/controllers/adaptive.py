@@ -97,7 +97,7 @@ class Adaptive(Controller):
             derivative = per_joint(model, "derivative", self.derivative)
         start = self.base(model).values(model)
         if self.friction:
-            drives = drive_numbers(model)[: len(ADAPTED) * model.freedom]
+            drives = drive_numbers(model)[: len(ADAPTED) * model.joint_count]
             start = np.concatenate([start, drives])
         rate = _SHARE * slope.min() if self.adaptation is None else self.adaptation
         known = shown(model, self.motion)

@@ -57,9 +57,9 @@ def period_of(value: float) -> float:
 def per_joint(model: Manipulator, name: str, value: PerJoint) -> Array:
     """Return a number for each joint (n,)."""
     found = np.asarray(value, dtype=float)
-    if found.ndim and found.shape != (model.freedom,):
+    if found.ndim and found.shape != (model.joint_count,):
         raise DataError(
-            f"{name}: {found.size} numbers given, but {model.name} has {model.freedom} joints "
+            f"{name}: {found.size} numbers given, but {model.name} has {model.joint_count} joints "
             f"({', '.join(model.joint_names)}); give one for each, or one for all"
         )
-    return np.broadcast_to(found, model.freedom)
+    return np.broadcast_to(found, model.joint_count)

@@ -143,10 +143,10 @@ class Law:
     @property
     def gain_names(self) -> tuple[str, ...]:
         """Names of the gains: "proportional_1" for joint 1, and so on."""
-        joints = range(1, self.model.freedom + 1)
+        joints = range(1, self.model.joint_count + 1)
         estimates: tuple[str, ...] = () if self.base is None else self.base.names
         if self.what == "adaptive_drives":
-            estimates += drive_names(self.model)[: len(ADAPTED) * self.model.freedom]
+            estimates += drive_names(self.model)[: len(ADAPTED) * self.model.joint_count]
         found: list[str] = []
         for name, per in GAINS[self.what].items():
             if per == "joint":

@@ -50,7 +50,7 @@ class Shown:
     @cached_property
     def columns(self) -> Array:
         """(B, n, K): forces at the joints per unit of every estimate."""
-        n = self.robot.freedom
+        n = self.robot.joint_count
         rates = joint_rates(self.robot, *self.motion[:2]).actuated
         seconds = joint_accelerations(self.robot, *self.motion).actuated
         drives = [seconds, np.sign(rates), rates, np.ones_like(rates)]
@@ -75,7 +75,7 @@ class Shown:
         rates = joint_rates(self.robot, *self.motion[:2]).actuated
         speed = np.sqrt((rates**2).mean(axis=0))
         least = _DRIVES * joint_masses(self.robot), force, force / speed, force
-        own = np.abs(drive_numbers(self.robot)[: len(ADAPTED) * self.robot.freedom])
+        own = np.abs(drive_numbers(self.robot)[: len(ADAPTED) * self.robot.joint_count])
         drives = np.maximum(own, np.concatenate(least))
         return np.concatenate([np.abs(self.base.grouping) @ sizes, drives])
 
@@ -158,7 +158,4 @@ def typical(robot: Manipulator) -> Shown:
 def _units(robot: Manipulator) -> Array:
     """Return the change of each coordinate of the pose (m,) that moves a platform point by 1 m."""
     lever = max(float(np.linalg.norm(leg.platform_point)) for leg in robot.legs)
-    unit = np.ones(robot.freedom)
-    if robot.platform.turns and lever > 0.0:
-        unit[-1] = 1.0 / lever
-    return unit
+    return np.where(robot.platform.angular & (lever > 0.0), 1.0 / (lever or 1.0), 1.0)

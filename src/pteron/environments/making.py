@@ -90,8 +90,8 @@ def _forces(robot: Manipulator, home: Array) -> Array:
     rows = jacobian(robot, home)
     rotors = np.diag([leg.drive.inertia if leg.drive else 0.0 for leg in robot.legs])
     mass = mass_matrix(robot, home) + rows.T @ rotors @ rows
-    turning = np.array([name == "phi" for name in robot.coordinates])
-    lively = np.linalg.solve(rows.T, mass * np.where(turning, _LIVELY / LEVER, _LIVELY))
+    most = np.where(robot.platform.angular, _LIVELY / LEVER, _LIVELY)
+    lively = np.linalg.solve(rows.T, mass * most)
     enough = 2.0 * np.abs(drive_forces(robot, home, rest, rest)) + np.abs(lively).sum(axis=1)
     limits = [(leg.drive or Drive()).max_force for leg in robot.legs]
     return np.array(

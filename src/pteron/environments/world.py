@@ -81,7 +81,7 @@ class World:
         size = max(
             hypot(*leg.guide_point) + leg.size + hypot(*leg.platform_point) for leg in robot.legs
         )
-        turning = self._turning
+        turning = self.robot.platform.angular
         pose, rate = np.where(turning, 2.0 * np.pi, size), np.where(turning, TURN, SPEED)
         return np.concatenate([pose, rate, pose, rate])
 
@@ -100,12 +100,10 @@ class World:
 
     def distance(self, state: State) -> Array:
         """Return how far machines are from their targets (...), m."""
-        away = (self.target(state)[0] - state.pose) * np.where(self._turning, LEVER, 1.0)
+        away = (self.target(state)[0] - state.pose) * np.where(
+            self.robot.platform.angular, LEVER, 1.0
+        )
         return np.asarray(np.sqrt((away**2).sum(axis=-1)))
-
-    @cached_property
-    def _turning(self) -> Bools:
-        return np.array([name == "phi" for name in self.robot.coordinates])
 
     def started(
         self, generators: Sequence[np.random.Generator], options: Mapping[str, Any] | None
@@ -133,7 +131,7 @@ class World:
 
     def _drawn(self, generators: Sequence[np.random.Generator]) -> Array:
         """Return a random pose of each generator with reserve enough, or home where it has none."""
-        half = np.where(self._turning, _ANGLE, self.spread)
+        half = np.where(self.robot.platform.angular, _ANGLE, self.spread)
         shape = (_DRAWS, self.robot.freedom)
         drawn = np.stack([rng.uniform(-1.0, 1.0, shape) for rng in generators])
         poses = self.home + half * drawn

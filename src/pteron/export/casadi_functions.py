@@ -55,7 +55,7 @@ def casadi_functions(robot: RobotLike) -> dict[str, ca.Function]:
     Parameters
     ----------
     robot : Manipulator, name or path
-        The machine, with n joints and m = n pose coordinates.
+        The machine, with n joints and m pose coordinates.
 
     Returns
     -------

@@ -87,13 +87,13 @@ def banner(robot: Manipulator, language: str) -> list[str]:
 
 def meaning(robot: Manipulator, port: Port, output: Output) -> str:
     """Return the meaning of an input or an output, with its unit."""
-    lengths = ", ".join(name for name in robot.platform.coordinates if name != "phi")
+    lengths, angles = ", ".join(robot.platform.lengths), ", ".join(robot.platform.angles)
     units = [leg.joint.unit for leg in robot.legs]
     joints = _by_leg(units)
     forces = _by_leg([leg.joint.force_unit for leg in robot.legs])
     angle, rate, second, moment = (
-        (", phi in rad", ", rad/s", ", rad/s^2", ", N m about k")
-        if robot.platform.turns
+        (f", {angles} in rad", ", rad/s", ", rad/s^2", ", N m about k")
+        if angles
         else ("", "", "", "")
     )
     texts = {

@@ -157,14 +157,13 @@ _Part = tuple[str, Kind, str, list[Variable]] | tuple[str, Kind, str, list[Varia
 
 def _parts(robot: Manipulator, pose: Array, forces: Array) -> Iterator[_Part]:
     coordinates = robot.platform.coordinates
-    lengths = ["rad" if name == "phi" else "m" for name in coordinates]
-    moments = ["N.m" if name == "phi" else "N" for name in coordinates]
+    units = robot.units
     legs = list(enumerate((leg.joint for leg in robot.legs), start=1))
 
     def of_pose(word: str, per: str, told: str, start: list[float] | None) -> list[Variable]:
         return [
             Variable(f"{word}.{name}", unit + per, f"{told} {name}", start[k] if start else None)
-            for k, (name, unit) in enumerate(zip(coordinates, lengths, strict=True))
+            for k, (name, unit) in enumerate(zip(coordinates, units, strict=True))
         ]
 
     rest = [0.0] * len(coordinates)
@@ -195,15 +194,18 @@ def _parts(robot: Manipulator, pose: Array, forces: Array) -> Iterator[_Part]:
     ]
     yield "forces", "INPUT", "offsetof(Values, forces)", inputs
     inputs = [
-        Variable(f"wrench.{name}", unit, f"What acts on the platform at P along {name}", 0.0)
-        for name, unit in zip(coordinates, moments, strict=True)
+        Variable(
+            *(f"wrench.{name}", "N.m" if unit == "rad" else "N"),
+            *(f"What acts on the platform at P along {name}", 0.0),
+        )
+        for name, unit in zip(coordinates, units, strict=True)
     ]
     yield "wrench", "INPUT", "offsetof(Values, wrench)", inputs
     # Each state's rate is a variable of its own: some tools do not take an output in its place.
     for name, per, place in (("pose", "/s", "VELOCITY"), ("velocity", "/s2", "ACCELERATION")):
         rates = [
             Variable(f"der({name}.{c})", unit + per, f"Rate of {name}.{c}")
-            for c, unit in zip(coordinates, lengths, strict=True)
+            for c, unit in zip(coordinates, units, strict=True)
         ]
         yield f"{name}_rates", "RESULT", place, rates, name
     yield from _payload(robot)
@@ -214,13 +216,13 @@ def _payload(robot: Manipulator) -> Iterator[_Part]:
     """Yield the payload's parameters: its mass, and what matters where the platform turns."""
     told = [Variable("payload.mass", "kg", "A body that the platform carries", 0.0, 0.0)]
     yield "payload.mass", "START", "offsetof(Values, payload)", told
-    if robot.platform.turns and not robot.platform.slides:
+    if robot.platform.rotation_axes:
         told = [
             Variable(f"payload.{x}", "m", f"Its centre of mass in the platform frame, {x}", 0.0)
             for x in "xy"
         ]
         yield "payload.centre", "START", "offsetof(Values, payload) + sizeof(double)", told
-    if robot.platform.turns:
+    if robot.platform.angles:
         axis = "Its inertia about the axis through its own centre"
         told = [Variable("payload.inertia", "kg.m2", axis, 0.0, 0.0)]
         yield "payload.inertia", "START", "offsetof(Values, payload) + 3 * sizeof(double)", told

@@ -283,9 +283,8 @@ def _states(
         states.append(
             [np.array(known.get(port.name, rng.normal(size=port.shape))) for port in ports]
         )
-    far = 100.0 * np.arange(1, robot.freedom + 1)
     beyond = [
-        value + far if port.name in ("pose", "joints") else value
+        value + 100.0 * np.arange(1, len(value) + 1) if port.name in ("pose", "joints") else value
         for port, value in zip(ports, states[0], strict=True)
     ]
     return [*states, beyond]

@@ -84,7 +84,7 @@ def read_identified(robot: Manipulator, path: str | Path) -> Identified:
         same = list(base.names) == names and list(base.expressions(digits=12)) == expressions
     except ModelError:
         same = False
-    if not same or len(found) != robot.freedom or values.shape != (base.rank,):
+    if not same or len(found) != robot.joint_count or values.shape != (base.rank,):
         raise DataError(
             f"{path}: base parameters of another machine ({str(data.get('robot'))[:60]!r}), not of "
             f"{robot.name!r}: names or groupings differ; give the robot that was identified"

@@ -79,7 +79,7 @@ class _Arm:
     def of(cls, platform: Platform) -> _Arm:
         x, y, z = (platform.directions @ axis for axis in platform.frame)
         a, b, c = platform.tool
-        if not platform.turns:
+        if not platform.angles:
             return cls(a * x + b * y + c * z, np.zeros_like(x), np.zeros_like(x))
         return cls(c * z, a * x + b * y, a * y - b * x)
 
@@ -97,12 +97,9 @@ class _Arm:
         parts = (part.tolist() for part in (self.still, self.cosine, self.sine))
         return [list(row) for row in zip(*parts, strict=True)]
 
-    def at(self, pose: Array) -> Array:
-        """Return it at a pose (m,), with 0 for the angle."""
-        place = np.zeros_like(pose)
-        turned = np.cos(pose[-1]) * self.cosine + np.sin(pose[-1]) * self.sine
-        place[: len(self.still)] = self.still + turned
-        return place
+    def at(self, angle: float) -> Array:
+        """Return it at an angle of the platform."""
+        return np.asarray(self.still + np.cos(angle) * self.cosine + np.sin(angle) * self.sine)
 
 
 def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
@@ -152,7 +149,9 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
     home = start_pose(robot)
     axes, joints = _axes(robot), tuple(_joints(robot, home))
     arm = _Arm.of(robot.platform)
-    seen = home + arm.at(home)
+    angular = robot.platform.angular
+    seen = home.copy()
+    seen[~angular] += arm.at(float(home[angular].sum()))
     values = {
         "banner": [line for line in banner(robot, "LinuxCNC") if "SI units" not in line],
         "prefix": prefix,
@@ -165,7 +164,7 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
         "freedom": robot.freedom,
         "modes": exported[1].outputs[0].shape[0] if closed else 0,
         "lengths": len(robot.platform.lengths),
-        "free": _turns_freely(robot),
+        "free": bool(robot.wraps.any()),
         "places": [
             next(
                 (
@@ -213,18 +212,12 @@ def _linear(robot: Manipulator) -> bool:
     )
 
 
-def _turns_freely(robot: Manipulator) -> bool:
-    """Return whether a whole turn of the platform leaves the joints as they were."""
-    held = any(leg.follows_angle for leg in robot.legs)
-    return robot.platform.turns and not robot.platform.slides and not held
-
-
 def _axes(robot: Manipulator) -> tuple[_Axis, ...]:
     """Return the axes of LinuxCNC that the pose's coordinates are."""
     letters = iter("XYZ")
     found = []
-    for name in robot.platform.coordinates:
-        if name != "phi":
+    for name, unit in zip(robot.coordinates, robot.units, strict=True):
+        if unit == "m":
             letter = next(letters)
             found.append(_Axis(letter, f"tran.{letter.lower()}", name, _MILLIMETRES))
             continue
@@ -245,7 +238,7 @@ def _joints(robot: Manipulator, home: Array) -> Iterator[_Joint]:
         least, most = leg.limits or (None, None)
         speed = leg.drive.max_speed if leg.drive else None
         middle, turns = None, 0.0
-        if angular and not leg.follows_angle:  # limits may hold half a turn, where angles jump
+        if leg.goes_round:  # limits may hold half a turn, where angles jump
             middle = 0.0 if leg.limits is None else sum(leg.limits) / 2.0
             turns = math.floor((middle - at) / (2.0 * math.pi) + 0.5)
         yield _Joint(

@@ -188,7 +188,7 @@ def _parts(robot: Manipulator, poses: Array, p: Array) -> tuple[Part, ...]:
     frame = np.array(platform.frame)
     arms = np.array([leg.platform_point for leg in robot.legs])
     still = np.array([leg.fixed_offset for leg in robot.legs]) @ frame.T
-    if not platform.turns:
+    if not platform.angles:
         arms, still = arms + still, np.zeros_like(still)
     found = [Part(p, p[..., None, :] + platform.arms(_corners(arms), poses))]
     for hinge in _distinct(arms):

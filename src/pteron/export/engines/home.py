@@ -85,6 +85,7 @@ def _worth(robot: Manipulator, poses: Array) -> Array:
     held = type_ii_sizes(robot, poses)
     room = numeric(robot, "passive_room")(poses)[0].min(axis=-1)
     worth = np.minimum(bent, held)
-    if robot.platform.turns:  # a machine seldom works the wrong way round
-        worth = np.minimum(worth, 1.0 - np.abs(poses[:, -1]) / np.pi)
+    # A machine seldom works the wrong way round.
+    turned = np.abs(poses[:, robot.platform.angular]).max(axis=1, initial=0.0)
+    worth = np.minimum(worth, 1.0 - turned / np.pi)
     return np.asarray(np.nan_to_num(np.where(room < 0.0, room, worth), nan=-1.0))

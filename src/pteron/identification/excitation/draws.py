@@ -122,7 +122,7 @@ def sizes(robot: Manipulator, space: Space) -> Array:
     metres = 0.25 * float(np.mean([leg.size for leg in robot.legs]))
     if space == "joints":
         return np.array([metres / leg.lever for leg in robot.legs])
-    return np.array([1.0 if name == "phi" else metres for name in robot.coordinates])
+    return np.where(robot.platform.angular, 1.0, metres)
 
 
 def is_clear(motion: Movement, limits: Limits, samples: int, clear: float = _CLEAR) -> bool:

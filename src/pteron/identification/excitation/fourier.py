@@ -160,10 +160,10 @@ class FourierMotion:
         if self.space == "platform":
             return state_of_platform(robot, q, dq, ddq)
         poses: Array = unchecked(robot, "closure_poses", np.vstack([self.center, q]))
-        center, pose = poses[0, self.mode], poses[1:, self.mode].copy()
-        if robot.platform.turns and not any(leg.follows_angle for leg in robot.legs):
-            # Within a mode phi stays on one side of the singular orientations, half a turn at most.
-            pose[:, -1] = center[-1] + (pose[:, -1] - center[-1] + np.pi) % (2.0 * np.pi) - np.pi
+        center, pose = poses[0, self.mode], poses[1:, self.mode]
+        # Within a mode angles stay on one side of the singular orientations, half a turn at most.
+        apart = (pose - center + np.pi) % (2.0 * np.pi) - np.pi
+        pose = np.where(robot.wraps, center + apart, pose)
         velocity, acceleration = unchecked(robot, "platform_motion", pose, dq, ddq)
         return State(pose, velocity, acceleration, q, dq, ddq)
 

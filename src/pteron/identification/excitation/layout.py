@@ -41,7 +41,7 @@ class Layout:
     length_unit : {"m", "mm", "um"}
         Of sliders and poses. Rates and accelerations are in that unit a second, forces in N (N m).
     angle_unit : {"rad", "deg"}
-        Of cranks and phi.
+        Of cranks and the pose's angles.
     time_unit : {"s", "ms", "us"}
         Of the column t.
     separator : str, optional
@@ -94,7 +94,7 @@ class Layout:
             If the machine has another number of joints, or two columns would be called alike.
         """
         joints = {leg.joint.unit: self._unit(leg.joint.unit) for leg in robot.legs}
-        turns, poses = "phi" in robot.coordinates, self.contents != "joints"
+        turns, poses = bool(robot.platform.angles), self.contents != "joints"
         found = Description(
             csv=self.dialect,
             time_unit=self.time_unit,
@@ -124,7 +124,7 @@ class Layout:
         robot = movement.robot
         self.description(robot)
         samples = movement.duration * rate
-        expect_to_fit("rate", rate, 8.0 * samples * (robot.freedom + len(robot.legs)))
+        expect_to_fit("rate", rate, 8.0 * samples * (robot.freedom + robot.joint_count))
         ticks = np.arange(math.ceil(samples - _ROUNDING) + 1)
         state = movement.states(ticks / rate)
         values = {"joints": [state.joints], "poses": [state.pose]}.get(self.contents) or [
@@ -140,7 +140,7 @@ class Layout:
         """Return the columns behind t, and what they are in, in SI units."""
         names = self.joint_columns or robot.joint_names
         joints = [(name, leg.joint.unit) for name, leg in zip(names, robot.legs, strict=True)]
-        pose = [(name, "rad" if name == "phi" else "m") for name in robot.coordinates]
+        pose = list(zip(robot.coordinates, robot.units, strict=True))
         if self.contents != "all":
             return joints if self.contents == "joints" else pose
         found = joints + pose

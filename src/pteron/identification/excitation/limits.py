@@ -56,8 +56,8 @@ class Limits:
         Least distance of the actuated joints from their limits, m or rad; without effect on a joint
         that has none.
     passive_clearance : float
-        Least distance of the passive joints and of phi from their limits, over half their ranges,
-        in [0, 1).
+        Least distance of the passive joints and of the pose's angles from their limits, over half
+        their ranges, in [0, 1).
 
     Raises
     ------
@@ -126,12 +126,12 @@ def per_joint(limits: Limits, name: str, robot: Manipulator) -> Array:
     """Return a limit of each joint (n,), infinite where there is none."""
     given = getattr(limits, name)
     values = np.atleast_1d(np.array(np.inf if given is None else given, dtype=float))
-    if values.size not in (1, robot.freedom):
+    if values.size not in (1, robot.joint_count):
         raise DataError(
-            f"limits: {values.size} numbers for {name}, one expected or {robot.freedom}, one for "
-            f"each joint of {robot.name}"
+            f"limits: {values.size} numbers for {name}, one expected or {robot.joint_count}, one "
+            f"for each joint of {robot.name}"
         )
-    return np.broadcast_to(values, (robot.freedom,)).copy()
+    return np.broadcast_to(values, (robot.joint_count,)).copy()
 
 
 def joint_sizes(robot: Manipulator) -> Array:

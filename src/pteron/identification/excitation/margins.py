@@ -173,7 +173,7 @@ def _limits_passive(robot: Manipulator) -> bool:
 def _margins_of(robot: Manipulator, limits: Limits, state: State) -> dict[str, Array]:
     """Return every limit's margins (T, n) or (T, 1), -inf where the machine cannot be."""
     found = {"type_i": unchecked(robot, "reach", state.pose)[1] - limits.type_i}
-    if closure_of(robot).vanishes() is None or robot.platform.turns:
+    if closure_of(robot).vanishes() is None or robot.platform.angles:
         type_ii = np.abs(unchecked(robot, "type_ii", state.pose))[:, None]
         found["type_ii"] = type_ii / best_type_ii(robot) - limits.type_ii
     if any(leg.limits for leg in robot.legs):

@@ -74,6 +74,7 @@ class Simulation:
         error = self.error
         parts = zip(
             self.robot.coordinates,
+            self.robot.units,
             np.sqrt((error**2).mean(axis=0)),
             np.abs(error).max(axis=0),
             self.robot.joint_names,
@@ -85,12 +86,11 @@ class Simulation:
         )
         rows = [
             (
-                *(name, _with_unit(rms, "rad" if name == "phi" else "m")),
-                *(_with_unit(most, "rad" if name == "phi" else "m"), joint),
-                *(_with_unit(speed, f"{kind.unit}/s"), _with_unit(force, kind.force_unit)),
+                *(name, f"{rms:.4g} {unit}", f"{most:.4g} {unit}", joint),
+                *(f"{speed:.4g} {kind.unit}/s", f"{force:.4g} {kind.force_unit}"),
                 f"{100.0 * share:.3g} %",
             )
-            for name, rms, most, joint, speed, force, share, kind in parts
+            for name, unit, rms, most, joint, speed, force, share, kind in parts
         ]
         about = f"simulated for {self.time[-1]:.6g} s, {len(self.time)} samples"
         notes = [f"Stopped: {self.stopped}"] if self.stopped else []
@@ -137,7 +137,3 @@ class Simulation:
         for titles, values in blocks:
             columns |= dict(zip(titles, values.T, strict=True))
         return pl.DataFrame(columns | {"payload": self.payload})
-
-
-def _with_unit(value: float, unit: str) -> str:
-    return f"{value:.4g} {unit}"

@@ -119,7 +119,7 @@ def choose(sizing: Sizing, motors: Sequence[Motor], *, margin: float = 1.0) -> t
     if not 1.0 <= margin < math.inf:
         raise DataError(f"margin: {margin} given, a number of 1 or more expected")
     found = []
-    for leg in range(1, sizing.robot.freedom + 1):
+    for leg in range(1, sizing.robot.joint_count + 1):
         fits = [_fit(sizing, leg, motor, margin) for motor in motors]
         found += sorted(fits, key=_place)
     return tuple(found)

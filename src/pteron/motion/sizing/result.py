@@ -244,7 +244,7 @@ class Sizing:
         columns = [pl.Series(k, np.asarray(v), nan_to_null=True) for k, v in numbers.items()]
         return pl.DataFrame(
             [
-                pl.Series("leg", range(1, self.robot.freedom + 1)),
+                pl.Series("leg", range(1, self.robot.joint_count + 1)),
                 pl.Series("joint", [joint.noun for joint in joints]),
                 pl.Series("force_unit", [joint.force_unit for joint in joints]),
                 pl.Series("speed_unit", [f"{joint.unit}/s" for joint in joints]),

@@ -245,7 +245,7 @@ def _beyond(way: _Way, at: float, leg: int, told: str, metres: float) -> _Failur
 
 def _failed_type_ii(way: _Way, marks: Array) -> _Failure | None:
     robot = way.robot
-    if closure_of(robot).vanishes() is False and not robot.platform.turns:
+    if closure_of(robot).vanishes() is False and not robot.platform.angles:
         return None
 
     def measure(at: Array) -> Array:

@@ -110,13 +110,14 @@ class Cycle:
     def at(self, tau: Array) -> tuple[Array, Array, Array]:
         """Return poses (T, m) at times `tau` (T,) in [0, 1], and two derivatives by tau."""
         place, velocity, acceleration = self.path(tau)
-        place = self.around[: place.shape[1]] + place
-        if not self.platform.turns:
+        angular = self.platform.angular
+        place = self.around[~angular] + place
+        if not self.platform.angles:
             return place, velocity, acceleration
         turned, rate, growth = (self.scale * self.turn * s[:, None] for s in _shares(tau)[0])
-        angle = self.around[-1:] + turned
-        # The middle is told as a pose of P, the path as that of the tool.
-        middle, _ = turning_arm(self.platform, self.around[-1:])
+        angle = self.around[angular] + turned
+        # The middle is given as a pose of P, the path as that of the tool.
+        middle, _ = turning_arm(self.platform, self.around[angular])
         return pose_motion(
             self.platform,
             np.hstack([place + middle, angle]),

@@ -77,7 +77,7 @@ def demand(robot: Manipulator, pose: Array, first: Array, second: Array) -> Dema
     drives = Drives(*np.split(drive_numbers(robot), len(Drives._fields)))
     pushed = unchecked(robot, "inverse_dynamics", pose, rest, first)
     swept = unchecked(robot, "inverse_dynamics", pose, first, second)
-    count = len(robot.platform.lengths)
+    lengths = ~robot.platform.angular
     _, speed, bend = tool_motion(robot.platform, pose, first, second)
     return Demand(
         rates,
@@ -87,7 +87,7 @@ def demand(robot: Manipulator, pose: Array, first: Array, second: Array) -> Dema
         swept - weight + drives.inertia * bends,
         np.array([drives.coulomb, drives.coulomb + drives.stribeck]),
         np.asarray(drives.viscous),
-        (speed[:, :count], bend[:, :count]),
+        (speed[:, lengths], bend[:, lengths]),
     )
 
 

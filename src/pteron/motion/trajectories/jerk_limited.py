@@ -87,7 +87,7 @@ def jerk_limited(
     robot = as_manipulator(robot)
     ends = [checked_one(robot, start, "start"), checked_one(robot, end, "end")]
     kept = limits_of(robot) if limits is None else limits
-    jerks = per_joint(robot, "jerk", jerk, [None] * robot.freedom)
+    jerks = per_joint(robot, "jerk", jerk, [None] * robot.joint_count)
     if not np.isfinite([*kept.acceleration, *jerks]).all():
         raise DataError(
             "a motion with limited jerk needs jerk and acceleration of every joint; give both"
@@ -96,9 +96,8 @@ def jerk_limited(
         _joints(robot, name, pose) for name, pose in zip(("start", "end"), ends, strict=True)
     )
     # The shorter way round, where the limits of a crank leave one.
-    for i, leg in enumerate(robot.legs):
-        if leg.joint.unit == "rad" and leg.limits is None and not leg.follows_angle:
-            last[i] = first[i] + (last[i] - first[i] + np.pi) % (2.0 * np.pi) - np.pi
+    free = [leg.goes_round and leg.limits is None for leg in robot.legs]
+    last = np.where(free, first + _within_half_a_turn(last - first), last)
     if np.abs(last - first).max() <= _NEAR:
         raise DataError("end: the joints are at start's already; give another pose")
     planned = _planned(first, last, kept, jerks)
@@ -130,6 +129,11 @@ def jerk_limited(
     return kept_motion(robot, course, kept, step)
 
 
+def _within_half_a_turn(angles: Array) -> Array:
+    """Return angles, rad, less whole turns: from -pi to pi."""
+    return (angles + np.pi) % (2.0 * np.pi) - np.pi
+
+
 def _joints(robot: Manipulator, name: str, pose: Array) -> Array:
     try:
         return inverse_kinematics(robot, pose)
@@ -143,12 +147,12 @@ def _joints(robot: Manipulator, name: str, pose: Array) -> Array:
 def _expect_modes(robot: Manipulator, motion: Motion, planned: Any, end: Array) -> None:
     """Refuse a motion that leaves the machine's working mode, or ends in another pose."""
     off = motion.pose[-1] - end
-    if robot.platform.turns and not any(leg.follows_angle for leg in robot.legs):
-        off[-1] = (off[-1] + np.pi) % (2.0 * np.pi) - np.pi
+    off = np.where(robot.wraps, _within_half_a_turn(off), off)
     joints = np.array([planned.at_time(t)[0] for t in motion.time])
-    turns = np.where([leg.joint.unit == "rad" for leg in robot.legs], 2.0 * np.pi, np.inf)
     away = joints - inverse_kinematics(robot, motion.pose)
-    away -= np.where(np.isinf(turns), 0.0, np.round(away / turns) * 2.0 * np.pi)
+    away = np.where(
+        [leg.joint.unit == "rad" for leg in robot.legs], _within_half_a_turn(away), away
+    )
     if max(np.abs(off).max(), np.abs(away).max()) > _NEAR:
         raise UnreachablePose(
             "end: the joints' way leads to another assembly or working mode there; go by way of "

@@ -109,12 +109,12 @@ def per_joint(
         return np.array([math.inf if value is None else value for value in own])
     several = list(given) if isinstance(given, Sequence | np.ndarray) else [given]
     values = [_positive(name, value) for value in several]
-    if len(values) not in (1, robot.freedom):
+    if len(values) not in (1, robot.joint_count):
         raise DataError(
-            f"{name}: {len(values)} numbers given, one expected or {robot.freedom}, one for each "
-            f"joint of {robot.name}"
+            f"{name}: {len(values)} numbers given, one expected or {robot.joint_count}, one for "
+            f"each joint of {robot.name}"
         )
-    return np.broadcast_to(np.array(values), (robot.freedom,)).copy()
+    return np.broadcast_to(np.array(values), (robot.joint_count,)).copy()
 
 
 def _positive(name: str, value: object) -> float:

@@ -164,7 +164,7 @@ def line_path(robot: RobotLike, poses: ArrayLike, corner: float = 0.0) -> LinePa
 
 def path_weights(platform: Platform) -> Array:
     """Return the length of path (m,) that a unit of each coordinate counts as: m/m or m/rad."""
-    return np.array([TURN if name == "phi" else 1.0 for name in platform.coordinates])
+    return np.where(platform.angular, TURN, 1.0)
 
 
 def _rounded(

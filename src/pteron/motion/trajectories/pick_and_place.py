@@ -124,7 +124,7 @@ def pick_and_place(
             robot, middle, direction=direction, turn=turn, least=least
         )
     across, up = moves(robot, direction, 1)[0]
-    angle = turn if robot.platform.turns else 0.0
+    angle = turn if robot.platform.angles else 0.0
     cycle = Cycle(robot.platform, middle, across, up, angle, scale)
     if duration is None:
         # Accelerations go with 1 / duration^2.

@@ -128,9 +128,8 @@ def _read(rows: Table, columns: Sequence[str]) -> tuple[Array, Array]:
 
 
 def _turned_on(robot: Manipulator, poses: Array) -> Array:
-    """Return poses (T, m) whose angle goes on where, in a table, it jumps by a turn."""
-    angles = [name == "phi" for name in robot.coordinates]
-    return np.where(angles, np.unwrap(poses, axis=0), poses)
+    """Return poses (T, m) whose angles are continuous where, in a table, they jump by a turn."""
+    return np.where(robot.platform.angular, np.unwrap(poses, axis=0), poses)
 
 
 def _spline(time: Array, values: Array) -> tuple[Array, Array, Array]:

@@ -155,7 +155,7 @@ def _keeps(robot: Manipulator, poses: Array, least: float) -> bool:
     type_i = numeric(robot, "reach")(poses)[1]
     if not (type_i >= least + _DIP).all():  # NaN, out of reach, compares false
         return False
-    if closure_of(robot).vanishes() is not False or robot.platform.turns:
+    if closure_of(robot).vanishes() is not False or robot.platform.angles:
         type_ii = type_ii_sizes(robot, poses) / best_type_ii(robot)
         if not (type_ii >= least + _DIP).all():
             return False

@@ -12,7 +12,7 @@ Curve = tuple[Array, Array, Array]
 
 
 def tool_motion(platform: Platform, pose: Array, first: Array, second: Array) -> Curve:
-    """Return where the tool is, along the pose's lengths, with phi, and two derivatives.
+    """Return the tool's place along the pose's lengths, with its angles, and two derivatives.
 
     The way from P to the tool along the platform's axis, which is constant, is left out.
     """
@@ -25,15 +25,16 @@ def pose_motion(platform: Platform, place: Array, first: Array, second: Array) -
 
 
 def _moved(platform: Platform, curve: Curve, side: float) -> Curve:
-    if not platform.turns or not any(platform.tool[:2]):
+    if not platform.angles or not any(platform.tool[:2]):
         return curve
     place, velocity, acceleration = (part.copy() for part in curve)
-    rate, growth = velocity[..., -1:], acceleration[..., -1:]
-    # P leads to the tool by an arm, of which a part turns with the platform.
-    arm, lever = turning_arm(platform, place[..., -1:])
-    place[..., :-1] += side * arm
-    velocity[..., :-1] += side * rate * lever
-    acceleration[..., :-1] += side * (growth * lever - rate**2 * arm)
+    angular = platform.angular
+    rate, growth = velocity[..., angular], acceleration[..., angular]
+    # The arm from P to the tool turns in part with the platform.
+    arm, lever = turning_arm(platform, place[..., angular])
+    place[..., ~angular] += side * arm
+    velocity[..., ~angular] += side * rate * lever
+    acceleration[..., ~angular] += side * (growth * lever - rate**2 * arm)
     return place, velocity, acceleration
 
 
