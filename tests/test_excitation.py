@@ -33,9 +33,9 @@ from pteron.identification.excitation import (
     stacked_regressor,
 )
 from pteron.identification.excitation.conditioning import condition_of_long
-from pteron.identification.excitation.draws import within_limits
 from pteron.identification.excitation.limits import UNITS
-from pteron.identification.excitation.program import measure
+from pteron.identification.excitation.random_motions import within_limits
+from pteron.identification.excitation.search_program import measure
 from pteron.identification.logs import read_log
 
 MACHINES = {

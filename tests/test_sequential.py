@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from pteron.identification.excitation.sequential import Program, sequential_minimum
+from pteron.identification.excitation.sequential import NonlinearProgram, sequential_minimum
 
-ROSENBROCK = Program(
+ROSENBROCK = NonlinearProgram(
     lambda x: (
         100.0 * (x[1] - x[0] ** 2) ** 2 + (1.0 - x[0]) ** 2,
         np.array(
@@ -18,14 +18,14 @@ ROSENBROCK = Program(
     lambda x: np.array([1.5 - x @ x]),
     lambda x: -2.0 * x[None, :],
 )
-SPHERE = Program(
+SPHERE = NonlinearProgram(
     lambda x: (x.sum() if x[0] > -1.9 else np.nan, np.ones(3)),
     lambda x: np.array([1.0 - x @ x, x[2] + 0.1]),
     lambda x: np.array([-2.0 * x, [0.0, 0.0, 1.0]]),
 )
 
 
-def minimum(program: Program, start: list[float]) -> np.ndarray | None:
+def minimum(program: NonlinearProgram, start: list[float]) -> np.ndarray | None:
     return sequential_minimum(
         program,
         np.array(start),

@@ -32,7 +32,7 @@ from pteron.motion import (
     time_optimal,
     with_payload,
 )
-from pteron.motion.trajectories.polynomials import polynomial
+from pteron.motion.trajectories.time_polynomials import polynomial
 from pteron.tables import Table
 from pteron.workspace import home_pose
 

@@ -9,7 +9,7 @@ from scipy.interpolate import make_interp_spline
 import pteron
 from pteron.identification import Processing, Terms, identify
 from pteron.identification.excitation import FourierMotion, Limits, found_lead
-from pteron.identification.excitation.result import Excitation
+from pteron.identification.excitation.excitation import Excitation
 
 SPEEDS = np.array([0.02, 0.03, 0.015])
 FALLS = np.array([1.5, 2.0, 1.0])

@@ -7,10 +7,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from pteron.controllers.adaptation_scales import Moves, scales_of, typical_scales
 from pteron.controllers.controller import Controller
-from pteron.controllers.gain_numbers import PerJoint, per_joint
 from pteron.controllers.joint_masses import joint_masses
-from pteron.controllers.shown import Moves, shown, typical
+from pteron.controllers.joint_numbers import PerJoint, per_joint
 from pteron.equations.control import ADAPTED
 from pteron.equations.drives import drive_numbers
 from pteron.kernels import Array
@@ -86,7 +86,7 @@ class Adaptive(Controller):
 
     def base(self, model: Manipulator) -> BaseParameters:
         """Return the base parameters that it estimates of a machine."""
-        return typical(model).base
+        return typical_scales(model).base
 
     def gains(self, model: Manipulator) -> Array:
         """Return its gains (G,) for a machine; see `Controller.gains`."""
@@ -100,7 +100,7 @@ class Adaptive(Controller):
             drives = drive_numbers(model)[: len(ADAPTED) * model.joint_count]
             start = np.concatenate([start, drives])
         rate = _SHARE * slope.min() if self.adaptation is None else self.adaptation
-        known = shown(model, self.motion)
+        known = scales_of(model, self.motion)
         learning, size = known.learning(derivative, len(start), rate, float(slope.min()))
         room = [self.uncertainty * size]
         return np.concatenate([slope, derivative, [self.period], start, learning.ravel("F"), room])

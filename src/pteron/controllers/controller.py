@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
-from pteron.controllers.gain_numbers import PerJoint, above_zero, per_joint, period_of
+from pteron.controllers.joint_numbers import PerJoint, above_zero, per_joint, period_of
 from pteron.controllers.law import Law
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator

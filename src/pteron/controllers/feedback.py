@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 
 from pteron.controllers.controller import Controller
-from pteron.controllers.gain_numbers import PerJoint, per_joint
 from pteron.controllers.joint_masses import joint_masses
+from pteron.controllers.joint_numbers import PerJoint, per_joint
 from pteron.equations.control import GAINS
 from pteron.errors import DataError
 from pteron.kernels import Array

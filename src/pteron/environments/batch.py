@@ -11,10 +11,10 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from pteron.environments.making import world_of
+from pteron.environments.construction import world_of
 from pteron.environments.picture import Picture
 from pteron.environments.single import Numbers, checked_mode, spaces
-from pteron.environments.state import Bools, State
+from pteron.environments.state import Bools, EpisodeState
 from pteron.errors import DataError
 from pteron.manipulator import RobotLike
 from pteron.motion import Motion
@@ -82,7 +82,7 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
         self.metadata = {**self.metadata, "render_fps": round(1.0 / period)}
         self._most = max_episode_steps
         self._generators: list[np.random.Generator | None] = [None] * num_envs
-        self._state: State | None = None
+        self._state: EpisodeState | None = None
         self._done = np.zeros(num_envs, dtype=bool)
         self._steps = np.zeros(num_envs, dtype=np.int64)
         self._picture = Picture(self.world)

@@ -10,7 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from pteron.environments.state import State
+from pteron.environments.state import EpisodeState
 from pteron.environments.world import World
 from pteron.kernels import Array
 from pteron.motion import Guide, joint_guides, joint_points
@@ -30,7 +30,7 @@ class Picture:
         generators = [np.random.default_rng(seed) for seed in range(_POSES)]
         return joint_guides(self._world.robot, self._world.started(generators, None).pose)
 
-    def of(self, state: State) -> NDArray[np.uint8]:
+    def of(self, state: EpisodeState) -> NDArray[np.uint8]:
         """Return a machine's state (m,), with a line from its tool to the target.
 
         All pictures have the size of the one in which the machine is at home.

@@ -8,9 +8,9 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.environments.making import world_of
+from pteron.environments.construction import world_of
 from pteron.environments.picture import Picture
-from pteron.environments.state import State
+from pteron.environments.state import EpisodeState
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.manipulator import RobotLike
@@ -87,7 +87,7 @@ class PteronEnv(gymnasium.Env[Numbers, Numbers]):
         )
         self.render_mode = checked_mode(render_mode)
         self.metadata = {**self.metadata, "render_fps": round(1.0 / period)}
-        self._state: State | None = None
+        self._state: EpisodeState | None = None
         self._picture = Picture(self.world)
 
     def reset(

@@ -13,7 +13,7 @@ Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
-class State:
+class EpisodeState:
     """The state of machines: pose, velocity and target (..., m), clock (...) in s."""
 
     pose: Array
@@ -21,14 +21,14 @@ class State:
     target: Array
     clock: Array
 
-    def put(self, chosen: Bools, others: State) -> State:
+    def put(self, chosen: Bools, others: EpisodeState) -> EpisodeState:
         """Return these states with others in the place of those that are chosen, (B,)."""
         found = self.pose.copy(), self.velocity.copy(), self.target.copy(), self.clock.copy()
         new = others.pose, others.velocity, others.target, others.clock
         for into, values in zip(found, new, strict=True):
             into[chosen] = values
-        return State(*found)
+        return EpisodeState(*found)
 
-    def row(self, i: int) -> State:
+    def row(self, i: int) -> EpisodeState:
         """Return the state of one machine."""
-        return State(self.pose[i], self.velocity[i], self.target[i], self.clock[i])
+        return EpisodeState(self.pose[i], self.velocity[i], self.target[i], self.clock[i])

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.environments.state import Bools, State
+from pteron.environments.state import Bools, EpisodeState
 from pteron.errors import DataError
 from pteron.kernels import Array, as_array, numeric
 from pteron.manipulator import Manipulator
@@ -85,20 +85,20 @@ class World:
         pose, rate = np.where(turning, 2.0 * np.pi, size), np.where(turning, TURN, SPEED)
         return np.concatenate([pose, rate, pose, rate])
 
-    def observed(self, state: State) -> NDArray[np.float32]:
+    def observed(self, state: EpisodeState) -> NDArray[np.float32]:
         """Return observations (..., 4 m): pose, velocity, the target's pose and velocity."""
         parts = [state.pose, state.velocity, *self.target(state)]
         bounds = self.bounds
         return np.clip(np.concatenate(parts, axis=-1), -bounds, bounds).astype(np.float32)
 
-    def target(self, state: State) -> tuple[Array, Array]:
+    def target(self, state: EpisodeState) -> tuple[Array, Array]:
         """Return pose and velocity of the targets (..., m)."""
         if self.motion is None:
             return state.target, np.zeros_like(state.target)
         time = self.motion.time[0] + np.mod(state.clock, self.motion.duration)
         return self.motion.at(time)[:2]
 
-    def distance(self, state: State) -> Array:
+    def distance(self, state: EpisodeState) -> Array:
         """Return how far machines are from their targets (...), m."""
         away = (self.target(state)[0] - state.pose) * np.where(
             self.robot.platform.angular, LEVER, 1.0
@@ -107,7 +107,7 @@ class World:
 
     def started(
         self, generators: Sequence[np.random.Generator], options: Mapping[str, Any] | None
-    ) -> State:
+    ) -> EpisodeState:
         """Return the states at the start of episodes, (B, m), one for each generator.
 
         Raises
@@ -122,7 +122,7 @@ class World:
             clock = np.array([rng.uniform(0.0, self.motion.duration) for rng in generators])
             if "pose" not in given:
                 poses, velocity, _ = self.motion.at(self.motion.time[0] + clock)
-        return State(
+        return EpisodeState(
             np.broadcast_to(given.get("pose", poses), poses.shape),
             velocity,
             np.broadcast_to(given.get("target", targets), poses.shape),
@@ -166,7 +166,7 @@ class World:
             )
         return pose
 
-    def after(self, state: State, action: Array) -> tuple[State, Array, Array, Bools]:
+    def after(self, state: EpisodeState, action: Array) -> tuple[EpisodeState, Array, Array, Bools]:
         """Return states after an action (..., n), the distances, the rewards, and what has ended.
 
         reward = 1 - tanh(2 distance / spread) - 0.01 mean(action^2), at most 1; -1 where the
@@ -181,7 +181,7 @@ class World:
         pose, velocity, going = advance(
             self.robot, state.pose, state.velocity, action * self.forces, self.step, self.count
         )
-        new = State(pose, velocity, state.target, state.clock + self.period)
+        new = EpisodeState(pose, velocity, state.target, state.clock + self.period)
         distance = self.distance(new)
         reward = 1.0 - np.tanh(2.0 * distance / self.spread)
         reward = reward - EFFORT * (action**2).mean(axis=-1)

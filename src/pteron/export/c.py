@@ -127,7 +127,7 @@ def c_texts(
         "upper": prefix.upper(),
         "real": real,
         "f": "f" if single else "",
-        "printer": Printer(prefix, real),
+        "printer": CPrinter(prefix, real),
         "tables": {table.name: table for item in exported for table in item.tables}.values(),
         "functions": exported,
         "largest": 3.4028234e38 if single else 1.7976931348623157e308,
@@ -143,7 +143,7 @@ def c_texts(
 
 
 @dataclass(frozen=True)
-class Printer:
+class CPrinter:
     """Writes numbers, comments and functions in C."""
 
     prefix: str

@@ -25,9 +25,9 @@ from numpy.typing import ArrayLike
 from pteron.atomic import make_folder, write_files
 from pteron.dynamics import drive_forces
 from pteron.errors import DataError, ModelError
-from pteron.export.c import Printer, c_texts
+from pteron.export.c import CPrinter, c_texts
 from pteron.export.descriptions import banner
-from pteron.export.fmu_variables import layout
+from pteron.export.fmu_variables import fmu_variables
 from pteron.export.functions import chosen
 from pteron.export.names import prefix_of
 from pteron.export.start_pose import start_pose
@@ -113,13 +113,13 @@ def export_fmu(
         "quoted": lambda value: quoteattr(str(value)),
         "prefix": prefix,
         "upper": prefix.upper(),
-        "printer": Printer(prefix, "double"),
-        "number": Printer(prefix, "double").number,
+        "printer": CPrinter(prefix, "double"),
+        "number": CPrinter(prefix, "double").number,
         "freedom": robot.freedom,
         "inertial": tables["parameters"],
         "drives": tables["drives"],
         "least_square": LEAST**2,
-        "layout": layout(robot, start, forces),
+        "layout": fmu_variables(robot, start, forces),
         "start": np.concatenate([start, rest]),
         "forces": np.asarray(forces),
         "acceleration_call": ", ".join([*call, "found + M"]),

@@ -72,7 +72,7 @@ class Block:
 
 
 @dataclass(frozen=True)
-class Layout:
+class FmuVariables:
     """All variables of an FMU."""
 
     blocks: tuple[Block, ...]
@@ -143,13 +143,13 @@ class Layout:
         return tuple(sorted(found))
 
 
-def layout(robot: Manipulator, pose: Array, forces: Array) -> Layout:
+def fmu_variables(robot: Manipulator, pose: Array, forces: Array) -> FmuVariables:
     """Return the variables of a machine that starts at rest at a pose, held by forces."""
     blocks: list[Block] = []
     for name, kind, place, variables, *rate_of in _parts(robot, pose, forces):
         first = sum(len(block.variables) for block in blocks)
         blocks.append(Block(name, first, kind, place, tuple(variables), *rate_of))
-    return Layout(tuple(blocks))
+    return FmuVariables(tuple(blocks))
 
 
 _Part = tuple[str, Kind, str, list[Variable]] | tuple[str, Kind, str, list[Variable], str]

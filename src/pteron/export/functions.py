@@ -68,7 +68,7 @@ _BASE = "_base"
 
 
 @dataclass(frozen=True)
-class Table:
+class NumberTable:
     """Numbers of the machine that functions take as an argument."""
 
     name: str
@@ -99,7 +99,7 @@ class Exported:
     outputs: tuple[Port, ...]
     meanings: dict[str, str]
     """Meanings of inputs and outputs, with their units."""
-    tables: tuple[Table, ...]
+    tables: tuple[NumberTable, ...]
     examples: tuple[Example, ...]
 
     @property
@@ -249,18 +249,18 @@ def _exported(
 
 def _table(
     robot: Manipulator, name: str, base: Identified | None, controller: Controller | None
-) -> Table:
+) -> NumberTable:
     """Return the machine's own numbers for a shared input."""
     if name == "gains":
         assert controller is not None
         law = controller.law(robot)
-        return Table(f"{controller.what}_gains", GAINS, law.gain_names, law.gains)
+        return NumberTable(f"{controller.what}_gains", GAINS, law.gain_names, law.gains)
     if name == "drives":
-        return Table(name, DRIVES, drive_names(robot), drive_numbers(robot))
+        return NumberTable(name, DRIVES, drive_names(robot), drive_numbers(robot))
     if base is not None:
         verdict = f" Verdict of the identification: {base.grade}." if base.grade else ""
-        return Table(name, BASE_PARAMETERS + verdict, base.comments, base.values)
-    return Table(name, PARAMETERS, parameter_names(robot), parameters(robot))
+        return NumberTable(name, BASE_PARAMETERS + verdict, base.comments, base.values)
+    return NumberTable(name, PARAMETERS, parameter_names(robot), parameters(robot))
 
 
 def _states(

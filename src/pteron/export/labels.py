@@ -21,7 +21,7 @@ from pteron.kernels.graph import CONSTANT, INPUT, expression
 _SAME = 1e-12
 """Relative difference below which two values are the same quantity."""
 
-Quantity = tuple[str, int, Expression]
+NamedQuantity = tuple[str, int, Expression]
 """A name, the leg (from 1) whose quantity it is, or 0, and a scalar or a vector."""
 
 _AXES = {1: [""], 2: ["_a", "_b"], 3: ["_x", "_y", "_z"]}
@@ -55,7 +55,7 @@ def node_names(
     return _named(graph, _matches(values, wanted), names, legs)
 
 
-def _quantities(machine: Machine, inputs: dict[str, Expression]) -> Iterator[Quantity]:
+def _quantities(machine: Machine, inputs: dict[str, Expression]) -> Iterator[NamedQuantity]:
     """Yield the quantities with names, preferred ones first."""
     if "found" in inputs:  # the pose given is but where Newton's method begins
         moving = [inputs.get(f"joint_{name}") for name in ("rates", "accelerations")]
@@ -76,7 +76,7 @@ def _quantities(machine: Machine, inputs: dict[str, Expression]) -> Iterator[Qua
                 yield f"pose{k}_{name}", 0, value  # of no leg alone: all of them make the pose
 
 
-def _motion(machine: Machine, pose: Expression, *rates: Expression) -> Iterator[Quantity]:
+def _motion(machine: Machine, pose: Expression, *rates: Expression) -> Iterator[NamedQuantity]:
     """Yield the motion of the platform's points, and that of the legs."""
     state = machine.state(pose, *rates)
     platform = state.platform

@@ -12,10 +12,10 @@ from pteron.motion.simulation import (
     longest_step,
     simulate,
 )
-from pteron.motion.sizing.gearing import Span, best_ratio, best_ratios
+from pteron.motion.sizing.drive_loads import Sizing, best_ratio, best_ratios
+from pteron.motion.sizing.gearing import Span
 from pteron.motion.sizing.motor_choice import Fit, choose
 from pteron.motion.sizing.motors import Motor, read_motors
-from pteron.motion.sizing.result import Sizing
 from pteron.motion.sizing.size import size
 from pteron.motion.trajectories.checks import check_motion, check_path
 from pteron.motion.trajectories.demand import Peak, peaks

@@ -2,7 +2,7 @@
 
 from pteron.export.engines.coordinates import coordinates
 from pteron.export.engines.mjcf import export_mjcf, mjcf
-from pteron.export.engines.parts import Closing, Motor, Tree, TreeBody, TreeJoint
+from pteron.export.engines.parts import Closing, Tree, TreeBody, TreeJoint, TreeMotor
 from pteron.export.engines.pinocchio import export_pinocchio, pinocchio_model
 from pteron.export.engines.sdf import export_sdf
 from pteron.export.engines.tree import tree
@@ -10,7 +10,7 @@ from pteron.export.engines.urdf import export_urdf
 
 __all__ = [
     "Closing",
-    "Motor",
+    "TreeMotor",
     "Tree",
     "TreeBody",
     "TreeJoint",

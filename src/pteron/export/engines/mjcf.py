@@ -9,10 +9,7 @@ import numpy as np
 
 from pteron.atomic import write_texts
 from pteron.dynamics import inverse_dynamics
-from pteron.export.engines.parts import BASE, Shape, Tree, TreeBody, TreeJoint
-from pteron.export.engines.shapes import dressed
-from pteron.export.engines.tree import tree
-from pteron.export.engines.writing import (
+from pteron.export.engines.formatting import (
     BASE_COLOR,
     COLORS,
     PLATFORM_COLOR,
@@ -28,6 +25,9 @@ from pteron.export.engines.writing import (
     small,
     within,
 )
+from pteron.export.engines.parts import BASE, Shape, Tree, TreeBody, TreeJoint
+from pteron.export.engines.shapes import dressed
+from pteron.export.engines.tree import tree
 from pteron.export.names import identifier
 from pteron.kernels import Array
 from pteron.kernels.code import rendered

@@ -129,7 +129,7 @@ class Closing:
 
 
 @dataclass(frozen=True)
-class Motor:
+class TreeMotor:
     """The drive of a joint of the tree.
 
     Attributes
@@ -165,7 +165,7 @@ class Tree:
         Each after its parent: the platform's first, then those of leg 1, leg 2, ...
     closings : tuple of Closing
         Of the legs, then of the platform's parts.
-    motors : tuple of Motor
+    motors : tuple of TreeMotor
         One for each leg.
     base : tuple of (int, Shape)
         What stands on the base, guides and axles, by the leg it belongs to.
@@ -177,7 +177,7 @@ class Tree:
     home: Array
     bodies: tuple[TreeBody, ...]
     closings: tuple[Closing, ...]
-    motors: tuple[Motor, ...]
+    motors: tuple[TreeMotor, ...]
     base: tuple[tuple[int, Shape], ...]
     size: float
 

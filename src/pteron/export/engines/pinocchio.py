@@ -15,9 +15,7 @@ import numpy as np
 
 from pteron.atomic import write_texts
 from pteron.errors import ModelError
-from pteron.export.engines.parts import BASE, Tree, TreeBody, at_zero
-from pteron.export.engines.tree import tree
-from pteron.export.engines.writing import (
+from pteron.export.engines.formatting import (
     frame,
     head,
     inverse,
@@ -26,6 +24,8 @@ from pteron.export.engines.writing import (
     small,
     within,
 )
+from pteron.export.engines.parts import BASE, Tree, TreeBody, at_zero
+from pteron.export.engines.tree import tree
 from pteron.export.names import identifier
 from pteron.extras import install_command
 from pteron.kernels import Array

@@ -6,12 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from pteron.atomic import write_texts
-from pteron.export.engines.inertia import SHARE, between_joints
-from pteron.export.engines.looks import Look, look_of, placed
-from pteron.export.engines.parts import BASE, Tree, TreeBody, TreeJoint
-from pteron.export.engines.shapes import dressed
-from pteron.export.engines.tree import tree
-from pteron.export.engines.writing import (
+from pteron.export.engines.formatting import (
     BASE_COLOR,
     COLORS,
     PLATFORM_COLOR,
@@ -23,6 +18,11 @@ from pteron.export.engines.writing import (
     small,
     within,
 )
+from pteron.export.engines.inertia import SHARE, between_joints
+from pteron.export.engines.link_shapes import LinkShape, link_shape, placed
+from pteron.export.engines.parts import BASE, Tree, TreeBody, TreeJoint
+from pteron.export.engines.shapes import dressed
+from pteron.export.engines.tree import tree
 from pteron.export.names import identifier
 from pteron.kernels.code import rendered
 from pteron.manipulator import RobotLike, as_manipulator
@@ -89,7 +89,7 @@ def sdf(opened: Tree) -> str:
         share=SHARE,
         name=identifier(opened.robot),
         gravity=row(opened.robot.gravity),
-        base=[look_of(shape, None) for _, shape in opened.base],
+        base=[link_shape(shape, None) for _, shape in opened.base],
         base_color=BASE_COLOR,
         links=[link for body in opened.bodies for link in _links(opened, body)],
         closings=closings,
@@ -115,7 +115,7 @@ def _links(opened: Tree, body: TreeBody) -> list[dict[str, Any]]:
             "mass": small(mass),
             "center": row(within(body, body.center)) if last else "0 0 0",
             "moments": [small(moment) for moment in moments],
-            "looks": [look_of(shape, body) for shape in body.shapes] if last else [],
+            "looks": [link_shape(shape, body) for shape in body.shapes] if last else [],
             "color": COLORS[(body.color - 1) % len(COLORS)] if body.color else PLATFORM_COLOR,
         }
         found.append(link)
@@ -152,7 +152,7 @@ def _joint(opened: Tree, body: TreeBody, joint: TreeJoint) -> dict[str, Any]:
     }
 
 
-def _visual(shape: Look, count: int, color: str) -> str:
+def _visual(shape: LinkShape, count: int, color: str) -> str:
     sizes = {
         "sphere": f"<sphere><radius>{shape.radius}</radius></sphere>",
         "cylinder": f"<cylinder><radius>{shape.radius}</radius><length>{shape.length}</length>"

@@ -16,9 +16,9 @@ from dataclasses import replace
 import numpy as np
 
 from pteron.export.engines.chains import LegStance, leg_stances, shaft_ratio
-from pteron.export.engines.home import chosen_home
+from pteron.export.engines.home_pose import chosen_home
 from pteron.export.engines.inertia import about_center, cube_moments, plane_moments, rod_moments
-from pteron.export.engines.parts import BASE, Closing, Motor, Tree, TreeBody, TreeJoint
+from pteron.export.engines.parts import BASE, Closing, Tree, TreeBody, TreeJoint, TreeMotor
 from pteron.export.engines.platform import platform_bodies
 from pteron.kernels import Array
 from pteron.legs import Drive
@@ -77,7 +77,7 @@ def tree(robot: RobotLike, home: PoseLike | None = None) -> Tree:
         if leg.follows_angle:
             ratio = shaft_ratio(robot, i)
             bodies[0] = _with_shaft(bodies[0], leg.limits, ratio)
-        motors.append(Motor(names[i], "phi" if leg.follows_angle else names[i], ratio, drive))
+        motors.append(TreeMotor(names[i], "phi" if leg.follows_angle else names[i], ratio, drive))
     # The legs' closings first: what the platform's parts add comes after.
     count = len(robot.legs)
     closings = closings[-count:] + closings[:-count]

@@ -9,12 +9,7 @@ from typing import Any
 import numpy as np
 
 from pteron.atomic import write_texts
-from pteron.export.engines.inertia import SHARE, between_joints
-from pteron.export.engines.looks import Look, look_of, placed
-from pteron.export.engines.parts import BASE, Tree, TreeBody, TreeJoint, at_zero
-from pteron.export.engines.shapes import dressed
-from pteron.export.engines.tree import tree
-from pteron.export.engines.writing import (
+from pteron.export.engines.formatting import (
     BASE_COLOR,
     COLORS,
     PLATFORM_COLOR,
@@ -28,6 +23,11 @@ from pteron.export.engines.writing import (
     small,
     within,
 )
+from pteron.export.engines.inertia import SHARE, between_joints
+from pteron.export.engines.link_shapes import LinkShape, link_shape, placed
+from pteron.export.engines.parts import BASE, Tree, TreeBody, TreeJoint, at_zero
+from pteron.export.engines.shapes import dressed
+from pteron.export.engines.tree import tree
 from pteron.export.names import identifier
 from pteron.kernels import Array
 from pteron.kernels.code import rendered
@@ -102,7 +102,7 @@ def urdf(opened: Tree) -> str:
         name=name,
         colors=[("base", BASE_COLOR), ("platform", PLATFORM_COLOR), *legs],
         share=SHARE,
-        base=[look_of(shape, None) for _, shape in opened.base],
+        base=[link_shape(shape, None) for _, shape in opened.base],
         links=links,
         visual=_visual,
     )
@@ -129,7 +129,7 @@ def _links(opened: Tree, bodies: Sequence[TreeBody], body: TreeBody) -> list[dic
             "mass": small(mass),
             "center": row(within(body, body.center)) if last else "0 0 0",
             "moments": [small(moment) for moment in moments],
-            "looks": [look_of(shape, body) for shape in body.shapes] if last else [],
+            "looks": [link_shape(shape, body) for shape in body.shapes] if last else [],
             "material": material(body),
         }
         found.append(link)
@@ -167,7 +167,7 @@ def _joint(opened: Tree, body: TreeBody, joint: TreeJoint) -> dict[str, Any]:
     }
 
 
-def _visual(shape: Look, name: str) -> str:
+def _visual(shape: LinkShape, name: str) -> str:
     sizes = {
         "sphere": f'<sphere radius="{shape.radius}"/>',
         "cylinder": f'<cylinder radius="{shape.radius}" length="{shape.length}"/>',

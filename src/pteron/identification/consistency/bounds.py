@@ -18,7 +18,7 @@ Box = tuple[tuple[float, float], tuple[float, float]]
 
 
 @dataclass(frozen=True)
-class Limits:
+class LinearLimits:
     """Linear limits `matrix @ parameters <= right`, and what each one is called."""
 
     matrix: Array
@@ -88,7 +88,7 @@ class Bounds:
             if not low <= high:
                 raise ModelError(f"bounds: {name}: lower limit {low:g} is above the upper {high:g}")
 
-    def limits(self, robot: Manipulator) -> Limits:
+    def limits(self, robot: Manipulator) -> LinearLimits:
         """Return the limits as rows on the N parameters, with what every rod keeps.
 
         The centre of mass of a rod is between its ends, whatever else is known.
@@ -125,7 +125,7 @@ class Bounds:
             rows.append((-total, -low, f"total mass >= {low:g}"))
             rows.append((total, high, f"total mass <= {high:g}"))
         matrix = np.array([row for row, _, _ in rows]).reshape(len(rows), len(columns))
-        return Limits(
+        return LinearLimits(
             matrix, np.array([right for _, right, _ in rows]), tuple(name for _, _, name in rows)
         )
 

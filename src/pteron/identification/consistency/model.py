@@ -19,9 +19,9 @@ from pteron.identification.consistency.bodies import (
     plain_target,
     real_bodies,
 )
-from pteron.identification.consistency.bounds import Bounds, Limits
+from pteron.identification.consistency.bounds import Bounds, LinearLimits
 from pteron.identification.consistency.cones import RealBodies, closest, nearest, widest
-from pteron.identification.consistency.result import Consistency
+from pteron.identification.consistency.consistency import Consistency
 from pteron.kernels import Array
 from pteron.manipulator import (
     Manipulator,
@@ -245,7 +245,7 @@ def _certify(
     robot: Manipulator,
     bodies: Bodies,
     target: Target,
-    limits: Limits,
+    limits: LinearLimits,
     answer: Array,
     found: Array,
     residual: float,

@@ -6,7 +6,7 @@ from pteron.identification.excitation.conditioning import (
     scaled_condition,
     stacked_regressor,
 )
-from pteron.identification.excitation.draws import random_excitation
+from pteron.identification.excitation.excitation import Excitation, Start
 from pteron.identification.excitation.files import motion_paths
 from pteron.identification.excitation.fourier import FourierMotion
 from pteron.identification.excitation.held_out import RepeatedCycle, held_out_cycle
@@ -14,7 +14,7 @@ from pteron.identification.excitation.layout import Layout, check_sampling
 from pteron.identification.excitation.leads import Lead, LedMotion, found_lead
 from pteron.identification.excitation.limits import Limits
 from pteron.identification.excitation.margins import Margin, Margins, margins
-from pteron.identification.excitation.result import Excitation, Start
+from pteron.identification.excitation.random_motions import random_excitation
 from pteron.identification.excitation.search import optimal_excitation
 
 __all__ = [

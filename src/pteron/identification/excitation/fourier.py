@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from pteron.equations.machine import closure_of
 from pteron.errors import DataError, UnreachablePose
-from pteron.identification.excitation.movement import State, state_of_platform
+from pteron.identification.excitation.movement import FullMotion, motion_of_platform
 from pteron.identification.signals.states import home_mode
 from pteron.kernels import Array, as_array
 from pteron.kinematics.evaluate import unchecked
@@ -147,7 +147,7 @@ class FourierMotion:
         """The time after which the motion repeats, s."""
         return self.period
 
-    def states(self, phase: Array, rate: ArrayLike = 1.0, gain: ArrayLike = 0.0) -> State:
+    def states(self, phase: Array, rate: ArrayLike = 1.0, gain: ArrayLike = 0.0) -> FullMotion:
         """Return the motion of platform and joints at phases (T,), s.
 
         The phase itself may go on at another rate than 1 s a second, (T,), and gain speed, (T,) in
@@ -158,14 +158,14 @@ class FourierMotion:
         rate, gain = np.reshape(rate, (-1, 1)), np.reshape(gain, (-1, 1))
         dq, ddq = first * rate, second * rate**2 + first * gain
         if self.space == "platform":
-            return state_of_platform(robot, q, dq, ddq)
+            return motion_of_platform(robot, q, dq, ddq)
         poses: Array = unchecked(robot, "closure_poses", np.vstack([self.center, q]))
         center, pose = poses[0, self.mode], poses[1:, self.mode]
         # Within a mode angles stay on one side of the singular orientations, half a turn at most.
         apart = (pose - center + np.pi) % (2.0 * np.pi) - np.pi
         pose = np.where(robot.wraps, center + apart, pose)
         velocity, acceleration = unchecked(robot, "platform_motion", pose, dq, ddq)
-        return State(pose, velocity, acceleration, q, dq, ddq)
+        return FullMotion(pose, velocity, acceleration, q, dq, ddq)
 
     def uniform_times(self, count: int) -> Array:
         """Return so many times (count,) evenly over one period, without its end."""

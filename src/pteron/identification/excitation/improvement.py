@@ -15,10 +15,10 @@ from queue import SimpleQueue
 
 import numpy as np
 
-from pteron.identification.excitation.draws import within_limits
 from pteron.identification.excitation.fourier import FourierMotion
 from pteron.identification.excitation.margins import relative_margins
-from pteron.identification.excitation.program import Setting, minimised
+from pteron.identification.excitation.random_motions import within_limits
+from pteron.identification.excitation.search_program import Setting, minimised
 from pteron.kernels import Array
 
 _NEAR = 0.5

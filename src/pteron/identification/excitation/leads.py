@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pteron.errors import ModelError
-from pteron.identification.excitation.draws import is_clear
 from pteron.identification.excitation.fourier import FourierMotion
 from pteron.identification.excitation.limits import Limits
 from pteron.identification.excitation.margins import Margins, margins, relative_margins
-from pteron.identification.excitation.movement import State
+from pteron.identification.excitation.movement import FullMotion
+from pteron.identification.excitation.random_motions import is_clear
 from pteron.kernels import Array, as_array
 from pteron.manipulator import Manipulator
 from pteron.motion.motion import Motion
@@ -120,7 +120,7 @@ class LedMotion:
         found = self.states(times)
         return Motion(times, found.pose, found.velocity, found.acceleration)
 
-    def states(self, times: Array) -> State:
+    def states(self, times: Array) -> FullMotion:
         """Return the motion of platform and joints at times (T,), s; it rests before and after."""
         span = self.lead.duration
         (far_in, rate_in, gain_in), (far_out, rate_out, gain_out) = (

@@ -18,7 +18,7 @@ from pteron.identification.excitation.limits import (
     per_joint,
     unit_of,
 )
-from pteron.identification.excitation.movement import Movement, State
+from pteron.identification.excitation.movement import FullMotion, Movement
 from pteron.identification.signals.states import home
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import unchecked
@@ -143,8 +143,8 @@ def relative_margins(motion: Movement, limits: Limits, times: Array) -> dict[str
 def check_rest(robot: Manipulator, home: Array, limits: Limits) -> None:
     """Refuse limits that the machine at rest in its home pose does not keep, naming the limit."""
     zero = np.zeros_like(home)
-    rest = State(home, zero, zero, unchecked(robot, "joint_coordinates", home), zero, zero)
-    rows = State(*(value[None] for value in rest))
+    rest = FullMotion(home, zero, zero, unchecked(robot, "joint_coordinates", home), zero, zero)
+    rows = FullMotion(*(value[None] for value in rest))
     for name, values in _margins_of(robot, limits, rows).items():
         leg = int(values[0].argmin())
         left = values[0, leg]
@@ -170,7 +170,7 @@ def _limits_passive(robot: Manipulator) -> bool:
     return not all(joint.actuated for joint in joints)
 
 
-def _margins_of(robot: Manipulator, limits: Limits, state: State) -> dict[str, Array]:
+def _margins_of(robot: Manipulator, limits: Limits, state: FullMotion) -> dict[str, Array]:
     """Return every limit's margins (T, n) or (T, 1), -inf where the machine cannot be."""
     found = {"type_i": unchecked(robot, "reach", state.pose)[1] - limits.type_i}
     if closure_of(robot).vanishes() is None or robot.platform.angles:

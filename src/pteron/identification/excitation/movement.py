@@ -9,7 +9,7 @@ from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator
 
 
-class State(NamedTuple):
+class FullMotion(NamedTuple):
     """Motion of platform and joints, (T, n) each; NaN where the joints have no pose."""
 
     pose: Array
@@ -31,16 +31,16 @@ class Movement(Protocol):
     def duration(self) -> float:
         """Duration, s."""
 
-    def states(self, times: Array, /) -> State:
+    def states(self, times: Array, /) -> FullMotion:
         """Return the motion of platform and joints at times (T,), s."""
 
 
-def state_of_platform(
+def motion_of_platform(
     robot: Manipulator, pose: Array, velocity: Array, acceleration: Array
-) -> State:
+) -> FullMotion:
     """Return the state in a motion of the platform, (T, m) each."""
     # A slider's motion is finite out of the legs' reach too; that of the links is not.
     joints = unchecked(robot, "joint_coordinates", pose)
     rates = unchecked(robot, "joint_rates", pose, velocity)[0]
     path = pose, velocity, acceleration
-    return State(*path, joints, rates, unchecked(robot, "joint_accelerations", *path)[0])
+    return FullMotion(*path, joints, rates, unchecked(robot, "joint_accelerations", *path)[0])

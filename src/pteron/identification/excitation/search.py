@@ -19,14 +19,14 @@ from pteron.identification.excitation.conditioning import (
     conditioning_of,
     information_root,
 )
-from pteron.identification.excitation.draws import random_excitation
+from pteron.identification.excitation.excitation import Excitation, Start
 from pteron.identification.excitation.fourier import FourierMotion, Space
 from pteron.identification.excitation.improvement import ROUNDS, Improvement, Round, improved
 from pteron.identification.excitation.leads import found_lead
 from pteron.identification.excitation.limits import Limits
 from pteron.identification.excitation.margins import margins
-from pteron.identification.excitation.program import Criterion, Setting
-from pteron.identification.excitation.result import Excitation, Start
+from pteron.identification.excitation.random_motions import random_excitation
+from pteron.identification.excitation.search_program import Criterion, Setting
 from pteron.kernels import Array, columns_of
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.reduction import BaseParameters, base_parameters

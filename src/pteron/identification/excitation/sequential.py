@@ -40,7 +40,7 @@ _FELT = 1e-3
 
 
 @dataclass(frozen=True)
-class Program:
+class NonlinearProgram:
     """A nonlinear program: its cost, and margins that must be 0 or more, of variables (v,).
 
     Attributes
@@ -58,7 +58,7 @@ class Program:
     slopes: Callable[[Array], Array]
 
 
-class Place(NamedTuple):
+class Iterate(NamedTuple):
     """The values of a program at a place."""
 
     cost: float
@@ -72,7 +72,7 @@ class Place(NamedTuple):
 
 
 def sequential_minimum(
-    program: Program,
+    program: NonlinearProgram,
     start: Array,
     *,
     radius: float,
@@ -88,7 +88,7 @@ def sequential_minimum(
 
     Parameters
     ----------
-    program : Program
+    program : NonlinearProgram
         The program.
     start : array, shape (v,)
         Where it begins.
@@ -106,7 +106,7 @@ def sequential_minimum(
     J. Nocedal, S. J. Wright, Numerical optimization, 2006, chapter 18.
     C. L. Lawson, R. J. Hanson, Solving least squares problems, 1974, chapter 23.
     """
-    here, x = _place(program, start), start
+    here, x = _iterate(program, start), start
     if not np.isfinite(here.cost + here.violation):
         return None
     hessian: Array = np.eye(len(start))
@@ -128,7 +128,7 @@ def sequential_minimum(
         promised = weight * (here.violation - left) - model
         if promised < settled:
             break
-        there = _place(program, x + step)
+        there = _iterate(program, x + step)
         gained = here.cost - there.cost + weight * (here.violation - there.violation)
         share = gained / promised if np.isfinite(gained) else -1.0
         if share < _POOR:
@@ -144,12 +144,12 @@ def sequential_minimum(
     return x
 
 
-def _place(program: Program, x: Array) -> Place:
-    return Place(*program.cost(x), program.margins(x))
+def _iterate(program: NonlinearProgram, x: Array) -> Iterate:
+    return Iterate(*program.cost(x), program.margins(x))
 
 
 def _step(
-    here: Place, slopes: Array, hessian: Array, radius: float, weight: float
+    here: Iterate, slopes: Array, hessian: Array, radius: float, weight: float
 ) -> tuple[Array, Array, float]:
     """Return the step (v,), the rows' multipliers (R,), and the violation that the step leaves.
 

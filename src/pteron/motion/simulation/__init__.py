@@ -1,14 +1,14 @@
 """A machine with its drives, simulated under a controller, under given forces, or free."""
 
-from pteron.motion.simulation.loop import Law
+from pteron.motion.simulation.loop import ControlLaw
 from pteron.motion.simulation.plant import advance, longest_step
-from pteron.motion.simulation.result import Simulation
 from pteron.motion.simulation.sensors import Sensors
 from pteron.motion.simulation.simulate import Controls, simulate
+from pteron.motion.simulation.simulation import Simulation
 
 __all__ = [
     "Controls",
-    "Law",
+    "ControlLaw",
     "Sensors",
     "Simulation",
     "advance",

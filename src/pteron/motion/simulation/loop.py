@@ -14,8 +14,8 @@ from pteron.kernels import Array, numeric
 from pteron.manipulator import Manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.simulation.plant import Plant
-from pteron.motion.simulation.result import Simulation
 from pteron.motion.simulation.sensors import Encoders
+from pteron.motion.simulation.simulation import Simulation
 from pteron.motion.simulation.stops import (
     first_beyond_limits,
     first_singular,
@@ -30,7 +30,7 @@ _WHOLE = 1e-9
 
 
 @runtime_checkable
-class Law(Protocol):
+class ControlLaw(Protocol):
     """A controller's law for one machine; `pteron.controllers` has some."""
 
     def memory(self, pose: Array, velocity: Array) -> Array:
@@ -49,7 +49,7 @@ class Law(Protocol):
 
 
 @runtime_checkable
-class Source(Protocol):
+class ForceSource(Protocol):
     """A source of forces, sample by sample."""
 
     memory: Array
@@ -58,7 +58,7 @@ class Source(Protocol):
         """Return the forces asked of the drives, (n,), at sample k."""
 
 
-class Given:
+class TimedForces:
     """Forces that depend on time alone."""
 
     def __init__(self, of_time: Callable[[float], Array], time: Array) -> None:
@@ -70,11 +70,11 @@ class Given:
         return self._of_time(float(self._time[k]))
 
 
-class Controlled:
+class ControllerForces:
     """Forces of a controller that sees the joints."""
 
     def __init__(
-        self, law: Law, encoders: Encoders, reference: Motion, pose: Array, velocity: Array
+        self, law: ControlLaw, encoders: Encoders, reference: Motion, pose: Array, velocity: Array
     ) -> None:
         self._law, self._encoders, self._reference = law, encoders, reference
         self.memory = law.memory(pose, velocity)
@@ -105,7 +105,7 @@ class Loads:
 def run(
     robot: Manipulator,
     plant: Plant,
-    source: Source,
+    source: ForceSource,
     reference: Motion,
     loads: Loads,
     delay: float,

@@ -15,10 +15,17 @@ from pteron.kinematics.evaluate import checked
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.payload import with_payload
-from pteron.motion.simulation.loop import Controlled, Given, Law, Loads, Source, run
+from pteron.motion.simulation.loop import (
+    ControlLaw,
+    ControllerForces,
+    ForceSource,
+    Loads,
+    TimedForces,
+    run,
+)
 from pteron.motion.simulation.plant import Method, Plant, allowed_step
-from pteron.motion.simulation.result import Simulation
 from pteron.motion.simulation.sensors import Encoders, Sensors
+from pteron.motion.simulation.simulation import Simulation
 from pteron.shapes import JointsLike, PoseLike
 
 STEP = 1e-4
@@ -44,7 +51,7 @@ class Controls(Protocol):
     def period(self) -> float:
         """Time between two samples, s."""
 
-    def law(self, model: Manipulator) -> Law:
+    def law(self, model: Manipulator) -> ControlLaw:
         """Return what it does for a machine."""
 
 
@@ -160,10 +167,10 @@ def simulate(
     encoders = Encoders(sensors or Sensors(), period, joints, rates, round_ones)
 
     if controller is None:
-        source: Source = Given(_of_time(forces, robot, "forces"), reference.time)
+        source: ForceSource = TimedForces(_of_time(forces, robot, "forces"), reference.time)
     else:
         believed = model or (loaded[masses[0]] if len(loaded) == 1 else robot)
-        source = Controlled(controller.law(believed), encoders, reference, pose, velocity)
+        source = ControllerForces(controller.law(believed), encoders, reference, pose, velocity)
     about = np.vstack([pose, reference.pose[:: max(1, len(reference.time) // _POSES)]])
     plant = Plant(pose, velocity, method, allowed_step(robot, about, step), tolerance)
     loads = Loads(masses, loaded, _of_time(wrench, robot, "wrench"))

@@ -13,11 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pteron.kernels import Array
-from pteron.motion.sizing.result import Sizing
-from pteron.shapes import PerJoint
-
-_STILL = 1e-9
-"""Share of the fastest joint's acceleration below which a joint counts as still: rounding."""
+from pteron.motion.sizing.drive_loads import Sizing
 
 
 class Span(NamedTuple):
@@ -61,68 +57,12 @@ def torques(sizing: Sizing, leg: int, ratio: float, rotor_inertia: float) -> tup
     rms, peak : float
         N m.
     """
-    force, mixed, acceleration = squares(sizing, leg)
+    force, mixed, acceleration = sizing.squares(leg)
     square = force / ratio**2 + 2.0 * rotor_inertia * mixed
     square += (rotor_inertia * ratio) ** 2 * acceleration
     loads, accelerations = _samples(sizing, leg)
     peak = np.abs(loads / ratio + rotor_inertia * ratio * accelerations).max()
     return math.sqrt(max(square, 0.0)), float(peak)
-
-
-def best_ratio(sizing: Sizing, leg: int, rotor_inertia: float) -> float:
-    """Return the ratio at which a motor's root mean square torque over the cycle is least.
-
-    T^2 = <f^2> / i^2 + 2 J <f q''> + J^2 i^2 <q''^2> is least at i^2 = rms(f) / (J rms(q'')): the
-    load and the rotor then take equal parts of the torque.
-
-    Parameters
-    ----------
-    sizing : Sizing
-        What the cycle asks of the joints.
-    leg : int
-        From 1.
-    rotor_inertia : float
-        J, kg m^2.
-
-    Returns
-    -------
-    float
-        rad/m or rad/rad; infinite where the joint does not accelerate, or J is 0.
-
-    Examples
-    --------
-    >>> import pteron
-    >>> from pteron.motion import best_ratio, pick_and_place, size
-    >>> robot = pteron.load("tripteron")
-    >>> found = size(robot, pick_and_place(robot, [0.0, 0.0, 0.0], scale=0.5, duration=0.5))
-    >>> round(best_ratio(found, 1, 3e-5), 1)
-    295.1
-    """
-    force, _, acceleration = squares(sizing, leg)
-    all_joints = sizing.mean(sizing.accelerations**2)
-    if rotor_inertia == 0.0 or acceleration <= _STILL**2 * float(all_joints.max()):
-        return math.inf
-    return math.sqrt(math.sqrt(force / acceleration) / rotor_inertia)
-
-
-def best_ratios(sizing: Sizing) -> PerJoint:
-    """Return the best ratio of each drive's own motor, rad/m or rad/rad; NaN where it has no rotor.
-
-    Parameters
-    ----------
-    sizing : Sizing
-        What the cycle asks of the joints.
-
-    Returns
-    -------
-    array, shape (n,)
-    """
-    return np.array(
-        [
-            best_ratio(sizing, i, drive.rotor_inertia) if drive.rotor_inertia else np.nan
-            for i, drive in enumerate(sizing.drives, start=1)
-        ]
-    )
 
 
 def speed_span(sizing: Sizing, leg: int, max_speed: float) -> Span:
@@ -133,7 +73,7 @@ def speed_span(sizing: Sizing, leg: int, max_speed: float) -> Span:
 
 def rated_span(sizing: Sizing, leg: int, rotor_inertia: float, rated_torque: float) -> Span:
     """Return the ratios at which the root mean square torque is no more than the rated, N m."""
-    force, mixed, acceleration = squares(sizing, leg)
+    force, mixed, acceleration = sizing.squares(leg)
     # C u^2 - B u + A <= 0 with u = i^2.
     a, b, c = force, rated_torque**2 - 2.0 * rotor_inertia * mixed, rotor_inertia**2 * acceleration
     inside = b * b - 4.0 * a * c
@@ -161,14 +101,6 @@ def peak_span(sizing: Sizing, leg: int, rotor_inertia: float, peak_torque: float
     moving = np.abs(own) > 0.0
     greatest = root[moving] / (2.0 * np.abs(own[moving]))
     return Span(float(least.max()), float(greatest.min(initial=math.inf)))
-
-
-def squares(sizing: Sizing, leg: int) -> tuple[float, float, float]:
-    """Return the means over the cycle of f^2, f q'' and q''^2 of a leg, from 1."""
-    i = leg - 1
-    f, a, held = sizing.loads[:, i], sizing.accelerations[:, i], sizing.holding[i]
-    means = sizing.mean(np.stack([f * f, f * a, a * a], axis=-1), [held**2, 0.0, 0.0])
-    return float(means[0]), float(means[1]), float(means[2])
 
 
 def _samples(sizing: Sizing, leg: int) -> tuple[Array, Array]:

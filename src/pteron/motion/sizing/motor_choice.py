@@ -9,16 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pteron.errors import DataError
-from pteron.motion.sizing.gearing import (
-    Span,
-    best_ratio,
-    peak_span,
-    rated_span,
-    speed_span,
-    torques,
-)
+from pteron.motion.sizing.drive_loads import Sizing, best_ratio
+from pteron.motion.sizing.gearing import Span, peak_span, rated_span, speed_span, torques
 from pteron.motion.sizing.motors import Motor
-from pteron.motion.sizing.result import Sizing
 
 
 @dataclass(frozen=True)

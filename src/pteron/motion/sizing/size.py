@@ -16,7 +16,7 @@ from pteron.kernels import Array
 from pteron.kinematics import jacobian, joint_accelerations, joint_rates
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
-from pteron.motion.sizing.result import Sizing
+from pteron.motion.sizing.drive_loads import Sizing
 
 _AT_REST = 1e-6
 """Share of the motion's greatest speed below which its end is at rest."""

@@ -21,7 +21,7 @@ from pteron.kinematics.architecture import expect_regular
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.demand import told_pose
-from pteron.motion.trajectories.least import first_below, least_along
+from pteron.motion.trajectories.minima import first_below, least_along
 from pteron.motion.trajectories.path import Path, poses_of
 
 _SAMPLES = 1001
@@ -54,7 +54,7 @@ def check_path(robot: RobotLike, path: Path) -> None:
     """
     robot = as_manipulator(robot)
     s, _ = poses_of(path, _SAMPLES)
-    check_way(robot, lambda at: path.at(at)[0], s, lambda at: f"the path, {path.place(at)}")
+    check_curve(robot, lambda at: path.at(at)[0], s, lambda at: f"the path, {path.place(at)}")
 
 
 def check_motion(
@@ -94,10 +94,10 @@ def check_motion(
     even = np.linspace(float(motion.time[0]), float(motion.time[-1]), _SAMPLES)
     marks = np.unique(np.concatenate([motion.time, even]))
     told = place or (lambda at: f"the motion, at {at:.4g} s")
-    check_way(robot, lambda at: motion.at(at)[0], marks, told)
+    check_curve(robot, lambda at: motion.at(at)[0], marks, told)
 
 
-def check_way(
+def check_curve(
     robot: Manipulator,
     poses: Callable[[Array], Array],
     marks: Array,
@@ -108,7 +108,7 @@ def check_way(
     `marks` are the parameters checked first, and `place` says in words where a parameter is.
     """
     expect_regular(robot)
-    way = _Way(robot, poses, place)
+    way = _Curve(robot, poses, place)
     # Beyond the reach nothing else is measured.
     failures = [_failed_reach(way, marks)]
     if failures[0] is not None:
@@ -122,7 +122,7 @@ def check_way(
         raise min(found, key=lambda failure: failure.at).error
 
 
-class _Way(NamedTuple):
+class _Curve(NamedTuple):
     """A curve of poses (K, m) over a parameter (K,), and words for a place on it."""
 
     robot: Manipulator
@@ -146,7 +146,7 @@ class _Failure(NamedTuple):
     error: PteronError
 
 
-def _failed_reach(way: _Way, marks: Array) -> _Failure | None:
+def _failed_reach(way: _Curve, marks: Array) -> _Failure | None:
     robot = way.robot
 
     def squares(at: Array) -> Array:
@@ -185,7 +185,7 @@ def _failed_reach(way: _Way, marks: Array) -> _Failure | None:
     return _Failure(at, error)
 
 
-def _failed_limit(way: _Way, marks: Array) -> _Failure | None:
+def _failed_limit(way: _Curve, marks: Array) -> _Failure | None:
     robot = way.robot
     low, high = np.array([leg.limits or (-np.inf, np.inf) for leg in robot.legs]).T
 
@@ -209,7 +209,7 @@ def _failed_limit(way: _Way, marks: Array) -> _Failure | None:
     )
 
 
-def _failed_passive(way: _Way, marks: Array) -> _Failure | None:
+def _failed_passive(way: _Curve, marks: Array) -> _Failure | None:
     robot = way.robot
 
     def room(at: Array) -> Array:
@@ -233,7 +233,7 @@ def _failed_passive(way: _Way, marks: Array) -> _Failure | None:
     return _beyond(way, at, i + 1, f"leg {i + 1} passes a passive joint's limits", -float(least[i]))
 
 
-def _beyond(way: _Way, at: float, leg: int, told: str, metres: float) -> _Failure:
+def _beyond(way: _Curve, at: float, leg: int, told: str, metres: float) -> _Failure:
     error = UnreachablePose(
         f"{way.told(at)}: {told}; take another path",
         leg=leg,
@@ -243,7 +243,7 @@ def _beyond(way: _Way, at: float, leg: int, told: str, metres: float) -> _Failur
     return _Failure(at, error)
 
 
-def _failed_type_ii(way: _Way, marks: Array) -> _Failure | None:
+def _failed_type_ii(way: _Curve, marks: Array) -> _Failure | None:
     robot = way.robot
     if closure_of(robot).vanishes() is False and not robot.platform.angles:
         return None

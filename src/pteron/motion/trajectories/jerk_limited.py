@@ -18,9 +18,9 @@ from pteron.kinematics.evaluate import checked_one, unchecked
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.checks import check_motion
-from pteron.motion.trajectories.course import Timed
 from pteron.motion.trajectories.limits import MotionLimits, PerJointLimit, limits_of, per_joint
 from pteron.motion.trajectories.time_law import STEP, kept_motion, sampled
+from pteron.motion.trajectories.timed_path import Timed
 from pteron.motion.trajectories.tool import Curve
 from pteron.shapes import PoseLike
 

@@ -9,8 +9,8 @@ from pteron.manipulator import RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.limits import MotionLimits
 from pteron.motion.trajectories.path import line_path
-from pteron.motion.trajectories.polynomials import Law
 from pteron.motion.trajectories.time_law import STEP, along
+from pteron.motion.trajectories.time_polynomials import PolynomialLaw
 from pteron.shapes import PoseLike
 
 
@@ -21,7 +21,7 @@ def point_to_point(
     *,
     duration: float | None = None,
     limits: MotionLimits | None = None,
-    law: Law = "quintic",
+    law: PolynomialLaw = "quintic",
     step: float = STEP,
 ) -> Motion:
     """Return the motion from rest in one pose straight to rest in another.

@@ -11,11 +11,11 @@ from pteron.kernels import Array
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.checks import check_path
-from pteron.motion.trajectories.course import Course, InTime, Timed
 from pteron.motion.trajectories.demand import demand, demand_between, most_rate, peaks
 from pteron.motion.trajectories.limits import MotionLimits, limits_of
 from pteron.motion.trajectories.path import Path
-from pteron.motion.trajectories.polynomials import Law, Progress, polynomial
+from pteron.motion.trajectories.time_polynomials import PolynomialLaw, Progress, polynomial
+from pteron.motion.trajectories.timed_path import Course, InTime, Timed
 from pteron.motion.trajectories.tool import Curve
 
 STEP = 1e-3
@@ -115,7 +115,7 @@ def along(
     *,
     duration: float | None = None,
     limits: MotionLimits | None = None,
-    law: Law = "quintic",
+    law: PolynomialLaw = "quintic",
     step: float = STEP,
 ) -> Motion:
     """Return the motion along a path that is one polynomial in time between two rests.

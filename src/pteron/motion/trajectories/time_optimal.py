@@ -25,15 +25,15 @@ from pteron.extras import install_command
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
+from pteron.motion.trajectories.acceleration_profile import Profile
 from pteron.motion.trajectories.checks import check_path
-from pteron.motion.trajectories.course import Course
 from pteron.motion.trajectories.demand import demand, demand_between
 from pteron.motion.trajectories.limit_rows import LimitRows, limit_rows
 from pteron.motion.trajectories.limits import MotionLimits, limits_of
 from pteron.motion.trajectories.path import Path
-from pteron.motion.trajectories.polynomials import Progress, polynomial
-from pteron.motion.trajectories.profile import Profile
 from pteron.motion.trajectories.time_law import STEP, kept_motion, stretch_times
+from pteron.motion.trajectories.time_polynomials import Progress, polynomial
+from pteron.motion.trajectories.timed_path import Course
 from pteron.motion.trajectories.tool import Curve
 
 _GRID = 400

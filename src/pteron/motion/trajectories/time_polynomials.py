@@ -9,7 +9,7 @@ import numpy as np
 from pteron.errors import DataError
 from pteron.kernels import Array
 
-Law = Literal["quintic", "seventh"]
+PolynomialLaw = Literal["quintic", "seventh"]
 """The polynomial of a motion from rest to rest, by its degree."""
 
 
@@ -21,7 +21,7 @@ class Progress(Protocol):
         """Return a share of the way in [0, 1] and two derivatives, (T,) each, at tau (T,)."""
 
 
-def polynomial(law: Law) -> Progress:
+def polynomial(law: PolynomialLaw) -> Progress:
     """Return the polynomial from 0 to 1 whose derivatives vanish at both ends.
 
     Of the fifth degree, 10 t^3 - 15 t^4 + 6 t^5, two of them; of the seventh, 35 t^4 - 84 t^5 +
@@ -35,12 +35,12 @@ def polynomial(law: Law) -> Progress:
     Examples
     --------
     >>> import numpy as np
-    >>> from pteron.motion.trajectories.polynomials import polynomial
+    >>> from pteron.motion.trajectories.time_polynomials import polynomial
     >>> [float(v[0]) for v in polynomial("seventh")(np.array([0.5]))]
     [0.5, 2.1875, 0.0]
     """
-    if law not in get_args(Law):
-        raise DataError(f"law: {law!r} is not one of {', '.join(get_args(Law))}")
+    if law not in get_args(PolynomialLaw):
+        raise DataError(f"law: {law!r} is not one of {', '.join(get_args(PolynomialLaw))}")
     factors = {
         "quintic": [0.0, 0.0, 0.0, 10.0, -15.0, 6.0],
         "seventh": [0.0, 0.0, 0.0, 0.0, 35.0, -84.0, 70.0, -20.0],

@@ -10,7 +10,7 @@ import numpy as np
 
 from pteron.kernels import Array
 from pteron.motion.trajectories.path import Path
-from pteron.motion.trajectories.polynomials import Progress
+from pteron.motion.trajectories.time_polynomials import Progress
 from pteron.motion.trajectories.tool import Curve
 
 

@@ -17,10 +17,10 @@ import casadi as ca
 import numpy as np
 
 from pteron.bodies.motion import Expression
-from pteron.identification.excitation.draws import sizes
 from pteron.identification.excitation.fourier import Space
 from pteron.identification.excitation.limits import Limits, drive_load, joint_sizes, per_joint
-from pteron.identification.excitation.sequential import Program, sequential_minimum
+from pteron.identification.excitation.random_motions import sizes
+from pteron.identification.excitation.sequential import NonlinearProgram, sequential_minimum
 from pteron.identification.signals.states import home, home_mode
 from pteron.kernels import Array, Columns, program
 from pteron.kinematics.evaluate import unchecked
@@ -85,7 +85,7 @@ def minimised(
         return float(value), np.array(gradient).ravel()
 
     found = sequential_minimum(
-        Program(measured, kept.values, kept.slopes),
+        NonlinearProgram(measured, kept.values, kept.slopes),
         (start / size).ravel(),
         radius=_RADIUS,
         settled=_SETTLED,

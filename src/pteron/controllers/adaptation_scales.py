@@ -40,7 +40,7 @@ _DRIVES = 0.1
 
 
 @dataclass(frozen=True)
-class Shown:
+class AdaptationScales:
     """The excitation of a machine's base parameters and drives by a motion."""
 
     robot: Manipulator
@@ -117,10 +117,10 @@ class Moves(Protocol):
         """Their accelerations."""
 
 
-def shown(robot: Manipulator, motion: Moves | None) -> Shown:
+def scales_of(robot: Manipulator, motion: Moves | None) -> AdaptationScales:
     """Return the excitation by a motion, or by the typical one."""
     if motion is None:
-        return typical(robot)
+        return typical_scales(robot)
     if np.shape(motion.pose)[-1:] != (robot.freedom,):
         raise DataError(
             f"motion: poses of shape {np.shape(motion.pose)} given, (T, {robot.freedom}) expected: "
@@ -136,11 +136,11 @@ def shown(robot: Manipulator, motion: Moves | None) -> Shown:
         parts.append(
             part[thinned] + share * size * unit * rng.uniform(-1.0, 1.0, part[thinned].shape)
         )
-    return Shown(robot, typical(robot).base, (parts[0], parts[1], parts[2]))
+    return AdaptationScales(robot, typical_scales(robot).base, (parts[0], parts[1], parts[2]))
 
 
 @lru_cache(maxsize=32)
-def typical(robot: Manipulator) -> Shown:
+def typical_scales(robot: Manipulator) -> AdaptationScales:
     """Return the excitation by a typical motion, the same for the same machine.
 
     It is random: the poses among many in which the legs are bent best, at 0.5 m/s and 5 m/s^2.
@@ -152,7 +152,7 @@ def typical(robot: Manipulator) -> Shown:
         size * unit * way / np.linalg.norm(way, axis=-1, keepdims=True)
         for size, way in zip(_TYPICAL, rng.normal(size=(2, *poses.shape)), strict=True)
     )
-    return Shown(robot, base_parameters(robot), (poses, velocity, acceleration))
+    return AdaptationScales(robot, base_parameters(robot), (poses, velocity, acceleration))
 
 
 def _units(robot: Manipulator) -> Array:

@@ -6,14 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pteron.export.engines.formatting import look, row
 from pteron.export.engines.parts import Shape, TreeBody
-from pteron.export.engines.writing import look, row
 from pteron.kernels import Array
 
 _SAME = 1e-6
 
 
-class Look(NamedTuple):
+class LinkShape(NamedTuple):
     """A shape: "sphere", "cylinder" along its own z, or "box"; all texts."""
 
     kind: str
@@ -24,7 +24,7 @@ class Look(NamedTuple):
     side: str
 
 
-def look_of(shape: Shape, body: TreeBody | None) -> Look:
+def link_shape(shape: Shape, body: TreeBody | None) -> LinkShape:
     """Return a shape in a body's frame, or in the base frame."""
     ends = shape.ends if body is None else (shape.ends - body.origin) @ body.axes
     along, middle = ends[1] - ends[0], ends.mean(axis=0)
@@ -39,7 +39,7 @@ def look_of(shape: Shape, body: TreeBody | None) -> Look:
         x /= np.linalg.norm(x)
         turn = np.column_stack([x, np.cross(z, x), z])
     sizes = look(shape.radius), look(length), look(2.0 * shape.radius)
-    return Look(kind, look(middle), look(roll_pitch_yaw(turn)), *sizes)
+    return LinkShape(kind, look(middle), look(roll_pitch_yaw(turn)), *sizes)
 
 
 def roll_pitch_yaw(turn: Array) -> Array:

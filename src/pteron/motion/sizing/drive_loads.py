@@ -1,7 +1,8 @@
-"""Forces, speeds, power, energy and inertia at the drives over a cycle."""
+"""Forces, speeds, power, energy and inertia at the drives over a cycle, and the best ratios."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -18,6 +19,9 @@ from pteron.shapes import PerJoint
 
 if TYPE_CHECKING:
     import polars as pl
+
+_STILL = 1e-9
+"""Share of the fastest joint's acceleration below which a joint counts as still: rounding."""
 
 _NONE = 1e-9
 """Share of the energy given below which the net energy counts as zero."""
@@ -195,6 +199,13 @@ class Sizing:
         gears = np.array([abs(drive.gear) for drive in self.drives])
         return self.rms_forces / gears, self.peak_forces / gears
 
+    def squares(self, leg: int) -> tuple[float, float, float]:
+        """Return the means over the cycle of f^2, f q'' and q''^2, f being the load of a leg."""
+        i = leg - 1
+        f, a, held = self.loads[:, i], self.accelerations[:, i], self.holding[i]
+        means = self.mean(np.stack([f * f, f * a, a * a], axis=-1), [held**2, 0.0, 0.0])
+        return float(means[0]), float(means[1]), float(means[2])
+
     @cached_property
     def overloads(self) -> tuple[str, ...]:
         """Loads beyond the drives' limits, a line each: which leg, which limit, and by how much."""
@@ -215,8 +226,6 @@ class Sizing:
         What a drive has not is empty.
         """
         import polars as pl
-
-        from pteron.motion.sizing.gearing import best_ratios
 
         joints = [leg.joint for leg in self.robot.legs]
         turning = np.array([drive.ratio is not None for drive in self.drives])
@@ -251,3 +260,59 @@ class Sizing:
                 *columns,
             ]
         )
+
+
+def best_ratio(sizing: Sizing, leg: int, rotor_inertia: float) -> float:
+    """Return the ratio at which a motor's root mean square torque over the cycle is least.
+
+    T^2 = <f^2> / i^2 + 2 J <f q''> + J^2 i^2 <q''^2> is least at i^2 = rms(f) / (J rms(q'')): the
+    load and the rotor then take equal parts of the torque.
+
+    Parameters
+    ----------
+    sizing : Sizing
+        What the cycle asks of the joints.
+    leg : int
+        From 1.
+    rotor_inertia : float
+        J, kg m^2.
+
+    Returns
+    -------
+    float
+        rad/m or rad/rad; infinite where the joint does not accelerate, or J is 0.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.motion import best_ratio, pick_and_place, size
+    >>> robot = pteron.load("tripteron")
+    >>> found = size(robot, pick_and_place(robot, [0.0, 0.0, 0.0], scale=0.5, duration=0.5))
+    >>> round(best_ratio(found, 1, 3e-5), 1)
+    295.1
+    """
+    force, _, acceleration = sizing.squares(leg)
+    all_joints = sizing.mean(sizing.accelerations**2)
+    if rotor_inertia == 0.0 or acceleration <= _STILL**2 * float(all_joints.max()):
+        return math.inf
+    return math.sqrt(math.sqrt(force / acceleration) / rotor_inertia)
+
+
+def best_ratios(sizing: Sizing) -> PerJoint:
+    """Return the best ratio of each drive's own motor, rad/m or rad/rad; NaN where it has no rotor.
+
+    Parameters
+    ----------
+    sizing : Sizing
+        What the cycle asks of the joints.
+
+    Returns
+    -------
+    array, shape (n,)
+    """
+    return np.array(
+        [
+            best_ratio(sizing, i, drive.rotor_inertia) if drive.rotor_inertia else np.nan
+            for i, drive in enumerate(sizing.drives, start=1)
+        ]
+    )

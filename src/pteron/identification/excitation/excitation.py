@@ -19,7 +19,7 @@ from pteron.identification.excitation.leads import Lead, LedMotion
 from pteron.identification.excitation.limits import Limits
 from pteron.identification.excitation.margins import Margins
 from pteron.identification.excitation.movement import Movement
-from pteron.identification.excitation.program import Criterion
+from pteron.identification.excitation.search_program import Criterion
 from pteron.identification.logs import Description, write_description
 from pteron.kinematics import assembly_mode
 from pteron.tables import write_table
