@@ -1,4 +1,4 @@
-"""Energy: what free motion keeps, and what a sized motion's drives give.
+"""Energy: the balance of free motion, and the energy that the drives give over a sized cycle.
 
 Free motion: 100 random states move without drives by fourth-order steps of 0.1 ms, until a leg's
 reach margin falls below 5 % of its size. Sizing: from rest to the middle of a pick-and-place cycle,
@@ -29,7 +29,7 @@ SPEED = 0.5
 
 MARGIN = 0.05
 GOAL = 1e-9
-"""Of the largest kinetic energy."""
+"""Greatest error, as a share of the largest kinetic energy."""
 
 
 def main() -> None:

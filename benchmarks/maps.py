@@ -1,4 +1,4 @@
-"""Maps of eight million poses: seconds and memory for each index, and what survives a killing.
+"""Maps of eight million poses: seconds and memory for each index; a map that was ended goes on.
 
 Every index over 200 x 200 x 200 poses, in this process. Then one of them on a local cluster of two
 workers, of which one is killed in the middle; and by a process that is killed in the middle, and

@@ -1,4 +1,4 @@
-"""Memory traffic: what the program that JAX compiles reads and writes a state, and its derivatives.
+"""Memory traffic of the program that JAX compiles, and of its derivatives: bytes a state.
 
 A state has 12 numbers to read and 4 to write; a program of several loops also writes and reads what
 passes between them. XLA counts the bytes itself, for the device on which this runs.

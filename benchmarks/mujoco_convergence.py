@@ -29,7 +29,7 @@ DURATION, SAMPLE = 0.5, 0.01
 """s; errors are taken at each sample."""
 
 LEAST_MARGIN = 0.05
-"""Of the leg's longest reach, the sum of its links."""
+"""Least margin of the reach, as a share of the sum of a leg's links."""
 
 SPEED = 0.15
 """Standard deviation of the initial velocities, m/s and, ten times that, rad/s."""

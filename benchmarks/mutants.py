@@ -279,12 +279,6 @@ def maps(work: Path) -> list[Kind]:
         expect(same(load_map(file), whole), "a changed map was read")
         return _AS_WRITTEN
 
-    def damage_store(place: Path, chance: Chance) -> Path:
-        store = place / "map.zarr"
-        shutil.copytree(work / "map.zarr", store)
-        damaged_folder(store, chance)
-        return store
-
     def read_store(store: Path) -> str:
         refused: PteronError | None = None
         try:
@@ -302,8 +296,19 @@ def maps(work: Path) -> list[Kind]:
         Kind("map, CSV", 2000, damage_csv, read_csv),
         Kind("map, NPZ", 1500, damage_npz, read_checked),
         Kind("map, Parquet", 1500, damage_parquet, read_checked),
-        Kind("store, Zarr", 1200, damage_store, read_store),
+        Kind("store, Zarr", 1200, damaged_copies(work / "map.zarr"), read_store),
     ]
+
+
+def damaged_copies(whole: Path) -> Callable[[Path, Chance], Path]:
+    """Return a function that puts a damaged copy of a folder into another one."""
+
+    def damage(place: Path, chance: Chance) -> Path:
+        folder = shutil.copytree(whole, place / whole.name)
+        damaged_folder(folder, chance)
+        return folder
+
+    return damage
 
 
 def same(one: Map, other: Map) -> bool:
@@ -368,19 +373,13 @@ def checkpoints(work: Path) -> Kind:
     sweep(rows_of, range(3), TableStore(work / "table", plan))
     whole = TableStore(work / "table", plan).scan().collect()
 
-    def damage(place: Path, chance: Chance) -> Path:
-        folder = place / "table"
-        shutil.copytree(work / "table", folder)
-        damaged_folder(folder, chance)
-        return folder
-
     def read(folder: Path) -> str:
         store = TableStore(folder, plan)
         computed = sweep(rows_of, range(3), store)
         expect(store.scan().collect().equals(whole), "a changed checkpoint was read")
         return _AGAIN if computed else _AS_WRITTEN
 
-    return Kind("checkpoint", 1200, damage, read)
+    return Kind("checkpoint", 1200, damaged_copies(work / "table"), read)
 
 
 def identifications(work: Path) -> Kind:

@@ -26,7 +26,7 @@ from pteron.workspace import NearestSingularity, nearest_singularities
 
 _NEARER = 0.01
 _CELLS = 28
-"""Of the grid in space, along each side of the ball."""
+"""Cells of the grid along each side of the ball."""
 
 _PAIRS = 2000
 _WHAT = {"II": "type_ii", "constraint": "constraint"}
@@ -34,7 +34,7 @@ _WHAT = {"II": "type_ii", "constraint": "constraint"}
 
 @dataclass
 class Account:
-    """What is found at a machine's poses."""
+    """Distances found at a machine's poses."""
 
     name: str
     told: int = 0

@@ -1,4 +1,4 @@
-"""Fewest operations: what every form of the inverse dynamics costs, counted from the code.
+"""Operation counts of every form of the inverse dynamics, from the compiled graphs.
 
 Counts are of the expressions that are compiled, with shared subexpressions found; nothing is typed
 in, and nothing depends on the machine that runs this.

@@ -1,4 +1,4 @@
-"""The paper says its reduced model is about 41 % faster: in which form, and by how much.
+"""The paper's claim that its reduced model is about 41 % faster, tried in each form of the model.
 
 Prints the model's forms, complete and reduced, side by side: operations counted, times measured in
 one run with the rounds taking turns, the quickest of each. A percentage is that of the two numbers

@@ -1,4 +1,4 @@
-"""Public functions beside the kernels under them: what a user calls, and what it costs beside C.
+"""Times of public functions beside those of the kernels under them.
 
 A call of one pose, and a batch; public function and kernel take turns, so that a ratio is of the
 same rounds. The kernel is the function's own: the machine's numbers as inputs, a status beside the

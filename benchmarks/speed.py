@@ -1,4 +1,4 @@
-"""Fastest: inverse dynamics of machines of every family against other engines, in one run.
+"""Speed of inverse dynamics of machines of every family beside other engines, in one run.
 
 Three contests each: one state a call from Python; one state a call in C, each waiting for the last;
 and a batch. The contestants of a contest take turns, round by round, and ratios are of the same

@@ -1,4 +1,4 @@
-"""The second start: a fresh Python process from its start to its first result.
+"""Start-up: a fresh Python process to its first result, with a filled cache.
 
 Each process imports pteron, compiles the quadrupteron's inverse dynamics and computes one state. A
 first start finds an empty cache, a second one what the first has left. Also what the import brings.

@@ -1,4 +1,4 @@
-"""The viewer: from a slider to the picture, and what minutes of random dragging leave behind.
+"""The viewer: delay from a slider to the picture, and memory after minutes of random dragging.
 
 A key moves a slider of the page in headless Chromium, whose WebGL the processor draws. The clock
 runs from the key's event until the picture with the new pose has been drawn; it also runs on the

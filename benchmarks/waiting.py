@@ -1,4 +1,4 @@
-"""The two commands that a user waits for longest: CPU and wall seconds of whole processes, medians.
+"""The two slowest commands: CPU and wall seconds of whole processes, medians.
 
 `pteron excite delta`, and `pteron identify` of a log of 20 s at 1 kHz, four periods of the motion
 that it writes: encoders of 20 bits a turn, friction, bodies off by up to 20 %, 1 % of noise in the
@@ -34,7 +34,7 @@ _STEADY = 5000, 20000
 """The first row behind the lead-in, and how many rows there are."""
 
 _NOISE = 0.01
-"""Of each force's root mean square."""
+"""Standard deviation, as a share of each force's root mean square."""
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""How Sphinx builds the site: `make docs`. Every warning is an error there; no network is used."""
+"""Sphinx's configuration of the site, for `make docs`: warnings are errors, no network is used."""
 
 from __future__ import annotations
 

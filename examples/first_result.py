@@ -1,4 +1,4 @@
-"""From a pose to sliders and forces, and back: the first ten minutes with a Quadrupteron."""
+"""A first result: joint coordinates and forces of a Quadrupteron's pose, and the pose again."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""From a recorded motion to an identified model: a machine that is not quite as it was drawn."""
+"""Identification: a machine that differs from its drawing, from a recorded motion."""
 
 import numpy as np
 

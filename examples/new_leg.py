@@ -1,4 +1,4 @@
-"""A kind of leg of one's own: P-S-S, a slider with a rod between ball joints; three make a Delta.
+"""A new kind of leg: P-S-S, a slider with a rod between ball joints; three make a linear Delta.
 
 It is written by `pteron.legs.leg` alone, with q = h - sigma sqrt(ll^2 - w.w + h^2), w = c - r and
 h = w.e; b = w - q e is the rod. Differentiated, (b.e) q' = b.c' and (b.e) q'' = b.c'' + b'.b'.

@@ -1,4 +1,4 @@
-"""Pictures: the machine on its way through a pick-and-place cycle, and its forces there.
+"""Pictures of a machine in a pick-and-place cycle, and of its forces.
 
 Writes `quadrupteron.png` and `forces.png` to the folder it is run in.
 """

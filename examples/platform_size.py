@@ -1,4 +1,4 @@
-"""A design question: how large a platform gives little force and much room to turn.
+"""A design question: the size of a platform that needs little force and turns far.
 
 The platform points are moved out from P; the machine's home pose, the largest force of a
 pick-and-place cycle, and the conditioning of J follow.

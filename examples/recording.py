@@ -1,4 +1,4 @@
-"""A machine to try the way from log to controller with: it follows a motion, and writes a log.
+"""A simulated machine, to try identification with: it follows a motion, and writes a log.
 
 It stands for the real one: every body is up to 20 % off the drawing, its joints have friction, its
 encoders 20 bits a turn (1 um on sliders), and its forces 1 % of noise.

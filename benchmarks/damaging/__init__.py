@@ -1,4 +1,4 @@
-"""Damage to files, by chance: bytes, lines, numbers, keys, and the files of a folder."""
+"""Random damage to files: bytes, lines, numbers, keys, and the files of a folder."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _OTHERS = (
     *(b'"text"', b"''", b"true", b"false", b"null", b"[]", b"[1, 2]", b"{}", b"", b"1_0", b"0x1F"),
     *(b"2026-11-23", b"12:30", b"1,5", b"1.2.3", b"\xd9\xa1", b"=1+1"),
 )
-"""What a number is replaced by."""
+"""Texts that take the place of a number."""
 
 _ODD = (
     *(b"\x00", b"\x01", b"\x07", b"\x1b[31m", b"\x7f", b"\r", b"\t", b"\xff", b"\xef\xbb\xbf"),

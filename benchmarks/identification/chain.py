@@ -35,11 +35,11 @@ from pteron.motion.trajectories.cycle import Cycle
 from pteron.report.identification import numbers
 
 BANDWIDTH = 2.0 * np.pi * 10.0
-"""Of the feedback that the cycle is run with, rad/s: 10 Hz, both poles there, with the masses that
-the drawing has at the joints."""
+"""Bandwidth of the feedback in the cycle, rad/s: both poles at 10 Hz, with the drawing's masses at
+the joints."""
 
 _NOISE = 0.01
-"""Of each force's root mean square."""
+"""Standard deviation, as a share of each force's root mean square."""
 
 _JITTER = 1e-5
 _REST = 0.2
@@ -96,7 +96,7 @@ class Cycles:
 
     @property
     def duration(self) -> float:
-        """Of a cycle, s."""
+        """Duration of a cycle, s."""
         return self._whole.duration
 
     @property
@@ -155,7 +155,7 @@ class Controller:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What the chain gave for a machine."""
+    """Result of the chain for a machine."""
 
     found: Identification
     prediction: Array
@@ -173,7 +173,7 @@ class Outcome:
 
     @property
     def gains(self) -> Array:
-        """How many times better each joint follows with the exported C than with PD alone."""
+        """Tracking error of each joint with PD alone, over that with the exported C."""
         return np.asarray(self.tracking["nothing"] / self.tracking["exported C"])
 
 

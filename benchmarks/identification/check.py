@@ -30,7 +30,7 @@ import pteron
 
 
 class Case(NamedTuple):
-    """What brakes a machine, and how fast it moves."""
+    """A machine's friction, and the speed of its motion."""
 
     coulomb: tuple[float, ...] = (6.0, 7.0, 9.0, 8.0)
     viscous: tuple[float, ...] = (10.0, 12.0, 16.0, 14.0)

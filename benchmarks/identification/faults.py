@@ -53,7 +53,7 @@ from pteron.workspace import home_pose
 _RATE = 400.0
 _PERIODS = 2
 _NOISE = 0.01
-"""Of each force's root mean square."""
+"""Standard deviation, as a share of each force's root mean square."""
 
 _COLOUR = 0.9
 """Correlation of coloured noise over 1 ms."""
@@ -62,14 +62,14 @@ _SMALL = 1e-6
 """Inertia of a payload at P, over its mass, m^2."""
 
 _SIZE = 0.9
-"""Of the cycle, over the largest: a machine 1 mm off must come along."""
+"""Size of the cycle over the largest: a machine that is 1 mm off must reach all of it."""
 
 _TWENTY_BITS = 2.0 * np.pi / 2**20
 
 
 @dataclass(frozen=True)
 class Usual:
-    """How a machine is driven: dry and viscous friction, encoder, and limits of its joints."""
+    """Drives of a machine: dry and viscous friction, encoder, and limits of its joints."""
 
     dry: float
     viscous: float
@@ -383,7 +383,7 @@ def recorded(name: str, fault: str, seed: int, *, other: bool = False) -> tuple[
 
 @dataclass(frozen=True)
 class Said:
-    """What was said of one log, and how far a cycle's forces are off (%)."""
+    """Verdict on one log, and how far a cycle's forces are off (%)."""
 
     grade: str
     faults: tuple[str, ...]

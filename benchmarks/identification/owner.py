@@ -1,4 +1,4 @@
-"""An owner's way, by the command line: a Delta with a fourth axis, from its file to its code.
+"""The command line from a robot's file to its code: a Delta with a fourth axis.
 
 The machine is simulated in MuJoCo (`plant`), up to 20 % off what was drawn, with dry friction that
 sticks and falls with speed. Its controller's log is of another dialect than Pteron's: forces in per

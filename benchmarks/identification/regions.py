@@ -1,4 +1,4 @@
-"""How often stated intervals, and the joint region of all values, hold the truth.
+"""Coverage: how often stated intervals, and the joint region of all values, hold the truth.
 
 Logs of 20 s at 1 kHz are made from a machine's own equations, with friction, so that nothing but
 noise is wrong with them: white noise on the forces, or noise that remembers the last 10 ms or
@@ -36,10 +36,10 @@ from pteron.legs import Drive
 RATE = 1000.0
 DURATION = 20.0
 FORCE_NOISE = 0.01
-"""Of each force's root mean square."""
+"""Standard deviation, as a share of each force's root mean square."""
 
 JITTER = 1e-5
-"""Of the sampling, s."""
+"""Standard deviation of the sampling times, s."""
 
 MEMORIES = {"white": 0.0, "AR(1) 0.9": 0.9, "AR(1) 0.995": 0.995}
 """Correlation of the forces' noise between samples."""
@@ -49,7 +49,7 @@ _TWENTY_BITS = 2.0 * np.pi / 2**20
 
 @dataclass(frozen=True)
 class Machine:
-    """How a machine moves, and its encoders' step, m or rad."""
+    """A machine's motion, and its encoders' step, m or rad."""
 
     speed: float = 0.8
     acceleration: float = 8.0
@@ -118,7 +118,7 @@ class Bench:
 
 @dataclass(frozen=True)
 class Held:
-    """What held the truth: shares of intervals and regions, and the mean square distance."""
+    """Shares of intervals and regions that held the truth, and its mean square distance."""
 
     intervals: float
     regions: float

@@ -54,7 +54,7 @@ _QUICK = "--quick" in sys.argv
 
 @dataclass(frozen=True)
 class Drives:
-    """What drives a machine: friction of its joints, encoders, and how fast they move.
+    """Drives of a machine: friction of its joints, encoders, and speeds.
 
     Friction is that of the first joint and what each next one has more; at cranks in N m, N m s and
     N m.
@@ -98,7 +98,7 @@ elif _QUICK:
     MACHINES = {name: MACHINES[name] for name in ("quadrupteron",)}
 
 FORCE_NOISE = 0.01
-"""Of each force's root mean square."""
+"""Standard deviation, as a share of each force's root mean square."""
 
 NOISE = (
     (1e-7, 0.001),
@@ -110,7 +110,7 @@ NOISE = (
     (5e-4, 0.01),
 )
 JITTER = 1e-5
-"""Of the sampling, s; the log has the nominal times."""
+"""Standard deviation of the sampling times, s; the log has the nominal ones."""
 
 REPETITIONS = 20 if _QUICK else 200
 SWEPT = 3 if _QUICK else 10

@@ -1,4 +1,4 @@
-"""What the benchmarks share: contests whose rounds take turns, and how their times are printed."""
+"""Timing: contests whose rounds take turns, and tables of their times."""
 
 from __future__ import annotations
 

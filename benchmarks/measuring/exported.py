@@ -23,7 +23,7 @@ LEVELS: tuple[tuple[str, ...], ...] = (
     ("-O3", "-march=native"),
     ("-O3", "-march=native", "-fno-tree-slp-vectorize"),
 )
-"""How a controller's C is usually compiled, and for this processor.
+"""Compiler options: as is usual for a controller, and for this processor.
 
 GCC gathers lone scalars into short vectors, from 12 on at -O2 too; in straight-line code like this
 the gathering costs more than it saves.
@@ -35,7 +35,7 @@ FORMS = {
     "specialised": ("inverse_dynamics", True),
     "base, specialised": ("inverse_dynamics_base", True),
 }
-"""Which function is exported, and whether the machine's numbers are folded in."""
+"""Exported function, and whether the machine's numbers are folded in."""
 
 _FLAGS = ("-std=c99", "-fPIC", "-fvisibility=hidden")
 _LOOP = ("-O2", "-fno-tree-vectorize")

@@ -1,4 +1,4 @@
-"""Other engines doing our inverse dynamics: platform motion to actuator forces, the whole job.
+"""Inverse dynamics by other engines, from platform motion to actuator forces.
 
 Each cuts the loops, runs its Newton-Euler algorithm on the tree, and projects the joint forces
 through the closure; what is not the engine's is done in closed form. Tuned peers have the best

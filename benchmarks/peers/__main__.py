@@ -1,4 +1,4 @@
-"""Print for each peer how far it is from `pteron.inverse_dynamics`, and what a state costs.
+"""Print each peer's difference from `pteron.inverse_dynamics`, and its time a state.
 
 Run it from the folder above with `python -m peers [name of a machine or path of its file]`.
 """

@@ -48,7 +48,7 @@ def _across(d: Array) -> Array:
 
 @dataclass(frozen=True)
 class Closure:
-    """What the closed form needs of a machine with four legs.
+    """A machine with four legs in closed form.
 
     With c = p + s(phi) the platform point of a leg, three rows give all that the leg sees of it:
     rho = d_bar . (c - r), and u = W (c - r) from R1 to R3 in the leg's plane.

@@ -51,7 +51,7 @@ static inline void after(const Closure *c, const Legs *legs, const double *tau, 
     forces(given, found, NULL, NULL, 0);
 }
 """
-"""What closure.h offers to the peers, for the functions that CasADi prints."""
+"""C functions of closure.h, which call those that CasADi prints."""
 
 Point = tuple[Expression, Expression, Expression]
 """w = c - r, w' and w'', each (3, 1), in the leg's frame."""
@@ -64,11 +64,11 @@ class Joints(NamedTuple):
     rates: list[Expression]
     accelerations: list[Expression]
     rows: list[Expression]
-    """What `pull` asks for."""
+    """The rows that `pull` takes."""
 
 
 class Pull(NamedTuple):
-    """What a leg's joint forces come to."""
+    """A leg's joint forces as forces on the platform."""
 
     own: Expression
     """At the actuated joint."""
@@ -82,7 +82,7 @@ class Pull(NamedTuple):
 
 @dataclass(frozen=True)
 class Leg(ABC):
-    """What the closed form needs of a leg.
+    """A leg in closed form.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class Leg(ABC):
     sigma: float
 
     sizes: ClassVar[tuple[int, int]]
-    """How many joints and how many rows it has."""
+    """Numbers of its joints and of its rows."""
 
     @classmethod
     def of(cls, leg: Any, platform: Any) -> Leg:

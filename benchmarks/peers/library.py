@@ -25,7 +25,7 @@ _FLAGS = ("-O3", "-march=native", "-DNDEBUG", "-shared", "-fPIC", "-w")
 
 
 class Missing(Exception):
-    """What a peer needs is not there; the message says what."""
+    """A peer lacks something; the message says what."""
 
 
 def compiled(

@@ -26,7 +26,7 @@ _BOOST = (
     "-DBOOST_MPL_LIMIT_VECTOR_SIZE=30",
     "-DBOOST_FUSION_INVOKE_MAX_ARITY=12",
 )
-"""What Pinocchio's own CMake files define for those who include it."""
+"""Macros that Pinocchio's own CMake files define for its users."""
 
 _TUNING = (
     "-fno-math-errno",

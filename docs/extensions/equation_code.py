@@ -1,4 +1,4 @@
-"""Where each numbered equation of the theory stands in the code. A test holds both ends."""
+"""The place in the code of each numbered equation of the theory; a test checks both ends."""
 
 _E, _L, _R = "pteron.equations", "pteron.legs", "pteron.reduction"
 

@@ -1,4 +1,4 @@
-"""Equations keep the paper's numbers, and are linked with the code, there and back.
+"""Equations with the paper's numbers, linked to the code and back.
 
 A numbered equation has the label `eq-NUMBER`. `CODE` says where each stands in the code: on a page
 of the theory the links to it follow the equation, and in the reference the code's docstring links

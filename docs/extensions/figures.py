@@ -1,4 +1,4 @@
-"""What the gallery shows of its scripts: every new matplotlib figure among a block's names.
+"""Scraper of the gallery: every new matplotlib figure among a block's names.
 
 Pteron's figures are not made by pyplot, which the usual scraper asks. A film shows itself, where a
 block ends with it.

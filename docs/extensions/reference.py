@@ -53,7 +53,7 @@ TOPICS: dict[str, tuple[str, ...]] = {
         "OutputError",
     ),
 }
-"""What stands on which page, in order."""
+"""Names on each page, in order."""
 
 MORE_MODULES = ("pteron.reduction",)
 """Public, though `pteron.__all__` has its functions only."""
@@ -192,7 +192,7 @@ def plain_bars(
 
 
 _COLON = "\N{RATIO}"
-"""What stands for a colon while napoleon reads."""
+"""Stands for a colon while napoleon reads."""
 
 
 def _without_meaning(found: re.Match[str]) -> str:

@@ -1,4 +1,4 @@
-"""The results of the benchmarks, which stand outside docs, as pages of the site."""
+"""Pages of the benchmarks' results, which stand outside docs."""
 
 from __future__ import annotations
 

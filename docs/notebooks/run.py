@@ -1,4 +1,4 @@
-"""Run the notebooks from top to bottom, each in an empty folder, and say how long each took.
+"""Run the notebooks from top to bottom, each in an empty folder, and print their times.
 
     python docs/notebooks/run.py              # all of them
     python docs/notebooks/run.py 3 5          # the third and the fifth

@@ -1,4 +1,4 @@
-"""Whether two pictures look the same, though another version of matplotlib has drawn them."""
+"""Comparison of pictures that different versions of matplotlib have drawn."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _DIFFERENCE = 0.01
 """Mean difference of colours, of 1, that nobody sees."""
 
 _SHIFT = 0.5
-"""How far a point of an SVG may have moved."""
+"""Greatest shift of a point of an SVG."""
 
 
 def alike(old: Path, new: Path) -> bool:

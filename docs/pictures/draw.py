@@ -30,7 +30,7 @@ DRAWN: dict[str, Callable[[Path], None]] = {
     "index_maps": index_maps.draw,
     "view_page": view_page.draw,
 }
-"""What writes each group of pictures into a folder laid out as docs, by the script's name."""
+"""Writers of each group of pictures into a folder laid out as docs, by the script's name."""
 
 
 def main() -> None:

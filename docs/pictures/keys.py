@@ -33,7 +33,7 @@ TABLES: dict[str, type[Table]] = {
     "stribeck": StribeckTable,
     **{name: leg_table(kind) for name, kind in KINDS.items()},
 }
-"""What the page has tables of; those of legs by their type."""
+"""Subjects of the page's tables; those of legs by their type."""
 
 _MARKED = re.compile(r"(<!-- keys of ([^>]*) -->\n).*?(<!-- end -->)", re.DOTALL)
 

@@ -1,4 +1,4 @@
-"""From the motion of the actuated joints to the platform's."""
+"""The platform's motion from that of the actuated joints."""
 
 from __future__ import annotations
 

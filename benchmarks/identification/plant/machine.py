@@ -50,7 +50,7 @@ _DIVISION = 20
 
 @dataclass(frozen=True)
 class Recording:
-    """What the machine did, sampled at a constant rate.
+    """The machine's motion and forces, sampled at a constant rate.
 
     Attributes
     ----------

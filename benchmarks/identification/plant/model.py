@@ -1,4 +1,4 @@
-"""A parallel robot in MuJoCo: its exported MJCF, with what can hold an actuated joint that sticks.
+"""A parallel robot in MuJoCo: its exported MJCF, with constraints that hold joints that stick.
 
 Of Pteron it has the bodies, in space, and where their loops close (`pteron.export`). MuJoCo finds
 the passive joints' motion by itself, and its constraint forces carry what the legs do to the

@@ -1,4 +1,4 @@
-"""What a log shows of a motion: steps of the encoders, noisy forces, uneven sampling."""
+"""Sensors: encoders with steps, noisy forces, uneven sampling."""
 
 from __future__ import annotations
 
