@@ -2,10 +2,13 @@
 
 import importlib
 from pkgutil import resolve_name
+from types import SimpleNamespace
 
 import pytest
 
 import pteron
+from pteron.design import Design
+from pteron.identification import FaultIsolation, Identification, Payload
 from pteron.renamed import RENAMED, UNTIL
 
 NAMES = [(package, old, new) for package, names in RENAMED.items() for old, new in names.items()]
@@ -38,3 +41,21 @@ def test_another_name_is_unknown(package):
 
 def test_former_names_are_gone_when_their_release_is_over():
     assert [*map(int, pteron.__version__.split(".")[:2])] < [*map(int, UNTIL.split("."))]
+
+
+@pytest.mark.parametrize(
+    ("owner", "old", "new"),
+    [
+        (Identification, "trial", "fault_isolation"),
+        (Payload, "trial", "fault_isolation"),
+        (FaultIsolation, "suspicions", "faults"),
+        (Design, "reserve", "margin"),
+        (Design, "start_strokes", "reference_strokes"),
+    ],
+)
+def test_a_former_attribute_answers_with_what_to_write(owner, old, new):
+    stand_in = type(owner.__name__, (SimpleNamespace,), {old: vars(owner)[old]})(**{new: "value"})
+    words = rf"^{owner.__name__}\.{old} goes with version {UNTIL}; write \.{new}$"
+    with pytest.warns(DeprecationWarning, match=words):
+        assert getattr(stand_in, old) == "value"
+    assert hasattr(owner, new) or new in owner.__dataclass_fields__

@@ -4,6 +4,8 @@ A name that is renamed gets a line in `RENAMED`, and its package, if it has none
 
     if not TYPE_CHECKING:
         __getattr__ = former_names(__name__)
+
+An attribute that is renamed leaves a line in its class: ``old = former_attribute("old", "new")``.
 """
 
 from __future__ import annotations
@@ -14,7 +16,16 @@ from pkgutil import resolve_name
 from typing import Any
 
 RENAMED = {
-    "pteron.identification": {"playback": "pteron.playback"},
+    "pteron.identification": {
+        "Suspicion": "pteron.identification.IsolatedFault",
+        "Trial": "pteron.identification.FaultIsolation",
+        "playback": "pteron.playback",
+    },
+    "pteron.identification.faults": {
+        "Suspicion": "pteron.identification.faults.IsolatedFault",
+        "Trial": "pteron.identification.faults.FaultIsolation",
+        "trial": "pteron.identification.faults.isolate_faults",
+    },
     "pteron.identification.signals": {
         "FourierSeries": "pteron.identification.signals.FittedSeries",
     },
@@ -64,3 +75,28 @@ def former_names(package: str) -> Callable[[str], Any]:
         return resolve_name(present)
 
     return __getattr__
+
+
+def former_attribute(former: str, present: str) -> property:
+    """Return a property for a class's body: an attribute under its former name.
+
+    Parameters
+    ----------
+    former, present : str
+        What the attribute was called, and what it is called now.
+
+    Returns
+    -------
+    property
+        It gives the attribute, with a `DeprecationWarning` that has what to write instead.
+    """
+
+    def attribute(own: Any) -> Any:
+        warnings.warn(
+            f"{type(own).__name__}.{former} goes with version {UNTIL}; write .{present}",
+            DeprecationWarning,
+            stacklevel=2,
+        )
+        return getattr(own, present)
+
+    return property(attribute)

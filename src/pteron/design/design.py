@@ -17,6 +17,7 @@ from pteron.equations.machine import numbers
 from pteron.kernels import Array
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, parameters
+from pteron.renamed import former_attribute
 from pteron.workspace.fit import UNKNOWN, Fit, largest_fit
 from pteron.workspace.samples import cube, shape_samples
 
@@ -146,6 +147,9 @@ class Design:
         if self.task.spec.workspace is None:
             return self.cube.margin
         return min(max(self._sides.values()), self.least)
+
+    reserve = former_attribute("reserve", "margin")
+    start_strokes = former_attribute("start_strokes", "reference_strokes")
 
     def quantity(self, name: str) -> float:
         """Return one of its quantities; NaN where it has none."""

@@ -31,6 +31,7 @@ from pteron.identification.signals import Preprocessing, Processing, preprocessi
 from pteron.kernels import Array
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.reduction import BaseParameters
+from pteron.renamed import former_attribute
 
 _NAMES = tuple(f"{name}_L" for name in PLATFORM_KINDS)
 
@@ -73,6 +74,8 @@ class Payload:
     residual: Array
     fault_isolation: FaultIsolation = field(repr=False)
     findings: tuple[Finding, ...] = ()
+
+    trial = former_attribute("trial", "fault_isolation")
 
     @property
     def values(self) -> Array:

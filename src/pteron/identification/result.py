@@ -21,6 +21,7 @@ from pteron.identification.verdict import Verdict
 from pteron.kernels import Array
 from pteron.legs import Drive, Stribeck
 from pteron.manipulator import Manipulator
+from pteron.renamed import former_attribute
 
 
 @dataclass(frozen=True, repr=False)
@@ -78,6 +79,8 @@ class Identification:
     notes: tuple[str, ...] = ()
     rotors: tuple[tuple[float, float], ...] | None = None
     unknowns: Unknowns = field(default_factory=Unknowns)
+
+    trial = former_attribute("trial", "fault_isolation")
 
     def __repr__(self) -> str:
         """Return the result in a line."""

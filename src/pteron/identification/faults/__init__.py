@@ -1,9 +1,15 @@
 """Fault isolation: faults of logs and machines that a fit's residuals show, and what they spoil."""
 
+from typing import TYPE_CHECKING
+
 from pteron.identification.faults.fault import IsolatedFault
 from pteron.identification.faults.isolation import FaultIsolation, delay_of, isolate_faults
+from pteron.renamed import former_names
 
 __all__ = ["FaultIsolation", "IsolatedFault", "delay_of", "isolate_faults"]
+
+if not TYPE_CHECKING:
+    __getattr__ = former_names(__name__)
 
 
 def __dir__() -> list[str]:

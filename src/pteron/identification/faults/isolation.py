@@ -29,6 +29,7 @@ from pteron.identification.signals import (
 )
 from pteron.identification.signals.preprocessing import LATEST
 from pteron.kernels import Array
+from pteron.renamed import former_attribute
 
 _ROWS, _MORE = 20_000, 100_000
 """Rows of all logs that are looked at, those in which the joints move most; and where these are too
@@ -79,6 +80,8 @@ class FaultIsolation:
     spoiled: Array
     why_not: str = ""
     hidden: tuple[FaultName, ...] = ()
+
+    suspicions = former_attribute("suspicions", "faults")
 
     @property
     def off(self) -> Array:
