@@ -113,7 +113,7 @@ _LATER_MODULES = (
     *("controllers", "design", "environments", "export", "identification", "indices"),
     *("maps", "motion", "plots", "report", "viewer", "workspace"),
 )
-"""What would slow the start of those who do not use it (SymPy, SciPy, matplotlib, Gymnasium)."""
+"""Modules imported at their first use: SymPy, SciPy, matplotlib and Gymnasium are slow to load."""
 
 
 def __dir__() -> list[str]:

@@ -47,7 +47,7 @@ class Between(NamedTuple):
 
 
 class _Kind(NamedTuple):
-    """What an argument may be: in words, and as a test."""
+    """A kind of argument: its words in messages, and its test."""
 
     words: str
     holds: Callable[[Any], bool]
@@ -167,7 +167,7 @@ def _kinds_of(
 
 
 def _hint(function: Callable[..., Any], annotation: Any) -> Any:
-    """Return what a type hint means; anything where its names are there for type checkers only."""
+    """Return the value of a type hint; `Any` where its names exist for type checkers only."""
     try:
         return eval(annotation, function.__globals__) if isinstance(annotation, str) else annotation
     except NameError:
@@ -175,7 +175,7 @@ def _hint(function: Callable[..., Any], annotation: Any) -> Any:
 
 
 def _kind(hint: Any) -> _Kind | None:
-    """Return what a type hint asks for; nothing where any value may do."""
+    """Return the kind that a type hint asks for; None where it allows any value."""
     if hint in _PLAIN:
         return _PLAIN[hint]
     origin, inner = typing.get_origin(hint), typing.get_args(hint)
@@ -214,7 +214,7 @@ def _kind(hint: Any) -> _Kind | None:
 
 
 def _alternative(hint: Any) -> _Kind | None:
-    """Return what one of several type hints asks for: of choices, one of them."""
+    """Return the kind of one of several type hints; a literal is compared with its choices."""
     kind = _kind(hint)
     if kind is None or typing.get_origin(hint) is not typing.Literal:
         return kind

@@ -17,10 +17,10 @@ from numpy.typing import ArrayLike
 from pteron.arguments import Between
 
 OnFailure = Literal["raise", "nan"]
-"""What a batch function does with a pose it cannot serve: raise the error, or return NaN there."""
+"""The action of a batch function at a pose that fails: raise the error, or return NaN there."""
 
 Seed = Annotated[int, Between(0)]
-"""Where the randomness of a result comes from: the same seed, the same result."""
+"""The seed of random numbers: the same seed, the same result."""
 Workers = Annotated[int, Between(1, 1024)]
 """Processes or threads that share the work."""
 

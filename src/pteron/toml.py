@@ -1,4 +1,4 @@
-"""TOML files, read safely and checked against pydantic models: every fault is told at once."""
+"""TOML files, read safely and checked against pydantic models; one message has every fault."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _Node = dict[str, Any]
 _LARGEST = 1 << 24
 _PARTS = 16
 _MANY = 20
-"""Faults of a file that are told."""
+"""Most faults of a file in one message."""
 
 _BOUNDS = {
     "greater_than": "above",
@@ -47,7 +47,7 @@ _LONG_KEY = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{_PARTS}}}")
 
 
 def read_toml(path: str | Path, error: type[PteronError], absent: str) -> dict[str, Any]:
-    """Return what a TOML file holds.
+    """Return the content of a TOML file.
 
     `error` is what is raised, `absent` what its message says if there is no such file.
 
@@ -78,7 +78,7 @@ def toml_bytes(path: str | Path, error: type[PteronError], absent: str) -> tuple
 
 
 def parsed_toml(data: bytes, source: str, error: type[PteronError]) -> dict[str, Any]:
-    """Return what a TOML text in UTF-8 holds; `source` is what messages call it.
+    """Return the content of a TOML text in UTF-8; messages call it `source`.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def parsed_toml(data: bytes, source: str, error: type[PteronError]) -> dict[str,
 def validated(
     model: type[_Model], document: dict[str, Any], source: str, error: type[PteronError]
 ) -> _Model:
-    """Return what a document says as an instance of a pydantic model or dataclass.
+    """Return a document as an instance of a pydantic model or dataclass.
 
     Raises
     ------
@@ -238,7 +238,7 @@ def _schema(model: Any) -> _Node:
 
 
 def _at(node: _Node, location: tuple[int | str, ...]) -> _Node:
-    """Return what is expected at a location."""
+    """Return the schema at a location."""
     for part in location:
         inner: Any
         if isinstance(part, int):
@@ -257,7 +257,7 @@ def _keys(node: _Node, table: str) -> tuple[str, ...]:
 
 
 def _words(node: _Node) -> str:
-    """Return what is expected in words; empty where there are none for it."""
+    """Return the words for a schema; empty where there are none."""
     if node.get("type") != "array":
         return _WORDS.get(node.get("type", ""), "")
     several = node.get("prefixItems", [])

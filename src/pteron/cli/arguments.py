@@ -136,7 +136,7 @@ def regrouped(args: Sequence[str], valued: Collection[str]) -> list[str]:
 
 
 def _meant_for_vector(words: Sequence[str]) -> int:
-    """Return how many words go to an option before them: up to the last number before the next."""
+    """Return the number of words of an option: up to the last number before the next option."""
     count = 0
     for i, word in enumerate(words, start=1):
         if _numeric(word):

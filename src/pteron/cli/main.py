@@ -81,7 +81,7 @@ class CommandGroup(TyperGroup):
 
 
 def _open_closed_streams() -> None:
-    """Let what is printed go nowhere if the caller has closed the stream (``>&-``)."""
+    """Discard output to a stream that the caller has closed (``>&-``)."""
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
             setattr(sys, name, StringIO())

@@ -25,7 +25,7 @@ _SUMMARY = ("best", "best_pose", "worst", "worst_pose", "mean", "median")
 def map_data(
     found: Map, volume: ReachVolume | None, warnings: list[str], out: str | None
 ) -> dict[str, Any]:
-    """Return what `--json` prints: the grid, the reach, what ends it, and each index."""
+    """Return the data of `--json`: the grid, the reach, its causes, and each index."""
     grid = found.grid
     return {
         "robot": found.robot,

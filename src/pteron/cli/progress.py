@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
 _SHORT = 0.05
-"""s below which a stage's time is not told."""
+"""s below which a stage's time is left out."""
 
 
 def is_watched() -> bool:
@@ -87,7 +87,7 @@ def _bar() -> Progress:
 
 
 class Times:
-    """The times of the stages of long work, of which it is told as a bar is."""
+    """The times of the stages of long work; it is called as a bar of `stages` is."""
 
     def __init__(self, tell: Callable[[str, int, int], None]) -> None:
         self._tell = tell

@@ -135,7 +135,7 @@ def _data(found: Sizing, fits: tuple[Fit, ...], cycle: str, payload: float) -> d
 
 
 def _fits_table(found: Sizing, fits: tuple[Fit, ...]) -> pl.DataFrame:
-    """Return how each motor suits each joint, a row each."""
+    """Return a table with a row for each motor and joint."""
     import polars as pl
 
     rows = [

@@ -43,7 +43,7 @@ class Rows:
         columns: Sequence[str],
         on_failure: Failure,
     ) -> NDArray[Any]:
-        """Return what `serve` makes of the numbers (..., K) in `columns`, chunk by chunk."""
+        """Return the results of `serve` for the numbers (..., K) in `columns`, chunk by chunk."""
         import numpy as np
 
         from pteron.errors import UnlikelyValue

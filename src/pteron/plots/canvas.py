@@ -82,7 +82,7 @@ class Picture(Figure):
         return all(axes.name == "rectilinear" for axes in self.axes)
 
     def savefig(self, fname: Any, **options: Any) -> None:
-        """Write the figure; letters that no font here has are told in one warning."""
+        """Write the figure, with one warning of all letters that no font here has."""
         absent = take_fonts(self)
         with no_word_of_glyphs():
             super().savefig(fname, **options)

@@ -1,4 +1,4 @@
-"""Residuals as noise, and how well parameters are known: one by one, and together."""
+"""The noise of residuals, and the certainty and correlations of identified parameters."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _CERTAIN = 1.96
 
 _LEVELS = 10
 _LEAST = 0.05
-"""Correlations below it are nothing to see."""
+"""Least correlation that is drawn."""
 
 _REACH = 4.5
 """Standard deviations to each side."""

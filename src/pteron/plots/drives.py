@@ -32,10 +32,10 @@ from pteron.plots.canvas import (
 from pteron.plots.joint_columns import joints_of, named, rows
 
 _ROOM = 1.15
-"""The axes' half width over what is drawn."""
+"""The axes' half width over the largest value."""
 
 _FAR = 3.0
-"""A limit that many times what is used is left out of the picture, which it would make small."""
+"""Ratio of a limit to the largest use above which the picture leaves it out."""
 
 
 class Ability(NamedTuple):

@@ -131,7 +131,7 @@ def _hundredths(fps: float) -> float:
 
 
 ENCODERS = {".mp4": Encoder(Mp4, float, np.inf), ".gif": Encoder(Gif, _hundredths, _GIF_PIXELS)}
-"""By the ending of the file."""
+"""Encoders by the ending of the file."""
 
 
 def checked_encoder(path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The frames of a film: one machine in the poses of a motion, always seen in one view."""
+"""The frames of a film: one machine in the poses of a motion, all in one view."""
 
 from __future__ import annotations
 

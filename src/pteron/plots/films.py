@@ -23,7 +23,7 @@ from pteron.plots.film_frames import frames
 
 _SPEEDS = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
 _LEAST = 2.0
-"""s that a film takes at least, where its speed is left to it."""
+"""Least length of a film, s, by which its speed is chosen."""
 
 _FPS = 30.0
 _SIZES = (160, 3840)
@@ -59,7 +59,7 @@ class Film:
 
     @property
     def duration(self) -> float:
-        """How long it takes to watch, s."""
+        """Its length, s."""
         return self.frames / self.fps
 
     def _repr_html_(self) -> str:

@@ -1,4 +1,4 @@
-"""Letters that the usual font lacks: from another font of this machine, or told in one line."""
+"""Letters that the usual font lacks: from another font of this machine, or in one warning."""
 
 from __future__ import annotations
 

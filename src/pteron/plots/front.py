@@ -1,4 +1,4 @@
-"""The front of a design search: what each objective costs in the others."""
+"""The front of a design search: the first objective over each of the others."""
 
 from __future__ import annotations
 

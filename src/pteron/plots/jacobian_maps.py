@@ -94,7 +94,7 @@ def singularities_figure(
     *,
     names: tuple[str, str] = ("x", "y"),
 ) -> Figure:
-    """Return where a determinant changes its sign over two coordinates: there poses are singular.
+    """Return the map of a determinant's sign over two coordinates: it changes at singular poses.
 
     Of the Jacobian of q' = J x' these are the type-II singularities, where the actuators, held
     still, no longer hold the platform. Regions of the two signs are shaded, and marked + and -: no

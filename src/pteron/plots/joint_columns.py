@@ -1,4 +1,4 @@
-"""What the joints of a machine measure, for the labels of a figure."""
+"""Columns of a figure's data, one a joint, and the joints' words and units for its labels."""
 
 from __future__ import annotations
 

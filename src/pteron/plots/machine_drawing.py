@@ -151,7 +151,7 @@ def draw_machine(sheet: MachineAxes, scene: Scene, points: JointPoints, angle: s
 
 
 def draw_path(sheet: MachineAxes, path: Array) -> None:
-    """Draw the way (T, 3) of a point in the base frame, m."""
+    """Draw the path (T, 3) of a point in the base frame, m."""
     sheet.line(path, INK, 1.2, raised=1.0, style=(0, (1.5, 1.2)))
 
 

@@ -249,6 +249,6 @@ def _alike(scenes: list[Scene]) -> list[Scene]:
 
 
 def _columns(count: int) -> int:
-    """Return how many of so many pictures stand in a row: up to four, the rows alike."""
+    """Return the columns for so many pictures: up to four, and rows of one length."""
     rows = -(-count // 4)
     return -(-count // rows)

@@ -15,14 +15,14 @@ from pteron.plots.canvas import nice_step, plain_axes
 from pteron.plots.machine_axes import MachineAxes
 
 _RIM = 0.06
-"""Share of what is drawn that the scales show around it."""
+"""Rim around the drawing, as a share of its size."""
 
 
 _APART = 0.4
 """Inches between two numbers of a scale, at least."""
 
 _LEFT, _BELOW, _TOP = 0.62, 0.46, 0.1
-"""Inches of a box that the scales and their names take, and that are free over the axes."""
+"""Inches of a box for the scales and their names, and free above the axes."""
 
 
 class PlaneAxes(MachineAxes):
@@ -86,7 +86,7 @@ class PlaneAxes(MachineAxes):
         self.axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         if self._small:
             return
-        # As many squares as their numbers have room for.
+        # As many squares as their numbers leave space for.
         figure, place = self.axes.get_figure(root=True), self.axes.get_position()
         assert figure is not None
         room = np.array([place.width, place.height]) * figure.get_size_inches()

@@ -36,7 +36,7 @@ _METADATA: dict[str, dict[str, Any]] = {
     ".pdf": dict.fromkeys(("Creator", "Producer", "CreationDate")),
     ".png": {"Software": None},
 }
-"""By the ending of the file: without a date a figure makes the same file on every run."""
+"""Metadata by the ending of the file: without a date a figure makes the same file on every run."""
 
 _TEXT: Any = {"svg.fonttype": "none", "svg.hashsalt": "pteron", "pdf.fonttype": 42}
 """Text stays text, which a journal's printer and a search find."""

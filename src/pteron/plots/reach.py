@@ -1,4 +1,4 @@
-"""Maps of the reach: slices of poses, coloured by what they are good for, and how good."""
+"""Maps of the reach: slices of poses, coloured by the leg that ends it, or by a measure."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _TIE = 1e-9
 """Metres."""
 
 _SPECK = 2.0
-"""Cells of the grid: what is smaller is not drawn."""
+"""Cells of the grid below which a rim is not drawn."""
 
 _DASHES = ("-", "-", (0, (3, 2)), (0, (3, 2)))
 """Legs 1 to 4: lines which coincide, as those of mirrored legs do, both show."""

@@ -1,4 +1,4 @@
-"""Values of parameters with their intervals, and counts, as one row a name."""
+"""Figures with a row a name: values of parameters with their intervals, and counts."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def parameters_figure(
 
 
 def operations_figure(names: Sequence[str], counts: ArrayLike) -> Figure:
-    """Return bars of how much each of some costs, such as operations, with its number.
+    """Return bars of counts, such as operations, each with its number.
 
     Parameters
     ----------

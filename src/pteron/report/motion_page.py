@@ -119,7 +119,7 @@ def motion_page(robot: Manipulator, recorded: Playback) -> str:
 
 
 def _forces_told(found: ShownMotion) -> tuple[str, str]:
-    """Return whose forces the page shows: in a word, and in a clause."""
+    """Return the origin of the forces on the page: in a word, and in a clause."""
     if found.given and found.playback.log:
         return "Measured", "as they were measured."
     if found.given:

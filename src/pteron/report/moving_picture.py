@@ -1,4 +1,4 @@
-"""What the pages with a moving picture share: its words, its speeds and its data."""
+"""The moving picture of a page: its words, its speeds and its data."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pteron.report.quantities import coordinate, force
 from pteron.report.typeset import embedded, resource
 
 _SHORT = 3.0
-"""s of a motion that the eye does not follow in real time."""
+"""s: the eye does not follow a shorter motion in real time."""
 
 _PACES = (
     (0.0, 0.1, "10 % of real speed"),
@@ -23,7 +23,7 @@ _PACES = (
     (10.0, 4.0, "4 times real speed"),
     (60.0, 16.0, "16 times real speed"),
 )
-"""For motions of at least so many s, a speed of the playback, and its name."""
+"""Least duration of a motion, s, speed of its playback, and name of the speed."""
 
 _ROUNDING = 1e-9
 
@@ -36,7 +36,7 @@ def stage(
     grid: float,
     **words: str,
 ) -> dict[str, Any]:
-    """Return what `moving_picture.html.j2` asks for; its pictures are the page's own affair.
+    """Return the variables of `moving_picture.html.j2`, but for its pictures.
 
     The words are what the machine is `doing`, what the `still` picture shows, and the
     `force_title` over the forces of the moment.
@@ -60,7 +60,7 @@ def stage(
 
 
 def gravity_words(robot: Manipulator) -> str:
-    """Return which way gravity acts in the picture of a planar machine, as a clause."""
+    """Return the direction of gravity in the picture of a planar machine, as a clause."""
     gravity, frame = np.array(robot.gravity), np.array(robot.platform.frame)
     if not gravity.any():
         return "there is no gravity"

@@ -35,7 +35,7 @@ from pteron.report.quantities import SYMBOLS, angles_text, force, nouns, readabl
 from pteron.report.typeset import compact, fixed, resource, template, triple
 
 _LONGEST = 200
-"""Characters of a sum that a person still reads; an oblique Quadrupteron's take thousands."""
+"""Most characters of a sum that is shown; those of an oblique Quadrupteron have thousands."""
 
 
 def page(report: Report) -> str:
@@ -166,7 +166,7 @@ def bodies(robot: Manipulator) -> list[tuple[str, int | None, dict[str, float]]]
 
 
 def _letters(robot: Manipulator) -> list[tuple[str, str]]:
-    """Return what the letters of the legs' bodies stand for."""
+    """Return the letters of the legs' bodies, with the names that they stand for."""
     found: dict[str, list[str]] = {}
     for leg in robot.legs:
         for letter in leg.bodies:
@@ -187,7 +187,7 @@ def _reasons(robot: Manipulator) -> list[str]:
 
 
 def _weighed(report: Report) -> list[str]:
-    """Return how what is no length is measured in the condition number of the Jacobian."""
+    """Return the measures of angles, as lengths, in the condition number of the Jacobian."""
     legs, radius = report.robot.legs, report.jacobian.radius
     followers = [legs[i].joint.noun for i in _followers(report.robot)]
     found = []
@@ -211,7 +211,7 @@ def _figures(report: Report) -> dict[str, Any]:
     """Return the pictures as SVG, by their names in the template."""
     robot, cycle, at = report.robot, report.cycle, report.orientations
     gravity, shown, standard = np.array(robot.gravity), report.shown, report.standard
-    # The way back of the cycle is its way out.
+    # The cycle returns on its own path.
     out = slice(len(shown.time) // 2 + 1 if standard else None)
     path = shown.pose[out, : len(robot.platform.lengths)]
     machine = robot_figure(

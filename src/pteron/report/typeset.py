@@ -8,10 +8,11 @@ from importlib.resources import files
 from math import floor, isfinite, log10
 from typing import Any
 
-import jinja2
+from jinja2 import Template
 from markupsafe import Markup
 
 from pteron.platforms.coordinates import coordinate
+from pteron.templates import template as any_template
 
 _MINUS = "\u2212"
 _NARROW = "\u202f"
@@ -73,22 +74,14 @@ def embedded(data: Any) -> Markup:
     return Markup(text.replace("<", "\\u003c"))
 
 
-def template(name: str, **filters: Callable[..., Any]) -> jinja2.Template:
-    """Return a page's template: strict, escaped, with the shared filters and some of its own."""
-    made = jinja2.Environment(
-        loader=jinja2.PackageLoader("pteron", "report"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    made.filters |= {
+def template(name: str, folder: str = "report", **filters: Callable[..., Any]) -> Template:
+    """Return a page's template, with the filters of all pages and some of its own."""
+    shared: dict[str, Callable[..., Any]] = {
         "compact": compact,
         "fixed": fixed,
         "mm": _millimetres,
         "significant": significant,
         "symbol": lambda name: coordinate(name).symbol,
         "unit": lambda text: text.replace(" ", _NARROW).replace("^2", "²"),
-        **filters,
     }
-    return made.get_template(name)
+    return any_template(folder, name, **shared | filters)

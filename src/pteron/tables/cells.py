@@ -19,7 +19,7 @@ _DATA = {
     sign: re.compile(f"{_NUMBER.format(re.escape(sign))}|{_STAMP}", re.IGNORECASE)
     for sign in (".", ",")
 }
-"""What a cell of data looks like, by the decimal sign: a number, or a time of day."""
+"""Patterns of a cell of data, a number or a time of day, by the decimal sign."""
 
 
 class Record(NamedTuple):

@@ -34,7 +34,7 @@ class CsvFile:
     data : path or bytes
         A regular file, or what was in one.
     source : str
-        What messages call it.
+        Its name in messages.
     dialect : Dialect, optional
         How it is written, as far as that is declared in the TOML file beside it; the rest is found.
         By default it must be plain: commas, decimal points, UTF-8, names in the first line.
@@ -50,11 +50,11 @@ class CsvFile:
     repeated : dict
         Names that the file has more than once, as they are told apart, and as it has them.
     found : tuple of str
-        What is unlike a plain CSV file and was not declared, in words.
+        Differences from a plain CSV file that were not declared, in words.
     rows_estimate : int or None
         About how many rows it has.
     hint : str
-        What may be amiss with the header where a column is missing.
+        The likely fault of the header where a column is missing.
 
     Raises
     ------
@@ -260,7 +260,7 @@ def _any(cells: Sequence[str]) -> bool:
 
 
 def _end_of_records(block: bytes) -> int:
-    """Return how much of a block is whole records: up to its last line end outside quotes."""
+    """Return the length of the whole records in a block: up to its last line end outside quotes."""
     cut = block.rfind(b"\n") + 1
     while cut and block.count(b'"', 0, cut) % 2:
         cut = block.rfind(b"\n", 0, block.rfind(b'"', 0, cut)) + 1

@@ -23,7 +23,7 @@ SEPARATORS: dict[Separator, str] = {
 
 @dataclass(frozen=True)
 class Dialect:
-    """How a CSV file is written; what is None is found from its beginning.
+    """The dialect of a CSV file; each part that is None is found from the file's beginning.
 
     Parameters
     ----------

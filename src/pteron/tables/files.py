@@ -35,7 +35,7 @@ def open_table(
     path : str or path
         A regular file; its ending says which it is.
     noun : str
-        What messages call such files.
+        The word for such files in messages.
     dialect : Dialect, optional
         How a CSV file is written, as far as that is declared; the rest is found. By default it must
         be plain.
@@ -183,7 +183,7 @@ def write_table(frame: pl.DataFrame, path: str | Path, dialect: Dialect | None =
 
 
 def table_bytes(frame: pl.DataFrame, path: str | Path, dialect: Dialect | None = None) -> bytes:
-    """Return what `write_table` writes."""
+    """Return the bytes that `write_table` writes."""
     file = check_output(path, dialect)
     buffer = io.BytesIO()
     try:

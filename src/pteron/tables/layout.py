@@ -38,7 +38,7 @@ _TICKS = 10**15
 
 @dataclass(frozen=True)
 class Layout:
-    """How a CSV file is laid out.
+    """The layout of a CSV file.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class Layout:
     first_line : int
         The line of the first row, from 1.
     found : tuple of str
-        What is unlike a plain CSV file and was not declared, in words.
+        Differences from a plain CSV file that were not declared, in words.
     """
 
     dialect: Dialect
@@ -99,11 +99,11 @@ def find_layout(head: bytes, declared: Dialect, encoding: str, source: str) -> L
     head : bytes
         The beginning of its text, in UTF-8.
     declared : Dialect
-        What is known about it.
+        The parts that are known.
     encoding : str
         From `find_encoding`.
     source : str
-        What messages call it.
+        Its name in messages.
 
     Raises
     ------

@@ -14,7 +14,7 @@ from pteron.tables.table import Table
 _ROWS = 262_144
 
 _UNREADABLE = (pl.exceptions.PolarsError, pl.exceptions.PanicException)
-"""What Polars raises at damaged bytes; a panic is no `Exception`."""
+"""Exceptions of Polars at damaged bytes; a panic is no `Exception`."""
 
 
 class ParquetFile:

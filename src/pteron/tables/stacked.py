@@ -16,19 +16,19 @@ from pteron.tables.layout import find_encoding
 from pteron.tables.table import listed
 
 _VALUES = re.compile(r'^"?VarName"? *(?P<separator>[;,\t])', re.MULTILINE)
-"""How a log of WinCC begins: a row for each value."""
+"""The header of a log of WinCC, which has a row for each value."""
 
 _BLOCKS = re.compile(r"^\d+\.Variable *(?P<separator>[;,\t])", re.MULTILINE)
-"""How a trace of CODESYS 3 begins: a line for each variable, and its samples below."""
+"""The first line of a variable in a trace of CODESYS 3, whose samples stand below."""
 
 _HEAD = 1 << 12
-"""Bytes in which they are told."""
+"""Bytes from which either is recognised."""
 
 _OF_ARCHIVE = "$RT_"
-"""How WinCC's own marks between the values begin."""
+"""Prefix of WinCC's own marks between the values."""
 
 _SECONDS = Decimal("0.0864")
-"""In a millionth of a day, the unit of WinCC's Time_ms."""
+"""Seconds in a millionth of a day, the unit of WinCC's Time_ms."""
 
 _Columns = dict[str, list[tuple[str, str]]]
 """Times and values of each variable, as text with decimal points."""

@@ -1,4 +1,4 @@
-"""A table: rows with named columns, and the words for where in its file a row is."""
+"""A table: rows with named columns, and the place of each row in its file."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ class Table:
     Parameters
     ----------
     source : str
-        What messages call it: the path of the file.
+        Its name in messages: the path of the file.
     frame : polars.DataFrame
         The cells; those of a CSV file are text.
     hint : str
-        What to do where a column is missing.
+        The advice where a column is missing.
     first_row : int
         Index from 0 of the first row in its file.
     line_of : callable, optional
@@ -52,7 +52,7 @@ class Table:
         return tuple(self.frame.columns)
 
     def place(self, index: int) -> str:
-        """Return where a row is: its number from 1 and, in a CSV file, its line."""
+        """Return the place of a row: its number from 1 and, in a CSV file, its line."""
         row = f"{self.source}: row {self.first_row + index + 1}"
         return row if self.line_of is None else f"{row} (line {self.line_of(index)})"
 

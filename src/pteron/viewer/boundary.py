@@ -1,4 +1,4 @@
-"""The boundary that stops a machine on its way to a pose, and the leg or limit that it is."""
+"""The boundary that stops a machine on its path to a pose: a leg's reach, or a limit."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ _SAME_JOINT = 1e-6
 
 
 def allowed(robot: Manipulator, poses: Array) -> NDArray[np.bool_]:
-    """Return which poses (..., m) are in reach of all legs and within all limits, (...)."""
+    """Return whether poses (..., m) are in reach of all legs and within all limits, (...)."""
     measure = numeric(robot, "reach")(poses)[1]
     bent = (measure >= LEAST_TYPE_I).all(axis=-1)
     return np.asarray(bent & (room_to_limits(robot, poses).min(axis=-1) >= -_ROUNDING))
 
 
 def farthest(robot: Manipulator, start: Array, target: Array) -> tuple[Array, Array | None]:
-    """Return how far the platform can go on the straight way from one pose to another.
+    """Return the last pose that the platform reaches on the straight path to another.
 
     A target that is allowed is always come to.
 
@@ -73,7 +73,7 @@ def farthest(robot: Manipulator, start: Array, target: Array) -> tuple[Array, Ar
 def followed(
     robot: Manipulator, pose: Array, joints: Array, target: Array
 ) -> tuple[Array, Array | None]:
-    """Return how far the platform follows joints on their straight way, in its assembly mode.
+    """Return the last pose in which the platform follows its joints on their straight path.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Who may ask the viewer's server: pages that it served itself, by a name of this machine.
+"""A guard of the viewer's server: it answers its own pages only, by a name of this machine.
 
 A browser lets any page ask any server for a socket, and a name that its owner points at 127.0.0.1
 makes a foreign page one of this machine's. Both stand in the request: in `Origin` and in `Host`.

@@ -20,7 +20,7 @@ _SIZE = 0.16
 
 
 class Handle:
-    """The handle of one machine; `pull` is told the pose (m,) that it is dragged to."""
+    """The handle of one machine; `pull` takes the pose (m,) to which it is dragged."""
 
     def __init__(
         self,

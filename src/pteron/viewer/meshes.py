@@ -1,4 +1,4 @@
-"""The few meshes that everything is made of, as vertices (V, 3) and faces (F, 3)."""
+"""The few meshes of all bodies, as vertices (V, 3) and faces (F, 3)."""
 
 from __future__ import annotations
 

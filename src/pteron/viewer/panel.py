@@ -229,7 +229,7 @@ class Panel:
             slider.value = value
 
     def show_settled(self) -> None:
-        """Show what takes longer to find, or seldom changes."""
+        """Show the parts that take longer to find, or seldom change."""
         session = self._session
         state = session.state
         self._poses, now = session.assemblies()

@@ -1,4 +1,4 @@
-"""A plane slice through the reach, as surfaces that the picture can show."""
+"""A plane slice through the reach, as surfaces of the picture."""
 
 from __future__ import annotations
 

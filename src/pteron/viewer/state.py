@@ -110,7 +110,7 @@ def assembly_poses(state: ViewerState) -> Array:
 
 
 def current_assembly(state: ViewerState, poses: Array) -> int | None:
-    """Return which of the assembly modes' poses the machine is in; None if in none of them."""
+    """Return the place of the machine's pose among those of its assembly modes, or None."""
     apart = np.abs(poses - state.pose)
     around = np.abs((apart + np.pi) % (2.0 * np.pi) - np.pi)
     apart = np.where(state.robot.wraps, around, apart)

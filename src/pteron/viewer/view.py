@@ -33,10 +33,10 @@ _PANEL = 0.1
 """s between two readings of a motion: nobody reads faster, and browsers are busy."""
 
 _SETTLED = 0.25
-"""s without an action after which is shown what takes longer to find."""
+"""s without an action after which slower results are shown."""
 
 STANDARD_CYCLE = "adept"
-"""What the command line calls the standard pick-and-place cycle."""
+"""The name of the standard pick-and-place cycle at the command line."""
 
 
 class Viewer:
@@ -94,12 +94,12 @@ class Viewer:
 
     @property
     def state(self) -> ViewerState:
-        """What is shown now."""
+        """The state that is shown."""
         return self._session.state
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """What failed unexpectedly in the viewer, as tracebacks; the page tells of it too."""
+        """Tracebacks of unexpected failures in the viewer; the page reports them too."""
         return tuple(self._faults)
 
     def move_to(self, pose: PoseLike) -> None:
@@ -177,14 +177,14 @@ class Viewer:
                 self._guard(lambda: self._show(settled=True))
 
     def _until(self, last: float, changed: float, settled: bool) -> float | None:
-        """Return how long there is nothing to do; None is until someone acts."""
+        """Return the time until the next picture, s; None where it waits for an action."""
         now = monotonic()
         times = [last + _FRAME - now] if self._session.playing else []
         times += [] if settled else [changed + _SETTLED - now]
         return max(0.0, min(times)) if times else None
 
     def _guard(self, act: Callable[[], object]) -> None:
-        """Do something; what fails is told on the page, and the last good state stays."""
+        """Act; a failure is reported on the page, and the last good state stays."""
         session = self._session
         try:
             act()
@@ -339,7 +339,7 @@ def view(
 
 
 def read_bytes(path: str | Path) -> bytes:
-    """Return what is in a file.
+    """Return the bytes of a file.
 
     Raises
     ------

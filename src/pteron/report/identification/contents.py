@@ -1,4 +1,4 @@
-"""What the page of an identification holds, computed once."""
+"""The contents of the page of an identification, computed once."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ class Shown:
 
     @property
     def seconds(self) -> tuple[float, float]:
-        """Where the stretch begins and ends, s."""
+        """Beginning and end of the stretch, s."""
         time = self.prediction.time[self.stretch]
         return float(time[0]), float(time[-1])
 
 
 @dataclass(frozen=True)
 class Contents:
-    """All that a page says about an identification.
+    """The contents of the page of an identification.
 
     Texts call recordings as on the page. `drawn` are the worst of those held out; `repeats` says
     whether what was held out is the end of what was fitted. A finding is a kind, a row, a column
@@ -71,18 +71,18 @@ class Contents:
 
     @property
     def worst_floor(self) -> float:
-        """What noise alone makes of it, percent."""
+        """The part of it that noise alone makes, percent."""
         shown = max(self.held_out, key=lambda one: float(one.prediction.nrms.max()))
         return float(shown.prediction.floor[int(np.argmax(shown.prediction.nrms))])
 
     @property
     def essential(self) -> int:
-        """How many values the data show."""
+        """Number of values that the data show."""
         return sum(not row.weak for row in self.parameters)
 
 
 def short_sources(result: Identification) -> dict[str, str]:
-    """Return what recordings are called on a page: without folders, unless two would be alike."""
+    """Return the names of recordings on a page: without folders, unless two would be alike."""
     every = list(dict.fromkeys(one.source for one in (*result.fitted, *result.held_out)))
     names = [PurePath(source).name or source for source in every]
     return {
@@ -102,7 +102,7 @@ def shortened(texts: Iterable[str], sources: Mapping[str, str]) -> tuple[str, ..
 
 
 def contents(result: Identification) -> Contents:
-    """Return what the page of an identification holds."""
+    """Return the contents of the page of an identification."""
     names = short_sources(result)
     held = tuple(_shown(prediction, names) for prediction in result.held_out)
     fitted = tuple(_shown(prediction, names) for prediction in result.fitted)

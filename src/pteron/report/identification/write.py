@@ -79,7 +79,7 @@ def write_identification(
 
 
 def model_path(folder: str | Path, name: str, sources: Iterable[str | Path] = ()) -> Path:
-    """Return where the model file goes: replacing none that is read, nor describing a log."""
+    """Return the path of the model file: no file that is read, and no description of a log."""
     stem = _SAFE.sub("_", name).strip("._") or "robot"
     path = Path(folder) / f"{stem[:100]}.toml"
     for source in map(Path, sources):

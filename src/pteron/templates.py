@@ -1,0 +1,28 @@
+"""Jinja templates of pages, tables and readings in HTML: strict, and escaped."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import jinja2
+
+
+def template(folder: str, name: str, **filters: Callable[..., Any]) -> jinja2.Template:
+    """Return a template of a folder inside the package, with filters of its own.
+
+    A template may extend or include others of its folder.
+    """
+    # Slow to load, and values that are shown in notebooks stand on the lowest floors.
+    import jinja2
+
+    made = jinja2.Environment(
+        loader=jinja2.PackageLoader("pteron", folder),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    made.filters |= filters
+    return made.get_template(name)
