@@ -16,6 +16,7 @@ from pkgutil import resolve_name
 from typing import Any
 
 RENAMED = {
+    "pteron.export.engines": {"Motor": "pteron.export.engines.TreeMotor"},
     "pteron.identification": {
         "Suspicion": "pteron.identification.IsolatedFault",
         "Trial": "pteron.identification.FaultIsolation",
@@ -29,6 +30,7 @@ RENAMED = {
     "pteron.identification.signals": {
         "FourierSeries": "pteron.identification.signals.FittedSeries",
     },
+    "pteron.motion.simulation": {"Law": "pteron.motion.simulation.ControlLaw"},
 }
 """Names of version 0.1 by package, and where each of them is now."""
 

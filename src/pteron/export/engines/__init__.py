@@ -1,5 +1,7 @@
 """The machine for other engines: one description of the opened mechanism, and files from it."""
 
+from typing import TYPE_CHECKING
+
 from pteron.export.engines.coordinates import coordinates
 from pteron.export.engines.mjcf import export_mjcf, mjcf
 from pteron.export.engines.parts import Closing, Tree, TreeBody, TreeJoint, TreeMotor
@@ -7,6 +9,7 @@ from pteron.export.engines.pinocchio import export_pinocchio, pinocchio_model
 from pteron.export.engines.sdf import export_sdf
 from pteron.export.engines.tree import tree
 from pteron.export.engines.urdf import export_urdf
+from pteron.renamed import former_names
 
 __all__ = [
     "Closing",
@@ -23,6 +26,9 @@ __all__ = [
     "pinocchio_model",
     "tree",
 ]
+
+if not TYPE_CHECKING:
+    __getattr__ = former_names(__name__)
 
 
 def __dir__() -> list[str]:
