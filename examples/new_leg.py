@@ -15,7 +15,7 @@ import numpy as np
 
 import pteron
 from pteron.bodies.inertia import PlanarInertia, PointMass, RodInertia
-from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, PointMotion
+from pteron.bodies.motion import BodyMotion, Expression, PointMotion, RotationMotion, point_rows
 from pteron.bodies.vectors import Vector
 from pteron.legs import KINDS, Drive
 from pteron.legs.keys import Key
@@ -94,7 +94,7 @@ class SliderRodEquations(LegEquations):
         self.r, self.e, self.d = guide_point, slider_direction, bar_direction
         self.ll, self.sigma = lower_length, elbow
 
-    def motion(self, point: PointMotion, angle: AngleMotion | None) -> LegMotion:
+    def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
         c, dc, ddc = point
         w = c - self.r
         h = ca.dot(w, self.e)
@@ -104,14 +104,14 @@ class SliderRodEquations(LegEquations):
         rate = ca.dot(b, dc) / divisor
         db = dc - rate * self.e
         acceleration = (ca.dot(b, ddc) + ca.dot(db, db)) / divisor
-        row = ca.horzcat(b.T, 0)
+        row = point_rows(b.T)
 
         tip, n = self.r + q * self.e, b / self.ll
         slides = ca.mtimes(self.e, row / divisor)
-        swing = (ca.horzcat(ca.SX.eye(3), ca.SX(3, 1)) - slides) / self.ll  # d n / d (c, phi)
+        swing = (point_rows(ca.SX.eye(3)) - slides) / self.ll  # n' = swing (c', omega)
         dn, ddn = db / self.ll, (ddc - acceleration * self.e) / self.ll
-        slider = Joint("P", self.e, self.r, row / divisor, rate, acceleration, "p")
-        chain = (slider, *universal_joints(self.d, tip, point, swing, (n, dn, ddn), angle))
+        slider = Joint("P", self.e, self.r, row / divisor, rate, acceleration, "p", driven=True)
+        chain = (slider, *universal_joints(self.d, tip, point, swing, (n, dn, ddn), rotation))
         slides = BodyMotion(tip, slides, acceleration * self.e)
         bodies = {"p": slides, "l": rod_body(point, n, ddn, swing)}
         return LegMotion(q, rate, acceleration, row, divisor, bodies, chain, links=(None, b))

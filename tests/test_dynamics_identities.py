@@ -81,7 +81,7 @@ def test_what_a_leg_needs_is_what_its_bodies_need(name):
     for leg, at, point, bodies in zip(
         machine.legs, state.legs, state.platform.points, inertia, strict=True
     ):
-        given = point, state.platform.angle, machine.gravity, bodies
+        given = point, state.platform.rotation, machine.gravity, bodies
         for mass_by in (type(leg).riding, LegEquations.riding):
             forms = []
             for form in (type(leg).needs, LegEquations.needs):

@@ -11,30 +11,39 @@ from pteron.legs import KINDS, PRR
 from pteron.legs.prr import PRREquations
 
 
-class RamEquations(PRREquations):
-    """A passive joint comes first, as in an R-P-R leg with a ram."""
+class UndrivenEquations(PRREquations):
+    """No joint is marked as driven."""
 
-    def motion(self, point, angle):
-        found = super().motion(point, angle)
+    def motion(self, point, rotation):
+        found = super().motion(point, rotation)
+        return found._replace(chain=tuple(joint._replace(driven=False) for joint in found.chain))
+
+
+class ElsewhereEquations(PRREquations):
+    """A passive joint is marked as the driven one."""
+
+    def motion(self, point, rotation):
+        found = super().motion(point, rotation)
         driven, first, *others = found.chain
-        return found._replace(chain=(first, driven, *others))
+        chain = (driven._replace(driven=False), first._replace(driven=True), *others)
+        return found._replace(chain=chain)
 
 
 class SilentEquations(PRREquations):
-    def motion(self, point, angle):
-        found = super().motion(point, angle)
+    def motion(self, point, rotation):
+        found = super().motion(point, rotation)
         return found._replace(chain=tuple(joint._replace(body="") for joint in found.chain))
 
 
 class TwiceEquations(PRREquations):
-    def motion(self, point, angle):
-        found = super().motion(point, angle)
+    def motion(self, point, rotation):
+        found = super().motion(point, rotation)
         return found._replace(chain=tuple(joint._replace(body="p") for joint in found.chain))
 
 
 class IdleEquations(PRREquations):
-    def motion(self, point, angle):
-        found = super().motion(point, angle)
+    def motion(self, point, rotation):
+        found = super().motion(point, rotation)
         return found._replace(row=0 * found.row)
 
 
@@ -68,8 +77,12 @@ def with_kind(kind):
     ("made", "words"),
     [
         (
-            kind(RamEquations),
-            "leg 2: a Own leg is not driven at the first joint .*its joint 2 moves",
+            kind(UndrivenEquations),
+            "leg 2: 0 joints of a Own leg's chain are marked as driven",
+        ),
+        (
+            kind(ElsewhereEquations),
+            "leg 2: the driven joint of a Own leg does not move as its coordinate does",
         ),
         (
             kind(SilentEquations),
@@ -82,7 +95,7 @@ def with_kind(kind):
         (kind(IdleEquations), "leg 2: a Own leg moves nothing"),
         (Sizeless, 'leg 2: a Sizeless leg has no size, 0 m, .* of role "length"'),
     ],
-    ids=["driven later", "no body", "bodies twice", "idle", "no size"],
+    ids=["none driven", "another driven", "no body", "bodies twice", "idle", "no size"],
 )
 def test_a_kind_that_breaks_the_protocol_is_refused(made, words):
     with pytest.raises(pteron.ModelError, match=words) as caught:
@@ -94,8 +107,8 @@ def test_a_file_that_names_such_a_kind_is_refused(tmp_path):
     path = pteron.save(CATALOG["3-prr"], tmp_path / "own.toml")
     path.write_text(path.read_text().replace('type = "PRR"', 'type = "Own"', 1))
     with (
-        patch.dict(KINDS, Own=kind(RamEquations)),
-        pytest.raises(pteron.ModelError, match=r"own.toml: .*leg 1: a Own leg is not driven"),
+        patch.dict(KINDS, Own=kind(UndrivenEquations)),
+        pytest.raises(pteron.ModelError, match=r"own.toml: .*leg 1: 0 joints of a Own leg"),
     ):
         pteron.load(path)
 

@@ -12,7 +12,7 @@ CODE: dict[str, tuple[str, ...]] = {
     "6": (f"{_E}.kinematics.link_vectors", f"{_L}.circles.links_from_triangle"),
     "7": (f"{_E}.kinematics.link_vectors", f"{_L}.circles.links_from_triangle"),
     "8": (f"{_E}.kinematics.joint_screws",),
-    "9": (f"{_E}.kinematics.joint_screws", f"{_E}.kinematics.chain_motion"),
+    "9": (f"{_E}.kinematics.joint_screws", f"{_E}.kinematics.passive_motion"),
     "10": (f"{_E}.kinematics.jacobian",),
     "11": (f"{_E}.kinematics.link_jacobians", f"{_E}.kinematics.body_jacobian"),
     "12": (f"{_E}.kinematics.link_jacobians", f"{_E}.kinematics.body_jacobian"),

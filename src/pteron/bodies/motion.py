@@ -22,19 +22,40 @@ class PointMotion(NamedTuple):
     acceleration: Expression
 
 
-class AngleMotion(NamedTuple):
-    """The platform's angle phi about its axis k, to second order."""
+def point_rows(rows: Expression) -> Expression:
+    """Return rows (k, 6) against (c', omega) from rows (k, 3) against c' alone."""
+    return ca.horzcat(rows, ca.SX(rows.shape[0], 3))
+
+
+class Turn(NamedTuple):
+    """A turn about an axis that is fixed in the base frame, to second order."""
 
     axis: Expression
-    """k, (3, 1)."""
-    angle: Expression
+    """Unit vector, (3, 1)."""
     rate: Expression
     acceleration: Expression
-    hinge: Expression | None = None
-    """A point of the axis about which it turns against a leg, (3, 1); None: the platform point."""
 
-    def axis_point(self, point: PointMotion) -> Expression:
-        """Return a point of the axis about which the platform turns against a leg."""
+    @property
+    def row(self) -> Expression:
+        """(1, 6): d rate / d (c', omega), the axes of all turns being perpendicular."""
+        return ca.horzcat(ca.SX(1, 3), self.axis.T)
+
+
+class RotationMotion(NamedTuple):
+    """The platform's rotation against its legs, to second order.
+
+    Its angular velocity is the sum of its turns: none of a platform that only translates, one of
+    a platform with an axis, three of one that tilts.
+    """
+
+    turns: tuple[Turn, ...] = ()
+    angle: Expression | None = None
+    """phi, of a platform with one axis."""
+    hinge: Expression | None = None
+    """The point about which it turns against a leg, (3, 1); None: the platform point."""
+
+    def center(self, point: PointMotion) -> Expression:
+        """Return the point about which the platform turns against the leg at a platform point."""
         return point.position if self.hinge is None else self.hinge
 
 
@@ -51,20 +72,21 @@ class BodyMotion(NamedTuple):
     """A rigid body that moves in a plane, a rod that swings, or a slider: all are written alike.
 
     A body is its reference point and its axes x and y. A rod has no y, a slider no axes. The rows
-    are the derivatives with respect to (c, phi): the leg's platform point and the platform's angle.
+    stand against (c', omega): the velocity of the leg's platform point, and the platform's angular
+    velocity.
     """
 
     position: Expression
     """Of the reference point, (3, 1)."""
     velocity_row: Expression
-    """(3, 4): d v / d (c', phi')."""
+    """(3, 6): d v / d (c', omega)."""
     acceleration: Expression
     """a, of the reference point, (3, 1)."""
     axes: Expression | None = None
     """(3, k): unit vectors at right angles about which it turns: z in a plane, all three for a rod,
     whose angular velocity is perpendicular to x."""
     rates_row: Expression | None = None
-    """(k, 4): d rates / d (c', phi'), the rates about the axes."""
+    """(k, 6): d rates / d (c', omega), the rates about the axes."""
     x: Expression | None = None
     """The axes x and y, (3, 1), and their second derivatives with respect to time."""
     y: Expression | None = None
@@ -73,9 +95,9 @@ class BodyMotion(NamedTuple):
 
     @property
     def turning_row(self) -> Expression:
-        """(3, 4): d omega / d (c', phi'), omega being the angular velocity."""
+        """(3, 6): d (the body's angular velocity) / d (c', omega)."""
         if self.axes is None:
-            return ca.SX(3, 4)
+            return ca.SX(3, 6)
         return ca.mtimes(self.axes, self.rates_row)
 
     @property
@@ -121,7 +143,7 @@ def wrench_matrix(body: BodyMotion, gravity: Expression) -> Expression:
 
 
 def mass_matrix(body: BodyMotion, inertia: Moments) -> Expression:
-    """Return the mass matrix (4, 4) of a body with respect to (c', phi').
+    """Return the mass matrix (6, 6) of a body against (c', omega).
 
     T = m v.v / 2 + v.h' + I omega.omega / 2, omega being perpendicular to x.
     """

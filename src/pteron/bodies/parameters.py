@@ -89,7 +89,9 @@ def body_places(parameters: Iterable[Parameter]) -> dict[str, dict[str, int]]:
 
 
 def parameter_list(
-    legs: Sequence[Mapping[str, Iterable[str]]], groups: Sequence[tuple[int, ...]] | None = None
+    legs: Sequence[Mapping[str, Iterable[str]]],
+    platform: Sequence[str],
+    groups: Sequence[tuple[int, ...]] | None = None,
 ) -> tuple[Parameter, ...]:
     """Return the inertial parameters in the paper's order, Eq. (16).
 
@@ -100,6 +102,8 @@ def parameter_list(
     ----------
     legs : sequence of mapping
         For each leg the kinds of parameters of each of its bodies, by letter.
+    platform : sequence of str
+        The kinds of the platform's.
     groups : sequence of tuple of int, optional
         Legs, from 1, that share one parameter set; those of a group have the same bodies.
     """
@@ -110,5 +114,5 @@ def parameter_list(
         for group in groups
         for kind in legs[group[0] - 1].get(body, ())
     ]
-    platform = [Parameter(k, PLATFORM, (), _UNITS[LENGTH_POWERS[k]]) for k in PLATFORM_KINDS]
-    return (*found, *platform)
+    carried = [Parameter(k, PLATFORM, (), _UNITS[LENGTH_POWERS[k]]) for k in platform]
+    return (*found, *carried)

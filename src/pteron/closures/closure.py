@@ -1,7 +1,7 @@
 """What a closure must supply: read this page before writing another.
 
-The legs' rows [dq/dc | dq/dphi] and the platform's matrices d (c, phi)/dx make up the Jacobian, Eq.
-(10): q' = J x'. A closure turns that round: forces through J^-T, rates through J^-1, joint
+The legs' rows against (c', omega) and the platform's matrices d(c, omega)/dx make up the Jacobian,
+Eq. (10): q' = J x'. A closure turns that round: forces through J^-T, rates through J^-1, joint
 coordinates into poses, and how far J is from singular. Which closure serves a machine depends on
 its legs' rows and on its platform alone. A kind is one file of this folder, named in
 `closures.KINDS`; what is solved here by the adjugate it may give in closed form.
@@ -94,7 +94,7 @@ class Closure(ABC):
             sizes = [ca.norm_2(x.normal) if isinstance(x, Plane) else ca.SX(1) for x in loci]
         forces = sum(not isinstance(locus, Turned) for locus in loci)
         greatest = (forces / lengths) ** (lengths / 2)
-        if forces == len(self.legs) and "phi" in self.platform.coordinates:
+        if forces == len(self.legs) and self.platform.angles():
             if self._in_line:  # no force has a moment
                 return ca.SX(0)
             greatest = greatest * self._lever

@@ -17,6 +17,8 @@ from pteron.closures.closure import Closure, nan_below_zero
 from pteron.closures.determinants import adjugate, determinant
 from pteron.legs.leg import LegEquations, LegMotion, Plane
 from pteron.platforms.motion import PlatformEquations, PlatformMotion
+from pteron.platforms.translating import Translating
+from pteron.platforms.turning import Turning
 
 _VANISHING = 1e-10
 """Relative size below which the coefficients of det J count as zero: far above their rounding
@@ -32,11 +34,13 @@ class ConstantRows(Closure):
     @classmethod
     def fits(cls, legs: Sequence[type[LegEquations]], platform: type[PlatformEquations]) -> bool:
         constant = all(leg.row_is_constant for leg in legs)
-        return constant and "z" in platform.coordinates and not platform.slides
+        return (
+            constant and issubclass(platform, Translating | Turning) and "z" in platform.coordinates
+        )
 
     def __init__(self, legs: Sequence[LegEquations], platform: PlatformEquations) -> None:
         super().__init__(legs, platform)
-        self.turns = "phi" in platform.coordinates
+        self.turns = bool(platform.angles())
         bars: list[Expression] = [leg.constant_row for leg in legs]
         self.rows = ca.horzcat(*bars).T  # D
         if not self.turns:
@@ -95,8 +99,7 @@ class ConstantRows(Closure):
 
     def _column(self, platform: PlatformMotion) -> Expression:
         """Return j, the Jacobian's fourth column."""
-        assert platform.angle is not None
-        phi = platform.angle.angle
+        phi = platform.rotation.angle
         return self.cosines * ca.cos(phi) + self.sines * ca.sin(phi)
 
     def rates(

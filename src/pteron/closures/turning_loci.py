@@ -39,7 +39,7 @@ class TurningLoci(Closure):
 
     @classmethod
     def fits(cls, legs: Sequence[type[LegEquations]], platform: type[PlatformEquations]) -> bool:
-        return "phi" in platform.coordinates
+        return len(platform.angles()) == 1
 
     @property
     def modes(self) -> int:

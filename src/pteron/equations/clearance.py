@@ -136,7 +136,7 @@ def _segments(machine: Machine, state: State) -> Iterator[tuple[Body, list[Segme
 def _of_leg(
     i: int, leg: LegKind, motion: LegMotion, c: Expression
 ) -> Iterator[tuple[Body, list[Segment]]]:
-    if motion.chain[0].kind == "P" and leg.limits is not None:
+    if "p" in motion.bodies and leg.limits is not None:
         r, e = ca.SX(list(leg.guide_point)), ca.SX(list(leg.joint_axis))
         low, high = leg.limits
         yield Body("guide", i, f"leg {i} guide"), [(r + low * e, r + high * e)]
@@ -166,7 +166,7 @@ def _arms(machine: Machine, state: State) -> Iterator[Segment]:
         hinge = point.position - ca.SX(list(leg.fixed_offset))
         ends = [p, hinge, point.position]
         offsets = [leg.platform_point, leg.fixed_offset]
-        if not robot.platform.turns:
+        if not state.platform.rotation.turns and not robot.platform.slides:
             total = tuple(a + b for a, b in zip(*offsets, strict=True))
             ends, offsets = [p, point.position], [total]
         for k, offset in enumerate(offsets):

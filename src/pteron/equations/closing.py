@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import casadi as ca
 
-from pteron.bodies.motion import Expression
+from pteron.bodies.motion import Expression, point_rows
 from pteron.closures.closure import nan_below_zero, plain_rows
 from pteron.closures.determinants import adjugate, determinant
 from pteron.equations.kinematics import reach
@@ -128,16 +128,16 @@ def misses(machine: Machine, joints: Expression, pose: Expression) -> Misses:
         locus, c = leg.locus(q), point.position
         arms.append(None)
         if isinstance(locus, Turned):
-            assert platform.angle is not None
-            length, row = platform.angle.angle - locus.angle, ca.SX([[0, 0, 0, 1]])
+            length = platform.rotation.angle - locus.angle
+            row = platform.rotation.turns[0].row
             angles.append(ca.fabs(length) / (1 + ca.fabs(locus.angle)))
         elif isinstance(locus, Plane):
-            length, row = ca.dot(locus.normal, c) - locus.offset, ca.horzcat(locus.normal.T, 0)
+            length, row = ca.dot(locus.normal, c) - locus.offset, point_rows(locus.normal.T)
             sizes.append(locus.size + ca.dot(ca.fabs(locus.normal), ca.fabs(c)))
         else:
             b = _counted(machine, locus, c - locus.center)
             length = 0.5 * (ca.dot(b, b) / locus.radius - locus.radius)
-            row = ca.horzcat(b.T / locus.radius, 0)
+            row = point_rows(b.T / locus.radius)
             sizes.append(locus.radius + ca.norm_1(c) + ca.norm_1(locus.center))
             arms[-1] = b
         lengths.append(length)

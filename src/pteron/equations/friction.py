@@ -18,7 +18,7 @@ class PassiveJoint(NamedTuple):
     leg: int | None
     """From 1; None for the platform's own axis, about which several legs' joints may turn."""
     number: int
-    """Its place in the leg's chain, the actuated joint being 0."""
+    """Its place in the leg's chain, from 0."""
     kind: Literal["P", "R"]
 
 
@@ -28,13 +28,14 @@ def passive_friction(machine: Machine, state: State) -> Expression:
     By virtual work: a joint at the rate q' with the coefficient c needs J^T F = c (dq'/dx')^T q'.
     Columns are the passive joints of leg 1 that move with its point, of leg 2, ...; where legs have
     joints that turn with the platform alone, one more follows for all of them: they turn alike,
-    as phi' does, so that only the sum of their coefficients acts.
+    as the platform does, so that only the sum of their coefficients acts.
     """
     columns = []
     for joint in _moving(state):
         if joint.leg is None:
-            assert state.platform.angle is not None  # something turns with it
-            load = ca.vertcat(ca.SX(machine.freedom - 1, 1), state.platform.angle.rate)
+            rows = [(turn.row, turn.rate) for turn in state.platform.rotation.turns]
+            at_p = state.platform.matrix.T
+            load = sum(ca.mtimes(at_p, row.T) * rate for row, rate in rows)
         else:
             one = state.legs[joint.leg - 1].chain[joint.number]
             row = ca.mtimes(one.row, state.platform.matrices[joint.leg - 1])
@@ -54,9 +55,11 @@ def _moving(state: State) -> tuple[PassiveJoint, ...]:
     """Return the passive joints, those that turn with the platform alone as one, which is last."""
     found, turning = [], []
     for i, leg in enumerate(state.legs, start=1):
-        for k, joint in enumerate(leg.chain[1:], start=1):
+        for k, joint in enumerate(leg.chain):
+            if joint.driven:
+                continue
             if not joint.row[:3].is_zero():
                 found.append(PassiveJoint(i, k, joint.kind))
-            elif not joint.row[3].is_zero():
+            elif not joint.row[3:].is_zero():
                 turning.append(PassiveJoint(None, k, joint.kind))
     return (*found, *turning[:1])

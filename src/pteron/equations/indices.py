@@ -31,8 +31,9 @@ class Homogeneous(NamedTuple):
 
 def lever_arms(machine: Machine, state: State) -> list[Expression]:
     """Return k x s (3, 1) of the platform points that legs hold: how they move per radian."""
-    pairs = zip(machine.robot.legs, state.platform.matrices, strict=True)
-    return [matrix[:3, -1] for leg, matrix in pairs if not leg.follows_angle]
+    (angle,) = machine.platform.angles()
+    pairs = zip(state.legs, state.platform.matrices, strict=True)
+    return [matrix[:3, angle] for leg, matrix in pairs if leg.pushes]
 
 
 def homogeneous(machine: Machine, state: State) -> Homogeneous:
@@ -42,7 +43,7 @@ def homogeneous(machine: Machine, state: State) -> Homogeneous:
     through P; 1 m where none of them does. The joint of a leg that follows the angle counts as that
     angle times L: its gear does not count.
     """
-    if "phi" not in machine.platform.coordinates:
+    if not machine.platform.angles():
         return Homogeneous(_measured(machine, kinematics.jacobian(state), ca.SX(1)), ca.SX(1))
     arms = lever_arms(machine, state)
     length = _root_or_one(sum(ca.dot(arm, arm) for arm in arms) / len(arms))
@@ -57,7 +58,7 @@ def by_points(machine: Machine, state: State) -> Expression:
     With V = S x' these velocities and S^T S = n R^T R it is J R^-1: that of the points' centroid,
     with their root mean square distance from it for L. No length and no point P is chosen.
     """
-    if "phi" not in machine.platform.coordinates:
+    if not machine.platform.angles():
         return homogeneous(machine, state).matrix
     first, *_ = arms = lever_arms(machine, state)
     # From the first one, so that points that coincide do so to the last bit.
@@ -193,9 +194,10 @@ def pressure_angle(machine: Machine, state: State) -> Expression:
     """
     angles = [ca.SX(0)]
     for leg in state.legs:
-        if leg.row[:3].is_zero():
-            continue  # it passes on a moment alone
-        joint, after = leg.chain[:2]
+        if not leg.pushes:
+            continue
+        place = leg.chain.index(leg.driven)
+        joint, after = leg.chain[place : place + 2]
         way = joint.axis
         if joint.kind == "R":
             way = ca.cross(joint.axis, after.point - joint.point)
@@ -210,7 +212,7 @@ def output_pressure_angle(machine: Machine, state: State) -> Expression:
     """
     across, angles = adjugate(plain_rows(state.platform, state.legs)), [ca.SX(0)]
     for i, (leg, matrix) in enumerate(zip(state.legs, state.platform.matrices, strict=True)):
-        if not leg.row[:3].is_zero():
+        if leg.pushes:
             angles.append(_between(leg.row[:3].T, ca.mtimes(matrix[:3, :], across[:, i])))
     return reduce(ca.fmax, angles)
 
@@ -225,7 +227,7 @@ def _between(u: Expression, v: Expression) -> Expression:
 def kappa(machine: Machine, state: State, mass: Expression) -> Expression:
     """Return the condition number of the mass matrix, turning measured by L as in the Jacobian."""
     counts = ca.SX.ones(machine.freedom)
-    if "phi" in machine.platform.coordinates:
+    if machine.platform.angles():
         counts[-1] = homogeneous(machine, state).length
     values = singular_values(_root(mass / ca.mtimes(counts, counts.T)))
     ratio = largest(values) / smallest(values)

@@ -37,8 +37,7 @@ def beyond_reach(machine: Machine, pose: Expression) -> Expression:
 def passive_joints(machine: Machine, pose: Expression) -> list[list[Passive]]:
     """Return the passive joints that have limits: the platform's angle first, then every leg's."""
     state, platform = machine.state(pose), machine.robot.platform
-    still, body = ca.horzcat(*machine.platform.frame), state.platform.body
-    turned = still if body.x is None else ca.horzcat(body.x, body.y, body.axes)
+    still, turned = ca.horzcat(*machine.platform.frame), state.platform.axes
     angle = []
     if platform.limits is not None:
         radius = max(norm(leg.platform_point) for leg in machine.robot.legs)
@@ -107,7 +106,7 @@ def direct_position(machine: Machine, joints: Expression, *, reached: bool = Tru
 
 
 def jacobian(state: State) -> Expression:
-    """Return J (n, m), Eq. (10): row i is [dq/dc | dq/dphi] d(c, phi)/dx."""
+    """Return J (n, m), Eq. (10): the legs' rows times their points' matrices."""
     pairs = zip(state.legs, state.platform.matrices, strict=True)
     return ca.vertcat(*(ca.mtimes(leg.row / leg.divisor, matrix) for leg, matrix in pairs))
 
@@ -123,8 +122,9 @@ def body_jacobian(state: State, i: int, letter: str) -> Expression | None:
 def link_jacobians(state: State) -> tuple[list[Expression], list[Expression]]:
     """Return J_u and J_l of every leg, each (6, m); NaN for a link that a leg has not."""
     n = len(state.legs)
+    m = state.platform.matrix.shape[1]
     upper, lower = (
-        [ca.SX.nan(6, n) if j is None else j for j in jacobians]
+        [ca.SX.nan(6, m) if j is None else j for j in jacobians]
         for jacobians in ([body_jacobian(state, i, k) for i in range(n)] for k in LEG_BODIES[1:])
     )
     return upper, lower
@@ -152,14 +152,22 @@ def link_turning(state: State, order: int) -> Expression:
     return ca.vertcat(*rows)
 
 
-def chain_motion(state: State, order: int) -> Expression:
-    """Return rates, or accelerations, (n, j) of every leg's joints; NaN for one it has not."""
-    return ca.vertcat(*_chains(state, lambda joint: (joint.rate, joint.acceleration)[order]))
+def driven_motion(state: State, order: int) -> Expression:
+    """Return rates, or accelerations, (n, 1) of the actuated joints."""
+    return ca.vertcat(*((leg.rate, leg.acceleration)[order] for leg in state.legs))
+
+
+def passive_motion(state: State, order: int) -> Expression:
+    """Return rates, or accelerations, (n, j) of the passive joints; NaN for one a leg has not."""
+    passive = [[joint for joint in leg.chain if not joint.driven] for leg in state.legs]
+    rows = [[(joint.rate, joint.acceleration)[order] for joint in joints] for joints in passive]
+    longest = max(map(len, rows))
+    return ca.vertcat(*(ca.horzcat(*row, ca.SX.nan(1, longest - len(row))) for row in rows))
 
 
 def chain_points(state: State) -> list[Expression]:
     """Return a point (j, 3) on every leg's joint axes, NaN for one it has not."""
-    return [points.T for points in _chains(state, lambda joint: joint.point)]
+    return [points.T for points in _chains(state, lambda j: j.point if j.seat is None else j.seat)]
 
 
 def _chains(state: State, column: Callable[[Joint], Expression]) -> list[Expression]:

@@ -28,8 +28,7 @@ def mass_matrix(machine: Machine, pose: Expression, parameters: Expression) -> E
         riding.append(sum((bodies[k].m for k in rides), none))
         bodies |= {k: bodies[k]._replace(m=none) for k in rides}
     carried = machine.platform.carrying(inertia, riding)
-    at_p = machine.platform.mass_matrix(platform, carried)
-    total = ca.mtimes(platform.matrix.T, ca.mtimes(at_p, platform.matrix))
+    total = machine.platform.mass_matrix(platform, carried)
     for leg, bodies, matrix in zip(state.legs, legs, platform.matrices, strict=True):
         at_c = sum(motion.mass_matrix(body, bodies[k]) for k, body in leg.bodies.items())
         total = total + ca.mtimes(matrix.T, ca.mtimes(at_c, matrix))

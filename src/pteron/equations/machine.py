@@ -8,7 +8,7 @@ from functools import cached_property, lru_cache
 import casadi as ca
 
 from pteron.bodies.motion import Expression, Moments, moments_of
-from pteron.bodies.parameters import PLATFORM, PLATFORM_KINDS, Parameter, parameter_list
+from pteron.bodies.parameters import PLATFORM, Parameter, parameter_list
 from pteron.closures import Closure, kind_for
 from pteron.legs.leg import LegEquations, LegMotion
 from pteron.manipulator import Manipulator
@@ -37,13 +37,13 @@ class Machine:
 
     @property
     def freedom(self) -> int:
-        """Number of pose coordinates, m = n."""
-        return len(self.legs)
+        """Number of pose coordinates m."""
+        return len(self.platform.coordinates)
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """The inertial parameters in the paper's order."""
-        return parameter_list([leg.kinds for leg in self.legs])
+        return parameter_list([leg.kinds for leg in self.legs], self.platform.kinds)
 
     @classmethod
     def of(cls, robot: Manipulator) -> Machine:
@@ -104,7 +104,7 @@ class Machine:
             rest if acceleration is None else acceleration,
         )
         trios = zip(self.legs, platform.points, self.platform.fixed, strict=True)
-        legs = tuple(leg.motion(c, platform.angle_at(c, fixed)) for leg, c, fixed in trios)
+        legs = tuple(leg.motion(c, platform.rotation_at(c, fixed)) for leg, c, fixed in trios)
         return State(platform, legs)
 
     def moments(self, parameters: Expression) -> tuple[list[dict[str, Moments]], Moments]:
@@ -116,7 +116,7 @@ class Machine:
             {body: moments_of(kinds, blocks[body, (i,)]) for body, kinds in leg.kinds.items()}
             for i, leg in enumerate(self.legs, start=1)
         ]
-        return legs, moments_of(PLATFORM_KINDS, blocks[PLATFORM, ()])
+        return legs, self.platform.moments(blocks[PLATFORM, ()])
 
 
 @lru_cache(maxsize=64)

@@ -59,7 +59,7 @@ class Equilibrium(NamedTuple):
 def equilibrium(machine: Machine, state: State, parameters: Expression) -> Equilibrium:
     """Return the equations of the internal forces of a state."""
     inertia, own = machine.moments(parameters)
-    platform, count = state.platform, machine.freedom
+    platform, count = state.platform, len(machine.legs)
     sums, works, legs, driven = [], [], [], []
     released: list[_Row] = []
     bars: dict[Vector, list[_Row]] = {}
@@ -70,30 +70,28 @@ def equilibrium(machine: Machine, state: State, parameters: Expression) -> Equil
         legs.append(found)
         arm = ca.skew(c - platform.body.position)
         sums.append(ca.blockcat([[ca.SX.eye(3), ca.SX(3, 3)], [arm, ca.SX.eye(3)]]))
-        moved = ca.horzcat(platform.matrices[i][:3, :].T, ca.SX(count, 3))
-        hinged = platform.angle is not None and platform.hinged
-        barred = any(leg.fixed_offset)
-        if hinged and (leg.follows_angle or not barred):
-            moved[-1, 3:] = machine.platform.frame[2].T
+        moved, barred = platform.matrices[i].T, any(leg.fixed_offset)
+        if barred and motion.pushes:  # the bar that it holds does not turn
+            moved = ca.horzcat(moved[:, :3], ca.SX(machine.freedom, 3))
         works.append(moved)
-        last = hinged or leg.follows_angle
-        released += [_among(row, i, count) for row in _released(leg, motion, found, last)]
-        if hinged and not leg.follows_angle:
-            hinge = _among(_along(motion, found, -1), i, count)
+        hinges = len(platform.rotation.turns)
+        released += [_among(row, i, count) for row in _released(leg, motion, found, hinges)]
+        for k in range(len(motion.chain) - hinges, len(motion.chain)) if motion.pushes else ():
+            hinge = _among(_along(motion, found, k), i, count)
             if barred:  # at one platform point it is one bar, on one hinge
                 bars.setdefault(leg.platform_point, []).append(hinge)
             else:
                 released.append(hinge)
-        driven.append(_among(_actuated(leg, motion, found), i, count))
-    hinges = [tuple(sum(parts) for parts in zip(*bar, strict=True)) for bar in bars.values()]
+        driven.append(_among(_actuated(motion, found), i, count))
+    shared = [tuple(sum(parts) for parts in zip(*bar, strict=True)) for bar in bars.values()]
     needs = machine.platform.needs(platform, machine.gravity, own)
     whole = machine.platform.needed_wrench(platform, machine.gravity, own)
     wanted = (ca.vertcat(*part) for part in zip(*driven, strict=True))
     return Equilibrium(
         ca.vertcat(ca.horzcat(*works), *(row for row, _ in released)),
         ca.vertcat(needs, *(-rest for _, rest in released)),
-        ca.vertcat(ca.horzcat(*sums), *(row for row, _ in hinges)),
-        ca.vertcat(*whole, *(-rest for _, rest in hinges)),
+        ca.vertcat(ca.horzcat(*sums), *(row for row, _ in shared)),
+        ca.vertcat(*whole, *(-rest for _, rest in shared)),
         tuple(legs),
         *wanted,
     )
@@ -145,9 +143,10 @@ def _leg_forces(
             body = motion.bodies[joint.body]
             needed, about = needed_wrench(body, inertia[joint.body], machine.gravity)
             force, moment = force + needed, moment + about + ca.cross(body.position - c, needed)
-        # A slider passes on a moment where it is, a shaft's motor where the shaft begins.
-        ahead = joint.kind == "P" or (leg.follows_angle and k == 0)
-        point = motion.chain[k + 1].point if ahead else joint.point
+        # A slider passes on a moment where it is.
+        point = motion.chain[k + 1].point if joint.kind == "P" else joint.point
+        if joint.seat is not None:
+            point = joint.seat
         arm = ca.horzcat(ca.skew(c - point), eye)
         points.append(point)
         forces = ca.horzcat(eye, ca.SX(3, 3))
@@ -174,22 +173,22 @@ def _along(motion: LegMotion, found: LegForces, k: int) -> _Row:
     return ca.mtimes(axis, at.moment_rows), ca.mtimes(axis, at.moment)
 
 
-def _actuated(leg: LegKind, motion: LegMotion, found: LegForces) -> _Row:
-    """Return the actuator force; of a shaft it is what it passes on over the ratio of its gear."""
-    row, rest = _along(motion, found, 0)
-    ratio = motion.row[-1] / motion.divisor if leg.follows_angle else 1
-    return row / ratio, rest / ratio
+def _actuated(motion: LegMotion, found: LegForces) -> _Row:
+    """Return the actuator force: what the driven joint passes on, over the ratio of its gear."""
+    row, rest = _along(motion, found, motion.chain.index(motion.driven))
+    return row / motion.driven.gear, rest / motion.driven.gear
 
 
-def _released(leg: LegKind, motion: LegMotion, found: LegForces, last: bool) -> list[_Row]:
+def _released(leg: LegKind, motion: LegMotion, found: LegForces, hinges: int) -> list[_Row]:
     """Return what the passive joints of a leg pass on along their freedoms: nothing.
 
-    With `last` that of the last joint is left out: a hinge on the platform's axis, which legs may
-    share, or what is geared to the first.
+    The last ones are left out: hinges on the platform's axes, which legs may share, or what is
+    geared to the driven joint.
     """
     couple = leg.rod_couple(motion)
     if couple is None:
-        return [_along(motion, found, k) for k in range(1, len(motion.chain) - last)]
+        passive = [k for k, joint in enumerate(motion.chain) if not joint.driven]
+        return [_along(motion, found, k) for k in passive if k < len(motion.chain) - hinges]
     # Rods: what is no force along them is their couple, the same at both of their ends.
     length = ca.norm_2(motion.links[1])
     n, couple = motion.links[1] / length, couple / length

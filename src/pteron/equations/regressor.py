@@ -35,13 +35,13 @@ class Terms:
 def terms(machine: Machine, state: State) -> Terms:
     """Return the factors of Eq. (15)."""
     slider, *links = LEG_BODIES
-    n = machine.freedom
+    n = len(machine.legs)
     diagonal = []
     for leg in state.legs:
         body = leg.bodies.get(slider)
         force = ca.SX(1, 1)
         if body is not None:
-            force = ca.dot(leg.chain[0].axis, machine.gravity - body.acceleration)
+            force = ca.dot(leg.driven.axis, machine.gravity - body.acceleration)
         diagonal.append(force)
     places = [(i, link) for link in links for i in range(n) if link in state.legs[i].bodies]
     jacobians = [body_jacobian(state, i, link) for i, link in places]

@@ -50,7 +50,7 @@ def needed_forces(
     legs, inertia = machine.moments(parameters)
     platform = state.platform
     needs = [
-        leg.needs(point, platform.angle, machine.gravity, bodies)
+        leg.needs(point, platform.rotation, machine.gravity, bodies)
         for leg, point, bodies in zip(machine.legs, platform.points, legs, strict=True)
     ]
     if carried:
@@ -59,9 +59,9 @@ def needed_forces(
         trios = zip(machine.legs, platform.points, needs, strict=True)
         needs += [leg.riding(point, machine.gravity, need.mass) for leg, point, need in trios]
     load = machine.platform.needs(platform, machine.gravity, inertia)
-    joints = ca.SX(machine.freedom, parameters.shape[1])
+    joints = ca.SX(len(machine.legs), parameters.shape[1])
     for k, need in enumerate(needs):
-        i = k % machine.freedom
+        i = k % len(machine.legs)
         load = load + ca.mtimes(platform.matrices[i].T, need.point)
         joints[i, :] = joints[i, :] + need.joint
     return joints, load

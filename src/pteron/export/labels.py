@@ -82,13 +82,13 @@ def _motion(machine: Machine, pose: Expression, *rates: Expression) -> Iterator[
     platform = state.platform
     for name, coordinate in zip(machine.platform.coordinates, ca.vertsplit(pose), strict=True):
         yield name, 0, coordinate
-    if platform.angle is not None:
-        yield "cos_phi", 0, ca.cos(platform.angle.angle)
-        yield "sin_phi", 0, ca.sin(platform.angle.angle)
+    if platform.rotation.angle is not None:
+        yield "cos_phi", 0, ca.cos(platform.rotation.angle)
+        yield "sin_phi", 0, ca.sin(platform.rotation.angle)
     for i, (equations, leg, point) in enumerate(
         zip(machine.legs, state.legs, platform.points, strict=True), start=1
     ):
-        found = equations.named(point, platform.angle) | {
+        found = equations.named(point, platform.rotation) | {
             "l_u": leg.links[0],
             "l_l": leg.links[1],
             "joint": leg.coordinate,

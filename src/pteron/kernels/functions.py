@@ -147,11 +147,9 @@ def _link_jacobians(m: Machine, v: Symbols) -> Outputs:
 
 def _joint_motion(m: Machine, v: Symbols) -> Outputs:
     state, order = _state(m, v), int("acceleration" in v)
-    chain = kinematics.chain_motion(state, order)
-    links = kinematics.link_turning(state, order)
-    passive = chain[:, 1:]
+    links, passive = kinematics.link_turning(state, order), kinematics.passive_motion(state, order)
     return {
-        "actuated": chain[:, 0],
+        "actuated": kinematics.driven_motion(state, order),
         "upper_links": links[:, 0],
         "lower_links": links[:, 1],
         "passive": (passive, passive.shape),

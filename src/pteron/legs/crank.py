@@ -15,13 +15,20 @@ from typing import Any, NamedTuple
 import casadi as ca
 
 from pteron.bodies.inertia import PlanarInertia
-from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, PointMotion
+from pteron.bodies.motion import (
+    BodyMotion,
+    Expression,
+    Moments,
+    PointMotion,
+    RotationMotion,
+    point_rows,
+)
 from pteron.bodies.vectors import Vector, cross, vertical
 from pteron.legs.circles import perpendicular_to, plane_of, quarter_turn
 from pteron.legs.drive import Drive
 from pteron.legs.keys import Key
 from pteron.legs.kind import CRANK, LegKind, Quantity, ReachBound, Transfer
-from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Reach
+from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Reach, on_point
 
 ELBOW: Mapping[tuple[str, str], tuple[int, tuple[str, ...]]] = {
     ("m", "u"): (1, ()),
@@ -186,7 +193,7 @@ class CrankEquations(LegEquations):
     def last_link(
         self,
         point: PointMotion,
-        angle: AngleMotion | None,
+        rotation: RotationMotion,
         at: CrankState,
         crank: Joint,
     ) -> tuple[BodyMotion, list[Joint], tuple[Expression, Expression] | None]:
@@ -224,10 +231,10 @@ class CrankEquations(LegEquations):
         """Return a vector that `counted` or `within` gave, in the base frame."""
         return v if v.shape[0] == 3 else ca.mtimes(self.plane, v)
 
-    def motion(self, point: PointMotion, angle: AngleMotion | None) -> LegMotion:
+    def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
         at = self.state(point)
         l_u, g, b = (self.in_space(v) for v in (at.l_u, at.g, at.b))
-        full, square = ca.horzcat(b.T, 0), at.rate * at.rate
+        full, square = point_rows(b.T), at.rate * at.rate
         coordinate = self.middle + ca.atan2(
             ca.dot(at.l_u, quarter_turn(self.zero)), ca.dot(at.l_u, self.zero)
         )
@@ -235,9 +242,9 @@ class CrankEquations(LegEquations):
         x, y = l_u / self.lu, g / self.lu
         ddx, ddy = at.acceleration * y - square * x, -at.acceleration * x - square * y
         rest = ca.SX(3, 1)
-        crank = BodyMotion(self.r, ca.SX(3, 4), rest, self.d, row, x, y, ddx, ddy)
-        joint = Joint("R", self.d, self.r, row, at.rate, at.acceleration, "u")
-        last, joints, turning = self.last_link(point, angle, at, joint)
+        crank = BodyMotion(self.r, ca.SX(3, 6), rest, self.d, row, x, y, ddx, ddy)
+        joint = Joint("R", self.d, self.r, row, at.rate, at.acceleration, "u", driven=True)
+        last, joints, turning = self.last_link(point, rotation, at, joint)
         return LegMotion(
             coordinate,
             at.rate,
@@ -251,7 +258,7 @@ class CrankEquations(LegEquations):
             self.ll,
         )
 
-    def named(self, point: PointMotion, angle: AngleMotion | None) -> dict[str, Expression]:
+    def named(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
         w, at = point.position - self.r, self.state(point)
         u, h, quarter = self._triangle(w)
         n2, root = ca.dot(u, u), ca.sqrt(quarter)
@@ -315,7 +322,7 @@ class CrankEquations(LegEquations):
     def needs(
         self,
         point: PointMotion,
-        angle: AngleMotion | None,
+        rotation: RotationMotion,
         gravity: Expression,
         inertia: Mapping[str, Moments],
     ) -> Needs:
@@ -340,4 +347,4 @@ class CrankEquations(LegEquations):
         force = ca.mtimes(self.counted(gravity), alpha) - self.within(tip)
         turned = quarter_turn(at.g * at.acceleration - at.l_u * at.rate**2 - weight)
         force = self.in_space(force - self.within(ca.mtimes(turned, nu)))
-        return Needs(joint, ca.vertcat(force, ca.SX(1, alpha.shape[1])), lower.m + eta + alpha)
+        return Needs(joint, on_point(force), lower.m + eta + alpha)

@@ -208,9 +208,12 @@ class LegKind(ABC):
         return self
 
     @property
-    @abstractmethod
-    def joint_axis(self) -> Vector:
-        """The unit vector along which the slider moves, or about which the crank turns."""
+    def joint_axis(self) -> Vector | None:
+        """The unit vector along which the slider moves, or about which the crank turns.
+
+        None where the driven joint moves with the leg, as a ram does.
+        """
+        return None
 
     @property
     def bar(self) -> Vector | None:

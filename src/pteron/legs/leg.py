@@ -1,14 +1,14 @@
 """What a kind of leg must supply: read this page before writing another.
 
 A leg makes one actuated joint follow one point of the platform. It knows the platform only through
-the motion of that point, c, and of the platform's angle, phi. A kind of leg is two classes in one
-file of this folder:
+the motion of that point, c, and the platform's rotation: its rows stand against (c', omega). A kind
+of leg is two classes in one file of this folder:
 
 - a frozen dataclass under `LegKind` (`legs.kind`): the leg's data with its TOML keys and bodies
   (`keys`), and what of its geometry the equations need (`quantities`);
 - a class under `LegEquations`: built from these quantities, in numbers or in symbols, it answers a
-  motion of c and phi with the motion of its joint and of its bodies (`motion`), says how far it
-  reaches (`reach`) and where c lies for a given joint (`locus`).
+  motion of c and of the platform's rotation with that of its joint and its bodies (`motion`), says
+  how far it reaches (`reach`) and where c lies for a given joint (`locus`).
 
 Two lines bind them: `MyLeg.equations_class = MyEquations`, and `pteron.legs.KINDS[MyLeg.type] =
 MyLeg`, after which files may name the kind.
@@ -35,17 +35,17 @@ from typing import ClassVar, Literal, NamedTuple
 import casadi as ca
 
 from pteron.bodies.motion import (
-    AngleMotion,
     BodyMotion,
     Expression,
     Moments,
     PointMotion,
+    RotationMotion,
     needed_wrench,
 )
 
 
 class Joint(NamedTuple):
-    """One joint of a leg's chain, from the base to the platform; the actuated one comes first."""
+    """One joint of a leg's chain, from the base to the platform."""
 
     kind: Literal["P", "R"]
     axis: Expression
@@ -53,12 +53,18 @@ class Joint(NamedTuple):
     point: Expression
     """A point on the axis, (3, 1)."""
     row: Expression
-    """(1, 4): d rate / d (c', phi')."""
+    """(1, 6): d rate / d (c', omega)."""
     rate: Expression
     acceleration: Expression
     body: str = ""
     """The letter of the body that it carries; none where the next joint follows at once, and at
     the platform, where the leg's loop is cut."""
+    driven: bool = False
+    """Whether it is the actuated joint: one of the chain is, wherever it stands."""
+    gear: Expression = 1
+    """Its coordinate over the motion that it passes on: of a shaft, its angle per phi."""
+    seat: Expression | None = None
+    """Where it passes on forces and moments, (3, 1), if that is not on its axis."""
 
 
 class LegMotion(NamedTuple):
@@ -69,7 +75,7 @@ class LegMotion(NamedTuple):
     rate: Expression
     acceleration: Expression
     row: Expression
-    """(1, 4), with `divisor`: dq / d (c, phi) = row / divisor. Kept apart, since forces need no
+    """(1, 6), with `divisor`: q' = row (c', omega) / divisor. Kept apart, since forces need no
     division by it: it vanishes where the leg is singular (type I)."""
     divisor: Expression
     bodies: dict[str, BodyMotion]
@@ -88,12 +94,21 @@ class LegMotion(NamedTuple):
     length of the link that `row` lies along."""
 
     @property
+    def driven(self) -> Joint:
+        """The actuated joint."""
+        return next(joint for joint in self.chain if joint.driven)
+
+    @property
+    def pushes(self) -> bool:
+        """Whether the leg passes a force on to its platform point, and not a moment alone."""
+        return not self.row[:3].is_zero()
+
+    @property
     def wrench_size(self) -> Expression:
         """The size in space of the force that `row` is; of its moment where it has no force."""
         if self.row_size is not None:
             return self.row_size
-        force = self.row[:3]
-        return ca.fabs(self.row[3]) if force.is_zero() else ca.norm_2(force)
+        return ca.norm_2(self.row[:3] if self.pushes else self.row[3:])
 
 
 class Passive(NamedTuple):
@@ -117,9 +132,14 @@ class Needs(NamedTuple):
     joint: Expression
     """(1, K): at the actuated joint."""
     point: Expression
-    """(4, K): a force on the platform point, and a moment about k on the platform."""
+    """(6, K): a force on the platform point, and a moment on the platform."""
     mass: Expression
     """(1, K): a mass that rides on the platform point, left to the platform to carry."""
+
+
+def on_point(force: Expression) -> Expression:
+    """Return the wrench (6, K) of a force (3, K) on the platform point alone."""
+    return ca.vertcat(force, ca.SX(3, force.shape[1]))
 
 
 class Reach(NamedTuple):
@@ -189,8 +209,8 @@ class LegEquations(ABC):
     """dq/dc, (3, 1), where that is so."""
 
     @abstractmethod
-    def motion(self, point: PointMotion, angle: AngleMotion | None) -> LegMotion:
-        """Return what the leg does; `angle` is None where the platform does not turn."""
+    def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
+        """Return the motion of the leg's joints and bodies."""
 
     @abstractmethod
     def reach(self, c: Expression) -> Reach:
@@ -223,28 +243,43 @@ class LegEquations(ABC):
     def locus(self, q: Expression) -> Locus:
         """Return where c may be while the actuated joint is at q."""
 
-    def named(self, point: PointMotion, angle: AngleMotion | None) -> dict[str, Expression]:
+    def named(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
         """Return what exported code calls by name: scalars, or vectors (2, 1) or (3, 1)."""
         return {}
 
     def needs(
         self,
         point: PointMotion,
-        angle: AngleMotion | None,
+        rotation: RotationMotion,
         gravity: Expression,
         inertia: Mapping[str, Moments],
     ) -> Needs:
-        """Return the forces that the leg's bodies need: Eqs. (13) and (14), J_b^T F_b summed.
+        """Return the forces that the leg's bodies need.
 
-        A kind of leg may say it more cheaply, giving what its joint carries to `Needs.joint` and
-        what is a mass on its platform point to `Needs.mass`; the tests hold that against this.
+        A kind of leg may say more cheaply what `needs_of_bodies` says, giving what its joint
+        carries to `Needs.joint` and what is a mass on its platform point to `Needs.mass`; its
+        conformance test holds the two against each other.
         """
-        motion = self.motion(point, angle)
+        return self.needs_of_bodies(point, rotation, gravity, inertia)
+
+    def needs_of_bodies(
+        self,
+        point: PointMotion,
+        rotation: RotationMotion,
+        gravity: Expression,
+        inertia: Mapping[str, Moments],
+    ) -> Needs:
+        """Return what the leg's bodies need, body by body, as the paper writes it.
+
+        Eq. (14) is the wrench F_b that acts on a body by its weight and inertia; what the body
+        needs is -F_b. Eq. (13) sums J_b^T of it, J_b being the body's rows against (c', omega).
+        """
+        motion = self.motion(point, rotation)
         columns = next(iter(inertia.values())).m.shape[1]
-        total = ca.SX(4, columns)
+        total = ca.SX(6, columns)
         for letter, body in motion.bodies.items():
-            force, moment = needed_wrench(body, inertia[letter], gravity)
-            total = total + ca.mtimes(body.velocity_row.T, force)
+            force, moment = needed_wrench(body, inertia[letter], gravity)  # -F_b, Eq. (14)
+            total = total + ca.mtimes(body.velocity_row.T, force)  # J_b^T, Eq. (13)
             if body.axes is not None:
                 total = total + ca.mtimes(body.turning_row.T, moment)
         return Needs(ca.SX(1, columns), total, ca.SX(1, columns))
@@ -253,4 +288,4 @@ class LegEquations(ABC):
         """Return what a mass (1, K) on the platform point needs, where the platform has it not."""
         none = ca.SX(1, mass.shape[1])
         force = ca.mtimes(point.acceleration - gravity, mass)
-        return Needs(none, ca.vertcat(force, none), none)
+        return Needs(none, on_point(force), none)

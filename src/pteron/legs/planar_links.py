@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import casadi as ca
 
-from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, PointMotion
+from pteron.bodies.motion import BodyMotion, Expression, PointMotion, RotationMotion, point_rows
 from pteron.legs.circles import quarter_turn
 from pteron.legs.leg import Joint
 
@@ -21,7 +21,7 @@ _COINCIDENT = 1e-12
 
 
 class Turning(NamedTuple):
-    """How a link turns about d: d theta / d(c, phi) (1, 4), theta' and theta''."""
+    """How a link turns about d: its row (1, 6) against (c', omega), theta' and theta''."""
 
     row: Expression
     rate: Expression
@@ -39,7 +39,7 @@ def link_body(
     x: Expression,
     turning: Turning,
 ) -> BodyMotion:
-    """Return a link in motion: its reference point's place, row (3, 4) and acceleration; its x."""
+    """Return a link in motion: its reference point's place, row (3, 6) and acceleration; its x."""
     y = quarter_turn(x)
     along, square = turning.acceleration, turning.rate * turning.rate
     vectors = (x, y, along * y - square * x, -along * x - square * y)
@@ -51,26 +51,25 @@ def lower_link_body(
     point: PointMotion, d: Expression, plane: Expression, x: Expression, turning: Turning
 ) -> BodyMotion:
     """Return the link that ends at the platform point, its reference point."""
-    rides = point.position, ca.horzcat(ca.SX.eye(3), ca.SX(3, 1)), point.acceleration
+    rides = point.position, point_rows(ca.SX.eye(3)), point.acceleration
     return link_body(rides, d, plane, x, turning)
 
 
 def last_joints(
-    d: Expression, point: PointMotion, lower: Turning, angle: AngleMotion | None
+    d: Expression, point: PointMotion, lower: Turning, rotation: RotationMotion
 ) -> list[Joint]:
-    """Return the revolute joint at the platform point and, where the platform turns, one about k.
+    """Return the revolute joint at the platform point, and one about each turn of the platform.
 
-    Where both have one axis they are one: its motion is under the first, the second has none.
+    Where two have one axis they are one: its motion is under the first, the second has none.
     """
-    ankle = Turning(*(-a for a in lower))
-    if angle is None:
-        return [Joint("R", d, point.position, *ankle)]
-    at = angle.axis_point(point)
-    along, apart = ca.dot(d, angle.axis), ca.cross(d, point.position - at)
-    one = ca.logic_and(ca.fabs(along) > _PARALLEL, ca.dot(apart, apart) < _COINCIDENT**2)
-    sense = ca.if_else(one, along, 0)
-    turn = Turning(ca.SX([[0, 0, 0, 1]]), angle.rate, angle.acceleration)
-    ankle = Turning(*(a + sense * b for a, b in zip(ankle, turn, strict=True)))
-    rest = 1 - sense * sense
-    hinge = Joint("R", angle.axis, at, *(rest * b for b in turn))
-    return [Joint("R", d, point.position, *ankle), hinge]
+    ankle, at = Turning(*(-a for a in lower)), rotation.center(point)
+    hinges = []
+    for turn in rotation.turns:
+        along, apart = ca.dot(d, turn.axis), ca.cross(d, point.position - at)
+        one = ca.logic_and(ca.fabs(along) > _PARALLEL, ca.dot(apart, apart) < _COINCIDENT**2)
+        sense = ca.if_else(one, along, 0)
+        motion = turn.row, turn.rate, turn.acceleration
+        ankle = Turning(*(a + sense * b for a, b in zip(ankle, motion, strict=True)))
+        rest = 1 - sense * sense
+        hinges.append(Joint("R", turn.axis, at, *(rest * b for b in motion)))
+    return [Joint("R", d, point.position, *ankle), *hinges]

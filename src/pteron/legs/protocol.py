@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.bodies.motion import AngleMotion, Expression, PointMotion
+from pteron.bodies.motion import Expression, PointMotion, RotationMotion, Turn
 from pteron.bodies.vectors import Vector
 from pteron.legs.kind import LegKind
 from pteron.legs.leg import LegMotion
@@ -51,19 +51,25 @@ def _of_chain(leg: LegKind, axis: Vector | None) -> tuple[str, ...]:
     return found
 
 
-def _motion(leg: LegKind, axis: Vector | None) -> LegMotion | None:
-    """Return what the leg does at rest at a random point in its reach."""
+def point_in_reach(leg: LegKind, seed: int = 0) -> NDArray[np.float64] | None:
+    """Return a random point (3,) in the reach of a leg; None where none was found."""
     equations, bound = leg.equations(), leg.reach_bound
     center, radius = (leg.guide_point, 1.0) if bound is None else (bound.point, bound.radius)
-    rest, rng = ca.SX(3, 1), np.random.default_rng(0)
+    rng = np.random.default_rng(seed)
     for point in center + radius * rng.uniform(-1.0, 1.0, (_TRIED, 3)):
-        c = ca.SX(ca.DM(point))
-        if _numbers(equations.reach(c).discriminant) > 0.0:
-            angle = (
-                None if axis is None else AngleMotion(ca.SX(list(axis)), *map(ca.SX, (0.3, 0, 0)))
-            )
-            return equations.motion(PointMotion(c, rest, rest), angle)
+        if _numbers(equations.reach(ca.SX(ca.DM(point))).discriminant) > 0.0:
+            return np.asarray(point)
     return None
+
+
+def _motion(leg: LegKind, axis: Vector | None) -> LegMotion | None:
+    """Return the leg's motion at rest at a random point in its reach."""
+    point, rest = point_in_reach(leg), ca.SX(3, 1)
+    if point is None:
+        return None
+    turns = () if axis is None else (Turn(ca.SX(list(axis)), ca.SX(0), ca.SX(0)),)
+    at_rest = PointMotion(ca.SX(ca.DM(point)), rest, rest)
+    return leg.equations().motion(at_rest, RotationMotion(turns, ca.SX(0.3)))
 
 
 def _carried(leg: LegKind, motion: LegMotion) -> Iterator[str]:
@@ -82,18 +88,23 @@ def _carried(leg: LegKind, motion: LegMotion) -> Iterator[str]:
 
 
 def _driven(leg: LegKind, motion: LegMotion) -> Iterator[str]:
-    """Yield it where the driven joint is not the first of the chain."""
+    """Yield why the chain's driven joint is not the leg's."""
     row = _numbers(motion.row / motion.divisor)
     size = np.abs(row).max()
     if not size > 0.0:
         yield f"a {leg.type} leg moves nothing: no motion of its platform point moves its joint"
         return
-    moved = [np.abs(_numbers(joint.row) - row).max() <= _ALIKE * size for joint in motion.chain]
-    if not any(moved[:1]):
-        place = f"its joint {moved.index(True) + 1}" if any(moved) else "none of its joints"
+    driven = [joint for joint in motion.chain if joint.driven]
+    if len(driven) != 1:
         yield (
-            f"a {leg.type} leg is not driven at the first joint of its chain ({place} moves as "
-            "its coordinate does); such legs are not modelled: put the driven joint first"
+            f"{len(driven)} joints of a {leg.type} leg's chain are marked as driven; mark the one "
+            "whose motion is the leg's coordinate (`Joint.driven`)"
+        )
+        return
+    if not np.abs(_numbers(driven[0].row) - row).max() <= _ALIKE * size:
+        yield (
+            f"the driven joint of a {leg.type} leg does not move as its coordinate does: "
+            "`Joint.row` is not `LegMotion.row` over its divisor"
         )
 
 

@@ -12,7 +12,14 @@ from typing import ClassVar, Self
 import casadi as ca
 
 from pteron.bodies.inertia import PlanarInertia, PointMass
-from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, PointMotion
+from pteron.bodies.motion import (
+    BodyMotion,
+    Expression,
+    Moments,
+    PointMotion,
+    RotationMotion,
+    point_rows,
+)
 from pteron.bodies.vectors import Vector, cross, perpendicular
 from pteron.legs.circles import perpendicular_to, plane_of, quarter_turn, random_vector
 from pteron.legs.cones import check_elbow, within
@@ -164,11 +171,11 @@ class PRREquations(SlideEquations):
         return ca.mtimes(self.plane, v)
 
     def link(
-        self, point: PointMotion, angle: AngleMotion | None, at: SlideState, slider: Joint
+        self, point: PointMotion, rotation: RotationMotion, at: SlideState, slider: Joint
     ) -> tuple[BodyMotion, list[Joint], tuple[Expression, Expression]]:
         """Return the link: b' = theta' d x b, whose part across e is that of c'."""
         across = quarter_turn(self.counted(self.e)) / at.divisor
-        row = ca.horzcat(self.in_space(across).T, 0)
+        row = point_rows(self.in_space(across).T)
         rate = ca.dot(across, self.counted(point.velocity))
         pull = self.counted(point.acceleration) + rate * rate * at.b
         turning = Turning(row, rate, ca.dot(across, pull))
@@ -176,7 +183,7 @@ class PRREquations(SlideEquations):
         tip = self.r + at.q * self.e
         joints = [
             Joint("R", self.d, tip, *turning, "l"),
-            *last_joints(self.d, point, turning, angle),
+            *last_joints(self.d, point, turning, rotation),
         ]
         return body, joints, (turning.rate, turning.acceleration)
 
@@ -186,7 +193,7 @@ class PRREquations(SlideEquations):
     def needs(
         self,
         point: PointMotion,
-        angle: AngleMotion | None,
+        rotation: RotationMotion,
         gravity: Expression,
         inertia: Mapping[str, Moments],
     ) -> Needs:
@@ -194,13 +201,13 @@ class PRREquations(SlideEquations):
 
         With nu = m gamma_y / ll: nu d x (c'' - g) at the tip t, -nu d x (t'' - g) at the platform.
         """
-        along = super().needs(point, angle, gravity, inertia)
+        along = super().needs(point, rotation, gravity, inertia)
         at, nu = self.state(point), inertia["l"].hy / self.ll
         e, ddc, weight = (self.counted(v) for v in (self.e, point.acceleration, gravity))
         joint = along.joint + ca.dot(e, quarter_turn(ddc - weight)) * nu
         turned = quarter_turn(at.acceleration * e - weight)
         force = along.point[:3, :] - self.in_space(ca.mtimes(turned, nu))
-        return Needs(joint, ca.vertcat(force, along.point[3, :]), along.mass)
+        return Needs(joint, ca.vertcat(force, along.point[3:, :]), along.mass)
 
 
 PRR.equations_class = PRREquations

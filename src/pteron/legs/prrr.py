@@ -15,7 +15,14 @@ from typing import ClassVar, NamedTuple
 import casadi as ca
 
 from pteron.bodies.inertia import PlanarInertia, PointMass
-from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, PointMotion
+from pteron.bodies.motion import (
+    BodyMotion,
+    Expression,
+    Moments,
+    PointMotion,
+    RotationMotion,
+    point_rows,
+)
 from pteron.bodies.vectors import Vector, dot, parallel, vertical
 from pteron.errors import ModelError
 from pteron.legs.circles import (
@@ -32,7 +39,16 @@ from pteron.legs.crank import ELBOW
 from pteron.legs.drive import Drive
 from pteron.legs.keys import Condition, Key
 from pteron.legs.kind import SLIDER, LegKind, Quantity, ReachBound, Transfer
-from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Passive, Plane, Reach
+from pteron.legs.leg import (
+    Joint,
+    LegEquations,
+    LegMotion,
+    Needs,
+    Passive,
+    Plane,
+    Reach,
+    on_point,
+)
 from pteron.legs.planar_links import Turning, last_joints, link_body, lower_link_body
 from pteron.legs.slide import SLIDER_KEYS
 from pteron.legs.two_bar import two_bar_needs
@@ -265,16 +281,16 @@ class PRRREquations(LegEquations):
         v = ddu + (upper_rate * upper_rate) * l_u + (lower_rate * lower_rate) * l_l
         rows = upper_row, lower_row
         upper, lower = (
-            Turning(ca.horzcat(ca.mtimes(row.T, self.across), 0), rate, ca.dot(row, v))
+            Turning(point_rows(ca.mtimes(row.T, self.across)), rate, ca.dot(row, v))
             for row, rate in zip(rows, (upper_rate, lower_rate), strict=True)
         )
         return _InPlane(l_u, l_l, rows, upper, lower, ddu)
 
-    def motion(self, point: PointMotion, angle: AngleMotion | None) -> LegMotion:
+    def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
         at = self._state(point)
         rho = ca.dot(self.d_bar, point.position - self.r)  # Eq. (4)
         rate, sliding = (ca.dot(self.d_bar, v) for v in (point.velocity, point.acceleration))
-        row = ca.horzcat(self.d_bar.T, 0)
+        row = point_rows(self.d_bar.T)
         r1 = self.r + rho * self.e
         slides = r1, ca.mtimes(self.e, row), sliding * self.e
         bodies = {
@@ -284,15 +300,15 @@ class PRRREquations(LegEquations):
         }
         links = ca.mtimes(self.plane, at.l_u), ca.mtimes(self.plane, at.l_l)
         chain = (
-            Joint("P", self.e, self.r, row, rate, sliding, "p"),
+            Joint("P", self.e, self.r, row, rate, sliding, "p", driven=True),
             Joint("R", self.d, r1, *at.upper, "u"),
             Joint("R", self.d, r1 + links[0], *at.lower.less(at.upper), "l"),
-            *last_joints(self.d, point, at.lower, angle),
+            *last_joints(self.d, point, at.lower, rotation),
         )
         angles = tuple((link.rate, link.acceleration) for link in (at.upper, at.lower))
         return LegMotion(rho, rate, sliding, row, ca.SX(1), bodies, chain, links, angles)
 
-    def named(self, point: PointMotion, angle: AngleMotion | None) -> dict[str, Expression]:
+    def named(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
         at = self._state(point)
         u = at.l_u + at.l_l
         delta = squared_reach(self.lu, self.ll, ca.dot(u, u))
@@ -328,7 +344,7 @@ class PRRREquations(LegEquations):
     def needs(
         self,
         point: PointMotion,
-        angle: AngleMotion | None,
+        rotation: RotationMotion,
         gravity: Expression,
         inertia: Mapping[str, Moments],
     ) -> Needs:
@@ -348,8 +364,7 @@ class PRRREquations(LegEquations):
         else:
             at, on_r1 = self._state(point), sliding * self.e_plane - weight
             along, across = self._link_needs(at, on_r1, upper, lower)
-        none = ca.SX(1, upper.m.shape[1])
-        return Needs(masses + along, ca.vertcat(ca.mtimes(self.plane, across), none), lower.m)
+        return Needs(masses + along, on_point(ca.mtimes(self.plane, across)), lower.m)
 
     def riding(self, point: PointMotion, gravity: Expression, mass: Expression) -> Needs:
         """Return what a mass on the platform point needs: what acts along d, the slider gives."""
@@ -357,7 +372,7 @@ class PRRREquations(LegEquations):
         slope = 1 if self.aligned else ca.dot(self.d, self.e)
         across = ca.mtimes(self.plane, ca.mtimes(ca.mtimes(self.plane.T, a_g), mass))
         none = ca.SX(1, mass.shape[1])
-        return Needs(slope * ca.dot(self.d, a_g) * mass, ca.vertcat(across, none), none)
+        return Needs(slope * ca.dot(self.d, a_g) * mass, on_point(across), none)
 
     def _link_needs(
         self, at: _InPlane, on_r1: Expression, upper: Moments, lower: Moments

@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Self
 import casadi as ca
 
 from pteron.bodies.inertia import PointMass, RodInertia
-from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, PointMotion
+from pteron.bodies.motion import BodyMotion, Expression, PointMotion, RotationMotion, point_rows
 from pteron.bodies.vectors import Vector
 from pteron.legs.circles import random_vector
 from pteron.legs.cones import Cone
@@ -170,15 +170,15 @@ class PSSEquations(SlideEquations):
         return v
 
     def link(
-        self, point: PointMotion, angle: AngleMotion | None, at: SlideState, slider: Joint
+        self, point: PointMotion, rotation: RotationMotion, at: SlideState, slider: Joint
     ) -> tuple[BodyMotion, list[Joint], None]:
-        rides = ca.horzcat(ca.SX.eye(3), ca.SX(3, 1))
+        rides = point_rows(ca.SX.eye(3))
         swing = (rides - ca.mtimes(self.e, slider.row)) / self.ll
         n = at.b / self.ll
         dn = (point.velocity - at.rate * self.e) / self.ll
         ddn = (point.acceleration - at.acceleration * self.e) / self.ll
         tip = self.r + at.q * self.e
-        joints = universal_joints(self.bar, tip, point, swing, (n, dn, ddn), angle)
+        joints = universal_joints(self.bar, tip, point, swing, (n, dn, ddn), rotation)
         return rod_body(point, n, ddn, swing), joints, None
 
     def locus(self, q: Expression) -> Sphere:

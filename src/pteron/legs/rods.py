@@ -7,7 +7,7 @@ from typing import Any
 
 import casadi as ca
 
-from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, PointMotion
+from pteron.bodies.motion import BodyMotion, Expression, PointMotion, RotationMotion, point_rows
 from pteron.bodies.vectors import Vector, parallel
 from pteron.legs.cones import within_cone
 from pteron.legs.keys import Key
@@ -106,11 +106,11 @@ def hinge_doubts(leg: Any, axis: Vector | None) -> Iterator[str]:
 
 
 def rod_body(point: PointMotion, n: Expression, ddn: Expression, swing: Expression) -> BodyMotion:
-    """Return a rod in motion: its direction n towards the platform point, n'' and dn/d(c, phi).
+    """Return a rod in motion: its direction n towards the platform point, n'' and the row of n'.
 
-    `swing` is (3, 4). The rod's angular velocity is n x n', its reference point the platform point.
+    `swing` is (3, 6). The rod's angular velocity is n x n', its reference point the platform point.
     """
-    rides = ca.horzcat(ca.SX.eye(3), ca.SX(3, 1))
+    rides = point_rows(ca.SX.eye(3))
     turning = ca.mtimes(ca.skew(n), swing)
     return BodyMotion(point.position, rides, point.acceleration, ca.SX.eye(3), turning, n, ddx=ddn)
 
@@ -121,17 +121,17 @@ def universal_joints(
     point: PointMotion,
     swing: Expression,
     direction: tuple[Expression, Expression, Expression],
-    angle: AngleMotion | None,
+    rotation: RotationMotion,
     before: Joint | None = None,
     body: str = "l",
 ) -> list[Joint]:
     """Return the universal joints at a rod's ends, tip and c: about d, and about d x n across it.
 
-    Where the platform turns, a hinge about k follows.
+    A hinge about each axis of the platform's rotation follows.
 
     With n' = omega x n and omega = alpha' d + beta' e, e = d x n / |d x n|: alpha' = n'.(d x n) /
-    |d x n|^2 and beta' = - n'.d / |d x n|. `direction` is n, n' and n''; `swing` (3, 4) is
-    dn/d(c, phi); `before` is a joint about d that turns the tip's side, such as a crank's. `body`
+    |d x n|^2 and beta' = - n'.d / |d x n|. `direction` is n, n' and n''; `swing` (3, 6) is
+    the row of n'; `before` is a joint about d that turns the tip's side, such as a crank's. `body`
     is the rod's letter.
     """
     c, (n, dn, ddn) = point.position, direction
@@ -149,14 +149,14 @@ def universal_joints(
     if before is not None:
         knee = tuple(a - b for a, b in zip(about_d, before[3:6], strict=True))
     axis = across / size
-    hinge = []
-    if angle is not None:
-        turn = ca.SX([[0, 0, 0, 1]]), angle.rate, angle.acceleration
-        hinge = [Joint("R", angle.axis, angle.axis_point(point), *turn)]
+    hinges = [
+        Joint("R", turn.axis, rotation.center(point), turn.row, turn.rate, turn.acceleration)
+        for turn in rotation.turns
+    ]
     return [
         Joint("R", d, tip, *knee),
         Joint("R", axis, tip, *about_e, body),
         Joint("R", axis, c, *(-a for a in about_e)),
         Joint("R", d, c, *(-a for a in about_d)),
-        *hinge,
+        *hinges,
     ]

@@ -11,7 +11,7 @@ from typing import ClassVar
 import casadi as ca
 
 from pteron.bodies.inertia import PlanarInertia
-from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, PointMotion
+from pteron.bodies.motion import BodyMotion, Expression, PointMotion, RotationMotion, point_rows
 from pteron.bodies.vectors import Vector
 from pteron.legs.circles import random_triangle
 from pteron.legs.cones import ELBOW_LIMITS, between, check_elbow, within
@@ -124,7 +124,7 @@ class RRREquations(CrankEquations):
         return ca.SX(0)
 
     def last_link(
-        self, point: PointMotion, angle: AngleMotion | None, at: CrankState, crank: Joint
+        self, point: PointMotion, rotation: RotationMotion, at: CrankState, crank: Joint
     ) -> tuple[BodyMotion, list[Joint], tuple[Expression, Expression]]:
         """Return the lower link: theta_l' = -l_u . u' / D and theta_l'' = -l_u . v / D, as Eq. (7).
 
@@ -134,13 +134,13 @@ class RRREquations(CrankEquations):
         along = -at.l_u / at.divisor
         rate = ca.dot(along, du)
         v = ddu + at.rate * at.rate * at.l_u + rate * rate * at.b
-        row = ca.horzcat(ca.mtimes(self.plane, along).T, 0)
+        row = point_rows(ca.mtimes(self.plane, along).T)
         lower = Turning(row, rate, ca.dot(along, v))
         upper = Turning(crank.row, crank.rate, crank.acceleration)
         body = lower_link_body(point, self.d, self.plane, at.b / self.ll, lower)
         elbow = self.r + ca.mtimes(self.plane, at.l_u)
         knee = Joint("R", self.d, elbow, *lower.less(upper), "l")
-        joints = [knee, *last_joints(self.d, point, lower, angle)]
+        joints = [knee, *last_joints(self.d, point, lower, rotation)]
         return body, joints, (lower.rate, lower.acceleration)
 
     def locus(self, q: Expression) -> Circle:

@@ -15,7 +15,7 @@ from typing import ClassVar
 import casadi as ca
 
 from pteron.bodies.inertia import PlanarInertia, RodInertia
-from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, PointMotion
+from pteron.bodies.motion import BodyMotion, Expression, PointMotion, RotationMotion, point_rows
 from pteron.bodies.vectors import Vector, cross, parallel
 from pteron.errors import ModelError
 from pteron.legs.circles import random_vector
@@ -179,16 +179,16 @@ class RSSEquations(CrankEquations):
         return ca.dot(w, self.d)
 
     def last_link(
-        self, point: PointMotion, angle: AngleMotion | None, at: CrankState, crank: Joint
+        self, point: PointMotion, rotation: RotationMotion, at: CrankState, crank: Joint
     ) -> tuple[BodyMotion, list[Joint], None]:
         l_u, g = (ca.mtimes(self.plane, v) for v in (at.l_u, at.g))
-        rides, square = ca.horzcat(ca.SX.eye(3), ca.SX(3, 1)), at.rate * at.rate
+        rides, square = point_rows(ca.SX.eye(3)), at.rate * at.rate
         swing = (rides - ca.mtimes(g, crank.row)) / self.ll
         n = at.b / self.ll
         dn = (point.velocity - at.rate * g) / self.ll
         ddn = (point.acceleration - at.acceleration * g + square * l_u) / self.ll
         tip = self.r + l_u
-        joints = universal_joints(self.d, tip, point, swing, (n, dn, ddn), angle, crank)
+        joints = universal_joints(self.d, tip, point, swing, (n, dn, ddn), rotation, crank)
         return rod_body(point, n, ddn, swing), joints, None
 
     def locus(self, q: Expression) -> Sphere:

@@ -15,7 +15,7 @@ from typing import ClassVar, Self
 import casadi as ca
 
 from pteron.bodies.inertia import RodInertia
-from pteron.bodies.motion import AngleMotion, Expression, Moments, PointMotion
+from pteron.bodies.motion import Expression, Moments, PointMotion, RotationMotion, point_rows
 from pteron.bodies.vectors import Vector, dot, parallel
 from pteron.errors import ModelError
 from pteron.legs.circles import perpendicular_to, random_fraction, random_vector
@@ -23,7 +23,7 @@ from pteron.legs.cones import within
 from pteron.legs.drive import Drive
 from pteron.legs.keys import Condition, Key
 from pteron.legs.kind import SHAFT, LegKind, Quantity, Transfer
-from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Passive, Reach, Turned
+from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Passive, Reach, Turned, on_point
 from pteron.legs.rods import rod_body, universal_joints
 
 _FAST = 10.0
@@ -227,8 +227,8 @@ class RUPUEquations(LegEquations):
     ) -> None:
         self.r, self.d, self.hinge, self.ratio = guide_point, direction, plane_axis, ratio
 
-    def motion(self, point: PointMotion, angle: AngleMotion | None) -> LegMotion:
-        assert angle is not None  # the manipulator has asked
+    def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
+        (turn,) = rotation.turns  # the manipulator has asked for one
         w = point.position - self.r
         length = ca.sqrt(ca.dot(w, w))
         n = w / length
@@ -236,31 +236,41 @@ class RUPUEquations(LegEquations):
         dn = (point.velocity - rate * n) / length
         growth = ca.dot(n, point.acceleration) + length * ca.dot(dn, dn)
         ddn = (point.acceleration - growth * n - 2 * rate * dn) / length
-        along = ca.horzcat(n.T, 0)
-        rides = ca.horzcat(ca.SX.eye(3), ca.SX(3, 1))
+        along, rides = point_rows(n.T), point_rows(ca.SX.eye(3))
         swing = (rides - ca.mtimes(n, along)) / length
 
-        row = ca.horzcat(ca.SX(1, 3), self.ratio)
-        turned = self.ratio * angle.rate, self.ratio * angle.acceleration
+        row = self.ratio * turn.row
+        turned = self.ratio * turn.rate, self.ratio * turn.acceleration
         upper = rod_body(PointMotion(self.r, ca.SX(3, 1), ca.SX(3, 1)), n, ddn, swing)
-        bodies = {"u": upper._replace(velocity_row=ca.SX(3, 4))}
+        bodies = {"u": upper._replace(velocity_row=ca.SX(3, 6))}
         bodies["l"] = rod_body(point, n, ddn, swing)
 
         # The shaft turns at its base; what turns the platform has its axis at the platform's end.
-        joint = Joint("R", self.d, angle.axis_point(point), row, *turned)
+        joint = Joint(
+            "R",
+            self.d,
+            rotation.center(point),
+            row,
+            *turned,
+            driven=True,
+            gear=self.ratio,
+            seat=self.r,
+        )
         swung = (n, dn, ddn)
-        *hinges, last = universal_joints(self.hinge, self.r, point, swing, swung, angle, body="u")
+        *hinges, last = universal_joints(
+            self.hinge, self.r, point, swing, swung, rotation, body="u"
+        )
         telescope = Joint("P", n, self.r, along, rate, growth, "l")
         gear = (last.row - row, last.rate - joint.rate, last.acceleration - joint.acceleration)
         chain = (joint, *hinges[:2], telescope, *hinges[2:], Joint("R", self.d, last.point, *gear))
         return LegMotion(
-            self.ratio * angle.angle, *turned, row, ca.SX(1), bodies, chain, links=(None, w)
+            self.ratio * rotation.angle, *turned, row, ca.SX(1), bodies, chain, links=(None, w)
         )
 
     def needs(
         self,
         point: PointMotion,
-        angle: AngleMotion | None,
+        rotation: RotationMotion,
         gravity: Expression,
         inertia: Mapping[str, Moments],
     ) -> Needs:
@@ -280,8 +290,7 @@ class RUPUEquations(LegEquations):
         turning = ca.dot(dc, dc) - kappa * forward  # L^2 n'.n'
         along = (ca.mtimes(w.T, v) + turning * eta) / square - 2 * kappa * kappa * swing
         force = v - ca.mtimes(w, along) - ca.mtimes(dc, 2 * kappa * swing)
-        none = ca.SX(1, swing.shape[1])
-        return Needs(none, ca.vertcat(force, none), inertia["l"].m)
+        return Needs(ca.SX(1, swing.shape[1]), on_point(force), inertia["l"].m)
 
     def reach(self, c: Expression) -> Reach:
         w = c - self.r

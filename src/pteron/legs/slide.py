@@ -15,13 +15,20 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
-from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, PointMotion
+from pteron.bodies.motion import (
+    BodyMotion,
+    Expression,
+    Moments,
+    PointMotion,
+    RotationMotion,
+    point_rows,
+)
 from pteron.bodies.vectors import Vector
 from pteron.legs.circles import random_fraction
 from pteron.legs.drive import Drive
 from pteron.legs.keys import Key
 from pteron.legs.kind import SLIDER, LegKind, ReachBound, Transfer
-from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Reach
+from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Reach, on_point
 
 SLIDER_KEYS: dict[str, Key] = {
     "guide_point": Key("point", "r, the point of the guide where its coordinate is 0, m"),
@@ -147,7 +154,7 @@ class SlideEquations(LegEquations):
     def link(
         self,
         point: PointMotion,
-        angle: AngleMotion | None,
+        rotation: RotationMotion,
         at: SlideState,
         slider: Joint,
     ) -> tuple[BodyMotion, list[Joint], tuple[Expression, Expression] | None]:
@@ -174,15 +181,15 @@ class SlideEquations(LegEquations):
         db = dw - rate * e
         return SlideState(w, q, b, divisor, rate, (ca.dot(b, ddw) + ca.dot(db, db)) / divisor)
 
-    def motion(self, point: PointMotion, angle: AngleMotion | None) -> LegMotion:
+    def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
         at = self.state(point)
         b = self.in_space(at.b)
-        full = ca.horzcat(b.T, 0)
+        full = point_rows(b.T)
         row = full / at.divisor
-        slider = Joint("P", self.e, self.r, row, at.rate, at.acceleration, "p")
+        slider = Joint("P", self.e, self.r, row, at.rate, at.acceleration, "p", driven=True)
         tip = self.r + at.q * self.e
         body = BodyMotion(tip, ca.mtimes(self.e, row), at.acceleration * self.e)
-        link, joints, turning = self.link(point, angle, at, slider)
+        link, joints, turning = self.link(point, rotation, at, slider)
         return LegMotion(
             at.q,
             at.rate,
@@ -196,7 +203,7 @@ class SlideEquations(LegEquations):
             self.ll,
         )
 
-    def named(self, point: PointMotion, angle: AngleMotion | None) -> dict[str, Expression]:
+    def named(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
         w, h, square = self._closed(point.position)
         return {"w": w, "h": h, "square": square, "root": ca.sqrt(square), "b": self.state(point).b}
 
@@ -208,7 +215,7 @@ class SlideEquations(LegEquations):
     def needs(
         self,
         point: PointMotion,
-        angle: AngleMotion | None,
+        rotation: RotationMotion,
         gravity: Expression,
         inertia: Mapping[str, Moments],
     ) -> Needs:
@@ -228,4 +235,4 @@ class SlideEquations(LegEquations):
             + ca.dot(e, weight) * (eta - slider.m)
         )
         force = self.in_space(ca.mtimes(weight - at.acceleration * e, alpha))
-        return Needs(joint, ca.vertcat(force, ca.SX(1, alpha.shape[1])), lower.m + eta + alpha)
+        return Needs(joint, on_point(force), lower.m + eta + alpha)

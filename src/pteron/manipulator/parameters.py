@@ -43,15 +43,17 @@ def parameter_data(
     """
     robot = as_manipulator(robot)
     kinds = tuple(tuple((b, i.kinds) for b, i in leg.bodies.items()) for leg in robot.legs)
-    return _listed(kinds, None if groups is None else tuple(groups))
+    carried = robot.platform.joined.kinds
+    return _listed(kinds, carried, None if groups is None else tuple(groups))
 
 
 @lru_cache(maxsize=64)
 def _listed(
     kinds: tuple[tuple[tuple[str, tuple[str, ...]], ...], ...],
+    platform: tuple[str, ...],
     groups: tuple[tuple[int, ...], ...] | None,
 ) -> tuple[Parameter, ...]:
-    return parameter_list([dict(bodies) for bodies in kinds], groups)
+    return parameter_list([dict(bodies) for bodies in kinds], platform, groups)
 
 
 def parameter_names(robot: RobotLike) -> tuple[str, ...]:

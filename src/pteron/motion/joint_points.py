@@ -11,7 +11,6 @@ from pteron.kernels import Array, as_array
 from pteron.kinematics import inverse_kinematics
 from pteron.kinematics.evaluate import evaluated
 from pteron.legs import LegKind
-from pteron.legs.kind import SLIDER
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PerJoint, PoseLike
 
@@ -166,10 +165,8 @@ def joint_points(robot: RobotLike, pose: PoseLike) -> JointPoints:
 
 def _links(leg: LegKind, chain: Array, coordinate: Array, end: Array) -> Array:
     """Return a leg's line, which ends at its platform point: a hinge of the platform is beyond."""
-    # A joint that follows the platform's angle is counted where the leg ends, not where it begins.
-    chain = chain[..., int(leg.follows_angle) :, :]
     start = chain[..., 0, :]
-    if leg.joint is SLIDER:
+    if "p" in leg.bodies:
         start = start + np.multiply.outer(coordinate, leg.joint_axis)
     same = _SAME * float(np.abs(end - start).max(initial=0.0))
     line = [start]
@@ -242,10 +239,11 @@ def joint_guides(robot: RobotLike, poses: PoseLike) -> tuple[Guide, ...]:
     points = joint_points(robot, given.reshape(-1, robot.freedom))
     found = []
     for i, leg in enumerate(robot.legs):
-        used, axis = points.coordinates[:, i], np.array(leg.joint_axis)
-        if leg.follows_angle:
+        used, slides = points.coordinates[:, i], "p" in leg.bodies
+        axis = np.array(leg.joint_axis or leg.plane_normal)
+        if not slides and not leg.goes_round:
             path = points.links[i][0, :1]
-        elif leg.joint is SLIDER:
+        elif slides:
             spare = _SPARE * leg.size
             limits = leg.limits or (used.min() - spare, used.max() + spare)
             path = np.array(leg.guide_point) + np.multiply.outer(np.array(limits), axis)
@@ -254,7 +252,7 @@ def joint_guides(robot: RobotLike, poses: PoseLike) -> tuple[Guide, ...]:
             angles = np.linspace(low, high, 2 + int((high - low) / _ARC)) - used[0]
             center, end = points.links[i][0, :2]
             path = center + _turned(end - center, axis, angles)
-        found.append(Guide(leg.joint is SLIDER, axis, path))
+        found.append(Guide(slides, axis, path))
     return tuple(found)
 
 

@@ -12,18 +12,20 @@ from collections.abc import Sequence
 from typing import ClassVar, NamedTuple
 
 import casadi as ca
+import numpy as np
 
+from pteron.bodies.inertia import PlanarInertia
 from pteron.bodies.motion import (
-    AngleMotion,
     BodyMotion,
     Expression,
     Moments,
     PointMotion,
-    mass_matrix,
+    RotationMotion,
     mass_moment,
+    moments_of,
     needed_wrench,
-    wrench_matrix,
 )
+from pteron.platforms.coordinates import are_angles
 
 
 class Offset(NamedTuple):
@@ -38,25 +40,22 @@ class Offset(NamedTuple):
 
 
 class PlatformMotion(NamedTuple):
-    """The platform's state: its legs' points, their matrices, and its own body."""
+    """The platform's state: its legs' points, their matrices, its rotation and its own body."""
 
     points: tuple[PointMotion, ...]
     matrices: tuple[Expression, ...]
-    """(4, m), one a leg: d (c, phi) / dx."""
-    angle: AngleMotion | None
-    """None where the platform does not turn."""
+    """(6, m), one a leg: (c', omega) = matrix x'."""
+    rotation: RotationMotion
+    axes: Expression
+    """(3, 3): x, y and z of the platform's frame, as the joints of its legs see them."""
     body: BodyMotion
-    """The platform itself, its rows with respect to (p, phi)."""
+    """The platform itself, its rows against (p', omega)."""
     matrix: Expression
-    """(4, m): d (p, phi) / dx."""
-    hinged: bool = True
-    """Whether it turns against its legs where it has an angle."""
+    """(6, m): (p', omega) = matrix x'."""
 
-    def angle_at(self, point: PointMotion, fixed: Expression) -> AngleMotion | None:
-        """Return the angle's motion as the leg at a point sees it, whose fixed offset is given."""
-        if self.angle is None or not self.hinged:
-            return None
-        return self.angle._replace(hinge=point.position - fixed)
+    def rotation_at(self, point: PointMotion, fixed: Expression) -> RotationMotion:
+        """Return the rotation as the leg at a point sees it, whose fixed offset is given."""
+        return self.rotation._replace(hinge=point.position - fixed)
 
 
 class PlatformEquations(ABC):
@@ -64,6 +63,8 @@ class PlatformEquations(ABC):
 
     coordinates: ClassVar[tuple[str, ...]]
     """The pose's coordinates, in order."""
+    kinds: ClassVar[tuple[str, ...]] = PlanarInertia.kinds
+    """The kinds of its inertial parameters."""
     slides: ClassVar[bool] = False
     """Whether phi slides what the legs carry, and does not turn it."""
 
@@ -82,6 +83,15 @@ class PlatformEquations(ABC):
         self.directions = ca.SX.eye(3) if "z" in self.coordinates else ca.horzcat(x0, y0)
         """(3, 2) or (3, 3): along which the pose's lengths count; p = directions (x, y, ...)."""
 
+    @classmethod
+    def angles(cls) -> list[int]:
+        """Return where the pose's angles stand."""
+        return np.flatnonzero(are_angles(cls.coordinates)).tolist()
+
+    def moments(self, rows: Sequence[Expression]) -> Moments:
+        """Return the platform's inertia from the rows (1, K) of its parameters."""
+        return moments_of(self.kinds, rows)
+
     @abstractmethod
     def motion(
         self, pose: Expression, velocity: Expression, acceleration: Expression
@@ -99,14 +109,12 @@ class PlatformEquations(ABC):
         return needed_wrench(motion.body, inertia, gravity)
 
     def wrench_matrix(self, motion: PlatformMotion, gravity: Expression) -> Expression:
-        """Return Om_e (m, 4) of Eq. (15): what acts on it, per unit of each of its parameters."""
-        rows = ca.vertcat(motion.body.velocity_row, motion.body.turning_row)
-        acts = ca.mtimes(rows.T, wrench_matrix(motion.body, gravity))
-        return ca.mtimes(motion.matrix.T, acts)
+        """Return Om_e (m, k) of Eq. (15): what acts on it, per unit of each of its parameters."""
+        return -self.needs(motion, gravity, self.moments(ca.vertsplit(ca.SX.eye(len(self.kinds)))))
 
+    @abstractmethod
     def mass_matrix(self, motion: PlatformMotion, inertia: Moments) -> Expression:
-        """Return its mass matrix (4, 4) with respect to (p, phi)."""
-        return mass_matrix(motion.body, inertia)
+        """Return its mass matrix (m, m) with respect to the pose."""
 
     def mass_moment(self, motion: PlatformMotion, inertia: Moments) -> Expression:
         """Return mass times centre of mass, (3, K), in the base frame."""

@@ -9,7 +9,14 @@ from collections.abc import Sequence
 
 import casadi as ca
 
-from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, PointMotion
+from pteron.bodies.motion import (
+    BodyMotion,
+    Expression,
+    Moments,
+    PointMotion,
+    RotationMotion,
+    point_rows,
+)
 from pteron.platforms.motion import Offset, PlatformEquations, PlatformMotion
 
 
@@ -44,14 +51,19 @@ class Sliding(PlatformEquations):
         points, matrices = [], []
         for v, _, still in self.offsets:
             points.append(PointMotion(p + still + v * phi, dp + v * rate, ddp + v * growth))
-            rows = ca.horzcat(ca.SX.eye(3), v)
-            matrices.append(ca.vertcat(rows, ca.SX([[0, 0, 0, 1]])))
-        k = self.frame[2]
-        row = ca.horzcat(ca.SX.eye(3), ca.SX(3, 1))
-        body = BodyMotion(p, row, ddp, k, ca.SX([[0, 0, 0, 1]]))
-        angle = AngleMotion(k, phi, rate, growth)
-        eye = ca.SX.eye(4)
-        return PlatformMotion(tuple(points), tuple(matrices), angle, body, eye, hinged=False)
+            matrices.append(self._matrix(v))
+        x0, y0, k = self.frame
+        # The first moment of the halves is along axes that do not turn, but grow with phi.
+        grows = x0 * phi, y0 * phi, x0 * growth, y0 * growth
+        body = BodyMotion(p, point_rows(ca.SX.eye(3)), ddp, k, ca.SX(1, 6), *grows)
+        at_p, axes = self._matrix(ca.SX(3, 1)), ca.horzcat(*self.frame)
+        return PlatformMotion(
+            tuple(points), tuple(matrices), RotationMotion((), phi), axes, body, at_p
+        )
+
+    def _matrix(self, way: Expression) -> Expression:
+        """Return the matrix (6, m) of a point that slides so far per radian."""
+        return ca.blockcat([[ca.SX.eye(3), way], [ca.SX(3, 3), ca.SX(3, 1)]])
 
     def _moment(self, inertia: Moments) -> Expression:
         """Return the first moment per radian (3, K)."""
@@ -59,31 +71,11 @@ class Sliding(PlatformEquations):
         return ca.mtimes(x0, inertia.hx) + ca.mtimes(y0, inertia.hy)
 
     def needs(self, motion: PlatformMotion, gravity: Expression, inertia: Moments) -> Expression:
-        assert motion.angle is not None
-        a_g, growth = motion.body.acceleration - gravity, motion.angle.acceleration
+        a_g, growth = motion.body.acceleration - gravity, ca.dot(self.frame[0], motion.body.ddx)
         h = self._moment(inertia)
         force = ca.mtimes(a_g, inertia.m) + h * growth
         return ca.vertcat(force, ca.mtimes(a_g.T, h) + growth * inertia.i)
 
-    def needed_wrench(
-        self, motion: PlatformMotion, gravity: Expression, inertia: Moments
-    ) -> tuple[Expression, Expression]:
-        """Return what it needs, but for the spin of the tool, which I does not tell from slides."""
-        assert motion.angle is not None
-        h, a_g = self._moment(inertia), motion.body.acceleration - gravity
-        force = ca.mtimes(a_g, inertia.m) + h * motion.angle.acceleration
-        return force, ca.cross(h * motion.angle.angle, a_g)
-
-    def wrench_matrix(self, motion: PlatformMotion, gravity: Expression) -> Expression:
-        return -self.needs(motion, gravity, Moments(*ca.vertsplit(ca.SX.eye(4))))
-
     def mass_matrix(self, motion: PlatformMotion, inertia: Moments) -> Expression:
         h = self._moment(inertia)
-        upper = ca.horzcat(inertia.m * ca.SX.eye(3), h)
-        return ca.vertcat(upper, ca.horzcat(h.T, inertia.i))
-
-    def mass_moment(self, motion: PlatformMotion, inertia: Moments) -> Expression:
-        assert motion.angle is not None
-        return (
-            ca.mtimes(motion.body.position, inertia.m) + self._moment(inertia) * motion.angle.angle
-        )
+        return ca.blockcat([[inertia.m * ca.SX.eye(3), h], [h.T, inertia.i]])

@@ -6,7 +6,14 @@ from typing import ClassVar
 
 import casadi as ca
 
-from pteron.bodies.motion import BodyMotion, Expression, Moments, PointMotion
+from pteron.bodies.motion import (
+    BodyMotion,
+    Expression,
+    Moments,
+    PointMotion,
+    RotationMotion,
+    point_rows,
+)
 from pteron.platforms.motion import PlatformEquations, PlatformMotion
 
 
@@ -20,16 +27,19 @@ class Translating(PlatformEquations):
     ) -> PlatformMotion:
         p, dp, ddp = (ca.mtimes(self.directions, v) for v in (pose, velocity, acceleration))
         points = tuple(PointMotion(p + offset.a + offset.still, dp, ddp) for offset in self.offsets)
-        matrix = ca.vertcat(self.directions, ca.SX(1, len(self.coordinates)))
-        rest = ca.SX(3, 1)
+        matrix = ca.vertcat(self.directions, ca.SX(3, len(self.coordinates)))
+        rest, axes = ca.SX(3, 1), ca.horzcat(*self.frame)
         x, y, k = self.frame
-        row = ca.horzcat(ca.SX.eye(3), ca.SX(3, 1))
-        body = BodyMotion(p, row, ddp, k, ca.SX(1, 4), x, y, rest, rest)
-        return PlatformMotion(points, (matrix,) * len(points), None, body, matrix)
+        row = point_rows(ca.SX.eye(3))
+        body = BodyMotion(p, row, ddp, k, ca.SX(1, 6), x, y, rest, rest)
+        return PlatformMotion(points, (matrix,) * len(points), RotationMotion(), axes, body, matrix)
 
     def needs(self, motion: PlatformMotion, gravity: Expression, inertia: Moments) -> Expression:
         a_g = ca.mtimes(self.directions.T, motion.body.acceleration - gravity)
         return ca.mtimes(a_g, inertia.m)
+
+    def mass_matrix(self, motion: PlatformMotion, inertia: Moments) -> Expression:
+        return inertia.m * ca.SX.eye(len(self.coordinates))
 
 
 class PlanarTranslating(Translating):

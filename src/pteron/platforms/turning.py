@@ -6,7 +6,15 @@ from typing import ClassVar
 
 import casadi as ca
 
-from pteron.bodies.motion import AngleMotion, BodyMotion, Expression, Moments, PointMotion
+from pteron.bodies.motion import (
+    BodyMotion,
+    Expression,
+    Moments,
+    PointMotion,
+    RotationMotion,
+    Turn,
+    point_rows,
+)
 from pteron.platforms.motion import PlatformEquations, PlatformMotion
 
 
@@ -19,37 +27,45 @@ class Turning(PlatformEquations):
         self, pose: Expression, velocity: Expression, acceleration: Expression
     ) -> PlatformMotion:
         p, dp, ddp = (ca.mtimes(self.directions, v[:-1]) for v in (pose, velocity, acceleration))
-        angle = AngleMotion(self.frame[2], pose[-1], velocity[-1], acceleration[-1])
+        x0, y0, k = self.frame
+        turn = Turn(k, velocity[-1], acceleration[-1])
+        rotation = RotationMotion((turn,), pose[-1])
         points, matrices = [], []
         for a, b, still in self.offsets:
-            s, lever, dds = _turned(a, b, angle)
-            points.append(PointMotion(p + s + still, dp + lever * angle.rate, ddp + dds))
+            s, lever, dds = _turned(a, b, rotation)
+            points.append(PointMotion(p + s + still, dp + lever * turn.rate, ddp + dds))
             matrices.append(self._matrix(lever))
-        x0, y0, k = self.frame
-        x, y, ddx = _turned(x0, y0, angle)
-        ddy = _turned(y0, -x0, angle)[2]
-        row = ca.horzcat(ca.SX.eye(3), ca.SX(3, 1))
-        body = BodyMotion(p, row, ddp, k, ca.SX([[0, 0, 0, 1]]), x, y, ddx, ddy)
-        at_p = self._matrix(ca.SX(3, 1))
-        return PlatformMotion(tuple(points), tuple(matrices), angle, body, at_p)
+        x, y, ddx = _turned(x0, y0, rotation)
+        ddy = _turned(y0, -x0, rotation)[2]
+        body = BodyMotion(p, point_rows(ca.SX.eye(3)), ddp, k, turn.row, x, y, ddx, ddy)
+        at_p, axes = self._matrix(ca.SX(3, 1)), ca.horzcat(x, y, k)
+        return PlatformMotion(tuple(points), tuple(matrices), rotation, axes, body, at_p)
 
     def _matrix(self, lever: Expression) -> Expression:
-        """Return d (c, phi)/dx (4, m) of a point with this k x s."""
-        still = ca.SX(1, self.directions.shape[1])
-        return ca.vertcat(ca.horzcat(self.directions, lever), ca.horzcat(still, 1))
+        """Return the matrix (6, m) of a point with this k x s."""
+        still = ca.SX(3, self.directions.shape[1])
+        return ca.blockcat([[self.directions, lever], [still, self.frame[2]]])
 
     def needs(self, motion: PlatformMotion, gravity: Expression, inertia: Moments) -> Expression:
-        body, angle = motion.body, motion.angle
-        assert angle is not None
-        a_g = body.acceleration - gravity
-        # The first moment h turns with the platform: h, k x h and h''.
+        a_g = motion.body.acceleration - gravity
+        _, dh, ddh = self._first_moment(motion, inertia)
+        force = ca.mtimes(a_g, inertia.m) + ddh
+        moment = ca.mtimes(a_g.T, dh) + motion.rotation.turns[0].acceleration * inertia.i
+        return ca.vertcat(ca.mtimes(self.directions.T, force), moment)
+
+    def mass_matrix(self, motion: PlatformMotion, inertia: Moments) -> Expression:
+        coupling = ca.mtimes(self.directions.T, self._first_moment(motion, inertia)[1])
+        masses = inertia.m * ca.SX.eye(self.directions.shape[1])
+        return ca.blockcat([[masses, coupling], [coupling.T, inertia.i]])
+
+    def _first_moment(
+        self, motion: PlatformMotion, inertia: Moments
+    ) -> tuple[Expression, Expression, Expression]:
+        """Return h, k x h and h'' (3, K) of the first moment, which turns with the platform."""
         x0, y0, _ = self.frame
         h0 = ca.mtimes(x0, inertia.hx) + ca.mtimes(y0, inertia.hy)
         dh0 = ca.mtimes(y0, inertia.hx) - ca.mtimes(x0, inertia.hy)
-        _, dh, ddh = _turned(h0, dh0, angle)
-        force = ca.mtimes(a_g, inertia.m) + ddh
-        moment = ca.mtimes(a_g.T, dh) + angle.acceleration * inertia.i
-        return ca.vertcat(ca.mtimes(self.directions.T, force), moment)
+        return _turned(h0, dh0, motion.rotation)
 
 
 class PlanarTurning(Turning):
@@ -59,9 +75,10 @@ class PlanarTurning(Turning):
 
 
 def _turned(
-    a: Expression, b: Expression, angle: AngleMotion
+    a: Expression, b: Expression, rotation: RotationMotion
 ) -> tuple[Expression, Expression, Expression]:
     """Return s = a cos(phi) + b sin(phi), k x s and s'' = k x s phi'' - s phi'^2, b being k x a."""
-    c, s = ca.cos(angle.angle), ca.sin(angle.angle)
+    (turn,) = rotation.turns
+    c, s = ca.cos(rotation.angle), ca.sin(rotation.angle)
     turned, lever = a * c + b * s, b * c - a * s
-    return turned, lever, lever * angle.acceleration - turned * (angle.rate * angle.rate)
+    return turned, lever, lever * turn.acceleration - turned * (turn.rate * turn.rate)

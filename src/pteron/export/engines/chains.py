@@ -34,9 +34,11 @@ class LegStance:
         The platform point.
     coordinate : float
         The actuated joint's.
-    first : int
-        The number in the leg's chain of the first joint here: 1 where the actuated joint follows
-        the platform's angle and carries nothing of the leg.
+    numbers : tuple of int
+        The places of these joints in the leg's chain. A driven joint that passes a moment on to the
+        platform, and no force on to a point, carries nothing of the leg, and is not among them.
+    driven : int, optional
+        The place in the chain of the driven joint, if it is among them.
     """
 
     slides: tuple[bool, ...]
@@ -48,7 +50,8 @@ class LegStance:
     across: dict[str, Array]
     end: Array
     coordinate: Any
-    first: int
+    numbers: tuple[int, ...]
+    driven: int | None
 
 
 def leg_stances(robot: Manipulator, poses: Array) -> list[LegStance]:
@@ -62,10 +65,9 @@ def leg_stances(robot: Manipulator, poses: Array) -> list[LegStance]:
         return found.reshape(*batch, -1)
 
     found = []
-    for i, (leg, motion) in enumerate(zip(robot.legs, _states(robot)[1].legs, strict=True)):
-        before = _joints_before_the_cut(robot, i, motion)
-        first = int(leg.follows_angle)
-        numbers = range(first, first + len(before))
+    for i, motion in enumerate(_states(robot)[1].legs):
+        numbers = _numbers_before_the_cut(robot, i, motion)
+        before = [motion.chain[k] for k in numbers]
         turning = [b for b, body in motion.bodies.items() if body.x is not None]
         found.append(
             LegStance(
@@ -78,7 +80,8 @@ def leg_stances(robot: Manipulator, poses: Array) -> list[LegStance]:
                 {b: vector(i, "z", b) for b in turning if motion.bodies[b].y is not None},
                 vector(i, "end"),
                 vector(i, "coordinate")[..., 0],
-                first,
+                numbers,
+                next((k for k in numbers if motion.chain[k].driven), None),
             )
         )
     return found
@@ -87,22 +90,22 @@ def leg_stances(robot: Manipulator, poses: Array) -> list[LegStance]:
 def shaft_ratio(robot: Manipulator, i: int) -> float:
     """Return the actuated joint's angle per radian of phi, of a leg that follows the angle."""
     motion = _states(robot)[1].legs[i]
-    return float(ca.evalf(motion.row[3] / motion.divisor))
+    return float(ca.evalf(ca.SX(motion.driven.gear)))
 
 
-def _joints_before_the_cut(robot: Manipulator, i: int, motion: LegMotion) -> list[Any]:
-    """Return a leg's joints up to that of its last body."""
+def _numbers_before_the_cut(robot: Manipulator, i: int, motion: LegMotion) -> tuple[int, ...]:
+    """Return the places in its chain of a leg's joints, up to that of its last body."""
     leg = robot.legs[i]
-    chain = motion.chain[int(leg.follows_angle) :]
-    carried = [joint.body for joint in chain if joint.body]
+    carried = [joint.body for joint in motion.chain if joint.body]
     if sorted(carried) != sorted(motion.bodies):
         raise ModelError(
             f"leg {i + 1}: {leg.type}: its chain's joints carry {carried}, but its bodies are "
             f"{list(motion.bodies)}; let each body's joint name it (Joint.body)",
             subject=robot.name,
         )
-    last = max((k for k, joint in enumerate(chain) if joint.body), default=-1)
-    return list(chain[: last + 1])
+    last = max((k for k, joint in enumerate(motion.chain) if joint.body), default=-1)
+    held = [k for k, joint in enumerate(motion.chain) if motion.pushes or not joint.driven]
+    return tuple(k for k in held if k <= last)
 
 
 @lru_cache(maxsize=64)

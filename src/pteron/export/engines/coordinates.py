@@ -45,11 +45,10 @@ def coordinates(opened: Tree, poses: PoseLike) -> Array:
     for i, (home, away) in enumerate(
         zip(leg_stances(robot, opened.home), leg_stances(robot, flat), strict=True)
     ):
-        found = _leg(home, away)
-        if home.first == 0:
-            found[0] = joints[:, i]
-        names = [robot.joint_names[i], *(f"leg{i + 1}_joint{k}" for k in range(1, 20))]
-        values |= dict(zip(names[home.first :], found, strict=False))
+        for k, found in zip(home.numbers, _leg(home, away), strict=True):
+            driven = k == home.driven
+            name = robot.joint_names[i] if driven else f"leg{i + 1}_joint{k}"
+            values[name] = joints[:, i] if driven else found
     p, axes = robot.platform.at(flat)
     home_p, home_axes = robot.platform.at(opened.home)
     for body in opened.bodies:

@@ -74,10 +74,11 @@ def tree(robot: RobotLike, home: PoseLike | None = None) -> Tree:
         bodies += chain
         closings.append(Closing(f"leg{i + 1}", len(bodies) - 1, carriers[i], stance.end))
         drive, ratio = leg.drive or Drive(), 1.0
-        if leg.follows_angle:
-            ratio = shaft_ratio(robot, i)
+        joint = names[i]
+        if stance.driven is None:
+            joint, ratio = bodies[0].joints[-1].name, shaft_ratio(robot, i)
             bodies[0] = _with_shaft(bodies[0], leg.limits, ratio)
-        motors.append(TreeMotor(names[i], "phi" if leg.follows_angle else names[i], ratio, drive))
+        motors.append(TreeMotor(names[i], joint, ratio, drive))
     # The legs' closings first: what the platform's parts add comes after.
     count = len(robot.legs)
     closings = closings[-count:] + closings[:-count]
@@ -108,11 +109,11 @@ def _leg(
     """Return a leg's bodies, of which `count` others come before."""
     bodies: list[TreeBody] = []
     waiting: list[TreeJoint] = []
-    rows = zip(stance.slides, stance.carries, stance.axes, stance.points, strict=True)
-    for k, (slides, letter, axis, point) in enumerate(rows, start=stance.first):
-        if k == 0:
+    joints = stance.numbers, stance.slides, stance.carries, stance.axes, stance.points
+    for k, slides, letter, axis, point in zip(*joints, strict=True):
+        if k == stance.driven:
             home, name, limits = float(stance.coordinate), actuated, leg.limits
-            if slides:  # the guide's point is where the slider is at zero
+            if slides:  # its point is where its coordinate is zero
                 point = point + home * axis
         else:
             home, name, limits = 0.0, f"leg{number}_joint{k}", None

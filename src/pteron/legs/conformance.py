@@ -1,0 +1,180 @@
+"""Whether a kind of leg keeps the protocol of `legs.leg`: run it on a leg of a kind of your own.
+
+All of it is differentiation along one random motion of platform point and rotation: rates are the
+derivatives of coordinates, bodies move with the joints that carry them, the forces that bodies need
+do the work that their energy takes. No number is known beforehand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.bodies.motion import (
+    Expression,
+    PointMotion,
+    RotationMotion,
+    Turn,
+    mass_matrix,
+    mass_moment,
+    moments_of,
+)
+from pteron.bodies.vectors import Vector
+from pteron.legs.kind import LegKind
+from pteron.legs.leg import Circle, LegEquations, LegMotion, Plane, Sphere
+from pteron.legs.protocol import breaches, point_in_reach
+
+_SAME = 1e-9
+"""Share of its size by which a quantity may differ from what it should be."""
+
+
+class _Moved:
+    """A leg along c(t) and phi(t), with what holds of it at t = 0."""
+
+    def __init__(self, leg: LegKind, axis: Vector | None, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        c, normal = point_in_reach(leg, seed), leg.plane_normal
+        assert c is not None  # `breaches` has found one
+        across = np.eye(3) - (0.0 if normal is None else np.outer(normal, normal))
+        size = leg.size or 1.0
+        dc, ddc, self.gravity = (ca.SX(ca.DM(size * across @ rng.normal(size=3))) for _ in range(3))
+        self.leg = leg
+        self.t = t = ca.SX.sym("t")
+        self.point = PointMotion(ca.SX(ca.DM(c)) + dc * t + ddc * t**2 / 2, dc + ddc * t, ddc)
+        turns: tuple[Turn, ...] = ()
+        phi, rate, growth = rng.normal(size=3)
+        if axis is not None:
+            turns = (Turn(ca.SX(ca.DM(list(axis))), rate + growth * t, ca.SX(growth)),)
+        self.rotation = RotationMotion(turns, phi + rate * t + growth * t**2 / 2)
+        omega = sum((turn.rate * turn.axis for turn in turns), ca.SX(3, 1))
+        self.twist = ca.vertcat(self.point.velocity, omega)
+        self.equations: LegEquations = leg.equations()
+        self.motion: LegMotion = self.equations.motion(self.point, self.rotation)
+        kinds = self.equations.kinds
+        values = {b: ca.SX(ca.DM(rng.uniform(0.5, 1.5, len(kinds[b])))) for b in kinds}
+        self.inertia = {b: moments_of(kinds[b], ca.vertsplit(v)) for b, v in values.items()}
+
+    def rate_of(self, value: Expression) -> Expression:
+        return ca.jtimes(value, self.t, ca.SX(1))
+
+    def now(self, value: Expression) -> NDArray[np.float64]:
+        return np.asarray(ca.DM(ca.evalf(ca.substitute(ca.densify(value), self.t, 0)))).ravel()
+
+    def differ(self, found: Expression, expected: Expression) -> bool:
+        one, other = self.now(found), self.now(expected)
+        size = max(np.abs(one).max(initial=0.0), np.abs(other).max(initial=0.0), 1e-3)
+        return not bool(np.abs(one - other).max(initial=0.0) <= _SAME * size)
+
+
+def faults(leg: LegKind, axis: Vector | None = None, seed: int = 0) -> tuple[str, ...]:
+    """Return where a leg breaks the protocol, a line each; none where it keeps it.
+
+    Parameters
+    ----------
+    leg : LegKind
+        A leg of the kind, in numbers.
+    axis : unit vector, optional
+        That of a platform that turns against the leg; None for one that does not.
+    seed : int
+        Where the motion that is tried comes from.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.legs.conformance import faults
+    >>> faults(pteron.load("delta").legs[0])
+    ()
+    """
+    if found := breaches(leg, axis):
+        return found
+    at = _Moved(leg, axis, seed)
+    return (*_joints(at), *_bodies(at), *_forces(at), *_locus(at))
+
+
+def _joints(at: _Moved) -> Iterator[str]:
+    motion = at.motion
+    row = motion.row / motion.divisor
+    pairs = {
+        "rate: not the derivative of coordinate": (motion.rate, at.rate_of(motion.coordinate)),
+        "acceleration: not the derivative of rate": (motion.acceleration, at.rate_of(motion.rate)),
+        "row / divisor: its product with (c', omega) is not rate": (
+            ca.mtimes(row, at.twist),
+            motion.rate,
+        ),
+    }
+    twist = ca.SX(6, 1)
+    for k, joint in enumerate(motion.chain, start=1):
+        of = f"joint {k} of the chain: "
+        pairs[f"{of}row times (c', omega) is not rate"] = ca.mtimes(joint.row, at.twist), joint.rate
+        pairs[f"{of}acceleration is not the derivative of rate"] = (
+            joint.acceleration,
+            at.rate_of(joint.rate),
+        )
+        twist += joint.rate * _screw(joint.kind, joint.axis, joint.point, at.point.position)
+    carried = "chain: the joints' screws times their rates do not add up to (c', omega)"
+    pairs[carried] = twist, at.twist
+    yield from (fault for fault, pair in pairs.items() if at.differ(*pair))
+
+
+def _screw(kind: str, axis: Expression, point: Expression, c: Expression) -> Expression:
+    """Return the velocity of what is at c, and the angular velocity, per unit of a joint's rate."""
+    if kind == "P":
+        return ca.vertcat(axis, ca.SX(3, 1))
+    return ca.vertcat(ca.cross(axis, c - point), axis)
+
+
+def _bodies(at: _Moved) -> Iterator[str]:
+    for letter, body in at.motion.bodies.items():
+        velocity = ca.mtimes(body.velocity_row, at.twist)
+        turning = ca.mtimes(body.turning_row, at.twist)
+        pairs = {
+            "velocity_row: not the derivative of position": (velocity, at.rate_of(body.position)),
+            "acceleration: not the derivative of its velocity": (
+                body.acceleration,
+                at.rate_of(velocity),
+            ),
+        }
+        for name, axis, second in (("x", body.x, body.ddx), ("y", body.y, body.ddy)):
+            if axis is not None:
+                first = at.rate_of(axis)
+                pairs[f"{name}: does not turn as turning_row says"] = (
+                    first,
+                    ca.cross(turning, axis),
+                )
+                pairs[f"dd{name}: not the second derivative of {name}"] = second, at.rate_of(first)
+        yield from (f'body "{letter}": {f}' for f, pair in pairs.items() if at.differ(*pair))
+
+
+def _forces(at: _Moved) -> Iterator[str]:
+    given = at.point, at.rotation, at.gravity, at.inertia
+    needs, plain = at.equations.needs(*given), at.equations.needs_of_bodies(*given)
+    whole = needs.point + at.equations.riding(at.point, at.gravity, needs.mass).point
+    joint = needs.joint + at.equations.riding(at.point, at.gravity, needs.mass).joint
+    row = at.motion.row / at.motion.divisor
+    if at.differ(whole + ca.mtimes(row.T, joint), plain.point):
+        yield "needs: not what its bodies need, Eqs. (13) and (14)"
+    energy = ca.SX(0)
+    for letter, body in at.motion.bodies.items():
+        moments = at.inertia[letter]
+        energy += 0.5 * ca.bilin(mass_matrix(body, moments), at.twist, at.twist)
+        energy -= ca.dot(at.gravity, mass_moment(body, moments))
+    if at.differ(ca.dot(plain.point, at.twist), at.rate_of(energy)):
+        yield "bodies: the power of what they need is not the rate of their energy"
+
+
+def _locus(at: _Moved) -> Iterator[str]:
+    locus, c = at.equations.locus(at.motion.coordinate), at.point.position
+    if isinstance(locus, Plane):
+        pair = ca.dot(locus.normal, c), locus.offset
+    elif isinstance(locus, Sphere):
+        pair = ca.norm_2(c - locus.center), locus.radius
+    elif isinstance(locus, Circle):
+        normal = ca.SX(list(at.leg.plane_normal or ()))
+        pair = ca.norm_2(ca.cross(normal, c - locus.center)), locus.radius
+    else:
+        pair = at.rotation.angle, locus.angle
+    if at.differ(*pair):
+        yield "locus: c is not on it at the joint's coordinate"
