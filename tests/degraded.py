@@ -16,7 +16,7 @@ KINDS = [
     *("PPP", "RRR", "SSS", "PRS", "RPP", "SSP"),  # 3T
     *("PPPP", "RRRR", "SSSS", "PPSS", "RRRU", "PRSU", "SSPU", "PRSSI", "SSSSI"),  # 3T1R
     *("CC", "LL", "CL", "CS", "LP", "CP", "CR", "LS"),  # 2T
-    *("CCC", "LLL", "CCL", "CCU", "CLU", "CPR", "LPP", "CSS", "CPU", "LRS"),  # 2T1R
+    *("TTT", "TCL", "CCC", "LLL", "CCL", "CCU", "CLU", "CPR", "LPP", "CSS", "CPU", "LRS"),  # 2T1R
 ]
 """The letters are those of `random_machine`."""
 

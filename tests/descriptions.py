@@ -12,7 +12,7 @@ import numpy as np
 MOTIONS = {"3T": (3, False), "3T1R": (3, True), "2T": (2, False), "2T1R": (2, True)}
 """How many ways the platform moves without turning, and whether it turns."""
 
-FLAT = {"PRRR", "RRR", "PRR"}
+FLAT = {"PRRR", "RRR", "PRR", "RPR"}
 """The kinds whose last link moves in the plane perpendicular to d, as the others' swings."""
 
 LENGTH = 0.1
@@ -68,7 +68,7 @@ class Leg:
     @property
     def crank(self):
         """Whether its joint coordinate is a crank's angle."""
-        return self.e is None and self.ratio is None
+        return self.e is None and self.lu is not None
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ def _leg(leg, k):
         d = _across(first)
     else:
         d = np.array(leg.direction)
-        first = np.array(leg.zero_direction) if slider is None else _across(d)
+        first = np.array(getattr(leg, "zero_direction", _across(d)))
     return Leg(
         r=np.array(leg.guide_point),
         s0=np.array(leg.platform_point),
@@ -223,6 +223,10 @@ def _place(leg, c, phi):
         w -= ca.dot(w, d) * d
     x, y, out = ca.dot(w, first), ca.dot(w, second), ca.dot(w, d)
     n = ca.sqrt(x**2 + y**2)
+    if leg.lu is None:
+        angle = ca.atan2(y, x)
+        upper = ca.cos(angle) * first + ca.sin(angle) * second
+        return Place(n, c, slide, angle, upper, n * upper, 1)
     opening = ca.acos((n**2 + leg.lu**2 + out**2 - leg.ll**2) / (2 * n * leg.lu))
     angle = ca.atan2(y, x) + leg.elbow * opening
     upper = ca.cos(angle) * first + ca.sin(angle) * second

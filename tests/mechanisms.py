@@ -147,6 +147,19 @@ def planar_crank_leg(rng, n, c, *, k, **point):
     )
 
 
+def ram_leg(rng, n, c, *, k, **point):
+    """Return an R-P-R leg of the plane of normal k, its ram along n."""
+    length = rng.uniform(0.4, 0.6)
+    return pteron.RPR(
+        guide_point=c - length * n + rng.uniform(-0.1, 0.1) * k,
+        direction=rng.choice([1, -1]) * k,
+        limits=(0.7 * length, 1.3 * length),
+        upper=inertia(rng, 0.6 * length),
+        lower=inertia(rng, 0.6 * length),
+        **point,
+    )
+
+
 def shaft_leg(rng, n, c, *, k, **point):
     """Return an R-U-P-U leg less than 45 degrees from k, wherever n points."""
     across = rng.uniform(0.0, 1.0) * np.cross(k, n)
@@ -167,6 +180,7 @@ LEGS = {
     "U": shaft_leg,
     "C": planar_crank_leg,
     "L": planar_slider_leg,
+    "T": ram_leg,
 }
 
 
@@ -174,9 +188,9 @@ def random_machine(seed, kinds):
     """Return a machine with nothing special about it, built around a pose that it reaches: zero.
 
     `kinds` holds a letter for each leg: P (P-R-R-R), R (R-S-S), S (P-S-S), U (R-U-P-U), C (planar
-    R-R-R) and L (planar P-R-R); one of the last two makes the machine planar. The number of legs
-    says whether the platform turns, an I at the end that it slides, as an I4's. Of P-R-R-R legs
-    alone `kinds` may be whether it turns.
+    R-R-R), L (planar P-R-R) and T (planar R-P-R); one of the last three makes the machine planar.
+    The number of legs says whether the platform turns, an I at the end that it slides, as an I4's.
+    Of P-R-R-R legs alone `kinds` may be whether it turns.
     """
     if isinstance(kinds, bool):
         kinds = "PPPP" if kinds else "PPP"
@@ -194,7 +208,7 @@ MOTIONS = {(False, 3): "3T", (False, 4): "3T1R", (True, 2): "2T", (True, 3): "2T
 
 def _drawn_machine(rng, name, kinds):
     slides, kinds = "I" in kinds, kinds.removesuffix("I")
-    flat = bool(set(kinds) & set("CL"))
+    flat = bool(set(kinds) & set("CLT"))
     motion = MOTIONS[flat, len(kinds)]
     axis = unit(rng)
     x_axis = unit(rng, axis)
@@ -216,7 +230,7 @@ def _drawn_machine(rng, name, kinds):
             d += rng.uniform(-0.7, 0.7) * axis
             d /= np.linalg.norm(d)
         point = {"platform_point": s0, "fixed_offset": t0}
-        if kind in "CLU":
+        if kind in "CLTU":
             point["k"] = axis
         legs.append(LEGS[kind](rng, d, (0.0 if slides else frame @ s0) + t0, **point))
     parts = {}
@@ -298,13 +312,13 @@ MACHINES = {
     "random PRSU 0": random_machine(0, "PRSU"),
     "random PRSSI 0": random_machine(0, "PRSSI"),
     "five-bar": CATALOG["five-bar"],
-    "random CCL 0": random_machine(0, "CCL"),
+    "random CTL 0": random_machine(0, "CTL"),
 }
 """These and one of each other kind of leg, closure and platform."""
 
 GATE = (
     *("quadrupteron", "tripteron-oblique", "delta", "random PRR 0"),
-    *("random PRSU 0", "random PRSSI 0", "five-bar", "random CCL 0"),
+    *("random PRSU 0", "random PRSSI 0", "five-bar", "random CTL 0"),
 )
 """Eight machines that stand for all, see `test_gate`.
 

@@ -12,7 +12,7 @@ KINDS = [
     *("PPP", "RRR", "SSS", "PRS", "RPP"),  # 3T
     *("PPPP", "RRRR", "SSSS", "PPSS", "RRRU", "PRSU", "PRSSI"),  # 3T1R
     *("CC", "LL", "CL", "CS", "CR", "LP", "LS", "CP"),  # 2T
-    *("CCC", "LLL", "CCL", "CCU", "CPR", "CSS", "LRS", "CSU", "LRU"),  # 2T1R
+    *("TTT", "TCL", "CCC", "LLL", "CCL", "CCU", "CPR", "CSS", "LRS", "CSU", "LRU"),  # 2T1R
 ]
 """The letters are those of `random_machine`."""
 

@@ -23,8 +23,8 @@ ENGINES = {"pinocchio": trees.Pinocchio, "mujoco": trees.MuJoCo}
 KINDS = [
     *("PPP", "RRR", "SSS", "PRS"),  # 3T
     *("PPPP", "RRRR", "SSSS", "PPSS", "RRRU", "PRSU", "PRSSI"),  # 3T1R
-    *("CC", "LL", "CL", "CS"),  # 2T
-    *("CCC", "LLL", "CCL", "CCU", "CPR"),  # 2T1R
+    *("CC", "LL", "CL", "CS", "TT", "TL"),  # 2T
+    *("CCC", "LLL", "CCL", "CCU", "CPR", "TTT", "TCL", "TTU"),  # 2T1R
 ]
 """The letters are those of `random_machine`."""
 

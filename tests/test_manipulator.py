@@ -308,6 +308,7 @@ def test_turned_machines_are_loaded_without_loss(tmp_path_factory, name, seed):
 
 CATALOGUED = {
     "3-prr": ("2T1R", "PRR PRR PRR"),
+    "3-rpr": ("2T1R", "RPR RPR RPR"),
     "3-rrr": ("2T1R", "RRR RRR RRR"),
     "delta": ("3T", "RSS RSS RSS"),
     "delta-4": ("3T1R", "RSS RSS RSS RUPU"),
@@ -403,8 +404,8 @@ BAD_FILES = {
     ),
     "unknown kind": (
         "elbow = 1\n",
-        'elbow = 1\ntype = "RPR"\n',
-        "leg 1: type: 'RPR' is not one of PRRR, PSS, RSS, RRR, PRR, RUPU",
+        'elbow = 1\ntype = "RPX"\n',
+        "leg 1: type: 'RPX' is not one of PRRR, PSS, RSS, RRR, PRR, RUPU",
     ),
     "elbow": ("elbow = 1", "elbow = 0", "leg 1: elbow: 0 given, 1 or -1 expected"),
     "not a unit vector": (
@@ -570,7 +571,7 @@ def test_a_byte_order_mark_is_passed_over(tmp_path):
 
 def test_files_that_cannot_be_read_are_refused(tmp_path):
     missing = tmp_path / "nowhere.toml"
-    words = "neither a file nor a machine of the catalog (3-prr, 3-rrr, delta, "
+    words = "neither a file nor a machine of the catalog (3-prr, 3-rpr, 3-rrr, delta, "
     refused(lambda: pteron.load(missing), f"{missing}: {words}")
     refused(lambda: pteron.load("quadrupteorn"), 'did you mean "quadrupteron"?')
     refused(lambda: pteron.load(tmp_path), f"{tmp_path}: cannot be read")

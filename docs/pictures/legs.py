@@ -16,8 +16,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch
 
-from pteron import PRR, PRRR, PSS, RRR, RSS, RUPU, PlanarInertia, RodInertia
-from pteron.bodies.motion import AngleMotion, PointMotion
+from pteron import PRR, PRRR, PSS, RPR, RRR, RSS, RUPU, PlanarInertia, RodInertia
+from pteron.bodies.motion import PointMotion, RotationMotion, Turn
 from pteron.kernels import Array
 from pteron.legs import LegKind
 
@@ -145,8 +145,8 @@ class Posed:
     def __init__(self, leg: LegKind, c: Array, phi: float = 0.0) -> None:
         rest = ca.SX(3, 1)
         point = PointMotion(ca.SX(c), rest, rest)
-        angle = AngleMotion(ca.SX([0, 0, 1]), ca.SX(phi), ca.SX(0), ca.SX(0))
-        motion = leg.equations().motion(point, angle if leg.follows_angle else None)
+        turns = (Turn(ca.SX([0, 0, 1]), ca.SX(0), ca.SX(0)),) if leg.follows_angle else ()
+        motion = leg.equations().motion(point, RotationMotion(turns, ca.SX(phi)))
         self.leg, self.c = leg, c
         self.coordinate = float(ca.evalf(motion.coordinate))
         self.points = [_vector(joint.point) for joint in motion.chain]
@@ -360,6 +360,24 @@ def prr() -> Sheet:
     return sheet
 
 
+def rpr() -> Sheet:
+    """Draw a planar R-P-R leg, seen along d."""
+    leg = RPR((0.12, 0.06, 0), (-0.05, -0.05, 0), _BODY, _BODY, (0.3, 0.5)).under((0.0, 0.0, 1.0))
+    p = np.array([0.5, 0.3, 0.0])
+    posed = Posed(leg, p + leg.platform_point)
+    sheet = Sheet(-90.0, 90.0, (6.4, 4.2))
+    r, n = np.array(leg.guide_point), posed.bodies["u"][1]
+    length, beside = float(np.linalg.norm(posed.c - r)), 0.05 * np.cross([0.0, 0.0, 1.0], n)
+    sheet.line([r, r + 0.6 * length * n], UPPER, 6.5)
+    sheet.line([posed.c, posed.c - 0.6 * length * n], LOWER, 2.8)
+    both: dict[str, Any] = {"arrowstyle": "<|-|>", "linewidth": 0.9}
+    sheet.arrow(r + beside, posed.c + beside, "$q$", INK, (-0.6, 0.8), **both)
+    _scene(sheet, posed, p, [(-0.05, -0.05, 0), (0.1, -0.05, 0), (0.03, 0.08, 0)], up=False)
+    _out_of_page(sheet, posed.c)
+    _ends(sheet, posed, (r, "base joint", (0.3, -1.3)), (posed.c, "$d$", (-0.9, -0.7)))
+    return sheet
+
+
 def rupu() -> Sheet:
     """Draw a telescopic shaft."""
     leg = RUPU((0.16, 0, 0.34), (0.0, 0.0, 0.0), _ROD, _ROD).under((0.0, 0.0, 1.0))
@@ -382,7 +400,7 @@ def rupu() -> Sheet:
     return sheet
 
 
-DRAWINGS = {"PRRR": prrr, "PSS": pss, "RSS": rss, "RRR": rrr, "PRR": prr, "RUPU": rupu}
+DRAWINGS = {"PRRR": prrr, "PSS": pss, "RSS": rss, "RRR": rrr, "PRR": prr, "RPR": rpr, "RUPU": rupu}
 
 
 def draw(docs: Path) -> None:

@@ -56,7 +56,7 @@ from pteron.kinematics import (
     singular_orientations,
     working_mode,
 )
-from pteron.legs import PRR, PRRR, PSS, RRR, RSS, RUPU, Cone, Drive, Stribeck
+from pteron.legs import PRR, PRRR, PSS, RPR, RRR, RSS, RUPU, Cone, Drive, Stribeck
 from pteron.manipulator import (
     Manipulator,
     Radii,
@@ -148,6 +148,7 @@ __all__ = [
     "PlanarInertia",
     "Platform",
     "PteronError",
+    "RPR",
     "RRR",
     "RSS",
     "RUPU",

@@ -6,11 +6,14 @@ from pteron.legs.kind import LegKind
 from pteron.legs.prr import PRR
 from pteron.legs.prrr import PRRR
 from pteron.legs.pss import PSS
+from pteron.legs.rpr import RPR
 from pteron.legs.rrr import RRR
 from pteron.legs.rss import RSS
 from pteron.legs.rupu import RUPU
 
-KINDS: dict[str, type[LegKind]] = {kind.type: kind for kind in (PRRR, PSS, RSS, RRR, PRR, RUPU)}
+KINDS: dict[str, type[LegKind]] = {
+    kind.type: kind for kind in (PRRR, PSS, RSS, RRR, PRR, RPR, RUPU)
+}
 """The kinds of legs that files may name, by their key `type`; add another here."""
 
 __all__ = [
@@ -18,6 +21,7 @@ __all__ = [
     "PRR",
     "PRRR",
     "PSS",
+    "RPR",
     "RRR",
     "RSS",
     "RUPU",

@@ -1,0 +1,277 @@
+"""R-P-R legs, of planar machines: a ram between two revolute joints, driven in its middle.
+
+The cylinder swings about the base joint, the piston ends at the platform point; both turn alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from random import Random
+from typing import ClassVar, NamedTuple, Self
+
+import casadi as ca
+
+from pteron.bodies.inertia import PlanarInertia
+from pteron.bodies.motion import Expression, Moments, PointMotion, RotationMotion, point_rows
+from pteron.bodies.vectors import Vector, cross, vertical
+from pteron.errors import ModelError
+from pteron.legs.circles import (
+    first_moment,
+    perpendicular_to,
+    plane_of,
+    quarter_turn,
+    random_fraction,
+    random_vector,
+)
+from pteron.legs.drive import Drive
+from pteron.legs.keys import Condition, Key
+from pteron.legs.kind import ActuatedJoint, LegKind, Quantity, ReachBound, Transfer
+from pteron.legs.leg import Circle, Joint, LegEquations, LegMotion, Needs, Reach, on_point
+from pteron.legs.planar_links import Turning, last_joints, link_body, lower_link_body
+
+RAM = ActuatedJoint("ram", "rho", "m", "force", "N")
+
+
+def _check_limits(limits: tuple[float, float]) -> None:
+    if limits[0] <= 0.0:
+        raise ModelError(f"limits: least length {limits[0]:g} m given; a ram is longer than 0")
+
+
+@dataclass(frozen=True)
+class RPR(LegKind):
+    """A planar R-P-R leg that carries one point of the platform.
+
+    Its joint coordinate is the length of the ram, from `guide_point` to the platform point. Places
+    along `direction` do not count: the leg moves in a plane of its own.
+
+    Parameters
+    ----------
+    guide_point : vector
+        r, the revolute joint on the base, m.
+    platform_point : vector
+        s0, from P to the platform point, in the platform frame, m.
+    upper : PlanarInertia
+        Inertia of the cylinder about the joint on the base, x towards the platform point.
+    lower : PlanarInertia
+        Inertia of the piston about the platform point, x pointing there from the base.
+    limits : (float, float)
+        Least and greatest length, m; above 0.
+    elbow : {1}
+        A ram has but one branch.
+    fixed_offset : vector
+        t0, the part of the platform point that does not turn with phi, in the base frame, m.
+    drive : Drive, optional
+        What drives its joint.
+    direction : unit vector, optional
+        d, of the two revolute axes: the normal of the platform's plane, which is its default.
+    """
+
+    guide_point: Vector
+    platform_point: Vector
+    upper: PlanarInertia
+    lower: PlanarInertia
+    limits: tuple[float, float]
+    elbow: int = 1
+    fixed_offset: Vector = (0.0, 0.0, 0.0)
+    drive: Drive | None = None
+    direction: Vector | None = None
+
+    type = "RPR"
+    joint = RAM
+    branches = (1,)
+    names: ClassVar = {"u": "cylinder", "l": "piston"}
+    measure_text = "1 everywhere, as a ram pushes the platform point in every pose"
+    account = (
+        "A ram leads from a revolute joint at the guide point r to one at the platform point s0, "
+        "both with axes along d, the normal of the plane. Its coordinate rho is its length."
+    )
+
+    keys: ClassVar = {
+        "guide_point": Key("point", "r, the revolute joint on the base, m"),
+        "direction": Key(
+            "direction",
+            "d, of the revolute axes: along the platform's axis, and this where left out",
+            default=None,
+            example=[0.0, 0.0, 1.0],
+        ),
+        "elbow": Key("sign", "1: a ram has but one branch", default=1),
+        "limits": Key("limits", "least and greatest length, m, above 0"),
+        "upper": Key(
+            "planar", "the cylinder: origin at guide_point, x along it to the platform", "u"
+        ),
+        "lower": Key(
+            "planar", "the piston: origin at the platform point, x from the base to there", "l"
+        ),
+    }
+
+    conditions = (Condition(("limits",), _check_limits),)
+
+    def under(self, axis: Vector) -> Self:
+        return self if self.direction is not None else replace(self, direction=axis)
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        d = self.plane_normal
+        return (
+            Quantity("guide_point", "point", self.guide_point),
+            Quantity("direction", "direction", d, "d"),
+            Quantity("plane_axis", "normal", perpendicular_to(d)),
+            Quantity("elbow", "sign", (self.elbow,)),
+        )
+
+    @property
+    def plane_normal(self) -> Vector:
+        assert self.direction is not None  # the manipulator has given it
+        return self.direction
+
+    def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
+        return (self.plane_normal,)
+
+    @property
+    def size(self) -> float:
+        return self.limits[1]
+
+    @property
+    def reach_bound(self) -> ReachBound:
+        return ReachBound(self.guide_point, None, self.limits[1])
+
+    @property
+    def reach_text(self) -> str:
+        return "its ram has no length"
+
+    @property
+    def extents(self) -> dict[str, tuple[str, float, float, str]]:
+        shortest = self.limits[0]
+        return {
+            "u": ("upper", 0.0, shortest, "the joint on the base and the shortest ram's end"),
+            "l": ("lower", -shortest, 0.0, "the shortest ram's beginning and the platform point"),
+        }
+
+    def transfers(self, gravity: Vector) -> tuple[Transfer, ...]:
+        found = [
+            Transfer("the cylinder{} turns about a fixed axis", {("m", "u"): (1, ())}),
+            Transfer(
+                "cylinder and piston{} turn alike", {("I", "u"): (1, ()), ("I", "l"): (-1, ())}
+            ),
+        ]
+        if vertical(self.plane_normal, gravity):
+            reason = "no gravity acts across the axis of the cylinder{}"
+            found += [Transfer(reason, {(kind, "u"): (1, ())}) for kind in ("mgx", "mgy")]
+        return tuple(found)
+
+    @classmethod
+    def closing(
+        cls, values: Mapping[str, Sequence[Fraction]], rng: Random
+    ) -> tuple[list[Fraction], int]:
+        """Draw the ram in the leg's plane."""
+        a, (x, y) = values["plane_axis"], random_vector(abs(random_fraction(rng)), 2, rng)
+        b = cross(values["direction"], a)
+        return [x * p + y * q for p, q in zip(a, b, strict=True)], 1
+
+
+class _Ram(NamedTuple):
+    """The ram in its plane."""
+
+    w: Expression
+    """c - r, (2, 1)."""
+    length: Expression
+    n: Expression
+    """Its direction, (2, 1)."""
+    rate: Expression
+    """Of its length."""
+    turning: Turning
+    growth: Expression
+    """L''."""
+
+
+class RPREquations(LegEquations):
+    """The equations of an R-P-R leg: n along the ram, y = d x n, L its length."""
+
+    kinds: ClassVar = {"u": PlanarInertia.kinds, "l": PlanarInertia.kinds}
+    rides = ("l",)
+
+    def __init__(
+        self,
+        guide_point: Expression,
+        direction: Expression,
+        plane_axis: Expression,
+        elbow: Expression,
+    ) -> None:
+        self.r, self.d = guide_point, direction
+        self.plane = plane_of(direction, plane_axis)
+
+    def _ram(self, point: PointMotion) -> _Ram:
+        """Return the ram in motion.
+
+        L' = n.c' and L theta' = y.c'. Differentiated, L'' = n.c'' + L theta'^2 and L theta'' =
+        y.c'' - 2 L' theta'.
+        """
+        w = ca.mtimes(self.plane.T, point.position - self.r)
+        dw, ddw = (ca.mtimes(self.plane.T, v) for v in (point.velocity, point.acceleration))
+        length = ca.sqrt(ca.dot(w, w))
+        n = w / length
+        y = quarter_turn(n)
+        rate, swing = ca.dot(n, dw), ca.dot(y, dw) / length
+        row = point_rows(ca.mtimes(self.plane, y / length).T)
+        turning = Turning(row, swing, (ca.dot(y, ddw) - 2 * rate * swing) / length)
+        return _Ram(w, length, n, rate, turning, ca.dot(n, ddw) + length * swing * swing)
+
+    def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
+        at = self._ram(point)
+        n = ca.mtimes(self.plane, at.n)
+        row, still = point_rows(n.T), (self.r, ca.SX(3, 6), ca.SX(3, 1))
+        bodies = {
+            "u": link_body(still, self.d, self.plane, at.n, at.turning),
+            "l": lower_link_body(point, self.d, self.plane, at.n, at.turning),
+        }
+        chain = (
+            Joint("R", self.d, self.r, *at.turning, "u"),
+            Joint("P", n, self.r, row, at.rate, at.growth, "l", driven=True),
+            *last_joints(self.d, point, at.turning, rotation),
+        )
+        links = None, ca.mtimes(self.plane, at.w)
+        turns = ((at.turning.rate, at.turning.acceleration),) * 2
+        one = ca.SX(1)
+        return LegMotion(
+            at.length, at.rate, at.growth, row, one, bodies, chain, links, turns, row_size=one
+        )
+
+    def named(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
+        at = self._ram(point)
+        return {"w": at.w, "length": at.length, "n": at.n, "theta_rate": at.turning.rate}
+
+    def reach(self, c: Expression) -> Reach:
+        w = ca.mtimes(self.plane.T, c - self.r)
+        square = ca.dot(w, w)
+        length = ca.sqrt(square)
+        return Reach(length, square, square, length)
+
+    def locus(self, q: Expression) -> Circle:
+        return Circle(self.r, q)
+
+    def needs(
+        self,
+        point: PointMotion,
+        rotation: RotationMotion,
+        gravity: Expression,
+        inertia: Mapping[str, Moments],
+    ) -> Needs:
+        """Return the forces that cylinder and piston need: all of them at the platform point.
+
+        With h and dh = d x h their first moments, the force h_l'' of the piston and y / L times
+        (I_u + I_l) theta'' - g.dh_u + (c'' - g).dh_l, beside the mass that rides.
+        """
+        at, upper, lower = self._ram(point), inertia["u"], inertia["l"]
+        ddc, weight = (ca.mtimes(self.plane.T, v) for v in (point.acceleration, gravity))
+        swing, growth = at.turning.rate, at.turning.acceleration
+        _, held = first_moment(at.n, upper.hx, upper.hy)
+        h, dh = first_moment(at.n, lower.hx, lower.hy)
+        moment = growth * (upper.i + lower.i) - ca.mtimes(weight.T, held)
+        moment += ca.mtimes((ddc - weight).T, dh)
+        force = growth * dh - swing * swing * h + ca.mtimes(quarter_turn(at.n) / at.length, moment)
+        return Needs(ca.SX(1, force.shape[1]), on_point(ca.mtimes(self.plane, force)), lower.m)
+
+
+RPR.equations_class = RPREquations
