@@ -18,7 +18,7 @@ from mechanisms import CATALOG, random_machine, relative_error, with_elbows
 import pteron
 from pteron.export import export_mjcf, export_pinocchio, export_sdf, export_urdf, pinocchio_model
 from pteron.export.engines import coordinates, mjcf, tree
-from pteron.export.engines.link_shapes import roll_pitch_yaw
+from pteron.export.engines.links import roll_pitch_yaw
 from pteron.export.engines.parts import at_zero, moved_point, place
 
 COUNT = 20

@@ -65,9 +65,11 @@ def with_payload(robot: RobotLike, mass: float) -> Manipulator:
         carried = math.nan
     if not (math.isfinite(carried) and carried >= 0.0):
         raise DataError(f"payload: {mass!r} given, a mass of 0 kg or more expected")
+    if carried == 0.0:
+        return robot
     platform = robot.platform
     x, y, _ = platform.tool
-    if platform.slides and carried > 0.0 and (x, y) != (0.0, 0.0):
+    if platform.slides and (x, y) != (0.0, 0.0):
         raise ModelError(
             f"platform.tool is {math.hypot(x, y):g} m off the axis of a platform that slides, "
             "where a payload cannot be modelled; give the tool [0, 0, z]",

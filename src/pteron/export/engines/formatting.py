@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from importlib.metadata import version
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -70,9 +71,11 @@ def within(body: TreeBody, points: Array) -> Array:
     return np.asarray((points - body.origin) @ body.axes)
 
 
-def parent_frame(opened: Tree, body: TreeBody) -> Array:
-    """Return the frame (4, 4) at the home pose of the body before."""
-    return np.eye(4) if body.parent == BASE else frame(opened.bodies[body.parent])
+def from_parent(bodies: Sequence[TreeBody], body: TreeBody) -> Array:
+    """Return a body's frame (4, 4) in that of its parent, one of the bodies, or of the base."""
+    if body.parent == BASE:
+        return frame(body)
+    return np.asarray(inverse(frame(bodies[body.parent])) @ frame(body))
 
 
 def material(body: TreeBody) -> str:
@@ -120,3 +123,17 @@ def head(opened: Tree, language: str) -> list[str]:
         "own have a share of the",
         "platform's, which has that much less. Looks are made up but for the joints' places.",
     ]
+
+
+FORMATS: dict[str, Any] = {
+    "number": number,
+    "small": small,
+    "row": row,
+    "look": look,
+    "within": within,
+    "material": material,
+    "colors": COLORS,
+    "platform_color": PLATFORM_COLOR,
+    "base_color": BASE_COLOR,
+}
+"""Names that every template of an engine's file knows."""

@@ -10,17 +10,11 @@ import numpy as np
 from pteron.atomic import write_texts
 from pteron.dynamics import inverse_dynamics
 from pteron.export.engines.formatting import (
-    BASE_COLOR,
-    COLORS,
-    PLATFORM_COLOR,
-    frame,
+    FORMATS,
+    from_parent,
     head,
-    inverse,
     left_out,
-    look,
-    material,
     number,
-    parent_frame,
     row,
     small,
     within,
@@ -99,6 +93,7 @@ def mjcf(opened: Tree, *, step: float = STEP) -> str:
     return rendered(
         "pteron.export",
         "robot.mjcf.j2",
+        **FORMATS,
         head=head(opened, "MJCF"),
         notes=_notes(opened),
         name=identifier(robot),
@@ -107,9 +102,6 @@ def mjcf(opened: Tree, *, step: float = STEP) -> str:
         gravity=robot.gravity,
         offset=offset,
         size=opened.size,
-        colors=COLORS,
-        platform_color=PLATFORM_COLOR,
-        base_color=BASE_COLOR,
         base=opened.base,
         bodies=bodies,
         children=children,
@@ -121,17 +113,12 @@ def mjcf(opened: Tree, *, step: float = STEP) -> str:
         names=[motor.name for motor in opened.motors],
         home=[joint.home for joint in opened.joints],
         hold=_hold(opened),
-        number=number,
-        look=look,
-        row=row,
-        small=small,
         local=lambda body, points: points if body is None else within(body, points),
         same=lambda shape: np.ptp(shape.ends, axis=0).max() < _SAME,
         half=lambda shape: float(np.linalg.norm(shape.ends[1] - shape.ends[0])) / 2.0,
         moments=lambda body: " ".join(map(small, body.moments)),
         placed=lambda body: _placed(opened, body),
         joint_of=lambda body, joint: _joint(opened, body, joint),
-        material=material,
         **_scene(opened),
     )
 
@@ -148,7 +135,7 @@ def _placed(opened: Tree, body: TreeBody) -> str:
     """Return where a body is in the frame of the one before."""
     from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
 
-    there = inverse(parent_frame(opened, body)) @ frame(body)
+    there = from_parent(opened.bodies, body)
     x, y, z, w = Rotation.from_matrix(there[:3, :3]).as_quat(canonical=True)
     text = f'pos="{row(there[:3, 3])}"'
     turned = row([w, x, y, z])

@@ -15,15 +15,7 @@ import numpy as np
 
 from pteron.atomic import write_texts
 from pteron.errors import ModelError
-from pteron.export.engines.formatting import (
-    frame,
-    head,
-    inverse,
-    left_out,
-    number,
-    small,
-    within,
-)
+from pteron.export.engines.formatting import FORMATS, frame, head, inverse, left_out, number
 from pteron.export.engines.parts import BASE, Tree, TreeBody, at_zero
 from pteron.export.engines.tree import tree
 from pteron.export.names import identifier
@@ -132,11 +124,8 @@ def pinocchio_source(opened: Tree) -> str:
             "constrained dynamics have none; export it as MJCF, SDF or URDF",
             subject=robot.name,
         )
-    here = {body.name: body for body in opened.bodies}
     bodies = _without_gears(at_zero(opened))
     armature = {motor.joint: motor.ratio**2 * motor.drive.inertia for motor in opened.motors}
-    limits = _limits(opened)
-    homes = {joint.name: joint.home for joint in opened.joints}
     notes = left_out(opened, ("inertia",))
     if coupled:
         notes.append(
@@ -145,50 +134,18 @@ def pinocchio_source(opened: Tree) -> str:
     return rendered(
         "pteron.export",
         "robot.pinocchio.j2",
+        **FORMATS,
         head=head(opened, "Python for Pinocchio"),
         notes=notes,
-        title=identifier(robot),
         name=identifier(robot),
-        gravity=_list(robot.gravity),
-        bodies=[
-            {
-                "name": body.name,
-                "before": None if body.parent == BASE else opened.bodies[body.parent].name,
-                "place": _list(_from_parent(opened, bodies, body)[:3]),
-                "mass": small(body.mass),
-                "center": _list(within(body, body.center)),
-                "moments": ", ".join(map(small, body.moments)),
-            }
-            for body in bodies
-        ],
-        joints=[
-            {
-                "name": joint.name,
-                "body": body.name,
-                "slides": joint.slides,
-                "axis": _list(joint.axis @ body.axes),
-                "low": limits[joint.name][0],
-                "high": limits[joint.name][1],
-                "armature": small(armature.get(joint.name, 0.0)),
-                "home": number(homes[joint.name]),
-            }
-            for body in bodies
-            for joint in body.joints
-        ],
-        closings=[
-            {
-                "name": closing.name,
-                "one": opened.bodies[closing.one].name,
-                "end": _list(within(here[opened.bodies[closing.one].name], closing.point)),
-                "other": opened.bodies[closing.other].name,
-                "seat": _list(within(here[opened.bodies[closing.other].name], closing.point)),
-            }
-            for closing in opened.closings
-        ],
-        motors=[
-            {"name": motor.name, "joint": motor.joint, "ratio": number(motor.ratio)}
-            for motor in opened.motors
-        ],
+        opened=opened,
+        bodies=bodies,
+        armature=armature,
+        joints={joint.name: joint for joint in opened.joints},
+        place_of=lambda body: _from_parent(opened, bodies, body)[:3],
+        local=lambda body, axis: axis @ body.axes,
+        bound=_bound,
+        list=_list,
     )
 
 
@@ -228,17 +185,8 @@ def _from_parent(opened: Tree, bodies: Sequence[TreeBody], body: TreeBody) -> Ar
     return np.asarray(inverse(frame(before)) @ frame(body))
 
 
-def _limits(opened: Tree) -> dict[str, tuple[str, str]]:
-    """Return each joint's limits as text; infinite where there are none."""
-    found = {}
-    for joint in opened.joints:
-        low, high = joint.limits or (-np.inf, np.inf)
-        found[joint.name] = _bound(low), _bound(high)
-    return found
-
-
-def _bound(value: float) -> str:
-    return number(value) if np.isfinite(value) else f"{'-' if value < 0.0 else ''}np.inf"
+def _bound(value: float | None, infinite: str) -> str:
+    return infinite if value is None else number(value)
 
 
 def _list(values: Any) -> str:

@@ -6,21 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from pteron.atomic import write_texts
-from pteron.export.engines.formatting import (
-    BASE_COLOR,
-    COLORS,
-    PLATFORM_COLOR,
-    frame,
-    head,
-    left_out,
-    number,
-    row,
-    small,
-    within,
-)
-from pteron.export.engines.inertia import SHARE, between_joints
-from pteron.export.engines.link_shapes import LinkShape, link_shape, placed
-from pteron.export.engines.parts import BASE, Tree, TreeBody, TreeJoint
+from pteron.export.engines.formatting import FORMATS, frame, head, left_out, number, row
+from pteron.export.engines.inertia import SHARE
+from pteron.export.engines.links import link_shape, links_of, placed
+from pteron.export.engines.parts import Tree, TreeBody, TreeJoint
 from pteron.export.engines.shapes import dressed
 from pteron.export.engines.tree import tree
 from pteron.export.names import identifier
@@ -73,54 +62,21 @@ def export_sdf(
 def sdf(opened: Tree) -> str:
     """Return a machine as SDF."""
     opened = dressed(opened)
-    closings = []
-    for closing in opened.closings:
-        one, other = opened.bodies[closing.one], opened.bodies[closing.other]
-        # A joint's place is told in the frame of its child.
-        point = row(within(one, closing.point))
-        closings.append(
-            {"name": f"{closing.name}_ball", "one": one.name, "other": other.name, "point": point}
-        )
     return rendered(
         "pteron.export",
         "robot.sdf.j2",
+        **FORMATS,
         head=head(opened, "SDF"),
         notes=left_out(opened, ("viscous", "coulomb", "max_force", "max_speed")),
         share=SHARE,
         name=identifier(opened.robot),
-        gravity=row(opened.robot.gravity),
-        base=[link_shape(shape, None) for _, shape in opened.base],
-        base_color=BASE_COLOR,
-        links=[link for body in opened.bodies for link in _links(opened, body)],
-        closings=closings,
-        visual=_visual,
+        opened=opened,
+        links=links_of(opened.bodies),
+        frame=frame,
+        placed=placed,
+        link_shape=link_shape,
+        joint_of=lambda link: _joint(opened, link.body, link.joint),
     )
-
-
-def _links(opened: Tree, body: TreeBody) -> list[dict[str, Any]]:
-    """Return a body's links with their joints: those between joints at one place are light."""
-    parent = "base" if body.parent == BASE else opened.bodies[body.parent].name
-    pose = " ".join(placed(frame(body)))
-    found: list[dict[str, Any]] = []
-    for k, joint in enumerate(body.joints):
-        last = k == len(body.joints) - 1
-        mass, moments = body.mass, body.moments
-        if not last:
-            mass, moments = between_joints(mass, moments)
-        link = {
-            "name": body.name if last else f"{joint.name}_link",
-            "parent": parent,
-            "pose": pose,
-            "joint": _joint(opened, body, joint),
-            "mass": small(mass),
-            "center": row(within(body, body.center)) if last else "0 0 0",
-            "moments": [small(moment) for moment in moments],
-            "looks": [link_shape(shape, body) for shape in body.shapes] if last else [],
-            "color": COLORS[(body.color - 1) % len(COLORS)] if body.color else PLATFORM_COLOR,
-        }
-        found.append(link)
-        parent = str(link["name"])
-    return found
 
 
 def _joint(opened: Tree, body: TreeBody, joint: TreeJoint) -> dict[str, Any]:
@@ -150,17 +106,3 @@ def _joint(opened: Tree, body: TreeBody, joint: TreeJoint) -> dict[str, Any]:
         "dynamics": "".join(dynamics),
         "mimic": None if follows is None else (follows[0], number(follows[1])),
     }
-
-
-def _visual(shape: LinkShape, count: int, color: str) -> str:
-    sizes = {
-        "sphere": f"<sphere><radius>{shape.radius}</radius></sphere>",
-        "cylinder": f"<cylinder><radius>{shape.radius}</radius><length>{shape.length}</length>"
-        "</cylinder>",
-        "box": f"<box><size>{shape.side} {shape.side} {shape.length}</size></box>",
-    }
-    return (
-        f'<visual name="look{count}"><pose>{shape.place} {shape.turn}</pose>'
-        f"<geometry>{sizes[shape.kind]}</geometry>"
-        f"<material><ambient>{color}</ambient><diffuse>{color}</diffuse></material></visual>"
-    )

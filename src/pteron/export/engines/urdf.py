@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,26 +9,20 @@ import numpy as np
 
 from pteron.atomic import write_texts
 from pteron.export.engines.formatting import (
-    BASE_COLOR,
-    COLORS,
-    PLATFORM_COLOR,
-    frame,
+    FORMATS,
+    from_parent,
     head,
-    inverse,
     left_out,
-    material,
     number,
     row,
-    small,
     within,
 )
-from pteron.export.engines.inertia import SHARE, between_joints
-from pteron.export.engines.link_shapes import LinkShape, link_shape, placed
-from pteron.export.engines.parts import BASE, Tree, TreeBody, TreeJoint, at_zero
+from pteron.export.engines.inertia import SHARE
+from pteron.export.engines.links import link_shape, links_of, placed
+from pteron.export.engines.parts import Tree, TreeBody, TreeJoint, at_zero
 from pteron.export.engines.shapes import dressed
 from pteron.export.engines.tree import tree
 from pteron.export.names import identifier
-from pteron.kernels import Array
 from pteron.kernels.code import rendered
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.shapes import PoseLike
@@ -87,54 +80,20 @@ def urdf(opened: Tree) -> str:
     """Return the opened machine as URDF."""
     opened = dressed(opened)
     bodies = at_zero(opened)
-    links: list[dict[str, Any]] = []
-    for body in bodies:
-        links += _links(opened, bodies, body)
-    name = identifier(opened.robot)
-    legs = [(f"leg{k}", COLORS[(k - 1) % len(COLORS)]) for k in range(1, len(opened.motors) + 1)]
     return rendered(
         "pteron.export",
         "robot.urdf.j2",
+        **FORMATS,
         head=head(opened, "URDF"),
         notes=left_out(opened, ("viscous", "coulomb", "max_force", "max_speed")),
-        closure=f"{name}.closure.yaml",
-        gravity=", ".join(map(number, opened.robot.gravity)),
-        name=name,
-        colors=[("base", BASE_COLOR), ("platform", PLATFORM_COLOR), *legs],
         share=SHARE,
-        base=[link_shape(shape, None) for _, shape in opened.base],
-        links=links,
-        visual=_visual,
+        name=identifier(opened.robot),
+        opened=opened,
+        links=links_of(bodies),
+        place_of=lambda link: placed(from_parent(bodies, link.body) if link.first else np.eye(4)),
+        link_shape=link_shape,
+        joint_of=lambda link: _joint(opened, link.body, link.joint),
     )
-
-
-def _links(opened: Tree, bodies: Sequence[TreeBody], body: TreeBody) -> list[dict[str, Any]]:
-    """Return a body's links with their joints: those between joints at one place are light."""
-    parent, before = "base", np.eye(4)
-    if body.parent != BASE:
-        parent, before = bodies[body.parent].name, frame(bodies[body.parent])
-    place, turn = placed(inverse(before) @ frame(body))
-    found: list[dict[str, Any]] = []
-    for k, joint in enumerate(body.joints):
-        last = k == len(body.joints) - 1
-        mass, moments = body.mass, body.moments
-        if not last:
-            mass, moments = between_joints(mass, moments)
-        link = {
-            "name": body.name if last else f"{joint.name}_link",
-            "parent": parent,
-            "place": place,
-            "turn": turn,
-            "joint": _joint(opened, body, joint),
-            "mass": small(mass),
-            "center": row(within(body, body.center)) if last else "0 0 0",
-            "moments": [small(moment) for moment in moments],
-            "looks": [link_shape(shape, body) for shape in body.shapes] if last else [],
-            "material": material(body),
-        }
-        found.append(link)
-        parent, place, turn = str(link["name"]), "0 0 0", "0 0 0"
-    return found
 
 
 def _joint(opened: Tree, body: TreeBody, joint: TreeJoint) -> dict[str, Any]:
@@ -167,45 +126,16 @@ def _joint(opened: Tree, body: TreeBody, joint: TreeJoint) -> dict[str, Any]:
     }
 
 
-def _visual(shape: LinkShape, name: str) -> str:
-    sizes = {
-        "sphere": f'<sphere radius="{shape.radius}"/>',
-        "cylinder": f'<cylinder radius="{shape.radius}" length="{shape.length}"/>',
-        "box": f'<box size="{shape.side} {shape.side} {shape.length}"/>',
-    }
-    origin = f'<origin xyz="{shape.place}" rpy="{shape.turn}"/>'
-    geometry = f"<geometry>{sizes[shape.kind]}</geometry>"
-    return f'<visual>{origin}{geometry}<material name="{name}"/></visual>'
-
-
 def closure_yaml(opened: Tree) -> str:
     """Return the closure file: which points of the URDF's links are one."""
-    name = identifier(opened.robot)
-    closings = []
-    for closing in opened.closings:
-        one, other = opened.bodies[closing.one], opened.bodies[closing.other]
-        closings.append(
-            {
-                "name": closing.name,
-                "one": one.name,
-                "end": _list(within(one, closing.point)),
-                "other": other.name,
-                "seat": _list(within(other, closing.point)),
-            }
-        )
     return rendered(
         "pteron.export",
         "closure.yaml.j2",
         head=head(opened, "loops of the URDF"),
-        urdf=f"{name}.urdf",
-        name=name,
-        closings=closings,
-        motors=[
-            {"name": motor.name, "joint": motor.joint, "ratio": _real(motor.ratio)}
-            for motor in opened.motors
-        ],
-        home=[(joint.name, _real(joint.home)) for joint in opened.joints],
-        gravity=_list(np.array(opened.robot.gravity)),
+        name=identifier(opened.robot),
+        opened=opened,
+        within=within,
+        real=_real,
     )
 
 
@@ -214,7 +144,3 @@ def _real(value: float) -> str:
     text = number(value)
     head_, mark, tail = text.partition("e")
     return text if "." in head_ else f"{head_}.0{mark}{tail}"
-
-
-def _list(values: Array) -> str:
-    return ", ".join(map(_real, values))

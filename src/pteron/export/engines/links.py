@@ -1,16 +1,53 @@
-"""Shapes for URDF and SDF: in a link's frame, turned by roll, pitch and yaw."""
+"""Links and shapes for URDF and SDF: a link for each joint, frames by roll, pitch and yaw."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from pteron.export.engines.formatting import look, row
-from pteron.export.engines.parts import Shape, TreeBody
+from pteron.export.engines.inertia import between_joints
+from pteron.export.engines.parts import BASE, Shape, TreeBody, TreeJoint
 from pteron.kernels import Array
 
 _SAME = 1e-6
+
+
+class Link(NamedTuple):
+    """A link, and the joint between it and its parent; all but a body's last link are light."""
+
+    name: str
+    parent: str
+    body: TreeBody
+    joint: TreeJoint
+    first: bool
+    """Whether its joint is the body's first."""
+    last: bool
+    """Whether it is the body itself, and not a light link between two joints of it."""
+    mass: float
+    moments: Array
+
+    @property
+    def shapes(self) -> tuple[Shape, ...]:
+        """Its shapes: those of the body."""
+        return self.body.shapes if self.last else ()
+
+
+def links_of(bodies: Sequence[TreeBody]) -> list[Link]:
+    """Return the links of bodies, one for each joint."""
+    found = []
+    for body in bodies:
+        parent = "base" if body.parent == BASE else bodies[body.parent].name
+        for joint in body.joints:
+            first, last = joint is body.joints[0], joint is body.joints[-1]
+            name = body.name if last else f"{joint.name}_link"
+            inertia = body.mass, body.moments
+            inertia = inertia if last else between_joints(*inertia)
+            found.append(Link(name, parent, body, joint, first, last, *inertia))
+            parent = name
+    return found
 
 
 class LinkShape(NamedTuple):
