@@ -11,9 +11,8 @@ from pteron.environments.world import ENDS, LEVER, World
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.kinematics import jacobian
-from pteron.legs import Drive
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.motion import Motion, longest_step
+from pteron.motion import Motion, limits_of, longest_step
 from pteron.workspace import home_pose, reserve
 
 _STEP = 5e-4
@@ -93,7 +92,5 @@ def _forces(robot: Manipulator, home: Array) -> Array:
     most = np.where(robot.platform.angular, _LIVELY / LEVER, _LIVELY)
     lively = np.linalg.solve(rows.T, mass * most)
     enough = 2.0 * np.abs(drive_forces(robot, home, rest, rest)) + np.abs(lively).sum(axis=1)
-    limits = [(leg.drive or Drive()).max_force for leg in robot.legs]
-    return np.array(
-        [own if most is None else most for most, own in zip(limits, enough, strict=True)]
-    )
+    given = limits_of(robot).force
+    return np.where(np.isfinite(given), given, enough)

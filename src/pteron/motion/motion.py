@@ -155,3 +155,8 @@ class Motion:
             for part in (self.pose, self.velocity, self.acceleration)
         )
         return Motion(np.append(time, count * self.duration), *parts)
+
+
+def told_pose(pose: Array) -> str:
+    """Return a pose in brackets for messages, five digits a number."""
+    return f"[{', '.join(f'{value:.5g}' for value in pose + 0.0)}]"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -12,7 +12,7 @@ import numpy as np
 from pteron.dynamics import drive_accelerations
 from pteron.kernels import Array, numeric
 from pteron.manipulator import Manipulator
-from pteron.motion.motion import Motion
+from pteron.motion.motion import Motion, told_pose
 from pteron.motion.simulation.plant import Plant
 from pteron.motion.simulation.sensors import Encoders
 from pteron.motion.simulation.simulation import Simulation
@@ -20,10 +20,10 @@ from pteron.motion.simulation.stops import (
     first_beyond_limits,
     first_singular,
     told_limit,
-    told_pose,
     told_singular,
     why_not_further,
 )
+from pteron.motion.trajectories.limits import limits_of
 
 _WHOLE = 1e-9
 """Share of a sample below which a delay counts as whole samples: rounding."""
@@ -115,7 +115,7 @@ def run(
     """Simulate; `limits` says whether joints' limits and singularities of type II end it."""
     time = reference.time
     joints_of, rates_of = numeric(robot, "joint_coordinates"), numeric(robot, "joint_rates")
-    most = _most(robot)
+    most = limits_of(robot).force
     # A command acts `whole` samples and a part of one after it was asked for; before there are any,
     # the first one holds the machine.
     period = float(time[1] - time[0])
@@ -180,19 +180,9 @@ def run(
         rates,
         forces,
         asked,
-        Motion(*(part[:end] for part in (time, *_parts(reference)))),
+        Motion(*(getattr(reference, field.name)[:end] for field in fields(Motion))),
         loads.masses[:end],
         memory,
         min(plant.step, period),
         stopped,
     )
-
-
-def _parts(motion: Motion) -> tuple[Array, Array, Array]:
-    return motion.pose, motion.velocity, motion.acceleration
-
-
-def _most(robot: Manipulator) -> Array:
-    """Return what each drive can give, (n,)."""
-    limits = (leg.drive.max_force if leg.drive else None for leg in robot.legs)
-    return np.array([np.inf if limit is None else limit for limit in limits])

@@ -11,6 +11,7 @@ from pteron.html_table import Column, html_table
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.motion.motion import Motion
+from pteron.motion.trajectories.limits import limits_of
 
 if TYPE_CHECKING:
     import polars as pl
@@ -109,10 +110,8 @@ class Simulation:
     @property
     def saturated(self) -> Array:
         """Share of the samples, (n,), in which a drive could not give what was asked for."""
-        limits = [leg.drive.max_force if leg.drive else None for leg in self.robot.legs]
-        most = np.array([np.inf if limit is None else limit for limit in limits])
-        share: Array = (np.abs(self.asked) > most).mean(axis=0)
-        return share
+        beyond = np.abs(self.asked) > limits_of(self.robot).force
+        return np.asarray(beyond.mean(axis=0))
 
     def table(self) -> pl.DataFrame:
         """Return the samples as a table.

@@ -9,7 +9,9 @@ from pteron.kernels.functions import TYPE_II
 from pteron.kinematics.limits import limited_joints
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator
+from pteron.motion.motion import told_pose
 from pteron.shapes import PerJoint
+from pteron.workspace.reserve import clearances
 
 _FAST = 1e3
 """Speed, m/s or rad/s, beyond which the numbers count as diverging."""
@@ -35,11 +37,7 @@ def why_not_further(robot: Manipulator, pose: Array, velocity: Array) -> str:
 
 def first_beyond_limits(robot: Manipulator, poses: Array, joints: PerJoint) -> int | None:
     """Return the first of some poses (T, m) at which a joint is beyond its limits, or None."""
-    beyond = np.zeros(len(poses), dtype=bool)
-    for leg, q in zip(robot.legs, joints.T, strict=True):
-        if leg.limits is not None:
-            low, high = leg.limits
-            beyond |= (q < low - _ROUNDING) | (q > high + _ROUNDING)
+    beyond = (clearances(robot, joints) < -_ROUNDING).any(axis=-1)
     beyond |= (numeric(robot, "passive_room")(poses)[1] < -_ROUNDING).any(axis=-1)
     return int(beyond.argmax()) if beyond.any() else None
 
@@ -67,8 +65,3 @@ def told_singular(_: Manipulator, pose: Array) -> str:
     return (
         f"singular (type II) at pose {told_pose(pose)}: the actuators no longer hold the platform"
     )
-
-
-def told_pose(pose: Array) -> str:
-    """Return a pose in brackets, four digits a number."""
-    return f"[{', '.join(f'{value:.4g}' for value in pose)}]"

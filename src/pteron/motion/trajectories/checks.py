@@ -19,10 +19,10 @@ from pteron.kernels import Array, numeric
 from pteron.kernels.functions import TYPE_I, TYPE_II
 from pteron.kinematics.architecture import expect_regular
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.motion.motion import Motion
-from pteron.motion.trajectories.demand import told_pose
+from pteron.motion.motion import Motion, told_pose
 from pteron.motion.trajectories.minima import first_below, least_along
 from pteron.motion.trajectories.path import Path, poses_of
+from pteron.workspace.reserve import clearances
 
 _SAMPLES = 1001
 """Poses of a path that are looked at before its measures are followed between them."""
@@ -131,8 +131,7 @@ class _Curve(NamedTuple):
 
     def pose(self, at: float) -> Array:
         """Return the pose (m,) there."""
-        found: Array = self.poses(np.array([at]))[0]
-        return found
+        return np.asarray(self.poses(np.array([at]))[0])
 
     def told(self, at: float) -> str:
         """Return where that is, and the pose."""
@@ -150,8 +149,7 @@ def _failed_reach(way: _Curve, marks: Array) -> _Failure | None:
     robot = way.robot
 
     def squares(at: Array) -> Array:
-        found: Array = np.nan_to_num(numeric(robot, "squared_type_i")(way.poses(at))[0], nan=-1.0)
-        return found
+        return np.nan_to_num(numeric(robot, "squared_type_i")(way.poses(at))[0], nan=-1.0)
 
     found = first_below(squares, marks, TYPE_I**2)
     if found is None:
@@ -187,60 +185,51 @@ def _failed_reach(way: _Curve, marks: Array) -> _Failure | None:
 
 def _failed_limit(way: _Curve, marks: Array) -> _Failure | None:
     robot = way.robot
-    low, high = np.array([leg.limits or (-np.inf, np.inf) for leg in robot.legs]).T
 
-    def room(at: Array) -> Array:
-        q = numeric(robot, "joint_coordinates")(way.poses(at))[0]
-        return np.asarray(np.minimum(q - low, high - q))
+    def margin(at: Array) -> Array:
+        return clearances(robot, numeric(robot, "joint_coordinates")(way.poses(at))[0])
 
-    found = first_below(room, marks, -_ROUNDING)
+    found = first_below(margin, marks, -_ROUNDING)
     if found is None:
         return None
     at, i, _ = found
     leg = robot.legs[i]
-    beyond = -float(least_along(room, marks, -_ROUNDING)[1][i])
-    return _beyond(
-        way,
-        at,
-        i + 1,
-        f"leg {i + 1}: its {leg.joint.noun} passes its limits, {low[i]:g} to {high[i]:g} "
-        f"{leg.joint.unit}, by up to {beyond:.3g} {leg.joint.unit}",
-        beyond * leg.lever,
+    assert leg.limits is not None
+    beyond = -float(least_along(margin, marks, -_ROUNDING)[1][i])
+    unit, (low, high) = leg.joint.unit, leg.limits
+    told = (
+        f"leg {i + 1}: its {leg.joint.noun} passes its limits, {low:g} to {high:g} {unit}, by up "
     )
+    return _beyond(way, at, i + 1, f"{told}to {beyond:.3g} {unit}", beyond * leg.lever)
 
 
 def _failed_passive(way: _Curve, marks: Array) -> _Failure | None:
     robot = way.robot
 
-    def room(at: Array) -> Array:
+    def margin(at: Array) -> Array:
         return np.asarray(numeric(robot, "passive_room")(way.poses(at))[1])
 
-    found = first_below(room, marks, -_ROUNDING)
+    found = first_below(margin, marks, -_ROUNDING)
     if found is None:
         return None
     at, i, _ = found
-    places, least = least_along(room, marks, -_ROUNDING)
+    places, least = least_along(margin, marks, -_ROUNDING)
     shared, *legs = passive_joints(Machine.of(robot), ca.SX(ca.DM(way.pose(float(places[i])))))
     for joint in (*shared, *legs[i]):
         value = float(joint.value)
         if joint.least <= value <= joint.most:
             continue
-        limits = f"at most {joint.most:g}" if joint.only_most else ""
-        limits = limits or f"{joint.least:g} to {joint.most:g}"
+        low = "at most " if joint.only_most else f"{joint.least:g} to "
         whose = "" if joint in shared else f"leg {i + 1}: its "
-        told = f"{whose}{joint.noun} comes to {value:.4g} {joint.unit}, its limits are {limits}"
+        told = f"{whose}{joint.noun} comes to {value:.4g} {joint.unit}"
+        told += f", its limits are {low}{joint.most:g}"
         return _beyond(way, at, 0 if joint in shared else i + 1, told, -float(least[i]))
     return _beyond(way, at, i + 1, f"leg {i + 1} passes a passive joint's limits", -float(least[i]))
 
 
 def _beyond(way: _Curve, at: float, leg: int, told: str, metres: float) -> _Failure:
-    error = UnreachablePose(
-        f"{way.told(at)}: {told}; take another path",
-        leg=leg,
-        shortfall=metres,
-        index=(),
-    )
-    return _Failure(at, error)
+    text = f"{way.told(at)}: {told}; take another path"
+    return _Failure(at, UnreachablePose(text, leg=leg, shortfall=metres, index=()))
 
 
 def _failed_type_ii(way: _Curve, marks: Array) -> _Failure | None:

@@ -17,6 +17,7 @@ from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import unchecked
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.motion.motion import told_pose
 from pteron.motion.trajectories.limits import MotionLimits
 from pteron.motion.trajectories.tool import Curve, tool_motion
 
@@ -129,12 +130,15 @@ def _reversals(
     return np.concatenate([low, at[rest + 1]]), np.concatenate([joints, still])
 
 
+def curve_rate(
+    robot: Manipulator, curve: Curve, limits: MotionLimits, most: float = np.inf
+) -> float:
+    """Return `most_rate` for poses (K, m) on a curve, with two derivatives by p."""
+    return most_rate(robot, demand(robot, *curve), limits, curve[0], most)
+
+
 def most_rate(
-    robot: Manipulator,
-    asked: Demand,
-    limits: MotionLimits,
-    poses: Array,
-    most: float = np.inf,
+    robot: Manipulator, asked: Demand, limits: MotionLimits, poses: Array, most: float = np.inf
 ) -> float:
     """Return the largest constant p', `most` at most, at which a curve keeps the limits.
 
@@ -198,11 +202,6 @@ def _expect_strength(robot: Manipulator, still: Array, limits: MotionLimits, pos
         "stronger drive",
         subject=robot.name,
     )
-
-
-def told_pose(pose: Array) -> str:
-    """Return a pose as messages show it."""
-    return f"[{', '.join(f'{value:.5g}' for value in pose + 0.0)}]"
 
 
 class Peak(NamedTuple):

@@ -111,13 +111,10 @@ def jerk_limited(
         lost = np.isnan(poses).any(axis=-1)
         if lost.any():
             k = int(lost.argmax())
-            raise UnreachablePose(
+            raise _lost(
                 f"the motion, at {tau[k] * planned.duration:.4g} s: the platform does not follow "
                 f"to the joint coordinates {[round(float(q), 6) for q in joints[k]]}: its "
-                "assembly mode ends before; go there by way of another pose",
-                leg=0,
-                shortfall=float("nan"),
-                index=(),
+                "assembly mode ends before; go there by way of another pose"
             )
         velocity, acceleration = unchecked(robot, "platform_motion", poses, rates, gains)
         return poses, planned.duration * velocity, planned.duration**2 * acceleration
@@ -154,13 +151,14 @@ def _expect_modes(robot: Manipulator, motion: Motion, planned: Any, end: Array) 
         [leg.joint.unit == "rad" for leg in robot.legs], _within_half_a_turn(away), away
     )
     if max(np.abs(off).max(), np.abs(away).max()) > _NEAR:
-        raise UnreachablePose(
-            "end: the joints' way leads to another assembly or working mode there; go by way of "
-            "another pose",
-            leg=0,
-            shortfall=float("nan"),
-            index=(),
+        raise _lost(
+            "end: the joints' path leads to another assembly or working mode there; go by way of "
+            "another pose"
         )
+
+
+def _lost(text: str) -> UnreachablePose:
+    return UnreachablePose(text, leg=0, shortfall=float("nan"), index=())
 
 
 def _planned(first: Array, last: Array, limits: MotionLimits, jerks: Array) -> Any:

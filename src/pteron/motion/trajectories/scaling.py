@@ -19,6 +19,7 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.trajectories.cycle import Cycle, moves
 from pteron.shapes import PoseLike
 from pteron.workspace import reserve
+from pteron.workspace.reserve import clearances
 
 _LEAST_RESERVE = 0.2
 """Least reserve, of type I and of type II, that a cycle keeps."""
@@ -159,10 +160,6 @@ def _keeps(robot: Manipulator, poses: Array, least: float) -> bool:
         type_ii = type_ii_sizes(robot, poses) / best_type_ii(robot)
         if not (type_ii >= least + _DIP).all():
             return False
-    joints = numeric(robot, "joint_coordinates")(poses)[0]
-    for leg, q in zip(robot.legs, joints.T, strict=True):
-        if leg.limits is not None:
-            low, high = leg.limits
-            if not (q.min() >= low + _DIP and q.max() <= high - _DIP):
-                return False
-    return bool((numeric(robot, "passive_room")(poses)[1] >= _DIP).all())
+    actuated = clearances(robot, numeric(robot, "joint_coordinates")(poses)[0])
+    passive = numeric(robot, "passive_room")(poses)[1]
+    return bool((actuated >= _DIP).all() and (passive >= _DIP).all())

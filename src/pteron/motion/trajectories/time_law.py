@@ -11,7 +11,7 @@ from pteron.kernels import Array
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.checks import check_path
-from pteron.motion.trajectories.demand import demand, demand_between, most_rate, peaks
+from pteron.motion.trajectories.demand import curve_rate, demand_between, most_rate, peaks
 from pteron.motion.trajectories.limits import MotionLimits, limits_of
 from pteron.motion.trajectories.path import Path
 from pteron.motion.trajectories.time_polynomials import PolynomialLaw, Progress, polynomial
@@ -68,8 +68,7 @@ def shortest(
         If the drives cannot hold the machine somewhere on the way.
     """
     robot = as_manipulator(robot)
-    pose, first, second = curve(np.linspace(0.0, 1.0, _LOOK))
-    rate = most_rate(robot, demand(robot, pose, first, second), limits, pose)
+    rate = curve_rate(robot, curve(np.linspace(0.0, 1.0, _LOOK)), limits)
     if not np.isfinite(rate):
         raise _unlimited()
     return kept_motion(robot, Timed(curve, 1.0 / rate), limits, step)
@@ -94,11 +93,7 @@ def in_time(
     if duration is None:
         return shortest(robot, curve, limits, step)
     course = Timed(curve, _expect_time("duration", duration))
-    fine = course.at(np.linspace(0.0, duration, _LOOK))
-    asked = demand(robot, *fine)
-    if most_rate(robot, asked, limits, fine[0], 1.0) * KEPT < 1.0:
-        rate = most_rate(robot, asked, limits, fine[0])
-        raise too_short(robot, course, limits, duration / rate)
+    _expect_kept(robot, course, limits)
     return sampled(course.at, duration, step)
 
 
@@ -176,9 +171,7 @@ def along(
     _expect_time("duration", duration)
     given = course.slowed(duration / course.duration)
     if kept.any:
-        fine = given.at(np.linspace(0.0, duration, _LOOK))
-        if most_rate(robot, demand(robot, *fine), kept, fine[0], 1.0) * KEPT < 1.0:
-            raise too_short(robot, given, kept, course.duration)
+        _expect_kept(robot, given, kept, course.duration)
     return sampled(given.at, duration, step)
 
 
@@ -194,18 +187,23 @@ def stretch_times(
         pose, by_s, bend = path.at(begin + size * share)
         first = by_s * size * rate[:, None]
         second = bend * (size * rate[:, None]) ** 2 + by_s * size * gain[:, None]
-        most = most_rate(robot, demand(robot, pose, first, second), limits, pose)
+        most = curve_rate(robot, (pose, first, second), limits)
         if not np.isfinite(most):
             raise _unlimited()
         found.append(1.0 / most)
     return found
 
 
-def too_short(robot: Manipulator, course: InTime, limits: MotionLimits, least: float) -> DataError:
-    """Return the error for a duration that is too short: the worst limit, and by how much."""
-    time = np.linspace(0.0, course.duration, _LOOK)
-    worst = max(peaks(robot, *course.at(time), limits), key=lambda peak: peak.share)
-    return DataError(
+def _expect_kept(
+    robot: Manipulator, course: InTime, limits: MotionLimits, shortest: float | None = None
+) -> None:
+    """Refuse a course that is too fast for the limits; it names the worst one."""
+    curve = course.at(np.linspace(0.0, course.duration, _LOOK))
+    if curve_rate(robot, curve, limits, 1.0) * KEPT >= 1.0:
+        return
+    worst = max(peaks(robot, *curve, limits), key=lambda peak: peak.share)
+    least = shortest or course.duration / curve_rate(robot, curve, limits)
+    raise DataError(
         f"duration: {course.duration:.4g} s given, too short: {worst.told()}; the shortest that "
         f"keeps every limit is {least:.4g} s"
     )
