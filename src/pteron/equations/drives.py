@@ -55,9 +55,14 @@ def drive_numbers(robot: Manipulator) -> NDArray[np.float64]:
     return np.array(rows).T.ravel()
 
 
+def drives_of(robot: Manipulator) -> Drives:
+    """Return the numbers of a machine's drives as arrays, (n,) each."""
+    return Drives(*drive_numbers(robot).reshape(len(Drives._fields), -1))
+
+
 def drive_names(robot: Manipulator) -> tuple[str, ...]:
     """Return what `drive_numbers` are: "coulomb_1" for leg 1, and so on."""
-    legs = range(1, robot.freedom + 1)
+    legs = range(1, robot.joint_count + 1)
     return tuple(f"{name}_{i}" for name in Drives._fields for i in legs)
 
 

@@ -14,7 +14,7 @@ import subprocess
 import sys
 import tempfile
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
@@ -116,6 +116,7 @@ def export_fmu(
         "printer": CPrinter(prefix, "double"),
         "number": CPrinter(prefix, "double").number,
         "freedom": robot.freedom,
+        "joint_count": robot.joint_count,
         "inertial": tables["parameters"],
         "drives": tables["drives"],
         "least_square": LEAST**2,
@@ -175,7 +176,14 @@ def _compiled(prefix: str, sources: Mapping[str, str]) -> tuple[bytes, str]:
             (folder / name).write_text(text, encoding="utf-8")
         library = folder / f"{prefix}{suffix}"
         files = [name for name in sources if name.endswith(".c")]
-        done = _run([*command, *_FLAGS, *files, "-o", library.name, "-lm"], folder)
+        done = subprocess.run(
+            [*command, *_FLAGS, *files, "-o", library.name, "-lm"],
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            check=False,
+        )
         if done.returncode != 0:
             lines = done.stderr.strip().splitlines() or [f"exit code {done.returncode}"]
             raise ModelError(
@@ -185,22 +193,13 @@ def _compiled(prefix: str, sources: Mapping[str, str]) -> tuple[bytes, str]:
         return library.read_bytes(), f"binaries/{place}/{library.name}"
 
 
-def _run(command: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        command, cwd=folder, capture_output=True, text=True, errors="replace", check=False
-    )
-
-
 def _platform() -> tuple[str, str]:
     """Return the folder that FMI 3.0 gives to binaries of this machine, and their suffix."""
-    machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(
-        platform.machine().lower(), platform.machine().lower()
-    )
-    if sys.platform == "win32":
-        return f"{machine}-windows", ".dll"
-    return (
-        (f"{machine}-darwin", ".dylib") if sys.platform == "darwin" else (f"{machine}-linux", ".so")
-    )
+    machine = platform.machine().lower()
+    machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(machine, machine)
+    known = {"win32": ("windows", ".dll"), "darwin": ("darwin", ".dylib")}
+    system, suffix = known.get(sys.platform, ("linux", ".so"))
+    return f"{machine}-{system}", suffix
 
 
 def _zipped(members: Mapping[str, bytes]) -> bytes:

@@ -65,6 +65,8 @@ def coordinates(opened: Tree, poses: PoseLike) -> Array:
 
 def _leg(home: LegStance, away: LegStance) -> list[Array]:
     """Return how far each joint of a leg has moved from the home pose, (K,) each."""
+    from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
+
     count = len(away.end)
     turn, shift = np.broadcast_to(np.eye(3), (count, 3, 3)), np.zeros((count, 3))
     found: list[Array] = []
@@ -85,7 +87,7 @@ def _leg(home: LegStance, away: LegStance) -> list[Array]:
                 np.einsum("ki,ki->k", np.cross(across, now), here),
             )
             center = turn @ point + shift
-            turned = _rotations(now, by)
+            turned = Rotation.from_rotvec(by[:, None] * now).as_matrix()
             turn = turned @ turn
             shift = center + np.einsum("kij,kj->ki", turned, shift - center)
         found.append(by)
@@ -113,12 +115,3 @@ def _pointer(home: LegStance, away: LegStance, k: int) -> tuple[Array, Array]:
         if np.linalg.norm(np.cross(axis, before)) > _LONG * np.linalg.norm(before) > 0.0:
             return before, here
     return pairs[0]  # nothing tells: what it carries lies on its axis
-
-
-def _rotations(axes: Array, angles: Array) -> Array:
-    """Return rotations (K, 3, 3) about axes (K, 3)."""
-    zero = np.zeros(len(axes))
-    x, y, z = axes.T
-    cross = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
-    sine, cosine = np.sin(angles)[:, None, None], np.cos(angles)[:, None, None]
-    return np.asarray(np.eye(3) + sine * cross + (1.0 - cosine) * cross @ cross)

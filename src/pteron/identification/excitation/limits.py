@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from pteron.equations.drives import Drives, drive_numbers
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.legs import Drive
@@ -154,22 +153,3 @@ def _number(name: str, value: object) -> float:
     if not math.isfinite(number) and (name, number) != ("force", math.inf):
         raise DataError(f"limits: {name} {number} given, a finite number expected")
     return number
-
-
-class DriveLoad(NamedTuple):
-    """Forces that the drives need beside those of the rigid bodies, (n,) each.
-
-    inertia q'' + viscous q' + offset, and `dry` friction against the motion, at most.
-    """
-
-    inertia: Array
-    viscous: Array
-    offset: Array
-    dry: Array
-
-
-def drive_load(robot: Manipulator) -> DriveLoad:
-    """Return the load of a machine's drives; zero at a leg without one."""
-    drives = Drives(*np.split(drive_numbers(robot), len(Drives._fields)))
-    dry = drives.coulomb + drives.stribeck
-    return DriveLoad(drives.inertia, drives.viscous, drives.offset, dry)

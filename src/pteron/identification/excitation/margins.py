@@ -8,12 +8,12 @@ from functools import lru_cache
 
 import numpy as np
 
+from pteron.equations.drives import drives_of
 from pteron.equations.machine import closure_of
 from pteron.errors import ModelError
 from pteron.identification.excitation.limits import (
     PER_JOINT,
     Limits,
-    drive_load,
     joint_sizes,
     per_joint,
     unit_of,
@@ -184,10 +184,12 @@ def _margins_of(robot: Manipulator, limits: Limits, state: FullMotion) -> dict[s
     found["speed"] = per_joint(limits, "speed", robot) - np.abs(state.rates)
     found["acceleration"] = per_joint(limits, "acceleration", robot) - np.abs(state.accelerations)
     if limits.force is not None:
-        drives, still = drive_load(robot), np.zeros_like(state.pose)
+        drives, still = drives_of(robot), np.zeros_like(state.pose)
         moving = unchecked(robot, "inverse_dynamics", *state[:3])
         moving = moving + drives.inertia * state.accelerations + drives.viscous * state.rates
         held = unchecked(robot, "inverse_dynamics", state.pose, still, still)
         needed = np.maximum(np.abs(moving + drives.offset), np.abs(held + drives.offset))
-        found["force"] = per_joint(limits, "force", robot) - drives.dry - needed
+        # Dry friction counts in full, whichever way a joint moves.
+        dry = drives.coulomb + drives.stribeck
+        found["force"] = per_joint(limits, "force", robot) - dry - needed
     return {name: np.where(np.isnan(values), -np.inf, values) for name, values in found.items()}

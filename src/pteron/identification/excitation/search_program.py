@@ -17,8 +17,9 @@ import casadi as ca
 import numpy as np
 
 from pteron.bodies.motion import Expression
+from pteron.equations.drives import Drives, drives_of
 from pteron.identification.excitation.fourier import Space
-from pteron.identification.excitation.limits import Limits, drive_load, joint_sizes, per_joint
+from pteron.identification.excitation.limits import Limits, joint_sizes, per_joint
 from pteron.identification.excitation.random_motions import sizes
 from pteron.identification.excitation.sequential import NonlinearProgram, sequential_minimum
 from pteron.identification.signals.states import home, home_mode
@@ -195,12 +196,11 @@ def _path(
     for name, value in (("speed", rates), ("acceleration", seconds)):
         found[name] = value / per_joint(limits, name, robot), _BACK_OFF - 1.0, 1.0 - _BACK_OFF
     dynamics, still = program(robot, "inverse_dynamics").function, ca.SX(pose.shape[0], 1)
-    inertia, viscous, offset, dry = map(ca.DM, drive_load(robot))
-    values = ca.DM(parameters(robot))
-    moving = dynamics(*state, values).T + inertia * seconds + viscous * rates
+    drives, values = Drives(*map(ca.DM, drives_of(robot))), ca.DM(parameters(robot))
+    moving = dynamics(*state, values).T + drives.inertia * seconds + drives.viscous * rates
     held = dynamics(pose, still, still, values).T
-    most = ca.DM(per_joint(limits, "force", robot)) - dry
-    needed = ca.vertcat(*((forces + offset) / most for forces in (moving, held)))
+    most = ca.DM(per_joint(limits, "force", robot)) - (drives.coulomb + drives.stribeck)
+    needed = ca.vertcat(*((forces + drives.offset) / most for forces in (moving, held)))
     found["force"] = needed, _BACK_OFF - 1.0, 1.0 - _BACK_OFF
     values, *sides = zip(*(found[name] for name in watched), strict=True)
     low, high = (

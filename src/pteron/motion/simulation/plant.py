@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from scipy.integrate import DOP853  # type: ignore[import-untyped]
 
 from pteron.dynamics import mass_matrix
-from pteron.equations.drives import Drives, drive_numbers
+from pteron.equations.drives import drives_of
 from pteron.errors import DataError, PteronError, shown
 from pteron.kernels import Array, as_array, numeric
 from pteron.kernels.steps import steps
@@ -96,7 +96,7 @@ def longest_step(robot: RobotLike, poses: PoseLike) -> float:
     decay fast; the steps must follow that. The poses, (..., m), are where it may come to rest.
     """
     robot = as_manipulator(robot)
-    own = Drives(*drive_numbers(robot).reshape(len(Drives._fields), -1))
+    own = drives_of(robot)
     damping = own.viscous + (own.coulomb + own.stribeck) / own.rest_speed
     if not damping.any():
         return float("inf")

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.equations.drives import Drives, drive_numbers
+from pteron.equations.drives import drives_of
 from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import unchecked
@@ -75,7 +75,7 @@ def demand(robot: Manipulator, pose: Array, first: Array, second: Array) -> Dema
     weight = unchecked(robot, "inverse_dynamics", pose, rest, rest)
     rates = unchecked(robot, "joint_rates", pose, first)[0]
     bends = unchecked(robot, "joint_accelerations", pose, first, second)[0]
-    drives = Drives(*np.split(drive_numbers(robot), len(Drives._fields)))
+    drives = drives_of(robot)
     pushed = unchecked(robot, "inverse_dynamics", pose, rest, first)
     swept = unchecked(robot, "inverse_dynamics", pose, first, second)
     lengths = ~robot.platform.angular
