@@ -31,7 +31,7 @@ from damaging import Chance, damaged_bytes, damaged_folder, damaged_text
 import pteron
 from pteron.design import Task, read_spec
 from pteron.errors import PteronError
-from pteron.export.identified import read_identified
+from pteron.export.identified_parameters import read_identified
 from pteron.identification.logs import Log, read_log
 from pteron.maps import Map, TableStore, load_map, map_index, pose_grid, save_map, sweep
 

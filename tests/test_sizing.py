@@ -378,7 +378,7 @@ def test_motors_are_read_from_csv_and_toml_alike(tmp_path):
     found = read_motors(table)
     assert found == read_motors(write(tmp_path, "motors.toml", lines))
     assert found[0] == Motor("100 W", 4e-6, 0.32, 0.95, 600.0)
-    assert found[0].doubts == ()
+    assert found[0].warnings == ()
 
 
 @pytest.mark.parametrize(
@@ -418,7 +418,7 @@ def test_a_toml_list_with_a_mistake_is_refused(tmp_path, text, words):
 
 
 def test_other_units_are_doubted():
-    assert "revolutions per minute" in Motor("A", 4e-6, 0.32, 0.95, 6000.0).doubts[0]
-    assert "kg cm^2" in Motor("A", 0.04, 0.32, 0.95, 600.0).doubts[0]
+    assert "revolutions per minute" in Motor("A", 4e-6, 0.32, 0.95, 6000.0).warnings[0]
+    assert "kg cm^2" in Motor("A", 0.04, 0.32, 0.95, 600.0).warnings[0]
     assert Span(2.0, 1.0).within(Span(0.0, 3.0)) == Span(2.0, 1.0)
     assert not Span(2.0, 1.0)

@@ -104,7 +104,7 @@ def export(
     files = []
     with spinner(f"Writing code for {machine.name}"):
         from pteron.export import Real, export_c, export_st
-        from pteron.export.identified import read_identified
+        from pteron.export.identified_parameters import read_identified
 
         grade = read_identified(machine, base).grade if base is not None else _TRUSTED
         if c is not None:

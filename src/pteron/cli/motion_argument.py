@@ -95,9 +95,9 @@ def given_pose(machine: Manipulator, text: str | None, name: str) -> NDArray[Any
 def loaded(robot: Manipulator, payload: float) -> Manipulator:
     """Return a machine with a payload, kg."""
     from pteron.motion import with_payload
-    from pteron.motion.payload import payload_doubt
+    from pteron.motion.payload import payload_warning
 
-    if doubt := payload_doubt(robot, payload):
+    if doubt := payload_warning(robot, payload):
         note(f"Warning: {doubt}")
     return with_payload(robot, payload)
 

@@ -74,7 +74,7 @@ def size(
     destination = Destination(out, "sizing")
     destination.check()
     for motor in chosen:
-        for text in motor.doubts:
+        for text in motor.warnings:
             note(f"Warning: {text}")
     carrying = loaded(machine, payload)
     with spinner(f"Sizing the drives of {machine.name}"):

@@ -91,12 +91,12 @@ class AdaptationScales:
         scales = self.scales[:count]
         shown = self.columns[..., :count] * (scales / np.sqrt(damping)[:, None])
         mean = np.einsum("bik,bil->kl", shown, shown) / len(shown)
-        seen, ways = np.linalg.eigh(mean)
+        seen, axes = np.linalg.eigh(mean)
         seen = seen + _HARDLY * seen[-1]
-        part = shown @ (ways / np.sqrt(seen))
+        part = shown @ (axes / np.sqrt(seen))
         fastest = float(np.linalg.eigvalsh(part @ np.swapaxes(part, -1, -2)).max())
         rate = min(rate, most / fastest)
-        matrix = scales[:, None] * ways * np.sqrt(rate / seen)
+        matrix = scales[:, None] * axes * np.sqrt(rate / seen)
         return matrix, float(np.sqrt(seen.sum() / rate))
 
 
@@ -149,8 +149,8 @@ def typical_scales(robot: Manipulator) -> AdaptationScales:
     bent = numeric(robot, "reach")(poses)[1].min(axis=-1)
     poses = poses[np.argsort(-bent)[: len(poses) // 3]].repeat(_TURNS, axis=0)
     velocity, acceleration = (
-        size * unit * way / np.linalg.norm(way, axis=-1, keepdims=True)
-        for size, way in zip(_TYPICAL, rng.normal(size=(2, *poses.shape)), strict=True)
+        size * unit * direction / np.linalg.norm(direction, axis=-1, keepdims=True)
+        for size, direction in zip(_TYPICAL, rng.normal(size=(2, *poses.shape)), strict=True)
     )
     return AdaptationScales(robot, base_parameters(robot), (poses, velocity, acceleration))
 

@@ -1,4 +1,4 @@
-"""Computed torque: the forces that give the joints the accelerations which errors call for."""
+"""Computed torque: forces for the wanted accelerations, corrected by the errors."""
 
 from __future__ import annotations
 

@@ -14,8 +14,8 @@ except ImportError:
     ) from None
 
 from pteron.arguments import check_arguments
-from pteron.environments.batch import PteronVectorEnv
-from pteron.environments.single import PteronEnv
+from pteron.environments.environment import PteronEnv
+from pteron.environments.vector_environment import PteronVectorEnv
 from pteron.environments.world import World
 
 REACH = "pteron/Reach-v0"
@@ -27,8 +27,8 @@ EPISODE = 300
 if REACH not in gymnasium.registry:
     gymnasium.register(
         REACH,
-        entry_point="pteron.environments.single:PteronEnv",
-        vector_entry_point="pteron.environments.batch:PteronVectorEnv",
+        entry_point="pteron.environments.environment:PteronEnv",
+        vector_entry_point="pteron.environments.vector_environment:PteronVectorEnv",
         max_episode_steps=EPISODE,
     )
 

@@ -1,4 +1,4 @@
-"""The machine for others: code for a controller, files for engines, models for other tools."""
+"""Exports: code for controllers, files for physics engines, models for other tools."""
 
 from pteron.arguments import check_arguments
 from pteron.export.c import Real, export_c

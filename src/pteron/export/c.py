@@ -14,10 +14,10 @@ from typing import Literal, get_args
 
 from pteron.atomic import write_texts
 from pteron.errors import ModelError
+from pteron.export.command_units import Output
 from pteron.export.descriptions import banner
 from pteron.export.functions import Asked, Exported, chosen
 from pteron.export.names import prefix_of
-from pteron.export.outputs import Output
 from pteron.kernels import Array
 from pteron.kernels.code import (
     C,

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 
 from pteron.equations.control import MEMORY
-from pteron.export.outputs import NAMES, Output, told_meaning
+from pteron.export.command_units import NAMES, Output, told_meaning
 from pteron.kernels import Port
 from pteron.manipulator import Manipulator
 

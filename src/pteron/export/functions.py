@@ -12,6 +12,7 @@ from pteron.controllers import CONTROLLERS, Controller
 from pteron.equations.drives import drive_names, drive_numbers
 from pteron.equations.machine import Machine, closure_of
 from pteron.errors import ModelError
+from pteron.export.command_units import DRIVEN, Output, factors, in_units
 from pteron.export.descriptions import (
     BASE_PARAMETERS,
     BRANCHES,
@@ -23,9 +24,8 @@ from pteron.export.descriptions import (
     law_meanings,
     meaning,
 )
-from pteron.export.identified import Identified, base_program, read_identified
-from pteron.export.labels import node_names
-from pteron.export.outputs import DRIVEN, Output, factors, in_units
+from pteron.export.identified_parameters import Identified, base_program, read_identified
+from pteron.export.node_names import node_names
 from pteron.kernels import FUNCTIONS as COMPILED
 from pteron.kernels import (
     LOADED,

@@ -1,4 +1,4 @@
-"""A machine's name as files, code and formats take it: letters, digits and one separator."""
+"""A machine's name as an identifier: letters, digits and one separator."""
 
 from __future__ import annotations
 

@@ -12,11 +12,11 @@ from pathlib import Path
 
 from pteron.atomic import write_texts
 from pteron.equations.machine import closure_of
+from pteron.export.command_units import Output
 from pteron.export.descriptions import banner
 from pteron.export.functions import Asked, Exported, chosen, listed
 from pteron.export.guards import INPUT_POWER, Names, Statements, element, power
 from pteron.export.names import prefix_of
-from pteron.export.outputs import Output
 from pteron.kernels import Graph, Port
 from pteron.kernels.code import rendered
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator

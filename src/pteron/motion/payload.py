@@ -13,7 +13,7 @@ _HEAVY = 20.0
 """Payload over the machine's moving mass above which its unit is unlikely."""
 
 
-def payload_doubt(robot: Manipulator, mass: float) -> str:
+def payload_warning(robot: Manipulator, mass: float) -> str:
     """Return a warning about an unlikely payload, kg, as a clause; else an empty text."""
     bodies = [body for leg in robot.legs for body in leg.bodies.values()]
     moving = sum(body.values[0] for body in (*bodies, robot.platform.joined))

@@ -14,7 +14,7 @@ from pteron.kinematics import direct_kinematics, inverse_kinematics
 from pteron.manipulator import Manipulator
 from pteron.manipulator.variants import with_elbows
 from pteron.motion import Motion, with_payload
-from pteron.motion.payload import payload_doubt
+from pteron.motion.payload import payload_warning
 from pteron.platforms.coordinates import SHOWN
 from pteron.viewer.boundary import allowed, farthest, followed, told_rest, what_stops
 from pteron.workspace import home_pose
@@ -151,7 +151,7 @@ def carrying(state: ViewerState, text: str) -> ViewerState:
         with_payload(state.robot, mass)
     except PteronError as error:
         return replace(state, message=f"{error}. The payload stays {state.payload:g} kg.")
-    doubt = payload_doubt(state.robot, mass)
+    doubt = payload_warning(state.robot, mass)
     return replace(state, payload=mass, message=f"{doubt[:1].upper()}{doubt[1:]}")
 
 

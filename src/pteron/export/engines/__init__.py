@@ -1,4 +1,4 @@
-"""The machine for other engines: one description of the opened mechanism, and files from it."""
+"""Models for physics engines: one description of the opened mechanism, and files from it."""
 
 from typing import TYPE_CHECKING
 

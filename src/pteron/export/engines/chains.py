@@ -1,4 +1,4 @@
-"""The legs in numbers, as they stand in a pose: their joints, their bodies and their ends."""
+"""The legs at a pose in numbers: their joints, their bodies and their ends."""
 
 from __future__ import annotations
 

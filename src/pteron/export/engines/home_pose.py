@@ -83,9 +83,9 @@ def _worth(robot: Manipulator, poses: Array) -> Array:
         return np.empty(0)
     bent = numeric(robot, "reach")(poses)[1].min(axis=-1)
     held = type_ii_sizes(robot, poses)
-    room = numeric(robot, "passive_room")(poses)[0].min(axis=-1)
+    passive = numeric(robot, "passive_room")(poses)[0].min(axis=-1)
     worth = np.minimum(bent, held)
     # A machine seldom works the wrong way round.
     turned = np.abs(poses[:, robot.platform.angular]).max(axis=1, initial=0.0)
     worth = np.minimum(worth, 1.0 - turned / np.pi)
-    return np.asarray(np.nan_to_num(np.where(room < 0.0, room, worth), nan=-1.0))
+    return np.asarray(np.nan_to_num(np.where(passive < 0.0, passive, worth), nan=-1.0))

@@ -1,4 +1,4 @@
-"""The platform in pieces: what moves as one with P, parts that do not turn, gears, sliding halves.
+"""The platform's bodies: what moves as one with P, parts that do not turn, gears, sliding halves.
 
 The pieces have together the platform's mass, first moment and moment of inertia, as the equations
 take them (`Platform.joined`).

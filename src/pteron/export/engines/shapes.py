@@ -17,7 +17,7 @@ _APART = 0.018
 """Half the distance of parallel rods, as a share of the machine's size: files do not say it."""
 
 _SPARE = 0.25
-"""Length of a guide without limits either way, as a share of the machine's size."""
+"""Length of a guide without limits, each way, as a share of the machine's size."""
 
 _OVERLAP = 0.55
 """Each part of a telescope has this share of the whole."""
@@ -64,7 +64,7 @@ def _leg(
             found.append([Shape("capsule", ends, radius)])
             continue
         side = _APART * size * np.array(bar)
-        pair = [Shape("capsule", ends + way * side, 0.6 * thick) for way in (1.0, -1.0)]
+        pair = [Shape("capsule", ends + sign * side, 0.6 * thick) for sign in (1.0, -1.0)]
         across = [Shape("capsule", np.array([p - side, p + side]), 0.6 * thick) for p in ends]
         found.append(pair + across)
     return found

@@ -1,6 +1,6 @@
 """Klipper's configuration of a machine."""
 
-from pteron.export.klipper.export import export_klipper
+from pteron.export.klipper.configuration import export_klipper
 
 __all__ = ["export_klipper"]
 

@@ -70,7 +70,7 @@ def told_bed(robot: Manipulator, level: float, good: float, most: float) -> tupl
 
 
 def tool_of(robot: Manipulator) -> Array:
-    """Return the way from P to the tool, m in the base frame, of a platform that does not turn."""
+    """Return the vector from P to the tool, m, base frame, of a platform that does not turn."""
     return np.asarray(np.array(robot.platform.tool) @ np.array(robot.platform.frame))
 
 

@@ -1,4 +1,4 @@
-"""Klipper's delta: klippy/kinematics/delta.py and klippy/chelper/kin_delta.c."""
+"""Klipper's `delta`, as klippy/kinematics/delta.py and klippy/chelper/kin_delta.c compute it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Klipper's rotary_delta: klippy/kinematics/rotary_delta.py, chelper/kin_rotary_delta.c."""
+"""Klipper's `rotary_delta`, as its rotary_delta.py and chelper/kin_rotary_delta.c compute it."""
 
 from __future__ import annotations
 

@@ -4,7 +4,7 @@ from pteron.identification.consistency.bodies import real_bodies
 from pteron.identification.consistency.bounds import Bounds
 from pteron.identification.consistency.cones import MissingSolver
 from pteron.identification.consistency.consistency import Consistency
-from pteron.identification.consistency.model import consistent_model
+from pteron.identification.consistency.consistent_model import consistent_model
 
 __all__ = ["Bounds", "Consistency", "MissingSolver", "consistent_model", "real_bodies"]
 

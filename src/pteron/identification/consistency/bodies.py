@@ -1,4 +1,4 @@
-"""The bodies that parameters describe: their scale, whether they are real, what they are near."""
+"""The bodies that parameters describe: their scales, their cones, and the nearest targets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Essential parameters: what is left once the data have had their say on what they cannot show."""
+"""Essential parameters: the values that the data can show, by a backward Wald test."""
 
 from __future__ import annotations
 

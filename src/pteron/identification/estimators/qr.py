@@ -1,4 +1,4 @@
-"""Least squares through a QR factor, which is built block by block and holds everything."""
+"""Least squares through a QR factor that is built block by block."""
 
 from __future__ import annotations
 

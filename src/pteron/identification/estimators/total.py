@@ -1,4 +1,4 @@
-"""Total least squares: the regressor is noisy too."""
+"""Total least squares, for noise in the regressor as well as in the forces."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Exciting trajectories: periodic motions from whose forces the base parameters are seen well."""
+"""Exciting trajectories: periodic motions whose forces determine the base parameters well."""
 
 from pteron.identification.excitation.conditioning import (
     Conditioning,
@@ -7,13 +7,13 @@ from pteron.identification.excitation.conditioning import (
     stacked_regressor,
 )
 from pteron.identification.excitation.excitation import Excitation, Start
-from pteron.identification.excitation.files import motion_paths
 from pteron.identification.excitation.fourier import FourierMotion
 from pteron.identification.excitation.held_out import RepeatedCycle, held_out_cycle
 from pteron.identification.excitation.layout import Layout, check_sampling
 from pteron.identification.excitation.leads import Lead, LedMotion, found_lead
 from pteron.identification.excitation.limits import Limits
 from pteron.identification.excitation.margins import Margin, Margins, margins
+from pteron.identification.excitation.motion_files import motion_paths
 from pteron.identification.excitation.random_motions import random_excitation
 from pteron.identification.excitation.search import optimal_excitation
 

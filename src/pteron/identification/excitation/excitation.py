@@ -1,4 +1,4 @@
-"""An exciting trajectory: the motion, how good it is, and what it leaves of every limit."""
+"""An exciting trajectory: the motion, its conditioning, and its margins to every limit."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ import polars as pl
 
 from pteron.equations.machine import closure_of
 from pteron.identification.excitation.conditioning import Conditioning
-from pteron.identification.excitation.files import motion_paths, write_motions
 from pteron.identification.excitation.fourier import FourierMotion
 from pteron.identification.excitation.held_out import RepeatedCycle, held_out_cycle
 from pteron.identification.excitation.layout import Layout, check_sampling
 from pteron.identification.excitation.leads import Lead, LedMotion
 from pteron.identification.excitation.limits import Limits
 from pteron.identification.excitation.margins import Margins
+from pteron.identification.excitation.motion_files import motion_paths, write_motions
 from pteron.identification.excitation.movement import Movement
 from pteron.identification.excitation.search_program import Criterion
 from pteron.identification.logs import Description, write_description

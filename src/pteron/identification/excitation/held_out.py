@@ -1,4 +1,4 @@
-"""A motion of another kind to judge a model by: pick-and-place cycles within the same limits."""
+"""Pick-and-place cycles within the same limits, held out to validate an identified model."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Starts improved stage by stage, until they are good and keep their limits between samples too."""
+"""Improvement of starts in stages, until they keep their limits between samples too."""
 
 from __future__ import annotations
 

@@ -179,8 +179,8 @@ def _margins_of(robot: Manipulator, limits: Limits, state: FullMotion) -> dict[s
     if any(leg.limits for leg in robot.legs):
         found["joint_clearance"] = clearances(robot, state.joints) - limits.joint_clearance
     if _limits_passive(robot):
-        room = unchecked(robot, "passive_room", state.pose)[0]
-        found["passive_clearance"] = room - limits.passive_clearance
+        passive = unchecked(robot, "passive_room", state.pose)[0]
+        found["passive_clearance"] = passive - limits.passive_clearance
     found["speed"] = per_joint(limits, "speed", robot) - np.abs(state.rates)
     found["acceleration"] = per_joint(limits, "acceleration", robot) - np.abs(state.accelerations)
     if limits.force is not None:

@@ -1,4 +1,4 @@
-"""`optimal_excitation`: random motions, the best of them improved, the best of those returned."""
+"""`optimal_excitation`: random motions are drawn, the best improved, the best of those returned."""
 
 from __future__ import annotations
 

@@ -191,8 +191,8 @@ def _path(
     ranges = np.array([leg.limits or (-np.inf, np.inf) for leg in robot.legs])
     clearance = limits.joint_clearance + _BACK_OFF * joint_sizes(robot)
     found["joint_clearance"] = joints, ranges[:, 0] + clearance, ranges[:, 1] - clearance
-    room = program(robot, "passive_room").function(pose)[0].T
-    found["passive_clearance"] = room, limits.passive_clearance + _BACK_OFF, np.inf
+    passive = program(robot, "passive_room").function(pose)[0].T
+    found["passive_clearance"] = passive, limits.passive_clearance + _BACK_OFF, np.inf
     for name, value in (("speed", rates), ("acceleration", seconds)):
         found[name] = value / per_joint(limits, name, robot), _BACK_OFF - 1.0, 1.0 - _BACK_OFF
     dynamics, still = program(robot, "inverse_dynamics").function, ca.SX(pose.shape[0], 1)

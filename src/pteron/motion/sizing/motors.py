@@ -69,7 +69,7 @@ class Motor:
             raise DataError(told(faults), subject=f"motor {self.name}")
 
     @property
-    def doubts(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[str, ...]:
         """Warnings of unlikely numbers, most often in a wrong unit, one line each."""
         found = []
         if self.max_speed > _FASTEST:

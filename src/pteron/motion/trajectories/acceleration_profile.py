@@ -44,8 +44,8 @@ class Profile(NamedTuple):
             t = np.clip(whole * tau - h, -h, self.duration + h)
             s, rate = self._state(t)
             after, before = self._moments(t, h), self._moments(t, -h)
-            gains, rates, ways = ((a + b) / h**2 for a, b in zip(after, before, strict=True))
-            return s + ways, (rate + rates) * whole, gains * whole**2
+            gains, rates, parts = ((a + b) / h**2 for a, b in zip(after, before, strict=True))
+            return s + parts, (rate + rates) * whole, gains * whole**2
 
         return progress
 

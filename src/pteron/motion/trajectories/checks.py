@@ -108,15 +108,15 @@ def check_curve(
     `marks` are the parameters checked first, and `place` says in words where a parameter is.
     """
     expect_regular(robot)
-    way = _Curve(robot, poses, place)
+    curve = _Curve(robot, poses, place)
     # Beyond the reach nothing else is measured.
-    failures = [_failed_reach(way, marks)]
+    failures = [_failed_reach(curve, marks)]
     if failures[0] is not None:
         within = marks < failures[0].at
         marks = np.append(marks[within], failures[0].at)
     if len(marks) > 1:
-        failures += [_failed_limit(way, marks), _failed_passive(way, marks)]
-        failures.append(_failed_type_ii(way, marks))
+        failures += [_failed_limit(curve, marks), _failed_passive(curve, marks)]
+        failures.append(_failed_type_ii(curve, marks))
     found = [failure for failure in failures if failure is not None]
     if found:
         raise min(found, key=lambda failure: failure.at).error
@@ -145,24 +145,24 @@ class _Failure(NamedTuple):
     error: PteronError
 
 
-def _failed_reach(way: _Curve, marks: Array) -> _Failure | None:
-    robot = way.robot
+def _failed_reach(curve: _Curve, marks: Array) -> _Failure | None:
+    robot = curve.robot
 
     def squares(at: Array) -> Array:
-        return np.nan_to_num(numeric(robot, "squared_type_i")(way.poses(at))[0], nan=-1.0)
+        return np.nan_to_num(numeric(robot, "squared_type_i")(curve.poses(at))[0], nan=-1.0)
 
     found = first_below(squares, marks, TYPE_I**2)
     if found is None:
         return None
     at, i, square = found
     fine = np.linspace(marks[0], marks[-1], _SAMPLES)
-    missed = -float(np.nanmin(numeric(robot, "reach")(way.poses(fine))[0][:, i]))
+    missed = -float(np.nanmin(numeric(robot, "reach")(curve.poses(fine))[0][:, i]))
     leg = robot.legs[i]
     error: PteronError
     if missed <= _ROUNDING:
         error = SingularPose(
-            f"{way.told(at)}: singular for leg {i + 1}: {leg.singular_text} (type I); take another "
-            "path",
+            f"{curve.told(at)}: singular for leg {i + 1}: {leg.singular_text} (type I); take "
+            "another path",
             kind="I",
             measure=float(np.sqrt(max(square, 0.0))),
             index=(),
@@ -172,7 +172,7 @@ def _failed_reach(way: _Curve, marks: Array) -> _Failure | None:
     millimetres = missed > _MILLIMETRES * leg.size
     verb = "is out of the reach" if at == marks[0] else "leaves the reach"
     error = UnreachablePose(
-        f"{way.told(at)}: {verb} of leg {i + 1}, which misses the way by up to {missed:.3g} m: "
+        f"{curve.told(at)}: {verb} of leg {i + 1}, which misses the path by up to {missed:.3g} m: "
         f"{leg.reach_text}; "
         f"{'is it in millimetres? lengths are in metres' if millimetres else 'take another path'}",
         leg=i + 1,
@@ -183,11 +183,11 @@ def _failed_reach(way: _Curve, marks: Array) -> _Failure | None:
     return _Failure(at, error)
 
 
-def _failed_limit(way: _Curve, marks: Array) -> _Failure | None:
-    robot = way.robot
+def _failed_limit(curve: _Curve, marks: Array) -> _Failure | None:
+    robot = curve.robot
 
     def margin(at: Array) -> Array:
-        return clearances(robot, numeric(robot, "joint_coordinates")(way.poses(at))[0])
+        return clearances(robot, numeric(robot, "joint_coordinates")(curve.poses(at))[0])
 
     found = first_below(margin, marks, -_ROUNDING)
     if found is None:
@@ -200,21 +200,21 @@ def _failed_limit(way: _Curve, marks: Array) -> _Failure | None:
     told = (
         f"leg {i + 1}: its {leg.joint.noun} passes its limits, {low:g} to {high:g} {unit}, by up "
     )
-    return _beyond(way, at, i + 1, f"{told}to {beyond:.3g} {unit}", beyond * leg.lever)
+    return _beyond(curve, at, i + 1, f"{told}to {beyond:.3g} {unit}", beyond * leg.lever)
 
 
-def _failed_passive(way: _Curve, marks: Array) -> _Failure | None:
-    robot = way.robot
+def _failed_passive(curve: _Curve, marks: Array) -> _Failure | None:
+    robot = curve.robot
 
     def margin(at: Array) -> Array:
-        return np.asarray(numeric(robot, "passive_room")(way.poses(at))[1])
+        return np.asarray(numeric(robot, "passive_room")(curve.poses(at))[1])
 
     found = first_below(margin, marks, -_ROUNDING)
     if found is None:
         return None
     at, i, _ = found
     places, least = least_along(margin, marks, -_ROUNDING)
-    shared, *legs = passive_joints(Machine.of(robot), ca.SX(ca.DM(way.pose(float(places[i])))))
+    shared, *legs = passive_joints(Machine.of(robot), ca.SX(ca.DM(curve.pose(float(places[i])))))
     for joint in (*shared, *legs[i]):
         value = float(joint.value)
         if joint.least <= value <= joint.most:
@@ -223,22 +223,24 @@ def _failed_passive(way: _Curve, marks: Array) -> _Failure | None:
         whose = "" if joint in shared else f"leg {i + 1}: its "
         told = f"{whose}{joint.noun} comes to {value:.4g} {joint.unit}"
         told += f", its limits are {low}{joint.most:g}"
-        return _beyond(way, at, 0 if joint in shared else i + 1, told, -float(least[i]))
-    return _beyond(way, at, i + 1, f"leg {i + 1} passes a passive joint's limits", -float(least[i]))
+        return _beyond(curve, at, 0 if joint in shared else i + 1, told, -float(least[i]))
+    return _beyond(
+        curve, at, i + 1, f"leg {i + 1} passes a passive joint's limits", -float(least[i])
+    )
 
 
-def _beyond(way: _Curve, at: float, leg: int, told: str, metres: float) -> _Failure:
-    text = f"{way.told(at)}: {told}; take another path"
+def _beyond(curve: _Curve, at: float, leg: int, told: str, metres: float) -> _Failure:
+    text = f"{curve.told(at)}: {told}; take another path"
     return _Failure(at, UnreachablePose(text, leg=leg, shortfall=metres, index=()))
 
 
-def _failed_type_ii(way: _Curve, marks: Array) -> _Failure | None:
-    robot = way.robot
+def _failed_type_ii(curve: _Curve, marks: Array) -> _Failure | None:
+    robot = curve.robot
     if closure_of(robot).vanishes() is False and not robot.platform.angles:
         return None
 
     def measure(at: Array) -> Array:
-        return np.asarray(numeric(robot, "type_ii")(way.poses(at))[0])
+        return np.asarray(numeric(robot, "type_ii")(curve.poses(at))[0])
 
     # Its sign is that of the beginning, as far as the actuators hold the platform.
     side = 1.0 if float(measure(marks[:1])[0]) > 0.0 else -1.0
@@ -247,8 +249,8 @@ def _failed_type_ii(way: _Curve, marks: Array) -> _Failure | None:
         return None
     at = found[0]
     error = SingularPose(
-        f"{way.told(at)}: comes to a singularity (type II), where the actuators no longer hold the "
-        "platform; take another path, or go round it",
+        f"{curve.told(at)}: comes to a singularity (type II), where the actuators no longer hold "
+        "the platform; take another path, or go round it",
         kind="II",
         measure=float(np.abs(measure(np.array([at])))[0]),
         index=(),

@@ -79,4 +79,4 @@ class CyclePath:
 
     def place(self, s: float) -> str:
         """Return in words where on the path s is."""
-        return f"{s:.4g} m along its way of {self.length:.4g} m"
+        return f"{s:.4g} m along its path of {self.length:.4g} m"

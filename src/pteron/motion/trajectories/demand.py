@@ -168,18 +168,18 @@ def most_rate(
         for side in (1.0, -1.0):
             parts = limits.force - side * still, side * asked.square
             rows.append([*parts, side * asked.viscous * asked.first])
-    room, square, root = (
+    margin, square, root = (
         np.concatenate([row[k][:, limited].ravel() for row in rows]) for k in range(3)
     )
     with np.errstate(divide="ignore", invalid="ignore"):
-        below = root + np.sqrt(root**2 + 4.0 * square * room)
-        edge = np.where(below > 0.0, 2.0 * room / below, np.inf)
+        below = root + np.sqrt(root**2 + 4.0 * square * margin)
+        edge = np.where(below > 0.0, 2.0 * margin / below, np.inf)
     if not np.isfinite(least):
         least = float(np.nanmin(edge[(square > 0.0) | (square == 0.0)], initial=np.inf))
     # Friction may pass a limit between two speeds where what is slower, and faster, keeps it.
     step = _ROUNDING
     while np.isfinite(least):
-        over = square * least**2 + root * least > room + _ROUNDING * np.abs(room)
+        over = square * least**2 + root * least > margin + _ROUNDING * np.abs(margin)
         if not over.any():
             break
         # An edge may be off by rounding: it is left by a step, the longer the more were taken.

@@ -43,7 +43,7 @@ def jerk_limited(
     """Return the motion of the joints from rest in one pose to rest in another, with limited jerk.
 
     The joints start and arrive together; where forces of the drives are limited too, or the tool,
-    the motion is slowed as a whole. The tool's way is what follows, and not a line.
+    the motion is slowed as a whole. The path of the tool follows from them and is no line.
 
     Parameters
     ----------
@@ -68,9 +68,9 @@ def jerk_limited(
     DataError
         If a joint's acceleration has no limit, or the poses are the same.
     UnreachablePose
-        If the joints leave their limits on their way, or do not lead to the other pose.
+        If the joints leave their limits on their path, or do not lead to the other pose.
     SingularPose
-        If the way comes to a singularity.
+        If the path comes to a singularity.
     PteronError
         If ruckig is missing.
 

@@ -58,9 +58,11 @@ def limit_rows(asked: Demand, limits: MotionLimits, unit: float) -> LimitRows:
     if math.isfinite(limits.tool_acceleration):
         # Both lie in a plane: speed along its x, and what is left of the bend along its y.
         size = np.linalg.norm(speed, axis=-1)
-        way = np.divide(speed, size[:, None], out=np.zeros_like(speed), where=size[:, None] > 0.0)
-        ahead = np.sum(bend * way, axis=-1)
-        aside = np.linalg.norm(bend - ahead[:, None] * way, axis=-1)
+        direction = np.divide(
+            speed, size[:, None], out=np.zeros_like(speed), where=size[:, None] > 0.0
+        )
+        ahead = np.sum(bend * direction, axis=-1)
+        aside = np.linalg.norm(bend - ahead[:, None] * direction, axis=-1)
         angles = 2.0 * np.pi * (np.arange(_SIDES) + 0.5) / _SIDES
         cos, sin = np.cos(angles), np.sin(angles)
         most = np.full(_SIDES, limits.tool_acceleration * np.cos(np.pi / _SIDES))

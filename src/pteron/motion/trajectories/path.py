@@ -154,12 +154,12 @@ def line_path(robot: RobotLike, poses: ArrayLike, corner: float = 0.0) -> LinePa
     if not (np.isfinite(corner) and corner >= 0.0):
         raise DataError(f"corner: {corner} given, 0 m or more expected")
     places, _, _ = tool_motion(robot.platform, given, np.zeros_like(given), np.zeros_like(given))
-    ways = np.diff(places, axis=0)
-    sizes = np.linalg.norm(ways * path_weights(robot.platform), axis=-1)
+    directions = np.diff(places, axis=0)
+    sizes = np.linalg.norm(directions * path_weights(robot.platform), axis=-1)
     if (sizes <= _SAME).any():
         k = int(np.argmax(sizes <= _SAME))
         raise DataError(f"poses: {k + 2} is the same as {k + 1}; leave one of them out")
-    return _rounded(robot.platform, places, ways / sizes[:, None], sizes, corner)
+    return _rounded(robot.platform, places, directions / sizes[:, None], sizes, corner)
 
 
 def path_weights(platform: Platform) -> Array:
@@ -168,19 +168,20 @@ def path_weights(platform: Platform) -> Array:
 
 
 def _rounded(
-    platform: Platform, places: Array, ways: Array, sizes: Array, corner: float
+    platform: Platform, places: Array, directions: Array, sizes: Array, corner: float
 ) -> LinePath:
     """Return the path through places (K, m), its lines having these directions and lengths."""
     controls: list[Array] = []
     knots, rests, corners = [0.0], [0.0], [0.0]
     here = places[0]
-    for k in range(len(ways)):
-        last = k + 1 == len(ways)
-        cosine = 1.0 if last else float(np.sum(ways[k] * ways[k + 1] * path_weights(platform) ** 2))
+    weights = path_weights(platform)
+    cosines = np.append(np.sum(directions[:-1] * directions[1:] * weights**2, axis=-1), 1.0)
+    for k, cosine in enumerate(cosines):
+        last = k + 1 == len(cosines)
         rounds = not last and corner > 0.0 and _SHARP < cosine < _STRAIGHT
         cut = min(corner, sizes[k] / 2.0, sizes[k + 1] / 2.0) if rounds else 0.0
-        there = places[k + 1] - cut * ways[k]
-        line = float(np.linalg.norm((there - here) * path_weights(platform)))
+        there = places[k + 1] - cut * directions[k]
+        line = float(np.linalg.norm((there - here) * weights))
         if line > _SAME:
             controls.append(here + np.linspace(0.0, 1.0, 6)[:, None] * (there - here))
             knots.append(knots[-1] + line)
@@ -189,9 +190,9 @@ def _rounded(
         if rounds:
             # Both ends as on a line of twice the cut: the pose is smooth in s to second order.
             steps = np.array([0.0, 0.4, 0.8])[:, None] * cut
-            here = places[k + 1] + cut * ways[k + 1]
+            here = places[k + 1] + cut * directions[k + 1]
             controls.append(
-                np.vstack([there + steps * ways[k], (here - steps * ways[k + 1])[::-1]])
+                np.vstack([there + steps * directions[k], (here - steps * directions[k + 1])[::-1]])
             )
             knots.append(knots[-1] + 2.0 * cut)
         elif last or cosine < _STRAIGHT:
@@ -224,7 +225,7 @@ class BackPath:
         """Return in words where on the path s is."""
         if s <= self._out.length:
             return self._out.place(s)
-        return f"{self._out.place(self.length - s)}, on the way back"
+        return f"{self._out.place(self.length - s)}, on the path back"
 
 
 def there_and_back(path: Path) -> BackPath:

@@ -1,4 +1,4 @@
-"""From one pose straight to another, at rest in both."""
+"""A straight motion from one pose to another, at rest in both."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ def replay(
         poses' velocities and accelerations (dx ... ddx ...) these count; else they are those of the
         interpolating spline of the fifth degree, for which samples must be smooth.
     start : array, shape (m,), optional
-        A pose in the assembly mode of the joints, from which a straight way leads to the table's
+        A pose in the assembly mode of the joints, from which a straight path leads to the table's
         first row; needed where there are joints only.
 
     Returns

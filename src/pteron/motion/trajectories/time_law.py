@@ -65,7 +65,7 @@ def shortest(
     DataError
         If there is no limit.
     ModelError
-        If the drives cannot hold the machine somewhere on the way.
+        If the drives cannot hold the machine somewhere on the curve.
     """
     robot = as_manipulator(robot)
     rate = curve_rate(robot, curve(np.linspace(0.0, 1.0, _LOOK)), limits)
@@ -88,7 +88,7 @@ def in_time(
     DataError
         If the duration is too short for the limits, or neither it nor a limit is given.
     ModelError
-        If the drives cannot hold the machine somewhere on the way.
+        If the drives cannot hold the machine somewhere on the curve.
     """
     if duration is None:
         return shortest(robot, curve, limits, step)

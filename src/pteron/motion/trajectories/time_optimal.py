@@ -190,9 +190,9 @@ def _fastest(
     squares = _first(toppra, rows, grid)
     bound = Profile.of(grid, squares).duration
     found: list[_Stretch] = []
-    room, most = np.full_like(rows.c, 1.0 - _SPARE), rows.most
+    margin, most = np.full_like(rows.c, 1.0 - _SPARE), rows.most
     for _ in range(_PASSES):
-        tighter = rows._replace(c=rows.c + 1.0 - room, most=most)
+        tighter = rows._replace(c=rows.c + 1.0 - margin, most=most)
         squares = _solved(toppra, tighter, grid, squares, _AHEAD[-1])
         profile = Profile.of(grid, squares)
         spread = min(_SPREAD * step / unit, _SHARE * profile.duration)
@@ -214,7 +214,7 @@ def _fastest(
         if slower <= 1.0:
             break
         near = _near(tau * whole - spread, profile.time, 2.0 * spread)
-        room = np.minimum(room, room - 1.05 * np.maximum(_most_of(near, used - 1.0), 0.0))
+        margin = np.minimum(margin, margin - 1.05 * np.maximum(_most_of(near, used - 1.0), 0.0))
         most = most / np.maximum(_most_of(near, fast[:, None])[:, 0], 1.0)
     return min(found, key=lambda one: one.duration * one.slower)
 

@@ -18,7 +18,7 @@ class Progress(Protocol):
     """A time law from rest to rest: the share of the path covered, over one unit of time."""
 
     def __call__(self, tau: Array, /) -> tuple[Array, Array, Array]:
-        """Return a share of the way in [0, 1] and two derivatives, (T,) each, at tau (T,)."""
+        """Return a share of the path in [0, 1] and two derivatives, (T,) each, at tau (T,)."""
 
 
 def polynomial(law: PolynomialLaw) -> Progress:

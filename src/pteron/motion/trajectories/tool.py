@@ -14,7 +14,7 @@ Curve = tuple[Array, Array, Array]
 def tool_motion(platform: Platform, pose: Array, first: Array, second: Array) -> Curve:
     """Return the tool's place along the pose's lengths, with its angles, and two derivatives.
 
-    The way from P to the tool along the platform's axis, which is constant, is left out.
+    The part from P to the tool along the platform's axis, which is constant, is left out.
     """
     return _moved(platform, (pose, first, second), 1.0)
 

@@ -12,8 +12,8 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from pteron.environments.construction import world_of
+from pteron.environments.environment import Numbers, checked_mode, spaces
 from pteron.environments.picture import Picture
-from pteron.environments.single import Numbers, checked_mode, spaces
 from pteron.environments.state import Bools, EpisodeState
 from pteron.errors import DataError
 from pteron.manipulator import RobotLike
