@@ -46,15 +46,14 @@ def overloads(robot: RobotLike, forces: ArrayLike, speeds: ArrayLike) -> tuple[s
     force, speed = (np.fmax.reduce(values, axis=0, initial=0.0) for values in peaks)
     for i, leg in enumerate(robot.legs):
         drive = leg.drive or Drive()
-        unit, rate = leg.joint.force_unit, f"{leg.joint.unit}/s"
-        if drive.max_force is not None and force[i] > drive.max_force:
-            found.append(
-                f"leg {i + 1}: the motion takes up to {force[i]:.4g} {unit}, but its drive gives "
-                f"{drive.max_force:g} {unit} (max_force)"
-            )
-        if drive.max_speed is not None and speed[i] > drive.max_speed:
-            found.append(
-                f"leg {i + 1}: the motion takes up to {speed[i]:.4g} {rate}, but its drive gives "
-                f"{drive.max_speed:g} {rate} (max_speed)"
-            )
+        for key, most, unit in (
+            ("max_force", force[i], leg.joint.force_unit),
+            ("max_speed", speed[i], f"{leg.joint.unit}/s"),
+        ):
+            limit = getattr(drive, key)
+            if limit is not None and most > limit:
+                found.append(
+                    f"leg {i + 1}: the motion takes up to {most:.4g} {unit}, but its drive gives "
+                    f"{limit:g} {unit} ({key})"
+                )
     return tuple(found)

@@ -14,7 +14,6 @@ from pteron.kernels import Array, numeric
 from pteron.manipulator import Manipulator
 from pteron.motion.motion import Motion, told_pose
 from pteron.motion.simulation.plant import Plant
-from pteron.motion.simulation.sensors import Encoders
 from pteron.motion.simulation.simulation import Simulation
 from pteron.motion.simulation.stops import (
     first_beyond_limits,
@@ -48,48 +47,9 @@ class ControlLaw(Protocol):
         """Return forces (n,) and the next memory, from the reference and the measured joints."""
 
 
-@runtime_checkable
-class ForceSource(Protocol):
-    """A source of forces, sample by sample."""
-
-    memory: Array
-
-    def forces(self, k: int, joints: Array, rates: Array) -> Array:
-        """Return the forces asked of the drives, (n,), at sample k."""
-
-
-class TimedForces:
-    """Forces that depend on time alone."""
-
-    def __init__(self, of_time: Callable[[float], Array], time: Array) -> None:
-        self._of_time, self._time = of_time, time
-        self.memory = np.empty(0)
-
-    def forces(self, k: int, joints: Array, rates: Array) -> Array:
-        """Return them."""
-        return self._of_time(float(self._time[k]))
-
-
-class ControllerForces:
-    """Forces of a controller that sees the joints."""
-
-    def __init__(
-        self, law: ControlLaw, encoders: Encoders, reference: Motion, pose: Array, velocity: Array
-    ) -> None:
-        self._law, self._encoders, self._reference = law, encoders, reference
-        self.memory = law.memory(pose, velocity)
-
-    def forces(self, k: int, joints: Array, rates: Array) -> Array:
-        """Return what its law asks for."""
-        at = self._reference
-        found, self.memory = self._law(
-            at.pose[k],
-            at.velocity[k],
-            at.acceleration[k],
-            *self._encoders.read(joints, rates),
-            self.memory,
-        )
-        return found
+ForceSource = Callable[[int, Array, Array, Array], tuple[Array, Array]]
+"""Gives the forces asked of the drives, (n,), and the next memory, from the sample's number, the
+joints' coordinates and rates, and the memory."""
 
 
 @dataclass(frozen=True)
@@ -106,6 +66,7 @@ def run(
     robot: Manipulator,
     plant: Plant,
     source: ForceSource,
+    memory: Array,
     reference: Motion,
     loads: Loads,
     delay: float,
@@ -129,13 +90,13 @@ def run(
     for k, now in enumerate(time):
         joints = joints_of(plant.pose)[0]
         rates = rates_of(plant.pose, plant.velocity)[0]
-        asked = source.forces(k, joints, rates)
+        asked, memory = source(k, joints, rates, memory)
         commands.append(np.clip(asked, -most, most))
         while len(commands) < whole + 2:
             commands.append(commands[0])
         before, after = commands[0], commands[1]
         forces = before if late else after
-        rows.append((plant.pose, plant.velocity, joints, rates, forces, asked, source.memory))
+        rows.append((plant.pose, plant.velocity, joints, rates, forces, asked, memory))
         if not np.isfinite(asked).all():
             why = (
                 f"no forces are asked for at the joints {told_pose(joints)}: they have no pose "
@@ -162,7 +123,7 @@ def run(
         if first is not None:
             end, why = first + 1, ends[first](robot, columns[0][first])
     stopped = None if why is None else f"at {min(plant.time, time[end - 1]):.4g} s: {why}"
-    pose, velocity, joints, rates, forces, asked, memory = (part[:end] for part in columns)
+    pose, velocity, joints, rates, forces, asked, known = (part[:end] for part in columns)
     acceleration = np.empty_like(pose)
     wrenches = np.array([loads.wrench(float(t)) for t in time[:end]])
     for mass, loaded in loads.machines.items():
@@ -182,7 +143,7 @@ def run(
         asked,
         Motion(*(getattr(reference, field.name)[:end] for field in fields(Motion))),
         loads.masses[:end],
-        memory,
+        known,
         min(plant.step, period),
         stopped,
     )

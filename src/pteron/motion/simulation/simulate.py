@@ -15,14 +15,7 @@ from pteron.kinematics.evaluate import checked
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.payload import with_payload
-from pteron.motion.simulation.loop import (
-    ControlLaw,
-    ControllerForces,
-    ForceSource,
-    Loads,
-    TimedForces,
-    run,
-)
+from pteron.motion.simulation.loop import ControlLaw, Loads, run
 from pteron.motion.simulation.plant import Method, Plant, allowed_step
 from pteron.motion.simulation.sensors import Encoders, Sensors
 from pteron.motion.simulation.simulation import Simulation
@@ -167,16 +160,26 @@ def simulate(
     encoders = Encoders(sensors or Sensors(), period, joints, rates, round_ones)
 
     if controller is None:
-        source: ForceSource = TimedForces(_of_time(forces, robot, "forces"), reference.time)
+        memory, given = np.empty(0), _of_time(forces, robot, "forces")
+
+        def source(k: int, joints: Array, rates: Array, memory: Array) -> tuple[Array, Array]:
+            return given(float(reference.time[k])), memory
+
     else:
         believed = model or (loaded[masses[0]] if len(loaded) == 1 else robot)
-        source = ControllerForces(controller.law(believed), encoders, reference, pose, velocity)
+        law = controller.law(believed)
+        memory = law.memory(pose, velocity)
+        wanted = reference.pose, reference.velocity, reference.acceleration
+
+        def source(k: int, joints: Array, rates: Array, memory: Array) -> tuple[Array, Array]:
+            measured = encoders.read(joints, rates)
+            return law(wanted[0][k], wanted[1][k], wanted[2][k], *measured, memory)
+
     about = np.vstack([pose, reference.pose[:: max(1, len(reference.time) // _POSES)]])
     plant = Plant(pose, velocity, method, allowed_step(robot, about, step), tolerance)
     loads = Loads(masses, loaded, _of_time(wrench, robot, "wrench"))
-    return run(
-        robot, plant, source, reference, loads, delay, limits=limits and controller is not None
-    )
+    ends = limits and controller is not None
+    return run(robot, plant, source, memory, reference, loads, delay, limits=ends)
 
 
 def _expect_controller(controller: object) -> None:

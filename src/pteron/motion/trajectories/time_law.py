@@ -15,7 +15,7 @@ from pteron.motion.trajectories.demand import curve_rate, demand_between, most_r
 from pteron.motion.trajectories.limits import MotionLimits, limits_of
 from pteron.motion.trajectories.path import Path
 from pteron.motion.trajectories.time_polynomials import PolynomialLaw, Progress, polynomial
-from pteron.motion.trajectories.timed_path import Course, InTime, Timed
+from pteron.motion.trajectories.timed_path import Timed, timed_path
 from pteron.motion.trajectories.tool import Curve
 
 STEP = 1e-3
@@ -165,7 +165,7 @@ def along(
         shares = stretch_times(robot, path, laws[0], kept)
     elif duration is None:
         raise _unlimited()
-    course = Course(path, tuple(shares), laws)
+    course = timed_path(path, shares, laws)
     if duration is None:
         return kept_motion(robot, course, kept, step)
     _expect_time("duration", duration)
@@ -195,7 +195,7 @@ def stretch_times(
 
 
 def _expect_kept(
-    robot: Manipulator, course: InTime, limits: MotionLimits, shortest: float | None = None
+    robot: Manipulator, course: Timed, limits: MotionLimits, shortest: float | None = None
 ) -> None:
     """Refuse a course that is too fast for the limits; it names the worst one."""
     curve = course.at(np.linspace(0.0, course.duration, _LOOK))
@@ -209,7 +209,7 @@ def _expect_kept(
     )
 
 
-def kept_motion(robot: Manipulator, course: InTime, limits: MotionLimits, step: float) -> Motion:
+def kept_motion(robot: Manipulator, course: Timed, limits: MotionLimits, step: float) -> Motion:
     """Return a course as a motion that keeps the limits at ten times its samples too.
 
     And where a joint reverses between them.

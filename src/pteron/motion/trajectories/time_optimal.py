@@ -33,7 +33,7 @@ from pteron.motion.trajectories.limits import MotionLimits, limits_of
 from pteron.motion.trajectories.path import Path
 from pteron.motion.trajectories.time_law import STEP, kept_motion, stretch_times
 from pteron.motion.trajectories.time_polynomials import Progress, polynomial
-from pteron.motion.trajectories.timed_path import Course
+from pteron.motion.trajectories.timed_path import timed_path
 from pteron.motion.trajectories.tool import Curve
 
 _GRID = 400
@@ -149,9 +149,7 @@ def time_optimal(
     check_path(robot, path)
     slow = stretch_times(robot, path, polynomial("quintic"), kept)
     found = [_fastest(robot, path, j, kept, slow[j], step, toppra) for j in range(len(slow))]
-    course = Course(
-        path, tuple(stretch.duration for stretch in found), tuple(s.progress for s in found)
-    )
+    course = timed_path(path, [one.duration for one in found], [one.progress for one in found])
     motion = kept_motion(robot, course, kept, step)
     parts = motion.time, motion.pose, motion.velocity, motion.acceleration
     return TimeOptimal(*parts, sum(stretch.bound for stretch in found), sum(slow))

@@ -1,10 +1,9 @@
-"""Motions as functions of time that can be slowed as a whole: a path with time laws, or a curve."""
+"""A curve of poses with a duration: it can be slowed as a whole."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -12,50 +11,6 @@ from pteron.kernels import Array
 from pteron.motion.trajectories.path import Path
 from pteron.motion.trajectories.time_polynomials import Progress
 from pteron.motion.trajectories.tool import Curve
-
-
-@dataclass(frozen=True)
-class Course:
-    """A path traversed in time, from rest to rest.
-
-    Attributes
-    ----------
-    path : Path
-        The path.
-    durations : tuple of float
-        Of each stretch between two rests, s.
-    laws : tuple of Progress
-        The time law of each of them.
-    """
-
-    path: Path
-    durations: tuple[float, ...]
-    laws: tuple[Progress, ...]
-
-    @property
-    def duration(self) -> float:
-        """Duration of all stretches together, s."""
-        return float(sum(self.durations))
-
-    def slowed(self, factor: float) -> Course:
-        """Return the course with all its times longer by a factor."""
-        return Course(self.path, tuple(factor * d for d in self.durations), self.laws)
-
-    def at(self, time: Array) -> Curve:
-        """Return poses, velocities and accelerations, (T, m) each, at times (T,), s."""
-        starts = np.concatenate([[0.0], np.cumsum(self.durations)])
-        k = np.clip(np.searchsorted(starts, time, side="right") - 1, 0, len(self.laws) - 1)
-        s, rate, gain = (np.zeros(len(time)) for _ in range(3))
-        for j, law in enumerate(self.laws):
-            own = k == j
-            begin, end = self.path.rests[j : j + 2]
-            share, first, second = law((time[own] - starts[j]) / self.durations[j])
-            s[own] = begin + (end - begin) * share
-            rate[own] = (end - begin) * first / self.durations[j]
-            gain[own] = (end - begin) * second / self.durations[j] ** 2
-        pose, by_s, bend = self.path.at(s)
-        rate, gain = rate[:, None], gain[:, None]
-        return pose, by_s * rate, bend * rate**2 + by_s * gain
 
 
 @dataclass(frozen=True)
@@ -83,16 +38,23 @@ class Timed:
         return pose, first / self.duration, second / self.duration**2
 
 
-@runtime_checkable
-class InTime(Protocol):
-    """A motion in time that can be slowed: a `Course`, or a curve that is `Timed`."""
+def timed_path(path: Path, durations: Sequence[float], laws: Sequence[Progress]) -> Timed:
+    """Return a path traversed from rest to rest, a duration (s) and a time law for each stretch."""
+    whole = float(sum(durations))
+    starts = np.concatenate([[0.0], np.cumsum(durations)]) / whole
 
-    @property
-    def duration(self) -> float:
-        """Duration, s."""
+    def curve(tau: Array) -> Curve:
+        k = np.clip(np.searchsorted(starts, tau, side="right") - 1, 0, len(laws) - 1)
+        s, rate, gain = np.zeros((3, len(tau)))
+        for j, law in enumerate(laws):
+            own, span = k == j, starts[j + 1] - starts[j]
+            begin, end = path.rests[j : j + 2]
+            share, first, second = law((tau[own] - starts[j]) / span)
+            s[own] = begin + (end - begin) * share
+            rate[own] = (end - begin) * first / span
+            gain[own] = (end - begin) * second / span**2
+        pose, by_s, bend = path.at(s)
+        rate, gain = rate[:, None], gain[:, None]
+        return pose, by_s * rate, bend * rate**2 + by_s * gain
 
-    def at(self, time: Array, /) -> Curve:
-        """Return poses, velocities and accelerations, (T, m) each, at times (T,), s."""
-
-    def slowed(self, factor: float, /) -> InTime:
-        """Return the same with all its times longer by a factor."""
+    return Timed(curve, whole)
