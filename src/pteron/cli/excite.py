@@ -58,8 +58,7 @@ def excite(
         float, _limit("clearance", "Of the joints from their limits, m or rad.")
     ] = 0.005,
     passive_clearance: Annotated[
-        float,
-        _limit("passive-clearance", "Of passive joints and phi, share of half their range."),
+        float, _limit("passive-clearance", "Of passive joints and phi, share of half their range.")
     ] = 0.02,
     rate: Annotated[float, _file("rate", "Samples a second.")] = 1000.0,
     contents: Annotated[

@@ -109,10 +109,7 @@ class PteronEnv(gymnasium.Env[Numbers, Numbers]):
         return self.world.observed(self._state), float(reward), bool(ended), False, info
 
     def _info(self, distance: Any) -> dict[str, Any]:
-        return {
-            "distance": float(distance),
-            "is_success": bool(distance < self.world.tolerance),
-        }
+        return {"distance": float(distance), "is_success": bool(distance < self.world.tolerance)}
 
     def render(self) -> NDArray[np.uint8] | None:
         """Return a picture of the machine, (height, width, 3), if it is asked for."""

@@ -20,12 +20,7 @@ from pteron.export.names import prefix_of
 from pteron.export.start_pose import good_poses, joint_limits, keeps_limits, start_pose
 from pteron.kernels import program, specialised
 from pteron.kernels.code import rendered
-from pteron.manipulator import (
-    Manipulator,
-    RobotLike,
-    as_manipulator,
-    parameters,
-)
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator, parameters
 
 _NAMES = {
     "inverse_kinematics": "joint_coordinates",

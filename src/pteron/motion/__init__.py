@@ -5,13 +5,7 @@ from pteron.motion.joint_points import Guide, JointPoints, Part, joint_guides, j
 from pteron.motion.motion import Motion
 from pteron.motion.overloads import overloads
 from pteron.motion.payload import with_payload
-from pteron.motion.simulation import (
-    Sensors,
-    Simulation,
-    advance,
-    longest_step,
-    simulate,
-)
+from pteron.motion.simulation import Sensors, Simulation, advance, longest_step, simulate
 from pteron.motion.sizing.drive_loads import Sizing, best_ratio, best_ratios
 from pteron.motion.sizing.gearing import Span
 from pteron.motion.sizing.motor_choice import Fit, choose

@@ -12,12 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from pteron.bodies.vectors import cross
-from pteron.export.engines.inertia import (
-    about_center,
-    cube_moments,
-    plane_moments,
-    shared_masses,
-)
+from pteron.export.engines.inertia import about_center, cube_moments, plane_moments, shared_masses
 from pteron.export.engines.parts import BASE, Closing, TreeBody, TreeJoint
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
@@ -176,12 +171,7 @@ def _plane_body(
 
 
 def _still_body(
-    platform: Platform,
-    name: str,
-    parent: int,
-    joints: Sequence[TreeJoint],
-    at: Array,
-    mass: float,
+    platform: Platform, name: str, parent: int, joints: Sequence[TreeJoint], at: Array, mass: float
 ) -> TreeBody:
     """Return a body that does not turn, its mass where it is."""
     axes, moments = np.array(platform.frame).T, cube_moments(mass, _SIDE)

@@ -177,11 +177,7 @@ class Excitation:
         return (layout or Layout()).frame(self.with_leads(periods), rate)
 
     def write_csv(
-        self,
-        path: str | Path,
-        rate: float = 1000.0,
-        periods: int = 1,
-        layout: Layout | None = None,
+        self, path: str | Path, rate: float = 1000.0, periods: int = 1, layout: Layout | None = None
     ) -> Path:
         """Write the trajectory for a controller to a CSV (or Parquet) file, from rest to rest.
 

@@ -9,15 +9,7 @@ from pteron.motion.simulation.simulate import Controls, simulate
 from pteron.motion.simulation.simulation import Simulation
 from pteron.renamed import former_names
 
-__all__ = [
-    "Controls",
-    "ControlLaw",
-    "Sensors",
-    "Simulation",
-    "advance",
-    "longest_step",
-    "simulate",
-]
+__all__ = ["Controls", "ControlLaw", "Sensors", "Simulation", "advance", "longest_step", "simulate"]
 
 if not TYPE_CHECKING:
     __getattr__ = former_names(__name__)

@@ -174,6 +174,6 @@ def allowed_step(robot: Manipulator, poses: Array, step: float) -> float:
     if longest < _SHORTEST:
         raise DataError(
             f"drives: their friction at rest asks for steps below {_SHORTEST:g} s; make rest_speed "
-            "larger, or coulomb smaller",
+            "larger, or coulomb smaller"
         )
     return min(step, longest)

@@ -81,8 +81,7 @@ def rated_span(sizing: Sizing, leg: int, rotor_inertia: float, rated_torque: flo
         return NONE
     root = b + math.sqrt(inside)
     return Span(
-        math.sqrt(2.0 * a / root) if a else 0.0,
-        math.sqrt(root / (2.0 * c)) if c else math.inf,
+        math.sqrt(2.0 * a / root) if a else 0.0, math.sqrt(root / (2.0 * c)) if c else math.inf
     )
 
 

@@ -23,11 +23,7 @@ _AT_REST = 1e-6
 
 
 def size(
-    robot: RobotLike,
-    motion: Motion,
-    *,
-    dwell: float = 0.0,
-    wrench: ArrayLike | None = None,
+    robot: RobotLike, motion: Motion, *, dwell: float = 0.0, wrench: ArrayLike | None = None
 ) -> Sizing:
     """Return what a motion asks of each drive.
 

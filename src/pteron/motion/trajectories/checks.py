@@ -98,10 +98,7 @@ def check_motion(
 
 
 def check_curve(
-    robot: Manipulator,
-    poses: Callable[[Array], Array],
-    marks: Array,
-    place: Callable[[float], str],
+    robot: Manipulator, poses: Callable[[Array], Array], marks: Array, place: Callable[[float], str]
 ) -> None:
     """Refuse a curve of poses (K, m) over a parameter (K,), by its first failure.
 

@@ -39,9 +39,7 @@ def limit_rows(asked: Demand, limits: MotionLimits, unit: float) -> LimitRows:
     def add(linear: Array, square: Array, constant: Array, root: Array, limit: Array) -> None:
         has = np.isfinite(limit)
         for part, values in zip(
-            (a, b, c, v),
-            (linear / unit**2, square / unit**2, constant, root / unit),
-            strict=True,
+            (a, b, c, v), (linear / unit**2, square / unit**2, constant, root / unit), strict=True
         ):
             part.append((np.broadcast_to(values, linear.shape) / limit)[:, has])
 

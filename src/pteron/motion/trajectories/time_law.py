@@ -38,10 +38,7 @@ _TRIES = 8
 
 
 def shortest(
-    robot: RobotLike,
-    curve: Callable[[Array], Curve],
-    limits: MotionLimits,
-    step: float = STEP,
+    robot: RobotLike, curve: Callable[[Array], Curve], limits: MotionLimits, step: float = STEP
 ) -> Motion:
     """Return a curve of poses, gone as it is, in the shortest time that keeps the limits.
 

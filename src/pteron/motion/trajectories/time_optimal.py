@@ -93,11 +93,7 @@ class TimeOptimal(Motion):
 
 
 def time_optimal(
-    robot: RobotLike,
-    path: Path,
-    limits: MotionLimits | None = None,
-    *,
-    step: float = STEP,
+    robot: RobotLike, path: Path, limits: MotionLimits | None = None, *, step: float = STEP
 ) -> TimeOptimal:
     """Return the fastest motion along a path that keeps the limits.
 
