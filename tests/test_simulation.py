@@ -312,7 +312,10 @@ def test_mistakes_are_told_in_a_line():
         "duration: '1' given, a number expected": {"start": start, "duration": "1"},
         "delay: None given, a number expected": {"start": start, "duration": 1.0, "delay": None},
         "start: .* given, 2 values": {"start": (rest,), "duration": 1.0},
-        r"start, pose: shape \(2, 3\) given": {"start": (np.zeros((2, 3)), rest), "duration": 1.0},
+        "start, pose: 2 poses given, 1 expected": {
+            "start": (np.zeros((2, 3)), rest),
+            "duration": 1.0,
+        },
         r"wrench: \[nan, .* finite numbers": {
             "start": start,
             "duration": 1.0,

@@ -152,6 +152,7 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
     angular = robot.platform.angular
     seen = home.copy()
     seen[~angular] += arm.at(float(home[angular].sum()))
+    places = {a.letter: f"{a.scale * at:.6f}" for a, at in zip(axes, seen, strict=True)}
     values = {
         "banner": [line for line in banner(robot, "LinuxCNC") if "SI units" not in line],
         "prefix": prefix,
@@ -165,17 +166,7 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
         "modes": exported[1].outputs[0].shape[0] if closed else 0,
         "lengths": len(robot.platform.lengths),
         "free": bool(robot.wraps.any()),
-        "places": [
-            next(
-                (
-                    f"{axis.scale * value:.6f}"
-                    for axis, value in zip(axes, seen, strict=True)
-                    if axis.letter == letter
-                ),
-                "0",
-            )
-            for letter in "XYZABC"
-        ],
+        "places": [places.get(letter, "0") for letter in "XYZABC"],
         "planar": robot.platform.planar,
         "arm": arm,
         "number": repr,

@@ -7,9 +7,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from pteron.errors import DataError, ModelError
-from pteron.kernels import Array, as_array, numeric
+from pteron.errors import ModelError
+from pteron.kernels import Array, numeric
 from pteron.kinematics import direct_kinematics, inverse_kinematics, random_poses
+from pteron.kinematics.evaluate import checked_one
 from pteron.kinematics.sizes import type_ii_sizes
 from pteron.manipulator import Manipulator
 from pteron.shapes import PoseLike
@@ -36,11 +37,9 @@ def chosen_home(robot: Manipulator, home: PoseLike | None) -> Array:
     """
     if home is None:
         return np.array(_middle(robot))
-    pose = as_array(home, "home", (robot.freedom,), columns=robot.coordinates)
-    if pose.ndim > 1:
-        raise DataError(f"home: shape {pose.shape} given, one pose ({robot.freedom},) expected")
+    pose = checked_one(robot, home, "home")
     inverse_kinematics(robot, pose)
-    return np.array(pose)
+    return pose.copy()
 
 
 @lru_cache(maxsize=64)

@@ -114,6 +114,7 @@ def consistent_model(
     >>> result.feasible, result.distance
     (True, 0.0)
     """
+    # Arguments: values, their spread, the bodies, the limits, the CAD model
     robot = as_manipulator(robot)
     names = parameter_names(robot)
     if names != parameter_names(base.robot):
@@ -137,6 +138,7 @@ def consistent_model(
             prior, _HOLDS * np.abs(limits.matrix) @ units
         )
 
+    # Scaled free parameters z: the set of real bodies, and grouping z = values
     matrix = limits.matrix @ bodies.sharing * target.scale
     lengths = np.linalg.norm(matrix, axis=1)
     real = RealBodies(bodies, target.margins, matrix / lengths[:, None], limits.right / lengths)
@@ -145,6 +147,7 @@ def consistent_model(
     left, singular, right = np.linalg.svd(grouping / sizes[:, None])
     inverse, free = right[: base.rank].T / singular @ left.T, right[base.rank :].T
 
+    # Have any real bodies these values? If none, those of the closest ones are aimed at
     depth = widest(real, inverse @ (vector / sizes), free, _DEEPEST)
     feasible = depth is not None and depth >= _SHALLOW
     spread = np.diag(sizes) if root is None else root
@@ -165,6 +168,8 @@ def consistent_model(
             raise ModelError(_TOO_FAR)
         border, forces = _inside(bodies, least[0], deep, _SHALLOW * target.margins), least[1]
         aim, inner = grouping @ border, 0.5 * _SHALLOW
+
+    # Of all real bodies with these values, those nearest to the target
     start = inverse @ (aim / sizes)
     found = nearest(real, start, free, inner, target.matrix, target.right)
     if not feasible and (found is None or (bodies.least(found) <= 0.0).any()):
@@ -172,6 +177,8 @@ def consistent_model(
         found = border
     if found is None:
         raise ModelError(_TOO_FAR)
+
+    # The answer, checked without the solver
     residual = float(np.abs((grouping @ found - aim) / (sizes * np.linalg.norm(found))).max())
     answer = bodies.sharing @ (target.scale * found)
     _certify(robot, bodies, target, limits, answer, found, residual)

@@ -11,7 +11,7 @@ from pteron.errors import DataError, shown
 from pteron.kernels import Array, as_array
 from pteron.kernels.named_columns import by_name
 from pteron.kinematics import inverse_kinematics, joint_rates
-from pteron.kinematics.evaluate import checked
+from pteron.kinematics.evaluate import checked, checked_one
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.payload import with_payload
@@ -204,10 +204,7 @@ def _state(robot: Manipulator, start: tuple[PoseLike, PoseLike]) -> tuple[Array,
     """Return a pose and a velocity, (m,) each."""
     if len(start) != len(_STATE):
         raise DataError(f"start: {len(start)} parts given, a pose and a velocity expected")
-    pose, velocity = (checked(robot, v, name) for v, name in zip(start, _STATE, strict=True))
-    for part, name in zip((pose, velocity), _STATE, strict=True):
-        if part.ndim != 1:
-            raise DataError(f"{name}: shape {part.shape} given, ({robot.freedom},) expected")
+    pose, velocity = (checked_one(robot, v, name) for v, name in zip(start, _STATE, strict=True))
     return pose, velocity
 
 
