@@ -194,6 +194,7 @@ def export_casadi(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
         "banner": banner(robot, "CasADi functions"),
         "prefix": prefix,
         "coordinates": robot.platform.coordinates,
+        "angles": robot.platform.angles,
         "functions": {name: str(function) for name, function in functions.items()},
         "casadi": ca.__version__,
         "driven": has_drives(robot),

@@ -126,8 +126,11 @@ def mjcf(opened: Tree, *, step: float = STEP) -> str:
 def _notes(opened: Tree) -> list[str]:
     """Return notes on what the file cannot hold, and on how a shaft is driven."""
     kept = ("inertia", "viscous", "coulomb", "offset", "max_force")
-    shafts = [motor.name for motor in opened.motors if motor.name != motor.joint]
-    said = [f"{name} turns phi; its actuator's gear is the shaft's ratio." for name in shafts]
+    said = [
+        f"{motor.name} turns {motor.joint}; its actuator's gear is the shaft's ratio."
+        for motor in opened.motors
+        if motor.name != motor.joint
+    ]
     return [*said, *left_out(opened, kept)]
 
 

@@ -36,7 +36,7 @@ def platform_bodies(robot: Manipulator, pose: Array) -> Pieces:
     platform = robot.platform
     if platform.slides:
         return _sliding(robot, pose)
-    if platform.turns:
+    if platform.angles:
         return _turning(robot, pose)
     mass, center, about = about_center(platform.joined)
     body = _plane_body(platform, pose, _moves(platform, pose), mass, center, about)
@@ -73,12 +73,13 @@ def _turning(robot: Manipulator, pose: Array) -> Pieces:
 
 
 def _sliding(robot: Manipulator, pose: Array) -> Pieces:
-    """Return a platform whose halves slide by phi: what moves with P, what turns, what slides.
+    """Return a platform whose halves slide by its angle: a carrier, a tool that turns, and slides.
 
     The first moment of the whole per radian, h, is that of its mass m sliding by h / m; what of I
-    that leaves, h.h / m less, turns by phi.
+    that leaves, h.h / m less, turns by the angle.
     """
     platform = robot.platform
+    turned, angle = _angle(platform, pose)
     p, _ = platform.at(pose)
     frame = np.array(platform.frame)
     points = [np.array(leg.platform_point) for leg in robot.legs]
@@ -99,9 +100,9 @@ def _sliding(robot: Manipulator, pose: Array) -> Pieces:
     for name, v, own in slides:
         by = float(np.linalg.norm(v))
         along = v @ frame[:2] / by if by else frame[0]
-        at = p + by * pose[-1] * along
-        follows = ("phi", by)
-        joint = TreeJoint(f"{name}_slide", True, along, at, by * float(pose[-1]), None, follows)
+        at = p + by * angle * along
+        follows = (turned, by)
+        joint = TreeJoint(f"{name}_slide", True, along, at, by * angle, None, follows)
         bodies.append(_still_body(platform, name, 0, [joint], at, own))
     slide = [np.abs(point).max() > _COINCIDENT for point in points]
     carried = [
@@ -149,10 +150,16 @@ def _moves(platform: Platform, pose: Array) -> list[TreeJoint]:
     return [TreeJoint(name, True, axis, p, float(at)) for name, axis, at in lengths]
 
 
+def _angle(platform: Platform, pose: Array) -> tuple[str, float]:
+    """Return the name of the one angle that the platform has, and its value."""
+    (name,), (value,) = platform.angles, pose[platform.angular].tolist()
+    return name, value
+
+
 def _turn(platform: Platform, pose: Array) -> TreeJoint:
     """Return the joint about which the platform turns."""
-    p, axis = platform.at(pose)[0], np.array(platform.axis)
-    return TreeJoint("phi", False, axis, p, float(pose[-1]), platform.limits)
+    (name, angle), p = _angle(platform, pose), platform.at(pose)[0]
+    return TreeJoint(name, False, np.array(platform.axis), p, angle, platform.limits)
 
 
 def _plane_body(
@@ -179,13 +186,14 @@ def _still_body(
 
 
 def _gears(platform: Platform, pose: Array, masses: Array, against: float) -> list[TreeBody]:
-    """Return what gears turn, on a body that itself turns by `against` times phi."""
+    """Return what gears turn, on a body that itself turns by `against` times the angle."""
     p, axes = platform.at(pose)
+    turned, angle = _angle(platform, pose) if platform.geared else ("", 0.0)
     found = []
     for j, (part, mass) in enumerate(zip(platform.geared, masses, strict=True), start=1):
         by = part.ratio - against
-        follows, home = ("phi", by), by * float(pose[-1])
-        joint = TreeJoint(f"gear{j}", False, np.array(platform.axis), p, home, None, follows)
+        axis, follows = np.array(platform.axis), (turned, by)
+        joint = TreeJoint(f"gear{j}", False, axis, p, by * angle, None, follows)
         moments = np.full(3, part.inertia)
         found.append(TreeBody(f"geared{j}", 0, (joint,), p, axes.T, float(mass), p, moments, 0))
     return found
