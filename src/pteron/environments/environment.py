@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.environments.construction import world_of
-from pteron.environments.picture import Picture
+from pteron.environments.picture import EnvironmentPicture
 from pteron.environments.state import EpisodeState
 from pteron.errors import DataError
 from pteron.kernels import Array
@@ -88,7 +88,7 @@ class PteronEnv(gymnasium.Env[Numbers, Numbers]):
         self.render_mode = checked_mode(render_mode)
         self.metadata = {**self.metadata, "render_fps": round(1.0 / period)}
         self._state: EpisodeState | None = None
-        self._picture = Picture(self.world)
+        self._picture = EnvironmentPicture(self.world)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -19,7 +19,7 @@ from pteron.plots import robot_figure
 _POSES = 32
 
 
-class Picture:
+class EnvironmentPicture:
     """Draws one machine: its guides are the same in every picture."""
 
     def __init__(self, world: World) -> None:

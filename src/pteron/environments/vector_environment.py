@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pteron.environments.construction import world_of
 from pteron.environments.environment import Numbers, checked_mode, spaces
-from pteron.environments.picture import Picture
+from pteron.environments.picture import EnvironmentPicture
 from pteron.environments.state import Bools, EpisodeState
 from pteron.errors import DataError
 from pteron.manipulator import RobotLike
@@ -85,7 +85,7 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
         self._state: EpisodeState | None = None
         self._done = np.zeros(num_envs, dtype=bool)
         self._steps = np.zeros(num_envs, dtype=np.int64)
-        self._picture = Picture(self.world)
+        self._picture = EnvironmentPicture(self.world)
 
     def reset(
         self,

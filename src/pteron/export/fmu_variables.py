@@ -41,7 +41,7 @@ _XML: dict[Kind, dict[str, str]] = {
 
 
 @dataclass(frozen=True)
-class Variable:
+class FmuVariable:
     """One variable of modelDescription.xml."""
 
     name: str
@@ -61,7 +61,7 @@ class Block:
     kind: Kind
     place: str
     """Their place in the C code: a byte offset, or the name of a result."""
-    variables: tuple[Variable, ...]
+    variables: tuple[FmuVariable, ...]
     rate_of: str = ""
     """The block whose rates these are."""
 
@@ -152,7 +152,7 @@ def fmu_variables(robot: Manipulator, pose: Array, forces: Array) -> FmuVariable
     return FmuVariables(tuple(blocks))
 
 
-_Part = tuple[str, Kind, str, list[Variable]] | tuple[str, Kind, str, list[Variable], str]
+_Part = tuple[str, Kind, str, list[FmuVariable]] | tuple[str, Kind, str, list[FmuVariable], str]
 
 
 def _parts(robot: Manipulator, pose: Array, forces: Array) -> Iterator[_Part]:
@@ -160,41 +160,41 @@ def _parts(robot: Manipulator, pose: Array, forces: Array) -> Iterator[_Part]:
     units = robot.units
     legs = list(enumerate((leg.joint for leg in robot.legs), start=1))
 
-    def of_pose(word: str, per: str, told: str, start: list[float] | None) -> list[Variable]:
+    def of_pose(word: str, per: str, told: str, start: list[float] | None) -> list[FmuVariable]:
         return [
-            Variable(f"{word}.{name}", unit + per, f"{told} {name}", start[k] if start else None)
+            FmuVariable(f"{word}.{name}", unit + per, f"{told} {name}", start[k] if start else None)
             for k, (name, unit) in enumerate(zip(coordinates, units, strict=True))
         ]
 
     rest = [0.0] * len(coordinates)
-    yield "time", "TIME", "offsetof(Values, time)", [Variable("time", "s", "Time")]
+    yield "time", "TIME", "offsetof(Values, time)", [FmuVariable("time", "s", "Time")]
     states = of_pose("pose", "", "Platform pose,", [float(v) for v in pose])
     yield "pose", "STATE", "offsetof(Values, state)", states
     states = of_pose("velocity", "/s", "Rate of the pose's", rest)
     yield "velocity", "STATE", "offsetof(Values, state) + M * sizeof(double)", states
     results = of_pose("acceleration", "/s2", "Acceleration of the pose's", None)
     yield "acceleration", "RESULT", "ACCELERATION", results
-    results = [Variable(f"{j.coordinate}{i}", j.unit, f"Leg {i}: the {j.noun}") for i, j in legs]
+    results = [FmuVariable(f"{j.coordinate}{i}", j.unit, f"Leg {i}: the {j.noun}") for i, j in legs]
     yield "joints", "RESULT", "JOINTS", results
     results = [
-        Variable(f"{j.coordinate}{i}_rate", f"{j.unit}/s", f"Leg {i}: the {j.noun}'s rate")
+        FmuVariable(f"{j.coordinate}{i}_rate", f"{j.unit}/s", f"Leg {i}: the {j.noun}'s rate")
         for i, j in legs
     ]
     yield "joint_rates", "RESULT", "JOINT_RATES", results
     results = [
-        Variable(f"reach_reserve{i}", "1", f"Leg {i}: the simulation ends where this is 0")
+        FmuVariable(f"reach_reserve{i}", "1", f"Leg {i}: the simulation ends where this is 0")
         for i, _ in legs
     ]
     yield "reserves", "RESULT", "RESERVES", results
     inputs = [
-        Variable(
+        FmuVariable(
             f"{j.force}{i}", j.force_unit.replace(" ", "."), f"Leg {i}: the drive's {j.force}", f
         )
         for (i, j), f in zip(legs, (float(v) for v in forces), strict=True)
     ]
     yield "forces", "INPUT", "offsetof(Values, forces)", inputs
     inputs = [
-        Variable(
+        FmuVariable(
             *(f"wrench.{name}", "N.m" if unit == "rad" else "N"),
             *(f"What acts on the platform at P along {name}", 0.0),
         )
@@ -204,7 +204,7 @@ def _parts(robot: Manipulator, pose: Array, forces: Array) -> Iterator[_Part]:
     # Each state's rate is a variable of its own: some tools do not take an output in its place.
     for name, per, place in (("pose", "/s", "VELOCITY"), ("velocity", "/s2", "ACCELERATION")):
         rates = [
-            Variable(f"der({name}.{c})", unit + per, f"Rate of {name}.{c}")
+            FmuVariable(f"der({name}.{c})", unit + per, f"Rate of {name}.{c}")
             for c, unit in zip(coordinates, units, strict=True)
         ]
         yield f"{name}_rates", "RESULT", place, rates, name
@@ -214,21 +214,21 @@ def _parts(robot: Manipulator, pose: Array, forces: Array) -> Iterator[_Part]:
 
 def _payload(robot: Manipulator) -> Iterator[_Part]:
     """Yield the payload's parameters: its mass, and what matters where the platform turns."""
-    told = [Variable("payload.mass", "kg", "A body that the platform carries", 0.0, 0.0)]
+    told = [FmuVariable("payload.mass", "kg", "A body that the platform carries", 0.0, 0.0)]
     yield "payload.mass", "START", "offsetof(Values, payload)", told
     if robot.platform.rotation_axes:
         told = [
-            Variable(f"payload.{x}", "m", f"Its centre of mass in the platform frame, {x}", 0.0)
+            FmuVariable(f"payload.{x}", "m", f"Its centre of mass in the platform frame, {x}", 0.0)
             for x in "xy"
         ]
         yield "payload.centre", "START", "offsetof(Values, payload) + sizeof(double)", told
     if robot.platform.angles:
         axis = "Its inertia about the axis through its own centre"
-        told = [Variable("payload.inertia", "kg.m2", axis, 0.0, 0.0)]
+        told = [FmuVariable("payload.inertia", "kg.m2", axis, 0.0, 0.0)]
         yield "payload.inertia", "START", "offsetof(Values, payload) + 3 * sizeof(double)", told
 
 
-def _drives(robot: Manipulator) -> Iterator[Variable]:
+def _drives(robot: Manipulator) -> Iterator[FmuVariable]:
     """Yield the numbers of the drives, in the order of the table that the C code has."""
     texts = {
         "inertia": "the motor's inertia at the joint",
@@ -251,6 +251,6 @@ def _drives(robot: Manipulator) -> Iterator[Variable]:
             }
             unit = units.get(name, leg.joint.force_unit.replace(" ", "."))
             least = None if name == "offset" else 0.0
-            yield Variable(
+            yield FmuVariable(
                 f"drive{i}.{name}", unit, f"Leg {i}: {texts[name]}", float(next(values)), least
             )

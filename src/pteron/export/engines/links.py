@@ -9,7 +9,7 @@ import numpy as np
 
 from pteron.export.engines.formatting import look, row
 from pteron.export.engines.inertia import between_joints
-from pteron.export.engines.parts import BASE, Shape, TreeBody, TreeJoint
+from pteron.export.engines.parts import BASE, BodyShape, TreeBody, TreeJoint
 from pteron.kernels import Array
 
 _SAME = 1e-6
@@ -30,7 +30,7 @@ class Link(NamedTuple):
     moments: Array
 
     @property
-    def shapes(self) -> tuple[Shape, ...]:
+    def shapes(self) -> tuple[BodyShape, ...]:
         """Its shapes: those of the body."""
         return self.body.shapes if self.last else ()
 
@@ -61,7 +61,7 @@ class LinkShape(NamedTuple):
     side: str
 
 
-def link_shape(shape: Shape, body: TreeBody | None) -> LinkShape:
+def link_shape(shape: BodyShape, body: TreeBody | None) -> LinkShape:
     """Return a shape in a body's frame, or in the base frame."""
     ends = shape.ends if body is None else (shape.ends - body.origin) @ body.axes
     along, middle = ends[1] - ends[0], ends.mean(axis=0)

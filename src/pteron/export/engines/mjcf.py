@@ -19,7 +19,7 @@ from pteron.export.engines.formatting import (
     small,
     within,
 )
-from pteron.export.engines.parts import BASE, Shape, Tree, TreeBody, TreeJoint
+from pteron.export.engines.parts import BASE, BodyShape, Tree, TreeBody, TreeJoint
 from pteron.export.engines.shapes import dressed
 from pteron.export.engines.tree import tree
 from pteron.export.names import identifier
@@ -207,7 +207,7 @@ def _sites(opened: Tree) -> list[list[tuple[str, Array]]]:
 
 def _scene(opened: Tree) -> dict[str, Any]:
     """Return where floor, light and camera are."""
-    shapes: list[Shape] = [shape for body in opened.bodies for shape in body.shapes]
+    shapes: list[BodyShape] = [shape for body in opened.bodies for shape in body.shapes]
     points = np.vstack([shape.ends for shape in [*shapes, *(shape for _, shape in opened.base)]])
     gravity = np.array(opened.robot.gravity)
     weight = float(np.linalg.norm(gravity))

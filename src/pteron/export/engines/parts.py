@@ -50,7 +50,7 @@ class TreeJoint:
 
 
 @dataclass(frozen=True)
-class Shape:
+class BodyShape:
     """The shape of a body: a round bar from one point to another, or a box along them.
 
     Attributes
@@ -92,7 +92,7 @@ class TreeBody:
         Its moments of inertia about the centre of mass, kg m^2.
     color : int
         The leg it belongs to, from 1; 0 for the platform's.
-    shapes : tuple of Shape
+    shapes : tuple of BodyShape
         Its shapes in pictures.
     """
 
@@ -105,7 +105,7 @@ class TreeBody:
     center: Array
     moments: Array
     color: int
-    shapes: tuple[Shape, ...] = ()
+    shapes: tuple[BodyShape, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -167,7 +167,7 @@ class Tree:
         Of the legs, then of the platform's parts.
     motors : tuple of TreeMotor
         One for each leg.
-    base : tuple of (int, Shape)
+    base : tuple of (int, BodyShape)
         What stands on the base, guides and axles, by the leg it belongs to.
     size : float
         How large the machine is, m.
@@ -178,7 +178,7 @@ class Tree:
     bodies: tuple[TreeBody, ...]
     closings: tuple[Closing, ...]
     motors: tuple[TreeMotor, ...]
-    base: tuple[tuple[int, Shape], ...]
+    base: tuple[tuple[int, BodyShape], ...]
     size: float
 
     @property

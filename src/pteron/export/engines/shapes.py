@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pteron.export.engines.parts import BASE, Shape, Tree, TreeBody
+from pteron.export.engines.parts import BASE, BodyShape, Tree, TreeBody
 from pteron.kernels import Array
 
 _THICK = 0.011
@@ -28,8 +28,8 @@ _SAME = 1e-6
 def dressed(opened: Tree) -> Tree:
     """Return the tree with a shape for each body, and for guides and axles on the base."""
     thick = _THICK * opened.size
-    looks: list[list[Shape]] = [[] for _ in opened.bodies]
-    base: list[tuple[int, Shape]] = []
+    looks: list[list[BodyShape]] = [[] for _ in opened.bodies]
+    base: list[tuple[int, BodyShape]] = []
     for i, (leg, closing) in enumerate(zip(opened.robot.legs, opened.closings, strict=False)):
         chain = [k for k, body in enumerate(opened.bodies) if body.color == i + 1]
         bodies = [opened.bodies[k] for k in chain]
@@ -44,7 +44,7 @@ def dressed(opened: Tree) -> Tree:
 
 def _leg(
     bodies: Sequence[TreeBody], end: Array, bar: Sequence[float] | None, size: float
-) -> list[list[Shape]]:
+) -> list[list[BodyShape]]:
     """Return the shapes of a leg's bodies; the last one is doubled where rods are parallel."""
     thick, found = _THICK * size, []
     origins = [*(body.origin for body in bodies), end]
@@ -53,7 +53,7 @@ def _leg(
         slides = body.joints[-1].slides
         if slides and k == 0:
             axis = 2.6 * thick * body.joints[-1].axis
-            found.append([Shape("box", np.array([start - axis, start + axis]), 1.9 * thick)])
+            found.append([BodyShape("box", np.array([start - axis, start + axis]), 1.9 * thick)])
             continue
         if np.linalg.norm(stop - start) < _SAME:  # the next one slides in this one
             stop, radius = start + _OVERLAP * (end - start), 1.4 * thick
@@ -61,27 +61,27 @@ def _leg(
             start = stop - _OVERLAP * (stop - start)
         ends = np.array([start, stop])
         if bar is None or k < len(bodies) - 1:
-            found.append([Shape("capsule", ends, radius)])
+            found.append([BodyShape("capsule", ends, radius)])
             continue
         side = _APART * size * np.array(bar)
-        pair = [Shape("capsule", ends + sign * side, 0.6 * thick) for sign in (1.0, -1.0)]
-        across = [Shape("capsule", np.array([p - side, p + side]), 0.6 * thick) for p in ends]
+        pair = [BodyShape("capsule", ends + sign * side, 0.6 * thick) for sign in (1.0, -1.0)]
+        across = [BodyShape("capsule", np.array([p - side, p + side]), 0.6 * thick) for p in ends]
         found.append(pair + across)
     return found
 
 
-def _stand(first: TreeBody, size: float) -> list[Shape]:
+def _stand(first: TreeBody, size: float) -> list[BodyShape]:
     """Return the fixed part of a leg's first joint: a guide, or an axle."""
     joint, thick = first.joints[0], _THICK * size
     if joint.slides:
         low, high = joint.limits or (joint.home - _SPARE * size, joint.home + _SPARE * size)
         reach = np.array([[low - joint.home - 3.0 * thick], [high - joint.home + 3.0 * thick]])
-        return [Shape("cylinder", joint.point + reach * joint.axis, 0.8 * thick)]
+        return [BodyShape("cylinder", joint.point + reach * joint.axis, 0.8 * thick)]
     half = 2.6 * thick * joint.axis
-    return [Shape("cylinder", np.array([joint.point - half, joint.point + half]), 1.8 * thick)]
+    return [BodyShape("cylinder", np.array([joint.point - half, joint.point + half]), 1.8 * thick)]
 
 
-def _platform(opened: Tree, looks: list[list[Shape]], thick: float) -> None:
+def _platform(opened: Tree, looks: list[list[BodyShape]], thick: float) -> None:
     """Add the shapes of the platform's bodies: arms from their origins to where others close."""
     platform, bodies = opened.robot.platform, opened.bodies
     p, axes = platform.at(opened.home)
@@ -91,7 +91,7 @@ def _platform(opened: Tree, looks: list[list[Shape]], thick: float) -> None:
             if bodies[k].color == 0:
                 looks[k].append(_arm(bodies[k].origin, closing.point, thick))
     hub = np.array([p - 0.8 * thick * axis, p + 0.8 * thick * axis])
-    looks[0].append(Shape("cylinder", hub, 2.2 * thick))
+    looks[0].append(BodyShape("cylinder", hub, 2.2 * thick))
     tool = p + np.array(platform.tool) @ axes
     if np.linalg.norm(tool - p) > _SAME:
         looks[0].append(_arm(p, tool, 0.8 * thick))
@@ -100,10 +100,10 @@ def _platform(opened: Tree, looks: list[list[Shape]], thick: float) -> None:
             # What turns about P: a block, so that it is seen to turn.
             half = 2.4 * thick * body.axes[:, 0]
             middle = body.origin - 2.2 * thick * axis
-            looks[k].append(Shape("box", np.array([middle - half, middle + half]), thick))
+            looks[k].append(BodyShape("box", np.array([middle - half, middle + half]), thick))
         elif body.color == 0 and not looks[k]:
             looks[k].append(_arm(p, body.origin, thick))
 
 
-def _arm(start: Array, stop: Array, radius: float) -> Shape:
-    return Shape("capsule", np.array([start, stop]), radius)
+def _arm(start: Array, stop: Array, radius: float) -> BodyShape:
+    return BodyShape("capsule", np.array([start, stop]), radius)

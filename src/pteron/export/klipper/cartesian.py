@@ -13,7 +13,14 @@ import numpy as np
 
 from pteron.errors import ModelError
 from pteron.export.klipper.bed import tool_of
-from pteron.export.klipper.sections import INSTEAD, PINS, SPEEDS, Section, rotation_distance, signed
+from pteron.export.klipper.sections import (
+    INSTEAD,
+    PINS,
+    SPEEDS,
+    ConfigSection,
+    rotation_distance,
+    signed,
+)
 from pteron.kernels import Array
 from pteron.kinematics import inverse_kinematics, jacobian
 from pteron.kinematics.evaluate import unchecked
@@ -26,7 +33,7 @@ _LEAST_DETERMINANT = 1e-5
 """Below it Klipper (generic_cartesian.py) holds that the steppers cannot move all axes."""
 
 
-def cartesian(robot: Manipulator) -> Iterator[Section]:
+def cartesian(robot: Manipulator) -> Iterator[ConfigSection]:
     """Yield the sections of `generic_cartesian`: each stepper a sum of x, y and z.
 
     Raises
@@ -46,7 +53,7 @@ def cartesian(robot: Manipulator) -> Iterator[Section]:
             f"{robot.name}: its directions are so close to a plane (det(J^T J) = {size:.1e}) that "
             f"Klipper, which asks for 1e-5, refuses them; {INSTEAD}"
         )
-    yield Section("printer", (("kinematics", "generic_cartesian"), *SPEEDS))
+    yield ConfigSection("printer", (("kinematics", "generic_cartesian"), *SPEEDS))
     box, comments = _box(robot, rows, offsets, tool)
     straight = ((np.abs(rows) > ZERO).sum(axis=1) == 1).all()
     homing = (
@@ -56,7 +63,7 @@ def cartesian(robot: Manipulator) -> Iterator[Section]:
         "at a slider is none of an axis. Home with [homing_override] and SET_KINEMATIC_POSITION."
     )
     for axis, (least, most) in zip("xyz", box, strict=True):
-        yield Section(
+        yield ConfigSection(
             f"carriage {axis}",
             (
                 ("position_min", least),
@@ -68,7 +75,7 @@ def cartesian(robot: Manipulator) -> Iterator[Section]:
         )
     for i, (leg, row, offset) in enumerate(zip(robot.legs, rows, offsets, strict=True), start=1):
         joint = f"{leg.joint.coordinate}{i}"
-        yield Section(
+        yield ConfigSection(
             f"stepper {joint}",
             (
                 ("carriages", _sum(row)),

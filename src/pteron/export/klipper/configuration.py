@@ -19,7 +19,7 @@ from pteron.export.klipper.cartesian import cartesian
 from pteron.export.klipper.centers import Center
 from pteron.export.klipper.delta import delta
 from pteron.export.klipper.rotary_delta import rotary
-from pteron.export.klipper.sections import INSTEAD, Section
+from pteron.export.klipper.sections import INSTEAD, ConfigSection
 from pteron.export.names import prefix_of
 from pteron.kernels.code import rendered
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -81,7 +81,7 @@ def export_klipper(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
     return write_texts(folder, {f"{prefix}.cfg": text})
 
 
-def _sections(robot: Manipulator) -> Iterator[Section]:
+def _sections(robot: Manipulator) -> Iterator[ConfigSection]:
     machine = Machine.of(robot)
     if all(leg.row_is_constant for leg in machine.legs):
         return cartesian(robot)

@@ -12,7 +12,7 @@ from pteron.export.klipper.centers import SAME, Center, common, degrees, end_sto
 from pteron.export.klipper.sections import (
     PINS,
     SPEEDS,
-    Section,
+    ConfigSection,
     differs,
     mm,
     number,
@@ -23,7 +23,7 @@ from pteron.kinematics import inverse_kinematics, random_poses
 from pteron.manipulator import Manipulator
 
 
-def delta(robot: Manipulator, centers: Sequence[Center]) -> Iterator[Section]:
+def delta(robot: Manipulator, centers: Sequence[Center]) -> Iterator[ConfigSection]:
     """Yield the sections of `delta`: stepper = z + sqrt(arm^2 - (x - tower x)^2 - ...)."""
     radii, angles, rises = [], [], []
     for i, center in enumerate(centers, start=1):
@@ -49,7 +49,7 @@ def delta(robot: Manipulator, centers: Sequence[Center]) -> Iterator[Section]:
         for center, rise, arm in zip(centers, rises, arms, strict=True)
     ]
     level, comments = _bed(robot, radius, arms, ends)
-    yield Section(
+    yield ConfigSection(
         "printer",
         (
             ("kinematics", "delta"),
@@ -66,7 +66,7 @@ def delta(robot: Manipulator, centers: Sequence[Center]) -> Iterator[Section]:
         leg = robot.legs[center.leg]
         joint = f"{leg.joint.coordinate}{center.leg + 1}"
         top = None if pair is None else mm(pair[1] - level)
-        yield Section(
+        yield ConfigSection(
             f"stepper_{name}",
             (
                 ("angle", number(angle)),

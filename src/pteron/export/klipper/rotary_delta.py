@@ -14,7 +14,7 @@ from pteron.export.klipper.sections import (
     INSTEAD,
     PINS,
     SPEEDS,
-    Section,
+    ConfigSection,
     differs,
     mm,
     number,
@@ -24,7 +24,7 @@ from pteron.kinematics import inverse_kinematics, random_poses
 from pteron.manipulator import Manipulator
 
 
-def rotary(robot: Manipulator, centers: Sequence[Center]) -> Iterator[Section]:
+def rotary(robot: Manipulator, centers: Sequence[Center]) -> Iterator[ConfigSection]:
     """Yield the sections of `rotary_delta`: arms that turn in vertical planes through z."""
     kind = "rotary_delta"
     radii, heights, angles, lifts, zeros = [], [], [], [], []
@@ -55,7 +55,7 @@ def rotary(robot: Manipulator, centers: Sequence[Center]) -> Iterator[Section]:
     ]
     highest = min((top for top in tops if top is not None), default=0.0)
     level, comments = _bed(robot, radius, height, uppers, arms, highest)
-    yield Section(
+    yield ConfigSection(
         "printer",
         (
             ("kinematics", kind),
@@ -71,7 +71,7 @@ def rotary(robot: Manipulator, centers: Sequence[Center]) -> Iterator[Section]:
         joint = f"{leg.joint.coordinate}{k + 1}"
         top = tops[k]
         end = None if top is None else mm(height + top - level)
-        yield Section(
+        yield ConfigSection(
             f"stepper_{name}",
             (
                 ("angle", number(angles[k])),

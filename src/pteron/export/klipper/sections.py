@@ -12,7 +12,7 @@ INSTEAD = "use --linuxcnc, or --c for a controller of your own"
 
 
 @dataclass(frozen=True)
-class Section:
+class ConfigSection:
     """A section of the configuration: entries, with None for what only the builder knows."""
 
     title: str
