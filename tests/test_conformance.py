@@ -1,15 +1,19 @@
-"""Every kind of leg that files may name keeps the protocol, and what breaks it is told."""
+"""Every kind of leg, platform and closure keeps its protocol, and what breaks it is told."""
 
 from dataclasses import replace
 
 import casadi as ca
 import pytest
-from mechanisms import CATALOG
+from mechanisms import CATALOG, GATE, MACHINES, states
 
+from pteron.closures import conformance as of_closures
 from pteron.legs import KINDS
 from pteron.legs.conformance import faults
 from pteron.legs.prr import PRREquations
 from pteron.legs.rss import RSSEquations
+from pteron.platforms import conformance as of_platforms
+from pteron.platforms.sliding import Sliding
+from pteron.platforms.turning import Turning
 
 _LEGS = {
     f"{name} {i}": (leg, (robot.platform.rotation_axes or (None,))[0])
@@ -69,3 +73,28 @@ def test_what_a_kind_breaks_is_told(name, equations, words, monkeypatch):
     leg, axis = _LEGS[name]
     monkeypatch.setattr(type(leg), "equations_class", equations)
     assert any(words in fault for fault in faults(replace(leg), axis))
+
+
+@pytest.mark.parametrize("name", GATE)
+def test_every_kind_of_platform_conforms(name):
+    assert of_platforms.faults(MACHINES[name].platform) == ()
+
+
+@pytest.mark.parametrize("name", GATE)
+def test_every_closure_conforms(name):
+    robot = MACHINES[name]
+    pose = states(robot, 1)[0][0]
+    assert of_closures.faults(robot.legs, robot.platform, pose) == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "method", "words"),
+    [
+        ("quadrupteron", Turning, "mass_matrix", "needs: its power is not the rate of the energy"),
+        ("random PRSSI 0", Sliding, "needs", "needs: its power is not the rate of the energy"),
+    ],
+)
+def test_what_a_platform_breaks_is_told(name, kind, method, words, monkeypatch):
+    plain = getattr(kind, method)
+    monkeypatch.setattr(kind, method, lambda *given: 1.001 * plain(*given))
+    assert any(words in fault for fault in of_platforms.faults(MACHINES[name].platform))

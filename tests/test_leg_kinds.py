@@ -1,12 +1,16 @@
 """Kinds of legs from elsewhere that break the protocol are refused in one line."""
 
+import sys
 from dataclasses import dataclass, replace
 from unittest.mock import patch
 
+import numpy as np
 import pytest
 from mechanisms import CATALOG
+from typer.testing import CliRunner
 
 import pteron
+from pteron.cli.main import app
 from pteron.legs import KINDS, PRR
 from pteron.legs.prr import PRREquations
 
@@ -119,3 +123,62 @@ def test_a_kind_that_keeps_it_is_taken():
     rest = [0.0] * 3
     expected = pteron.inverse_dynamics("3-prr", pose, rest, rest)
     assert pteron.inverse_dynamics(robot, pose, rest, rest) == pytest.approx(expected, rel=1e-12)
+
+
+def installed(folder, text, value):
+    """Write a package of an environment that has a kind of leg as its entry point."""
+    (folder / "own_legs.py").write_text(text)
+    info = folder / "own_legs-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: own-legs\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(f"[pteron.legs]\nFromElsewhere = {value}\n")
+    return folder
+
+
+KIND = """
+from dataclasses import dataclass
+from pteron.legs import PRR
+
+@dataclass(frozen=True)
+class FromElsewhere(PRR):
+    type = "FromElsewhere"
+"""
+
+
+@pytest.fixture
+def named(tmp_path, monkeypatch):
+    """A file that names a kind of leg, whose package is then installed."""
+    path = pteron.save(CATALOG["3-prr"], tmp_path / "own.toml")
+    path.write_text(path.read_text().replace('type = "PRR"', 'type = "FromElsewhere"', 1))
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "own_legs", raising=False)
+    with patch.dict(KINDS):
+        yield path
+
+
+def test_a_kind_of_an_installed_package_is_known(named, tmp_path):
+    with pytest.raises(pteron.ModelError, match=r"'FromElsewhere' is not one of PRRR, .*RUPU$"):
+        pteron.load(named)
+    installed(tmp_path, KIND, "own_legs:FromElsewhere")
+    result = CliRunner().invoke(app, ["check", str(named)])
+    assert result.exit_code == 0, result.output
+    robot = pteron.load(named)
+    assert robot.legs[0].type == "FromElsewhere"
+    pose = pteron.random_poses(robot, 1)[0]
+    np.testing.assert_array_equal(
+        pteron.inverse_kinematics(robot, pose), pteron.inverse_kinematics("3-prr", pose)
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "value", "words"),
+    [
+        ("import nowhere_at_all", "own_legs:FromElsewhere", "cannot be loaded: .*No module"),
+        (KIND, "own_legs:PRR", "cannot be loaded: own_legs:PRR is no kind of leg with type"),
+    ],
+    ids=["import", "another"],
+)
+def test_a_package_that_has_no_such_kind_is_told(named, tmp_path, text, value, words):
+    installed(tmp_path, text, value)
+    with pytest.raises(pteron.ModelError, match=f"leg 1: type: 'FromElsewhere' {words}"):
+        pteron.load(named)

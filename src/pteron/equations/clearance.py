@@ -136,7 +136,7 @@ def _segments(machine: Machine, state: State) -> Iterator[tuple[Body, list[Segme
 def _of_leg(
     i: int, leg: LegKind, motion: LegMotion, c: Expression
 ) -> Iterator[tuple[Body, list[Segment]]]:
-    if "p" in motion.bodies and leg.limits is not None:
+    if "p" in motion.bodies and leg.limits is not None and leg.joint_axis is not None:
         r, e = ca.SX(list(leg.guide_point)), ca.SX(list(leg.joint_axis))
         low, high = leg.limits
         yield Body("guide", i, f"leg {i} guide"), [(r + low * e, r + high * e)]
@@ -210,6 +210,8 @@ def _at_one_point(robot: Manipulator, i: int, j: int) -> bool:
 def _one_line(robot: Manipulator, i: int, j: int) -> bool:
     """Say whether two guides lie on one line, as of sliders on one rail."""
     one, other = robot.legs[i - 1], robot.legs[j - 1]
+    if one.joint_axis is None or other.joint_axis is None:
+        return False
     along = np.array(one.joint_axis)
     apart = np.array(other.guide_point) - np.array(one.guide_point)
     if "p" not in one.bodies or "p" not in other.bodies:

@@ -2,6 +2,7 @@
 
 from pteron.legs.cones import Cone
 from pteron.legs.drive import Drive, Stribeck
+from pteron.legs.installed import KINDS
 from pteron.legs.kind import LegKind
 from pteron.legs.prr import PRR
 from pteron.legs.prrr import PRRR
@@ -10,11 +11,6 @@ from pteron.legs.rpr import RPR
 from pteron.legs.rrr import RRR
 from pteron.legs.rss import RSS
 from pteron.legs.rupu import RUPU
-
-KINDS: dict[str, type[LegKind]] = {
-    kind.type: kind for kind in (PRRR, PSS, RSS, RRR, PRR, RPR, RUPU)
-}
-"""The kinds of legs that files may name, by their key `type`; add another here."""
 
 __all__ = [
     "KINDS",

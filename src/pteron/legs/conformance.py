@@ -11,8 +11,8 @@ from collections.abc import Iterator
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from pteron.bodies.agreement import TIME, differing, rate_of
 from pteron.bodies.motion import (
     Expression,
     PointMotion,
@@ -27,9 +27,6 @@ from pteron.legs.kind import LegKind
 from pteron.legs.leg import Circle, LegEquations, LegMotion, Plane, Sphere
 from pteron.legs.protocol import breaches, point_in_reach
 
-_SAME = 1e-9
-"""Share of its size by which a quantity may differ from what it should be."""
-
 
 class _Moved:
     """A leg along c(t) and phi(t), with what holds of it at t = 0."""
@@ -42,7 +39,7 @@ class _Moved:
         size = leg.size or 1.0
         dc, ddc, self.gravity = (ca.SX(ca.DM(size * across @ rng.normal(size=3))) for _ in range(3))
         self.leg = leg
-        self.t = t = ca.SX.sym("t")
+        t = TIME
         self.point = PointMotion(ca.SX(ca.DM(c)) + dc * t + ddc * t**2 / 2, dc + ddc * t, ddc)
         turns: tuple[Turn, ...] = ()
         phi, rate, growth = rng.normal(size=3)
@@ -56,17 +53,6 @@ class _Moved:
         kinds = self.equations.kinds
         values = {b: ca.SX(ca.DM(rng.uniform(0.5, 1.5, len(kinds[b])))) for b in kinds}
         self.inertia = {b: moments_of(kinds[b], ca.vertsplit(v)) for b, v in values.items()}
-
-    def rate_of(self, value: Expression) -> Expression:
-        return ca.jtimes(value, self.t, ca.SX(1))
-
-    def now(self, value: Expression) -> NDArray[np.float64]:
-        return np.asarray(ca.DM(ca.evalf(ca.substitute(ca.densify(value), self.t, 0)))).ravel()
-
-    def differ(self, found: Expression, expected: Expression) -> bool:
-        one, other = self.now(found), self.now(expected)
-        size = max(np.abs(one).max(initial=0.0), np.abs(other).max(initial=0.0), 1e-3)
-        return not bool(np.abs(one - other).max(initial=0.0) <= _SAME * size)
 
 
 def faults(leg: LegKind, axis: Vector | None = None, seed: int = 0) -> tuple[str, ...]:
@@ -98,8 +84,8 @@ def _joints(at: _Moved) -> Iterator[str]:
     motion = at.motion
     row = motion.row / motion.divisor
     pairs = {
-        "rate: not the derivative of coordinate": (motion.rate, at.rate_of(motion.coordinate)),
-        "acceleration: not the derivative of rate": (motion.acceleration, at.rate_of(motion.rate)),
+        "rate: not the derivative of coordinate": (motion.rate, rate_of(motion.coordinate)),
+        "acceleration: not the derivative of rate": (motion.acceleration, rate_of(motion.rate)),
         "row / divisor: its product with (c', omega) is not rate": (
             ca.mtimes(row, at.twist),
             motion.rate,
@@ -111,12 +97,12 @@ def _joints(at: _Moved) -> Iterator[str]:
         pairs[f"{of}row times (c', omega) is not rate"] = ca.mtimes(joint.row, at.twist), joint.rate
         pairs[f"{of}acceleration is not the derivative of rate"] = (
             joint.acceleration,
-            at.rate_of(joint.rate),
+            rate_of(joint.rate),
         )
         twist += joint.rate * _screw(joint.kind, joint.axis, joint.point, at.point.position)
     carried = "chain: the joints' screws times their rates do not add up to (c', omega)"
     pairs[carried] = twist, at.twist
-    yield from (fault for fault, pair in pairs.items() if at.differ(*pair))
+    yield from differing(pairs)
 
 
 def _screw(kind: str, axis: Expression, point: Expression, c: Expression) -> Expression:
@@ -131,21 +117,21 @@ def _bodies(at: _Moved) -> Iterator[str]:
         velocity = ca.mtimes(body.velocity_row, at.twist)
         turning = ca.mtimes(body.turning_row, at.twist)
         pairs = {
-            "velocity_row: not the derivative of position": (velocity, at.rate_of(body.position)),
+            "velocity_row: not the derivative of position": (velocity, rate_of(body.position)),
             "acceleration: not the derivative of its velocity": (
                 body.acceleration,
-                at.rate_of(velocity),
+                rate_of(velocity),
             ),
         }
         for name, axis, second in (("x", body.x, body.ddx), ("y", body.y, body.ddy)):
             if axis is not None:
-                first = at.rate_of(axis)
+                first = rate_of(axis)
                 pairs[f"{name}: does not turn as turning_row says"] = (
                     first,
                     ca.cross(turning, axis),
                 )
-                pairs[f"dd{name}: not the second derivative of {name}"] = second, at.rate_of(first)
-        yield from (f'body "{letter}": {f}' for f, pair in pairs.items() if at.differ(*pair))
+                pairs[f"dd{name}: not the second derivative of {name}"] = second, rate_of(first)
+        yield from (f'body "{letter}": {fault}' for fault in differing(pairs))
 
 
 def _forces(at: _Moved) -> Iterator[str]:
@@ -154,15 +140,24 @@ def _forces(at: _Moved) -> Iterator[str]:
     whole = needs.point + at.equations.riding(at.point, at.gravity, needs.mass).point
     joint = needs.joint + at.equations.riding(at.point, at.gravity, needs.mass).joint
     row = at.motion.row / at.motion.divisor
-    if at.differ(whole + ca.mtimes(row.T, joint), plain.point):
-        yield "needs: not what its bodies need, Eqs. (13) and (14)"
     energy = ca.SX(0)
     for letter, body in at.motion.bodies.items():
         moments = at.inertia[letter]
         energy += 0.5 * ca.bilin(mass_matrix(body, moments), at.twist, at.twist)
         energy -= ca.dot(at.gravity, mass_moment(body, moments))
-    if at.differ(ca.dot(plain.point, at.twist), at.rate_of(energy)):
-        yield "bodies: the power of what they need is not the rate of their energy"
+    power = ca.dot(plain.point, at.twist)
+    yield from differing(
+        {
+            "needs: not what its bodies need, Eqs. (13) and (14)": (
+                whole + ca.mtimes(row.T, joint),
+                plain.point,
+            ),
+            "bodies: the power of what they need is not the rate of their energy": (
+                power,
+                rate_of(energy),
+            ),
+        }
+    )
 
 
 def _locus(at: _Moved) -> Iterator[str]:
@@ -176,5 +171,4 @@ def _locus(at: _Moved) -> Iterator[str]:
         pair = ca.norm_2(ca.cross(normal, c - locus.center)), locus.radius
     else:
         pair = at.rotation.angle, locus.angle
-    if at.differ(*pair):
-        yield "locus: c is not on it at the joint's coordinate"
+    yield from differing({"locus: c is not on it at the joint's coordinate": pair})

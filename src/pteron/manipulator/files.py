@@ -13,8 +13,9 @@ from typing import Any, TypeVar
 
 from pteron.bodies.vectors import unit_vector, vector
 from pteron.errors import ModelError, shown
-from pteron.legs import KINDS, LegKind
+from pteron.legs import LegKind
 from pteron.legs.circles import perpendicular_to
+from pteron.legs.installed import kind_named, kind_names
 from pteron.manipulator.manipulator import Manipulator, faults_of
 from pteron.manipulator.radii import Radii
 from pteron.platforms import Bar, Geared, Platform
@@ -232,9 +233,14 @@ class _Reading:
             self.faults.append(f"{prefix}{shown(given)} given, a table [[legs]] expected")
             return None
         name = given.get("type", _DEFAULT_KIND)
-        kind = KINDS.get(name) if isinstance(name, str) else None
+        try:
+            kind = kind_named(name) if isinstance(name, str) else None
+        except ModelError as error:
+            self.faults.append(f"{prefix}type: {shown(name)} cannot be loaded: {error}")
+            return None
         if kind is None:
-            self.faults.append(f"{prefix}type: {shown(name)} is not one of {', '.join(KINDS)}")
+            valid = ", ".join(kind_names())
+            self.faults.append(f"{prefix}type: {shown(name)} is not one of {valid}")
             return None
         for key, former in FORMER.items():
             if key in given and former in given:

@@ -166,7 +166,7 @@ def joint_points(robot: RobotLike, pose: PoseLike) -> JointPoints:
 def _links(leg: LegKind, chain: Array, coordinate: Array, end: Array) -> Array:
     """Return a leg's line, which ends at its platform point: a hinge of the platform is beyond."""
     start = chain[..., 0, :]
-    if "p" in leg.bodies:
+    if "p" in leg.bodies and leg.joint_axis is not None:
         start = start + np.multiply.outer(coordinate, leg.joint_axis)
     same = _SAME * float(np.abs(end - start).max(initial=0.0))
     line = [start]

@@ -90,7 +90,7 @@ class PlatformEquations(ABC):
 
     def moments(self, rows: Sequence[Expression]) -> Moments:
         """Return the platform's inertia from the rows (1, K) of its parameters."""
-        return moments_of(self.kinds, rows)
+        return moments_of(self.kinds, list(rows))
 
     @abstractmethod
     def motion(

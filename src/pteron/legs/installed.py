@@ -1,0 +1,59 @@
+"""Kinds of legs by name: those of this folder, and those that installed packages bring.
+
+A package names its kinds as entry points of the group `pteron.legs`; its module is imported when a
+file asks for the kind, not before.
+"""
+
+from __future__ import annotations
+
+from importlib.metadata import EntryPoint, entry_points
+
+from pteron.errors import ModelError
+from pteron.legs.kind import LegKind
+from pteron.legs.prr import PRR
+from pteron.legs.prrr import PRRR
+from pteron.legs.pss import PSS
+from pteron.legs.rpr import RPR
+from pteron.legs.rrr import RRR
+from pteron.legs.rss import RSS
+from pteron.legs.rupu import RUPU
+
+GROUP = "pteron.legs"
+
+KINDS: dict[str, type[LegKind]] = {
+    kind.type: kind for kind in (PRRR, PSS, RSS, RRR, PRR, RPR, RUPU)
+}
+"""The kinds of legs that are loaded, by their key `type`; add another here."""
+
+
+def kind_names() -> tuple[str, ...]:
+    """Return the names of all kinds that files may name."""
+    return (*KINDS, *sorted(entry.name for entry in _others() if entry.name not in KINDS))
+
+
+def kind_named(name: str) -> type[LegKind] | None:
+    """Return a kind of leg by its name, from an installed package if need be; None: there is none.
+
+    Raises
+    ------
+    ModelError
+        If the package that has it cannot be imported, or holds no kind of that name.
+    """
+    entry = next((e for e in _others() if e.name == name), None) if name not in KINDS else None
+    if entry is not None:
+        KINDS[name] = _loaded(entry)
+    return KINDS.get(name)
+
+
+def _others() -> tuple[EntryPoint, ...]:
+    return tuple(entry_points(group=GROUP))
+
+
+def _loaded(entry: EntryPoint) -> type[LegKind]:
+    try:
+        kind = entry.load()
+    except Exception as error:
+        raise ModelError(f"{entry.value}: {type(error).__name__}: {error}") from error
+    if not (isinstance(kind, type) and issubclass(kind, LegKind) and kind.type == entry.name):
+        raise ModelError(f"{entry.value} is no kind of leg with type {entry.name!r}")
+    return kind

@@ -1,0 +1,113 @@
+"""Whether a kind of platform keeps the protocol of `platforms.motion`: run it on one of your own.
+
+All of it is differentiation along one random motion of the pose.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import casadi as ca
+import numpy as np
+
+from pteron.bodies.agreement import TIME, differing, rate_of
+from pteron.bodies.motion import Expression
+from pteron.platforms import Platform, equations_class
+from pteron.platforms.coordinates import COORDINATES
+from pteron.platforms.motion import PlatformEquations, PlatformMotion
+
+_POINTS = 3
+
+
+def faults(platform: Platform, seed: int = 0) -> tuple[str, ...]:
+    """Return where a platform breaks the protocol, a line each; none where it keeps it.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.platforms.conformance import faults
+    >>> faults(pteron.load("quadrupteron").platform)
+    ()
+    """
+    kind = equations_class(platform)
+    unknown = [name for name in kind.coordinates if name not in COORDINATES]
+    if unknown or kind.coordinates != platform.coordinates:
+        return (f"coordinates: {kind.coordinates}, but files have {platform.coordinates}",)
+    rng = np.random.default_rng(seed)
+
+    def drawn(*shape: int) -> Expression:
+        return ca.SX(ca.DM(rng.normal(size=shape)))
+
+    def points(flat: bool) -> list[Expression]:
+        high = 0.0 if flat else 1.0  # what slides moves across the axis
+        return [ca.SX(ca.DM(rng.normal(size=3) * (1.0, 1.0, high))) for _ in range(_POINTS)]
+
+    frame = [ca.SX(ca.DM(list(axis))) for axis in platform.frame]
+    equations = kind(frame, points(platform.slides), points(False))
+    x, dx, ddx = (drawn(len(kind.coordinates)) for _ in range(3))
+    rates = dx + ddx * TIME
+    motion = equations.motion(x + dx * TIME + ddx * TIME**2 / 2, rates, ddx)
+    inertia = ca.vertsplit(ca.SX(ca.DM(rng.uniform(0.5, 1.5, len(kind.kinds)))))
+    return (
+        *_motions(motion, rates),
+        *_forces(equations, motion, rates, drawn(3), inertia),
+    )
+
+
+def _motions(motion: PlatformMotion, rates: Expression) -> Iterator[str]:
+    omega = sum((turn.rate * turn.axis for turn in motion.rotation.turns), ca.SX(3, 1))
+    turned = ca.mtimes(ca.skew(omega), motion.axes)
+    pairs = {"axes: do not turn with the angular velocity": (rate_of(motion.axes), turned)}
+    for k, turn in enumerate(motion.rotation.turns, start=1):
+        pairs[f"turn {k}: acceleration is not the derivative of rate"] = (
+            turn.acceleration,
+            rate_of(turn.rate),
+        )
+    for k, (point, matrix) in enumerate(zip(motion.points, motion.matrices, strict=True), start=1):
+        pairs |= {
+            f"point {k}: velocity is not the derivative of position": (
+                point.velocity,
+                rate_of(point.position),
+            ),
+            f"point {k}: acceleration is not the derivative of velocity": (
+                point.acceleration,
+                rate_of(point.velocity),
+            ),
+            f"matrix {k}: its product with x' is not (c', omega)": (
+                ca.mtimes(matrix, rates),
+                ca.vertcat(point.velocity, omega),
+            ),
+        }
+    pairs["matrix: its product with x' is not (p', omega)"] = (
+        ca.mtimes(motion.matrix, rates),
+        ca.vertcat(rate_of(motion.body.position), omega),
+    )
+    yield from differing(pairs)
+
+
+def _forces(
+    equations: PlatformEquations,
+    motion: PlatformMotion,
+    rates: Expression,
+    gravity: Expression,
+    rows: list[Expression],
+) -> Iterator[str]:
+    inertia = equations.moments(rows)
+    mass = equations.mass_matrix(motion, inertia)
+    energy = 0.5 * ca.bilin(mass, rates, rates)
+    energy -= ca.dot(gravity, equations.mass_moment(motion, inertia))
+    needs = equations.needs(motion, gravity, inertia)
+    masses = [ca.SX(k + 1.0) for k in range(len(motion.points))]
+    carried = equations.needs(motion, gravity, equations.carrying(inertia, masses)) - needs
+    pairs = zip(motion.points, motion.matrices, masses, strict=True)
+    ridden = sum(ca.mtimes(a[:3, :].T, m * (c.acceleration - gravity)) for c, a, m in pairs)
+    yield from differing(
+        {
+            "mass_matrix: not symmetric": (mass, mass.T),
+            "needs: its power is not the rate of the energy": (
+                ca.dot(needs, rates),
+                rate_of(energy),
+            ),
+            "carrying: not what masses on the points need": (carried, ridden),
+        }
+    )
