@@ -25,7 +25,7 @@ from pteron.identification import (
     open_log,
     write_log,
 )
-from pteron.identification.diagnosis import Fault
+from pteron.identification.exchanged_columns import ColumnFault
 from pteron.identification.logs import Description
 from pteron.identification.plausibility import has_negative_inertia
 from pteron.identification.prediction import Prediction
@@ -550,7 +550,7 @@ def test_negative_inertia_is_seen_on_every_machine():
 
 def test_a_fault_says_what_is_wrong():
     names = [tuple(f"{name}{i}" for i in (1, 2, 3)) for name in ("force", "rho")]
-    fault = Fault(*names, (1, 2, 0), (1, 1, -1), (0, 1, 2), (1, 1, 1), 0.5, 0.01)
+    fault = ColumnFault(*names, (1, 2, 0), (1, 1, -1), (0, 1, 2), (1, 1, 1), 0.5, 0.01)
     text = fault.message()
     assert "force1, force2 and force3 are in another order" in text
     assert "force1 has the sign flipped" in text

@@ -9,7 +9,7 @@ import pytest
 
 from pteron.errors import DataError, ModelError
 from pteron.identification import estimate, ordinary, reduced, weighted
-from pteron.identification.given import given
+from pteron.identification.checked_regressor import checked_observations
 
 ARM = Path(__file__).parent.parent / "examples" / "serial_arm.py"
 TRUE = np.array([2.0, -1.0, 0.5])
@@ -127,10 +127,10 @@ def test_dependent_columns_are_found_and_named():
 
 def test_independent_columns_stay_as_they_are():
     w, f = made()
-    found = reduced(given(w, f))
+    found = reduced(checked_observations(w, f))
     assert (found.kept, found.dependent, found.gap) == ((0, 1, 2), (), float("inf"))
     with pytest.raises(DataError, match="every column of the regressor is zero"):
-        reduced(given(0.0 * w, f))
+        reduced(checked_observations(0.0 * w, f))
 
 
 # Refusals

@@ -47,14 +47,14 @@ class DriveGains:
         Standard deviations, for a payload that is known exactly: its relative error is one of all
         gains beside these.
     total_least_squares : array, shape (n,)
-        Where the search for the gains began.
+        The gains by total least squares, from which the search began.
     unit : str
         The unit of the log's force columns: A, V or %.
     estimate : Estimate
         The fit of the gains (``g1`` ..., N per unit) and of the model's values without payload;
         its noise and residuals are in `unit`.
     residual : array, shape (n,)
-        Standard deviation of what is left of each current, in `unit`, before the filter.
+        Standard deviation of each current's residual, in `unit`, before the filter.
     condition : float
         Ratio of the largest to the second smallest singular value of the homogeneous equations:
         how well gains are told from inertia.
@@ -77,7 +77,7 @@ class DriveGains:
         return f"gains = [{', '.join(f'{value:.10g}' for value in self.gains)}]"
 
     def summary(self) -> str:
-        """Return what was found, for people, as lines of text."""
+        """Return the gains, for people, as lines of text."""
         lines = ["Drive gains:"]
         triples = zip(self.gains, self.deviations, self.total_least_squares, strict=True)
         for i, (gain, deviation, start) in enumerate(triples, 1):
@@ -134,11 +134,11 @@ def identify_drive_gains(
     with_payload : Log, optional
         A log of the same machine with the payload, where the first has none.
     payload : KnownPayload, optional
-        What is carried; by default what the log's description says.
+        The payload; by default that of the log's description.
     terms : Terms, optional
         Friction, offsets and other terms beside the base parameters.
     processing : Processing, optional
-        How the logs are treated; by default the data decide.
+        Choices about the preprocessing; by default the data decide.
     base : BaseParameters, optional
         Another choice of base parameters, such as that of legs which share theirs.
 
@@ -164,7 +164,7 @@ def identify_drive_gains(
             "the payload is not known, and without it gains and inertia cannot be told apart; "
             "declare [payload] in the log's description",
         )
-    if robot.platform.turns and not known.inertia:
+    if robot.platform.angles and not known.inertia:
         raise LogError(
             "no payload",
             logs[-1].source,

@@ -9,7 +9,6 @@ from itertools import combinations, product
 import numpy as np
 
 from pteron.errors import DataError, PteronError
-from pteron.identification.diagnosis import DECISIVE, column_fault, exchanged_joints
 from pteron.identification.errors import LogError
 from pteron.identification.estimators import (
     ESTIMATORS,
@@ -21,11 +20,12 @@ from pteron.identification.estimators import (
     total,
     weighted,
 )
+from pteron.identification.exchanged_columns import DECISIVE, column_fault, exchanged_joints
 from pteron.identification.logs import Log
 from pteron.identification.logs.at_motor import per_cent_advice
 from pteron.identification.logs.recorded import at_limits, check_forces, check_recorded
 from pteron.identification.model import Model
-from pteron.identification.observation import Linear, Observations, observations_of, stacked
+from pteron.identification.observation import LinearModel, Observations, observations_of, stacked
 from pteron.identification.plausibility import left_over
 from pteron.identification.recordings import Recording, same
 from pteron.identification.signals import Preprocessing, Processing, preprocessing_of
@@ -37,14 +37,14 @@ METHODS = (*ESTIMATORS, "instrumental", "likelihood")
 """Names of the estimators that `identify` knows."""
 
 _EXPLAINED = 0.2
-"""Error relative to the forces, three times smaller than which joints without a pose must make it
-to be called mended."""
+"""Error relative to the forces that joints in another order must undercut three times to be called
+the right ones, where those of the log have no pose."""
 
 _LOOK = 12_000
 """Rows that are tried in other orders."""
 
 _MOST = 10.0
-"""Ratio of the noise of two recordings, at most."""
+"""Largest ratio of the noise of two recordings."""
 
 _NOISELESS = 1e-10
 """Residuals, relative to the forces, that are rounding."""
@@ -109,7 +109,7 @@ def preprocessing_for(
     wanted: Processing,
     start: tuple[float, ...] | None = None,
 ) -> Preprocessing:
-    """Return how a recording is to be preprocessed, from its beginning.
+    """Return the preprocessing of a recording, from its beginning.
 
     `start` is a pose of its assembly mode, where it is known.
     """
@@ -126,7 +126,10 @@ def preprocessing_for(
 
 
 def fit_observations(
-    model: Linear, one: Recording, preprocessing: Preprocessing, progress: Callable[[int], None]
+    model: LinearModel,
+    one: Recording,
+    preprocessing: Preprocessing,
+    progress: Callable[[int], None],
 ) -> Observations:
     """Return a recording's observations; where it has no poses, say whether joints are swapped."""
     try:
@@ -188,7 +191,7 @@ def estimated(
     preprocessing: Sequence[Preprocessing],
     observations: Observations,
 ) -> Estimate:
-    """Return what an estimator makes of the observations, or of their recording."""
+    """Return the estimate from the observations, or from their recording."""
     if not isinstance(estimator, str):
         return estimator(observations)
     if estimator in ESTIMATORS and estimator != "total":
@@ -210,7 +213,7 @@ def estimated(
 
 
 def with_findings(error: PteronError, whole: Sequence[Recording]) -> PteronError:
-    """Return an error with what was noticed in the logs behind it, which may explain it."""
+    """Return an error with the logs' findings behind it, which may explain it."""
     findings = [said.rstrip(".") for one in whole for said in at_limits(one.head())]
     findings += [finding.message for one in whole for finding in one.findings]
     if findings:

@@ -34,8 +34,8 @@ from pteron.identification.logs import Log, LogFile
 from pteron.identification.logs.at_motor import by_rated_torque
 from pteron.identification.logs.recorded import at_limits
 from pteron.identification.model import Model, Terms, identification_model
-from pteron.identification.observation import Linear, Observations
-from pteron.identification.plausibility import doubts, unphysical, unseen
+from pteron.identification.observation import LinearModel, Observations
+from pteron.identification.plausibility import plausibility_warnings, unphysical, unseen
 from pteron.identification.prediction import predict
 from pteron.identification.recordings import Recording, divided, recording
 from pteron.identification.result import Identification
@@ -56,7 +56,7 @@ _SLOWLY = (
 )
 
 Stage = Callable[[str, int, int], None]
-"""Told what is being done, how many rows of it are done, and how many there are."""
+"""A callback that is told the task, its rows that are done, and all its rows."""
 
 
 def identify(
@@ -84,25 +84,25 @@ def identify(
         The machine as it is drawn: its geometry counts, its inertial parameters are where the
         search for real bodies begins.
     logs : Log, LogFile or a sequence of them
-        What to fit.
+        The logs to fit.
     held_out : Log, LogFile or a sequence of them
-        What to judge by; by default the last 30 % of each log.
+        The logs to judge by; by default the last 30 % of each fitted log.
     terms : Terms, optional
         Friction, offsets and other terms beside the base parameters.
     shared : bool or groups of legs
         Whether legs share one parameter set; see `pteron.base_parameters`.
     estimator : str or callable
         One of `METHODS`: ordinary, weighted (the default), huber, total, instrumental, likelihood;
-        or what takes observations and returns an estimate, such as
+        or a function from observations to an estimate, such as
         `functools.partial(huber, threshold=2.0)`.
     processing : Processing, optional
-        How positions are differentiated and filtered; by default the data decide.
+        Choices about derivatives and filters; by default the data decide.
     cad : Manipulator, name or path, "robot" or None
-        What real bodies are to be nearest to.
+        The machine that real bodies are to be nearest to.
     bounds : Bounds, optional
-        What is known about the bodies.
+        Limits that the bodies are known to keep.
     progress : callable, optional
-        Told what is being done, how many rows of it are done and how many there are.
+        Called with the task, its rows that are done, and all its rows.
 
     Raises
     ------
@@ -142,7 +142,7 @@ def identify(
     # Preprocess, stack and solve
     preprocessing = tuple(preprocessing_for(robot, one, wanted) for one in fit)
 
-    def observe(columns: Linear, delay: float | None = None) -> Observations:
+    def observe(columns: LinearModel, delay: float | None = None) -> Observations:
         late = [how if delay is None else replace(how, delay=delay) for how in preprocessing]
         return balanced(
             [
@@ -222,7 +222,7 @@ def identify(
     except ModelError as error:
         raise with_findings(error, whole) from None
     verdict = with_bodies(verdict, consistency, off)
-    advice = doubts(model, estimate, known, consistency, drawn)
+    advice = plausibility_warnings(model, estimate, known, consistency, drawn)
     if hidden or essential.dropped:
         weak = dict.fromkeys((*hidden, *essential.dropped))
         advice[:0] = _more_motion(model, list(weak))
@@ -240,7 +240,11 @@ def identify(
         verdict=replace(verdict, next_steps=(*verdict.next_steps, *advice)),
         unseen=hidden,
         findings=tuple(f for one in (*whole, *others) for f in one.findings),
-        notes=(*_notes(model, estimate, _reflected(rotors)), *_told(found, model), *missing),
+        notes=(
+            *_notes(model, estimate, _reflected(rotors)),
+            *_unknowns_notes(found, model),
+            *missing,
+        ),
         rotors=rotors,
         unknowns=found,
     )
@@ -279,12 +283,12 @@ def _rotors(robot: Manipulator, fit: Sequence[Recording]) -> tuple[tuple[float, 
 
 
 def _reflected(rotors: tuple[tuple[float, float], ...] | None) -> dict[str, float]:
-    """Return what rotors weigh on the joints, J r^2, by name."""
+    """Return the inertia that rotors add at the joints, J r^2, by name."""
     return {f"J_m{i}": inertia * r**2 for i, (inertia, r) in enumerate(rotors or (), start=1)}
 
 
 def _more_motion(model: Model, weak: Sequence[str]) -> list[str]:
-    """Return which motion shows more of values that are weak: friction at rest wants slow ones."""
+    """Return advice on motions that show more of weak values: slow ones for Stribeck's friction."""
     kinds = dict(zip(model.names, model.kinds, strict=True))
     falls = [name for name in weak if kinds[name] == "stribeck"]
     others = [name for name in weak if name not in falls]
@@ -300,8 +304,8 @@ def _more_motion(model: Model, weak: Sequence[str]) -> list[str]:
     return advice
 
 
-def _told(found: Unknowns, model: Model) -> list[str]:
-    """Return what was found of the delay and of the speeds with which friction falls."""
+def _unknowns_notes(found: Unknowns, model: Model) -> list[str]:
+    """Return notes on the delay and the speeds of Stribeck's friction that were found."""
     notes = []
     if found.delay_deviation:
         notes.append(
@@ -355,7 +359,7 @@ def _real_bodies(
 
 
 def _notes(model: Model, estimate: Estimate, rotors: dict[str, float]) -> list[str]:
-    """Return what else is to be known of an estimate."""
+    """Return notes on convergence, rotors and terms that join others."""
     notes, units = [], {term.name: term.unit for term in model.all_terms}
     if not estimate.converged:
         notes.append(

@@ -23,12 +23,12 @@ Passive = Literal["none", "shared", "each"]
 
 _PROBES = 200
 _DEPENDENT = 1e-9
-"""What is left of a column, relative to it, once those before it are taken out of it."""
+"""Residual of a column on those before it, relative to it, below which it depends on them."""
 
 
 @dataclass(frozen=True)
 class Terms:
-    """What the model has beside the base parameters.
+    """Terms of the model beside the base parameters.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ class Terms:
 
 
 class Term(NamedTuple):
-    """One value beside the base parameters: what it is, and how it is written and measured."""
+    """One value beside the base parameters: its kind, name and unit."""
 
     kind: Literal["coulomb", "viscous", "offset", "passive", "rotor", "payload", "stribeck"]
     name: str
@@ -87,15 +87,15 @@ class Model:
     Attributes
     ----------
     base : BaseParameters
-        Which inertial parameters, and sums of them, come first among the values.
+        The inertial parameters, and sums of them, that come first among the values.
     terms : Terms
-        What follows them.
+        The terms that follow them.
     joins : dict
         Terms whose columns depend on others at every state, and the share of each that goes with
         those it joins: they are no values of their own.
     speeds : tuple of n floats, optional
-        With which friction falls, where `Terms` ask for them to be found; infinite where it does
-        not. Without them the model has none of that friction.
+        Speeds of Stribeck's friction, where `Terms` ask for them to be found; infinite where
+        friction does not fall. Without them the model has none of that friction.
     """
 
     base: BaseParameters
@@ -172,7 +172,7 @@ class Model:
 
     @cached_property
     def kinds(self) -> tuple[str, ...]:
-        """What the values are: "base", or the kind of the term."""
+        """Kinds of the values: "base", or that of the term."""
         return (*("base" for _ in self.base.names), *(term.kind for term in self.kept_terms))
 
     @cached_property
@@ -183,7 +183,7 @@ class Model:
 
     @property
     def expressions(self) -> tuple[str, ...]:
-        """What each value is: base parameters as sums, the others by name."""
+        """The values in words: base parameters as sums, the others by name."""
         found = [*self.base.expressions(), *self.names[self.base.rank :]]
         for name, shares in self.joins.items():
             for kept, share in shares.items():
@@ -193,7 +193,7 @@ class Model:
         return tuple(found)
 
     def share_of(self, name: str, value: float) -> Array:
-        """Return what a term that joins others adds to the values (p,), such as a known rotor."""
+        """Return the part of the values (p,) that a term which joins them adds."""
         added = np.zeros(len(self.names))
         for kept, share in self.joins.get(name, {name: 1.0}).items():
             added[self.names.index(kept)] = share * value
@@ -202,7 +202,7 @@ class Model:
     def per_joint(self, kind: str, values: Array) -> Array | None:
         """Return a kind of term (n,) of values (p,); 0 where it joins others, None if it is none.
 
-        What joins others is in their values already.
+        A term that joins others is in their values already.
         """
         terms = [term for term in self.all_terms if term.kind == kind]
         known = dict(zip(self.names, values.tolist(), strict=True))
@@ -271,7 +271,7 @@ def identification_model(
     robot : Manipulator, name or path
         The machine; its inertial parameters play no part.
     terms : Terms, optional
-        What it has beside the base parameters; friction and offset of each joint by default.
+        Terms beside the base parameters; friction and offset of each joint by default.
     base : BaseParameters, optional
         Another choice of base parameters, such as that of legs which share theirs.
 

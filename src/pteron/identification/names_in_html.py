@@ -1,4 +1,4 @@
-"""What was identified, in HTML: sums of inertial parameters, and the names of other terms."""
+"""Identified values in HTML: sums of inertial parameters, and names of other terms."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pteron.reduction.expressions import html_name
 
 
 def html_expressions(model: Model) -> tuple[Markup, ...]:
-    """Return what each value of a model is, in HTML: sums of parameters, or names of terms."""
+    """Return the values of a model in HTML: sums of parameters, or names of terms."""
     names = [_term_html(term) for term in model.kept_terms]
     found = [*model.base.expressions("html"), *names]
     terms = {term.name: _term_html(term) for term in model.joining_terms}

@@ -19,14 +19,14 @@ from pteron.identification.logs import Log
 from pteron.identification.signals import Preprocessing, States
 from pteron.identification.signals.derivatives import EVEN, FourierFit
 from pteron.identification.signals.fourier import Projection, fitted_series, most_harmonics
-from pteron.identification.signals.samples import BLOCK, Samples, samples
+from pteron.identification.signals.samples import BLOCK, SampleBlock, samples
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.motion.trajectories.fourier import fourier_basis
 
 
-class Linear(Protocol):
-    """What observations are made of: a `Model`, or one with more columns."""
+class LinearModel(Protocol):
+    """A model whose columns observations are made of: a `Model`, or one with more columns."""
 
     @property
     def robot(self) -> Manipulator:
@@ -42,14 +42,14 @@ class Linear(Protocol):
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """What they are, as `Model.kinds`."""
+        """Their kinds, as `Model.kinds`."""
 
     def matrix(self, states: States) -> Array:
         """Return their columns (R, n, p) at states."""
 
 
 _LEAST_SHARE = 0.3
-"""Noise of an equation, relative to the usual, below which it is made of hardly any samples."""
+"""Least noise of an equation that is used, over the usual: below, hardly any samples are in it."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class Observations:
     Attributes
     ----------
     names, units : tuple of str
-        What the p values are called, and their SI units.
+        Names of the p values, and their SI units.
     matrix : array, shape (R, n, p)
         The observation matrix W.
     forces : array, shape (R, n)
@@ -70,13 +70,13 @@ class Observations:
     time : array, shape (R,)
         s.
     gain : array, shape (R, n)
-        What the rows were divided by; 0 for an equation that is not used, whose numbers are 0 too.
+        Divisors of the rows; 0 for an equation that is not used, whose numbers are 0 too.
     payload : array of int, shape (R,)
         The phase of each row.
     source : str
-        What messages call the log they come from.
+        Name of their log in messages.
     kinds : tuple of str
-        What the values are, as `Model.kinds`; empty where nobody has said.
+        Kinds of the values, as `Model.kinds`; empty where they are not known.
     """
 
     names: tuple[str, ...]
@@ -91,17 +91,17 @@ class Observations:
 
     @property
     def used(self) -> Array:
-        """How many equations of each actuator are used, (n,)."""
+        """Number of equations of each actuator that are used, (n,)."""
         return np.asarray((self.gain > 0.0).sum(axis=0))
 
     @property
     def rows(self) -> int:
-        """How many equations are used."""
+        """Number of equations that are used."""
         return int(self.used.sum())
 
     @property
     def actuators(self) -> int:
-        """How many actuators there are, n."""
+        """Number of actuators n."""
         return int(self.forces.shape[1])
 
     def columns(self, keep: Sequence[int]) -> Observations:
@@ -120,20 +120,24 @@ class Observations:
 
 
 def observations_of(
-    model: Linear, log: Log | Iterable[Log], preprocessing: Preprocessing, *, block: int = BLOCK
+    model: LinearModel,
+    log: Log | Iterable[Log],
+    preprocessing: Preprocessing,
+    *,
+    block: int = BLOCK,
 ) -> Observations:
     """Return the observations of a log.
 
     Parameters
     ----------
     model : Model or another that is linear in what is identified
-        What is identified.
+        The model.
     log : Log or iterable of Log
         The log, or its pieces in order, which are not kept.
     preprocessing : Preprocessing
-        How it is preprocessed, from `preprocessing_of`.
+        Its preprocessing, from `preprocessing_of`.
     block : int
-        How many rows are filtered at a time, about.
+        Rows that are filtered at a time, about.
 
     Raises
     ------
@@ -179,7 +183,7 @@ def in_motion(rates: Array, slow: Array, rows: int, *, wraps: bool = False) -> A
     return np.asarray(minimum_filter1d(moves, size, axis=0, mode=mode))
 
 
-def _filtered(model: Linear, block: Samples, preprocessing: Preprocessing) -> Observations:
+def _filtered(model: LinearModel, block: SampleBlock, preprocessing: Preprocessing) -> Observations:
     decimation = preprocessing.decimation
     settling = preprocessing.settling
     inner = slice(settling, len(block.states) - settling)
@@ -199,7 +203,7 @@ def _filtered(model: Linear, block: Samples, preprocessing: Preprocessing) -> Ob
 
 
 def _assembled(
-    model: Linear,
+    model: LinearModel,
     matrix: Array,
     forces: Array,
     noise: Array,
@@ -240,7 +244,7 @@ def _phases(log: Log, rate: float, fit: FourierFit) -> list[Log]:
 
 
 def _periodic(
-    model: Linear, log: Log, preprocessing: Preprocessing, fit: FourierFit
+    model: LinearModel, log: Log, preprocessing: Preprocessing, fit: FourierFit
 ) -> Observations:
     """Return the observations of one period, with noise averaged over all that were recorded."""
     # The parallel filter keeps the harmonics up to the band, on both sides, and as many rows as
@@ -294,7 +298,7 @@ def _periodic(
 
 
 def _projected_noise(moving: Array, count: int) -> Array:
-    """Return what `_projected` leaves of unit white noise on the samples (T, n) that are 1."""
+    """Return the noise of `_projected`, for unit white noise on the samples (T, n) that are 1."""
     rows = len(moving)
     pulse = np.zeros(rows)
     pulse[0] = 1.0

@@ -41,7 +41,7 @@ _CHANCE = 1e-3
 
 @dataclass(frozen=True)
 class Payload:
-    """What a payload adds to the platform's inertia, about P and in the platform's frame.
+    """The inertia of a payload, about P and in the platform's frame.
 
     Attributes
     ----------
@@ -58,11 +58,11 @@ class Payload:
     estimate : Estimate
         The fit of everything: base parameters, friction and offsets first, the payload last.
     residual : array, shape (n,)
-        Standard deviation of what is left of each actuator's forces, N or N m, before the filter.
+        Standard deviation of each actuator's residuals, N or N m, before the filter.
     fault_isolation : FaultIsolation
         Faults of the logs or the machine that the residuals show, and what they spoil.
     findings : tuple of Finding
-        What was noticed in the logs, such as uneven time stamps.
+        Oddities of the logs, such as uneven time stamps.
     """
 
     mass: float | None
@@ -118,7 +118,7 @@ class Payload:
         return not self.fault_isolation.matters
 
     def summary(self) -> str:
-        """Return what was found, for people, as lines of text."""
+        """Return the payload, for people, as lines of text."""
         lines = ["Payload, about P in the platform's frame:"]
         for name, value, deviation in zip(self.names, self.values, self.deviations, strict=True):
             unit = self.estimate.units[self.estimate.names.index(name)]
@@ -193,9 +193,9 @@ def identify_payload(
     terms : Terms, optional
         Friction, offsets and other terms beside base parameters and payload.
     processing : Processing, optional
-        How the logs are treated; by default the data decide.
+        Choices about the preprocessing; by default the data decide.
     estimator : callable
-        What solves the observations.
+        Estimates the values from observations.
     base : BaseParameters, optional
         Another choice of base parameters, such as that of legs which share theirs.
 

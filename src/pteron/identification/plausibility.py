@@ -29,28 +29,27 @@ _MOST_UNSEEN = 0.5
 """Share of the base parameters that a motion may leave unseen."""
 
 _FAR_ABOVE = 5.0
-"""What a fit leaves of the forces, over their noise, where the model is not the machine's."""
+"""Least residual, over the forces' noise, where the model is not the machine's."""
 
 _FAR = 0.5
-"""Difference from the drawn machine, as a share of what a parameter is made of, that is doubted."""
+"""Least difference from the drawn machine that is warned of, over a base parameter's usual size."""
 
 _TOLD = 0.2
-"""Standard deviation, and spread, of values over those drawn up to which their ratio is told."""
+"""Largest standard deviation, and spread, of ratios of values to those drawn that is told."""
 
 _APART = 1.5
 _FEWEST = 3
-"""Factor that this many values have in common, from which they are scaled rather than drawn badly.
-"""
+"""Least factor in common, and of how many values, that is a scale rather than a bad drawing."""
 
 _LEAST_SHARE = 0.02
-"""Share of a body's mass and length that a parameter is usually made of, at least."""
+"""Least usual size of a parameter, as a share of its body's mass and length."""
 
-_BEYOND_DOUBT = 3.0
-"""Standard deviations by which energy is below zero where the data say so."""
+_CERTAIN = 3.0
+"""Standard deviations by which energy is certainly below zero."""
 
 _NOTABLE = 0.1
-"""Energy below zero, over that of the machine as drawn, from which it counts: without noise next to
-nothing is beyond doubt."""
+"""Energy below zero, over that of the machine as drawn, from which it counts: without noise the
+slightest is certain."""
 
 _PUSHED = 0.05
 """Share of the forces from which friction that pushes counts, likewise."""
@@ -71,17 +70,17 @@ _USUAL_ERROR = 0.02
 """Error of a payload's mass, or of a rotor's inertia, that is usual."""
 
 
-def doubts(
+def plausibility_warnings(
     model: Model,
     estimate: Estimate,
     known: Array,
     consistency: Consistency | None,
     cad: Manipulator | None,
 ) -> list[str]:
-    """Return what held-out forces cannot show: values may be right for the wrong machine.
+    """Return warnings of values that predict forces well and yet belong to another machine.
 
-    `known` (p,) is what of the values is no part of the bodies, such as rotors; `consistency` are
-    the real bodies that were found, and `cad` is the machine as it is drawn.
+    `known` (p,) is the part of the values that is none of the bodies, such as rotors; `consistency`
+    are the real bodies that were found, and `cad` is the machine as it is drawn.
     """
     found = []
     if has_negative_inertia(model, estimate.values, estimate.covariance):
@@ -120,9 +119,9 @@ def doubts(
 
 
 def common_factor(model: Model, estimate: Estimate, known: Array, drawn: Array) -> float:
-    """Return by what all base parameters are multiplied beside those drawn (N,); 1 by nothing.
+    """Return the factor of all base parameters beside those drawn (N,); 1 where there is none.
 
-    They need not agree better than drawings do; `known` (p,) is what rotors have of the values.
+    They need not agree better than drawings do; `known` (p,) is the rotors' part of the values.
     """
     base = model.base
     wanted = base.grouping @ drawn + known[: base.rank]
@@ -188,7 +187,7 @@ def factor_of_forces(model: Model, fit: Estimate, known: Mapping[str, float]) ->
 
 
 def left_over(estimate: Estimate, preprocessing: Sequence[Preprocessing]) -> str:
-    """Return what may explain a fit that leaves far more of the forces than their noise."""
+    """Return a cause for residuals far larger than the forces' noise; empty if they are not."""
     noise = np.max([one.force_noise for one in preprocessing], axis=0)
     ratio = float((estimate.noise / np.maximum(noise, np.finfo(float).tiny)).max())
     if ratio < _FAR_ABOVE:
@@ -200,19 +199,19 @@ def left_over(estimate: Estimate, preprocessing: Sequence[Preprocessing]) -> str
 
 
 def has_negative_inertia(model: Model, values: Array, covariance: Array) -> bool:
-    """Say whether values (p,) give a machine whose kinetic energy is negative beyond doubt."""
+    """Say whether values (p,) give a machine whose kinetic energy is certainly negative."""
     return _negative_directions(model, values, covariance) > 0
 
 
 def unphysical(model: Model, observations: Observations, fit: Estimate) -> int:
-    """Return in how many ways the values of a fit are no machine's, beyond doubt.
+    """Return how many properties of a fit's values are certainly no machine's.
 
     Directions of motion in which kinetic energy is negative, and joints that friction pushes, with
     more than 5 % of the forces.
     """
     effect = np.abs(fit.values) * np.sqrt((observations.matrix**2).mean(axis=0))
     size = np.sqrt((observations.forces**2).mean(axis=0))
-    pushed = np.isin(model.kinds, _POSITIVE) & (fit.values < -_BEYOND_DOUBT * fit.deviations)
+    pushed = np.isin(model.kinds, _POSITIVE) & (fit.values < -_CERTAIN * fit.deviations)
     pushed &= (effect > _PUSHED * size[:, None]).any(axis=0)
     return _negative_directions(model, fit.values, fit.covariance) + int(pushed.sum())
 
@@ -228,13 +227,13 @@ def _negative_directions(model: Model, values: Array, covariance: Array) -> int:
     jacobians = unchecked(robot, "jacobian", pose)
     rank = model.base.rank
     known = covariance[:rank, :rank]
-    ways = [rng.normal(size=pose.shape), *(rest + axis for axis in np.eye(pose.shape[1]))]
+    directions = [rng.normal(size=pose.shape), *(rest + axis for axis in np.eye(pose.shape[1]))]
     found = 0
-    for way in ways:
-        needed = base_regressor(robot, model.base, pose, rest, way)
-        rows = np.einsum("rnp,rnm,rm->rp", needed - still, jacobians, way)
+    for along in directions:
+        needed = base_regressor(robot, model.base, pose, rest, along)
+        rows = np.einsum("rnp,rnm,rm->rp", needed - still, jacobians, along)
         spread = np.sqrt(np.maximum(np.einsum("rp,pq,rq->r", rows, known, rows), 0.0))
-        least = np.maximum(_BEYOND_DOUBT * spread, _NOTABLE * np.abs(rows @ drawn))
+        least = np.maximum(_CERTAIN * spread, _NOTABLE * np.abs(rows @ drawn))
         found += bool((rows @ values[:rank] < -least).mean() > 0.5)
     return found
 
@@ -242,7 +241,7 @@ def _negative_directions(model: Model, values: Array, covariance: Array) -> int:
 def unseen(model: Model, deviations: Array) -> tuple[tuple[str, ...], bool]:
     """Return the base parameters that a log cannot show, and whether they are too many.
 
-    Their standard deviation, among the (p,) of all values, is larger than what they are made of.
+    Their standard deviation, among the (p,) of all values, is larger than their usual size.
     One that is 10 000 times larger is too many: its actuator's forces are no forces of the machine.
     """
     base = model.base
@@ -253,10 +252,10 @@ def unseen(model: Model, deviations: Array) -> tuple[tuple[str, ...], bool]:
 
 
 def usual_sizes(base: BaseParameters, drawn: Array) -> Array:
-    """Return the sizes (rank,) of what base parameters are made of, for CAD parameters (N,).
+    """Return the usual sizes (rank,) of base parameters, for CAD parameters (N,).
 
-    What is drawn as zero, such as m gamma_y of a straight link, is not that exactly: it counts as a
-    share of the body's mass and length.
+    A parameter drawn as zero, such as m gamma_y of a straight link, is not that exactly: it counts
+    as a share of the body's mass and length.
     """
     bodies = bodies_of(base)
     masses = bodies.mean(np.abs(drawn))[bodies.masses]

@@ -20,7 +20,7 @@ _KEPT = 6000
 """Samples that are kept to be looked at."""
 
 _STANDS_OUT = 7.0
-"""How far from those around it, over the noise, an error stands out."""
+"""Outlier threshold: distance of an error from those around it, over the noise."""
 
 _AROUND = 9
 """Samples around an error, and it."""
@@ -29,18 +29,17 @@ _LEAST_NOISE = 1e-3
 """Noise of a force, over its size, that counts as at least."""
 
 _RARE, _FEW = 1e-3, 0.05
-"""Shares of the samples up to which what stands out may be chance, and from which it is no
-exception."""
+"""Shares of outliers up to which they may be chance, and from which they are no exception."""
 
 FRICTION = ("coulomb", "viscous", "stribeck", "offset")
 
 
 @dataclass(frozen=True)
 class Prediction:
-    """How well a model predicts the forces of a recording, at its own samples.
+    """A model's prediction of the forces of a recording, at its own samples.
 
-    Samples of a joint that hardly moves are left out, and those next to them in which the way it
-    moves is not certain: dry friction may hold it with any force.
+    Samples of a joint that hardly moves are left out, and those next to them in which its direction
+    is not certain: dry friction may hold it with any force.
     NRMS is the root mean square of the error over the standard deviation of the measured force, in
     percent, so that a constant load does not flatter.
 
@@ -49,19 +48,18 @@ class Prediction:
     source : str
         The recording.
     samples : int
-        How many.
+        Number of samples.
     left_out : array, shape (n,)
         Share of the samples of each actuator that was left out.
     size : array, shape (n,)
         Standard deviation of the measured forces, N.
     error, error_without_friction : array, shape (n,)
-        Root mean square of what the model misses, with all its terms and without friction and
-        offsets, N.
+        Root mean square error, with all terms and without friction and offsets, N.
     error_of_all : array, shape (n,)
         The same over every sample, with all terms, N.
     robust_error, outliers : array, shape (n,)
-        Root mean square of what it misses without samples that stand out, N, and their share: they
-        are missed by seven times the noise more than those around them. Up to 0.1 % may be chance
+        Root mean square error without outliers, N, and their share: they are missed by seven
+        times the noise more than those around them. Up to 0.1 % may be chance
         and beyond 5 % they are no exception: then there are none.
     noise : array, shape (n,)
         Standard deviation of the white noise on the measured forces, N: no model can do better.
@@ -141,7 +139,7 @@ def predict(
     preprocessing: Preprocessing,
     progress: Callable[[int], None] | None = None,
 ) -> Prediction:
-    """Return how well a model with values (p,) predicts a recording, preprocessed in its way.
+    """Return the prediction of a recording by a model with values (p,), with its preprocessing.
 
     `progress` is called with the number of rows just read.
     """
@@ -206,7 +204,7 @@ def predict(
 def _stands_out(error: Array, noise: Array) -> NDArray[np.bool_]:
     """Return which errors (R, n) are far from those around them, for noise (n,).
 
-    What is missed for longer than a few samples is no outlier, but not understood.
+    An error that lasts longer than a few samples is no outlier, but not understood.
     """
     around = median_filter(error, size=(_AROUND, 1), mode="nearest")
     return np.asarray(np.abs(error - around) > _STANDS_OUT * noise)

@@ -21,7 +21,7 @@ _END = int(np.iinfo(np.int64).max)
 """Beyond the last row of every file: how many it has is known for certain when it has been read."""
 
 _ROUNDINGS = 2.0
-"""How far stamps may be off their clock's ticks, in the spacing of floats."""
+"""Largest error of stamps beside their clock's ticks, in the spacing of floats."""
 
 _FIT = 0.7
 """Share of a log that is fitted where nothing else is held out."""
@@ -40,18 +40,18 @@ class Recording:
 
     @property
     def source(self) -> str:
-        """What messages call it."""
+        """Its name in messages."""
         return self.log.source
 
     @property
     def rows(self) -> int:
-        """How many rows there are, by estimate for a file."""
+        """Number of rows, by estimate for a file."""
         known = self.log.rows if isinstance(self.log, Log) else self.log.rows_estimate or 0
         return max(min(self.stop, known) - self.start, 1)
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What was noticed while it was read."""
+        """Oddities that were noticed as it was read."""
         return self.log.findings
 
     def head(self) -> Log:
@@ -76,13 +76,13 @@ class Recording:
                 yield piece.part(first, last)
 
     def beginning(self) -> Recording:
-        """Return what of a large file is enough to look at; a log in memory is returned whole."""
+        """Return the first rows of a large file, enough to look at; else the whole log."""
         if isinstance(self.log, Log):
             return self
         return replace(self, stop=min(self.stop, self.start + _LOOKED_AT))
 
     def samples(self, progress: Callable[[int], None] | None = None) -> Log | Iterator[Log]:
-        """Return what `equations_of` takes: the log where it is in memory, else its pieces."""
+        """Return the log where it is in memory, else its pieces."""
         return self.head() if isinstance(self.log, Log) else self.pieces(progress)
 
 
@@ -114,7 +114,7 @@ def _noticed(log: Log) -> tuple[Finding, ...]:
 
 
 def periodic_part(log: Log, period: float | None = None) -> Log:
-    """Return what repeats of a log that leads in and out, with a finding that says which rows.
+    """Return the part of a log with lead-in and lead-out that repeats, and a finding of its rows.
 
     Another log is returned as it is. Where nothing repeats after the period (s; by default as
     described), or the log has a phase with a payload and one without, all of it is returned as a

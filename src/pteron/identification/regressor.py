@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pteron.errors import DataError, ModelError
+from pteron.identification.checked_regressor import checked_observations, finite
 from pteron.identification.errors import LogError
 from pteron.identification.estimators import (
     ESTIMATORS,
@@ -20,7 +21,6 @@ from pteron.identification.estimators import (
     weighted,
 )
 from pteron.identification.estimators.reduction import Reduced, reduced
-from pteron.identification.given import finite, given
 from pteron.identification.observation import Observations
 from pteron.identification.prediction import FRICTION, Prediction
 from pteron.identification.signals.filters import white_noise
@@ -38,7 +38,7 @@ _ESTIMATORS = (*ESTIMATORS, "instrumental")
 
 @dataclass(frozen=True)
 class Fit:
-    """What samples of forces and a regressor say.
+    """The values of a model with a regressor of the user's own, and a verdict on them.
 
     Attributes
     ----------
@@ -47,11 +47,11 @@ class Fit:
     essential : Essential
         Those that the data can show, and the fit of these alone.
     held_out : Prediction
-        How well the values predict the forces that were held out.
+        Their prediction of the forces that were held out.
     verdict : Verdict
         Whether they can be trusted, from these forces alone.
     reduced : Reduced or None
-        Which columns are independent, where that was asked for.
+        The independent columns, where that was asked for.
     """
 
     estimate: Estimate
@@ -85,18 +85,18 @@ def estimate(
     forces : array, shape (R, n), or (R,) of a single actuator
         F, N or N m.
     names : sequence of str, optional
-        What the p values are called; "beta1" ... by default.
+        Names of the p values; "beta1" ... by default.
     units : sequence of str, optional
         Their units; none by default.
     kinds : sequence of str, optional
-        What they are: "coulomb", "viscous" and "offset" are friction, "base" is the rest. The
+        Their kinds: "coulomb", "viscous" and "offset" are friction, "base" is the rest. The
         verdict then says whether friction is what a model misses.
     time : array, shape (R,), optional
         s; one second a sample by default.
     used : array of bool, shape (R, n), optional
-        Which equations count; leave out what the model is not meant for, such as joints at rest.
+        Equations that count; leave out those that the model is not meant for, as of joints at rest.
     estimator : str or callable
-        ordinary, weighted, huber, total, instrumental; or what takes observations and returns an
+        ordinary, weighted, huber, total, instrumental; or a function from observations to an
         estimate.
     held_out : tuple of arrays, optional
         Regressor and forces of another motion, and which equations count there; by default the last
@@ -133,7 +133,9 @@ def estimate(
         raise ModelError(f"estimator: {estimator!r} is not one of {', '.join(_ESTIMATORS)}")
     if (estimator == "instrumental") != (instruments is not None):
         raise ModelError('instruments: belong to estimator "instrumental"; give both or neither')
-    whole = given(regressor, forces, names=names, units=units, kinds=kinds, time=time, used=used)
+    whole = checked_observations(
+        regressor, forces, names=names, units=units, kinds=kinds, time=time, used=used
+    )
     z: Observations | Callable[[Array], Observations] | None = None
     if callable(instruments):
         asked = instruments
@@ -148,7 +150,7 @@ def estimate(
     else:
         fit = whole
         other, measured, *counting = held_out
-        check = given(
+        check = checked_observations(
             other,
             measured,
             names=whole.names,

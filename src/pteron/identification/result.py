@@ -1,4 +1,4 @@
-"""What `identify` returns: values, a verdict on them, and what was done to the data."""
+"""The result of `identify`: values, a verdict on them, and the preprocessing of the data."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from pteron.renamed import former_attribute
 
 @dataclass(frozen=True, repr=False)
 class Identification:
-    """What a log says about a machine.
+    """A machine as identified from logs.
 
     Attributes
     ----------
     robot : Manipulator
         The machine as it was drawn.
     model : Model
-        What was identified: names, units and expressions of the values.
+        Names, units and expressions of the values.
     estimate : Estimate
         The values, their standard deviations, and what was left of the forces.
     essential : Essential
@@ -41,12 +41,12 @@ class Identification:
     consistency : Consistency or None
         Real bodies with these base parameters; None where Clarabel is not installed.
     consistency_share : float
-        Root mean square of what the real bodies' forces differ from those of the fit, over that of
+        Root mean square difference of the real bodies' forces from those of the fit, over that of
         its residuals.
     fitted, held_out : tuple of Prediction
-        How well the values predict the recordings that were fitted, and those that were not.
+        Predictions of the recordings that were fitted, and of those that were not.
     preprocessing : tuple of Preprocessing
-        How the fitted recordings were preprocessed.
+        Preprocessing of the fitted recordings.
     fault_isolation : FaultIsolation
         Faults of the log or the machine that the residuals show, and what they spoil.
     verdict : Verdict
@@ -54,9 +54,9 @@ class Identification:
     unseen : tuple of str
         Base parameters that are less well known than their usual size.
     findings : tuple of Finding
-        What was noticed in the logs.
+        Oddities of the logs.
     notes : tuple of str
-        What else is to be known.
+        Other notes, in sentences.
     rotors : tuple of (float, float), optional
         Inertia and ratio of each joint's motor, where they are known: no part of the real bodies.
     unknowns : Unknowns
@@ -137,7 +137,7 @@ class Identification:
 
     @property
     def friction(self) -> tuple[dict[str, Any], ...]:
-        """What `Drive` has of each joint's friction, as the fit found it."""
+        """The friction of each joint as the fit found it, by the fields of `Drive`."""
         coulomb, viscous, falls = map(self._per_joint, ("coulomb", "viscous", "stribeck"))
         offset = self._per_joint("offset", least=-np.inf)
         speeds = self.model.stribeck_speeds

@@ -1,4 +1,4 @@
-"""What the forces are not linear in: speeds with which friction falls (Stribeck's), and a delay.
+"""Unknowns that the forces are not linear in: speeds of Stribeck's friction, and a delay.
 
 Fs sign(q') exp(-(q'/v)^2) is linear in Fs and not in v. The speeds, and the delay of the forces for
 the positions, are those of least squares, all other values being projected out (variable
@@ -21,7 +21,7 @@ from scipy.interpolate import make_interp_spline  # type: ignore[import-untyped]
 from pteron.identification.estimators import weighted
 from pteron.identification.estimators.least_squares import actuator_noise
 from pteron.identification.model import Model
-from pteron.identification.observation import Linear, Observations
+from pteron.identification.observation import LinearModel, Observations
 from pteron.identification.signals import States
 from pteron.identification.signals.preprocessing import LATEST
 from pteron.kernels import Array
@@ -52,7 +52,7 @@ _ROUNDING = 1e-9
 _TWO_SIDED = 1.959963984540054
 """Standard deviations of an interval of 95 %."""
 
-Observe = Callable[[Linear], Observations]
+Observe = Callable[[LinearModel], Observations]
 """Makes the observations of all recordings, with the columns of a model or of more."""
 
 
@@ -63,9 +63,9 @@ class Unknowns:
     Attributes
     ----------
     speeds : array, shape (n,), optional
-        With which each joint's friction falls, m/s or rad/s; infinite where it is not seen to fall.
+        Speeds of Stribeck's friction, m/s or rad/s; infinite where it is not seen to fall.
     delay : float
-        By how much forces are late for positions, s.
+        Delay of the forces behind the positions, s.
     speed_deviations : array, shape (n,), optional
         Standard deviations of the speeds' logarithms.
     delay_deviation : float
@@ -94,7 +94,7 @@ class Unknowns:
 
 
 @dataclass(frozen=True)
-class _With:
+class _ExtendedModel:
     """A model with a group of columns behind it that are each actuator's own, (R, n, k)."""
 
     model: Model
@@ -123,7 +123,7 @@ class _With:
 
 def settled(
     model: Model,
-    observe: Callable[[Linear, float], Observations],
+    observe: Callable[[LinearModel, float], Observations],
     begin: Unknowns,
     values: Array,
     *,
@@ -139,7 +139,7 @@ def settled(
         Makes the observations of all recordings, with the columns of a model or of more, of forces
         that are so late, s.
     begin : Unknowns
-        Where to begin.
+        Unknowns to begin with.
     values : array, shape (p,)
         Values of a fit there.
     late : bool
@@ -148,8 +148,8 @@ def settled(
     Returns
     -------
     tuple
-        The model, its observations, the unknowns, and what the values' covariance (p, p) has more
-        than if they were known.
+        The model, its observations, the unknowns, and the part of the values' covariance (p, p)
+        that comes from them.
     """
     found, p = begin, len(model.names)
     speeds = None if found.speeds is None else found.speeds.copy()
@@ -158,7 +158,7 @@ def settled(
         if speeds is not None:
             model = model.falling(speeds)
         columns = partial(_slopes, model, seen, values, late)
-        rows = observe(_With(model, len(seen) + late, columns), found.delay)
+        rows = observe(_ExtendedModel(model, len(seen) + late, columns), found.delay)
         plain = rows.columns(range(p))
         whole, part = weighted(rows), weighted(plain)
         values, more = part.values, whole.covariance[:p, :p] - part.covariance
@@ -195,7 +195,7 @@ def searched_speeds(model: Model, observe: Observe, usual: Array) -> Array:
         falls = np.exp(-((rates / (usual[:, None] * shares)) ** 2))
         return np.asarray(np.sign(rates) * falls)
 
-    rows = observe(_With(model, _COLUMNS, columns))
+    rows = observe(_ExtendedModel(model, _COLUMNS, columns))
     plain = rows.columns(range(p))
     noise = weighted(plain).noise
     tried = np.geomspace(_SLOWEST, _FASTEST, _FINE)
@@ -230,7 +230,7 @@ def _coordinatewise(spline: Array, gram: Array, image: Array) -> NDArray[np.int6
     chosen = np.full(n, -1)
 
     def gain(picked: NDArray[np.int64]) -> float:
-        """Return by how much squares fall with these speeds; less than 0 if friction rises."""
+        """Return the drop of the squares with these speeds; below 0 if friction rises."""
         seen = np.flatnonzero(picked >= 0)
         if not len(seen):
             return 0.0

@@ -29,7 +29,7 @@ LARGE = 15.0
 """Percent of a force's standard deviation that the model misses beyond the noise."""
 
 CYCLE = 3.0
-"""Percent of its forces by which a pick-and-place cycle may be expected to be off."""
+"""Largest error of a pick-and-place cycle that is trusted, percent of its forces."""
 
 _LOWER = (0.7, 0.5)
 """Cut-offs that are tried too, over that of the whole recording."""
@@ -59,7 +59,7 @@ _HIDDEN: dict[str, tuple[str, str]] = {
         "Check each drive's gain by itself, or move more coordinates at once, and faster.",
     ),
 }
-"""What a log cannot tell, and what would, by fault."""
+"""Faults that a log may hide: the reason, and a remedy."""
 
 _ORDER: tuple[Grade, ...] = ("trustworthy", "usable with care", "not trustworthy")
 
@@ -77,9 +77,9 @@ class Verdict:
         trustworthy where either is more than 15 %, or where the error is more than half of the
         force.
     reasons : tuple of str
-        What speaks for it and against it, in sentences.
+        The reasons, in sentences.
     next_steps : tuple of str
-        What would make it better.
+        Advice for a better result.
     """
 
     grade: Grade
@@ -116,14 +116,13 @@ def verdict_of(
     Parameters
     ----------
     held_out : sequence of Prediction
-        How it predicts recordings that were not fitted.
+        Predictions of recordings that were not fitted.
     faults : FaultIsolation, optional
         The faults that the residuals of the fit show.
     repeats : bool
         Whether what was held out repeats the motion that was fitted.
     limits : sequence of str
-        What is said of forces that stay at their limit: then the grade is "usable with care" at
-        best.
+        Sentences on forces that stay at their limit: then the grade is "usable with care" at best.
     """
     opinions = [_Opinion("usable with care", list(limits), [])] if limits else []
     opinions += [_of_prediction(one) for one in held_out]
@@ -147,7 +146,7 @@ def verdict_of(
 def with_bodies(verdict: Verdict, consistency: Consistency | None, off: float) -> Verdict:
     """Return a verdict that says first where no real bodies have the values.
 
-    `off` is what the forces of the nearest ones differ from those of the fit, percent.
+    `off` is the difference of the nearest ones' forces from those of the fit, percent.
     """
     if consistency is None or consistency.metric != "covariance":
         return verdict
@@ -167,7 +166,7 @@ def judged(
     preprocessing: Preprocessing,
     progress: Callable[[int], None] | None = None,
 ) -> Prediction:
-    """Return how well a model with values (p,) predicts a recording that was not fitted.
+    """Return the prediction by a model with values (p,) of a recording that was not fitted.
 
     Where that is not trusted, lower cut-offs of the positions' filter are tried: it was chosen for
     the whole recording, and samples at rest, which do not count, have less noise than others. No

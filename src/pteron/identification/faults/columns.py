@@ -52,7 +52,7 @@ class Family:
     largest : float
         Sizes beyond it are another fault, told badly.
     speed : float, optional
-        Of friction that falls with speed: the speed, over the usual one.
+        Speed with which friction falls, over the usual one.
     effect : callable, optional
         Returns how the machine's forces change, where that is otherwise than those of the log: by a
         clock that is off all inertia is, and with it the mass that weighs.
@@ -208,12 +208,12 @@ class FaultColumns:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of all columns."""
+        """Names of all columns."""
         return (*self.model.names, *chain.from_iterable(self.sizes))
 
     @property
     def units(self) -> tuple[str, ...]:
-        """Of all columns' sizes."""
+        """Units of the sizes of all columns."""
         return (*self.model.units, *self._repeated([family.unit for family in self.families]))
 
     @property

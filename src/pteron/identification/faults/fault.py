@@ -75,16 +75,16 @@ class IsolatedFault:
     labels : tuple of str
         The force or the leg of each size.
     sizes, deviations : array, shape (k,)
-        By how much they are off, in s, rad, m, N or m/N, and its standard deviation.
+        Errors, in s, rad, m, N or m/N, and their standard deviations.
     chance : float
         Probability that residuals show it so clearly without it.
     shift : float
-        By how much the value that it changes most is off, in its standard deviations.
+        Error of the value that it changes most, in standard deviations.
     cycle : array, shape (n,)
         Error that it makes in a pick-and-place cycle's forces, percent of their standard deviation;
         NaN where no cycle fits into the machine's workspace.
     speeds : array, shape (n,), optional
-        Of Stribeck's friction: the speed of each joint with which it falls.
+        Speeds of the joints with which Stribeck's friction falls.
     step : float
         From one sample of the log to the next, s.
     """

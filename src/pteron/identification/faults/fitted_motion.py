@@ -58,7 +58,7 @@ class FittedMotion:
         Changes with the machine, which are smooth and costly, are worked out at every so many
         states, and interpolated.
     cutoff : float, optional
-        Of loads that are to be differentiated, Hz.
+        Cut-off of loads that are to be differentiated, Hz.
     """
 
     model: Model

@@ -85,7 +85,7 @@ class FaultIsolation:
 
     @property
     def off(self) -> Array:
-        """By how much such a cycle's forces are expected to be off, in percent (n,)."""
+        """Expected error of such a cycle's forces, in percent (n,)."""
         return np.asarray(np.hypot(self.uncertain, self.spoiled))
 
     @property
@@ -138,7 +138,7 @@ def isolate_faults(
     recordings : sequence of Recording
         The fitted ones; 20 000 rows in all are looked at, with and without payload.
     preprocessing : sequence of Preprocessing
-        How each was preprocessed.
+        Preprocessing of each.
     rotors : mapping of str to float, optional
         Inertia that rotors are known to add at the joints, by the name of the value, SI units.
     """

@@ -18,7 +18,7 @@ _MOVED = 0.01
 """A channel is frozen that stays for over so many rows while another joint moves by this share of
 its span."""
 _RESTED = 10.0
-"""How many times as far others may move while a channel rests at an end of the log: a motion sets
+"""Factor by which others may move farther while a channel rests at an end of the log: a motion sets
 off slowly, and not with all joints at once."""
 _ROUNDING = 1e-9
 

@@ -50,7 +50,7 @@ Values = NDArray[np.float64]
 
 @dataclass
 class Clock:
-    """How the times of a file are written; each pass over its rows takes a `fresh` one.
+    """The format of a file's times; each pass over its rows takes a `fresh` one.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def find_clock(
     unit: str | None,
     declared: TimeFormat | None,
 ) -> Clock:
-    """Return how the times of a file are written.
+    """Return the format of a file's times.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ TimeFormat = Literal[
     "DD/MM/YYYY hh:mm:ss",
     "MM/DD/YYYY hh:mm:ss",
 ]
-"""How times are written as text; fractions of a second may follow each."""
+"""Formats of times as text; fractions of a second may follow each."""
 LengthUnit = Literal["m", "mm", "um"]
 AngleUnit = Literal["rad", "deg"]
 ForceUnit = Literal["N", "N m", "A", "V", "%"]
@@ -155,7 +155,7 @@ class Description:
     Parameters
     ----------
     csv : Dialect, optional
-        How a CSV file is written.
+        Separator, decimal sign and encoding of a CSV file.
     time_column, payload_column : str, optional
         Names of columns.
     joint_columns, force_columns, pose_columns : tuple of str, optional
@@ -189,7 +189,7 @@ class Description:
     assembly_mode : int, optional
         The pose of `direct_kinematics` that the machine has at the first sample, counted from 1.
     rotor_inertia : tuple of float, optional
-        Of each joint's motor, kg m^2.
+        Inertia of each joint's motor, kg m^2.
     ratio : tuple of float, optional
         Turn of each motor per metre (or radian) of its joint, rad.
 

@@ -65,7 +65,7 @@ class LogFile:
     rows_estimate : int or None
         About how many rows it has, for a progress bar; exact in Parquet.
     findings : tuple of Finding
-        How it was read and, after a full pass, its oddities.
+        Notes on how it was read and, after a full pass, its oddities.
     rows_in_memory : int
         Rows up to which `identify` reads it whole: 2 million, 150 MB for four joints.
     rows_in_piece : int

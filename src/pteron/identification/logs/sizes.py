@@ -18,7 +18,7 @@ from pteron.manipulator import Manipulator
 from pteron.tables import declaration
 
 _BEYOND = 3.0
-"""How far beyond the machine's size a coordinate may lie; encoders have their own zero."""
+"""Largest coordinate, over the machine's size; encoders have their own zero."""
 _TURNS = 4.0 * math.pi
 _LONGEST_STEP = 0.2
 _LIKELY = (("ms", 1e2), ("us", 5e4))

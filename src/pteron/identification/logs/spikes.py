@@ -88,8 +88,8 @@ class _JointMotion:
         self._steps = np.diff(joints, axis=0)
         self._joints = joints
         self._usual: dict[int, Values] = {}
-        ways = np.percentile(np.abs(joints[LONGEST:] - joints[:-LONGEST]), 90.0, axis=0)
-        self._way = np.maximum(ways, np.finfo(float).tiny)
+        travel = np.percentile(np.abs(joints[LONGEST:] - joints[:-LONGEST]), 90.0, axis=0)
+        self._travel = np.maximum(travel, np.finfo(float).tiny)
 
     def is_pushed(self, start: int, stop: int) -> bool:
         """Say whether joints are accelerated in some samples as they are not before and after.
@@ -106,12 +106,12 @@ class _JointMotion:
             return True
         # Noise of the positions may hide that, but not that all joints rest.
         last = len(self._joints) - 1
-        before = self._way_between(max(start - 1 - LONGEST, 0), max(start - 1, 0))
-        after = self._way_between(min(stop, last), min(stop + LONGEST, last))
+        before = self._travel_between(max(start - 1 - LONGEST, 0), max(start - 1, 0))
+        after = self._travel_between(min(stop, last), min(stop + LONGEST, last))
         return min(before, after) < _RESTS < _MOVES < max(before, after)
 
-    def _way_between(self, start: int, stop: int) -> float:
-        return float((np.abs(self._joints[stop] - self._joints[start]) / self._way).max())
+    def _travel_between(self, start: int, stop: int) -> float:
+        return float((np.abs(self._joints[stop] - self._joints[start]) / self._travel).max())
 
 
 def _pushes(steps: Values, length: int) -> Values:
@@ -121,7 +121,7 @@ def _pushes(steps: Values, length: int) -> Values:
 
 
 def _groups(values: Values, share: float, least: Values | float) -> Mask:
-    """Return the samples between a jump and its way back."""
+    """Return the samples between a jump and the jump back."""
     steps = np.diff(values)
     jumps = steps - median_filter(steps, _WINDOW, mode="nearest")
     usual = _USUAL * float(np.percentile(np.abs(jumps), 95.0))

@@ -91,7 +91,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class _Sampled:
-    """What central differences and splines share: sampling rate and cut-off, Hz, and the delay."""
+    """The sampling rate and cut-off, Hz, and the delay of central differences and splines."""
 
     rate: float
     cutoff: float | None
@@ -121,7 +121,7 @@ class CentralDifferences(_Sampled):
 
     @property
     def edge(self) -> int:
-        """What the filter needs to settle, and the differences' own ends."""
+        """Rows that the filter takes to settle, and the differences' own ends."""
         settling = ceil(SETTLING * self.rate / self.cutoff) if self.cutoff else 0
         return LOST + settling + self.shift
 
@@ -149,7 +149,7 @@ class SmoothingSpline(_Sampled):
 
     @property
     def edge(self) -> int:
-        """What a spline feels of a block's ends."""
+        """Rows at a block's ends that the spline feels."""
         knot = 1.0 / (2.0 * self.cutoff) if self.cutoff else 1.0 / self.rate
         return ceil(_SPLINE_SETTLING * knot * self.rate) + self.shift
 

@@ -1,4 +1,4 @@
-"""Noise and what takes it away: its size, the positions' low-pass filter, the parallel filter."""
+"""Noise and its filters: its size, the positions' low-pass filter, the parallel filter."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ _POSITION_POWER = 0.9999
 _CANDIDATES = 40
 
 _CORRELATED = 12870.0 / 4900.0
-"""How much more a sum over the spectrum varies than one of independent powers: of Hann's window
-squared, the mean of w^4 over the square of that of w^2."""
+"""Variance of a sum over the spectrum, over that of independent powers: of Hann's window squared,
+the mean of w^4 over the square of that of w^2."""
 
 _LOOK = 60_000
 """Samples that the search for a cut-off looks at."""
@@ -231,7 +231,7 @@ class Decimation:
         return np.asarray(firwin(2 * self.margin + 1, 1.0 / self.factor, window=("kaiser", 5.0)))
 
     def noise(self, used: Array) -> Array:
-        """Return what is left of unit white noise on the samples (T, n) that are 1, not 0."""
+        """Return the noise left of unit white noise on the samples (T, n) that are 1, not 0."""
         return np.asarray(np.sqrt(np.maximum(self._filtered(used, self.taps**2), 0.0)))
 
     def __call__(self, signal: Array) -> Array:

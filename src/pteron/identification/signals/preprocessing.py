@@ -1,4 +1,4 @@
-"""How a log is preprocessed: what the user asked for, and what the data made of it."""
+"""The preprocessing of a log: choices of the user, and the plan that the data make of them."""
 
 from __future__ import annotations
 
@@ -48,17 +48,17 @@ _TOLERABLE = 0.5
 """Likewise, up to which a cut-off above that of least error is worth it."""
 
 _REPEATS = 0.02
-"""What a series may leave of a motion, as a share of its span, where it is said to repeat."""
+"""Largest residual of a series, as a share of the span, of a motion that is said to repeat."""
 
 _NOISE_ALONE = 1.25
-"""What it leaves, over the positions' noise, where that is noise alone: what stick and slip have
-above its last harmonic is little beside jitter in positions, and much in forces."""
+"""Largest residual, over the positions' noise, that is noise alone: stick and slip above the last
+harmonic are little beside jitter in positions, and much in forces."""
 
 _ROUNDING = 1e-13
-"""What it leaves by rounding."""
+"""Residual that is rounding."""
 
 _MIXED = 1.5
-"""How far the positions' filter reaches, its ringing included, in periods of its cut-off."""
+"""Reach of the positions' filter, its ringing included, in periods of its cut-off."""
 
 _UNSURE = 0.1
 """Within which the smoothed rate may have the wrong sign, likewise."""
@@ -79,7 +79,7 @@ the motion. More rows than needed cost little."""
 
 @dataclass(frozen=True)
 class Processing:
-    """What a user may choose about the preprocessing of a log; by default the data decide.
+    """Choices about the preprocessing of a log; by default the data decide.
 
     Parameters
     ----------
@@ -128,12 +128,12 @@ class Processing:
 
 @dataclass(frozen=True)
 class Preprocessing:
-    """How a log is preprocessed.
+    """The preprocessing of a log.
 
     Attributes
     ----------
     derivatives : {"periodic", "central", "spline"}
-        How positions are differentiated; see `Processing`.
+        The differentiator of positions; see `Processing`.
     start : tuple of float
         A pose (m,) of the assembly mode.
     rate : float
@@ -153,7 +153,7 @@ class Preprocessing:
     stroke : float
         Mean time between two reversals of the joint that reverses most, s.
     delay : float
-        By how much forces are late for positions, s.
+        Delay of the forces behind the positions, s.
     """
 
     derivatives: Derivatives
@@ -171,7 +171,7 @@ class Preprocessing:
 
     @property
     def differentiator(self) -> Differentiator:
-        """What differentiates the positions."""
+        """The differentiator of the positions."""
         if self.derivatives == "periodic":
             assert self.period is not None  # `preprocessing_of` sees to it
             return FourierFit(self.period, self.cutoff, self.delay)
@@ -190,7 +190,7 @@ class Preprocessing:
 
     @property
     def turning(self) -> int:
-        """Rows before and after a slow one in which the way a joint moves may not be known."""
+        """Rows before and after a slow one in which the direction of a joint may not be known."""
         return self._rows(_UNSURE)
 
     def _rows(self, periods: float) -> int:
@@ -208,7 +208,7 @@ def preprocessing_of(
     rows: int | None = None,
     start: tuple[float, ...] | None = None,
 ) -> Preprocessing:
-    """Return how a log is to be preprocessed.
+    """Return the preprocessing of a log.
 
     Parameters
     ----------
@@ -217,9 +217,9 @@ def preprocessing_of(
     log : Log
         The log, or its first part.
     processing : Processing, optional
-        What the user wants.
+        The user's choices.
     rows : int, optional
-        How many rows the whole log has, where `log` is only a part.
+        Number of rows of the whole log, where `log` is only a part.
     start : tuple of float, optional
         A pose (m,) of its assembly mode, where it is known.
 

@@ -25,7 +25,7 @@ _MOVES = 0.5
 
 _LONGER = 0.002
 """Part of a period by which the stretch is longer than one, at least: a motion that crosses its own
-way is there again for an instant."""
+path is there again for an instant."""
 
 _WHOLE = 0.02
 """Part of a period that may be missing from the last one."""

@@ -23,7 +23,7 @@ BLOCK = 1 << 15
 
 
 @dataclass(frozen=True)
-class Samples:
+class SampleBlock:
     """States and measured forces (R, n), N, at a log's own samples; no other block has the `fresh`.
 
     `smooth` (R,) is that of `Differentiated`.
@@ -43,7 +43,7 @@ def samples(
     *,
     margin: int = 0,
     block: int = BLOCK,
-) -> Iterator[Samples]:
+) -> Iterator[SampleBlock]:
     """Yield the states and forces of a log, in blocks that overlap by `margin` rows at each end.
 
     Parameters
@@ -53,7 +53,7 @@ def samples(
     log : Log or iterable of Log
         The log, or its pieces in order; a periodic one is taken as a whole.
     preprocessing : Preprocessing
-        How positions are smoothed and differentiated.
+        The plan by which positions are smoothed and differentiated.
     margin : int
         Rows at each end of a block that the next filter will lose.
     block : int
@@ -90,7 +90,7 @@ def samples(
         # The next block overlaps this one by its margins.
         pose = tuple(states.pose[-1 - 2 * margin].tolist())
         fresh = slice(margin, len(states) - margin)
-        yield Samples(states, found.forces, fresh, part.source, found.smooth)
+        yield SampleBlock(states, found.forces, fresh, part.source, found.smooth)
     if part is None:
         raise LogError(
             "too short",

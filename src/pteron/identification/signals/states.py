@@ -148,14 +148,14 @@ def start_pose(robot: Manipulator, log: Log) -> tuple[float, ...]:
 
 
 def _apart(robot: Manipulator, poses: Poses, measured: Array) -> Array:
-    """Return how far poses (R, k, m) are from measured ones (R, m), infinite where there is none.
+    """Return distances of poses (R, k, m) from measured ones (R, m), infinite where there is none.
 
-    Position and half-chord of the angle, so that whole turns count for nothing.
+    Of position, and half-chords of the angles, so that whole turns count for nothing.
     """
     off = poses - measured[:, None]
-    lengths = len(robot.platform.directions)
-    distance = np.linalg.norm(off[..., :lengths], axis=-1)
-    distance += np.abs(np.sin(0.5 * off[..., lengths:])).sum(axis=-1)
+    angular = robot.platform.angular
+    distance = np.linalg.norm(off[..., ~angular], axis=-1)
+    distance += np.abs(np.sin(0.5 * off[..., angular])).sum(axis=-1)
     return np.asarray(np.nan_to_num(distance, nan=np.inf))
 
 
@@ -195,7 +195,7 @@ def _no_pose(
 
 def _check_regular(robot: Manipulator, pose: Array, source: str, first_row: int) -> None:
     measures = {"a leg is all but stretched or folded": unchecked(robot, "reach", pose)[1].min(-1)}
-    if closure_of(robot).vanishes() is None or robot.platform.turns:
+    if robot.platform.angles or closure_of(robot).vanishes() is None:
         measures["the pose is all but singular"] = np.abs(unchecked(robot, "type_ii", pose))
     for what, size in measures.items():
         lost = ~(size >= _REGULAR)  # NaN is none

@@ -1,4 +1,4 @@
-"""What is wrong with a log whose forces a model cannot explain: flipped signs, swapped columns."""
+"""Columns of a log that are exchanged or have a flipped sign, found by the fit that mends it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pteron.errors import DataError
 from pteron.identification.estimators import weighted
 from pteron.identification.logs import Log
 from pteron.identification.model import Model
-from pteron.identification.observation import Linear, Observations, observations_of
+from pteron.identification.observation import LinearModel, Observations, observations_of
 from pteron.identification.plausibility import unphysical
 from pteron.identification.signals import Preprocessing
 
@@ -38,7 +38,7 @@ _TOLD = 3
 
 
 @dataclass(frozen=True)
-class Fault:
+class ColumnFault:
     """Columns of forces and of joints that are not what their names say, or gravity that is not.
 
     `order` is which of the columns, from 0, belongs to each actuator, a sign is -1 where it is
@@ -59,14 +59,14 @@ class Fault:
 
     @property
     def changes(self) -> int:
-        """How many exchanges and flips mend it; legs that are exchanged count once."""
+        """Number of exchanges and flips that mend it; legs that are exchanged count once."""
         legs = self.order == self.joint_order
         orders = (self.order,) if legs else (self.order, self.joint_order)
         flips = self.signs.count(-1) + self.joint_signs.count(-1)
         return flips + sum(map(_exchanges, orders)) + self.gravity
 
     def message(self) -> str:
-        """Return what is wrong and what to do, as part of a sentence."""
+        """Return the fault as part of a sentence."""
         parts = []
         usual = tuple(range(len(self.order)))
         if self.gravity:
@@ -110,7 +110,7 @@ def _flipped(names: Sequence[str], order: Sequence[int], signs: Sequence[int]) -
         yield f"{_listed(flipped)} {'has' if len(flipped) == 1 else 'have'} the sign flipped"
 
 
-def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> Fault | None:
+def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> ColumnFault | None:
     """Return the exchange of columns, or of signs, that explains a log's forces far better.
 
     Of those that explain them alike, the one comes first with which friction and inertia are
@@ -145,11 +145,11 @@ def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> Fault 
 
 
 def exchanged_joints(
-    model: Linear, log: Log, preprocessing: Preprocessing, before: float
-) -> Fault | None:
+    model: LinearModel, log: Log, preprocessing: Preprocessing, before: float
+) -> ColumnFault | None:
     """Return the order of the joints, or the sign of one, that makes the error `before` small."""
     none = _fault(model, log.joints.shape[1])
-    best: Fault | None = None
+    best: ColumnFault | None = None
     for fault, observations in _moved_joints(none, model, log, preprocessing):
         (error,) = _errors(observations, [fault])
         if error * DECISIVE < (before if best is None else best.after * DECISIVE):
@@ -157,14 +157,14 @@ def exchanged_joints(
     return best
 
 
-def _fault(model: Linear, n: int) -> Fault:
-    """Return that of a log without a fault."""
+def _fault(model: LinearModel, n: int) -> ColumnFault:
+    """Return the columns as they are called, for the other faults to change."""
     usual, upright = tuple(range(n)), (1,) * n
     names = model.robot.force_names, model.robot.joint_names
-    return Fault(*names, usual, upright, usual, upright, np.inf, np.inf)
+    return ColumnFault(*names, usual, upright, usual, upright, np.inf, np.inf)
 
 
-def _of_forces(none: Fault, observations: Observations) -> list[Fault]:
+def _of_forces(none: ColumnFault, observations: Observations) -> list[ColumnFault]:
     """Return all orders and signs of the forces with their errors, the usual one first."""
     signs = list(product((1, -1), repeat=len(none.order)))
     orders = permutations(none.order)
@@ -175,12 +175,12 @@ def _of_forces(none: Fault, observations: Observations) -> list[Fault]:
 
 def _others(
     model: Model, log: Log, how: Preprocessing, before: float
-) -> Iterator[tuple[Fault, Observations, Model]]:
+) -> Iterator[tuple[ColumnFault, Observations, Model]]:
     """Yield faults of joints, of legs and of gravity that explain the forces far better."""
     none = _fault(model, log.joints.shape[1])
     signs = list(product((1, -1), repeat=len(none.order)))
 
-    def clear(faults: Iterable[Fault]) -> Iterator[Fault]:
+    def clear(faults: Iterable[ColumnFault]) -> Iterator[ColumnFault]:
         return (fault for fault in faults if fault.after * DECISIVE < before)
 
     for fault, observations in _moved_joints(none, model, log, how):
@@ -199,8 +199,8 @@ def _others(
 
 
 def _moved_joints(
-    none: Fault, model: Linear, log: Log, how: Preprocessing
-) -> Iterator[tuple[Fault, Observations]]:
+    none: ColumnFault, model: LinearModel, log: Log, how: Preprocessing
+) -> Iterator[tuple[ColumnFault, Observations]]:
     """Yield logs with the sign of a joint flipped, or joints in another order, that have poses."""
     n = len(none.order)
     faults = [
@@ -217,12 +217,12 @@ def _moved_joints(
             continue  # no poses in this order
 
 
-def _with_errors(observations: Observations, faults: Sequence[Fault]) -> list[Fault]:
+def _with_errors(observations: Observations, faults: Sequence[ColumnFault]) -> list[ColumnFault]:
     errors = _errors(observations, faults)
     return [replace(fault, after=error) for fault, error in zip(faults, errors, strict=True)]
 
 
-def _errors(observations: Observations, faults: Sequence[Fault]) -> list[float]:
+def _errors(observations: Observations, faults: Sequence[ColumnFault]) -> list[float]:
     """Return the error of the fit relative to the forces, for each order and signs of these."""
     step = max(len(observations.forces) // _ROWS, 1)
     matrix, forces = observations.matrix[::step], observations.forces[::step]
@@ -241,7 +241,7 @@ def _errors(observations: Observations, faults: Sequence[Fault]) -> list[float]:
     return found
 
 
-def _unphysical(fault: Fault, observations: Observations, model: Model) -> int:
+def _unphysical(fault: ColumnFault, observations: Observations, model: Model) -> int:
     """Return how much of the machine cannot be, once the forces are mended."""
     forces = observations.forces[:, list(fault.order)] * np.array(fault.signs)
     mended = observations.with_forces(forces)

@@ -12,7 +12,7 @@ from pteron.identification.observation import Observations
 from pteron.kernels import Array
 
 
-def given(
+def checked_observations(
     regressor: ArrayLike,
     forces: ArrayLike,
     *,
