@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
@@ -228,10 +227,7 @@ def _assembled(
 
 def _phases(log: Log, rate: float, fit: FourierFit) -> list[Log]:
     """Return the stretches of a periodic log with one payload that last a period or more."""
-    edges = [0, log.rows]
-    if log.payload is not None:
-        edges[1:1] = (np.flatnonzero(np.diff(log.payload)) + 1).tolist()
-    parts = [log.part(start, stop) for start, stop in pairwise(edges)]
+    parts = [log.part(start, stop) for start, stop in log.phases]
     whole = [part for part in parts if part.duration + 1.0 / rate >= fit.period * (1.0 - 1e-3)]
     if not whole:
         raise LogError(

@@ -25,7 +25,7 @@ from pteron.identification.logs import Finding, Log
 from pteron.identification.logs.at_motor import by_rated_torque
 from pteron.identification.model import Model, Terms, identification_model
 from pteron.identification.observation import Observations, observations_of, stacked
-from pteron.identification.plausibility import left_over, unphysical, unseen
+from pteron.identification.plausibility import CHANCE, left_over, unphysical, unseen
 from pteron.identification.recordings import Recording, recording
 from pteron.identification.signals import Preprocessing, Processing, preprocessing_of
 from pteron.kernels import Array
@@ -34,9 +34,6 @@ from pteron.reduction import BaseParameters
 from pteron.renamed import former_attribute
 
 _NAMES = tuple(f"{name}_L" for name in PLATFORM_KINDS)
-
-_CHANCE = 1e-3
-"""Probability at which values are still taken for those of no payload."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +107,7 @@ class Payload:
         deviations = self.deviations
         correlation = self.covariance / np.outer(deviations, deviations)
         scaled = self.values / deviations
-        return bool(scaled @ np.linalg.solve(correlation, scaled) > chi2.isf(_CHANCE, len(scaled)))
+        return bool(scaled @ np.linalg.solve(correlation, scaled) > chi2.isf(CHANCE, len(scaled)))
 
     @property
     def allowed_for(self) -> bool:

@@ -57,8 +57,8 @@ _PUSHED = 0.05
 _POSITIVE = ("coulomb", "viscous", "passive", "rotor")
 """Terms that no machine has below zero."""
 
-_CHANCE = 1e-3
-"""Probability below which infeasible values are not chance."""
+CHANCE = 1e-3
+"""Probability below which infeasible values, or a payload's, are not chance."""
 
 CLEAR = 5.0
 """Standard deviations from which a scale is told from one."""
@@ -85,7 +85,7 @@ def plausibility_warnings(
     found = []
     if has_negative_inertia(model, estimate.values, estimate.covariance):
         found.append("With these values the machine has negative inertia: forces do not belong.")
-    if consistency is not None and consistency.p_value < _CHANCE:
+    if consistency is not None and consistency.p_value < CHANCE:
         found.append(
             f"No real bodies have these values: they are {consistency.distance:.2g} standard "
             "deviations away. Look at what the model takes for granted: geometry, working mode, "

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -23,7 +22,7 @@ _END = int(np.iinfo(np.int64).max)
 _ROUNDINGS = 2.0
 """Largest error of stamps beside their clock's ticks, in the spacing of floats."""
 
-_FIT = 0.7
+FITTED = 0.7
 """Share of a log that is fitted where nothing else is held out."""
 
 
@@ -184,9 +183,8 @@ def divided(whole: Recording, period: float | None) -> tuple[Recording, Recordin
     log = whole.log
     period = period or log.description.period
     if isinstance(log, Log) and log.payload is not None and np.ptp(log.payload):
-        edges = [0, *(np.flatnonzero(np.diff(log.payload)) + 1).tolist(), log.rows]
         out = np.zeros(log.rows, dtype=bool)
-        for start, stop in pairwise(edges):
+        for start, stop in log.phases:
             out[start + _cut(log.part(start, stop), stop - start, period) : stop] = True
         parts = log.without(out), log.without(~out)
         first, second = (Recording(part, 0, part.rows) for part in parts)
@@ -204,6 +202,6 @@ def _cut(log: Log | LogFile, rows: int, period: float | None) -> int:
     if period is not None and isinstance(log, Log):
         whole_periods = int((log.duration + 1.0 / log.rate) / period + 1e-3)
         if whole_periods >= 2:
-            share = min(max(round(_FIT * whole_periods), 1), whole_periods - 1)
+            share = min(max(round(FITTED * whole_periods), 1), whole_periods - 1)
             return int(np.searchsorted(log.time, log.time[0] + (share * period - 0.5 / log.rate)))
-    return int(_FIT * rows)
+    return int(FITTED * rows)

@@ -23,12 +23,10 @@ from pteron.identification.estimators import (
 from pteron.identification.estimators.reduction import Reduced, reduced
 from pteron.identification.observation import Observations
 from pteron.identification.prediction import FRICTION, Prediction
+from pteron.identification.recordings import FITTED
 from pteron.identification.signals.filters import white_noise
 from pteron.identification.verdict import Verdict, verdict_of
 from pteron.kernels import Array
-
-_FITTED = 0.7
-"""Share of the samples that is fitted where none are held out."""
 
 _LEAST_ROWS = 9
 """Samples from which the noise of forces can be told without a model."""
@@ -143,7 +141,7 @@ def estimate(
     elif instruments is not None:
         z = _like(whole, instruments)
     if held_out is None:
-        rows = round(_FITTED * len(whole.time))
+        rows = round(FITTED * len(whole.time))
         if rows in (0, len(whole.time)):
             raise DataError(f"forces: {len(whole.time)} samples given, more are needed")
         fit, check = _part(whole, slice(rows)), _part(whole, slice(rows, None))

@@ -305,8 +305,7 @@ def _moving_most(log: Log, rows: int) -> list[Log]:
     steps = (np.diff(log.joints, axis=0) ** 2).sum(axis=1)
     travel = np.concatenate([[0.0], np.cumsum(steps)])
     phase = np.zeros(log.rows) if log.payload is None else log.payload
-    edges = [0, *(np.flatnonzero(np.diff(phase)) + 1).tolist(), log.rows]
-    phases = sorted(pairwise(edges), key=lambda part: part[0] - part[1])
+    phases = sorted(log.phases, key=lambda part: part[0] - part[1])
     longest = {phase[start]: (start, stop) for start, stop in reversed(phases)}
     size = rows // len(longest)
     found = []

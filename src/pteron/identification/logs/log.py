@@ -156,9 +156,14 @@ class Log:
         """The stretches without a gap, in order; together they are the whole log."""
         if not self.rows:
             return ()
-        ends = np.flatnonzero(gaps(self.time, 1.0 / self.rate)) + 1
-        edges = [0, *ends.tolist(), self.rows]
-        return tuple(slice(a, b) for a, b in pairwise(edges))
+        return tuple(slice(a, b) for a, b in stretches(gaps(self.time, 1.0 / self.rate)))
+
+    @property
+    def phases(self) -> list[tuple[int, int]]:
+        """First row, and row behind the last, of each stretch with one payload."""
+        if self.payload is None:
+            return [(0, self.rows)]
+        return stretches(np.diff(self.payload) != 0)
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -230,6 +235,11 @@ def _rows_of(log: Log) -> NDArray[np.int64]:
     if log.rows_in_file is not None:
         return log.rows_in_file
     return log.first_row + np.arange(log.rows)
+
+
+def stretches(ends: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return first row, and row behind the last, of stretches that end where (T - 1,) is true."""
+    return list(pairwise([0, *(np.flatnonzero(ends) + 1).tolist(), len(ends) + 1]))
 
 
 def gaps(time: NDArray[np.float64], step: float) -> NDArray[np.bool_]:

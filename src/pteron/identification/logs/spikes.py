@@ -73,7 +73,7 @@ def force_spikes(values: Values, joints: Values, own: int) -> Mask:
     usual = (values > low - far) & (values < high + far)
     turns = maximum_filter1d(turns.astype(np.int8), 5) > 0
     motion = _JointMotion(joints)
-    for start, stop in _runs(found):
+    for start, stop in runs(found):
         group = slice(start, stop)
         turned = turns[group].any() and usual[group].all()
         if turned or motion.is_pushed(start, stop):
@@ -153,7 +153,8 @@ def _span(values: Values) -> float:
     return float(high - low)
 
 
-def _runs(mask: Mask) -> list[tuple[int, int]]:
+def runs(mask: Mask) -> list[tuple[int, int]]:
+    """Return first row, and row behind the last, of each run that is true."""
     edges = np.flatnonzero(np.diff(mask.astype(np.int8), prepend=0, append=0))
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
@@ -186,13 +187,13 @@ class Spikes:
             if not mask.any():
                 continue
             out |= mask
-            runs = _runs(mask)
-            start = runs[0][0]
+            groups = runs(mask)
+            start = groups[0][0]
             channel = joints[:, j] if j < n else forces[:, j - n]
             self._first.setdefault(name, float(channel[inner][start]))
             self._counts[name] += int(mask.sum())
             known = self._rows[name]
-            known += [(first_row + a, first_row + b) for a, b in runs[: _TOLD + 1 - len(known)]]
+            known += [(first_row + a, first_row + b) for a, b in groups[: _TOLD + 1 - len(known)]]
         if out.mean() > _MOST:
             self._too_many = True
             out[:] = False

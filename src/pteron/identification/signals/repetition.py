@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 from scipy.interpolate import make_interp_spline  # type: ignore[import-untyped]
 from scipy.ndimage import binary_closing  # type: ignore[import-untyped]
 
+from pteron.identification.logs.spikes import runs
 from pteron.identification.signals.filters import position_noise
 from pteron.kernels import Array
 
@@ -67,7 +66,7 @@ def repeating_rows(time: Array, joints: Array, period: float) -> slice | None:
     same = binary_closing(ends, np.ones(_SPIKES + 1))[_SPIKES:-_SPIKES]
 
     best: tuple[float, float] | None = None
-    for start, stop in _runs(same):
+    for start, stop in runs(same):
         begin, end = float(time[start]), float(time[stop - 1]) + period
         through = joints[start : int(np.searchsorted(time, end, side="right"))]
         moves = (np.ptp(through, axis=0) >= _MOVES * span).all() and span.all()
@@ -81,9 +80,3 @@ def repeating_rows(time: Array, joints: Array, period: float) -> slice | None:
     begin = max(begin + 0.5 * (end - begin - periods * period), begin)
     first = int(np.searchsorted(time, begin - 0.5 / rate))
     return slice(first, int(np.searchsorted(time, begin + periods * period - 0.5 / rate)))
-
-
-def _runs(true: Array) -> list[tuple[int, int]]:
-    """Return where each run of what is true starts, and where it stops."""
-    edges = np.flatnonzero(np.diff(np.r_[False, true, False])).tolist()
-    return list(pairwise(edges))[::2]

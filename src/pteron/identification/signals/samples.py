@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 from math import ceil
 
 import numpy as np
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 
 from pteron.identification.errors import LogError
 from pteron.identification.logs import Log, joined
-from pteron.identification.logs.log import are_apart, gaps
+from pteron.identification.logs.log import are_apart, gaps, stretches
 from pteron.identification.signals.preprocessing import Preprocessing
 from pteron.identification.signals.states import States
 from pteron.kernels import Array
@@ -132,10 +131,8 @@ def _stretches(piece: Log, rate: float) -> Iterator[Log]:
     ends = gaps(piece.time, 1.0 / rate)
     if piece.payload is not None:
         ends |= np.diff(piece.payload) != 0
-    edges = [0, *(np.flatnonzero(ends) + 1).tolist(), piece.rows]
-    for start, stop in pairwise(edges):
-        if stop > start:
-            yield piece.part(start, stop)
+    for start, stop in stretches(ends) if piece.rows else ():
+        yield piece.part(start, stop)
 
 
 def _continues(held: Log, following: Log, rate: float) -> bool:
