@@ -168,7 +168,7 @@ def main() -> None:
         pteron.save(robot, folder / "robot.toml")
         succeeded(folder, "check", "robot.toml")
         seconds = "5" if quick else "20"
-        motion = "excite robot.toml --stribeck --out motion.csv --acceleration 40 --periods 2"
+        motion = "excite robot.toml --stribeck --out motion.csv --acceleration 40 --periods 4"
         succeeded(folder, *motion.split(), "--seconds", seconds)
 
         # Record

@@ -16,7 +16,7 @@ CODE: dict[str, tuple[str, ...]] = {
     "10": (f"{_E}.kinematics.jacobian",),
     "11": (f"{_E}.kinematics.link_jacobians", f"{_E}.kinematics.body_jacobian"),
     "12": (f"{_E}.kinematics.link_jacobians", f"{_E}.kinematics.body_jacobian"),
-    "13": (f"{_E}.virtual_work.inverse_dynamics", f"{_L}.leg.LegEquations.needs"),
+    "13": (f"{_E}.virtual_work.inverse_dynamics", f"{_L}.leg.LegEquations.needs_of_bodies"),
     "14": (f"{_E}.virtual_work.needed_forces", "pteron.bodies.motion.needed_wrench"),
     "15": (f"{_E}.regressor.paper_regressor", f"{_E}.virtual_work.inverse_dynamics"),
     "16": ("pteron.bodies.parameters.parameter_list", "pteron.bodies.inertia.PlanarInertia"),

@@ -83,7 +83,7 @@ class LegMotion(NamedTuple):
     lower link's reference point is the platform point, and its x points there from the joint."""
     chain: tuple[Joint, ...]
     """The joints from the base to the platform, all of them: their screws times their rates are the
-    platform's twist. Their points, in this order, are what is drawn."""
+    platform's twist, Eq. (9). Their points, in this order, are what is drawn."""
     links: tuple[Expression | None, Expression | None] = (None, None)
     """l_u and l_l, where the leg has them."""
     turning: tuple[tuple[Expression, Expression] | None, ...] = (None, None)

@@ -263,7 +263,8 @@ class PRRREquations(LegEquations):
             self.d_bar = direction / ca.dot(direction, slider_direction)
             self.e_plane = ca.mtimes(self.plane.T, slider_direction)
         self.constant_row = self.d_bar
-        # u = across (c - r): the part of c - r - rho e in the plane, Eq. (5).
+        # r + rho e + u = c, Eq. (3): u = across (c - r) is the part of c - r - rho e in the plane,
+        # Eq. (5).
         self.across = self.plane.T - ca.mtimes(self.e_plane, self.d_bar.T)
 
     def _state(self, point: PointMotion) -> _InPlane:
