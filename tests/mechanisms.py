@@ -13,6 +13,9 @@ import pteron
 NIGHTLY = pytest.mark.nightly
 """Marks a test, or one of its cases, of a claim that the gate tests elsewhere."""
 
+CLIENTS = pytest.mark.clients
+"""Marks what uses the library at length as others do."""
+
 BATCH_SHAPES = [(), (1,), (7,), (3, 5), (0,), (300,)]
 """300 is more than one block of the virtual machine."""
 
@@ -333,11 +336,11 @@ LARGE = ("clearances", "least_clearances", "adaptive", "adaptive_drives", "paper
 """Functions that take a C compiler seconds; the gate compiles the others."""
 
 
-def gated(cases, gate=GATE):
-    """Return the cases of a claim, each once; those not of the gate are for `make nightly`."""
+def gated(cases, gate=GATE, mark=NIGHTLY):
+    """Return the cases of a claim, each once; those not of the gate wait as the mark says."""
     every = dict.fromkeys(cases)
     assert not set(gate).isdisjoint(every)
-    return [case if case in gate else pytest.param(case, marks=NIGHTLY) for case in every]
+    return [case if case in gate else pytest.param(case, marks=mark) for case in every]
 
 
 @lru_cache

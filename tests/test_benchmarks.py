@@ -5,16 +5,14 @@ import sys
 from pathlib import Path
 
 import pytest
+from mechanisms import CLIENTS, gated
 
 BENCHMARKS = sorted((Path(__file__).parent.parent / "benchmarks").glob("[!_]*.py"))
 
 
 @pytest.mark.parametrize(
     "script",
-    [
-        path if path.name == "operations.py" else pytest.param(path, marks=pytest.mark.clients)
-        for path in BENCHMARKS
-    ],
+    gated(BENCHMARKS, [path for path in BENCHMARKS if path.name == "operations.py"], CLIENTS),
     ids=lambda path: path.name,
 )
 def test_it_runs(script, tmp_path):

@@ -14,6 +14,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from mechanisms import CLIENTS, gated
 from typer.main import get_command
 from typer.testing import CliRunner
 
@@ -177,8 +178,7 @@ SLOW = {"docs/plots.md", "docs/play.md", "docs/how-to/prove-a-workspace.md"}
 
 
 @pytest.mark.parametrize(
-    "name",
-    [pytest.param(n, marks=pytest.mark.clients if n in SLOW else ()) for n in WITH_BLOCKS],
+    "name", gated(WITH_BLOCKS, [name for name in WITH_BLOCKS if name not in SLOW], CLIENTS)
 )
 def test_python_runs(name, tmp_path, monkeypatch):
     """In order, in one session; what follows `>>>` is compared with what is shown."""

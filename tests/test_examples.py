@@ -6,6 +6,7 @@ from pathlib import Path
 from unittest.mock import patch
 
 import pytest
+from mechanisms import CLIENTS, gated
 
 import pteron
 from pteron.legs import KINDS
@@ -20,10 +21,7 @@ SLOW = {"base_parameters.py", "identify.py", "platform_size.py"}
 
 @pytest.mark.parametrize(
     "script",
-    [
-        pytest.param(path, marks=pytest.mark.clients if path.name in SLOW else ())
-        for path in EXAMPLES
-    ],
+    gated(EXAMPLES, [path for path in EXAMPLES if path.name not in SLOW], CLIENTS),
     ids=lambda path: path.name,
 )
 def test_it_runs(script, tmp_path, monkeypatch, capsys):

@@ -17,7 +17,7 @@ import fmpy
 import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
-from mechanisms import CATALOG, MECHANISMS, random_machine, states, with_elbows
+from mechanisms import CATALOG, CLIENTS, MECHANISMS, gated, random_machine, states, with_elbows
 from scipy.integrate import solve_ivp
 from typer.testing import CliRunner
 
@@ -70,7 +70,9 @@ ROBOTS = {
 # CasADi
 
 
-@pytest.mark.parametrize("name", ["quadrupteron", "delta", "par4", "mixed"])
+@pytest.mark.parametrize(
+    "name", gated(["quadrupteron", "delta", "par4", "mixed"], ["quadrupteron", "delta"], CLIENTS)
+)
 def test_casadi_functions_are_the_librarys(name):
     robot = ROBOTS[name]
     functions = casadi_functions(robot)
@@ -171,7 +173,14 @@ def simulated(path, kind, stop, **values):
 KINDS = ["CoSimulation", "ModelExchange"]
 
 
-@pytest.mark.parametrize("name", ["quadrupteron", "oblique", "delta", "par4", "five-bar", "mixed"])
+@pytest.mark.parametrize(
+    "name",
+    gated(
+        ["quadrupteron", "oblique", "delta", "par4", "five-bar", "mixed"],
+        ["delta", "five-bar"],
+        CLIENTS,
+    ),
+)
 def test_fmpy_simulates_an_fmu_as_scipy_the_librarys_equations(name):
     """With forces, a wrench, and a payload, which here is another platform."""
     robot, path = ROBOTS[name], fmu_of(name)
@@ -472,7 +481,9 @@ def klippers(robot, poses, text):
     return places
 
 
-@pytest.mark.parametrize("name", KLIPPER)
+@pytest.mark.parametrize(
+    "name", gated(KLIPPER, ["tripteron-oblique", "cranks with a tool", "guides below"], CLIENTS)
+)
 def test_klipper_puts_the_joints_where_the_library_does(tmp_path, name):
     robot = KLIPPER[name]
     config, text = settings(robot, tmp_path)
@@ -514,7 +525,7 @@ def test_klippers_end_stops_are_the_joints_upper_limits(tmp_path, name):
 DELTAS = [name for name in KLIPPER if "delta" in name or "cranks" in name or "guides" in name]
 
 
-@pytest.mark.parametrize("name", DELTAS)
+@pytest.mark.parametrize("name", gated(DELTAS, ["cranks", "guides below"], CLIENTS))
 def test_klipper_homes_a_delta_and_reaches_its_bed(tmp_path, name):
     """`home` of rotary_delta.py comes from z = -1, that of delta.py from far below."""
     robot = KLIPPER[name]
@@ -715,7 +726,7 @@ ANGLE = {
 }
 
 
-@pytest.mark.parametrize("name", LINUXCNC)
+@pytest.mark.parametrize("name", gated(LINUXCNC, ["upside", "3-rrr with a tool"], CLIENTS))
 def test_linuxcnc_goes_to_the_joints_and_back(tmp_path, name):
     robot = LINUXCNC[name]
     library, _ = kinematics(robot, tmp_path)
