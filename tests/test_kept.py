@@ -13,7 +13,19 @@ from pteron.workspace import home
 
 PACKAGE = Path(pteron.__file__).parent
 
-PLAIN = {"arguments", "atomic", "errors", "extras", "html_table", "shapes", "toml"}
+PLAIN = {
+    *(
+        "arguments",
+        "atomic",
+        "errors",
+        "extras",
+        "html_table",
+        "renamed",
+        "shapes",
+        "templates",
+        "toml",
+    ),
+}
 """Modules at the top that hold messages, types and files, but no equation."""
 
 
