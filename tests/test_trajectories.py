@@ -584,7 +584,7 @@ def test_the_command_goes_lines_joints_and_tables(tmp_path):
         ("--kind joints --to 0.05 0 0", "--jerk is missing"),
         ("--kind replay", "no motion given; give --table"),
         ("--table nowhere.csv", "nowhere.csv: no such file"),
-        ("--rate 0", "--rate: 0.0 given"),
+        ("--rate 0", "--rate: 0 given"),
         ("--out motion.txt", "motion.txt: unknown ending"),
     ],
 )

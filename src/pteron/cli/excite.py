@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from rich.table import Table
 
@@ -172,7 +172,7 @@ def excite(
             )
     files = [] if out is None else found.write(out, rate, periods, layout, cycles, slow)
     if json:
-        more = {"start": led.start, "end": led.end, "duration": led.duration}
+        more: dict[str, Any] = {"start": led.start, "end": led.end, "duration": led.duration}
         more |= {"held_out": cycles and cycles.as_dict(), "slow": slow and slow.duration}
         show_json({**found.as_dict(), **more, "files": [str(path) for path in files]})
         return

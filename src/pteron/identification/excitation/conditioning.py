@@ -109,7 +109,7 @@ def information_root(
     matrix = stacked_regressor(motion, base, motion.uniform_times(count))
     if not np.isfinite(matrix).all():
         return np.full((base.rank, base.rank), np.nan)
-    return _qr_factor(matrix) / np.sqrt(count)
+    return np.asarray(_qr_factor(matrix) / np.sqrt(count))
 
 
 def conditioning_of(root: Array, values: Array) -> Conditioning:

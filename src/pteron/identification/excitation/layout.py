@@ -140,7 +140,7 @@ class Layout:
         """Return the columns behind t, and what they are in, in SI units."""
         names = self.joint_columns or robot.joint_names
         joints = [(name, leg.joint.unit) for name, leg in zip(names, robot.legs, strict=True)]
-        pose = list(zip(robot.coordinates, robot.units, strict=True))
+        pose: list[tuple[str, str]] = list(zip(robot.coordinates, robot.units, strict=True))
         if self.contents != "all":
             return joints if self.contents == "joints" else pose
         found = joints + pose

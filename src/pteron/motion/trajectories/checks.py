@@ -146,7 +146,8 @@ def _failed_reach(curve: _Curve, marks: Array) -> _Failure | None:
     robot = curve.robot
 
     def squares(at: Array) -> Array:
-        return np.nan_to_num(numeric(robot, "squared_type_i")(curve.poses(at))[0], nan=-1.0)
+        found = numeric(robot, "squared_type_i")(curve.poses(at))[0]
+        return np.asarray(np.nan_to_num(found, nan=-1.0))
 
     found = first_below(squares, marks, TYPE_I**2)
     if found is None:
