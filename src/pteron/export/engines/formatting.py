@@ -120,7 +120,13 @@ def head(opened: Tree, language: str) -> list[str]:
     ]
 
 
+def direction(body: TreeBody, axis: Array) -> Array:
+    """Return a unit vector (3,) of the base frame at the home pose in a body's own frame."""
+    return np.asarray(axis @ body.axes)
+
+
 FORMATS: dict[str, Any] = {
+    "direction": direction,
     "number": number,
     "small": small,
     "row": row,

@@ -9,7 +9,7 @@ import numpy as np
 
 from pteron.export.engines.formatting import look, row
 from pteron.export.engines.inertia import between_joints
-from pteron.export.engines.parts import BASE, BodyShape, TreeBody, TreeJoint
+from pteron.export.engines.parts import BASE, BodyShape, Tree, TreeBody, TreeJoint
 from pteron.kernels import Array
 
 _SAME = 1e-6
@@ -48,6 +48,26 @@ def links_of(bodies: Sequence[TreeBody]) -> list[Link]:
             found.append(Link(name, parent, body, joint, first, last, *inertia))
             parent = name
     return found
+
+
+class JointDrive(NamedTuple):
+    """A drive's numbers at the joint of the tree that it moves, SI units."""
+
+    effort: float | None
+    speed: float | None
+    damping: float
+    friction: float
+
+
+def joint_drive(opened: Tree, joint: TreeJoint) -> JointDrive | None:
+    """Return the numbers of the drive that moves a joint; None for a passive one."""
+    for motor in opened.motors:
+        if motor.joint == joint.name:
+            drive, ratio = motor.drive, abs(motor.ratio)
+            effort = ratio * drive.max_force if drive.max_force else None
+            speed = drive.max_speed / ratio if drive.max_speed else None
+            return JointDrive(effort, speed, ratio**2 * drive.viscous, ratio * drive.coulomb)
+    return None
 
 
 class LinkShape(NamedTuple):

@@ -143,7 +143,6 @@ def pinocchio_source(opened: Tree) -> str:
         armature=armature,
         joints={joint.name: joint for joint in opened.joints},
         place_of=lambda body: _from_parent(opened, bodies, body)[:3],
-        local=lambda body, axis: axis @ body.axes,
         bound=_bound,
         list=_list,
     )

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 from pteron.atomic import write_texts
-from pteron.export.engines.formatting import FORMATS, frame, head, left_out, number, row
+from pteron.export.engines.formatting import FORMATS, frame, head, left_out
 from pteron.export.engines.inertia import SHARE
-from pteron.export.engines.links import link_shape, links_of, placed
-from pteron.export.engines.parts import Tree, TreeBody, TreeJoint
+from pteron.export.engines.links import joint_drive, link_shape, links_of, placed
+from pteron.export.engines.parts import Tree
 from pteron.export.engines.shapes import dressed
 from pteron.export.engines.tree import tree
 from pteron.export.names import identifier
@@ -75,34 +74,5 @@ def sdf(opened: Tree) -> str:
         frame=frame,
         placed=placed,
         link_shape=link_shape,
-        joint_of=lambda link: _joint(opened, link.body, link.joint),
+        drive_of=lambda joint: joint_drive(opened, joint),
     )
-
-
-def _joint(opened: Tree, body: TreeBody, joint: TreeJoint) -> dict[str, Any]:
-    """Return a joint's texts; its limits are told from the home pose."""
-    limit, dynamics = [], []
-    if joint.limits is not None:
-        low, high = (number(bound - joint.home) for bound in joint.limits)
-        limit += [f"<lower>{low}</lower>", f"<upper>{high}</upper>"]
-    for motor in opened.motors:
-        if motor.joint != joint.name:
-            continue
-        drive, ratio = motor.drive, abs(motor.ratio)
-        if drive.max_force:
-            limit.append(f"<effort>{number(ratio * drive.max_force)}</effort>")
-        if drive.max_speed:
-            limit.append(f"<velocity>{number(drive.max_speed / ratio)}</velocity>")
-        if drive.viscous or drive.coulomb:
-            dynamics.append(f"<damping>{number(ratio**2 * drive.viscous)}</damping>")
-            dynamics.append(f"<friction>{number(ratio * drive.coulomb)}</friction>")
-    follows = joint.follows
-    return {
-        "name": joint.name,
-        "type": "prismatic" if joint.slides else "revolute",
-        "axis": row(joint.axis @ body.axes),
-        "home": number(joint.home),
-        "limit": "".join(limit),
-        "dynamics": "".join(dynamics),
-        "mimic": None if follows is None else (follows[0], number(follows[1])),
-    }

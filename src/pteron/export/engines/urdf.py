@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -14,12 +13,11 @@ from pteron.export.engines.formatting import (
     head,
     left_out,
     number,
-    row,
     within,
 )
 from pteron.export.engines.inertia import SHARE
-from pteron.export.engines.links import link_shape, links_of, placed
-from pteron.export.engines.parts import Tree, TreeBody, TreeJoint, at_zero
+from pteron.export.engines.links import joint_drive, link_shape, links_of, placed
+from pteron.export.engines.parts import Tree, at_zero
 from pteron.export.engines.shapes import dressed
 from pteron.export.engines.tree import tree
 from pteron.export.names import identifier
@@ -92,38 +90,10 @@ def urdf(opened: Tree) -> str:
         links=links_of(bodies),
         place_of=lambda link: placed(from_parent(bodies, link.body) if link.first else np.eye(4)),
         link_shape=link_shape,
-        joint_of=lambda link: _joint(opened, link.body, link.joint),
+        most=_MOST,
+        far=_FAR,
+        drive_of=lambda joint: joint_drive(opened, joint),
     )
-
-
-def _joint(opened: Tree, body: TreeBody, joint: TreeJoint) -> dict[str, Any]:
-    """Return a joint's texts."""
-    kind, limits = ("prismatic" if joint.slides else "revolute"), joint.limits
-    if limits is None and not joint.slides:
-        kind = "continuous"
-    low, high = limits or (-_FAR, _FAR)
-    drives = [motor for motor in opened.motors if motor.joint == joint.name]
-    effort = speed = _MOST
-    dynamics = ""
-    for motor in drives:
-        drive, ratio = motor.drive, abs(motor.ratio)
-        effort = ratio * drive.max_force if drive.max_force else _MOST
-        speed = drive.max_speed / ratio if drive.max_speed else _MOST
-        if drive.viscous or drive.coulomb:
-            damping, friction = number(ratio**2 * drive.viscous), number(ratio * drive.coulomb)
-            dynamics = f'damping="{damping}" friction="{friction}"'
-    limit = f'effort="{number(effort)}" velocity="{number(speed)}"'
-    if kind != "continuous":
-        limit = f'lower="{number(low)}" upper="{number(high)}" {limit}'
-    follows = joint.follows
-    return {
-        "name": joint.name,
-        "type": kind,
-        "axis": row(joint.axis @ body.axes),
-        "limit": limit if drives or kind != "continuous" else "",
-        "dynamics": dynamics,
-        "mimic": None if follows is None else (follows[0], number(follows[1])),
-    }
 
 
 def closure_yaml(opened: Tree) -> str:
