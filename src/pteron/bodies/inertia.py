@@ -14,7 +14,7 @@ _ROUNDING = 1e-12
 
 @runtime_checkable
 class Inertia(Protocol):
-    """What a body's inertia tells of itself: the kinds of its parameters, and their values."""
+    """The inertia of a body: the kinds of its parameters, and their values."""
 
     @property
     def kinds(self) -> tuple[str, ...]:

@@ -77,7 +77,7 @@ class BodyMotion(NamedTuple):
     """
 
     position: Expression
-    """Of the reference point, (3, 1)."""
+    """The place of the reference point, (3, 1)."""
     velocity_row: Expression
     """(3, 6): d v / d (c', omega)."""
     acceleration: Expression

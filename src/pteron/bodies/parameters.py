@@ -23,11 +23,11 @@ PREFERENCE = (
 """Kinds and bodies of parameters, those that base parameters keep first in front, as Table 1."""
 
 JOINED = (("m", "u"), ("mgx", "l"))
-"""What the cheapest model does without: m_u joins the slider, and m gamma_x of a lower link is
+"""Parameters that the cheapest model drops: m_u joins the slider, and m gamma_x of a lower link is
 masses at its ends."""
 
 OWN = (("m", "p"), ("I", "u"), ("mgx", "u"), ("mgy", "u"), ("I", "l"), ("mgy", "l"))
-"""What it always keeps, if it acts at all."""
+"""Parameters that the cheapest model keeps, if they act at all."""
 
 _UNITS = ("kg", "kg m", "kg m^2")
 
@@ -69,7 +69,7 @@ class Parameter:
 
     @property
     def suffix(self) -> str:
-        """What tells its legs in the name."""
+        """The end of its name, which tells its legs."""
         if self.everyone or not self.legs:
             return ""
         return str(self.legs[0]) if len(self.legs) == 1 else f"({','.join(map(str, self.legs))})"

@@ -14,7 +14,7 @@ from pteron.errors import ModelError, shown
 Vector = tuple[float, float, float]
 
 UNIT_TOLERANCE = 1e-6
-"""How far from 1 the length of a unit vector may be before it is refused instead of normalised."""
+"""Greatest difference from 1 of the length of a unit vector that is normalised, not refused."""
 
 PARALLEL_TOLERANCE = 1e-9
 """Sine of the angle under which two unit vectors count as parallel."""

@@ -1,4 +1,4 @@
-"""What a closure must supply: read this page before writing another.
+"""The protocol of closures: read this page before writing another kind.
 
 The legs' rows against (c', omega) and the platform's matrices d(c, omega)/dx make up the Jacobian,
 Eq. (10): q' = J x'. A closure turns that round: forces through J^-T, rates through J^-1, joint
@@ -39,7 +39,7 @@ class Closure(ABC):
     @property
     @abstractmethod
     def modes(self) -> int:
-        """How many poses joint coordinates have at most: the columns of `poses`."""
+        """The greatest number of poses of joint coordinates: the columns of `poses`."""
 
     def forces(
         self, wrench: Expression, platform: PlatformMotion, legs: Sequence[LegMotion]

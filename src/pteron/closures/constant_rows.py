@@ -25,7 +25,7 @@ _VANISHING = 1e-10
 (1e-16) and far below what any layout meant to work would have."""
 
 _ROUNDING = 1e-14
-"""What the closures' terms keep, relative to the largest of them."""
+"""Rounding of the closures' terms, relative to the largest of them."""
 
 
 class ConstantRows(Closure):

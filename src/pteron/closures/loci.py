@@ -1,4 +1,4 @@
-"""Where planes and spheres meet in space, circles and lines in a plane: closed forms."""
+"""Meeting points of planes and spheres in space, of circles and lines in a plane: closed forms."""
 
 from __future__ import annotations
 

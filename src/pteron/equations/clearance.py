@@ -1,4 +1,4 @@
-"""How far a machine's bodies are from each other: least distances of their centre lines.
+"""Clearances between a machine's bodies: least distances of their centre lines.
 
 A body is one straight segment or more: a leg's links and rods, a slider's guide within its limits,
 the platform as arms from P to its points. Two bodies that share a joint are left out, and so are

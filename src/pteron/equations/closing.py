@@ -1,4 +1,4 @@
-"""What legs leave to the platform while their joints are held, and Newton's step to a pose there.
+"""Closures with the joints held, and Newton's step to a pose that meets them.
 
 A held leg keeps its platform point c on a plane, a sphere or, in a planar machine, a circle, or it
 keeps the platform's angle: its locus, see `legs.leg`.
@@ -21,10 +21,10 @@ _STEPS = 4
 """Newton's steps that a controller takes: they reach rounding from some hundredths of the size."""
 
 _CLOSED = 1e-6
-"""What may be missed before the last of them, which squares it: enough for single precision."""
+"""Greatest share missed before the last of them, which squares it: enough for single precision."""
 
 _STEADY = 0.01
-"""By how much the determinants of the last two steps may differ, relatively.
+"""Greatest relative difference of the determinants of the last two steps.
 
 Next to a pose they are alike. Where there is none, next to a singularity, so little may be missed
 that it counts as closed, but each step's determinant is half of the last one's or less.
@@ -32,7 +32,7 @@ that it counts as closed, but each step's determinant is half of the last one's 
 
 
 _NOTHING = 1e-9
-"""m that are nothing beside a machine's size."""
+"""Length that counts as zero beside any machine, m."""
 
 
 class Rows(NamedTuple):
@@ -98,7 +98,7 @@ def _counted(machine: Machine, locus: Sphere | Circle, v: Expression) -> Express
 
 
 class Misses(NamedTuple):
-    """By how much a pose misses closures whose joints are held."""
+    """The distances by which a pose misses closures whose joints are held."""
 
     lengths: Expression
     """(n, 1): m, or rad."""
@@ -107,7 +107,7 @@ class Misses(NamedTuple):
     relative: Expression
     """The largest, as a share of the terms that they are the differences of, of all legs."""
     arms: list[Expression | None]
-    """From the centers of spheres and circles to the platform points, (3, 1) each."""
+    """Vectors from the centers of spheres and circles to the platform points, (3, 1) each."""
 
     @property
     def step(self) -> tuple[Expression, Expression]:
@@ -163,7 +163,7 @@ def newton_step(
 
 
 class Stepped(NamedTuple):
-    """Where Newton's steps lead to."""
+    """The end of Newton's steps."""
 
     pose: Expression
     """NaN where they do not converge, or a leg does not reach; not finite where the type-II
@@ -171,7 +171,7 @@ class Stepped(NamedTuple):
     measure: Expression
     """The type-II measure."""
     determinant: Expression
-    """Of the closures' derivatives: it has the same zeros, and changes its sign there."""
+    """The determinant of the closures' slopes, which has the measure's zeros and their signs."""
     missed: Misses
     """Before the last step."""
 

@@ -1,4 +1,4 @@
-"""What keeps the platform from turning otherwise than it should: the couples that the legs hold.
+"""The couples by which the legs keep the platform from turning otherwise than it should.
 
 A leg that lets what it carries turn about some axes only holds couples across these, whether its
 joint is held or not. Where the legs' couples no longer span the turns that the platform must not

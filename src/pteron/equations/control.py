@@ -26,8 +26,8 @@ from pteron.equations.drives import Drives, joint_motion
 from pteron.equations.machine import Machine, State
 
 Per = Literal["joint", "coordinate", "parameter", "pair", "law"]
-"""What a part of a vector has one number for: each joint, each of the pose's coordinates, each
-parameter that is estimated, each pair of these, or the law as a whole."""
+"""The owner of each number in a part of a vector: a joint, one of the pose's coordinates, a
+parameter that is estimated, a pair of these, or the law as a whole."""
 
 Layout = Mapping[str, Mapping[str, Per]]
 """The parts of a vector, in order, for each law by name."""
@@ -69,7 +69,7 @@ MEMORY: Layout = {
 and what is learnt beyond the estimates at the start, as `estimates` has it."""
 
 ADAPTED = ("inertia", "coulomb", "viscous", "offset")
-"""What `adaptive_drives` estimates of the drives, after the inertial or base parameters, each for
+"""Drives' numbers that `adaptive_drives` estimates after the inertial or base parameters, each for
 all joints: the first of `Drives`, in which forces are linear."""
 
 
@@ -115,7 +115,7 @@ def estimates(gains: Mapping[str, Expression], learnt: Expression) -> Expression
 
 
 class Wanted(NamedTuple):
-    """What the platform is to do at the sample: pose, velocity and acceleration, (m, 1) each."""
+    """The wanted motion of the platform at a sample: pose, velocity, acceleration, (m, 1) each."""
 
     pose: Expression
     velocity: Expression
@@ -133,7 +133,7 @@ class Wanted(NamedTuple):
 
 @dataclass(frozen=True)
 class Sample:
-    """What a law is given."""
+    """The inputs of a law."""
 
     machine: Machine
     wanted: Wanted
@@ -163,7 +163,7 @@ class Sample:
 
     @cached_property
     def error(self) -> Expression:
-        """By how much the joints are behind, e (n, 1): a crank's by half a turn at most."""
+        """The joints' errors e (n, 1): a crank's is half a turn at most."""
         behind = ca.vertsplit(coordinates(self.now) - self.joints)
         legs = self.machine.robot.legs
         return ca.vertcat(

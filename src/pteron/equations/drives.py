@@ -1,4 +1,4 @@
-"""What the drives must give beside the rigid bodies: their friction and their motors' inertia.
+"""Forces of the drives beside those of the rigid bodies: friction and the motors' inertia.
 
 Stated once, here; `Drive` says what the numbers are.
 """

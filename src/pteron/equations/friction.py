@@ -13,10 +13,10 @@ from pteron.manipulator import Manipulator
 
 
 class PassiveJoint(NamedTuple):
-    """What a column of `passive_friction` is for."""
+    """The joint that a column of `passive_friction` is for."""
 
     leg: int | None
-    """From 1; None for the platform's own axis, about which several legs' joints may turn."""
+    """Its leg, from 1; None for the platform's axis, about which several legs' joints may turn."""
     number: int
     """Its place in the leg's chain, from 0."""
     kind: Literal["P", "R"]

@@ -1,4 +1,4 @@
-"""How good a machine is at a pose: indices of performance, each one number.
+"""Indices of performance of a machine at a pose, each one number.
 
 Most read the homogeneous Jacobian, in which no unit is mixed with another: joint rates are speeds
 in m/s, of a slider or of a crank's end, and the platform's turning counts as the speed at a

@@ -14,7 +14,7 @@ from pteron.equations.machine import Machine, State
 from pteron.legs.leg import Joint, Passive, Reach
 
 FAR = 1e3
-"""What stands for no limit, m: code on a controller, and optimisers, want finite numbers."""
+"""The margin where there is no limit, m: controllers and optimisers want finite numbers."""
 
 
 def inverse_position(machine: Machine, pose: Expression) -> Expression:
@@ -46,7 +46,7 @@ def passive_joints(machine: Machine, pose: Expression) -> list[list[Passive]]:
     return [angle, *(leg.passive(motion, still, turned) for leg, motion in pairs)]
 
 
-def passive_room(machine: Machine, pose: Expression) -> tuple[Expression, Expression]:
+def passive_margins(machine: Machine, pose: Expression) -> tuple[Expression, Expression]:
     """Return how far the passive joints of every leg (n, 1) are from their limits, the least.
 
     First as shares of half their ranges, then in metres that the leg moves meanwhile; negative
@@ -75,7 +75,7 @@ def standing(machine: Machine, pose: Expression) -> tuple[Expression, Expression
     """
     found = reach(machine, pose)
     joints = ca.vertsplit(inverse_position(machine, pose))
-    passive = ca.vertsplit(passive_room(machine, pose)[1])
+    passive = ca.vertsplit(passive_margins(machine, pose)[1])
     least, worst, room = found[0].margin, ca.SX(1), ca.SX(FAR)
     rows = zip(machine.robot.legs, found, joints, passive, strict=True)
     for i, (leg, at, joint, way) in enumerate(rows, start=1):

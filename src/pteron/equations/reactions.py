@@ -32,10 +32,10 @@ class Wrench(NamedTuple):
 
 
 class LegForces(NamedTuple):
-    """What the joints of a leg pass on, from the base to the platform."""
+    """The wrenches that the joints of a leg pass on, from the base to the platform."""
 
     points: tuple[Expression, ...]
-    """Where, (3, 1)."""
+    """The points at which they are passed on, (3, 1)."""
     wrenches: tuple[Wrench, ...]
 
 
@@ -47,7 +47,7 @@ class Equilibrium(NamedTuple):
     right: Expression
     """b, where nothing but motion and gravity acts on the platform."""
     presumed_rows: Expression
-    """What holds only if the legs hold the platform as its motion presumes: the forces on it, the
+    """Equations of a platform that its legs hold as its motion presumes: the forces on it, the
     moments about P, and those on its bars."""
     presumed_right: Expression
     legs: tuple[LegForces, ...]

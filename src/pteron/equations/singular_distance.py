@@ -1,4 +1,4 @@
-"""How far type-II singularities are, to first order or in closed form: for maps, pose by pose.
+"""Distances to type-II singularities, to first order or in closed form: for maps, pose by pose.
 
 The nearest zero of the type-II measure mu is |mu| / |d mu / dx| away, to first order: less and less
 wrong the nearer it is. Where det J is a multiple of A cos(phi) + B sin(phi) the angle is exact.

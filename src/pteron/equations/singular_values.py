@@ -19,7 +19,7 @@ import casadi as ca
 from pteron.bodies.motion import Expression
 
 _SWEEPS = {1: 0, 2: 1, 3: 4, 4: 5}
-"""By the number of columns: what brings random and graded matrices to rounding."""
+"""Sweeps, by the number of columns, that bring random and graded matrices to rounding."""
 
 _TINY = 1e-300
 """Beside it nothing counts that is not zero: it keeps 0/0 out."""

@@ -22,10 +22,10 @@ from pteron.equations import (
 )
 from pteron.equations.clearance import clearances, least_clearances
 from pteron.equations.constraints import constraint_measure
+from pteron.equations.edges import edges
 from pteron.equations.friction import passive_friction
 from pteron.equations.laws import LAWS
 from pteron.equations.machine import Machine
-from pteron.equations.room import rooms
 from pteron.equations.singular_distance import type_ii_distances
 from pteron.equations.virtual_work import generalized_forces, inverse_dynamics
 
@@ -110,7 +110,7 @@ def _reach(m: Machine, v: Symbols) -> Outputs:
 
 
 def _passive_room(m: Machine, v: Symbols) -> Outputs:
-    shares, metres = kinematics.passive_room(m, v["pose"])
+    shares, metres = kinematics.passive_margins(m, v["pose"])
     return {"shares": shares, "metres": metres}
 
 
@@ -336,7 +336,7 @@ TABLE: dict[str, Entry] = {
     "reach": Entry(_POSE, _reach),
     "passive_room": Entry(_POSE, _passive_room),
     "room": Entry(
-        _POSE, lambda m, v: {"room": ca.vertcat(*(room.value for room in rooms(m, v["pose"])))}
+        _POSE, lambda m, v: {"room": ca.vertcat(*(edge.value for edge in edges(m, v["pose"])))}
     ),
     "joint_points": Entry(
         _POSE, lambda m, v: {"points": kinematics.chain_points(_state(m, v))}, ("reach",)

@@ -142,7 +142,7 @@ class CrankLeg(LegKind):
 
 
 class CrankState(NamedTuple):
-    """What crank and last link do."""
+    """Crank and last link in motion."""
 
     l_u: Expression
     """The crank, (2, 1), in its plane; g = d x l_u."""

@@ -1,4 +1,4 @@
-"""What drives an actuated joint, beside the rigid bodies: friction, the motor's inertia, limits."""
+"""The drive of an actuated joint: friction, the motor's inertia, limits."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ class Drive:
 
     @property
     def rated_force(self) -> float | None:
-        """What the motor's rated torque gives at the joint, N or N m."""
+        """The motor's rated torque at the joint, N or N m."""
         return None if self.rated_torque is None else abs(self.gear) * self.rated_torque
 
 

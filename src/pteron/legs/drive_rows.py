@@ -1,4 +1,4 @@
-"""What drives the joints, as a table that people read: a row for each quantity, a text a leg."""
+"""The drives as a table that people read: a row for each quantity, a text a leg."""
 
 from __future__ import annotations
 

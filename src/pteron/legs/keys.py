@@ -23,21 +23,21 @@ KeyRole = Literal[
     "rod",
     "drive",
 ]
-"""What a key holds: a vector, a unit vector, a length, a number, a whole number, +1 or -1, least
-and greatest value, a ball joint's cone, a slider's mass (TOML key `slider`), a body in a plane, a
+"""The content of a key: a vector, a unit vector, a length, a number, a whole number, +1 or -1, two
+limits, a ball joint's cone, a slider's mass (TOML key `slider`), a body in a plane, a
 rod, a drive. Files and pages give a leg's keys in this order."""
 
 
 class Key(NamedTuple):
-    """What a field of a leg, and its TOML key, holds."""
+    """A field of a leg, which is a TOML key of its table."""
 
     role: KeyRole
     help: str
-    """What it is, in a line, with its letter, its frame and its unit: for files and pages."""
+    """Its meaning in a line, with letter, frame and unit: for files and pages."""
     body: str = ""
     """The letter of the body whose inertia it is: "p", "u" or "l"."""
     default: Any = ...
-    """What stands where a file does not give it; `...` where it must."""
+    """Its value where a file does not give it; `...` where a file must."""
     example: Any = None
     """A usual value, where the default is None."""
     like: str = ""
@@ -67,7 +67,7 @@ COMMON: dict[str, Key] = {
 
 
 class Condition(NamedTuple):
-    """What else must hold of fields that are right by themselves."""
+    """A condition between fields that are right by themselves."""
 
     names: tuple[str, ...]
     check: Callable[..., None]

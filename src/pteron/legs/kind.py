@@ -24,7 +24,7 @@ from pteron.toml import told
 
 @dataclass(frozen=True)
 class ActuatedJoint:
-    """How an actuated joint is spoken of: names of its columns, units, and a noun for messages."""
+    """The names of an actuated joint: its columns, its units, and a noun for messages."""
 
     noun: str
     coordinate: str
@@ -38,7 +38,7 @@ CRANK = ActuatedJoint("crank", "theta", "rad", "torque", "N m")
 SHAFT = ActuatedJoint("shaft", "theta", "rad", "torque", "N m")
 
 Role = Literal["point", "direction", "normal", "length", "number", "sign"]
-"""What a quantity is: a point or a unit vector in the base frame; a unit vector that no force
+"""The role of a quantity: a point or a unit vector in the base frame; a unit vector that no force
 depends on, as an axis perpendicular to the kind's first direction; a length; a number; +1 or -1."""
 
 
@@ -53,7 +53,7 @@ class Quantity(NamedTuple):
     role: Role
     value: Sequence[float]
     symbol: str = ""
-    """How a length or a direction is written: "lu" becomes lu1 for leg 1."""
+    """The letters of a length or a direction: "lu" becomes lu1 for leg 1."""
 
 
 Monomial = tuple[int, tuple[str, ...]]
@@ -66,7 +66,7 @@ class Transfer(NamedTuple):
     reason: str
     """Why, with {} where the leg's number goes."""
     entries: Mapping[tuple[str, str], Monomial]
-    """By (kind, body letter) of the parameter."""
+    """The combination's factors, by (kind, body letter) of the parameter."""
 
 
 class ReachBound(NamedTuple):
@@ -112,24 +112,24 @@ class LegKind(ABC):
     drive: Drive | None
 
     type: ClassVar[str]
-    """What the file's key `type` says."""
+    """The value of the file's key `type`."""
     joint: ClassVar[ActuatedJoint]
     names: ClassVar[Mapping[str, str]] = {"p": "slider", "u": "upper link", "l": "lower link"}
-    """What its bodies are called, by letter."""
+    """The names of its bodies, by letter."""
     branches: ClassVar[tuple[int, ...]] = (1, -1)
     """The values that `elbow` may have."""
     follows_angle: ClassVar[bool] = False
     """Whether its joint follows the platform's angle, and not its platform point."""
     account: ClassVar[str] = ""
-    """How it is built, in a few sentences for a report; vectors by their letters r, d, e, k, s0."""
+    """Its construction in a few sentences for a report; vectors by their letters r, d, e, k, s0."""
     measure_text: ClassVar[str] = ""
-    """What its type-I measure is, as a clause for a report; vectors by their letters."""
+    """The meaning of its type-I measure, as a clause for a report."""
     singular_text: ClassVar[str] = "it is stretched or folded"
-    """How it stands where that is zero, as a clause for messages."""
+    """Its stance where that is zero, as a clause for messages."""
     keys: ClassVar[Mapping[str, Key]]
     """The fields of its own, which are its TOML keys, and what they hold; see `every_key`."""
     conditions: ClassVar[tuple[Condition, ...]] = ()
-    """What must hold between its fields."""
+    """Conditions between its fields."""
     equations_class: ClassVar[_EquationsClass]
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
@@ -181,7 +181,7 @@ class LegKind(ABC):
     @property
     @abstractmethod
     def quantities(self) -> tuple[Quantity, ...]:
-        """What of its geometry the equations need, but for the platform point."""
+        """The geometry that its equations need, but for the platform point."""
 
     @abstractmethod
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
@@ -224,7 +224,7 @@ class LegKind(ABC):
         return None
 
     bar_length: float | None = None
-    """How far its parallel rods are apart, m, where the file says so."""
+    """The distance of its parallel rods, m, where the file tells it."""
 
     @property
     def lever(self) -> float:
@@ -253,11 +253,11 @@ class LegKind(ABC):
     @property
     @abstractmethod
     def reach_text(self) -> str:
-        """How far it reaches, as a clause for messages: "its links span 0.1 to 0.4 m"."""
+        """Its reach, as a clause for messages: "its links span 0.1 to 0.4 m"."""
 
     @property
     def extents(self) -> dict[str, tuple[str, float, float, str]]:
-        """Where a body's mass is expected: its TOML key, least and greatest x, what is there."""
+        """The usual range of x of each body's mass: TOML key, least, greatest, what ends there."""
         return {}
 
     def beyond_ends(self, letter: str, x: float) -> str | None:
@@ -273,7 +273,7 @@ class LegKind(ABC):
 
     @property
     def metres(self) -> dict[str, Sequence[float]]:
-        """What of it is in metres, by its keys: values that tell if a file is in millimetres."""
+        """Its values in metres, by their keys: they tell if a file is in millimetres."""
         found: dict[str, Sequence[float]] = {
             q.name: q.value for q in self.quantities if q.role == "length"
         }

@@ -1,4 +1,4 @@
-"""What a kind of leg must supply: read this page before writing another.
+"""The protocol of legs: read this page before writing another kind.
 
 A leg makes one actuated joint follow one point of the platform. It knows the platform only through
 the motion of that point, c, and the platform's rotation: its rows stand against (c', omega). A kind
@@ -64,11 +64,11 @@ class Joint(NamedTuple):
     gear: Expression = 1
     """Its coordinate over the motion that it passes on: of a shaft, its angle per phi."""
     seat: Expression | None = None
-    """Where it passes on forces and moments, (3, 1), if that is not on its axis."""
+    """The point where it passes on forces and moments, (3, 1), if that is not on its axis."""
 
 
 class LegMotion(NamedTuple):
-    """What a leg does when its platform point and the platform's angle move."""
+    """A leg in motion, as its platform point and the platform's rotation drive it."""
 
     coordinate: Expression
     """q, m or rad."""
@@ -79,8 +79,8 @@ class LegMotion(NamedTuple):
     division by it: it vanishes where the leg is singular (type I)."""
     divisor: Expression
     bodies: dict[str, BodyMotion]
-    """By letter: "p" (slider), "u" (upper link or crank), "l" (lower link or rod); those it has. A
-    lower link's reference point is the platform point, and its x points there from the joint."""
+    """By letter: "p" (slider), "u" (upper link or crank), "l" (lower link or rod). A lower link's
+    reference point is the platform point, and its x points there from the joint."""
     chain: tuple[Joint, ...]
     """The joints from the base to the platform, all of them: their screws times their rates are the
     platform's twist, Eq. (9). Their points, in this order, are what is drawn."""
@@ -115,7 +115,7 @@ class Passive(NamedTuple):
     """A passive joint that has limits, and where it is."""
 
     noun: str
-    """What it is, for messages: "elbow"."""
+    """Its name in messages: "elbow"."""
     unit: str
     value: Expression
     least: float
@@ -164,7 +164,7 @@ class Reach(NamedTuple):
 
 
 class Plane(NamedTuple):
-    """Where c may be for a given joint: normal . c = offset."""
+    """The locus of c for a given joint, a plane: normal . c = offset."""
 
     normal: Expression
     offset: Expression
@@ -173,14 +173,14 @@ class Plane(NamedTuple):
 
 
 class Sphere(NamedTuple):
-    """Where c may be for a given joint: |c - center| = radius."""
+    """The locus of c for a given joint, a sphere: |c - center| = radius."""
 
     center: Expression
     radius: Expression
 
 
 class Circle(NamedTuple):
-    """Where c may be for a given joint of a planar leg: its part in the plane lies on a circle."""
+    """The locus of c for a given joint of a planar leg: a circle, of its part in the plane."""
 
     center: Expression
     """(3, 1); only its part in the plane counts."""

@@ -21,7 +21,7 @@ _COINCIDENT = 1e-12
 
 
 class Turning(NamedTuple):
-    """How a link turns about d: its row (1, 6) against (c', omega), theta' and theta''."""
+    """A link's turning about d: its row (1, 6) against (c', omega), theta' and theta''."""
 
     row: Expression
     rate: Expression

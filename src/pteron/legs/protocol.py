@@ -1,4 +1,4 @@
-"""What of the protocol of `legs.leg` a kind of leg breaks: asked before a machine has such legs."""
+"""Breaches of the protocol of `legs.leg`, told before a machine takes a kind of leg."""
 
 from __future__ import annotations
 

@@ -180,7 +180,7 @@ class _Ram(NamedTuple):
     n: Expression
     """Its direction, (2, 1)."""
     rate: Expression
-    """Of its length."""
+    """L'."""
     turning: Turning
     growth: Expression
     """L''."""

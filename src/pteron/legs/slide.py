@@ -114,7 +114,7 @@ class SlideLeg(LegKind):
 
 
 class SlideState(NamedTuple):
-    """What slider and link do."""
+    """Slider and link in motion."""
 
     w: Expression
     """c - r as the link counts it: (3, 1), or (2, 1) in the plane."""

@@ -1,4 +1,4 @@
-"""What a robot is: legs, platform and gravity as a value, its TOML files, and the catalog."""
+"""A robot as a value: legs, platform and gravity, its TOML files, and the catalog."""
 
 from pteron.arguments import check_arguments
 from pteron.manipulator.files import catalog, load

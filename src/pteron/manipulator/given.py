@@ -9,7 +9,7 @@ from pteron.manipulator.files import load
 from pteron.manipulator.manipulator import Manipulator
 
 RobotLike = Manipulator | str | Path
-"""What the public functions take for `robot`."""
+"""The types that public functions take for `robot`."""
 
 
 def as_manipulator(robot: RobotLike) -> Manipulator:

@@ -1,4 +1,4 @@
-"""How thick a machine's bodies are: the capsules round their centre lines."""
+"""The radii of the capsules round the centre lines of a machine's bodies."""
 
 from __future__ import annotations
 

@@ -197,7 +197,7 @@ _TYPES: dict[KeyRole, Any] = {
 }
 
 FORMER = {"limits": "slider_limits"}
-"""What keys were called in files of version 0.1."""
+"""Keys by their names in files of version 0.1."""
 
 
 @lru_cache(maxsize=16)
@@ -242,7 +242,7 @@ _ORDINARY: dict[KeyRole, Any] = {
     "planar": PlanarInertia(1.0, (0.0, 0.0), 1.0),
     "rod": RodInertia(1.0, (0.0,), 1.0),
 }
-"""What stands for a value with a fault while the rest of the machine is checked."""
+"""Ordinary values in the place of those with a fault, while the rest of the machine is checked."""
 
 
 def leg_of(kind: type[LegKind], table: Any) -> tuple[LegKind | None, list[str]]:

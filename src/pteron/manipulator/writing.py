@@ -15,7 +15,7 @@ from pteron.manipulator.tables import MachineTable, PlatformTable, leg_table
 
 _WIDTH = 110
 _COLUMN = 46
-"""Where comments begin at the latest; those of longer lines stand above them."""
+"""The last column in which comments begin; those of longer lines stand above them."""
 
 _UNITS = "SI units: m, kg, kg m, kg m^2, m/s^2, rad."
 

@@ -1,4 +1,4 @@
-"""What a kind of platform must supply: read this page before writing another.
+"""The protocol of platforms: read this page before writing another kind.
 
 A platform maps its pose x and its derivatives to the motion of the points that the legs carry, and
 says what it needs itself. A kind is one file of this folder: a class under `PlatformEquations`,

@@ -15,8 +15,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from pteron.equations.edges import Edge, edges
 from pteron.equations.machine import Machine
-from pteron.equations.room import Room, rooms
 from pteron.errors import DataError
 from pteron.kernels import Array, bounded, numeric
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -71,8 +71,8 @@ EDGES = ("stretched", "folded", _CAUSES["reach"])
 """The causes that are edges of a leg's reach, where its elbow may change its side."""
 
 
-def _told(room: Room) -> str:
-    return _CAUSES.get(room.cause, room.cause).format(room.noun)
+def _told(edge: Edge) -> str:
+    return _CAUSES.get(edge.cause, edge.cause).format(edge.noun)
 
 
 def conditions(
@@ -111,8 +111,8 @@ def conditions(
             raise DataError(f"{name}: {floor!r} given, a floor of 0 or more expected")
     pose = ca.SX.sym("pose", robot.freedom)
     found = [
-        Condition(room.leg, _told(room), "room", "room", k)
-        for k, room in enumerate(rooms(Machine.of(robot), pose))
+        Condition(edge.leg, _told(edge), "room", "room", k)
+        for k, edge in enumerate(edges(Machine.of(robot), pose))
     ]
     if type_i > 0.0:
         found += [
