@@ -1,8 +1,9 @@
 """Inverse dynamics by virtual work, Eqs. (13) and (14), in factored form.
 
 Each leg answers to its platform point alone: its bodies' wrenches become a force on that point and
-a force at its joint. So J_u and J_l of Eq. (13) are never multiplied out: they are their rows with
-respect to (c, phi), times d(c, phi)/dx. Given one column of parameters this is the inverse
+a force at its joint. So J_u and J_l of Eq. (13) are never multiplied out: they are their rows
+against (c', omega), times d(c', omega)/dx'. The paper's F_b of Eq. (14) acts on a body; all forces
+here are what the bodies need, -F_b. Given one column of parameters this is the inverse
 dynamics; given the identity matrix instead, the same lines return the regressor of Eq. (15).
 """
 

@@ -90,8 +90,9 @@ def jacobian(robot: RobotLike, pose: PoseLike, *, on_failure: OnFailure = "raise
     Returns
     -------
     array, shape (..., n, m)
-        Row i is [dq/dc | dq/dphi] d(c, phi)/dx; for a P-R-R-R leg [ d^T | (d x k) . s ] / (d . e),
-        which does not involve the links and is also given where they do not reach.
+        Row i is that of leg i against (c', omega), times d(c', omega)/dx'; for a P-R-R-R leg
+        [ d^T | (d x k) . s ] / (d . e), which does not involve the links and is also given where
+        they do not reach.
 
     Raises
     ------
