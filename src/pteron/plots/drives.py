@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -119,13 +119,12 @@ def _box(axes: Axes, ability: Ability, sizes: Sequence[float], color: str) -> No
     """Draw a drive's limits, as far as the axes show them."""
     x = min(ability.speed or sizes[0], sizes[0])
     y = min(ability.force or sizes[1], sizes[1])
-    look: dict[str, Any] = {"color": color, "linewidth": 1.0, "linestyle": (0, (4, 2))}
-    for sign in (-1.0, 1.0) if ability.force is not None else ():
-        axes.plot([-x, x], [sign * ability.force] * 2, **look)
-    for sign in (-1.0, 1.0) if ability.speed is not None else ():
-        axes.plot([sign * ability.speed] * 2, [-y, y], **look)
-    for sign in (-1.0, 1.0) if ability.rated is not None else ():
-        axes.plot([-x, x], [sign * ability.rated] * 2, **look | {"linestyle": (0, (1, 1.6))})
+    dashed, dotted = (0, (4, 2)), (0, (1, 1.6))
+    limits = (ability.force, False, dashed), (ability.speed, True, dashed)
+    for limit, upright, style in (*limits, (ability.rated, False, dotted)):
+        for side in () if limit is None else (-limit, limit):
+            ends = ([side, side], [-y, y]) if upright else ([-x, x], [side, side])
+            axes.plot(*ends, color=color, linewidth=1.0, linestyle=style)
 
 
 def power_figure(time: ArrayLike, power: ArrayLike) -> Figure:

@@ -69,7 +69,8 @@ class PlaneAxes(MachineAxes):
         return 10.0
 
     def _polygons(self, faces: list[Array], **look: Any) -> Artist:
-        return self.axes.add_collection(PolyCollection(faces, **look))
+        polygons: Artist = self.axes.add_collection(PolyCollection(faces, **look))
+        return polygons
 
     def beside(self, away: Array, along: Array) -> Array:
         """Return the unit vector in the plane, across a line, nearest to `away`."""

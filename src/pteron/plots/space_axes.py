@@ -79,7 +79,7 @@ class SpaceAxes(MachineAxes):
         return 10.0 + float(points.mean(axis=0) @ self._towards_eye)
 
     def _polygons(self, faces: list[Array], **look: Any) -> Artist:
-        polygons = Poly3DCollection(faces, **look)
+        polygons: Artist = Poly3DCollection(faces, **look)
         self.axes.add_collection3d(polygons)
         return polygons
 
