@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from importlib import import_module
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pteron.cli.arguments import Elbows, Json, Robot, load_robot, option
 from pteron.cli.completion import functions
@@ -109,7 +109,7 @@ def export(
         grade = read_identified(machine, base).grade if base is not None else _TRUSTED
         if c is not None:
             real: Real = "float" if single else "double"
-            look = {"real": real, "specialised": specialised}
+            look: dict[str, Any] = {"real": real, "specialised": specialised}
             files += export_c(machine, function, c, **look, wrench=wrench, output=output, base=base)
         if st is not None:
             files += export_st(machine, function, st, wrench=wrench, output=output, base=base)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from typer import Option
 
@@ -62,7 +62,7 @@ def film(
         motion = cycle_of(machine, cycle, duration)
         state = motion.pose, motion.velocity, motion.acceleration
         drawn = drive_forces(carrying, *state, smooth=True) if forces else None
-    look = {"fps": fps, "speed": speed, "size": sides, "turns": turns}
+    look: dict[str, Any] = {"fps": fps, "speed": speed, "size": sides, "turns": turns}
     with progress_bar(f"Filming {machine.name}") as tell:
         made = filmed(machine, motion, out, **look, forces=drawn, progress=tell)
     data = {

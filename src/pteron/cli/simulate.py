@@ -114,10 +114,9 @@ def simulate(
                 f"{'; '.join(overloads)}; give a smaller payload or a longer --duration, or see "
                 "what happens with --anyway"
             )
-        sensors, how = Sensors(encoder=encoder), {"delay": delay, "step": step, "method": method}
-        found = simulated(
-            machine, motion, acts, model=believed, payload=payload, sensors=sensors, **how
-        )
+        how: dict[str, Any] = {"sensors": Sensors(encoder=encoder), "delay": delay, "step": step}
+        how |= {"model": believed, "payload": payload, "method": method}
+        found = simulated(machine, motion, acts, **how)
     for text in overloads:
         note(f"Warning: {text}")
     if found.stopped:

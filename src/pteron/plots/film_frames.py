@@ -91,10 +91,7 @@ def frames(
     _draw_still(sheet, scene, path)
     for k in probes:
         draw_machine(sheet, scene, points.at(k))
-    if isinstance(sheet, SpaceAxes):
-        sheet.fill(angles[probes].tolist() if turns else (0.0,))
-    else:
-        sheet.fill()
+    sheet.fill(angles[probes].tolist() if turns else (0.0,))
     sheet.clear(0)
     yield from _drawn(figure, sheet, scene, points, path, angles, times, now)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -42,6 +43,10 @@ class MachineAxes(ABC):
     @abstractmethod
     def beside(self, away: Array, along: Array) -> Array:
         """Return the unit vector in the picture's plane, across a line, nearest to `away`."""
+
+    @abstractmethod
+    def fill(self, angles: Sequence[float] = (0.0,)) -> None:
+        """Place the axes so that all things fill them, seen from any of the angles, rad."""
 
     def clear(self, kept: int) -> None:
         """Remove all but the first things."""

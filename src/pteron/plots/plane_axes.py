@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -78,7 +79,7 @@ class PlaneAxes(MachineAxes):
         across = np.array([-y, x]) / max(float(np.hypot(x, y)), 1e-12)
         return np.asarray(np.copysign(1.0, across @ self.plane @ away) * across @ self.plane)
 
-    def fill(self) -> None:
+    def fill(self, angles: Sequence[float] = (0.0,)) -> None:
         """Let the scales end a rim beyond what was drawn."""
         drawn = self.drawn
         low, high = drawn.min(axis=0), drawn.max(axis=0)
