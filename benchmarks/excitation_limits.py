@@ -16,7 +16,7 @@ from measuring import quick
 
 import pteron
 from pteron.identification.excitation import LedMotion, Limits, RepeatedCycle, optimal_excitation
-from pteron.workspace import home_pose, reserve
+from pteron.workspace import home_pose, pose_margins
 
 _RATE = 1000.0
 """Samples a second in the file."""
@@ -75,7 +75,7 @@ def worst_margin(
     robot = motion.robot
     times = np.linspace(begin, end, math.ceil((end - begin) * _RATE * _FINER))
     pose, velocity, acceleration, *_ = motion.states(times)
-    room, path = reserve(robot, pose), (pose, velocity, acceleration)
+    room, path = pose_margins(robot, pose), (pose, velocity, acceleration)
     moving = {
         "speed": pteron.joint_rates(robot, pose, velocity).actuated,
         "acceleration": pteron.joint_accelerations(robot, *path).actuated,

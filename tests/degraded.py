@@ -10,7 +10,7 @@ import pteron
 from pteron.export import tree
 from pteron.indices import reactions
 from pteron.motion import check_path, line_path
-from pteron.workspace import Box, free_of_singularities, home_pose, paving, prove, reserve
+from pteron.workspace import Box, free_of_singularities, home_pose, paving, pose_margins, prove
 
 KINDS = [
     *("PPP", "RRR", "SSS", "PRS", "RPP", "SSP"),  # 3T
@@ -177,7 +177,7 @@ def calls(robot):
     yield "prove with a floor", lambda: prove(robot, box, type_ii=0.1)
     yield "paving", lambda: paving(robot, pose[0], within=box.box[:, : len(robot.platform.lengths)])
     yield "free_of_singularities", lambda: free_of_singularities(robot, box)
-    yield "reserve", lambda: reserve(robot, pose)
+    yield "reserve", lambda: pose_margins(robot, pose)
     yield "home_pose", lambda: home_pose(robot)
     yield "check_path", lambda: check_path(robot, line_path(robot, pose))
     yield "direct_kinematics", lambda: pteron.direct_kinematics(robot, rest[0])

@@ -13,9 +13,9 @@ import pteron
 from pteron import ModelError, PlanarInertia
 from pteron.legs.cones import Cone
 from pteron.manipulator.variants import turned
-from pteron.workspace import home_pose, reserve
-from pteron.workspace.doubts import doubts
-from pteron.workspace.drive_doubts import load_doubts
+from pteron.workspace import home_pose, pose_margins
+from pteron.workspace.drive_warnings import load_warnings
+from pteron.workspace.machine_warnings import machine_warnings
 
 FOLDER = Path(pteron.__file__).parent / "manipulator" / "catalog"
 
@@ -396,7 +396,7 @@ def test_a_cone_that_no_pose_or_next_to_none_keeps_is_named():
     narrow = with_cone(Z, 0.05)
     with pytest.raises(ModelError, match=words):
         pteron.random_poses(narrow, 100)
-    assert reserve(narrow, home_pose(narrow)).smallest > 0.3
+    assert pose_margins(narrow, home_pose(narrow)).least > 0.3
 
 
 def test_limits_that_no_pose_keeps_are_named_with_where_the_joints_are():
@@ -443,7 +443,7 @@ DOUBTS = {
 def test_a_leg_s_unlikely_numbers_are_doubted(words):
     robot = CATALOG["delta"]
     odd = replace(robot.legs[1], **DOUBTS[words](robot.legs[1]))
-    found = doubts(replace(robot, legs=(robot.legs[0], odd, robot.legs[2])))
+    found = machine_warnings(replace(robot, legs=(robot.legs[0], odd, robot.legs[2])))
     assert any(text.startswith("leg 2: ") and words in text for text in found), found
     assert not any(text.startswith("leg 1: ") for text in found)
 
@@ -452,7 +452,7 @@ def test_a_shaft_s_unlikely_numbers_are_doubted():
     robot = CATALOG["delta-4"]
     shaft = robot.legs[3]
     odd = replace(shaft, ratio=28.11, upper=shaft.lower, lower=shaft.upper, travel=(900.0, 1300.0))
-    found = doubts(replace(robot, legs=(*robot.legs[:3], odd)))
+    found = machine_warnings(replace(robot, legs=(*robot.legs[:3], odd)))
     for words in (
         "travel: [900.0, 1300.0] m: are these mm?",
         "ratio: 28.11",
@@ -470,17 +470,17 @@ def test_what_parallel_rods_would_keep_from_turning_is_asked_about():
             leg if i == 3 else replace(leg, platform_point=leg.fixed_offset, fixed_offset=(0, 0, 0))
         ),
     )
-    found = doubts(replace(robot, legs=rigid))
+    found = machine_warnings(replace(robot, legs=rigid))
     assert [text.split(": ")[0] for text in found] == ["leg 1", "leg 2", "leg 3"]
     assert all("is the bar on a hinge there?" in text for text in found)
     # Alone on its hinge, a single rod lets the offset turn; a pair beside it would not.
     par4 = CATALOG["par4"]
     single = legs_of("par4", lambda i, leg: replace(leg, rods=1) if i < 2 else leg)
-    found = doubts(replace(par4, legs=single))
+    found = machine_warnings(replace(par4, legs=single))
     assert [text.split(":")[0] for text in found] == ["leg 1", "leg 2"]
     assert all("no leg at this platform_point keeps it from turning" in text for text in found)
     one = legs_of("par4", lambda i, leg: replace(leg, rods=1) if i < 1 else leg)
-    assert doubts(replace(par4, legs=one)) == ()
+    assert machine_warnings(replace(par4, legs=one)) == ()
 
 
 SLIDERS, CRANKS = "quadrupteron", "delta"
@@ -517,7 +517,7 @@ DRIVE_DOUBTS = {
 def test_a_drive_s_unlikely_numbers_are_doubted(words):
     name, keys = DRIVE_DOUBTS[words]
     legs = legs_of(name, lambda i, leg: replace(leg, drive=pteron.Drive(**keys)) if i else leg)
-    found = doubts(replace(CATALOG[name], legs=legs))
+    found = machine_warnings(replace(CATALOG[name], legs=legs))
     assert all(text.split(": ")[1] == "drive" for text in found)
     assert next(text.split(":")[0] for text in found if words in text) == "leg 2", found
     assert not any(text.startswith("leg 1") for text in found)
@@ -529,7 +529,7 @@ def test_drives_that_cannot_hold_the_home_pose_and_rotors_that_outweigh_all_are_
 
     def found(**keys):
         legs = [replace(leg, drive=pteron.Drive(**keys)) for leg in robot.legs]
-        return load_doubts(replace(robot, legs=tuple(legs)), home)
+        return load_warnings(replace(robot, legs=tuple(legs)), home)
 
     # Leg 1 carries the weight of 31 N; an offset of 5 N may hold it.
     (text,) = found(max_force=30.0)
@@ -546,7 +546,9 @@ def test_drives_that_cannot_hold_the_home_pose_and_rotors_that_outweigh_all_are_
 
 
 def test_nothing_in_the_catalog_is_doubted():
-    assert {name: doubts(robot) for name, robot in CATALOG.items() if doubts(robot)} == {}
+    assert {
+        name: machine_warnings(robot) for name, robot in CATALOG.items() if machine_warnings(robot)
+    } == {}
 
 
 @pytest.mark.parametrize(
@@ -566,7 +568,7 @@ def test_numbers_whose_products_vanish_or_overflow_are_told(tmp_path, old, new, 
     file = tmp_path / "bad.toml"
     file.write_text(text.replace(old, new, 1), encoding="utf-8")
     try:
-        told = doubts(pteron.load(file))
+        told = machine_warnings(pteron.load(file))
     except ModelError as error:
         told = error.faults
     assert any(words in line for line in told)

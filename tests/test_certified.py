@@ -33,7 +33,7 @@ from pteron.workspace import (
     quadrature_volume,
 )
 from pteron.workspace.conditions import kept
-from pteron.workspace.reserve import room_to_limits
+from pteron.workspace.margins import distance_to_limits
 
 MACHINES = {**CATALOG, **MECHANISMS}
 SOME = ["quadrupteron-oblique", "delta", "3-rrr", "random 3T1R 0", "random PRR 0"]
@@ -190,7 +190,7 @@ def test_a_kernel_of_intervals_is_compiled_as_any_other():
 @EVERY
 def test_conditions_say_what_reach_and_limits_say(name):
     robot, (_, points) = MACHINES[name], boxes_about(name)
-    reached = np.minimum(numeric(robot, "reach")(points)[0], room_to_limits(robot, points))
+    reached = np.minimum(numeric(robot, "reach")(points)[0], distance_to_limits(robot, points))
     serves = (reached >= 0.0).all(axis=-1)
     assert (kept(robot, conditions(robot), points) == serves).all()
     assert 0.05 < serves.mean() < 0.95

@@ -22,7 +22,7 @@ import pteron
 from pteron.cli.arguments import regrouped
 from pteron.cli.main import app
 from pteron.manipulator.variants import with_elbows
-from pteron.workspace.doubts import doubts
+from pteron.workspace.machine_warnings import machine_warnings
 
 PROGRAM = [sys.executable, "-c", "from pteron_command import main; main()"]
 PLAIN = {"COLUMNS": "60", "NO_COLOR": "1", "FORCE_COLOR": None, "TTY_COMPATIBLE": None}
@@ -735,7 +735,7 @@ def test_what_is_possible_but_unlikely_is_doubted_aloud():
 
 def test_millimetres_in_a_file_are_doubted():
     robot = pteron.load("tripteron")
-    assert all(doubts(pteron.load(name)) == () for name in pteron.catalog())
+    assert all(machine_warnings(pteron.load(name)) == () for name in pteron.catalog())
     far = replace(robot.legs[0], upper_length=154.0, guide_point=(260.0, 0.0, 0.0))
     heavy = pteron.PlanarInertia.of_body(0.8, (0.006, -0.004), 2100.0)
     odd = replace(
@@ -744,7 +744,7 @@ def test_millimetres_in_a_file_are_doubted():
         platform=replace(robot.platform, inertia=heavy),
         legs=(far, *robot.legs[1:]),
     )
-    found = doubts(odd)
+    found = machine_warnings(odd)
     # First the cause, in one line, and nothing that follows from it.
     assert [text.split(": ")[0] for text in found] == ["leg 1", "gravity", "platform"]
     assert found[0] == "leg 1: upper_length, guide_point: beyond 10 m: are these mm?"
@@ -767,13 +767,13 @@ def test_lengths_in_millimetres_are_one_doubt_however_many():
     bars = tuple(replace(bar, hinge=scaled(bar.hinge)) for bar in robot.platform.bars)
     tool = scaled(robot.platform.tool)
     platform = replace(robot.platform, bars=bars, tool=tool)
-    assert doubts(replace(robot, platform=platform, legs=legs)) == (
+    assert machine_warnings(replace(robot, platform=platform, legs=legs)) == (
         "platform: tool, hinge of bars item 1, hinge of bars item 2; legs 1, 2, 3 and 4: "
         "upper_length, lower_length, guide_point, platform_point, fixed_offset: beyond 10 m: are "
         "these mm?",
     )
     bars = (replace(bars[0], hinge=(44.9, -44.9, 0.0)), robot.platform.bars[1])
-    assert doubts(replace(robot, platform=replace(robot.platform, bars=bars))) == (
+    assert machine_warnings(replace(robot, platform=replace(robot.platform, bars=bars))) == (
         "platform: hinge of bars item 1: [44.9, -44.9, 0.0] m: are these mm?",
     )
 

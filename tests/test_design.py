@@ -23,9 +23,9 @@ from pteron.design import (
     start_design,
     survey,
 )
-from pteron.design.masses import stretched
 from pteron.design.paths import places
 from pteron.design.rows import evaluated
+from pteron.design.stretched_links import stretched
 from pteron.design.variables import geometry_slopes
 from pteron.equations.machine import numbers
 from pteron.errors import DataError, ModelError, OutputError

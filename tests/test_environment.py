@@ -170,7 +170,7 @@ def test_starts_and_targets_are_safe_and_differ(name):
     world = env_of(name).unwrapped.world
     state = world.started([np.random.default_rng(seed) for seed in range(40)], None)
     for poses in (state.pose, state.target):
-        assert pteron.workspace.reserve(world.robot, poses).smallest.min() >= world.least
+        assert pteron.workspace.pose_margins(world.robot, poses).least.min() >= world.least
         assert len(np.unique(poses[:, 0])) > 30
         sides = np.linalg.det(pteron.jacobian(world.robot, np.vstack([world.home, poses])))
         assert (sides * sides[0] > 0.0).all()

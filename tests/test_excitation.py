@@ -275,7 +275,7 @@ def test_passive_joints_and_phi_keep_their_limits(search):
     found = search(robot, harmonics=2, period=2.0, limits=limits, **few)
     motion = getattr(found, "motion", found)
     pose = motion.at(motion.uniform_times(20_000)).pose
-    shares = pteron.workspace.reserve(robot, pose).clearances
+    shares = pteron.workspace.pose_margins(robot, pose).joints
     assert 0.55 <= shares.min() < 0.56
     assert np.abs(pose[:, 3]).max() < 0.45 * np.pi / 4
     found = margins(motion, limits)["passive_clearance"].least  # exact between the samples

@@ -31,7 +31,7 @@ from pteron.identification.excitation import (
 )
 from pteron.identification.logs import Description, Log, read_log
 from pteron.identification.recordings import periodic_part
-from pteron.workspace import home_pose, reserve
+from pteron.workspace import home_pose, pose_margins
 
 RATE = 200.0
 PLAIN = {"COLUMNS": "100", "NO_COLOR": "1", "FORCE_COLOR": None, "TTY_COMPATIBLE": None}
@@ -94,7 +94,7 @@ def left_of(robot, limits: Limits, movement, rate: float) -> dict[str, float]:
     rates = pteron.joint_rates(robot, pose, velocity).actuated
     second = pteron.joint_accelerations(robot, pose, velocity, acceleration).actuated
     forces = pteron.drive_forces(robot, pose, velocity, acceleration)
-    room = reserve(robot, pose)
+    room = pose_margins(robot, pose)
     joints = pteron.inverse_kinematics(robot, pose)
     found = {
         "type_i": room.type_i.min() - limits.type_i,

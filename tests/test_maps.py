@@ -34,7 +34,7 @@ from pteron.maps import (
 )
 from pteron.plots import map_figure, map_film
 from pteron.workspace import BEYOND_LIMITS, bounding_box, reach_volume
-from pteron.workspace.reserve import room_to_limits
+from pteron.workspace.margins import distance_to_limits
 
 INDICES = ("condition", "kappa", "margin")
 SPANS = {"x": (-1.0, 1.0), "y": (-1.0, 1.0)}
@@ -170,7 +170,7 @@ def test_the_status_says_which_leg_or_limit_ends_the_reach(name):
     }
     found = map_index(robot, (), pose_grid(robot, {}, spans))
     margin, type_i, _, _ = numeric(robot, "reach")(found.grid.poses())
-    room = room_to_limits(robot, found.grid.poses()).min(axis=-1)
+    room = distance_to_limits(robot, found.grid.poses()).min(axis=-1)
     missed, least = np.isnan(type_i).any(axis=-1), margin.min(axis=-1)
     status = np.where(missed, margin.argmin(axis=-1) + 1, np.where(room < 0.0, BEYOND_LIMITS, 0))
     assert (found.status == status).all()

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 import pteron
 from pteron.motion import joint_guides, joint_points, pick_and_place, scaled_to_reach
 from pteron.motion.trajectories.cycle import Cycle, quintic
-from pteron.workspace import home_pose, reserve
+from pteron.workspace import home_pose, pose_margins
 
 NAMES = [
     *("quadrupteron", "tripteron", "delta", "quadrupteron turned", "delta on a wall"),
@@ -110,10 +110,10 @@ def test_a_cycle_keeps_its_limits_between_the_samples(name):
     dense = pick_and_place(
         robot, home(name), scale=found.scale, direction=found.across, samples=20_011
     )
-    kept = reserve(robot, dense.pose)
+    kept = pose_margins(robot, dense.pose)
     assert kept.type_i.min() >= LEAST
     assert kept.type_ii.min() >= LEAST
-    assert kept.clearances.min() >= 0.0
+    assert kept.joints.min() >= 0.0
     if any(robot.platform.tool[:2]):
         return  # P is faster, or slower, than the tool
     peak = np.linalg.norm(dense.acceleration[:, : len(robot.platform.lengths)], axis=-1).max()
@@ -128,10 +128,10 @@ def test_a_cycle_is_the_largest_that_fits(name):
         larger = pick_and_place(
             robot, home(name), scale=found.scale + 0.005, direction=found.across, samples=2001
         )
-        kept = reserve(robot, larger.pose)
+        kept = pose_margins(robot, larger.pose)
         # The joints' clearance is kept to a hair's breadth, the others to the least reserve.
         tightest = min(kept.type_i.min(), kept.type_ii.min()) - LEAST
-        assert min(tightest, kept.clearances.min()) < 1e-3
+        assert min(tightest, kept.joints.min()) < 1e-3
 
 
 @FAMILIES

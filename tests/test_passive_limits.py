@@ -18,9 +18,9 @@ from pteron.workspace import (
     BEYOND_LIMITS,
     home_pose,
     limited_joints,
+    pose_margins,
     reach_slice,
     reach_volume,
-    reserve,
 )
 
 Z = np.array([0.0, 0.0, 1.0])
@@ -169,12 +169,12 @@ def test_random_poses_and_the_cycle_keep_them():
 def test_home_its_reserve_and_the_reach_keep_them():
     free, robot = CATALOG["delta"], NARROW
     home = home_pose(robot)
-    at = reserve(robot, home)
-    assert 0.0 < at.smallest < reserve(free, home_pose(free)).smallest
+    at = pose_margins(robot, home)
+    assert 0.0 < at.least < pose_margins(free, home_pose(free)).least
     ends = [joint for joint in limited_joints(robot, home) if not joint.actuated]
     room = [1.0 - abs(joint.value) / 0.9 for joint in ends]
-    assert (at.clearances <= np.array(room) + 1e-9).all()
-    assert reserve(robot, home_pose(free)).smallest < at.smallest
+    assert (at.joints <= np.array(room) + 1e-9).all()
+    assert pose_margins(robot, home_pose(free)).least < at.least
     assert reach_volume(robot, home).volume < 0.9 * reach_volume(free, home).volume
     cut, whole = (reach_slice(r, home, "xz", points=15, extent=BOX) for r in (robot, free))
     assert (cut.status == BEYOND_LIMITS).sum() > (whole.status == BEYOND_LIMITS).sum()
@@ -189,7 +189,7 @@ def test_the_platform_s_angle_has_limits_too():
     narrow = replace(robot, platform=replace(robot.platform, limits=(-0.7, 0.5)))
     assert np.abs(pteron.random_poses(narrow, 100)[:, 3] + 0.1).max() <= 0.6
     assert -0.7 < home_pose(narrow)[3] < 0.5
-    assert reserve(narrow, [0.0, 0.0, -0.45, 0.5]).smallest == pytest.approx(0.0, abs=1e-12)
+    assert pose_margins(narrow, [0.0, 0.0, -0.45, 0.5]).least == pytest.approx(0.0, abs=1e-12)
     (at,) = (joint for joint in limited_joints(narrow, [0.0, 0.0, -0.45, 0.2]) if joint.leg == 0)
     assert (at.noun, at.value, at.least, at.most) == ("phi", 0.2, -0.7, 0.5)
 

@@ -15,7 +15,7 @@ from mechanisms import CATALOG, MECHANISMS, gated, random_machine, with_elbows
 from test_workspace import fourfold, with_limits
 
 import pteron
-from pteron.kinematics.condition import jacobian_at
+from pteron.kinematics.jacobian_at import jacobian_at
 from pteron.legs.cones import Cone
 from pteron.reduction import FORMS
 from pteron.report import write_report
@@ -24,7 +24,7 @@ from pteron.report.costs import dense_operations
 from pteron.report.page import bodies, geometry, in_symbols, lettered, page
 from pteron.report.typeset import fixed, significant, triple
 from pteron.report.write import checked_folder, numbers
-from pteron.workspace import REACHABLE, reserve
+from pteron.workspace import REACHABLE, pose_margins
 
 HOSTILE = '</script><b onload="x">&\'{{ 7 * 6 }}'
 """A machine's name comes from a file that anyone may have written."""
@@ -340,7 +340,7 @@ def test_measures_are_shown_where_they_depend_on_the_position():
     assert found.cut.plane == "xz", "upright"
     inside = found.cut.status == REACHABLE
     poses = np.stack(np.meshgrid(found.cut.first, found.cut.second), axis=-1)[inside]
-    expected = reserve(CATALOG["delta"], np.insert(poses, 1, report("delta").home[1], axis=-1))
+    expected = pose_margins(CATALOG["delta"], np.insert(poses, 1, report("delta").home[1], axis=-1))
     np.testing.assert_allclose(found.type_i[inside], expected.type_i.min(axis=-1), rtol=1e-12)
     np.testing.assert_allclose(found.type_ii[inside], expected.type_ii, rtol=1e-12)
     assert "depends on the position" in read("delta").text

@@ -10,7 +10,7 @@ packages = ("kinematics", "dynamics", "motion", "workspace", "reduction.reduced"
 with install_import_hook([f"pteron.{name}" for name in packages], "beartype.beartype"):
     import pteron
     from pteron.motion import joint_points, pick_and_place
-    from pteron.workspace import reserve
+    from pteron.workspace import pose_margins
 
 for name, middle in (("quadrupteron", [0, 0, 0, 0]), ("delta", [0, 0, -0.8])):
     robot = pteron.load(name)
@@ -23,7 +23,7 @@ for name, middle in (("quadrupteron", [0, 0, 0, 0]), ("delta", [0, 0, -0.8])):
         for f in (
             *(pteron.jacobian, pteron.link_vectors, pteron.link_jacobians, pteron.joint_screws),
             *(pteron.mass_matrix, pteron.gravity_forces, pteron.potential_energy),
-            *(reserve, joint_points),
+            *(pose_margins, joint_points),
         ):
             f(robot, x)
         for f in (

@@ -9,8 +9,8 @@ from mechanisms import CATALOG
 
 import pteron
 from pteron.manipulator.variants import with_elbows
-from pteron.workspace import Box, home_pose, prove, reserve
-from pteron.workspace.doubts import doubts, elbow_doubts
+from pteron.workspace import Box, home_pose, pose_margins, prove
+from pteron.workspace.machine_warnings import elbow_warnings, machine_warnings
 
 
 def mirrored(robot):
@@ -42,7 +42,7 @@ def test_joints_in_degrees_or_millimetres_are_told_beside_the_missing_pose():
 def test_a_shaft_that_makes_many_turns_has_the_limits_it_has():
     robot = CATALOG["delta-4"]
     many = replace(robot, platform=replace(robot.platform, limits=(-20.0, 20.0)))
-    assert doubts(many) == (
+    assert machine_warnings(many) == (
         "platform: limits: [-20.0, 20.0] rad, more than a turn from phi = 0: are these degrees?",
     )
     angles = pteron.random_poses(many, 200)[:, 3]
@@ -56,15 +56,15 @@ def test_a_shaft_that_makes_many_turns_has_the_limits_it_has():
 @pytest.mark.parametrize("name", ["delta", "delta-4", "h4", "par4"])
 def test_elbows_that_raise_a_hanging_machine_are_doubted(name):
     upside = mirrored(CATALOG[name])
-    (told,) = elbow_doubts(upside, home_pose(upside))
+    (told,) = elbow_warnings(upside, home_pose(upside))
     assert told.startswith("elbow: the platform stands ")
     assert told.endswith("is that the working mode that is meant?")
-    assert elbow_doubts(CATALOG[name], home_pose(CATALOG[name])) == ()
+    assert elbow_warnings(CATALOG[name], home_pose(CATALOG[name])) == ()
 
 
 @pytest.mark.parametrize("name", ["delta-omnid", "quadrupteron", "five-bar", "linear-delta"])
 def test_machines_that_stand_or_have_no_such_side_are_not(name):
-    assert elbow_doubts(CATALOG[name], home_pose(CATALOG[name])) == ()
+    assert elbow_warnings(CATALOG[name], home_pose(CATALOG[name])) == ()
 
 
 def test_the_home_of_a_symmetric_machine_is_on_its_axis():
@@ -80,7 +80,7 @@ def test_the_home_of_a_symmetric_machine_is_on_its_axis():
     home = home_pose(wide)
     np.testing.assert_array_equal(home[:2], 0.0)
     others = pteron.random_poses(wide, 500, seed=3, type_i=0.0, type_ii=0.0)
-    assert reserve(wide, home).smallest >= 0.75 * reserve(wide, others).smallest.max()
+    assert pose_margins(wide, home).least >= 0.75 * pose_margins(wide, others).least.max()
 
 
 def test_boxes_beyond_all_numbers_are_refused():

@@ -19,7 +19,7 @@ import pytest
 from mechanisms import MECHANISMS
 
 import pteron
-from pteron.kinematics.condition import jacobian_at
+from pteron.kinematics.jacobian_at import jacobian_at
 from pteron.motion import joint_guides, joint_points
 from pteron.plots.canvas import LEG_COLORS
 from pteron.report.quantities import readable
@@ -71,8 +71,8 @@ def test_a_pose_out_of_reach_ends_at_the_boundary_and_names_the_leg(homes, name)
         named = re.match(r"(?:Leg|The \w+ of leg) (\d) (?:reaches|is at its limit)", found.message)
         leg = int(named[1]) - 1
         beyond = found.pose + 1e-6 * (target - home.pose)
-        alone = pteron.workspace.reserve(robot, beyond)
-        at_end = alone.type_i[leg] < 0.0101, alone.clearances[leg] < 0.0
+        alone = pteron.workspace.pose_margins(robot, beyond)
+        at_end = alone.type_i[leg] < 0.0101, alone.joints[leg] < 0.0
         assert any(at_end)
         rest = np.linalg.norm((target - found.pose)[: len(robot.platform.lengths)])
         assert f"stops {fixed(1e3 * rest)} mm" in found.message
@@ -158,7 +158,7 @@ def test_the_numbers_are_the_librarys(homes, name):
     forces = pteron.drive_forces(loaded, state.pose, velocity, acceleration)
     assert np.array_equal(found.forces, forces)
     assert found.condition == jacobian_at(robot, state.pose).condition
-    at = pteron.workspace.reserve(robot, state.pose)
+    at = pteron.workspace.pose_margins(robot, state.pose)
     assert np.array_equal(found.type_i, at.type_i)
     assert found.type_ii == at.type_ii
     page = readout(state, found)
@@ -219,7 +219,7 @@ def test_a_slice_holds_the_poses_in_reach(homes):
     (serves, _), (limited, _) = slice_meshes(state.robot, state.pose, "xz", span)
     poses = np.zeros((len(serves[0]), 4))
     poses[:, :3] = serves[0]
-    margins = pteron.workspace.reserve(state.robot, poses).smallest
+    margins = pteron.workspace.pose_margins(state.robot, poses).least
     assert len(poses) > 200
     assert (margins >= 0.0).all()
     assert np.ptp(serves[0][:, 1]) == 0.0

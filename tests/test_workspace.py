@@ -1,4 +1,4 @@
-"""Where a machine can work: reserves, home pose, reach, volume and joint ranges."""
+"""Where a machine can work: margins, home pose, reach, volume and joint ranges."""
 
 from dataclasses import replace
 from functools import lru_cache
@@ -16,9 +16,9 @@ from pteron.workspace import (
     bounding_box,
     home_pose,
     joint_ranges,
+    pose_margins,
     reach_slice,
     reach_volume,
-    reserve,
 )
 
 NAMES = [
@@ -94,7 +94,7 @@ def steinmetz(link):
 def test_measures_are_sines_and_volumes(name):
     robot = MECHANISMS[name]
     pose, _, _ = states(robot, 50)
-    found = reserve(robot, pose)
+    found = pose_margins(robot, pose)
     l_u, l_l = pteron.link_vectors(robot, pose)
     d = np.array([leg.direction for leg in robot.legs])
     # The sine between the links, seen along d: a rod may leave the plane.
@@ -111,8 +111,8 @@ def test_measures_are_sines_and_volumes(name):
     measure = np.abs(pteron.compile(robot, "type_ii")(np.concatenate([pose, best])))
     determinants *= measure[0] / determinants[0] / measure.max()
     np.testing.assert_allclose(found.type_ii, determinants, rtol=0.03)
-    everything = np.c_[found.type_i, found.clearances, found.type_ii]
-    np.testing.assert_array_equal(found.smallest, everything.min(axis=-1))
+    everything = np.c_[found.type_i, found.joints, found.type_ii]
+    np.testing.assert_array_equal(found.least, everything.min(axis=-1))
 
 
 @pytest.mark.parametrize("name", ["3-rrr", "par4", "linear-delta", "random PRR 0"])
@@ -133,7 +133,7 @@ def test_clearance_is_the_share_of_the_half_range_to_the_nearer_limit():
     robot = with_limits(MECHANISMS["tripteron"], -0.1, 0.3)
     pose = np.array([[0.1, -0.1, 0.3], [0.2, 0.0, -0.15]])
     joints = pteron.inverse_kinematics(MECHANISMS["tripteron"], pose, on_failure="nan")
-    found = reserve(robot, pose).clearances
+    found = pose_margins(robot, pose).joints
     reached = ~np.isnan(joints)
     expected = 1.0 - np.abs(joints - 0.1) / 0.2
     np.testing.assert_allclose(found[reached], expected[reached], atol=1e-12)
@@ -144,15 +144,15 @@ def test_out_of_reach_the_reserve_is_negative_and_says_by_how_much(name):
     robot, far = MECHANISMS[name], [0.0, 0.0, 2.0]
     with pytest.raises(pteron.UnreachablePose) as caught:
         pteron.inverse_kinematics(robot, far)
-    found = reserve(robot, far)
+    found = pose_margins(robot, far)
     share = caught.value.shortfall / robot.legs[caught.value.leg - 1].size
     assert found.type_i[caught.value.leg - 1] == pytest.approx(-share)
-    assert found.smallest < 0.0
+    assert found.least < 0.0
 
 
 def left(robot, poses):
-    """Return the least reserve, and of a machine that turns what is left of half a turn."""
-    least = reserve(robot, poses).smallest
+    """Return the least margin, and of a machine that turns what is left of half a turn."""
+    least = pose_margins(robot, poses).least
     turned = np.abs(poses[..., -1]) / np.pi if robot.platform.turns else 0.0
     return np.minimum(least, 1.0 - turned)
 
@@ -293,8 +293,8 @@ def test_the_box_holds_the_reach_and_touches_it(name):
     middle, half = box.mean(axis=0), np.ptp(box, axis=0) / 2.0
     k = len(robot.platform.lengths)
     poses[:, :k] = rng.uniform(middle - 1.3 * half, middle + 1.3 * half, (len(poses), k))
-    found = reserve(robot, poses)
-    good = poses[np.c_[found.type_i, found.clearances].min(axis=-1) >= 0.0, :k]
+    found = pose_margins(robot, poses)
+    good = poses[np.c_[found.type_i, found.joints].min(axis=-1) >= 0.0, :k]
     assert len(good) > 100
     assert (good >= box[0] - 1e-6).all()
     assert (good <= box[1] + 1e-6).all()

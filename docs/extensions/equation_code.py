@@ -65,7 +65,7 @@ CODE: dict[str, tuple[str, ...]] = {
     "G6": ("pteron.indices.compliance.stiffness",),
     "G7": (
         *("pteron.indices.sensitivities.geometric_sensitivities",),
-        "pteron.indices.errors.pose_error",
+        "pteron.indices.pose_errors.pose_error",
     ),
     # Drives, control, identification.
     "D1": (f"{_E}.drives.drive_forces", f"{_E}.drives.friction"),

@@ -110,11 +110,11 @@ def fourier_reference(
 
 def _serves(motion: Fourier, time: Array, speed: float, acceleration: float) -> bool:
     pose, _, _ = motion.platform(time)
-    reserve = pteron.workspace.reserve(motion.robot, pose)
+    reserve = pteron.workspace.margins(motion.robot, pose)
     if (
         reserve.type_i.min() < _TYPE_I
         or reserve.type_ii.min() < _TYPE_II
-        or reserve.clearances.min() < 0.0
+        or reserve.joints.min() < 0.0
     ):
         return False
     _, rates, accelerations = motion(time)

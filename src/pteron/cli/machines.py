@@ -113,9 +113,9 @@ def check(
         for fault in error.faults:
             complain(f"{error.subject}: {fault}")
         raise Exit(_FAULTY) from None
-    from pteron.workspace.doubts import doubts
+    from pteron.workspace.machine_warnings import machine_warnings
 
-    unlikely = doubts(robot)
+    unlikely = machine_warnings(robot)
     for text in unlikely:
         note(f"Warning: {file}: {text}")
     try:
@@ -133,9 +133,9 @@ def check(
 
 def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
     from pteron.kinematics import architecture, singular_orientations
-    from pteron.workspace import home_pose, limited_joints, reserve
-    from pteron.workspace.doubts import elbow_doubts
-    from pteron.workspace.drive_doubts import load_doubts
+    from pteron.workspace import home_pose, limited_joints, pose_margins
+    from pteron.workspace.drive_warnings import load_warnings
+    from pteron.workspace.machine_warnings import elbow_warnings
 
     # Refuses a singular layout, and one without a common reach with by how much legs miss it
     home = home_pose(robot)
@@ -150,10 +150,10 @@ def _findings(robot: Manipulator, unlikely: tuple[str, ...]) -> dict[str, Any]:
         "singular_at_every_position": bool(len(singular_orientations(robot))),
         "tool": list(robot.platform.tool),
         "home_pose": home.tolist(),
-        "home_reserve": float(reserve(robot, home).smallest),
+        "home_reserve": float(pose_margins(robot, home).least),
         "limited_joints": [asdict(joint) for joint in limited_joints(robot, home)],
         "holds_orientation": layout.holds,
-        "doubts": [*unlikely, *loose, *elbow_doubts(robot, home), *load_doubts(robot, home)],
+        "doubts": [*unlikely, *loose, *elbow_warnings(robot, home), *load_warnings(robot, home)],
     }
 
 

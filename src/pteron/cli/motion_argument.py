@@ -59,7 +59,7 @@ def _of_table(robot: Manipulator, rows: Table, start: PoseLike | None = None) ->
     """Return the motion of a table, after notes on its unlikely values."""
     import numpy as np
 
-    from pteron.kinematics.unlikely import unlikely_values
+    from pteron.kinematics.unlikely_values import unlikely_values
     from pteron.playback import of_table
 
     file = rows.source
@@ -106,7 +106,7 @@ def note_unlikely(
     robot: Manipulator, columns: Sequence[str], values: NDArray[Any], source: str
 ) -> None:
     """Note values that are possible but unlikely."""
-    from pteron.kinematics.unlikely import unlikely_values
+    from pteron.kinematics.unlikely_values import unlikely_values
 
     for text in unlikely_values(robot, columns, values):
         note(f"Note: {source}: {text}")

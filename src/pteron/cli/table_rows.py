@@ -47,7 +47,7 @@ class Rows:
         import numpy as np
 
         from pteron.errors import UnlikelyValue
-        from pteron.kinematics.unlikely import unlikely_values
+        from pteron.kinematics.unlikely_values import unlikely_values
 
         values = self.table.numbers(columns, on_failure)
         unlikely = "; ".join(unlikely_values(robot, columns, values))

@@ -1,8 +1,8 @@
 """Which dimensions are best: searches over a machine's geometry, with proofs of what they find."""
 
 from pteron.arguments import check_arguments
-from pteron.design.changes import Change
 from pteron.design.design import Design
+from pteron.design.differences import Change
 from pteron.design.front import Front
 from pteron.design.proofs import (
     Proved,

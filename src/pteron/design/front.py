@@ -185,7 +185,7 @@ def _missed(designs: pl.DataFrame) -> Array:
 
 def _foremost(task: Task, good: pl.DataFrame) -> pl.DataFrame:
     """Return the rows that no other betters, each once, in the order of the objectives."""
-    from pteron.design.extras import non_dominated
+    from pteron.design.evolution import non_dominated
 
     signs = np.array([o.sign for o in task.spec.objectives])
     costs = good.select([o.quantity for o in task.spec.objectives]).to_numpy() * signs

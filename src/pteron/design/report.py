@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from pteron.design.changes import (
+from pteron.design.design import Design
+from pteron.design.differences import (
     Change,
     geometry_changes,
     mass_changes,
     quantity_changes,
     stroke_words,
 )
-from pteron.design.design import Design
 from pteron.design.front import Front
 from pteron.design.proofs import ProvedCube, proved, workspace_share
 from pteron.design.task import Task

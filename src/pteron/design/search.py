@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pteron.design.extras import Evolution, one_thread
+from pteron.design.evolution import Evolution, one_thread
 from pteron.design.front import Front, Proofs
 from pteron.design.refine import refined
 from pteron.design.rows import FAILED, MISSES, columns

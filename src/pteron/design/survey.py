@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import qmc  # type: ignore[import-untyped]
 
-from pteron.design.extras import one_thread
+from pteron.design.evolution import one_thread
 from pteron.design.front import Front, Proofs
 from pteron.design.rows import columns
 from pteron.design.search import swept_proofs

@@ -16,7 +16,7 @@ from pteron.design.variables import Variable, moved, variables_of
 from pteron.errors import DataError, ModelError
 from pteron.indices import INDICES
 from pteron.kernels import Array, Kernel, compile
-from pteron.kinematics.unlikely import unlikely_values
+from pteron.kinematics.unlikely_values import unlikely_values
 from pteron.manipulator import Manipulator, load
 from pteron.manipulator.saving import text_of
 from pteron.maps.plan import RESULTS

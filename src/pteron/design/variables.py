@@ -8,13 +8,13 @@ from typing import Any, Literal
 
 import numpy as np
 
-from pteron.design.masses import with_stretched_bodies
 from pteron.design.paths import Place, places
 from pteron.design.spec import VariableTable
+from pteron.design.stretched_links import with_stretched_bodies
 from pteron.equations.machine import numbers
 from pteron.errors import ModelError
 from pteron.kernels import Array
-from pteron.kinematics.unlikely import unlikely_length
+from pteron.kinematics.unlikely_values import unlikely_length
 from pteron.manipulator import Manipulator
 from pteron.toml import told
 

@@ -13,7 +13,7 @@ from pteron.kernels import Array
 from pteron.kinematics import jacobian
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion import Motion, limits_of, longest_step
-from pteron.workspace import home_pose, reserve
+from pteron.workspace import home_pose, pose_margins
 
 _STEP = 5e-4
 """s; Runge and Kutta's method is then exact to some micrometres."""
@@ -22,7 +22,7 @@ _LIVELY = 20.0
 """m/s^2 that drives without `max_force` can give along every coordinate at once."""
 
 _LEAST = 0.2
-"""Reserve that starts and targets have."""
+"""Margin that starts and targets have."""
 
 _SPREAD = 0.25
 """Share of the longest leg within which starts and targets are from home."""
@@ -53,7 +53,7 @@ def world_of(
     if spread is None:
         spread = _SPREAD * max(leg.size for leg in machine.legs)
     home = _home(machine)
-    least = min(_LEAST, float(reserve(machine, home).smallest) / 2.0)
+    least = min(_LEAST, float(pose_margins(machine, home).least) / 2.0)
     step = min(_STEP, longest_step(machine, home[None]) / 2.0, period)
     count = int(np.ceil(period / step - 1e-9))
     given = (home, _forces(machine, home), period, period / count, count)

@@ -16,7 +16,7 @@ from pteron.errors import DataError
 from pteron.kernels import Array, as_array, numeric
 from pteron.manipulator import Manipulator
 from pteron.motion import Motion, advance
-from pteron.workspace import reserve
+from pteron.workspace import pose_margins
 
 LEVER = 0.1
 """Length that counts as much as a radian in distances, m."""
@@ -28,7 +28,7 @@ EFFORT = 0.01
 """Weight of the mean square of the action in the reward."""
 
 ENDS = 0.02
-"""Reserve below which an episode ends."""
+"""Margin below which an episode ends."""
 
 _ANGLE = np.pi / 4.0
 _DRAWS = 16
@@ -58,7 +58,7 @@ class World:
     tolerance : float
         Distance to the target that is a success, m.
     least : float
-        Reserve, see `pteron.workspace.Reserve`, of starts and targets.
+        Margin, see `pteron.workspace.PoseMargins`, of starts and targets.
     motion : Motion or None
         What is to be followed, again and again; None where a pose is to be reached.
     """
@@ -130,7 +130,7 @@ class World:
         )
 
     def _drawn(self, generators: Sequence[np.random.Generator]) -> Array:
-        """Return a random pose of each generator with reserve enough, or home where it has none."""
+        """Return a random pose of each generator with margin enough, or home where it has none."""
         half = np.where(self.robot.platform.angular, _ANGLE, self.spread)
         shape = (_DRAWS, self.robot.freedom)
         drawn = np.stack([rng.uniform(-1.0, 1.0, shape) for rng in generators])
@@ -140,9 +140,9 @@ class World:
         return np.where(good.any(axis=-1)[:, None], first, self.home)
 
     def reserve_of(self, poses: Array) -> Array:
-        """Return the reserve of poses, negative beyond a singularity of type II."""
+        """Return the margin of poses, negative beyond a singularity of type II."""
         across = numeric(self.robot, "type_ii")(poses)[0] * self._side < 0.0
-        smallest = reserve(self.robot, poses).smallest
+        smallest = pose_margins(self.robot, poses).least
         return np.where(across, -np.abs(smallest), smallest)
 
     @cached_property
@@ -204,10 +204,10 @@ class World:
         rates = self.bounds[self.robot.freedom : 2 * self.robot.freedom]
         if (np.abs(velocity) > rates).any():
             return f"faster than {SPEED:g} m/s or {TURN:g} rad/s"
-        found = reserve(self.robot, pose)
+        found = pose_margins(self.robot, pose)
         leg = int(found.type_i.argmin()) + 1
-        if self.reserve_of(pose[None])[0] < 0.0 <= found.smallest or found.type_ii < ENDS:
+        if self.reserve_of(pose[None])[0] < 0.0 <= found.least or found.type_ii < ENDS:
             return "next to a singularity of type II: the actuators hardly hold the platform"
-        if found.clearances.min() < ENDS <= found.type_i.min():
-            return f"leg {int(found.clearances.argmin()) + 1} is at its joint's limit"
+        if found.joints.min() < ENDS <= found.type_i.min():
+            return f"leg {int(found.joints.argmin()) + 1} is at its joint's limit"
         return f"leg {leg} is at the end of its reach"

@@ -4,10 +4,10 @@ from pteron.arguments import check_arguments
 from pteron.indices.compliance import Stiffness, stiffness
 from pteron.indices.conditioning import GlobalConditioning, global_conditioning
 from pteron.indices.elasticity import ALUMINIUM, STEEL, Elasticity, Material, Section
-from pteron.indices.errors import PoseError, Tolerances, pose_error
 from pteron.indices.evaluation import evaluate
 from pteron.indices.index import INDICES, Index, indices_of
 from pteron.indices.joint_reactions import Reactions, reactions
+from pteron.indices.pose_errors import PoseError, Tolerances, pose_error
 from pteron.indices.sensitivities import Sensitivities, geometric_sensitivities
 
 __all__ = [

@@ -16,7 +16,7 @@ from pteron.kinematics.evaluate import checked_one
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.shapes import PoseLike, Seed
 from pteron.workspace import bounding_box
-from pteron.workspace.reserve import room_to_limits
+from pteron.workspace.margins import distance_to_limits
 
 _GROUPS = 16
 """Independent scrambled sequences, whose spread is the standard error."""
@@ -113,7 +113,7 @@ def global_conditioning(
         poses = np.tile(low, (len(unit), 1))
         poses[:, free] += unit * (high - low)[free]
         margin = numeric(robot, "reach")(poses)[0]
-        inside = np.minimum(margin, room_to_limits(robot, poses)).min(axis=-1) >= 0.0
+        inside = np.minimum(margin, distance_to_limits(robot, poses)).min(axis=-1) >= 0.0
         # At the very edge of reach the index is not defined, and 1 / kappa is 0.
         values = np.nan_to_num(1.0 / np.asarray(evaluate(robot, name, poses[inside])))
         sums.append((values.sum(), inside.sum()))

@@ -19,7 +19,7 @@ from pteron.kinematics.position import (
     link_jacobians,
     link_vectors,
 )
-from pteron.kinematics.sampling import random_poses
+from pteron.kinematics.random_poses import random_poses
 from pteron.kinematics.singularities import singular_orientations
 
 __all__ = [

@@ -18,8 +18,9 @@ import numpy as np
 from pteron.equations.machine import closure_of
 from pteron.errors import ModelError, SingularPose
 from pteron.kernels import Array, NoSquareRoot, PrimeField, evaluate, general_program, numeric
-from pteron.kinematics.recognised import modular_geometry
-from pteron.kinematics.sizes import type_ii_sizes
+from pteron.kinematics.modular_geometry import modular_geometry
+from pteron.kinematics.sampling import drawn_poses
+from pteron.kinematics.type_ii_sizes import type_ii_sizes
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _VANISHING = 1e-10
@@ -159,10 +160,8 @@ def _is_singular_everywhere(robot: Manipulator) -> bool:
 @lru_cache(maxsize=64)
 def _poses(robot: Manipulator) -> Array:
     """Return some poses in reach, singular (type II) or not; none where none is found."""
-    from pteron.kinematics.sampling import random_poses
-
     try:
-        return random_poses(robot, _SAMPLES, type_i=1e-3, type_ii=0.0)
+        return drawn_poses(robot, _SAMPLES, np.random.default_rng(0), type_i=1e-3)
     except ModelError:
         return np.empty((0, robot.freedom))
 

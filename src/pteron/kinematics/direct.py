@@ -13,7 +13,7 @@ from pteron.kernels import Array
 from pteron.kinematics.architecture import is_singular_everywhere, singular_everywhere
 from pteron.kinematics.assembly import every_pose, in_order, within_a_turn
 from pteron.kinematics.evaluate import checked, evaluated, place, unchecked
-from pteron.kinematics.unlikely import unlikely_values, warn_of_unlikely
+from pteron.kinematics.unlikely_values import unlikely_values, warn_of_unlikely
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.manipulator.variants import with_elbows
 from pteron.shapes import JointsLike, OnFailure, PerJoint, PoseLike, Poses

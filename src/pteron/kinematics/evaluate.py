@@ -15,7 +15,7 @@ from pteron.errors import DataError, PteronError, SingularPose, UnreachablePose
 from pteron.kernels import Array, Selects, as_array, needs_of, numeric
 from pteron.kernels.functions import TYPE_I, TYPE_II
 from pteron.kinematics.architecture import is_singular_everywhere, singular_everywhere
-from pteron.kinematics.unlikely import warn_of_unlikely
+from pteron.kinematics.unlikely_values import warn_of_unlikely
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import OnFailure, PoseLike
 

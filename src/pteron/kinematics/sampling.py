@@ -1,4 +1,4 @@
-"""Reachable poses drawn at random."""
+"""Poses in reach, drawn at random from a ball that holds them all."""
 
 from __future__ import annotations
 
@@ -7,15 +7,12 @@ from operator import itemgetter
 import casadi as ca
 import numpy as np
 
-from pteron.arguments import expect_to_fit
 from pteron.equations.kinematics import passive_joints
 from pteron.equations.machine import Machine
-from pteron.errors import DataError, ModelError
+from pteron.errors import ModelError
 from pteron.kernels import Array, numeric
-from pteron.kinematics.architecture import expect_regular
-from pteron.kinematics.sizes import type_ii_sizes
-from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.shapes import Poses, Seed
+from pteron.kinematics.type_ii_sizes import type_ii_sizes
+from pteron.manipulator import Manipulator
 
 _BATCH = 4096
 _ATTEMPTS = 250
@@ -27,60 +24,22 @@ _SEEN = 1000
 _SELDOM = 0.1
 
 
-def random_poses(
-    robot: RobotLike,
+def drawn_poses(
+    robot: Manipulator,
     count: int,
+    rng: np.random.Generator,
+    type_i: float = 0.0,
+    type_ii: float = 0.0,
     *,
-    seed: Seed | np.random.Generator = 0,
-    type_i: float = 0.1,
-    type_ii: float = 0.1,
     limits: bool = True,
-) -> Poses:
-    """Return poses drawn at random from those in reach and away from singularities.
-
-    Uniformly in position and orientation, within a box that holds all but the rarest corners.
-    Passive joints and the platform's angle keep their limits; the actuated joints need not.
-
-    Parameters
-    ----------
-    robot : Manipulator, name or path
-        The machine.
-    count : int
-        How many poses.
-    seed : int or numpy Generator
-        Where the randomness comes from.
-    type_i : float
-        Least type-I measure of every leg: 0 where it is singular, 1 at best.
-    type_ii : float
-        Least type-II measure of the machine.
-    limits : bool
-        Whether limits are kept as said above, or none are.
-
-    Returns
-    -------
-    array, shape (count, m)
-        m and rad.
+) -> Array:
+    """Return poses (count, m) in reach, as `random_poses` does, singular everywhere or not.
 
     Raises
     ------
-    DataError
-        If the count is no whole number, or negative.
     ModelError
         If the legs have next to no common reach.
-    SingularPose
-        If a type-II measure above 0 is asked of a machine that is singular at every pose.
-
-    Examples
-    --------
-    >>> import pteron
-    >>> pteron.random_poses(pteron.load("quadrupteron"), 5).shape
-    (5, 4)
     """
-    robot = as_manipulator(robot)
-    if count < 0:
-        raise DataError(f"count: {count} given, 0 or more expected")
-    expect_to_fit("count", count, 4.0 * count * robot.freedom)
-    rng = np.random.default_rng(seed)
     center, radius = search_ball(robot)
     low, high = center - radius, center + radius
     coarse = _drawn(robot, low, high, min(count, _SCOUTS), rng, type_i, type_ii, limits)
@@ -117,8 +76,6 @@ def _drawn(
         poses = poses[(measures >= type_i).all(axis=-1)]
         if type_ii > 0.0 and len(poses):
             poses = poses[type_ii_sizes(robot, poses) >= type_ii]
-            if not len(poses):
-                expect_regular(robot)
         reached += len(poses)
         seen = seen if len(seen) >= _SEEN else np.concatenate([seen, poses])
         if limits:

@@ -11,7 +11,8 @@ from pteron.equations.machine import closure_of
 from pteron.errors import DataError, SingularPose
 from pteron.kernels import Array, as_array, numeric
 from pteron.kinematics.architecture import expect_regular, is_singular_everywhere
-from pteron.kinematics.sizes import type_ii_sizes
+from pteron.kinematics.sampling import drawn_poses
+from pteron.kinematics.type_ii_sizes import type_ii_sizes
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _VANISHING = 1e-10
@@ -48,15 +49,13 @@ def best_type_ii(robot: Manipulator) -> float:
     # Kinematics load without SciPy.
     from scipy.optimize import minimize  # type: ignore[import-untyped]
 
-    from pteron.kinematics.sampling import random_poses
-
     def measure(poses: Array) -> Array:
         reached = ~np.isnan(numeric(robot, "reach")(poses)[1]).any(axis=-1)
         return np.where(reached, type_ii_sizes(robot, poses), 0.0)
 
     if is_singular_everywhere(robot):
         return 1.0  # no share of rounding
-    drawn = random_poses(robot, _DRAWN, type_i=0.0, type_ii=0.0, limits=False)
+    drawn = drawn_poses(robot, _DRAWN, np.random.default_rng(0), limits=False)
     sizes = measure(drawn)
     improved = [
         -minimize(

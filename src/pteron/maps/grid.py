@@ -16,7 +16,7 @@ import numpy as np
 from pteron.errors import DataError, ModelError, shown
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import checked_one
-from pteron.kinematics.unlikely import unlikely_values
+from pteron.kinematics.unlikely_values import unlikely_values
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike
 from pteron.workspace import bounding_box, home_pose

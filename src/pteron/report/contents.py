@@ -10,7 +10,7 @@ import numpy as np
 from pteron.equations.machine import closure_of
 from pteron.kernels import Array, numeric
 from pteron.kinematics import singular_orientations
-from pteron.kinematics.condition import JacobianAtPose, jacobian_at
+from pteron.kinematics.jacobian_at import JacobianAtPose, jacobian_at
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator
 from pteron.motion import (
@@ -35,18 +35,18 @@ from pteron.workspace import (
     REACHABLE,
     JointRanges,
     LimitedJoint,
+    PoseMargins,
     ReachSlice,
     ReachVolume,
-    Reserve,
     home_pose,
     joint_ranges,
     limited_joints,
+    pose_margins,
     reach_slice,
     reach_volume,
-    reserve,
 )
-from pteron.workspace.doubts import doubts
-from pteron.workspace.drive_doubts import load_doubts
+from pteron.workspace.drive_warnings import load_warnings
+from pteron.workspace.machine_warnings import machine_warnings
 from pteron.workspace.reach import Plane, slice_planes
 
 _ANGLES = 361
@@ -111,7 +111,7 @@ class Report:
     robot: Manipulator
     doubts: tuple[str, ...]
     home: Array
-    reserve: Reserve
+    reserve: PoseMargins
     least: float
     cycle: Motion
     source: str
@@ -168,7 +168,7 @@ def contents(robot: Manipulator, motion: Playback | None = None) -> Report:
     It shows a motion, or the standard cycle where none is given.
     """
     home = home_pose(robot)
-    at_home = reserve(robot, home)
+    at_home = pose_margins(robot, home)
     cycle = pick_and_place(robot, home) if motion is None else motion.motion
     sizing = size(robot, cycle)
     volume = reach_volume(robot, home)
@@ -179,7 +179,7 @@ def contents(robot: Manipulator, motion: Playback | None = None) -> Report:
     half = (0.5 + _RIM) * float((volume.box[1] - volume.box[0]).max())
     return Report(
         robot=robot,
-        doubts=(*doubts(robot), *load_doubts(robot, home)),
+        doubts=(*machine_warnings(robot), *load_warnings(robot, home)),
         home=home,
         reserve=at_home,
         least=least_reserve(robot, home),

@@ -12,7 +12,7 @@ from pteron.kinematics import follow, inverse_kinematics
 from pteron.kinematics.limits import limited_joints
 from pteron.manipulator import Manipulator
 from pteron.report.quantities import readable
-from pteron.workspace.reserve import clearances, room_to_limits
+from pteron.workspace.margins import distance_to_limits, joint_distances
 
 LEAST_TYPE_I = 0.01
 """The type-I measure at the end of a leg's reach: forces still have most of their digits."""
@@ -38,7 +38,7 @@ def allowed(robot: Manipulator, poses: Array) -> NDArray[np.bool_]:
     """Return whether poses (..., m) are in reach of all legs and within all limits, (...)."""
     measure = numeric(robot, "reach")(poses)[1]
     bent = (measure >= LEAST_TYPE_I).all(axis=-1)
-    return np.asarray(bent & (room_to_limits(robot, poses).min(axis=-1) >= -_ROUNDING))
+    return np.asarray(bent & (distance_to_limits(robot, poses).min(axis=-1) >= -_ROUNDING))
 
 
 def farthest(robot: Manipulator, start: Array, target: Array) -> tuple[Array, Array | None]:
@@ -133,7 +133,7 @@ def what_stops(robot: Manipulator, beyond: Array) -> str:
         i = int(np.where(short, margin, np.inf).argmin())
         return f"Leg {i + 1} reaches no further: {robot.legs[i].singular_text}"
     joints = numeric(robot, "joint_coordinates")(beyond)[0]
-    room = clearances(robot, joints)
+    room = joint_distances(robot, joints)
     if room.min() < 0.0:
         i = int(room.argmin())
         leg = robot.legs[i]

@@ -10,15 +10,15 @@ import numpy as np
 from pteron.dynamics import drive_forces
 from pteron.errors import PteronError
 from pteron.kernels import Array
-from pteron.kinematics.condition import jacobian_at
+from pteron.kinematics.jacobian_at import jacobian_at
 from pteron.viewer.state import ViewerState
-from pteron.workspace import reserve
+from pteron.workspace import pose_margins
 
 Level = Literal["far", "near", "close"]
 
 _NEAR = 0.3
 _CLOSE = 0.1
-"""Reserves, of 1 at best, below which a pose is near, and close to, what ends the work."""
+"""Margins, of 1 at best, below which a pose is near, and close to, what ends the work."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +69,7 @@ def readings(state: ViewerState) -> Readings:
         condition = float("nan")
     most = [leg.drive.max_force if leg.drive else None for leg in robot.legs]
     shares = np.abs(forces) / np.array([np.nan if force is None else force for force in most])
-    at = reserve(robot, state.pose)
+    at = pose_margins(robot, state.pose)
     return Readings(
         state.joints,
         forces,
@@ -77,13 +77,13 @@ def readings(state: ViewerState) -> Readings:
         condition,
         at.type_i,
         float(at.type_ii),
-        at.clearances,
+        at.joints,
         fault,
     )
 
 
 def level(value: float) -> Level:
-    """Return the level of a reserve, 1 at best.
+    """Return the level of a margin, 1 at best.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Where a machine can work: its reserves, its home pose, its reach and its joints' ranges."""
+"""Where a machine can work: its margins, its home pose, its reach and its joints' ranges."""
 
 from pteron.arguments import check_arguments
 from pteron.kinematics.limits import LimitedJoint, limited_joints
@@ -9,15 +9,15 @@ from pteron.workspace.cube_bound import cube_bound
 from pteron.workspace.free_regions import FreeRegion, free_of_singularities
 from pteron.workspace.home import home_pose
 from pteron.workspace.inscribed import Inscribed, largest_cube, largest_cylinder
+from pteron.workspace.margins import JointRanges, PoseMargins, joint_ranges, pose_margins
 from pteron.workspace.modes import Contact, mode_contacts, mode_pavings
-from pteron.workspace.nearest import NearestSingularity, nearest_singularities
+from pteron.workspace.nearest_singularities import NearestSingularity, nearest_singularities
 from pteron.workspace.orientations import VolumesOverAngles, over_angles
 from pteron.workspace.paving import Paving, paving
 from pteron.workspace.proofs import Proof, prove
 from pteron.workspace.quadrature import Quadrature, quadrature_volume
 from pteron.workspace.reach import BEYOND_LIMITS, REACHABLE, ReachSlice, reach_slice
 from pteron.workspace.regions import Box, Cylinder, Region
-from pteron.workspace.reserve import JointRanges, Reserve, joint_ranges, reserve
 from pteron.workspace.volume import ReachVolume, bounding_box, reach_volume
 
 __all__ = [
@@ -41,7 +41,7 @@ __all__ = [
     "ReachSlice",
     "ReachVolume",
     "Region",
-    "Reserve",
+    "PoseMargins",
     "VolumesOverAngles",
     "bounding_box",
     "clearance",
@@ -64,7 +64,7 @@ __all__ = [
     "quadrature_volume",
     "reach_slice",
     "reach_volume",
-    "reserve",
+    "pose_margins",
 ]
 check_arguments(__name__)
 

@@ -124,7 +124,7 @@ def conditions(
     return tuple(found)
 
 
-def rooms_left(robot: Manipulator, given: Sequence[Condition], poses: Array) -> Array:
+def condition_margins(robot: Manipulator, given: Sequence[Condition], poses: Array) -> Array:
     """Return by how much (..., C) poses keep conditions, by ordinary evaluation; NaN: undefined."""
     found = []
     results = {
@@ -146,7 +146,7 @@ def rooms_left(robot: Manipulator, given: Sequence[Condition], poses: Array) -> 
 
 def kept(robot: Manipulator, given: Sequence[Condition], poses: Array) -> NDArray[np.bool_]:
     """Return which poses (...) keep all conditions, by ordinary evaluation."""
-    return np.asarray((rooms_left(robot, given, poses) >= 0.0).all(axis=-1))
+    return np.asarray((condition_margins(robot, given, poses) >= 0.0).all(axis=-1))
 
 
 class Judge:

@@ -12,12 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pteron.equations.machine import closure_of
+from pteron.equations.machine import closure_of, numbers
 from pteron.errors import DataError
 from pteron.kernels import Array, as_array, bounds, numeric
 from pteron.kinematics.architecture import is_singular_everywhere
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.workspace.boxes import halved
+from pteron.workspace.conditions import conditions
 from pteron.workspace.regions import Box
+from pteron.workspace.smooth_conditions import smooth_conditions
 
 _SAMPLES = 4096
 _PAIRS = 64
@@ -32,9 +35,6 @@ _STARTS = 32
 
 _SINGULAR = 1e-10
 """The measure of a pose that counts as singular."""
-
-_DIFFERENCE = 1e-6
-"""m or rad, for the measure's slope."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ def free_of_singularities(
         return _refuted(robot, found, 0)
     sizes = np.where(given[1] > given[0], given[1] - given[0], np.inf)
     if closure_of(robot).orientation is not None:
-        sizes[:-1] = np.inf  # it depends on the angle alone
+        sizes[~robot.platform.angular] = np.inf  # it depends on the angle alone
     boxes, looked, least = given[None], 0, np.inf
     nearest = max(floor, _SINGULAR)  # no float is a root of cos: an end of the region may be one
     while len(boxes):
@@ -132,22 +132,13 @@ def free_of_singularities(
             return _refuted(robot, found, looked)
         if looked + 2 * len(boxes) > most:
             return FreeRegion(None, None, 0.0, looked, boxes)
-        boxes = _halved(boxes, sizes)
+        boxes = halved(boxes, sizes)
     return FreeRegion(True, None, least if np.isfinite(least) else 0.0, looked, none)
 
 
 def _refuted(robot: Manipulator, pose: Array, looked: int) -> FreeRegion:
     measure = abs(float(numeric(robot, "type_ii")(pose)[0]))
     return FreeRegion(False, pose, measure, looked, np.empty((0, 2, robot.freedom)))
-
-
-def _halved(boxes: Array, sizes: Array) -> Array:
-    """Return each box cut in two across its longest side, measured by sizes (m,)."""
-    longest = ((boxes[:, 1] - boxes[:, 0]) / sizes).argmax(axis=-1)
-    rows, middles = np.arange(len(boxes)), boxes.mean(axis=1)
-    lower, upper = boxes.copy(), boxes.copy()
-    lower[rows, 1, longest] = upper[rows, 0, longest] = middles[rows, longest]
-    return np.concatenate([lower, upper])
 
 
 def _in_reach(robot: Manipulator, poses: Array) -> Array:
@@ -181,11 +172,11 @@ def _stepped(robot: Manipulator, region: Array, boxes: Array) -> Array | None:
     """Return a singular pose of the region to which Newton's steps lead from boxes' middles."""
     chosen = boxes[np.linspace(0, len(boxes) - 1, min(len(boxes), _STARTS)).astype(int)]
     poses = chosen.mean(axis=1)
-    shifts = _DIFFERENCE * np.eye(robot.freedom)
+    smooth = smooth_conditions(robot, conditions(robot, type_ii=_SINGULAR)[-1:])
+    geometry = np.array(numbers(robot))
     free = region[1] > region[0]
     for _ in range(_STEPS):
-        ahead, behind = (_in_reach(robot, poses[:, None] + side * shifts) for side in (1.0, -1.0))
-        slopes = np.where(free, (ahead - behind) / (2.0 * _DIFFERENCE), 0.0)
+        slopes = np.where(free, smooth.slopes(geometry, poses, 1.0)[1][:, 0], 0.0)
         squares = (slopes * slopes).sum(axis=-1)
         steps = _in_reach(robot, poses) / np.where(squares > 0.0, squares, np.inf)
         moved = np.clip(poses - steps[:, None] * slopes, *region)

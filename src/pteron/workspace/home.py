@@ -1,4 +1,4 @@
-"""The home pose: where a machine has the best reserve, turned by no more than that is worth."""
+"""The home pose: where a machine has the best margin, turned by no more than that is worth."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from pteron.kinematics import inverse_kinematics, random_poses, singular_orienta
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import Numbers
-from pteron.workspace.limits import beyond_limits, nowhere
-from pteron.workspace.reserve import reserve
+from pteron.workspace.margins import pose_margins
+from pteron.workspace.unreachable import beyond_limits, nowhere
 
 _SEARCHES = ((200, 0.3), (200, 0.02), (200, 0.0), (1, 0.0))
 """How many random poses, and their least measures: less where the legs have little common reach."""
@@ -38,22 +38,22 @@ _DEGREES = (30.0, 15.0, 5.0, 1.0)
 """Round poses that are tried, coarsest first: multiples of so many metres and degrees."""
 
 _WORTH = 0.99
-"""The share of the best reserve that counts as equal to it: nobody wants to type the rest."""
+"""The share of the best margin that counts as equal to it: nobody wants to type the rest."""
 
 _AXIS = 0.75
 """The share that a place on the axis of a machine's symmetry must have: it is looked for there."""
 
 _SAME = 1e-9
-"""Differences of reserves that are rounding."""
+"""Differences of margins that are rounding."""
 
 _MIDDLE = 0.9
 """The share that the middle between equals must have: from there the machine goes every way."""
 
 
 def home_pose(robot: RobotLike) -> Array:
-    """Return the pose with the best reserve, rounded where that costs next to nothing.
+    """Return the pose with the best margin, rounded where that costs next to nothing.
 
-    The reserve is the smallest of the type-I and type-II measures and of the joints' clearances
+    The margin is the smallest of the type-I and type-II measures and of the joints' clearances
     (see `Reserve`) and, where the platform turns, of what is left of half a turn from phi = 0: a
     machine seldom works the wrong way round. A random search with a fixed seed finds it, and Nelder
     and Mead's method refines it. The result is always the same for the same machine.
@@ -66,7 +66,7 @@ def home_pose(robot: RobotLike) -> Array:
     Returns
     -------
     array, shape (m,)
-        m and rad. Its reserve is at least 98 % of the best one found. Of equals it is the one whose
+        m and rad. Its margin is at least 98 % of the best one found. Of equals it is the one whose
         sliders are nearest to their guide points, and cranks to their zero; or the middle between
         them, if that has 90 %. Of a machine that a turn about the platform's axis leaves as it is,
         it is on that axis, if the best place there has 75 %.
@@ -108,13 +108,13 @@ def _best(robot: Manipulator) -> Array:
     drawn = _random_poses(robot)
     order = np.argsort(-_worth(robot, drawn), kind="stable")
     refined = np.array([_refined(robot, drawn[i]) for i in order[:_STARTS]])
-    reserves = _worth(robot, refined)
-    most = float(reserves.max())
+    margins = _worth(robot, refined)
+    most = float(margins.max())
     if most <= 0.0:
         reached = ~np.isnan(inverse_kinematics(robot, refined, on_failure="nan")).any(axis=-1)
         raise beyond_limits(robot, np.concatenate([refined[reached], drawn]))
     # Zero says where the joints are meant to be, where nothing else tells.
-    equals = refined[reserves >= _WORTH * most]
+    equals = refined[margins >= _WORTH * most]
     best = _least_travel(robot, equals)
     middle = _distinct(equals, _steps(robot, *_STEPS)).mean(axis=0)
     if _worth(robot, middle) >= _MIDDLE * most:
@@ -150,7 +150,7 @@ def _on_axis(robot: Manipulator, poses: Array) -> Array:
     """Return poses (K, m) moved onto the axis of the machine's symmetry; none if it has none.
 
     A symmetry is a turn about the platform's axis after which each leg stands where another stood:
-    the reserves are the same then.
+    the margins are the same then.
     """
     center, _ = search_ball(robot)
     directions, axis = robot.platform.directions, np.array(robot.platform.axis)
@@ -173,8 +173,8 @@ def _distinct(poses: Array, apart: Array) -> Array:
 
 
 def _worth(robot: Manipulator, poses: Array) -> Numbers:
-    """Return the least reserve (...), which is 0 at most where the platform is turned back."""
-    least = reserve(robot, poses).smallest
+    """Return the least margin (...), which is 0 at most where the platform is turned back."""
+    least = pose_margins(robot, poses).least
     if not robot.platform.turns:
         return least
     return np.minimum(least, 1.0 - np.abs(poses[..., -1]) / np.pi)
@@ -186,7 +186,7 @@ def _steps(robot: Manipulator, metres: float, radians: float) -> Array:
 
 
 def _refined(robot: Manipulator, start: Array) -> Array:
-    """Return the pose of a locally best reserve."""
+    """Return the pose of a locally best margin."""
     simplex = np.vstack([start, start + np.diag(_steps(robot, *_STEPS))])
     found = minimize(
         lambda pose: -float(_worth(robot, pose)),

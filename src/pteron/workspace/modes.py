@@ -11,9 +11,9 @@ from pteron.kernels import Array
 from pteron.kinematics.evaluate import checked_one
 from pteron.manipulator import RobotLike, as_manipulator, working_modes
 from pteron.shapes import PoseLike
-from pteron.workspace.conditions import EDGES, Judge, judge, rooms_left
+from pteron.workspace.boxes import halved
+from pteron.workspace.conditions import EDGES, Judge, condition_margins, judge
 from pteron.workspace.paving import Paving, paving
-from pteron.workspace.proofs import halved_each
 
 _HALVINGS = 50
 _ROUNDS = 30
@@ -121,7 +121,7 @@ def _contact(
                 return Contact(elbows, leg, one.conditions[k].cause, pose, True)
         if 2 * len(boxes) > _MOST:
             break
-        boxes = halved_each(boxes, boxes[0, 1] - boxes[0, 0])
+        boxes = halved(boxes, boxes[0, 1] - boxes[0, 0])
     return Contact(elbows, leg, "", None, False)
 
 
@@ -136,7 +136,7 @@ def _crossing(one: Paving, own: Judge, k: int, low: Array, high: Array) -> Array
         inside, beyond = poses[least.argmax()], poses[most.argmin()]
         for _ in range(_HALVINGS):
             middle = 0.5 * (inside + beyond)
-            serves = rooms_left(one.robot, one.conditions, middle)[k] >= 0.0
+            serves = condition_margins(one.robot, one.conditions, middle)[k] >= 0.0
             inside, beyond = (middle, beyond) if serves else (inside, middle)
         return np.asarray(inside)
     return None

@@ -15,6 +15,7 @@ from pteron.kinematics.architecture import expect_regular
 from pteron.kinematics.evaluate import checked_one
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike
+from pteron.workspace.boxes import halved
 from pteron.workspace.conditions import Condition, Judge, conditions, judge
 from pteron.workspace.enclosing import enclosing_box
 
@@ -277,12 +278,3 @@ def _whole(box: Array, moving: NDArray[np.intp], boxes: Array) -> tuple[Array, A
     low, high = (np.repeat(corner[None], len(boxes), axis=0) for corner in box)
     low[:, moving], high[:, moving] = boxes[:, 0], boxes[:, 1]
     return low, high
-
-
-def halved(boxes: Array) -> Array:
-    """Return both halves of boxes (N, 2, k) of one size, across their longest side."""
-    axis = int((boxes[0, 1] - boxes[0, 0]).argmax())
-    halves = np.repeat(boxes, 2, axis=0)
-    middle = 0.5 * (boxes[:, 0, axis] + boxes[:, 1, axis])
-    halves[0::2, 1, axis] = halves[1::2, 0, axis] = middle
-    return halves

@@ -12,7 +12,8 @@ from pteron.kernels import Array, numeric
 from pteron.kinematics.architecture import expect_regular
 from pteron.kinematics.limits import limited_joints
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.workspace.conditions import Condition, Judge, conditions, judge, rooms_left
+from pteron.workspace.boxes import halved
+from pteron.workspace.conditions import Condition, Judge, condition_margins, conditions, judge
 from pteron.workspace.regions import Cylinder, Region
 
 _TRIED = 4096
@@ -79,7 +80,7 @@ class Proof:
         margins = numeric(self.robot, "reach")(self.counterexample)[0]
         joints = {(j.leg, j.noun): j for j in limited_joints(self.robot, self.counterexample)}
         told = []
-        left = rooms_left(self.robot, self.causes, self.counterexample)
+        left = condition_margins(self.robot, self.causes, self.counterexample)
         for condition, room in zip(self.causes, left.tolist(), strict=True):
             joint = joints.get((condition.leg, condition.cause.split(" at ")[0]))
             text = str(condition)
@@ -157,6 +158,7 @@ def prove(
     judging = judge(robot, asked)
     left, open_, seen = box[None], np.array([judging.all]), 0
     least = _THINNEST * (box[1] - box[0])
+    sizes = np.where(box[0] < box[1], box[1] - box[0], 1.0)
     while True:
         parts, still = [], []
         for start in range(0, len(left), _SLICE):
@@ -172,7 +174,7 @@ def prove(
             return Proof(True, robot, region, asked, boxes=seen)
         found = _counterexample(robot, judging, region, left)
         if found is not None:
-            left_there = rooms_left(robot, asked, found)
+            left_there = condition_margins(robot, asked, found)
             # Out of reach limits are undefined: it is the reach that is told.
             fails = left_there < 0.0
             fails = fails if fails.any() else np.isnan(left_there)
@@ -185,20 +187,7 @@ def prove(
             return Proof(
                 None, robot, region, asked, None, left[smallest], causes=causes, boxes=seen
             )
-        left, open_ = halved_each(left, box[1] - box[0]), np.repeat(open_, 2)
-
-
-def halved_each(boxes: Array, whole: Array) -> Array:
-    """Return both halves of boxes (N, 2, m), each across the side that is the largest of `whole`'s.
-
-    So coordinates of different units are halved alike.
-    """
-    shares = (boxes[:, 1] - boxes[:, 0]) / np.where(whole > 0.0, whole, 1.0)
-    axis, rows = shares.argmax(axis=1), np.arange(len(boxes))
-    middle = 0.5 * (boxes[rows, 0, axis] + boxes[rows, 1, axis])
-    halves = np.repeat(boxes, 2, axis=0)
-    halves[2 * rows, 1, axis] = halves[2 * rows + 1, 0, axis] = middle
-    return halves
+        left, open_ = halved(left, sizes), np.repeat(open_, 2)
 
 
 def _counterexample(
@@ -214,6 +203,6 @@ def _counterexample(
         poses.append(pose)
     every = np.concatenate(poses)
     every = every[region.holds(every)]
-    failing = every[~(rooms_left(robot, judging.given, every) >= 0.0).all(axis=-1)]
+    failing = every[~(condition_margins(robot, judging.given, every) >= 0.0).all(axis=-1)]
     proved: NDArray[np.bool_] = judging(failing, failing, np.full(len(failing), judging.all))[0]
     return failing[proved.argmax()] if proved.any() else None

@@ -15,7 +15,7 @@ from pteron.kinematics.evaluate import checked_one
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike, Seed
-from pteron.workspace.reserve import room_to_limits
+from pteron.workspace.margins import distance_to_limits
 
 _SAMPLES = 20_000
 _STARTS = 5
@@ -111,31 +111,31 @@ def bounding_box(robot: RobotLike, pose: PoseLike) -> Array:
     given = checked_one(robot, pose, "pose")
     count = len(robot.platform.lengths)
 
-    def room(p: Array) -> Array:
+    def depths(p: Array) -> Array:
         """Return how far inside every bound positions are, m."""
         at = np.broadcast_to(given, (*p.shape[:-1], len(given))).copy()
         at[..., :count] = p
-        limits = room_to_limits(robot, at)
+        limits = distance_to_limits(robot, at)
         return np.concatenate([numeric(robot, "reach")(at)[0], np.minimum(limits, _FAR)], axis=-1)
 
     center, radius = search_ball(robot)
     rng = np.random.default_rng(0)
     drawn = center + radius * rng.uniform(-1.0, 1.0, (_SAMPLES, count))
     drawn = np.vstack([drawn, given[:count]])
-    inside = room(drawn).min(axis=-1)
+    inside = depths(drawn).min(axis=-1)
     # Where next to nothing is in reach, the deepest positions are moved inside first.
     starts = drawn[np.argsort(-inside)[:_STARTS]]
     if not (inside > _TOUCH).any():
-        starts = np.array([_deepest(room, start) for start in starts])
-        starts = starts[room(starts).min(axis=-1) > _TOUCH]
+        starts = np.array([deepest(depths, start) for start in starts])
+        starts = starts[depths(starts).min(axis=-1) > _TOUCH]
         if not len(starts):
             raise ModelError(
                 "no position is in reach of all legs, within the joints' limits, at the "
                 f"orientation of pose {given.tolist()}",
                 subject=robot.name,
             )
-    good = np.vstack([drawn[inside > _TOUCH], starts[room(starts).min(axis=-1) > _TOUCH]])
-    if any((room(good + way).min(axis=-1) > _TOUCH).any() for way in _long_ways(robot, radius)):
+    good = np.vstack([drawn[inside > _TOUCH], starts[depths(starts).min(axis=-1) > _TOUCH]])
+    if any((depths(good + way).min(axis=-1) > _TOUCH).any() for way in _long_ways(robot, radius)):
         raise ModelError(
             "the reach has no end: the guides let the platform move along them for ever; give the "
             "legs limits",
@@ -145,8 +145,8 @@ def bounding_box(robot: RobotLike, pose: PoseLike) -> Array:
     for axis in range(count):
         for side, sign in enumerate((1.0, -1.0)):
             objective = sign * np.eye(count)[axis]
-            front = _front(room, good, objective, radius, rng)
-            sides[side, axis] = sign * min(_furthest(room, p, objective) for p in front[:_STARTS])
+            front = _front(depths, good, objective, radius, rng)
+            sides[side, axis] = sign * min(_furthest(depths, p, objective) for p in front[:_STARTS])
     return sides
 
 
@@ -158,20 +158,20 @@ def _long_ways(robot: Manipulator, size: float) -> Iterator[Array]:
             yield from (way, -way)
 
 
-def _deepest(room: Callable[[Array], Array], start: Array) -> Array:
+def deepest(depths: Callable[[Array], Array], start: Array) -> Array:
     """Return a position that is deeper inside every bound, from one that need not be inside."""
     found = minimize(
         lambda v: -v[-1],
-        np.append(start, float(room(start).min())),
+        np.append(start, float(depths(start).min())),
         method="SLSQP",
-        constraints={"type": "ineq", "fun": lambda v: room(v[:-1]) - v[-1]},
+        constraints={"type": "ineq", "fun": lambda v: depths(v[:-1]) - v[-1]},
         options=_OPTIONS,
     )
     return np.asarray(found.x[:-1])
 
 
 def _front(
-    room: Callable[[Array], Array],
+    depths: Callable[[Array], Array],
     inside: Array,
     objective: Array,
     size: float,
@@ -183,23 +183,23 @@ def _front(
         inside = inside[np.argsort(inside @ objective)[:_FRONT]]
         tried = np.repeat(inside, 20 * _FRONT // len(inside), axis=0)
         tried = tried + spread * rng.normal(size=tried.shape)
-        inside = np.vstack([inside, tried[room(tried).min(axis=-1) > _TOUCH]])
+        inside = np.vstack([inside, tried[depths(tried).min(axis=-1) > _TOUCH]])
         spread *= _NEARER
     return inside[np.argsort(inside @ objective)]
 
 
-def _furthest(room: Callable[[Array], Array], start: Array, objective: Array) -> float:
+def _furthest(depths: Callable[[Array], Array], start: Array, objective: Array) -> float:
     """Return the least value of objective . p inside every bound, from a position inside."""
     found = minimize(
         lambda p: float(objective @ p),
         start,
         jac=lambda p: objective,
         method="SLSQP",
-        constraints={"type": "ineq", "fun": room},
+        constraints={"type": "ineq", "fun": depths},
         options=_OPTIONS,
     )
     way = start + np.linspace(1.0, 0.0, _WAY)[:, None] * (found.x - start)
-    inside = room(way).min(axis=-1) > -_SLACK
+    inside = depths(way).min(axis=-1) > -_SLACK
     # At the rim of a leg's reach its joint may have no coordinate, and so no limit.
     inside[:-1] &= inside[1:]
     return float(objective @ way[inside.argmax()])
@@ -244,7 +244,7 @@ def reach_volume(
     size = (count, len(box[0]))
     poses[:, : size[1]] = np.random.default_rng(seed).uniform(box[0], box[1], size)
     margin = numeric(robot, "reach")(poses)[0]
-    share = float((np.minimum(margin, room_to_limits(robot, poses)).min(axis=-1) >= 0.0).mean())
+    share = float((np.minimum(margin, distance_to_limits(robot, poses)).min(axis=-1) >= 0.0).mean())
     whole = float(np.prod(box[1] - box[0]))
     error = whole * float(np.sqrt(share * (1.0 - share) / count))
     return ReachVolume(share * whole, error, f"m^{size[1]}", box, count)

@@ -25,7 +25,7 @@ from pteron.kinematics.evaluate import unchecked
 from pteron.kinematics.limits import limited_joints
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator
-from pteron.workspace.reserve import clearances
+from pteron.workspace.margins import joint_distances
 
 _REFINED = 33
 """Samples between the neighbours of the tightest sample, for its exact place."""
@@ -177,7 +177,7 @@ def _margins_of(robot: Manipulator, limits: Limits, state: FullMotion) -> dict[s
         type_ii = np.abs(unchecked(robot, "type_ii", state.pose))[:, None]
         found["type_ii"] = type_ii / best_type_ii(robot) - limits.type_ii
     if any(leg.limits for leg in robot.legs):
-        found["joint_clearance"] = clearances(robot, state.joints) - limits.joint_clearance
+        found["joint_clearance"] = joint_distances(robot, state.joints) - limits.joint_clearance
     if _limits_passive(robot):
         passive = unchecked(robot, "passive_room", state.pose)[0]
         found["passive_clearance"] = passive - limits.passive_clearance

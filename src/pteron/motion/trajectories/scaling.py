@@ -14,15 +14,15 @@ from pteron.kernels import Array, numeric
 from pteron.kinematics import inverse_kinematics
 from pteron.kinematics.evaluate import checked_one
 from pteron.kinematics.singularities import best_type_ii
-from pteron.kinematics.sizes import type_ii_sizes
+from pteron.kinematics.type_ii_sizes import type_ii_sizes
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.trajectories.cycle import Cycle, moves
 from pteron.shapes import PoseLike
-from pteron.workspace import reserve
-from pteron.workspace.reserve import clearances
+from pteron.workspace import pose_margins
+from pteron.workspace.margins import clearances
 
 _LEAST_RESERVE = 0.2
-"""Least reserve, of type I and of type II, that a cycle keeps."""
+"""Least margin, of type I and of type II, that a cycle keeps."""
 
 TURN = np.pi / 3.0
 """Turn of the platform on its way across in the full cycle, rad."""
@@ -32,7 +32,7 @@ _SAMPLES = 501
 """Poses checked on the path out; the path back is the same."""
 
 _DIP = 1e-4
-"""Safety margin between checked poses, in units of the reserve, m and rad: more than a reserve or a
+"""Safety margin between checked poses, in units of the margin, m and rad: more than a margin or a
 joint can dip between two of them."""
 
 _STEPS = 1000
@@ -43,9 +43,9 @@ _WORTH = 1.01
 
 
 def least_reserve(robot: RobotLike, around: PoseLike) -> float:
-    """Return the reserve that a cycle about a pose keeps, if nothing else is said.
+    """Return the margin that a cycle about a pose keeps, if nothing else is said.
 
-    It is 0.2; a machine with little reserve moves where it has half of what the pose has.
+    It is 0.2; a machine with little margin moves where it has half of what the pose has.
 
     Parameters
     ----------
@@ -57,11 +57,11 @@ def least_reserve(robot: RobotLike, around: PoseLike) -> float:
     Returns
     -------
     float
-        Of the reserves of `pteron.workspace.reserve`, without unit.
+        Of the margins of `pteron.workspace.pose_margins`, without unit.
     """
     robot = as_manipulator(robot)
     middle = checked_one(robot, around, "around")
-    return min(_LEAST_RESERVE, float(reserve(robot, middle).smallest) / 2.0)
+    return min(_LEAST_RESERVE, float(pose_margins(robot, middle).least) / 2.0)
 
 
 def scaled_to_reach(
@@ -74,9 +74,9 @@ def scaled_to_reach(
 ) -> tuple[float, Array]:
     """Return the scale of the largest pick-and-place cycle about a pose, and its direction.
 
-    The whole cycle stays in reach, keeps the reserves of type I and type II (see
-    `pteron.workspace.Reserve`) at `least` or above, and the joints within their limits. The scale
-    is found by bisection: a smaller cycle stays nearer to the pose in its middle.
+    The whole cycle stays in reach, keeps the margins of type I and type II (see
+    `pteron.workspace.PoseMargins`) at `least` or above, and the joints within their limits. The
+    scale is found by bisection: a smaller cycle stays nearer to the pose in its middle.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def scaled_to_reach(
     turn : float
         Turn of the platform on its way across, at scale 1, rad; without effect where it does not.
     least : float, optional
-        What the reserves must keep; by default `least_reserve`.
+        What the margins must keep; by default `least_reserve`.
 
     Returns
     -------
@@ -129,7 +129,7 @@ def scaled_to_reach(
     if best is None:
         inverse_kinematics(robot, middle)  # says which leg misses the pose, and by how much
         raise ModelError(
-            f"no pick-and-place cycle about pose {middle.tolist()} keeps a reserve of {least:g} to "
+            f"no pick-and-place cycle about pose {middle.tolist()} keeps a margin of {least:g} to "
             "the singularities and the joints' limits; choose a better pose",
             subject=robot.name,
         )
@@ -152,7 +152,7 @@ def _largest(robot: Manipulator, cycle: Cycle, least: float, wanted: int) -> int
 
 
 def _keeps(robot: Manipulator, poses: Array, least: float) -> bool:
-    """Say whether all poses keep the reserves and the joints' limits."""
+    """Say whether all poses keep the margins and the joints' limits."""
     type_i = numeric(robot, "reach")(poses)[1]
     if not (type_i >= least + _DIP).all():  # NaN, out of reach, compares false
         return False

@@ -16,9 +16,9 @@ from pteron.manipulator import Manipulator
 from pteron.manipulator.manipulator import told_legs
 from pteron.manipulator.variants import with_elbows
 from pteron.platforms import Platform
-from pteron.workspace.drive_doubts import drive_doubts
+from pteron.workspace.drive_warnings import drive_warnings
 from pteron.workspace.home import home_pose
-from pteron.workspace.reserve import reserve
+from pteron.workspace.margins import pose_margins
 
 _LARGE = 10.0
 """Length, m, beyond which millimetres are likelier."""
@@ -31,13 +31,13 @@ _UPRIGHT = 0.1
 """Share of a leg's length by which a platform is above or below its base, not level with it."""
 
 _ALIKE = 0.7
-"""Share of the reserve in one working mode from which on another serves as well."""
+"""Share of the margin in one working mode from which on another serves as well."""
 
 _PULL = 30.0
 """Gravity, m/s^2, beyond which another unit is likelier."""
 
 
-def doubts(robot: Manipulator) -> tuple[str, ...]:
+def machine_warnings(robot: Manipulator) -> tuple[str, ...]:
     """Return what a person should look at again, one line each.
 
     Parameters
@@ -53,8 +53,8 @@ def doubts(robot: Manipulator) -> tuple[str, ...]:
     Examples
     --------
     >>> import pteron
-    >>> from pteron.workspace.doubts import doubts
-    >>> doubts(pteron.load("quadrupteron"))
+    >>> from pteron.workspace.machine_warnings import machine_warnings
+    >>> machine_warnings(pteron.load("quadrupteron"))
     ()
     """
     platform, far = robot.platform, _far(robot)
@@ -74,17 +74,17 @@ def doubts(robot: Manipulator) -> tuple[str, ...]:
     axis = platform.axis if platform.turns and not platform.slides else None
     for i, leg in enumerate(robot.legs, start=1):
         own = () if i in far else _leg_doubts(leg)
-        found += [f"leg {i}: {text}" for text in (*own, *leg.doubts(axis), *drive_doubts(leg))]
+        found += [f"leg {i}: {text}" for text in (*own, *leg.doubts(axis), *drive_warnings(leg))]
     if axis is not None:
         found += _turning_offsets(robot.legs, axis)
     return tuple(found)
 
 
-def elbow_doubts(robot: Manipulator, home: Array) -> tuple[str, ...]:
+def elbow_warnings(robot: Manipulator, home: Array) -> tuple[str, ...]:
     """Return the doubt whether the other working mode is meant, where the platform stands upright.
 
     Most machines hang below their base. One that stands above it, and whose other elbows would let
-    it hang there with much the same reserve, was perhaps given the wrong ones.
+    it hang there with much the same margin, was perhaps given the wrong ones.
     """
     down, base = np.array(robot.gravity), np.mean([leg.guide_point for leg in robot.legs], axis=0)
     others = [-leg.elbow if len(leg.branches) > 1 else leg.elbow for leg in robot.legs]
@@ -102,7 +102,7 @@ def elbow_doubts(robot: Manipulator, home: Array) -> tuple[str, ...]:
         hanging = home_pose(other)
     except PteronError:
         return ()
-    worth = float(reserve(other, hanging).smallest) / float(reserve(robot, home).smallest)
+    worth = float(pose_margins(other, hanging).least) / float(pose_margins(robot, home).least)
     if below(hanging) < least or worth < _ALIKE:
         return ()
     return (

@@ -27,7 +27,7 @@ _HEAVY = 100.0
 """How many times the mass at its joint a rotor may be: matched, they are equal."""
 
 
-def drive_doubts(leg: LegKind) -> Iterator[str]:
+def drive_warnings(leg: LegKind) -> Iterator[str]:
     """Yield what a person should look at again in a leg's drive, by itself, one line each."""
     drive = leg.drive
     if drive is None:
@@ -71,7 +71,7 @@ def drive_doubts(leg: LegKind) -> Iterator[str]:
         )
 
 
-def load_doubts(robot: Manipulator, pose: Array) -> tuple[str, ...]:
+def load_warnings(robot: Manipulator, pose: Array) -> tuple[str, ...]:
     """Return what is unlikely in the drives for the load that they have in a pose (m,), at rest."""
     rest = np.zeros(robot.freedom)
     holding = np.abs(drive_forces(robot, pose, rest, rest))

@@ -28,7 +28,7 @@ from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike
 from pteron.workspace.enclosing import enclosing_box
-from pteron.workspace.nearest_zero import SINGULAR, Nearest, Search
+from pteron.workspace.nearest_vanishing import SINGULAR, Nearest, Search
 from pteron.workspace.vanishing import Kind, Vanishing
 
 _MOST = 20_000

@@ -1,10 +1,9 @@
-"""How far poses are from all that ends the machine's work, and what of its range a joint uses."""
+"""Margins of poses to singularities and limits, and the part of its range that each joint uses."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,14 +12,14 @@ from pteron.errors import DataError
 from pteron.kernels import Array, numeric
 from pteron.kinematics import inverse_kinematics
 from pteron.kinematics.singularities import best_type_ii
-from pteron.kinematics.sizes import type_ii_sizes
+from pteron.kinematics.type_ii_sizes import type_ii_sizes
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import Numbers, PerJoint, PoseLike
 
 
 @dataclass(frozen=True)
-class Reserve:
-    """Three reserves of a pose; each is 1 at best and 0 where the machine fails.
+class PoseMargins:
+    """Distances of poses from what ends a machine's work; each is 1 at best, 0 where it ends.
 
     Attributes
     ----------
@@ -30,21 +29,21 @@ class Reserve:
     type_ii : array, shape (...)
         The size of the type-II measure over the best that the machine's geometry allows, limits or
         not: 0 where the actuators do not hold the platform.
-    clearances : array, shape (..., n)
+    joints : array, shape (..., n)
         Distance of each leg's joint, or of a passive one, from its nearer limit, over half its
         range, the least; negative beyond it, and 1 for a leg without limits.
-    smallest : array, shape (...)
+    least : array, shape (...)
         The least of them all, which is what `home_pose` makes as large as it can.
     """
 
     type_i: PerJoint
     type_ii: Numbers
-    clearances: PerJoint
-    smallest: Numbers
+    joints: PerJoint
+    least: Numbers
 
 
-def reserve(robot: RobotLike, pose: PoseLike) -> Reserve:
-    """Return the reserves of poses, in reach or not.
+def pose_margins(robot: RobotLike, pose: PoseLike) -> PoseMargins:
+    """Return the margins of poses, in reach or not.
 
     Parameters
     ----------
@@ -55,65 +54,55 @@ def reserve(robot: RobotLike, pose: PoseLike) -> Reserve:
 
     Returns
     -------
-    Reserve
+    PoseMargins
 
     Examples
     --------
     >>> import pteron
-    >>> from pteron.workspace import reserve
-    >>> reserve(pteron.load("quadrupteron"), [0.0, 0.0, 0.0, 0.0]).type_i.round(3)
+    >>> from pteron.workspace import pose_margins
+    >>> pose_margins(pteron.load("quadrupteron"), [0.0, 0.0, 0.0, 0.0]).type_i.round(3)
     array([1.   , 1.   , 0.991, 1.   ])
     """
     robot = as_manipulator(robot)
-    facts = _facts(robot)
-    margin, measure, _, _ = numeric(robot, "reach")(pose)
+    reach, measure, _, _ = numeric(robot, "reach")(pose)
     # A shaft without lengths reaches everywhere.
-    type_i = np.divide(margin, facts.sizes, out=np.nan_to_num(measure), where=margin < 0.0)
+    sizes = np.array([leg.size for leg in robot.legs])
+    type_i = np.divide(reach, sizes, out=np.nan_to_num(measure), where=reach < 0.0)
     type_ii = np.minimum(type_ii_sizes(robot, pose) / best_type_ii(robot), 1.0)
-    room = clearances(robot, numeric(robot, "joint_coordinates")(pose)[0])
-    shares = np.where(np.isinf(room), 1.0, room / facts.half_ranges)
+    low, high = joint_limits(robot)
+    half = np.where(np.isinf(low), 1.0, (high - low) / 2.0)
+    distances = joint_distances(robot, numeric(robot, "joint_coordinates")(pose)[0])
+    shares = np.where(np.isinf(distances), 1.0, distances / half)
     shares = np.where(np.isnan(shares), np.minimum(type_i, 0.0), shares)
     shares = np.fmin(shares, numeric(robot, "passive_room")(pose)[0])
-    smallest = np.minimum(np.minimum(type_i, shares).min(axis=-1), type_ii)
-    return Reserve(type_i, type_ii, shares, smallest)
-
-
-class _Facts(NamedTuple):
-    """What a machine's reserves are measured by, (n,) each."""
-
-    sizes: Array
-    low: Array
-    high: Array
-    half_ranges: Array
-    levers: Array
+    least = np.minimum(np.minimum(type_i, shares).min(axis=-1), type_ii)
+    return PoseMargins(type_i, type_ii, shares, least)
 
 
 @lru_cache(maxsize=64)
-def _facts(robot: Manipulator) -> _Facts:
-    low, high = np.array([leg.limits or (-np.inf, np.inf) for leg in robot.legs]).T
-    sizes, levers = np.array([(leg.size, leg.lever) for leg in robot.legs]).T
-    half = np.where(np.isinf(low), 1.0, (high - low) / 2.0)
-    return _Facts(sizes, low, high, half, levers)
+def joint_limits(robot: Manipulator) -> Array:
+    """Return the joints' limits (2, n), m or rad; infinite where there are none."""
+    return np.array([leg.limits or (-np.inf, np.inf) for leg in robot.legs]).T
 
 
-def clearances(robot: Manipulator, joints: Array) -> Array:
+def joint_distances(robot: Manipulator, joints: Array) -> Array:
     """Return the distance (..., n) of joints from their nearer limit, negative beyond, or inf."""
-    facts = _facts(robot)
-    return np.asarray(np.minimum(joints - facts.low, facts.high - joints))
+    low, high = joint_limits(robot)
+    return np.asarray(np.minimum(joints - low, high - joints))
 
 
-def room_to_limits(robot: Manipulator, poses: Array) -> Array:
+def distance_to_limits(robot: Manipulator, poses: Array) -> Array:
     """Return how far (..., n) legs may move until an actuated or passive joint meets its limit, m.
 
     Very far without limits, and out of reach, where a joint may have no coordinate; so is a joint
-    that follows the platform's angle within its limits, since no way leads out of them.
+    that follows the platform's angle within its limits, since no translation leads out of them.
     """
-    joints = numeric(robot, "joint_coordinates")(poses)[0]
-    room = clearances(robot, joints) * _facts(robot).levers
+    distances = joint_distances(robot, numeric(robot, "joint_coordinates")(poses)[0])
+    levers = np.array([leg.lever for leg in robot.legs])
     follows = np.array([leg.follows_angle for leg in robot.legs])
-    free = np.isnan(room) | (follows & (room >= 0.0))
+    free = np.isnan(distances) | (follows & (distances >= 0.0))
     passive: Array = numeric(robot, "passive_room")(poses)[1]
-    return np.asarray(np.fmin(np.where(free, np.inf, room), passive))
+    return np.asarray(np.fmin(np.where(free, np.inf, distances * levers), passive))
 
 
 @dataclass(frozen=True)
@@ -173,5 +162,5 @@ def joint_ranges(robot: RobotLike, poses: PoseLike) -> JointRanges:
         joints.min(axis=0),
         joints.max(axis=0),
         tuple(leg.limits for leg in robot.legs),
-        np.asarray((clearances(robot, joints) >= 0.0).all(axis=0)),
+        np.asarray((joint_distances(robot, joints) >= 0.0).all(axis=0)),
     )

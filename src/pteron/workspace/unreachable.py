@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import minimize  # type: ignore[import-untyped]
 
 from pteron.errors import ModelError
 from pteron.kernels import Array, numeric
@@ -11,7 +10,8 @@ from pteron.kinematics.limits import limited_joints
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator
 from pteron.manipulator.manipulator import told_legs
-from pteron.workspace.reserve import room_to_limits
+from pteron.workspace.margins import distance_to_limits
+from pteron.workspace.volume import deepest
 
 _DRAWN = 20_000
 _STARTS = 5
@@ -50,23 +50,14 @@ def _deepest(robot: Manipulator) -> tuple[Array, Array]:
     def margins(pose: Array) -> Array:
         return np.asarray(numeric(robot, "reach")(pose)[0])
 
-    def deeper(start: Array) -> Array:
-        found = minimize(
-            lambda v: -v[-1],
-            np.append(start, margins(start).min()),
-            method="SLSQP",
-            constraints={"type": "ineq", "fun": lambda v: margins(v[:-1]) - v[-1]},
-        )
-        return np.asarray(found.x[:-1])
-
     starts = drawn[np.argsort(-margins(drawn).min(axis=-1))[:_STARTS]]
-    best = np.array([*starts, *map(deeper, starts)])
+    best = np.array([*starts, *(deepest(margins, start) for start in starts)])
     return best[np.nanargmax(margins(best).min(axis=-1))], drawn
 
 
 def beyond_limits(robot: Manipulator, poses: Array) -> ModelError:
     """Return what is said of a machine that at the best of poses, in reach, passes limits."""
-    pose = poses[room_to_limits(robot, poses).min(axis=-1).argmax()]
+    pose = poses[distance_to_limits(robot, poses).min(axis=-1).argmax()]
     told = [
         f"{f'leg {at.leg}: ' if at.leg else ''}{at.noun} at {at.value:.4g} {at.unit} of "
         f"{at.told_limits('{:g}'.format)}"

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.kernels import Array
+from pteron.workspace.boxes import halved
 from pteron.workspace.vanishing import Vanishing
 
 SINGULAR = 1e-10
@@ -109,7 +110,7 @@ class Search:
             tried = batch[: 0 if rounds >= _SEEKING and rounds % _SELDOM else _TRIED]
             rounds += 1
             best, nearest = self._better(tried, best, nearest, 1)
-            boxes = np.concatenate([_halved(batch), rest])
+            boxes = np.concatenate([halved(batch), rest])
             away = self._distances(boxes)
             boxes, away = boxes[away < nearest], away[away < nearest]
         if len(boxes) and away.min() < (1.0 - _CLOSE) * nearest:
@@ -297,11 +298,3 @@ class Search:
         here = self.at[self.moving]
         apart = np.maximum(np.maximum(boxes[:, 0] - here, here - boxes[:, 1]), 0.0)
         return np.asarray(np.linalg.norm(apart, axis=-1))
-
-
-def _halved(boxes: Array) -> Array:
-    """Return each box (B, 2, k) cut in two across its longest side."""
-    rows, longest = np.arange(len(boxes)), (boxes[:, 1] - boxes[:, 0]).argmax(axis=-1)
-    lower, upper, middles = boxes.copy(), boxes.copy(), boxes.mean(axis=1)
-    lower[rows, 1, longest] = upper[rows, 0, longest] = middles[rows, longest]
-    return np.concatenate([lower, upper])

@@ -1,0 +1,71 @@
+"""Random poses in reach, away from singularities."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pteron.arguments import expect_to_fit
+from pteron.errors import DataError
+from pteron.kinematics.architecture import expect_regular
+from pteron.kinematics.sampling import drawn_poses
+from pteron.manipulator import RobotLike, as_manipulator
+from pteron.shapes import Poses, Seed
+
+
+def random_poses(
+    robot: RobotLike,
+    count: int,
+    *,
+    seed: Seed | np.random.Generator = 0,
+    type_i: float = 0.1,
+    type_ii: float = 0.1,
+    limits: bool = True,
+) -> Poses:
+    """Return poses drawn at random from those in reach and away from singularities.
+
+    Uniformly in position and orientation, within a box that holds all but the rarest corners.
+    Passive joints and the platform's angle keep their limits; the actuated joints need not.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+    count : int
+        How many poses.
+    seed : int or numpy Generator
+        Where the randomness comes from.
+    type_i : float
+        Least type-I measure of every leg: 0 where it is singular, 1 at best.
+    type_ii : float
+        Least type-II measure of the machine.
+    limits : bool
+        Whether limits are kept as said above, or none are.
+
+    Returns
+    -------
+    array, shape (count, m)
+        m and rad.
+
+    Raises
+    ------
+    DataError
+        If the count is no whole number, or negative.
+    ModelError
+        If the legs have next to no common reach.
+    SingularPose
+        If a type-II measure above 0 is asked of a machine that is singular at every pose.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> pteron.random_poses(pteron.load("quadrupteron"), 5).shape
+    (5, 4)
+    """
+    robot = as_manipulator(robot)
+    if count < 0:
+        raise DataError(f"count: {count} given, 0 or more expected")
+    expect_to_fit("count", count, 4.0 * count * robot.freedom)
+    if type_ii > 0.0:
+        expect_regular(robot)
+    rng = np.random.default_rng(seed)
+    return drawn_poses(robot, count, rng, type_i, type_ii, limits=limits)
