@@ -16,7 +16,7 @@ from measuring import quick
 import pteron
 from pteron.kernels import Array
 from pteron.workspace import Paving, cube_bound, home_pose, largest_cube, paving, quadrature_volume
-from pteron.workspace.conditions import kept
+from pteron.workspace.conditions import keeps
 
 _SECONDS = 60.0
 _CHUNK = 500_000
@@ -88,7 +88,7 @@ def compare(found: Paving, count: int, name: str) -> None:
     while totals.sum() < count:
         low, high = near if totals.sum() < count // 2 else found.box
         poses = rng.uniform(low, high, (min(_CHUNK, count - int(totals.sum())), len(low)))
-        where, serves = found.locate(poses), kept(found.robot, found.conditions, poses)
+        where, serves = found.locate(poses), keeps(found.robot, found.conditions, poses)
         wrong += int((serves & (where < 0)).sum() + (~serves & (where > 0)).sum())
         totals += [(where == value).sum() for value in (1, 0, -1)]
     inside, undecided, outside = totals

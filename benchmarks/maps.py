@@ -29,8 +29,8 @@ _INDEX = "condition"
 _DYING = """\
 import os, signal
 from pteron.maps import map_index, pose_grid
-def progress(done, total):
-    if 2 * done >= total:
+def progress(share):
+    if share >= 0.5:
         os.kill(os.getpid(), signal.SIGKILL)
 grid = pose_grid("{robot}", {held}, points={points})
 map_index("{robot}", "{index}", grid, out="{store}", progress=progress)
@@ -82,13 +82,11 @@ def main() -> None:
         run = subprocess.run([sys.executable, "-c", code], check=False)
         if run.returncode != -signal.SIGKILL:
             sys.exit("the process that was to be killed has ended by itself")
-        there: list[int] = []
+        there: list[float] = []
         begin = perf_counter()
-        resumed = map_index(
-            robot, _INDEX, grid, out=store, progress=lambda done, _: there.append(done)
-        )
+        resumed = map_index(robot, _INDEX, grid, out=store, progress=there.append)
         print(
-            f"{f'resumed after a killing, {there[0]} of {there[-1]} chunks being there':<54}"
+            f"{f'resumed after a killing, {there[0]:.0%} of the chunks being there':<54}"
             f"{perf_counter() - begin:>7.2f} s"
         )
         expect_alike(plain, resumed)
@@ -99,8 +97,8 @@ def a_worker_dies(robot: pteron.Manipulator, grid: Grid, plain: Map, store: Path
     """Print how long two workers take, of which one is killed in the middle."""
     killed: list[int] = []
 
-    def progress(done: int, total: int) -> None:
-        if not killed and 2 * done >= total:
+    def progress(share: float) -> None:
+        if not killed and share >= 0.5:
             killed.append(a_worker())
             os.kill(killed[0], signal.SIGKILL)
 

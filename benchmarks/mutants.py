@@ -285,11 +285,11 @@ def maps(work: Path) -> list[Kind]:
             expect(same(load_map(store), whole), "a changed store was read")
         except PteronError as error:
             refused = error
-        told: list[int] = []
-        found = map_index(robot, names, grid, out=store, progress=lambda *n: told.append(n[0]))
+        told: list[float] = []
+        found = map_index(robot, names, grid, out=store, progress=told.append)
         expect(same(found, whole), "a changed store was resumed")
         expect(same(load_map(store), whole), "a store is not whole after it was resumed")
-        expect((refused is None) == (told == [1]), "a damaged chunk was not computed again")
+        expect((refused is None) == (told == [1.0]), "a damaged chunk was not computed again")
         return _AS_WRITTEN if refused is None else _AGAIN
 
     return [

@@ -32,7 +32,7 @@ from pteron.workspace import (
     prove,
     quadrature_volume,
 )
-from pteron.workspace.conditions import kept
+from pteron.workspace.conditions import keeps
 from pteron.workspace.margins import distance_to_limits
 
 MACHINES = {**CATALOG, **MECHANISMS}
@@ -192,7 +192,7 @@ def test_conditions_say_what_reach_and_limits_say(name):
     robot, (_, points) = MACHINES[name], boxes_about(name)
     reached = np.minimum(numeric(robot, "reach")(points)[0], distance_to_limits(robot, points))
     serves = (reached >= 0.0).all(axis=-1)
-    assert (kept(robot, conditions(robot), points) == serves).all()
+    assert (keeps(robot, conditions(robot), points) == serves).all()
     assert 0.05 < serves.mean() < 0.95
 
 
@@ -209,7 +209,7 @@ def test_random_poses_agree_with_the_paving(name):
     poses = np.concatenate(
         [rng.uniform(a, b, (10_000, len(low))) for a, b in ((low, high), (least, most))]
     )
-    where, serves = found.locate(poses), kept(found.robot, found.conditions, poses)
+    where, serves = found.locate(poses), keeps(found.robot, found.conditions, poses)
     assert serves[where == 1].all()
     assert not serves[where == -1].any()
     assert (where == 1).mean() > 0.05
@@ -274,7 +274,7 @@ def test_a_region_is_proved_or_a_pose_is_shown():
     assert [str(c) for c in bad.causes] == ["near type II"]
     wide = prove(QUADRUPTERON, Box.around([[0.0, 0.0, 0.0, 0.0], [0.0, 0.25, 0.0, 0.0]]))
     assert "stretched (it misses the pose by" in str(wide)
-    assert not kept(QUADRUPTERON, conditions(QUADRUPTERON), wide.counterexample)
+    assert not keeps(QUADRUPTERON, conditions(QUADRUPTERON), wide.counterexample)
     with pytest.raises(DataError, match="region: 3 coordinates given, x, y, z, phi expected"):
         prove(QUADRUPTERON, Box((0.0,) * 3, (0.0,) * 3))
     point = prove("3-rrr", Box((9.0, 0.0, 0.0), (9.0, 0.0, 0.0)))  # nothing of it varies
@@ -322,7 +322,7 @@ def test_the_largest_cube_is_proved_and_no_neighbour_is_larger(name):
     for shift in 0.02 * found.edge * rng.normal(size=(30, lengths)):
         poses = np.repeat(found.center[None], len(grid), axis=0)
         poses[:, :lengths] += shift + 1.01 * found.size * grid
-        assert not kept(robot, conditions(robot), poses).all()
+        assert not keeps(robot, conditions(robot), poses).all()
 
 
 def test_parts_that_are_apart_are_told_and_how_modes_meet():
@@ -331,7 +331,7 @@ def test_parts_that_are_apart_are_told_and_how_modes_meet():
     assert parts[1, 1, 1].connected
     two = parts[1, 1, -1]
     assert (two.groups, two.connected) == (2, False)
-    assert kept(pavings[1, 1, -1].robot, pavings[1, 1, -1].conditions, two.parts[1].pose)
+    assert keeps(pavings[1, 1, -1].robot, pavings[1, 1, -1].conditions, two.parts[1].pose)
     contacts = mode_contacts({key: pavings[key] for key in [(1, 1, 1), (1, 1, -1), (-1, -1, -1)]})
     (one,) = contacts
     assert (one.leg, one.cause, one.proved) == (3, "at the edge of its reach", True)

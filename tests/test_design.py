@@ -31,7 +31,7 @@ from pteron.equations.machine import numbers
 from pteron.errors import DataError, ModelError, OutputError
 from pteron.indices import evaluate
 from pteron.workspace import Box, conditions, largest_cube, prove
-from pteron.workspace.conditions import kept
+from pteron.workspace.conditions import keeps
 
 LENGTHS = [
     {"moves": "legs.upper_length", "range": (0.1, 0.35), "each": True},
@@ -155,7 +155,7 @@ def test_a_tube_between_the_points_is_no_part_of_the_cube():
     rng = np.random.default_rng(0)
     poses = cube.center + cube.edge * rng.uniform(-0.5, 0.5, (20_000, 3))
     floors = conditions(design.robot, type_i=0.05, type_ii=0.01)
-    assert kept(design.robot, floors, poses).all()
+    assert keeps(design.robot, floors, poses).all()
 
 
 def test_a_tube_is_seen_beside_many_points_on_a_limit(task):

@@ -86,10 +86,10 @@ def _found(
     work: dict[str, Any] = {"workers": workers, "scheduler": scheduler}
     if count is not None:
         with progress_bar(f"Evaluating {count} designs") as tell:
-            work["progress"] = lambda done, chunks: tell(done / chunks)
+            work["progress"] = tell
             return survey(spec, count, Path(str(out)) / _SURVEY, **work)
     with progress_bar("Searching") as tell:
-        work["progress"] = lambda number, generations, best: tell(number / generations)
+        work["progress"] = tell
         return search(spec, folder=None if out is None else Path(out) / _GENERATIONS, **work)
 
 

@@ -220,7 +220,7 @@ def _passive(joints: list[dict[str, Any]]) -> list[Table]:
 
     rows = []
     for joint in (joint for joint in joints if not joint["actuated"]):
-        limits = LimitedJoint(**joint).told_limits(lambda value, unit: f"{value:.4g}")
+        limits = LimitedJoint(**joint).limits_text(lambda value, unit: f"{value:.4g}")
         at, unit = f"{joint['value']:.4g}", joint["unit"]
         rows.append((str(joint["leg"] or ""), joint["noun"], at, f"{limits} {unit}"))
     headings = ("leg", "passive joint", "at home", "limits")

@@ -164,7 +164,7 @@ def workspace(
             out=out if ending in (*_DATA, *_SURFACES) else None,
             scheduler=scheduler,
             workers=workers,
-            progress=lambda done, total: tell(done / total),
+            progress=tell,
         )
     if out is not None and ending in (*_PICTURES, *_FILMS):
         _draw(found, out, ending)

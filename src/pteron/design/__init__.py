@@ -1,4 +1,4 @@
-"""Which dimensions are best: searches over a machine's geometry, with proofs of what they find."""
+"""The best dimensions: searches over a machine's geometry, with proofs of their results."""
 
 from pteron.arguments import check_arguments
 from pteron.design.design import Design
@@ -14,7 +14,7 @@ from pteron.design.proofs import (
     workspace_proofs,
 )
 from pteron.design.quantities import Quantity, quantities
-from pteron.design.report import Summary, Told
+from pteron.design.report import ReportedDesign, Summary
 from pteron.design.search import search
 from pteron.design.spec import Spec, read_spec
 from pteron.design.survey import survey
@@ -31,7 +31,7 @@ __all__ = [
     "Spec",
     "Summary",
     "Task",
-    "Told",
+    "ReportedDesign",
     "Variable",
     "cube_proofs",
     "proved",

@@ -1,4 +1,4 @@
-"""One design: the machine that values of the variables make, and what it is worth."""
+"""One design: the machine with some values of the variables, and its quantities."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, parameters
 from pteron.renamed import former_attribute
 from pteron.workspace.fit import UNKNOWN, Fit, largest_fit
+from pteron.workspace.margins import joint_limits
 from pteron.workspace.samples import cube, shape_samples
 
 _IN_CUBE = 5
@@ -26,7 +27,7 @@ _IN_CUBE = 5
 
 
 class DriveMotion(NamedTuple):
-    """What joints and drives do at the workspace's corners."""
+    """Motion of joints and forces of drives at the workspace's corners."""
 
     rates: Array
     forces: Array
@@ -99,7 +100,7 @@ class Design:
 
     @cached_property
     def drive_motion(self) -> DriveMotion:
-        """Joint rates (K, n) and drives' forces at the corners, along each axis, both ways."""
+        """Joint rates (K, n) and drives' forces at the corners, in both directions of each axis."""
         motion = self.task.spec.motion
         corners = self._region(2)
         lengths = len(self.robot.platform.lengths)
@@ -120,7 +121,8 @@ class Design:
             drives=drive_numbers(self.robot),
         )
         return DriveMotion(
-            np.einsum("kij,lj->kli", jacobians, velocity).reshape(-1, self.robot.freedom), forces
+            np.einsum("kij,lj->kli", jacobians, velocity).reshape(-1, self.robot.joint_count),
+            forces,
         )
 
     @cached_property
@@ -160,21 +162,15 @@ class Design:
 
     @cached_property
     def strokes(self) -> Array:
-        """The way of each joint (n,) over these poses, m or rad."""
-        return np.ptp(self.joints, axis=0)
+        """The travel of each joint (n,) over these poses, m or rad."""
+        return np.asarray(np.ptp(self.joints, axis=0))
 
     @property
     def reference_strokes(self) -> Array:
-        """The ways (n,) by which `stroke` is measured: the limits' width, or those at the start."""
-        limits = [leg.limits for leg in self.task.robot.legs]
-        if all(limits):
-            return np.ptp(limits, axis=1)
-        return np.array(
-            [
-                way if pair is None else pair[1] - pair[0]
-                for way, pair in zip(_start(self.task).strokes, limits, strict=True)
-            ]
-        )
+        """Travels (n,) over which `stroke` is a share: the limits' width, or those at the start."""
+        widths = np.ptp(joint_limits(self.task.robot), axis=0)
+        endless = np.isinf(widths)
+        return np.where(endless, _start(self.task).strokes, widths) if endless.any() else widths
 
 
 @lru_cache(maxsize=8)

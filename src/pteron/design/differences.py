@@ -1,4 +1,4 @@
-"""What a design changes against the machine that a search began with, in words."""
+"""Differences of a design from the machine that a search began with, in words."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pteron.manipulator import Manipulator
 from pteron.manipulator.manipulator import told_legs
 
 _NONE = 1e-9
-"""A change that is smaller, m or none, is none."""
+"""Smaller changes, in m or without unit, are left out."""
 
 
 @dataclass(frozen=True)
@@ -21,11 +21,11 @@ class Change:
     Attributes
     ----------
     what : str
-        Which number.
+        Name of the number.
     before, after : float
         Its values.
     unit : str
-        Of both; empty where they have none.
+        Unit of both; empty where they have none.
     """
 
     what: str
@@ -36,19 +36,19 @@ class Change:
     @property
     def words(self) -> str:
         """The change as a clause: "upper length of legs 2 and 4: 154 mm, now 246 mm (+60 %)"."""
-        return f"{self.what}: {self.told(self.before)}, now {self.told(self.after)} ({self.by})"
+        return f"{self.what}: {self.shown(self.before)}, now {self.shown(self.after)} ({self.by})"
 
     @property
     def by(self) -> str:
-        """By how much: as a share, or as a difference where a share says nothing."""
+        """The change as a share, or as a difference where a share says nothing."""
         if self.before > _NONE and self.after > 0.0:
             text = f"{100.0 * (self.after / self.before - 1.0):+.1f} %"
             return "none" if float(text[:-2]) == 0.0 else text
         return (
-            f"{'+' if self.after > self.before else '-'}{self.told(abs(self.after - self.before))}"
+            f"{'+' if self.after > self.before else '-'}{self.shown(abs(self.after - self.before))}"
         )
 
-    def told(self, value: float) -> str:
+    def shown(self, value: float) -> str:
         """Return a value with its unit; lengths in millimetres."""
         if self.unit == "m":
             return f"{1000.0 * value:.1f} mm"
@@ -56,7 +56,7 @@ class Change:
 
 
 def geometry_changes(task: Task, robot: Manipulator) -> list[Change]:
-    """Return what of the geometry is another in a design; legs that change alike as one."""
+    """Return the changes of the geometry in a design; legs that change alike as one."""
     found: dict[tuple[str, float, float, str], list[int]] = {}
     for variable in task.variables:
         for place in variable.places:
@@ -74,7 +74,7 @@ def geometry_changes(task: Task, robot: Manipulator) -> list[Change]:
 
 
 def mass_changes(task: Task, robot: Manipulator) -> list[Change]:
-    """Return which bodies have another mass; legs that change alike as one."""
+    """Return the changes of the bodies' masses; legs that change alike as one."""
     found: dict[tuple[str, float, float], list[int]] = {}
     for i, (leg, other) in enumerate(zip(task.robot.legs, robot.legs, strict=True), start=1):
         for (letter, body), new in zip(leg.bodies.items(), other.bodies.values(), strict=True):
@@ -97,7 +97,7 @@ def quantity_changes(design: Design) -> list[Change]:
 
 
 def stroke_words(design: Design) -> list[str]:
-    """Return how much of its way each joint uses in the workspace, or in the cube."""
+    """Return the range of its travel that each joint uses in the workspace, or in the cube."""
     low, high = design.joints.min(axis=0), design.joints.max(axis=0)
     lines = []
     for i, (leg, a, b) in enumerate(zip(design.robot.legs, low, high, strict=True), start=1):

@@ -1,4 +1,4 @@
-"""What the search asks of pymoo, which is an extra: a generation, and which designs are best."""
+"""Generations of designs, and the best of them: by pymoo, which is an extra."""
 
 from __future__ import annotations
 
@@ -52,9 +52,9 @@ class Evolution:
     first : array, shape (P, V)
         The first generation, each variable from 0 to 1.
     objectives, constraints : int
-        How many: what is minimised, and what must be 0 or less.
+        Numbers of values that are minimised, and of those that must be 0 or less.
     seed : int
-        Of all chance: the same seed asks for the same designs where it is told the same.
+        Seed of all chance: the same seed and the same answers give the same designs.
     """
 
     def __init__(self, first: Array, objectives: int, constraints: int, seed: int) -> None:

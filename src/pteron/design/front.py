@@ -28,14 +28,14 @@ class Front:
     Attributes
     ----------
     task : Task
-        What was asked.
+        The task of the search.
     table : polars.DataFrame
         A row for each design of the front: its variables, the quantities asked for, and what it
         misses, which is nothing; the best of the first objective comes first.
     evaluated : int
-        How many designs it was found among.
+        Number of designs it was found among.
     kept : int
-        How many of them keep all that is asked.
+        Number of of them keep all that is asked.
     """
 
     task: Task
@@ -71,7 +71,7 @@ class Front:
 
     @cached_property
     def chosen(self) -> dict[str, int]:
-        """Which designs are told of: the best in each objective, and the compromise.
+        """The designs of a report: the best in each objective, and the compromise.
 
         The compromise is nearest to the best of all objectives at once, each measured by its range
         over the front; of one objective there is none.
@@ -90,7 +90,7 @@ class Front:
 
     @property
     def headings(self) -> dict[str, str]:
-        """What the table's columns are called with their units."""
+        """Headings of the table's columns, with their units."""
         found = {}
         for v in self.task.variables:
             found[v.name] = f"{v.name} ({v.unit})" if v.unit else v.name
@@ -106,7 +106,7 @@ class Proofs:
     Parameters
     ----------
     task : Task
-        What was asked.
+        The task of the search.
     prove : callable
         Values of designs (N, V) to their rows, each as far as it is proved.
     """

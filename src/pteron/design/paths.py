@@ -27,11 +27,11 @@ class Place:
     key : str
         Its key in the robot's file.
     part : int or None
-        Which component of a vector; None of a number that is none.
+        Index of a vector's component; None for a number.
     sign : int
         1, or -1 where the path has a minus before it.
     role : str
-        What the key holds: "point", "direction", "length" or "number".
+        Role of the key: "point", "direction", "length" or "number".
     """
 
     leg: int
@@ -64,7 +64,7 @@ def places(robot: Manipulator, path: str) -> list[Place]:
     if found is None:
         raise ModelError(f"{shown(path)} is not {_SHAPE}")
     minus, numbers, key, part = found.groups()
-    legs = range(1, robot.freedom + 1)
+    legs = range(1, robot.joint_count + 1)
     if numbers is not None:
         try:
             named = [int(word) for word in numbers.split(",") if word.strip()]

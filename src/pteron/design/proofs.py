@@ -20,7 +20,7 @@ from pteron.workspace.fit import UNKNOWN, Fit, proved_fit
 from pteron.workspace.samples import Samples, cube, fixed_samples
 
 _SHARES = (0.9999, 0.999, 0.995, 0.98, 0.95, 0.9, 0.75, 0.5, 0.25, 0.1)
-"""Of the edge that was found: at the whole of it a condition is zero somewhere, and undecided."""
+"""Shares of the edge that was found: at all of it some condition is zero, and undecided."""
 
 _MOST = 200_000
 """Boxes after which a proof is given up."""
@@ -53,7 +53,7 @@ class ProvedCube:
 
     @property
     def words(self) -> str:
-        """What is proved, in a sentence."""
+        """The statement that is proved, in a sentence."""
         center = ", ".join(f"{round(1000.0 * x, 1) + 0.0:g}" for x in self.center)
         boxes = sum(proof.boxes for proof in self.proofs)
         return (
@@ -73,7 +73,7 @@ class Proved:
     cube : ProvedCube or None
         The largest cube, where the search seeks one and there is one.
     workspace : tuple of Proof
-        Of the required workspace, one for each orientation; none where none is required.
+        Proofs of the required workspace, one for each orientation; none where none is required.
     """
 
     design: Design
@@ -145,7 +145,7 @@ def workspace_proofs(design: Design) -> tuple[Proof, ...]:
 
 
 def workspace_region(design: Design, pose: Array, share: float = 1.0) -> Region:
-    """Return the required workspace at the orientation of a pose, or so much of it."""
+    """Return the required workspace at the orientation of a pose, or a share of it."""
     asked = design.task.spec.workspace
     assert asked is not None  # who asks has one
     if asked.shape == "cylinder":

@@ -1,4 +1,4 @@
-"""What a design is judged by: a table of quantities, each with its unit and what it means."""
+"""Quantities by which designs are compared: a table with units and meanings."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Quantity:
     unit : str
         Empty where it has none.
     about : str
-        What it is, in a line.
+        Its meaning, in a line.
     of : callable
         Takes a `Design`; NaN where there is none.
     of_machine : callable or None
@@ -121,8 +121,8 @@ _OWN = {
     ),
     "stroke": Quantity(
         "",
-        "greatest way of a joint in the workspace, over the width of its limits or, without them, "
-        "over its way in the machine to begin with",
+        "greatest travel of a joint in the workspace, over the width of its limits or, without "
+        "them, over its travel in the machine to begin with",
         _stroke,
     ),
     "speed": Quantity(

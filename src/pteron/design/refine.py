@@ -20,7 +20,7 @@ from pteron.workspace.exchange import POINTS, Program, improved
 from pteron.workspace.samples import Samples, cube, fixed_samples, shape_samples
 
 _EXCHANGES = 8
-"""How often counterexamples of the proof of what was found join its conditions."""
+"""Most times that counterexamples of the result's proof join its conditions."""
 
 _FIRST = 5
 """Points along a cube's edge at which its conditions are asked at first."""
@@ -41,7 +41,7 @@ def refined(task: Task, values: Sequence[float], objective: int) -> list[float]:
     values : sequence of float
         The variables' values, of a design that keeps what is asked.
     objective : int
-        Which of the objectives.
+        Index of the objective.
     """
     spec, start = task.spec, np.array(values)
     asked = spec.objectives[objective]
@@ -97,7 +97,7 @@ def _asked_at(design: Design, lengths: int, count: int) -> Samples:
 
 @dataclass(frozen=True)
 class _Slopes:
-    """How quantities follow the unknowns, to first order, about one design."""
+    """Slopes of quantities by the unknowns about one design."""
 
     task: Task
     design: Design

@@ -1,4 +1,4 @@
-"""What is told of a search: a page in Markdown, its figures as plain data, and files of robots."""
+"""The report of a search: a page in Markdown, its figures as plain data, and files of robots."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Told:
+class ReportedDesign:
     """One machine of a search, with what is proved of it.
 
     Attributes
@@ -40,7 +40,7 @@ class Told:
     cube : ProvedCube or None
         The largest cube, where the search seeks one and it is proved.
     workspace : tuple of Proof
-        Of the required workspace, one for each orientation; none where none is required.
+        Proofs of the required workspace, one for each orientation; none where none is required.
     """
 
     name: str
@@ -60,7 +60,7 @@ class Told:
 
     @property
     def proofs(self) -> list[str]:
-        """What is proved, a sentence each."""
+        """The statements that are proved, a sentence each."""
         lines = []
         if self.design.task.seeks_cube:
             lines.append("cube: not proved" if self.cube is None else f"cube {self.cube.words}")
@@ -76,17 +76,17 @@ class Told:
 
 @dataclass(frozen=True)
 class Summary:
-    """A front with the designs that are told of, and the machine that it began with."""
+    """A front with the designs that a report shows, and the machine that it began with."""
 
     front: Front
 
     @cached_property
-    def start(self) -> Told:
+    def start(self) -> ReportedDesign:
         """The machine to begin with."""
         return _told("start", Design(self.front.task, self.front.task.robot))
 
     @cached_property
-    def chosen(self) -> list[Told]:
+    def chosen(self) -> list[ReportedDesign]:
         """The best designs in each objective, and the compromise; one of several names once."""
         task, names = self.front.task, dict[int, str]()
         for name, at in self.front.chosen.items():
@@ -98,9 +98,9 @@ class Summary:
     def robots(self) -> dict[str, str]:
         """Return the chosen machines as texts of files, by the files' names."""
         return {
-            f"{name}.toml": text_of(told.design.robot)
-            for told in self.chosen
-            for name in told.name.split(", ")
+            f"{name}.toml": text_of(one.design.robot)
+            for one in self.chosen
+            for name in one.name.split(", ")
         }
 
     def table(self) -> pl.DataFrame:
@@ -120,7 +120,7 @@ class Summary:
             ],
             "objectives": [o.quantity for o in front.task.spec.objectives],
             "start": _data(self.start),
-            "chosen": {told.name: _data(told) for told in self.chosen},
+            "chosen": {one.name: _data(one) for one in self.chosen},
             "front": front.table.select(list(front.headings)).to_dicts(),
         }
 
@@ -142,14 +142,14 @@ class Summary:
             "",
             *(f"- {line}" for line in [*self.start.proofs, *_strokes(self.start)]),
         ]
-        for told in self.chosen:
-            lines += ["", f"## {told.name.replace('-', ' ').capitalize()}", ""]
+        for one in self.chosen:
+            lines += ["", f"## {one.name.replace('-', ' ').capitalize()}", ""]
             lines += ["| what | to begin with | now | change |", "| --- | ---: | ---: | ---: |"]
             lines += [
-                f"| {c.what} | {c.told(c.before)} | {c.told(c.after)} | {c.by} |"
-                for c in told.changes
+                f"| {c.what} | {c.shown(c.before)} | {c.shown(c.after)} | {c.by} |"
+                for c in one.changes
             ]
-            lines += ["", *(f"- {line}" for line in [*told.proofs, *_strokes(told)])]
+            lines += ["", *(f"- {line}" for line in [*one.proofs, *_strokes(one)])]
         return "\n".join(lines) + "\n"
 
 
@@ -158,28 +158,28 @@ def _design(task: Task, robot: Manipulator, name: str) -> Design:
     return Design(task, replace(robot, name=robot.name[: LONGEST_NAME - len(ending)] + ending))
 
 
-def _told(name: str, design: Design) -> Told:
+def _told(name: str, design: Design) -> ReportedDesign:
     found = proved(design)
-    return Told(name, found.design, found.cube, found.workspace)
+    return ReportedDesign(name, found.design, found.cube, found.workspace)
 
 
-def _strokes(told: Told) -> list[str]:
-    region = "the workspace" if told.design.task.spec.workspace is not None else "the cube"
-    if region == "the cube" and told.design.cube.edge <= 0.0:
+def _strokes(one: ReportedDesign) -> list[str]:
+    region = "the workspace" if one.design.task.spec.workspace is not None else "the cube"
+    if region == "the cube" and one.design.cube.edge <= 0.0:
         return []
-    return [f"{line}, over {region}" for line in stroke_words(told.design)]
+    return [f"{line}, over {region}" for line in stroke_words(one.design)]
 
 
-def _data(told: Told) -> dict[str, Any]:
-    task = told.design.task
-    found: dict[str, Any] = {name: told.design.quantity(name) for name in task.asked}
-    found["changes"] = [vars(change) for change in told.changes] if told.name != "start" else []
-    if told.cube is not None:
+def _data(one: ReportedDesign) -> dict[str, Any]:
+    task = one.design.task
+    found: dict[str, Any] = {name: one.design.quantity(name) for name in task.asked}
+    found["changes"] = [vars(change) for change in one.changes] if one.name != "start" else []
+    if one.cube is not None:
         found["proved_cube"] = {
-            "center": told.cube.center.tolist(),
-            "edge": told.cube.edge,
-            "boxes": sum(proof.boxes for proof in told.cube.proofs),
+            "center": one.cube.center.tolist(),
+            "edge": one.cube.edge,
+            "boxes": sum(proof.boxes for proof in one.cube.proofs),
         }
-    found["workspace_proved"] = [proof.holds for proof in told.workspace]
-    found["workspace_share"] = [workspace_share(told.design, proof) for proof in told.workspace]
+    found["workspace_proved"] = [proof.holds for proof in one.workspace]
+    found["workspace_share"] = [workspace_share(one.design, proof) for proof in one.workspace]
     return found

@@ -14,7 +14,7 @@ MISSES = "misses "
 """Beginning of the names of columns that say by how much something asked is missed."""
 
 FAILED = 1e6
-"""How much a requirement is missed by a design that is no machine, or has no such quantity."""
+"""Miss of a requirement by a design that is no machine, or has no such quantity."""
 
 ROUNDING = 1e-9
 """A condition that is missed by no more is kept."""

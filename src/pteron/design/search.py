@@ -35,9 +35,6 @@ if TYPE_CHECKING:
 _CHUNK = 4
 """Designs that one worker takes at a time."""
 
-Progress = Callable[[int, int, float | None], None]
-"""Is told the generation, how many there are, and the best of the first objective so far."""
-
 
 def search(
     spec: Spec,
@@ -46,7 +43,7 @@ def search(
     seed: int | None = None,
     workers: Workers | None = None,
     scheduler: str | None = None,
-    progress: Progress | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> Front:
     """Search for the best designs of a machine.
 
@@ -57,17 +54,17 @@ def search(
     Parameters
     ----------
     spec : Spec
-        What is asked; see `read_spec`.
+        The search; see `read_spec`.
     folder : str or Path, optional
-        Where what is evaluated is kept; the same call goes on where it was ended.
+        Folder of the results; the same call goes on where it was ended.
     seed : int, optional
-        Of all chance, in place of the spec's.
+        Seed of all chance, in place of the spec's.
     workers : int, optional
         Processes of this computer that do the work; by default this one does.
     scheduler : str, optional
         Address of a Dask scheduler whose workers do the work; they must reach the folder.
     progress : callable, optional
-        Is told how far the search is after each generation.
+        Takes the share of the generations that are done.
 
     Returns
     -------
@@ -78,7 +75,7 @@ def search(
     DataError
         If the spec does not suit its machine.
     ModelError
-        If no design keeps all that is asked: what is missed by least is told; or if an extra is not
+        If no design keeps all that is asked: the message names the nearest; or if an extra is not
         installed.
     OutputError
         If the folder holds another search, or cannot be written.
@@ -91,7 +88,7 @@ def search(
 
 
 def _generations(
-    task: Task, folder: Path, scheduler: str | None, progress: Progress | None
+    task: Task, folder: Path, scheduler: str | None, progress: Callable[[float], None] | None
 ) -> Front:
     """Return the front of all designs that were evaluated, each design of it proved."""
     settings = task.spec.search
@@ -121,8 +118,7 @@ def _generations(
         values = np.asarray(found.select([v.name for v in task.variables]).to_numpy())
         evolution.tell((values - low) / (high - low), *_costs(task, found))
         if progress is not None:
-            best = None if front is None else float(front.objectives[0, 0])
-            progress(number, settings.generations, best)
+            progress(number / settings.generations)
     return proofs.front(lambda: tables)
 
 

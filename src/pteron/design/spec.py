@@ -1,4 +1,4 @@
-"""The file of a design search: what may change, what is asked, and what is better."""
+"""The file of a design search: variables, requirements and objectives."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class VariableTable(Table):
 
 
 class WorkspaceTable(Table):
-    """`[workspace]`: where the machine must work."""
+    """`[workspace]`: the region in which the machine must work."""
 
     low: tuple[Number, ...] | None = Field(None, description="a box's least x, y, z, m")
     high: tuple[Number, ...] | None = Field(None, description="a box's greatest x, y, z, m")
@@ -95,7 +95,7 @@ class WorkspaceTable(Table):
 
     @property
     def shape(self) -> Literal["box", "cube", "cylinder"]:
-        """Which of the three it is."""
+        """The kind of workspace."""
         if self.low is not None:
             return "box"
         return "cube" if self.edge is not None else "cylinder"
@@ -116,7 +116,7 @@ class WorkspaceTable(Table):
 
 
 class FloorsTable(Table):
-    """`[floors]`: what no pose of the workspace, or of the cube, may be below."""
+    """`[floors]`: least measures of the poses of the workspace, or of the cube."""
 
     type_i: Floor = Field(0.05, description="type-I measure of every leg; 0: it need only reach")
     type_ii: Floor = Field(
@@ -125,7 +125,7 @@ class FloorsTable(Table):
 
 
 class MotionTable(Table):
-    """`[motion]`: what the drives are asked for at the workspace's corners."""
+    """`[motion]`: the motion by which drives are judged at the workspace's corners."""
 
     speed: Positive = Field(1.0, description="of P along each axis, m/s")
     acceleration: Positive = Field(10.0, description="of P along each axis, m/s^2")
@@ -150,7 +150,7 @@ class ObjectiveTable(Table):
 
     @property
     def quantity(self) -> str:
-        """What is asked for."""
+        """The quantity's name."""
         return self.maximise or self.minimise or ""
 
     @property
@@ -160,7 +160,7 @@ class ObjectiveTable(Table):
 
 
 class RequirementTable(Table):
-    """`[[requirements]]`: a quantity that must be at least, or at most, so much."""
+    """`[[requirements]]`: a quantity with a least or a greatest value."""
 
     quantity: str
     least: Number | None = None
@@ -192,14 +192,14 @@ class RequirementTable(Table):
 
     @property
     def words(self) -> str:
-        """What is asked, in words: "links at most 1.2"."""
+        """The requirement in words: "links at most 1.2"."""
         ends = (("at least", self.least), ("at most", self.most))
         told = (f"{word} {bound:g}" for word, bound in ends if bound is not None)
         return f"{self.quantity} {' and '.join(told)}"
 
 
 class SearchTable(Table):
-    """`[search]`: how long, and how."""
+    """`[search]`: size, length and seed of the search."""
 
     population: Annotated[int, Field(ge=4, strict=True)] = Field(40, description="designs kept")
     generations: Count = Field(25, description="how many")
@@ -217,7 +217,7 @@ class Spec(Table):
         None, description="its orientation is the cube's; all zero if left out"
     )
     angles: tuple[Number, ...] | None = Field(
-        None, description="several phi that workspace and cube must allow, rad"
+        None, description="several angles that workspace and cube must allow, rad"
     )
     masses: Literal["per length", "kept"] = Field(
         "per length", description="what a link's inertia does when its length changes"
@@ -259,7 +259,8 @@ def read_spec(path: str | Path) -> Spec:
     Raises
     ------
     DataError
-        If it cannot be read, has unknown keys, or asks for what cannot be; all its faults are told.
+        If it cannot be read, has unknown keys, or asks for the impossible; all its faults are
+        listed.
     """
     source = shown(str(path), bare=True, longest=1000)
     spec = validated(Spec, read_toml(path, DataError, _ABSENT), source, DataError)

@@ -1,4 +1,4 @@
-"""What a link's inertia does when its length changes.
+"""Inertia of links whose length changes.
 
 A link of another length is taken for one of the same section, drawn out along its own x: mass and
 the centre's distance along x grow with the length, and what lies across x keeps its place. So the

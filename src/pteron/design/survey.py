@@ -35,7 +35,7 @@ def survey(
     *,
     workers: Workers | None = None,
     scheduler: str | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> Front:
     """Evaluate many designs, and return the front of them.
 
@@ -45,17 +45,17 @@ def survey(
     Parameters
     ----------
     spec : Spec
-        What is asked; see `read_spec`.
+        The search; see `read_spec`.
     count : int
-        How many designs.
+        Number of designs.
     folder : str or Path
-        Where a Parquet file for every 256 designs is written; a run that was ended goes on.
+        Folder of Parquet files, one for every 256 designs; a run that was ended goes on.
     workers : int, optional
         Processes of this computer that do the work; by default this one does.
     scheduler : str, optional
         Address of a Dask scheduler whose workers do the work; they must reach the folder.
     progress : callable, optional
-        Is told how many chunks are finished, and of how many.
+        Takes the share of the work that is done.
 
     Returns
     -------
@@ -112,7 +112,7 @@ def surveyed(task: Task, chunk: tuple[int, int]) -> pl.DataFrame:
 
 
 def survey_designs(task: Task, first: int, count: int) -> Array:
-    """Return so many designs (count, V) of the survey's sequence from one on."""
+    """Return designs (count, V) of the survey's sequence, beginning with number `first`."""
     low, high = task.ranges
     sequence = qmc.Sobol(len(low), scramble=False)
     if first:

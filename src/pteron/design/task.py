@@ -32,11 +32,11 @@ class Task:
     Attributes
     ----------
     spec : Spec
-        What is asked.
+        Its file.
     robot : Manipulator
         The machine to begin with.
     variables : tuple of Variable
-        What may change.
+        The variables.
     """
 
     spec: Spec
@@ -52,7 +52,7 @@ class Task:
         ModelError
             If there is no such machine.
         DataError
-            If the search does not suit the machine; all that is wrong is told.
+            If the search does not suit the machine; all its faults are listed.
         """
         robot = load(spec.robot)
         faults = list(_misfits(spec, robot))
@@ -71,7 +71,7 @@ class Task:
 
     @property
     def plan(self) -> dict[str, Any]:
-        """What its results follow from: the spec, the machine, and the version of the results."""
+        """All that its results depend on: the spec, the machine, and the version of results."""
         spec = self.spec.model_dump(mode="json", exclude={"robot"})
         return {"robot": text_of(self.robot), "spec": spec, "pteron": RESULTS}
 
@@ -85,7 +85,7 @@ class Task:
     @cached_property
     def orientations(self) -> Array:
         """Poses (A, m) whose angles are those that the search asks for."""
-        return orientations_of(self.spec, self.robot.freedom)
+        return orientations_of(self.spec, self.robot.platform.angular)
 
     @property
     def asked(self) -> tuple[str, ...]:
@@ -133,10 +133,10 @@ class Task:
 
 
 def _misfits(spec: Spec, robot: Manipulator) -> Iterator[str]:
-    """Yield in what a search does not suit its machine."""
+    """Yield the faults for which a search does not suit its machine."""
     if spec.pose is not None and len(spec.pose) != robot.freedom:
         yield f"pose: {len(spec.pose)} numbers given, {' '.join(robot.coordinates)} expected"
-    if spec.angles is not None and "phi" not in robot.coordinates:
+    if spec.angles is not None and len(robot.platform.angles) != 1:
         yield f"angles: given, but the platform of {robot.name} does not turn; leave it out"
     lengths = robot.platform.lengths
     if spec.workspace is not None and spec.workspace.lengths != len(lengths):
@@ -148,10 +148,12 @@ def _misfits(spec: Spec, robot: Manipulator) -> Iterator[str]:
         yield f"workspace: a cylinder given, but {robot.name} moves in a plane; give a box"
     elif spec.workspace is not None:
         corners = workspace_poses(spec.workspace, np.zeros((1, robot.freedom)), samples=2)
-        for doubt in unlikely_values(robot, robot.coordinates, corners):
-            yield f"workspace: {doubt}"
-    for doubt in unlikely_values(robot, ["phi"], np.array(spec.angles or ())[:, None]):
-        yield f"angles: {doubt}"
+        for warning in unlikely_values(robot, robot.coordinates, corners):
+            yield f"workspace: {warning}"
+    for warning in unlikely_values(
+        robot, robot.platform.angles[:1], np.array(spec.angles or ())[:, None]
+    ):
+        yield f"angles: {warning}"
     asked = {o.quantity for o in spec.objectives} | {r.quantity for r in spec.requirements}
     units = {leg.joint.force_unit for leg in robot.legs}
     for name in sorted(asked & {"force", "speed"}):
@@ -161,7 +163,7 @@ def _misfits(spec: Spec, robot: Manipulator) -> Iterator[str]:
                 "limits the machine's file gives"
             )
     for name in sorted(asked & INDICES.keys()):
-        if INDICES[name].turning and not robot.platform.turns:
+        if INDICES[name].turning and not robot.platform.angles:
             yield f"{name}: about turning, but the platform of {robot.name} does not turn"
     drives = [leg.drive for leg in robot.legs if leg.drive is not None]
     if "drive_load" in asked and not any(d.max_force or d.max_speed for d in drives):

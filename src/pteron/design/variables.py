@@ -29,7 +29,7 @@ class Variable:
     Attributes
     ----------
     name : str
-        What tables call it.
+        Its name in tables.
     places : tuple of Place
         The numbers.
     by : {"value", "factor", "offset"}
@@ -49,12 +49,12 @@ class Variable:
 
     @property
     def unit(self) -> str:
-        """Of its value: m of lengths and points; none of factors, directions and plain numbers."""
+        """The value's unit: m of lengths and points; none of factors, directions and numbers."""
         scale = {"length", "point"} & {place.role for place in self.places}
         return "m" if scale and self.by != "factor" else ""
 
     def number(self, place: Place, start: float, value: float) -> float:
-        """Return what one of the numbers becomes; `start` is what it was."""
+        """Return the new value of one of the numbers, from its value at the start."""
         if self.by == "factor":
             return start * value
         return place.sign * value + (start if self.by == "offset" else 0.0)

@@ -1,4 +1,4 @@
-"""How good a machine is at a pose: indices of performance, stiffness, errors and reactions."""
+"""Performance of a machine at a pose: indices, stiffness, errors and reactions."""
 
 from pteron.arguments import check_arguments
 from pteron.indices.compliance import Stiffness, stiffness

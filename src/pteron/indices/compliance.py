@@ -1,4 +1,4 @@
-"""Stiffness at the tool, from what gives way in the actuators and the links."""
+"""Stiffness at the tool, from the elasticity of actuators and links."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import Matrices, Numbers, OnFailure, PerCoordinate, PoseLike
 
 _GAUSS = 0.5 - 0.5 / np.sqrt(3.0), 0.5 + 0.5 / np.sqrt(3.0)
-"""Where along a beam its energy is taken, which is a square of what is linear there: exact."""
+"""Gauss points along a beam: its energy is quadratic in the place, so that two are exact."""
 
-_NOTHING = 1e-12
-"""Share of the whole compliance below which a self-stress meets none."""
+_FREE = 1e-12
+"""Compliance, over the whole one, below which a self-stress counts as free."""
 
 
 @dataclass(frozen=True)
 class Stiffness:
-    """How a machine gives way under a load at its tool, while the actuators hold their joints.
+    """Compliance of a machine under a load at its tool, while the actuators hold their joints.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class Stiffness:
         Natural frequencies of the bodies' masses, in platform coordinates, on these springs, Hz,
         ascending; infinite where nothing gives way.
     lengths : int
-        How many of the pose's coordinates, the first ones, are lengths.
+        Number of of the pose's coordinates, the first ones, are lengths.
     """
 
     compliance: Matrices
@@ -50,7 +50,7 @@ class Stiffness:
 
     @property
     def least(self) -> Numbers:
-        """Force over the way that the tool gives in the worst direction, N/m, without a moment."""
+        """Force over the tool's displacement in the worst direction, N/m, without a moment."""
         with np.errstate(divide="ignore"):
             return np.asarray(1.0 / self._along_axes[..., -1])
 
@@ -69,7 +69,7 @@ class Stiffness:
         return np.asarray(np.where(known[..., None], found, np.nan))
 
     def along(self, direction: ArrayLike) -> Numbers:
-        """Return force over the way that the tool gives along a direction (..., k), N/m.
+        """Return force over the tool's displacement along a direction (..., k), N/m.
 
         Raises
         ------
@@ -113,7 +113,7 @@ def stiffness(
     pose : array, shape (..., m)
         The poses, m and rad.
     elasticity : Elasticity
-        What gives way.
+        The stiffnesses.
     on_failure : {"raise", "nan"}
         Whether a pose that fails raises, or gives NaN.
 
@@ -141,7 +141,7 @@ def stiffness(
     """
     robot = as_manipulator(robot)
     poses = checked(robot, pose, "pose", on_failure)
-    # What cannot be served is told of the whole batch.
+    # Errors name a state of the whole batch.
     evaluated(robot, "manipulability", on_failure, poses)
     parts = [
         _of_block(robot, elasticity, block)
@@ -176,14 +176,14 @@ def _of_block(robot: Manipulator, elasticity: Elasticity, poses: Array) -> tuple
 
 
 def _compliance(robot: Manipulator, given: Equations, energy: Array, arm: Array) -> Array:
-    """Return C (B, m, m) at a point, whose way from P is `arm` (B, 3)."""
+    """Return C (B, m, m) at a point whose vector from P is `arm` (B, 3)."""
     batch, m = len(arm), robot.freedom
     wrench = np.broadcast_to(np.eye(m), (batch, m, m)).copy()  # a row for each unit load
     force = on_platform(robot, wrench, np.zeros(3))[..., :3]
     moment = np.cross(arm[:, None], force)
-    if robot.platform.turns:
+    if robot.platform.angles:
         axis = np.array(robot.platform.axis)
-        wrench[..., -1] += moment @ axis
+        wrench[..., robot.platform.angular] += moment @ axis[:, None]
         # `on_platform` has the part about the axis from the wrench.
         moment = moment - (moment @ axis)[..., None] * axis
     load = on_platform(robot, wrench, moment)
@@ -195,7 +195,7 @@ def _compliance(robot: Manipulator, given: Equations, energy: Array, arm: Array)
     if free.shape[-1]:  # the self-stress of the least energy
         values, vectors = np.linalg.eigh(free.mT @ energy @ free)
         whole = (units(robot) ** 2 * np.diagonal(energy, axis1=-2, axis2=-1)).sum(axis=-1)
-        counts = values > _NOTHING * whole[:, None]
+        counts = values > _FREE * whole[:, None]
         back = vectors @ (vectors / np.where(counts, values, np.inf)[:, None]).mT
         w = w - free @ back @ (free.mT @ energy @ w)
     found = w.mT @ energy @ w

@@ -31,9 +31,9 @@ class GlobalConditioning:
     value : float
         In (0, 1]; 1 where the machine is isotropic everywhere.
     standard_error : float
-        Of it.
+        Its standard error.
     share : float
-        Of the box that is in reach, within the joints' limits.
+        Share of the box that is in reach, within the joints' limits.
     count : int
         Number of poses in the box that the estimate rests on.
     """
@@ -71,7 +71,7 @@ def global_conditioning(
     count : int
         Number of poses, rounded up to 16 times a power of two.
     seed : int
-        Of the random numbers.
+        Seed of the random numbers.
 
     Returns
     -------

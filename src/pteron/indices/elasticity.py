@@ -1,4 +1,4 @@
-"""What gives way in a machine: actuators as springs, links as beams."""
+"""Elasticity of a machine: actuators as springs, links as beams."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ ALUMINIUM = Material(70e9, 26e9)
 
 @dataclass(frozen=True)
 class Section:
-    """The cross-section of a link, as stiffnesses; infinite where it does not give way.
+    """The cross-section of a link, as stiffnesses; infinite where it is rigid.
 
     Of parallel rods it is the sum of both.
 
@@ -107,16 +107,16 @@ Springs = tuple[tuple[float, ...], tuple[tuple[Section | None, Section | None], 
 
 @dataclass(frozen=True)
 class Elasticity:
-    """What of a machine gives way.
+    """Stiffnesses of a machine's actuators and links.
 
     Parameters
     ----------
     actuators : float or sequence of float
         Stiffness of each actuator at its joint, held by its controller, N/m or N m/rad: one for
-        all, or one a leg; infinite where it does not give way.
+        all, or one a leg; infinite where it is rigid.
     upper, lower : Section or sequence of Section or None
-        Of the upper links or cranks, and of the lower links or rods: one for all, or one a leg;
-        None where they do not give way.
+        Sections of the upper links or cranks, and of the lower links or rods: one for all, or one a
+        leg; None where they are rigid.
     rod_distance : float, optional
         Between the two rods of a pair, m; without it their couple meets no elasticity.
     """
@@ -148,11 +148,11 @@ class Elasticity:
     def _each(self, robot: Manipulator, name: str) -> tuple[Any, ...]:
         given = getattr(self, name)
         if not isinstance(given, tuple):
-            return (given,) * robot.freedom
-        if len(given) != robot.freedom:
+            return (given,) * robot.joint_count
+        if len(given) != robot.joint_count:
             raise ModelError(
-                f"{name}: {len(given)} given, but {robot.name} has {robot.freedom} legs; give one "
-                "for all, or one a leg",
+                f"{name}: {len(given)} given, but {robot.name} has {robot.joint_count} legs; give "
+                "one for all, or one a leg",
                 subject=robot.name,
             )
         return given

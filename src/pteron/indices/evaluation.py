@@ -20,7 +20,7 @@ def evaluate(
     robot : Manipulator, name or path
         The machine.
     name : str
-        Of the index, one of `indices_of(robot)`.
+        Name of the index, one of `indices_of(robot)`.
     poses : array, shape (..., m)
         The poses, m and rad.
     on_failure : {"nan", "raise"}

@@ -26,7 +26,7 @@ class Index:
     unit : str
         Empty for a plain number.
     better : {"more", "less"}
-        Which values are the good ones.
+        The values that are good.
     turning : bool
         Whether it is about the platform's turning, so that a machine must have an angle.
     """
@@ -210,7 +210,7 @@ def indices_of(robot: RobotLike) -> tuple[str, ...]:
     (False, True)
     """
     robot = as_manipulator(robot)
-    return tuple(i.name for i in _LISTED if robot.platform.turns or not i.turning)
+    return tuple(i.name for i in _LISTED if robot.platform.angles or not i.turning)
 
 
 def expect_index(robot: RobotLike, name: str) -> Index:
@@ -219,7 +219,7 @@ def expect_index(robot: RobotLike, name: str) -> Index:
     if name not in INDICES:
         raise DataError(f"index: {name!r} is not known; choose from {', '.join(INDICES)}")
     index = INDICES[name]
-    if index.turning and not robot.platform.turns:
+    if index.turning and not robot.platform.angles:
         raise ModelError(
             f"index: {name!r} is about turning, but this {robot.platform.motion} platform does not "
             f"turn; choose from {', '.join(indices_of(robot))}",

@@ -15,7 +15,7 @@ _RANK = 1e-10
 
 
 class Equations(NamedTuple):
-    """What the kernel "reactions" returns, for B states; see `equations.reactions`."""
+    """Outputs of the kernel "reactions", for B states; see `equations.reactions`."""
 
     rows: Array
     right: Array
@@ -57,7 +57,7 @@ def size_of(robot: Manipulator) -> float:
 
 def units(robot: Manipulator) -> Array:
     """Return what makes the legs' forces and moments (6 n,) comparable: 1, and the size, m."""
-    return np.tile(np.repeat([1.0, size_of(robot)], 3), robot.freedom)
+    return np.tile(np.repeat([1.0, size_of(robot)], 3), robot.joint_count)
 
 
 def hold(robot: Manipulator, given: Equations, right: Array, presumed: Array) -> Held:
@@ -71,7 +71,7 @@ def hold(robot: Manipulator, given: Equations, right: Array, presumed: Array) ->
     rows, more = given.rows * size, given.presumed_rows * size
     parts = given.rows.reshape(*given.rows.shape[:-1], -1, 6)
     moments = (parts[..., 3:] != 0.0).any(axis=(0, -1, -2))
-    moments[robot.freedom - 1] |= robot.platform.turns
+    moments[: robot.freedom] |= robot.platform.angular
     each = np.where(moments, 1.0 / length, 1.0)[:, None]
     rows, right = each * rows, each * right
     per = np.ones(more.shape[-2])
@@ -100,14 +100,14 @@ def on_platform(robot: Manipulator, wrench: Array, moment: Array) -> Array:
     count, platform = len(robot.platform.lengths), robot.platform
     force = wrench[..., :count] @ platform.directions
     turning = np.zeros(3)
-    if platform.turns and not platform.slides:
-        turning = wrench[..., -1:] * np.array(platform.axis)
+    if platform.rotation_axes:
+        turning = wrench[..., platform.angular] @ np.array(platform.rotation_axes)
     force, whole = np.broadcast_arrays(force, turning + moment)
     return np.concatenate([force, whole], axis=-1)
 
 
 def moved(arms: Array) -> Array:
-    """Return rows (..., 6, 6): what a wrench at c is at points whose way to c is `arms`."""
+    """Return matrices (..., 6, 6) that move a wrench from c to points with vectors `arms` to c."""
     found = np.zeros((*arms.shape[:-1], 6, 6))
     found[...] = np.eye(6)
     x, y, z = np.moveaxis(arms, -1, 0)

@@ -1,4 +1,4 @@
-"""Reactions in joints and guides: what every joint passes on, at rest or in motion."""
+"""Reactions: the forces and moments in every joint and guide, at rest or in motion."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from pteron.shapes import OnFailure, PoseLike
 
 @dataclass(frozen=True)
 class Reactions:
-    """What the joints of the legs pass on: on the side of the platform, from that of the base.
+    """Forces and moments in the legs' joints: on the side of the platform, from that of the base.
 
     Attributes
     ----------
@@ -41,15 +41,15 @@ class Reactions:
     forces, moments : array, shape (..., n, j, 3)
         N, and N m about that point, in the base frame. What an actuator gives is among them.
     actuators : array, shape (..., n)
-        What the actuators give, N or N m: that of `inverse_dynamics`.
+        Forces of the actuators, N or N m: that of `inverse_dynamics`.
     redundancy : int
-        How many self-stresses the machine has: sets of reactions that balance each other. Where it
+        Number of the machine's self-stresses: sets of reactions that balance each other. Where it
         is not 0 the reactions are not unique, and those are returned whose norm is the least.
     length : float
         By which moments are divided in that norm, m.
     unheld : array, shape (...)
-        What of the load the legs, as they are modelled, cannot hold, N: moments that would tilt
-        the platform count over the legs' mean size. It is 0 where they hold all of it.
+        The part of the load that the legs, as they are modelled, cannot hold, N: moments that would
+        tilt the platform count over the legs' mean size. It is 0 where they hold all of it.
     """
 
     names: tuple[tuple[str, ...], ...]
@@ -95,12 +95,12 @@ def reactions(
     velocity, acceleration : array, shape (..., m), optional
         The platform's motion; at rest by default.
     wrench : array, shape (..., m), optional
-        What acts on the platform at P: a force in N and, where it turns, a moment about k in N m.
+        Wrench on the platform at P: a force in N and, where it turns, a moment about k in N m.
     moment : array, shape (..., 3), optional
         A moment on the platform beside it, in the base frame, N m; what of it turns the platform
         belongs in `wrench`.
     length : float, optional
-        What moments are divided by in the norm, m; the legs' mean size by default.
+        Length by which moments are divided in the norm, m; the legs' mean size by default.
     on_failure : {"raise", "nan"}
         Whether a pose that fails raises, or gives NaN.
 
@@ -136,7 +136,7 @@ def reactions(
         for name, part in given.items()
     ]
     states.append(np.zeros(3) if moment is None else as_array(moment, "moment", (3,)))
-    # What cannot be served is told of the whole batch.
+    # Errors name a state of the whole batch.
     evaluated(robot, "inverse_dynamics", on_failure, *states[:3])
     lead = np.broadcast_shapes(*(part.shape[:-1] for part in states))
     flat = [

@@ -17,7 +17,7 @@ from pteron.shapes import Numbers, OnFailure, PerCoordinate, PoseLike
 
 @dataclass(frozen=True)
 class Tolerances:
-    """What is uncertain in a machine: each number is +- from its nominal value, or a deviation.
+    """Tolerances of a machine: each number is +- from its nominal value, or a deviation.
 
     Parameters
     ----------
@@ -26,9 +26,9 @@ class Tolerances:
     backlash : float or sequence of float
         The whole play of a drive at its joint, m or rad; half of it counts to either side.
     point, length, angle : float
-        Of every dimension of that role, m and rad; see `geometric_sensitivities`.
+        Tolerance of every dimension of that role, m and rad; see `geometric_sensitivities`.
     named : mapping of str to float
-        Of dimensions by their names, in place of these.
+        Tolerances of dimensions by their names, in place of these.
     """
 
     joints: float | Sequence[float] = 0.0
@@ -53,9 +53,9 @@ class PoseError:
     position : array, shape (...)
         Standard deviation of the position as a whole, m.
     names : tuple of str
-        What the errors come from: the joints by their names, then dimensions.
+        Sources of the errors: the joints by their names, then dimensions.
     parts : array, shape (..., m, p)
-        What each of them gives to first order; the sign is that of a positive error.
+        The error of each to first order; the sign is that of a positive error.
     """
 
     worst: PerCoordinate
@@ -79,7 +79,7 @@ def pose_error(
     pose : array, shape (..., m)
         The poses, m and rad.
     tolerances : Tolerances
-        What is uncertain.
+        The tolerances.
     on_failure : {"raise", "nan"}
         Whether a pose that fails raises, or gives NaN.
 
@@ -111,8 +111,8 @@ def pose_error(
     good = np.isfinite(known.matrix).all(axis=(-2, -1))
     back = np.full(rows.shape, np.nan)
     back[good] = np.linalg.inv(rows[good])
-    joints = _each(tolerances.joints, "joints", robot.freedom)
-    joints = joints + 0.5 * _each(tolerances.backlash, "backlash", robot.freedom)
+    joints = _each(tolerances.joints, "joints", robot.joint_count)
+    joints = joints + 0.5 * _each(tolerances.backlash, "backlash", robot.joint_count)
     unknown = sorted(set(tolerances.named) - set(known.names))
     if unknown:
         raise DataError(

@@ -1,4 +1,4 @@
-"""By how much the pose changes with each dimension of a machine, its joints where they are."""
+"""Sensitivities: the change of the pose with each dimension of a machine, its joints held."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ _UPRIGHT = 1e-9
 
 @dataclass(frozen=True)
 class Sensitivities:
-    """How the pose changes with a machine's dimensions.
+    """Derivatives of the pose by a machine's dimensions.
 
     Attributes
     ----------
     names : tuple of str
-        Of the dimensions: "leg 1: upper_length", "leg 1: guide_point x", "leg 2: direction about
-        y".
+        Names of the dimensions: "leg 1: upper_length", "leg 1: guide_point x", "leg 2: direction
+        about y".
     roles : tuple of {"point", "length", "angle"}
-        What each one is.
+        Its role.
     units : tuple of str
         m or rad of each; of what slides on a platform m/rad.
     matrix : array, shape (..., m, p)
@@ -101,8 +101,8 @@ def geometric_sensitivities(
         slopes = _slopes(bare(robot))
         geometry = np.tile(np.array(numbers(robot))[:, None], (1, int(good.sum())))
         values = np.array(slopes.map(geometry.shape[1])(geometry, flat[good].T))
-        by_geometry = values.reshape(robot.freedom, -1, len(geometry)).swapaxes(0, 1)
-        square = rows.reshape(-1, robot.freedom, robot.freedom)[good]
+        by_geometry = values.reshape(robot.joint_count, -1, len(geometry)).swapaxes(0, 1)
+        square = rows.reshape(-1, robot.joint_count, robot.freedom)[good]
         found[good] = -np.linalg.solve(square, by_geometry @ np.array(ways).T)
     matrix = found.reshape((*poses.shape[:-1], *found.shape[1:]))
     return Sensitivities(names, roles, units, matrix, at_tool(robot, poses, matrix))
@@ -118,19 +118,20 @@ def _slopes(robot: Manipulator) -> ca.Function:
 
 
 def tool_arm(robot: Manipulator, poses: Array) -> Array:
-    """Return the way (..., 3) from P to the tool's centre point, base frame."""
+    """Return the vector (..., 3) from P to the tool's centre point, base frame."""
     _, axes = robot.platform.at(poses)
     return np.asarray(np.array(robot.platform.tool) @ axes)
 
 
 def at_tool(robot: Manipulator, poses: Array, errors: Array) -> Array:
     """Return changes of the pose (..., m, K) as the tool's centre point sees them."""
-    if not robot.platform.turns or not any(robot.platform.tool):
+    if not robot.platform.angles or not any(robot.platform.tool):
         return errors
     platform = robot.platform
     lever = np.cross(np.array(platform.axis), tool_arm(robot, poses)) @ platform.directions.T
     found = errors.copy()
-    found[..., :-1, :] += lever[..., :, None] * errors[..., -1:, :]
+    turning = platform.angular
+    found[..., ~turning, :] += lever[..., :, None] * errors[..., turning, :]
     return found
 
 

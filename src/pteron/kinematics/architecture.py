@@ -1,4 +1,4 @@
-"""Layouts that are singular everywhere: found before anything else is asked, and told why.
+"""Layouts that are singular everywhere, with the reason and how it is known.
 
 det J of a layout vanishes at every pose, or at none but some. One pose at which it does not is
 proof of the latter. Of the former there are three degrees: exact arithmetic, for a geometry that
@@ -24,12 +24,12 @@ from pteron.kinematics.type_ii_sizes import type_ii_sizes
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _VANISHING = 1e-10
-"""A type-II measure, or a singular value over the largest, that is none but for rounding."""
+"""Type-II measures, or singular values over the largest, below this are rounding."""
 
 _SAMPLES = 64
 
 _PRIMES = (2305843009213690799, 2305843009213689479, 2305843009213688159, 2305843009213684559)
-"""Modulo which 2, 3 and 5 are squares, and -1 is none."""
+"""Primes modulo which 2, 3 and 5 are squares, and -1 is none."""
 
 _ATTEMPTS = 400
 _ZEROS = 3
@@ -40,7 +40,7 @@ Proof = Literal["closed form", "exact arithmetic", "numerical", "one pose"]
 
 @dataclass(frozen=True)
 class Architecture:
-    """What a machine's layout is, wherever its platform is.
+    """Properties of a machine's layout, whatever its pose.
 
     Attributes
     ----------
@@ -50,9 +50,9 @@ class Architecture:
     reason : str
         Why, in words; empty where it is not.
     proof : {"one pose", "exact arithmetic", "closed form", "numerical"}
-        How it is known. "one pose": it is not singular, as one pose shows. "exact arithmetic": det
-        J is zero in exact numbers, at random states modulo primes. "closed form": the coefficients
-        of det J vanish but for rounding. "numerical": det J does at many poses.
+        The kind of proof. "one pose": it is not singular, as one pose shows. "exact arithmetic":
+        det J is zero in exact numbers, at random states modulo primes. "closed form": the
+        coefficients of det J vanish but for rounding. "numerical": det J does at many poses.
     type_ii : float
         The largest type-II measure, in size, of the poses that were looked at.
     holds : bool or None
@@ -202,7 +202,7 @@ def _reason(robot: Manipulator) -> str:
     forces = jacobian[..., :lengths]
     if lengths == 3 and (axis := _always_free(forces)) is not None:
         return (
-            f"the legs' rows all lie across {_told(axis)}, along which no actuator holds the "
+            f"the legs' rows all lie across {_rounded(axis)}, along which no actuator holds the "
             "platform"
         )
     if _points_are_in_line(robot):
@@ -218,7 +218,7 @@ def _reason(robot: Manipulator) -> str:
     legs = _dependent_legs(jacobian)
     if len(legs) == 1:
         return f"the row of leg {legs[0]} of J is zero: its joint does not move the platform"
-    if len(legs) < robot.freedom:
+    if len(legs) < robot.joint_count:
         *rest, last = map(str, legs)
         return f"the rows of legs {', '.join(rest)} and {last} of J depend on each other"
     if (axis := _always_free(jacobian)) is not None and lengths < robot.freedom:
@@ -232,9 +232,7 @@ def _reason(robot: Manipulator) -> str:
 
 def _points_are_in_line(robot: Manipulator) -> bool:
     """Say whether the platform turns about an axis through all its points, but for rounding."""
-    if not robot.platform.turns or robot.platform.slides:
-        return False
-    if any(leg.follows_angle for leg in robot.legs):
+    if not robot.wraps.any():
         return False
     points = np.array([leg.platform_point for leg in robot.legs])
     size = max(float(np.abs(points).max()), 1e-9)
@@ -252,7 +250,7 @@ def _always_free(rows: Array) -> Array | None:
     return np.where(np.abs(axis) < 1e-9, 0.0, axis)
 
 
-def _told(axis: Array) -> list[float]:
+def _rounded(axis: Array) -> list[float]:
     return [round(float(v), 3) + 0.0 for v in axis]
 
 

@@ -34,8 +34,8 @@ _HUGE = 1e30
 """Sizes of the machine beyond which joints have no pose; det G stays finite."""
 
 _COINCIDING = 1e-10
-"""What is left of a row, in numbers about 1, once those before it are taken out, for it to count:
-ten digits of it are rounding then."""
+"""Least size of a row, in numbers about 1, after those before it are taken out: ten digits of a
+smaller one are rounding."""
 
 _VANISHING = 1e-14
 """The size of det G, of orthonormal rows, below which it is all rounding: the platform can move
@@ -46,10 +46,10 @@ _MARGIN = 5e-3
 digits."""
 
 _NEAR = 0.1
-"""What a point may miss a closure by, as a share of the terms, to be worth Newton's steps."""
+"""Greatest miss of a closure, as a share of the terms, that is worth Newton's steps."""
 
 _ROUNDING = 1e-13
-"""What it may miss in the end: as much as two modes that meet do within 1e-7 of where they are."""
+"""Greatest miss in the end: as much as two modes that meet do within 1e-7 of where they are."""
 
 _STEPS = 20
 """Newton's steps at most: they end where a pose misses no less than before."""
@@ -61,9 +61,10 @@ _SAME = 1e-6
 """Two poses within this, in rad and sizes of the machine, may be one, found twice."""
 
 _APART, _LEAST = 6.0, 2e-16
-"""Between two modes that meet the closures are missed, by a quarter of the square of their distance
-or so; it must be so many times what both poses miss, and no less than rounding. That tells modes
-apart to some 1e-7 of the size, where joints are themselves known to half of the digits of that."""
+"""Factor and floor of the miss that tells two modes apart. Between two that meet the closures are
+missed, by a quarter of the square of their distance or so: this must be so many times what both
+poses miss, and no less than rounding. It tells modes apart to some 1e-7 of the size, where joints
+are themselves known to half of the digits of that."""
 
 _TURN_ROUNDING = 1e-14
 """rad."""
@@ -95,8 +96,8 @@ def _poses(robot: Manipulator, joints: Array, most: int) -> Array:
     which, points, phi = _points(_at(rows[which], phi, slides), which, phi)
     starts = np.column_stack([origin[which] + size[which, None] * points, phi])
     which, poses, missed = _polished(robot, joints, which, starts)
-    if not slides:
-        poses[:, -1] = within_a_turn(poses[:, -1])
+    around = robot.platform.angular & (not slides)
+    poses[:, around] = within_a_turn(poses[:, around])
     same = _found_twice(robot, joints, which, poses, missed, size)
     which, poses = which[~same], poses[~same]
     return in_order(_table(poses, which, most, len(joints)))[:, :most]

@@ -1,4 +1,4 @@
-"""How well the legs' constraints hold the platform's orientation."""
+"""The constraint measure: how firmly the legs hold the platform's orientation."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def constraint_measure(
     pose : array, shape (..., m)
         The poses, m and rad.
     on_failure : {"raise", "nan"}
-        What happens to a pose out of reach.
+        Treatment of a pose out of reach.
 
     Returns
     -------

@@ -195,8 +195,7 @@ def assembly_modes(robot: RobotLike, joints: Array, *, all_branches: bool = Fals
         poses = evaluated(robot, "direct_kinematics", "nan", joints)
     else:
         poses = every_pose(robot, joints, closure.modes)
-    if _turns_freely(robot):
-        poses[..., -1] = within_a_turn(poses[..., -1])
+    poses[..., robot.wraps] = within_a_turn(poses[..., robot.wraps])
     back: PerJoint = evaluated(robot, "inverse_kinematics", "nan", poses)
     lost = np.isnan(back).any(axis=-1)
     if not closure.keeps_modes and not all_branches:
@@ -220,17 +219,11 @@ def nearest(robot: RobotLike, poses: Array, pose: Array) -> NDArray[np.int64]:
     """Return which of poses (..., k, m) is nearest to a pose (..., m), whole turns left out."""
     robot = as_manipulator(robot)
     apart = poses - pose[..., None, :]
-    lengths = len(robot.platform.directions)
-    distance = np.linalg.norm(apart[..., :lengths], axis=-1)
-    angle = 0.5 * apart[..., lengths:]
-    distance += np.abs(np.sin(angle) if _turns_freely(robot) else angle).sum(axis=-1)
+    angular = robot.platform.angular
+    distance = np.linalg.norm(apart[..., ~angular], axis=-1)
+    angles = 0.5 * apart[..., angular]
+    distance += np.abs(np.where(robot.wraps[angular], np.sin(angles), angles)).sum(axis=-1)
     return np.asarray(np.nan_to_num(distance, nan=np.inf).argmin(axis=-1))
-
-
-def _turns_freely(robot: Manipulator) -> bool:
-    """Return whether a whole turn of the platform leaves all as it was."""
-    held = any(leg.follows_angle for leg in robot.legs)
-    return robot.platform.turns and not robot.platform.slides and not held
 
 
 def _rows(robot: Manipulator, joints: Array, *, all_branches: bool) -> Poses:

@@ -1,4 +1,4 @@
-"""How a public function is evaluated: one kernel a call, and what is said of a state it refuses.
+"""Evaluation of public functions: one kernel a call, and errors that name a state it refuses.
 
 The kernel returns its values and a status. Nothing else happens as long as the status is good; the
 particulars of a bad state are worked out only then.
@@ -25,7 +25,7 @@ _COINCIDENT = 1e-6
 """Share of a leg's length within which its two ends count as coincident, in messages."""
 
 _TYPED: tuple[type, ...] = (list, tuple)
-"""What a person types; a program's arrays are not asked for their units."""
+"""Types that a person writes; a program's arrays are not checked for likely units."""
 
 _MILLIMETRES = 20.0
 """A pose that misses a leg's reach by so many times its size was perhaps given in millimetres."""

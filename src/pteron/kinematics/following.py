@@ -11,7 +11,7 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import JointsLike, OnFailure, PerCoordinate, PoseLike
 
 _HALVINGS = 12
-"""How often the way between two samples may be halved before it counts as none."""
+"""Most halvings of the step between two samples."""
 
 
 def follow(
@@ -20,7 +20,7 @@ def follow(
     """Return the poses of joints that move, in one assembly mode: that of a pose to start from.
 
     From each pose a line through the last two leads near the next one, and Newton's steps onto it;
-    where they do not converge the joints' way is halved. A mode ends where the machine is singular
+    where they do not converge the joints' step is halved. A mode ends where the machine is singular
     (type II), and the motion with it.
 
     Parameters
@@ -28,10 +28,10 @@ def follow(
     robot : Manipulator, name or path
         The machine.
     joints : array, shape (N, n)
-        Joint coordinates along the motion, m or rad: close enough to tell the way between them,
-        which is taken as straight.
+        Joint coordinates along the motion, m or rad: close enough that the path between them
+        may be taken as straight.
     start : array, shape (m,)
-        The pose of the first sample, or one from whose joint coordinates a straight way leads
+        The pose of the first sample, or one from whose joint coordinates a straight path leads
         there, m and rad.
     on_failure : {"raise", "nan"}
         Whether a sample that the motion does not come to raises, or gives NaN with all after it.
@@ -39,7 +39,7 @@ def follow(
     Returns
     -------
     array, shape (N, m)
-        The poses, m and rad; phi goes on beyond a turn.
+        The poses, m and rad; angles go on beyond a turn.
 
     Raises
     ------
@@ -58,13 +58,13 @@ def follow(
     robot = as_manipulator(robot)
     given, pose = checked(robot, joints, "joints", on_failure), checked(robot, start, "start")
     if given.ndim != 2 or pose.ndim != 1:
-        n = robot.freedom
+        n, m = robot.joint_count, robot.freedom
         raise DataError(
-            f"joints, start: shapes {given.shape} and {pose.shape} given, (N, {n}) and ({n},) "
+            f"joints, start: shapes {given.shape} and {pose.shape} given, (N, {n}) and ({m},) "
             "expected"
         )
     step = numeric(robot, "followed_step")
-    found = np.full(given.shape, np.nan)
+    found = np.full((len(given), robot.freedom), np.nan)
     before, side = pose, 0.0
     for k, q in enumerate(given):
         ahead, measure, _ = step(q, 2.0 * pose - before)

@@ -1,4 +1,4 @@
-"""How evenly the joints move the platform at a pose: the Jacobian and its condition number."""
+"""The Jacobian at a pose and its condition number."""
 
 from __future__ import annotations
 
@@ -42,6 +42,6 @@ def jacobian_at(robot: Manipulator, pose: Array) -> JacobianAtPose:
     matrix = jacobian(robot, pose)
     found: tuple[Array, Array] = evaluated(robot, "homogeneous_jacobian", "raise", pose)
     plain, length = found
-    turning = [leg.platform_point[:2] for leg in robot.legs if not leg.follows_angle]
-    radius = float(length) if robot.platform.turns and np.any(turning) else None
+    turning = [leg.platform_point[:2] for leg in robot.legs if leg.reach_bound is not None]
+    radius = float(length) if robot.platform.angles and np.any(turning) else None
     return JacobianAtPose(matrix, radius, float(np.linalg.cond(plain)))

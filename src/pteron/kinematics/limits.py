@@ -25,13 +25,13 @@ class LimitedJoint:
     leg : int
         Its leg, from 1; 0 for the platform's angle.
     noun : str
-        What it is: "slider", "elbow", ...
+        Its kind: "slider", "elbow", ...
     actuated : bool
         Whether a drive moves it.
     unit : str
-        Of the numbers, "m" or "rad".
+        Unit of the numbers, "m" or "rad".
     value, least, most : float
-        Where it is, and its limits.
+        Its coordinate, and the limits of it.
     only_most : bool
         Whether it is never below zero, as the angle in a cone, and only its greatest value a limit.
     """
@@ -45,10 +45,10 @@ class LimitedJoint:
     most: float
     only_most: bool = False
 
-    def told_limits(self, told: Callable[..., str]) -> str:
-        """Return its limits as words; `told` turns a value and the unit into text."""
-        most = told(self.most, self.unit)
-        return f"at most {most}" if self.only_most else f"{told(self.least, self.unit)} to {most}"
+    def limits_text(self, text: Callable[..., str]) -> str:
+        """Return its limits as words; `text` turns a value and the unit into text."""
+        most = text(self.most, self.unit)
+        return f"at most {most}" if self.only_most else f"{text(self.least, self.unit)} to {most}"
 
 
 def limited_joints(robot: RobotLike, pose: PoseLike) -> tuple[LimitedJoint, ...]:

@@ -31,9 +31,9 @@ def random_poses(
     robot : Manipulator, name or path
         The machine.
     count : int
-        How many poses.
+        Number of poses.
     seed : int or numpy Generator
-        Where the randomness comes from.
+        Seed, or source, of the random numbers.
     type_i : float
         Least type-I measure of every leg: 0 where it is singular, 1 at best.
     type_ii : float

@@ -21,7 +21,7 @@ _DRAWN = 4096
 """Random poses among which the best type-II measure is sought."""
 
 _FOREMOST = 6
-"""How many of them are improved."""
+"""Those of them that are improved."""
 
 _TRIES = 200
 """Poses that are tried to improve one."""
@@ -106,7 +106,7 @@ def singular_orientations(robot: RobotLike, position: ArrayLike | None = None) -
     expect_regular(robot)
     given = None
     if position is not None:
-        names = tuple(name for name in robot.coordinates if name != "phi")
+        names = robot.platform.lengths
         given = as_array(position, "position", (len(names),), columns=names)
         if given.ndim > 1 or not np.isfinite(given).all():
             raise DataError(f"position: {given.tolist()} given, one row of finite numbers expected")
@@ -115,7 +115,7 @@ def singular_orientations(robot: RobotLike, position: ArrayLike | None = None) -
         a, b = (float(value) for value in orientation)
         one = np.arctan2(b, a) + np.pi / 2
         return np.sort(_wrapped(np.array([one, one - np.pi])))
-    if given is None or not robot.platform.turns:
+    if given is None or not robot.platform.angles:
         return np.empty(0)
     return _sign_changes(robot, given)
 

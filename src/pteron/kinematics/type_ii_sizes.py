@@ -12,7 +12,7 @@ from pteron.shapes import PoseLike
 def type_ii_sizes(robot: Manipulator, poses: PoseLike) -> Array:
     """Return the size (...) of the type-II measure of poses (..., m): 0 where it is not a number.
 
-    What is not finite passes no floor: out of reach, or where a leg's force is lost.
+    A measure that is not finite passes no floor: out of reach, or where a leg's force is lost.
     """
     sizes = np.abs(numeric(robot, "type_ii")(poses)[0])
     return np.where(np.isfinite(sizes), sizes, 0.0)

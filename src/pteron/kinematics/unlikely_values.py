@@ -11,6 +11,7 @@ import numpy as np
 from pteron.errors import UnlikelyValue
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
+from pteron.platforms.coordinates import COORDINATES
 
 _WOUND = 6.0 * np.pi
 """rad, three turns: beyond them the coordinate of a crank is likelier in degrees."""
@@ -31,7 +32,7 @@ def unlikely_values(robot: Manipulator, columns: Sequence[str], values: Array) -
     robot : Manipulator
         The machine.
     columns : sequence of str
-        What the values are: ``x``, ``phi``, ``rho1``, ...; others are not looked at.
+        Names of the values: ``x``, ``phi``, ``rho1``, ...; others are not looked at.
     values : array, shape (..., len(columns))
         m and rad.
 
@@ -39,17 +40,14 @@ def unlikely_values(robot: Manipulator, columns: Sequence[str], values: Array) -
     -------
     tuple of str
     """
-    far = {"x": unlikely_length(robot), "phi": _turn(robot.platform.limits)}
-    far |= {"y": far["x"], "z": far["x"]}
-    for i, leg in enumerate(robot.legs, start=1):
-        turns = leg.joint.unit == "rad"
-        most = max(_turn(leg.limits), far["phi"], _WOUND) if turns else far["x"]
-        far[f"{leg.joint.coordinate}{i}"] = most
-    angles = {"phi"} | {
-        f"{leg.joint.coordinate}{i}"
-        for i, leg in enumerate(robot.legs, start=1)
-        if leg.joint.unit == "rad"
-    }
+    length, turn = unlikely_length(robot), _turn(robot.platform.limits)
+    far = dict.fromkeys(COORDINATES, length) | dict.fromkeys(robot.platform.angles, turn)
+    angles = set(robot.platform.angles)
+    for name, leg in zip(robot.joint_names, robot.legs, strict=True):
+        far[name] = length
+        if leg.joint.unit == "rad":
+            far[name] = max(_turn(leg.limits), turn, _WOUND)
+            angles.add(name)
     found = []
     for turning, question in (
         (False, "are these mm? m are expected"),

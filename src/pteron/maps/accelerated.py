@@ -1,4 +1,4 @@
-"""The same map through JAX: one function of the axes' values, compiled once for all chunks."""
+"""Maps computed by JAX: one function of the axes' values, compiled once for all chunks."""
 
 from __future__ import annotations
 

@@ -47,8 +47,8 @@ def read_archive(source: Path) -> Map:
     try:
         arrays = _arrays(source)
         about = json.loads(str(arrays.pop(_ABOUT)))
-        told = about.pop("sha256")
-        if told != checksum(about, arrays):
+        given_sum = about.pop("sha256")
+        if given_sum != checksum(about, arrays):
             raise ValueError("its checksum is another one")
         values = {name: arrays[name] for name in about["units"]}
         grid = Grid.of_plain(about["grid"])

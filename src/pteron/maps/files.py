@@ -30,7 +30,7 @@ def save_map(given: Map, path: str | Path) -> Path:
     Parameters
     ----------
     given : Map
-        What to write.
+        The map.
     path : str or Path
         The file; it is replaced whole, or not at all.
 
@@ -57,12 +57,12 @@ def load_map(path: str | Path) -> Map:
     Parameters
     ----------
     path : str or Path
-        What `save_map` or `map_index` has written, but surfaces.
+        A file of `save_map` or `map_index`, but no surfaces.
 
     Returns
     -------
     Map
-        Of a table the machine's name is the file's.
+        For a table the machine's name is the file's.
 
     Raises
     ------

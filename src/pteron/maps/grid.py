@@ -1,4 +1,4 @@
-"""Grids of poses: which coordinates vary, from where to where, and what the others are."""
+"""Grids of poses: the ranges of coordinates that vary, and the values of the others."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from pteron.kernels import Array
 from pteron.kinematics.evaluate import checked_one
 from pteron.kinematics.unlikely_values import unlikely_values
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.platforms.coordinates import COORDINATES, coordinate
 from pteron.shapes import PoseLike
 from pteron.workspace import bounding_box, home_pose
 
@@ -32,9 +33,6 @@ _HUGE = float_info.max
 _CHUNK = 1 << 17
 """Poses of a chunk at most: a second's work or less, and a megabyte of each index."""
 
-COORDINATES = ("x", "y", "z", "phi")
-"""Of poses, in their order; a machine has some of them."""
-
 Region = tuple[slice, ...]
 """A part of a grid: from where to where along each of its axes."""
 
@@ -46,11 +44,11 @@ class Axis:
     Attributes
     ----------
     name : str
-        ``x``, ``y``, ``z`` or ``phi``.
+        A coordinate of `pteron.platforms.coordinates`, such as ``x`` or ``phi``.
     least, greatest : float
         The first and the last value, m or rad.
     count : int
-        How many values there are, 2 or more.
+        Number of values, 2 or more.
 
     Raises
     ------
@@ -91,8 +89,8 @@ class Axis:
 
     @property
     def unit(self) -> str:
-        """Of the values: ``m`` or ``rad``."""
-        return "rad" if self.name == "phi" else "m"
+        """Unit of the values: ``m`` or ``rad``."""
+        return coordinate(self.name).unit
 
 
 @dataclass(frozen=True)
@@ -153,12 +151,12 @@ class Grid:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """How many values each axis has."""
+        """The number of values of each axis."""
         return tuple(axis.count for axis in self.axes)
 
     @property
     def size(self) -> int:
-        """How many poses there are."""
+        """The number of poses."""
         return prod(self.shape)
 
     @property
@@ -221,7 +219,7 @@ def pose_grid(
         not `points`. Other lengths that vary do so over the bounding box of the reach, an angle
         over its limits or else a whole turn.
     points : int, optional
-        How many values along each axis; by default 200 in a plane, 100 in three dimensions.
+        Number of values along each axis; by default 200 in a plane, 100 in three dimensions.
     center : array, shape (m,), optional
         Gives what is held where `held` is left out, m and rad; by default the home pose.
     rim : float
@@ -266,12 +264,11 @@ def pose_grid(
         raise DataError(f"nothing varies: leave one of {', '.join(names)} out of what is held")
     count = _POINTS[len(varying_names)] if points is None else points
     free = [name for name in varying_names if name not in spans]
-    if "phi" in free:
-        limits = robot.platform.limits
-        spans["phi"] = (-pi, pi) if limits is None else limits
-    lengths = [name for name in free if name != "phi"]
+    angles = [name for name in free if name in robot.platform.angles]
+    lengths = [name for name in free if name not in angles]
+    spans |= dict.fromkeys(angles, robot.platform.limits or (-pi, pi))
     if lengths:
-        box = _box(robot, pose, spans.get("phi"))
+        box = _box(robot, pose, spans)
         box += rim * np.array([-1.0, 1.0])[:, None] * np.ptp(box, axis=0)
         spans |= {name: tuple(box[:, names.index(name)].tolist()) for name in lengths}
     axes = []
@@ -286,14 +283,15 @@ def pose_grid(
     return Grid(names, tuple(pose.tolist()), tuple(axes))
 
 
-def _box(robot: Manipulator, pose: Array, angles: tuple[float, ...] | None) -> Array:
-    """Return the box (2, k) of the reach at a pose's orientation, or at angles between two."""
-    if angles is None:
-        return bounding_box(robot, pose)
-    boxes = []
-    for angle in np.linspace(angles[0], angles[1], _TURNS):
+def _box(robot: Manipulator, pose: Array, spans: Mapping[str, tuple[float, ...]]) -> Array:
+    """Return the box (2, k) of the reach at a pose's orientation, or over the spans of angles."""
+    varying = [k for k in np.flatnonzero(robot.platform.angular) if robot.coordinates[k] in spans]
+    ends = [spans[robot.coordinates[k]][:2] for k in varying]
+    boxes, at = [], pose.copy()
+    for turned in product(*(np.linspace(low, high, _TURNS) for low, high in ends)):
+        at[varying] = turned
         try:
-            boxes.append(bounding_box(robot, [*pose[:-1], angle]))
+            boxes.append(bounding_box(robot, at))
         except ModelError as error:
             nowhere = error
     if not boxes:
@@ -302,7 +300,7 @@ def _box(robot: Manipulator, pose: Array, angles: tuple[float, ...] | None) -> A
 
 
 def _number(key: str, value: object) -> float:
-    """Return a finite float, or say under which key it is none."""
+    """Return a finite float, or raise an error that names its key."""
     if (
         isinstance(value, int | float | np.integer | np.floating)
         and not isinstance(value, bool)
@@ -331,5 +329,5 @@ def expect_coordinates(
             raise DataError(
                 f"{name}: from {values[0]:g} to {values[1]:g} given, an ascending range expected"
             )
-        for doubt in unlikely_values(robot, [name], np.array([values[:2]])):
-            raise DataError(doubt)
+        for warning in unlikely_values(robot, [name], np.array([values[:2]])):
+            raise DataError(warning)

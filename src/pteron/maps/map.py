@@ -1,4 +1,4 @@
-"""A map: what indices of performance are over a grid of poses, and which of the poses serve."""
+"""A map: indices of performance over a grid of poses, and whether each pose is in reach."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from pteron.errors import DataError
 from pteron.indices import INDICES, Index
 from pteron.kernels import Array
 from pteron.maps.grid import Grid
+from pteron.platforms.coordinates import coordinate
 from pteron.workspace import BEYOND_LIMITS, REACHABLE
 
 if TYPE_CHECKING:
@@ -26,28 +27,28 @@ MARGIN = Index(
     "m",
     "more",
 )
-"""What a map has where no other index is asked for; negative where a pose does not serve."""
+"""The index of maps for which no other is asked; negative out of reach or beyond limits."""
 
 ALL = {MARGIN.name: MARGIN, **INDICES}
-"""Whatever a map may hold, by name."""
+"""All indices that a map may hold, by name."""
 
 
 @dataclass(frozen=True)
 class Summary:
-    """What an index is over the poses of a map that serve.
+    """Statistics of an index over the poses of a map that serve.
 
     Attributes
     ----------
     name, unit : str
-        Of the index.
+        Name and unit of the index.
     best, worst : float
-        Which is the greatest and which the least depends on the index.
+        The extreme values; which of them is the greatest depends on the index.
     best_pose, worst_pose : array, shape (m,)
         Where, m and rad.
     mean, median : float
         Over the poses where it is a finite number.
     count : int
-        How many these are.
+        Number of these.
     infinite : int
         At how many poses that serve it is none: they are singular, or next to it.
     """
@@ -75,7 +76,7 @@ class Map:
     grid : Grid
         The poses.
     values : mapping of str to array, shape grid.shape
-        What each index is, in its `units`; NaN where the pose is out of reach, or the index is not
+        Each index, in its `units`; NaN where the pose is out of reach, or the index is not
         determined. ``margin`` is determined everywhere.
     status : array of int, shape grid.shape
         `REACHABLE`, 0; `BEYOND_LIMITS`, -1; or the leg, from 1, that misses the pose by most.
@@ -96,7 +97,7 @@ class Map:
 
     @property
     def indices(self) -> tuple[Index, ...]:
-        """What its values mean, in their order."""
+        """The indices of its values, in their order."""
         return tuple(ALL[name] for name in self.values)
 
     @property
@@ -106,7 +107,7 @@ class Map:
 
     @property
     def reachable(self) -> NDArray[np.bool_]:
-        """Which poses serve, shape grid.shape."""
+        """Whether each pose serves, shape grid.shape."""
         return np.asarray(self.status == REACHABLE)
 
     @property
@@ -168,7 +169,7 @@ class Map:
 
         poses = self.grid.poses().reshape(-1, len(self.grid.coordinates))
         columns = {
-            f"{name} [{'rad' if name == 'phi' else 'm'}]": poses[:, k]
+            f"{name} [{coordinate(name).unit}]": poses[:, k]
             for k, name in enumerate(self.grid.coordinates)
         }
         columns |= {headed(index): self.values[index.name].ravel() for index in self.indices}

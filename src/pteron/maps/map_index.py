@@ -45,7 +45,7 @@ def map_index(
     out: str | Path | None = None,
     scheduler: str | None = None,
     workers: Workers | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> Map:
     """Return what indices of performance are over a grid of poses, and which of the poses serve.
 
@@ -59,7 +59,7 @@ def map_index(
     grid : Grid, optional
         The poses; by default those of `pose_grid(robot)`.
     engine : {"auto", "jax"}
-        What computes: this processor's compiled kernels, or JAX, on the accelerator if it finds
+        The means: this processor's compiled kernels, or JAX, on the accelerator if it finds
         one. They agree to rounding.
     out : str or Path, optional
         A file or a Zarr store, as `save_map` has them. What is computed streams to a ``.zarr``
@@ -67,7 +67,7 @@ def map_index(
     scheduler, workers
         As `sweep` has them; by default this process does the work, in a thread a processor.
     progress : callable, optional
-        Is told how many chunks are finished, and of how many.
+        Takes the share of the work that is done.
 
     Returns
     -------

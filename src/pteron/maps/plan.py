@@ -1,4 +1,4 @@
-"""What a store says it holds: it is resumed by the same plan, and no other's is mixed into it."""
+"""Plans of stores: a store is resumed by the plan that it was made with, and by no other."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ It is raised where a number of them changes.
 
 _LONG = 40
 _MANY = 2
-"""Differences of each part of a plan that are told."""
+"""Most differences that are listed of each part of a plan."""
 
 
 def expect_same(path: str | Path, found: Any, wanted: Mapping[str, Any]) -> None:

@@ -1,4 +1,4 @@
-"""Where the chunks of a map go: to memory, or to a Zarr store on a disk that all reach."""
+"""Stores of a map's chunks: memory, or a Zarr store on a disk that all processes reach."""
 
 from __future__ import annotations
 
@@ -21,14 +21,15 @@ from pteron.arguments import expect_to_fit
 from pteron.errors import DataError, ModelError, OutputError
 from pteron.extras import install_command
 from pteron.maps.checksums import checksum
-from pteron.maps.grid import COORDINATES, Grid
+from pteron.maps.grid import Grid
 from pteron.maps.map import ALL, Map
 from pteron.maps.plan import expect_same
+from pteron.platforms.coordinates import COORDINATES
 
 _CHECKSUM = "checksum"
 _STATUS = "status"
 _NOT_COMPUTED = -128
-"""What `status` is where no chunk has been written: no pose is taken for one that serves."""
+"""`status` where no chunk has been written: no pose is taken for one that serves."""
 
 
 class MemoryStore:
@@ -87,7 +88,7 @@ class MapStore:
         robot, grid, names
             The machine's name, the poses and the indices.
         plan : mapping
-            What else makes the numbers what they are, as JSON has them.
+            All else that the numbers depend on, as JSON has them.
 
         Raises
         ------

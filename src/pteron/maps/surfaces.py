@@ -23,7 +23,7 @@ from pteron.kernels import Array
 from pteron.maps.map import MARGIN, Map, headed
 
 ENDINGS = (".vtk", ".vtu", ".ply", ".stl")
-"""Of the files that hold surfaces; what a surface's value is, STL does not say."""
+"""Endings of files that hold surfaces; what a surface's value is, STL does not say."""
 
 _SHARES = (0.25, 0.5, 0.75)
 """By default surfaces part the poses that serve, by their value, at these shares."""
@@ -45,7 +45,7 @@ class Surface:
     triangles : array of int, shape (T, 3)
         The numbers of their corners.
     values : array, shape (P,)
-        What the index is at the points.
+        The index at the points.
     """
 
     level: float | None
@@ -92,7 +92,7 @@ def surfaces(given: Map, name: str, levels: Sequence[float] | None = None) -> tu
     if levels is None:
         shares = () if name == MARGIN.name else _SHARES
         levels = np.unique(np.quantile(values[known], shares)).tolist()
-    # What is not determined has its nearest neighbour's value, so that interpolation stays finite.
+    # Undetermined poses have their nearest neighbour's value, so that interpolation stays finite.
     nearest = distance_transform_edt(~known, return_distances=False, return_indices=True)
     whole = values[tuple(nearest)]
     found = []

@@ -1,4 +1,4 @@
-"""The same work on many chunks: here, in processes of this computer, or on a cluster.
+"""Sweeps: the same work on many chunks, here, in processes of this computer, or on a cluster.
 
 Chunks are numbered by a plan that depends on nothing but what is asked for. What a chunk gives is
 written, whole or not at all, by whoever has computed it. So a worker or a client that is killed
@@ -43,7 +43,7 @@ _AHEAD = 4
 
 
 class Store(Protocol[_Written]):
-    """Where a sweep's results go. It crosses to other processes, and they must reach its place."""
+    """A place for a sweep's results. It crosses to other processes, which must reach it."""
 
     def finished(self) -> Collection[int]:
         """Return the numbers of the chunks that are written."""
@@ -60,7 +60,7 @@ def sweep(
     scheduler: str | None = None,
     workers: Workers | None = None,
     threads: Workers = 1,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> int:
     """Compute the chunks that a store has not yet, and write what each gives to the store.
 
@@ -72,9 +72,9 @@ def sweep(
         Takes a chunk and returns what the store writes. For other processes it must be found by
         its module and name, as a function of a module is, or a `functools.partial` of one.
     chunks : sequence
-        What there is to compute, in the plan's order; the k-th is the store's number k.
+        The work, in the plan's order; the k-th is the store's number k.
     store : Store
-        Where the results go, such as a `TableStore`.
+        The place for the results, such as a `TableStore`.
     scheduler : str, optional
         The address of a Dask scheduler, such as ``tcp://host:8786``, whose workers do the work.
         They reach the store by the same path as this process does. It has no lock of its own: who
@@ -84,15 +84,15 @@ def sweep(
         asks for them does so under ``if __name__ == "__main__":``, as Python's `multiprocessing`
         wants it.
     threads : int
-        How many share the work in this process, for functions that leave Python's lock to others.
-        The first chunk is computed alone: what it builds, the others share.
+        Number of threads that share the work in this process, for functions that leave Python's
+        lock to others. The first chunk is computed alone: what it builds, the others share.
     progress : callable, optional
-        Is told how many chunks are finished, and of how many, at first and after each.
+        Takes the share of the chunks that are finished, at first and after each.
 
     Returns
     -------
     int
-        How many chunks were computed: none where the store had them all.
+        Number of chunks that were computed: none where the store had them all.
 
     Raises
     ------
@@ -109,8 +109,9 @@ def sweep(
         raise DataError("scheduler and workers given; a scheduler has its own workers: give one")
     done = set(store.finished())
     left = [k for k in range(len(chunks)) if k not in done]
-    tell = progress or (lambda *_: None)
-    tell(len(chunks) - len(left), len(chunks))
+    total, ready = len(chunks), len(chunks) - len(left)
+    tell = progress or (lambda share: None)
+    tell(ready / total if total else 1.0)
     if not left:
         return 0
     tasks = ((k, chunks[k]) for k in left)
@@ -120,8 +121,8 @@ def sweep(
         if scheduler is None and workers is None
         else _elsewhere(task, tasks, scheduler, workers)
     )
-    for count, _ in enumerate(finished, start=len(chunks) - len(left) + 1):
-        tell(count, len(chunks))
+    for count, _ in enumerate(finished, start=ready + 1):
+        tell(count / total)
     return len(left)
 
 
@@ -217,7 +218,7 @@ def _lost(where: str) -> PteronError:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Let no part of Dask log what is told in one line here."""
+    """Silence Dask's logs: errors are reported in one line here."""
     loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
     levels = [logger.level for logger in loggers]
     for logger in loggers:

@@ -14,20 +14,21 @@ from pteron.atomic import write_bytes
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.maps.checksums import checksum
-from pteron.maps.grid import COORDINATES, Axis, Grid
+from pteron.maps.grid import Axis, Grid
 from pteron.maps.map import ALL, Map, headed
+from pteron.platforms.coordinates import COORDINATES
 from pteron.tables import Table, listed, read_table, write_table
 from pteron.workspace import BEYOND_LIMITS
 
 _STATUS = "status"
 _CHECKSUMS = ("pteron.sha256", "pteron.sha256.again")
-"""Where a Parquet file's metadata have it: no one damaged place takes it away."""
+"""Keys of the checksum in a Parquet file's metadata: two, so that one damaged place is harmless."""
 
 _WRITER = "ARROW:schema"
-"""What is there in files of data frames; where it is not, the metadata are damaged."""
+"""Key that files of data frames have; where it is missing, the metadata are damaged."""
 
 _EQUAL = 1e-6
-"""Of a step: by how much the steps of a coordinate may differ, for tables with few digits."""
+"""Greatest difference of a coordinate's steps, over a step, for tables with few digits."""
 
 
 def write_map_table(given: Map, target: Path) -> Path:
@@ -50,7 +51,7 @@ def read_map_table(source: Path) -> Map:
         another one.
     """
     table = read_table(source)
-    coordinates = {name: f"{name} [{'rad' if name == 'phi' else 'm'}]" for name in COORDINATES}
+    coordinates = {name: f"{name} [{at.unit}]" for name, at in COORDINATES.items()}
     wanted = {**coordinates, **{index.name: headed(index) for index in ALL.values()}}
     columns = {name: _column(table, name, full) for name, full in wanted.items()}
     columns = {name: column for name, column in columns.items() if column}

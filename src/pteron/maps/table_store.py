@@ -32,7 +32,7 @@ class TableStore:
         It is made if it is missing. Where it holds results of the same plan they are kept, and the
         sweep goes on with what is left.
     plan : mapping
-        What makes the results what they are, as JSON has them: the robot's file as text, the seed,
+        All that the results depend on, as JSON has them: the robot's file as text, the seed,
         Pteron's version.
 
     Raises
@@ -96,9 +96,11 @@ class TableStore:
                 yield int(name), file
 
     def _is_whole(self, file: Path) -> bool:
-        number, _, told = file.stem.partition("-")
+        number, _, given_sum = file.stem.partition("-")
         try:
-            return number.isdecimal() and told == self._checksum(int(number), file.read_bytes())
+            return number.isdecimal() and given_sum == self._checksum(
+                int(number), file.read_bytes()
+            )
         except OSError:  # gone meanwhile, or it cannot be read
             return False
 

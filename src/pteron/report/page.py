@@ -80,7 +80,7 @@ def page(report: Report) -> str:
         speed=speed(joints),
         joint=nouns(joints),
         joint_units=dict.fromkeys(joint.unit for joint in joints),
-        passive=[(joint, joint.told_limits(readable)) for joint in report.passive],
+        passive=[(joint, joint.limits_text(readable)) for joint in report.passive],
         modes=prod(len(leg.branches) for leg in robot.legs),
         figures=_figures(report),
         sizing=report.sizing,

@@ -144,7 +144,7 @@ def what_stops(robot: Manipulator, beyond: Array) -> str:
     for joint in limited_joints(robot, beyond):
         if not joint.actuated and not joint.least <= joint.value <= joint.most:
             whose = f"of leg {joint.leg}" if joint.leg else "of the platform"
-            return f"The {joint.noun} {whose} is at its limit, {joint.told_limits(readable)}"
+            return f"The {joint.noun} {whose} is at its limit, {joint.limits_text(readable)}"
     return "The assembly mode ends here (singular, type II)"
 
 

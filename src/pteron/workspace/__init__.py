@@ -1,4 +1,4 @@
-"""Where a machine can work: its margins, its home pose, its reach and its joints' ranges."""
+"""The workspace of a machine: margins, home pose, reach, joints' ranges, and proofs of them."""
 
 from pteron.arguments import check_arguments
 from pteron.kinematics.limits import LimitedJoint, limited_joints

@@ -1,4 +1,4 @@
-"""How far a machine's bodies are from touching each other."""
+"""Clearance: the distances between a machine's bodies."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Thickness = Radii | Mapping[str, float] | float
 
 @dataclass(frozen=True)
 class Clearance:
-    """How far bodies are apart, pair by pair.
+    """Distances between bodies, pair by pair.
 
     Attributes
     ----------
@@ -75,10 +75,10 @@ def clearance(
     pose : array, shape (..., m)
         The poses, m and rad.
     radii : Radii, mapping or float, optional
-        How thick the bodies are, m: for each kind of body, or one radius for all. The machine's
+        Radii of the bodies, m: for each kind of body, or one radius for all. The machine's
         own where it is not given; without these the centre lines count.
     on_failure : {"raise", "nan"}
-        What happens to a pose out of reach.
+        Treatment of a pose out of reach.
 
     Returns
     -------

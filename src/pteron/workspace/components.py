@@ -1,4 +1,4 @@
-"""Of which connected parts a workspace consists, and which are proved to be apart."""
+"""Connected parts of a workspace, and proofs that some of them are apart."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pteron.kernels import Array
 from pteron.workspace.paving import Paving
 
 _CELLS = 1 << 22
-"""Of the lattice in which parts are sought."""
+"""Most cells of the lattice in which parts are sought."""
 
 
 _ROUNDING = 1e-9
@@ -21,16 +21,16 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Component:
-    """A part of the workspace in which a way leads from any pose to any other.
+    """A part of the workspace in which a path leads from any pose to any other.
 
     Attributes
     ----------
     volume : float
-        What of it is proved inside, in the paving's unit.
+        Its volume that is proved inside, in the paving's unit.
     pose : array, shape (m,)
         The middle of a box of it, far from its edge.
     box : array, shape (2, k)
-        What bounds its proved part.
+        The bounding box of its proved part.
     group : int
         Parts of different groups are proved to be apart; of two of one group it is not decided.
     """
@@ -54,7 +54,7 @@ class Components:
     connected : bool or None
         True: there is one part. False: at least two are proved to be apart. None: not decided.
     share : float
-        How much of what is proved inside the parts hold: where the paving's smallest boxes are
+        Share of the volume proved inside that the parts hold: where the paving's smallest boxes are
         finer than the lattice in which parts are sought, some of it is in none.
     """
 
@@ -68,12 +68,13 @@ def components(paving: Paving, *, smallest: float = 0.0) -> Components:
     """Return the connected parts of a paved workspace.
 
     Boxes that are proved inside and touch are connected. Where no chain of boxes that are inside or
-    undecided leads from one to another there is no way between them.
+    undecided leads from one to another there is no path between them.
 
     Parameters
     ----------
     paving : Paving
-        The workspace; over phi too, if it was paved so. phi and phi + 2 pi count as different.
+        The workspace; over angles too, if it was paved so. An angle and the same one a
+        turn on are different.
     smallest : float
         Parts of less volume than this share of the whole are left out of `parts`.
 
@@ -126,13 +127,13 @@ class Lattice(NamedTuple):
     size: Array
     """(k,): of a cell."""
     inside: NDArray[np.bool_]
-    """Which cells are proved inside."""
+    """Whether a cell is proved inside."""
     possible: NDArray[np.bool_]
-    """Which cells may have poses inside."""
+    """Whether a cell may have poses inside."""
 
 
 def lattice(paving: Paving, most: int = _CELLS) -> Lattice:
-    """Return a paving as a lattice, as fine as the smallest boxes, or as so many cells allow."""
+    """Return a paving as a lattice, as fine as the smallest boxes, or as `most` cells allow."""
     moving = [paving.robot.coordinates.index(axis) for axis in paving.axes]
     start, whole = paving.box[0, moving], (paving.box[1] - paving.box[0])[moving]
     depths, places = [], []

@@ -1,7 +1,7 @@
-"""What a pose must keep to count: a list of conditions, each a compiled function above a floor.
+"""Conditions on a pose: each a compiled function that must not be below a floor.
 
-Pavings, proofs, boundaries and largest shapes all use the same list. What else a region must keep,
-as a distance between links, is one more condition: the name of a function of the table.
+Pavings, proofs, boundaries, largest shapes and designs all use the same list. Anything else that a
+region must keep, such as a distance between links, is one more condition: the name of a function.
 """
 
 from __future__ import annotations
@@ -24,24 +24,24 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 @dataclass(frozen=True)
 class Condition:
-    """That an element of a compiled function's output is not below a floor.
+    """A condition: an element of a compiled function's output is not below a floor.
 
     Parameters
     ----------
     leg : int
-        Whose it is, from 1; 0 where it is no leg's.
+        The leg that it is about, from 1; 0 where it is about none.
     cause : str
-        What ends there, as a clause: "stretched", "slider at its least", "singular (type II)".
+        The cause of the end there: "stretched", "slider at its least", "singular (type II)".
     what : str
         The function of the pose; see `pteron.kernels.FUNCTIONS`.
     output : str
-        Which of its outputs.
+        Name of one of its outputs.
     element : int
-        Which of that output's elements.
+        Index of one of that output's elements.
     floor : float
-        What it must not be below.
+        The least value that keeps it.
     sized : bool
-        Whether its size counts, without the sign.
+        Whether its absolute value counts.
     """
 
     leg: int
@@ -57,7 +57,7 @@ class Condition:
 
 
 _MOST = 64
-"""Conditions in a list: one bit each."""
+"""Most conditions in a list: one bit each."""
 
 _CAUSES = {
     "reach": "at the edge of its reach",
@@ -71,14 +71,14 @@ EDGES = ("stretched", "folded", _CAUSES["reach"])
 """The causes that are edges of a leg's reach, where its elbow may change its side."""
 
 
-def _told(edge: Edge) -> str:
+def _clause(edge: Edge) -> str:
     return _CAUSES.get(edge.cause, edge.cause).format(edge.noun)
 
 
 def conditions(
     robot: RobotLike, *, type_i: float = 0.0, type_ii: float = 0.0
 ) -> tuple[Condition, ...]:
-    """Return what a pose must keep: every leg's reach, the limits of all joints, and two floors.
+    """Return the conditions on a pose: every leg's reach, the limits of all joints, and two floors.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def conditions(
             raise DataError(f"{name}: {floor!r} given, a floor of 0 or more expected")
     pose = ca.SX.sym("pose", robot.freedom)
     found = [
-        Condition(edge.leg, _told(edge), "room", "room", k)
+        Condition(edge.leg, _clause(edge), "room", "room", k)
         for k, edge in enumerate(edges(Machine.of(robot), pose))
     ]
     if type_i > 0.0:
@@ -125,7 +125,7 @@ def conditions(
 
 
 def condition_margins(robot: Manipulator, given: Sequence[Condition], poses: Array) -> Array:
-    """Return by how much (..., C) poses keep conditions, by ordinary evaluation; NaN: undefined."""
+    """Return the margins (..., C) to which poses keep conditions; NaN where undefined."""
     found = []
     results = {
         what: dict(zip((port.name for port in kernel.outputs), kernel(poses), strict=True))
@@ -138,19 +138,19 @@ def condition_margins(robot: Manipulator, given: Sequence[Condition], poses: Arr
         if value.ndim > lead:
             size = int(np.prod(value.shape[lead:]))
             value = value.reshape(*value.shape[:lead], size)[..., condition.element]
-        # What is infinite is as little known as NaN.
+        # An infinite value is as little known as NaN.
         value = np.where(np.isfinite(value), value, np.nan)
         found.append((np.abs(value) if condition.sized else value) - condition.floor)
     return np.stack(found, axis=-1)
 
 
-def kept(robot: Manipulator, given: Sequence[Condition], poses: Array) -> NDArray[np.bool_]:
+def keeps(robot: Manipulator, given: Sequence[Condition], poses: Array) -> NDArray[np.bool_]:
     """Return which poses (...) keep all conditions, by ordinary evaluation."""
     return np.asarray((condition_margins(robot, given, poses) >= 0.0).all(axis=-1))
 
 
-class Judge:
-    """What intervals prove of boxes of poses, condition by condition.
+class IntervalTest:
+    """Interval tests of boxes of poses, condition by condition.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ class Judge:
         outside : array of bool, shape (B,)
             Whether a condition is proved to fail in all of the box.
         open_ : array of uint64, shape (B,)
-            What is not proved of a box; 0: it lies inside. Not looked at further where outside.
+            The conditions not proved in a box; 0: it lies inside. Not tested further where outside.
         """
         outside, open_ = np.zeros(len(low), bool), open_.copy()
         for c, condition in enumerate(self.given):
@@ -228,6 +228,6 @@ class Judge:
 
 
 @lru_cache(maxsize=64)
-def judge(robot: Manipulator, given: tuple[Condition, ...]) -> Judge:
-    """Return what judges boxes of a machine's poses by these conditions."""
-    return Judge(robot, given)
+def interval_test(robot: Manipulator, given: tuple[Condition, ...]) -> IntervalTest:
+    """Return the interval test of a machine's poses by these conditions."""
+    return IntervalTest(robot, given)

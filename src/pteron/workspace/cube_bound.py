@@ -1,4 +1,4 @@
-"""How large a cube in the workspace can be at most, which is proved."""
+"""A proved upper bound on the edge of cubes in the workspace."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def cube_bound(paving: Paving) -> float:
     Raises
     ------
     DataError
-        If phi varies.
+        If an angle varies.
 
     Examples
     --------
@@ -42,8 +42,8 @@ def cube_bound(paving: Paving) -> float:
     >>> round(cube_bound(paving("tripteron-router", [0.1, 0.1, 0.1], tolerance=0.1)), 2)
     0.21
     """
-    if "phi" in paving.axes:
-        raise DataError("paving: phi varies; a cube is sought at one orientation")
+    if turning := [axis for axis in paving.axes if axis in paving.robot.platform.angles]:
+        raise DataError(f"paving: {turning[0]} varies; a cube is sought at one orientation")
     if not len(paving.inner) + len(paving.boundary):
         return 0.0
     cells = lattice(paving)

@@ -1,4 +1,4 @@
-"""What is possible but unlikely in drives: most often a wrong unit, or a missing ratio."""
+"""Warnings about drives: possible but unlikely values, most often in a wrong unit."""
 
 from __future__ import annotations
 
@@ -13,22 +13,21 @@ from pteron.legs import LegKind
 from pteron.manipulator import Manipulator
 
 _SLOW = 5.0
-"""Motor radians per metre below which a slider's ratio is doubted: belts have 20 and more, screws
+"""Motor radians per metre below which a slider's ratio is unlikely: belts have 20 and more, screws
 hundreds."""
 
 _SMOOTH = 0.1
 """Share of the greatest speed within which dry friction may change its sign smoothly."""
 
 _APART = 20.0
-"""How many times the rated force a drive's greatest may be, or the inverse: servo drives have 2 to
-5 times."""
+"""Greatest ratio of a drive's peak to its rated force, or the inverse: servo drives have 2 to 5."""
 
 _HEAVY = 100.0
-"""How many times the mass at its joint a rotor may be: matched, they are equal."""
+"""Greatest ratio of a rotor's inertia to the mass at its joint: matched, they are equal."""
 
 
 def drive_warnings(leg: LegKind) -> Iterator[str]:
-    """Yield what a person should look at again in a leg's drive, by itself, one line each."""
+    """Yield warnings about a leg's drive by itself, one line each."""
     drive = leg.drive
     if drive is None:
         return
@@ -72,7 +71,7 @@ def drive_warnings(leg: LegKind) -> Iterator[str]:
 
 
 def load_warnings(robot: Manipulator, pose: Array) -> tuple[str, ...]:
-    """Return what is unlikely in the drives for the load that they have in a pose (m,), at rest."""
+    """Return warnings about the drives under their load in a pose (m,), at rest."""
     rest = np.zeros(robot.freedom)
     holding = np.abs(drive_forces(robot, pose, rest, rest))
     inverse = np.linalg.inv(jacobian(robot, pose))

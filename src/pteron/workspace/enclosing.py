@@ -16,7 +16,7 @@ _SINGULAR = 1e-9
 
 
 def enclosing_box(robot: Manipulator, low: Array, high: Array) -> Array:
-    """Return a box (2, k) of positions P that holds all in reach for phi in an interval.
+    """Return a box (2, k) of positions P that holds all in reach between two orientations.
 
     Each leg keeps its platform point within R_j of a point, or of its guide's line: |A_j (P - p_j)|
     <= R_j. So sum |A_j (P - p_j)|^2 <= sum R_j^2, an ellipsoid, whose box is known in closed form.
@@ -26,7 +26,7 @@ def enclosing_box(robot: Manipulator, low: Array, high: Array) -> Array:
     robot : Manipulator
         The machine.
     low, high : array, shape (m,)
-        Two poses; of them only phi counts.
+        Two poses, of which the angles count.
 
     Raises
     ------
@@ -37,7 +37,7 @@ def enclosing_box(robot: Manipulator, low: Array, high: Array) -> Array:
     size = len(directions)
     # The platform points at the middle of the interval, and how far they are from there at most.
     middle = 0.5 * (low + high)
-    half = float(0.5 * (high - low)[-1]) if robot.platform.turns else 0.0
+    half = 0.5 * float((high - low)[robot.platform.angular].sum())
     points = np.array([leg.platform_point for leg in robot.legs])
     arms = robot.platform.arms(points, middle)
     far = np.linalg.norm(points, axis=1) * half

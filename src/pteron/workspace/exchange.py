@@ -26,7 +26,7 @@ _PER_ROW = 3
 _ROUNDS = 12
 
 _ROUNDING = 1e-12
-"""How far below 0 a row may be where it counts as kept."""
+"""Rows above minus this count as kept."""
 
 _FIRST_STEP = 0.25
 """Share of the unknowns' bounds within which the first round looks."""
@@ -40,7 +40,7 @@ _GAIN = 1e-5
 _HALVINGS = 12
 
 _CUTS = 8
-"""How often a step that leads over what fails between the points is made shorter."""
+"""Most times that a step over failing points between the samples is made shorter."""
 
 POINTS = 13
 """Points along each edge of a shape's box at which it is looked at."""
@@ -62,15 +62,15 @@ class Program:
     start : array, shape (V + k + 1,)
         The unknowns to begin with.
     geometry, slopes : array, shape (G,) and (G, V)
-        Of the machine, at the start.
+        The geometry at the start, and its slopes by the variables.
     objective : array, shape (V + k + 1,)
-        What is minimised is its product with the unknowns.
+        Its product with the unknowns is minimised.
     bounds : array, shape (V + k + 1, 2)
-        Of each unknown.
+        Bounds of each unknown.
     shape : Shape
-        Which shape.
+        The shape.
     orientations : array, shape (A, m)
-        Of the shape; none where none is sought.
+        Poses with the shape's orientations; none where none is sought.
     above : tuple of (array, float)
         Each: a row (V + k + 1,) whose product with the unknowns is at least a number.
     failing : array, shape (F, m), optional
@@ -111,7 +111,7 @@ class Program:
         geometry, center, edge = self.parts(z)
         units, poses = [np.empty((0, len(center)))], [self.orientations[:0]]
         for fixed in self.orientations if edge > 0.0 else ():
-            axes = center[:, None] + 0.5 * edge * lattice(self.shape, POINTS)
+            axes = list(center[:, None] + 0.5 * edge * lattice(self.shape, POINTS))
             _, places = self.on_lattice(geometry, axes, fixed)
             at = (places - center) / (0.5 * edge)
             units.append(at[self.shape.gauge(at) <= 1.0])
@@ -120,7 +120,7 @@ class Program:
         return Samples(np.concatenate(poses), every, np.ones(len(every)))
 
     def on_lattice(
-        self, geometry: Array, axes: Sequence[Array] | Array, fixed: Array
+        self, geometry: Array, axes: Sequence[Array], fixed: Array
     ) -> tuple[Array, Array]:
         """Return the rows (n1, ..., nk, R) on a lattice, and positions (F, k) that fail.
 
@@ -151,9 +151,9 @@ def improved(program: Program, samples: Samples, dense: Samples) -> Array:
     Parameters
     ----------
     program : Program
-        What is minimised, and its conditions.
+        The program.
     samples, dense : Samples
-        Where conditions are asked at first, and where the solution is looked at.
+        Points at which conditions are asked at first, and at which the solution is tested.
 
     Returns
     -------

@@ -23,7 +23,7 @@ _FIRST = 5
 _SHRINKINGS = 30
 
 UNKNOWN = -1e-6
-"""What stands for a row that is NaN, or of which no proof says whether it is kept."""
+"""Stand-in for a row that is NaN, or that no proof decides: just below 0."""
 
 _RIM = 0.98
 """A counterexample further out, over half the edge, is avoided by a smaller share."""
@@ -34,7 +34,7 @@ _EXCHANGES = 20
 
 @dataclass(frozen=True)
 class Fit:
-    """Where a shape is, and how large.
+    """The place and size of a shape.
 
     Attributes
     ----------
@@ -72,9 +72,9 @@ def largest_fit(
     Parameters
     ----------
     conditions : SmoothConditions
-        What must hold.
+        The conditions.
     geometry : array, shape (G,)
-        Of the machine.
+        The machine's geometry.
     orientations : array, shape (A, m)
         Poses whose orientations count.
     ball : (array, float)
@@ -82,7 +82,7 @@ def largest_fit(
     failing : array, shape (F, m)
         Poses that are known to fail, which it must not hold: counterexamples of its proof.
     shape : Shape
-        Which shape.
+        The shape.
     starts : int
         Places of the grid from which the program is solved.
     """
@@ -138,9 +138,9 @@ def proved_fit(
     prove : callable
         Takes a fit, returns its proofs: the last one does not hold, or all do.
     shape : Shape
-        Which shape.
+        The shape.
     shares : iterable of float
-        Of the edge that was found, the largest first: at the whole of it a condition is zero
+        Shares of the edge that was found, the largest first: at all of it a condition is zero
         somewhere, and undecided.
     freedom : int
         Size m of a pose.
@@ -197,7 +197,7 @@ def _on_grid(
             least[at] = np.minimum(least[at], UNKNOWN)
         inside = least >= 0.0
         if not inside.any():
-            # What is thin may lie between the points: look closer where they fail by least.
+            # A thin region may lie between the points: look closer where they fail by least.
             at = np.unravel_index(int(least.argmax()), least.shape)
             found = [Fit(grid[at], 0.0, side, float(least[at]))]
             low, high = grid[at] - 2.0 * step, grid[at] + 2.0 * step

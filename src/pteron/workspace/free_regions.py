@@ -49,10 +49,10 @@ class FreeRegion:
     pose : array, shape (m,), or None
         A singular pose in the region.
     measure : float
-        What the type-II measure is in size: its proved floor where the region is free, that of
+        Size of the type-II measure: its proved floor where the region is free, that of
         `pose` where it is not; 0 where it is undecided.
     boxes : int
-        How many boxes were looked at.
+        Number of boxes that were examined.
     undecided : array, shape (K, 2, m)
         The boxes that are left, least and greatest pose of each; none where it is decided.
     """

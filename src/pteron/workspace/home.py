@@ -23,7 +23,7 @@ from pteron.workspace.margins import pose_margins
 from pteron.workspace.unreachable import beyond_limits, nowhere
 
 _SEARCHES = ((200, 0.3), (200, 0.02), (200, 0.0), (1, 0.0))
-"""How many random poses, and their least measures: less where the legs have little common reach."""
+"""Numbers of random poses and their least measures: less where legs have little common reach."""
 
 _SOURCES = (*EQUATIONS, "kinematics", "workspace")
 """The packages that a home pose depends on."""
@@ -47,14 +47,14 @@ _SAME = 1e-9
 """Differences of margins that are rounding."""
 
 _MIDDLE = 0.9
-"""The share that the middle between equals must have: from there the machine goes every way."""
+"""The share that the middle between equals must have: from there the machine moves every way."""
 
 
 def home_pose(robot: RobotLike) -> Array:
     """Return the pose with the best margin, rounded where that costs next to nothing.
 
-    The margin is the smallest of the type-I and type-II measures and of the joints' clearances
-    (see `Reserve`) and, where the platform turns, of what is left of half a turn from phi = 0: a
+    The margin is the smallest of the type-I and type-II measures and of the joints' margins
+    (see `PoseMargins`) and, where the platform turns, of what is left of half a turn from 0: a
     machine seldom works the wrong way round. A random search with a fixed seed finds it, and Nelder
     and Mead's method refines it. The result is always the same for the same machine.
 
@@ -87,11 +87,11 @@ def home_pose(robot: RobotLike) -> Array:
     """
     robot = as_manipulator(robot)
     # Neither bodies nor drives matter; a refusal tells the name.
-    return np.array(_kept(replace(bare(robot), name=robot.name)))
+    return np.array(_stored(replace(bare(robot), name=robot.name)))
 
 
 @lru_cache(maxsize=256)
-def _kept(robot: Manipulator) -> tuple[float, ...]:
+def _stored(robot: Manipulator) -> tuple[float, ...]:
     """Return the home pose that was worked out before, in another process too, or a new one."""
     name = name_of("home_pose", bare(robot), sources=_SOURCES)
     text = None if name is None else find_text(name)
@@ -175,14 +175,13 @@ def _distinct(poses: Array, apart: Array) -> Array:
 def _worth(robot: Manipulator, poses: Array) -> Numbers:
     """Return the least margin (...), which is 0 at most where the platform is turned back."""
     least = pose_margins(robot, poses).least
-    if not robot.platform.turns:
-        return least
-    return np.minimum(least, 1.0 - np.abs(poses[..., -1]) / np.pi)
+    turned = np.abs(poses[..., robot.platform.angular]) / np.pi
+    return np.asarray(np.minimum(least, 1.0 - turned.max(axis=-1, initial=0.0)))
 
 
 def _steps(robot: Manipulator, metres: float, radians: float) -> Array:
     """Return a step of each of the pose's coordinates."""
-    return np.array([radians if name == "phi" else metres for name in robot.coordinates])
+    return np.where(robot.platform.angular, radians, metres)
 
 
 def _refined(robot: Manipulator, start: Array) -> Array:

@@ -24,7 +24,7 @@ from pteron.workspace.smooth_conditions import smooth_conditions
 _STARTS = 3
 
 _SHARES = 40
-"""How often a shape is made smaller by the tolerance until it is proved."""
+"""Most times that a shape is made smaller by the tolerance until it is proved."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Inscribed:
     region : Box or Cylinder
         The shape.
     proof : Proof or None
-        That all of it lies in the workspace; None where it was not asked for.
+        The proof that all of it lies in the workspace; None where it was not asked for.
     """
 
     center: Array
@@ -79,7 +79,7 @@ def largest_cube(
     proved : bool
         Whether it is proved; else it is what the search found, so much smaller.
     given : tuple of Condition, optional
-        What a pose must keep; by default `conditions(robot)`: reach and limits.
+        The conditions on a pose; by default `conditions(robot)`: reach and limits.
 
     Returns
     -------
@@ -161,9 +161,9 @@ def largest_cylinder(
     def region(center: Array, size: float) -> Region:
         return Cylinder(tuple(center), size, 2.0 * ratio * size, axis)
 
-    def gauge(ways: Array) -> Array:
-        along = ways @ unit
-        away = np.linalg.norm(ways - along[..., None] * unit, axis=-1)
+    def gauge(vectors: Array) -> Array:
+        along = vectors @ unit
+        away = np.linalg.norm(vectors - along[..., None] * unit, axis=-1)
         return np.asarray(np.maximum(away, np.abs(along) / ratio))
 
     half = np.array(region(np.zeros(3), 1.0).box[1])

@@ -1,4 +1,4 @@
-"""What is possible but unlikely in a machine or in values: most often a wrong unit or sign."""
+"""Warnings about a machine: possible but unlikely values, most often a wrong unit or sign."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ _LARGE = 10.0
 """Length, m, beyond which millimetres are likelier."""
 
 _UNLIKE = 20.0
-"""How many times a uniform bar's, about its centre, a link's inertia may be, or the inverse: two
-masses at its ends have 3 times."""
+"""Greatest ratio of a link's central inertia to a uniform bar's, or the inverse: two masses at its
+ends have 3."""
 
 _UPRIGHT = 0.1
 """Share of a leg's length by which a platform is above or below its base, not level with it."""
@@ -38,7 +38,7 @@ _PULL = 30.0
 
 
 def machine_warnings(robot: Manipulator) -> tuple[str, ...]:
-    """Return what a person should look at again, one line each.
+    """Return warnings about a machine's file, one line each.
 
     Parameters
     ----------
@@ -63,25 +63,25 @@ def machine_warnings(robot: Manipulator) -> tuple[str, ...]:
         found.append(f"gravity: {hypot(*robot.gravity):g} m/s^2: is that mm/s^2?")
     if platform.limits and max(map(abs, platform.limits)) > 2.0 * pi:
         found.append(
-            f"platform: limits: {list(platform.limits)} rad, more than a turn from phi = 0: are "
-            "these degrees?"
+            f"platform: limits: {list(platform.limits)} rad, more than a turn from "
+            f"{platform.angles[0]} = 0: are these degrees?"
         )
     radius = max(hypot(*leg.platform_point) for leg in robot.legs)
     points = any("platform_point" in keys for keys in far.values())
-    # What follows from lengths in millimetres is not told beside them.
+    # Consequences of lengths in millimetres are not listed beside them.
     if radius > 0.0 and not points and 0 not in far:
         found += [f"platform: {text}" for text in _spread(platform, radius)]
-    axis = platform.axis if platform.turns and not platform.slides else None
+    axis = platform.rotation_axes[0] if len(platform.rotation_axes) == 1 else None
     for i, leg in enumerate(robot.legs, start=1):
-        own = () if i in far else _leg_doubts(leg)
+        own = () if i in far else _leg_warnings(leg)
         found += [f"leg {i}: {text}" for text in (*own, *leg.doubts(axis), *drive_warnings(leg))]
     if axis is not None:
-        found += _turning_offsets(robot.legs, axis)
+        found += _turning_offsets(robot.legs, axis, platform.angles[0])
     return tuple(found)
 
 
 def elbow_warnings(robot: Manipulator, home: Array) -> tuple[str, ...]:
-    """Return the doubt whether the other working mode is meant, where the platform stands upright.
+    """Return a warning that the other working mode may be meant, where the platform stands upright.
 
     Most machines hang below their base. One that stands above it, and whose other elbows would let
     it hang there with much the same margin, was perhaps given the wrong ones.
@@ -157,8 +157,8 @@ def _in_millimetres(far: Mapping[int, Mapping[str, Sequence[float]]]) -> list[st
     return [f"{where}: {f'beyond {_LARGE:g}' if others else size} m: are these mm?"]
 
 
-def _leg_doubts(leg: LegKind) -> Iterator[str]:
-    """Yield what a person should look at again, one line each."""
+def _leg_warnings(leg: LegKind) -> Iterator[str]:
+    """Yield warnings about a leg, one line each."""
     far = hypot(*leg.platform_point)
     if 0.0 < leg.size < far:
         yield (
@@ -174,7 +174,7 @@ def _leg_doubts(leg: LegKind) -> Iterator[str]:
         yield from (f"{key}: {text}" for text in _unlike_a_bar(body, high - low))
 
 
-def _turning_offsets(legs: Sequence[LegKind], axis: Vector) -> Iterator[str]:
+def _turning_offsets(legs: Sequence[LegKind], axis: Vector, angle: str) -> Iterator[str]:
     """Yield the legs whose fixed offset is kept from turning by no leg at the same hinge."""
     keeps: dict[Vector, bool] = {}
     for leg in legs:
@@ -184,8 +184,8 @@ def _turning_offsets(legs: Sequence[LegKind], axis: Vector) -> Iterator[str]:
     for i, leg in enumerate(legs, start=1):
         if hypot(*cross(leg.fixed_offset, axis)) > 0.0 and not keeps[leg.platform_point]:
             yield (
-                f"leg {i}: fixed_offset: does not turn with phi, but no leg at this platform_point "
-                "keeps it from turning"
+                f"leg {i}: fixed_offset: does not turn with {angle}, but no leg at this "
+                "platform_point keeps it from turning"
             )
 
 

@@ -95,12 +95,12 @@ def distance_to_limits(robot: Manipulator, poses: Array) -> Array:
     """Return how far (..., n) legs may move until an actuated or passive joint meets its limit, m.
 
     Very far without limits, and out of reach, where a joint may have no coordinate; so is a joint
-    that follows the platform's angle within its limits, since no translation leads out of them.
+    within its limits that turns with the platform alone, since no translation leads out of them.
     """
     distances = joint_distances(robot, numeric(robot, "joint_coordinates")(poses)[0])
     levers = np.array([leg.lever for leg in robot.legs])
-    follows = np.array([leg.follows_angle for leg in robot.legs])
-    free = np.isnan(distances) | (follows & (distances >= 0.0))
+    turned = np.array([leg.reach_bound is None for leg in robot.legs])
+    free = np.isnan(distances) | (turned & (distances >= 0.0))
     passive: Array = numeric(robot, "passive_room")(poses)[1]
     return np.asarray(np.fmin(np.where(free, np.inf, distances * levers), passive))
 
@@ -112,9 +112,9 @@ class JointRanges:
     Attributes
     ----------
     least, greatest : array, shape (n,)
-        Of the joint coordinate, m or rad.
+        Ends of the joint coordinate's range, m or rad.
     limits : tuple of ((float, float) or None)
-        What the machine allows; None where it does not say.
+        The machine's limits; None where it has none.
     within : array of bool, shape (n,)
         Whether the range lies within the limits; True where there are none.
     """
@@ -155,7 +155,7 @@ def joint_ranges(robot: RobotLike, poses: PoseLike) -> JointRanges:
     (array([0.1, 0.1, 0. ]), True)
     """
     robot = as_manipulator(robot)
-    joints = inverse_kinematics(robot, poses).reshape(-1, robot.freedom)
+    joints = inverse_kinematics(robot, poses).reshape(-1, robot.joint_count)
     if not len(joints):
         raise DataError("poses: none given, at least one expected")
     return JointRanges(

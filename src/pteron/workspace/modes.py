@@ -1,4 +1,4 @@
-"""Which working modes' workspaces meet: where a leg can change the side of its elbow."""
+"""Contacts of working modes: poses at which a leg can change the side of its elbow."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pteron.kinematics.evaluate import checked_one
 from pteron.manipulator import RobotLike, as_manipulator, working_modes
 from pteron.shapes import PoseLike
 from pteron.workspace.boxes import halved
-from pteron.workspace.conditions import EDGES, Judge, condition_margins, judge
+from pteron.workspace.conditions import EDGES, IntervalTest, condition_margins, interval_test
 from pteron.workspace.paving import Paving, paving
 
 _HALVINGS = 50
@@ -30,9 +30,9 @@ class Contact:
     elbows : pair of tuple of int
         The two modes, which differ in one leg.
     leg : int
-        That leg, from 1: it is stretched or folded where they meet.
+        The leg, from 1: it is stretched or folded where they meet.
     cause : str
-        How it stands there; empty where they do not meet.
+        The edge of reach there; empty where they do not meet.
     pose : array, shape (m,), or None
         A pose at which they meet, but for rounding.
     proved : bool
@@ -82,7 +82,7 @@ def mode_contacts(pavings: dict[tuple[int, ...], Paving]) -> tuple[Contact, ...]
     Parameters
     ----------
     pavings : dict
-        Of `mode_pavings`.
+        The result of `mode_pavings`.
 
     Returns
     -------
@@ -99,7 +99,7 @@ def mode_contacts(pavings: dict[tuple[int, ...], Paving]) -> tuple[Contact, ...]
 def _contact(
     one: Paving, other: Paving, elbows: tuple[tuple[int, ...], tuple[int, ...]], leg: int
 ) -> Contact:
-    own, theirs = (judge(side.robot, side.conditions) for side in (one, other))
+    own, theirs = (interval_test(side.robot, side.conditions) for side in (one, other))
     edges = [k for k, c in enumerate(one.conditions) if c.leg == leg and c.cause in EDGES]
     boxes = np.concatenate([one.inner, one.boundary])
     for _ in range(_ROUNDS):
@@ -107,8 +107,8 @@ def _contact(
         # Where an edge may be met; not only on the boundary, since links of one length fold inside.
         least = np.array([own.bounds(k, low, high)[0] for k in edges])
         near = np.flatnonzero((least <= 0.0).any(axis=0))
-        for judging in (own, theirs):
-            outside, _ = judging(low[near], high[near], np.full(len(near), judging.all))
+        for test in (own, theirs):
+            outside, _ = test(low[near], high[near], np.full(len(near), test.all))
             near = near[~outside]
         boxes, low, high = boxes[near], low[near], high[near]
         if not len(boxes):
@@ -125,7 +125,7 @@ def _contact(
     return Contact(elbows, leg, "", None, False)
 
 
-def _crossing(one: Paving, own: Judge, k: int, low: Array, high: Array) -> Array | None:
+def _crossing(one: Paving, own: IntervalTest, k: int, low: Array, high: Array) -> Array | None:
     """Return a pose on an edge, of boxes of which a corner is proved inside it, and one beyond."""
     corners = np.array(list(np.ndindex(*(2,) * low.shape[1])))
     for a, b in zip(low, high, strict=True):

@@ -1,4 +1,4 @@
-"""How far a pose is from the nearest singular poses, moved or turned alone, in metres or radians.
+"""The nearest singular poses, by translation or by rotation alone, with proved lower bounds.
 
 A singular pose is where a function that is smooth in the pose and in its roots vanishes: the square
 of a leg's type-I measure, the type-II measure, or the constraint measure. Under translation it is
@@ -48,14 +48,15 @@ class NearestSingularity:
     leg : int
         The leg, from 1, of type I; else 0.
     by : {"translation", "rotation"}
-        What leads there: the position alone, or the angle alone.
+        The motion that leads there: the position alone, or the angle alone.
     distance : float
         m or rad; rad too where the platform slides. Infinite where none was found.
     pose : array, shape (m,)
         The singular pose, to rounding: at the edge of a leg's reach the measure feels its root.
         NaN where none was found.
     measure : float
-        What vanishes there: the type-I measure's square, the type-II or the constraint measure.
+        The value that vanishes there: the type-I measure's square, the type-II or the constraint
+        measure.
     lower_bound : float
         No singular pose of this kind is nearer: proved by intervals, in the unit of `distance`.
     """
@@ -97,7 +98,7 @@ def nearest_singularities(
     tuple of NearestSingularity
         Those by translation first, the nearest first. A kind of which there is none, which is
         proved, is left out, and constraint singularities where every pose is one, or bars are not
-        told.
+        given.
 
     Raises
     ------
@@ -127,10 +128,10 @@ def nearest_singularities(
         raise singular_everywhere(robot)
     inverse_kinematics(robot, at)
     found: list[NearestSingularity] = []
-    ways: tuple[By, ...] = ("translation", "rotation")
-    for by in ways[: 1 + ("phi" in robot.coordinates)]:
+    kinds: tuple[By, ...] = ("translation", "rotation")
+    for by in kinds[: 1 + bool(robot.platform.angles)]:
         several = [
-            _told(robot, at, by, vanishing, _search(vanishing, at, by, most))
+            _result(robot, at, by, vanishing, _search(vanishing, at, by, most))
             for vanishing in _kinds(robot)
         ]
         some = [one for one in several if np.isfinite(one.lower_bound)]
@@ -139,14 +140,14 @@ def nearest_singularities(
 
 
 def _kinds(robot: Manipulator) -> Iterator[Vanishing]:
-    for i in range(1, robot.freedom + 1):
+    for i in range(1, robot.joint_count + 1):
         yield Vanishing(robot, "I", i)
     yield Vanishing(robot, "II")
     if architecture(robot).holds:
         yield Vanishing(robot, "constraint")
 
 
-def _told(
+def _result(
     robot: Manipulator, at: Array, by: By, vanishing: Vanishing, found: Nearest
 ) -> NearestSingularity:
     pose = np.full_like(at, np.nan) if found.pose is None else found.pose
@@ -161,8 +162,7 @@ def _told(
 
 def _moving(robot: Manipulator, by: By) -> NDArray[np.intp]:
     """Return the coordinates that vary."""
-    lengths = len(robot.platform.lengths)
-    return np.arange(lengths) if by == "translation" else np.arange(lengths, robot.freedom)
+    return np.flatnonzero(robot.platform.angular == (by == "rotation"))
 
 
 def _search(vanishing: Vanishing, at: Array, by: By, most: int) -> Nearest:
@@ -177,10 +177,12 @@ def _search(vanishing: Vanishing, at: Array, by: By, most: int) -> Nearest:
             box = at[moving] + beyond * np.array([[-1.0], [1.0]])
         return Search(vanishing, at, moving, box).run(beyond, most)
     if vanishing.kind == "II" and closure_of(robot).orientation is not None:
-        ways = singular_orientations(robot) - at[-1]
-        ways -= 2.0 * np.pi * np.round(ways / (2.0 * np.pi))
-        way = float(ways[np.abs(ways).argmin()])
-        return Nearest(np.append(at[:-1], at[-1] + way), 0.0, abs(way) * (1.0 - SINGULAR))
+        turns = singular_orientations(robot) - at[moving]
+        turns -= 2.0 * np.pi * np.round(turns / (2.0 * np.pi))
+        turn = float(turns[np.abs(turns).argmin()])
+        pose = at.copy()
+        pose[moving] += turn
+        return Nearest(pose, 0.0, abs(turn) * (1.0 - SINGULAR))
     beyond = np.pi if robot.platform.slides else np.inf
     box = at[moving] + np.pi * np.array([[-1.0], [1.0]])
     return Search(vanishing, at, moving, box).run(beyond, most)

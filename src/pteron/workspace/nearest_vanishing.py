@@ -39,19 +39,19 @@ _BESIDE = 0.1
 """Share of its distance within which other poses are next to one."""
 
 _LAST, _HITS = 128, 12
-"""Where boxes are left in the end: so many of the nearest, and of all, are looked into, and so many
-poses found in them lead to quadratic programs."""
+"""Boxes, of those left in the end, that are searched, of the nearest and of all; and poses found in
+them that lead to quadratic programs."""
 
 _STEPS = 30
-"""Of Newton: where a function does not change its sign they halve the distance only."""
+"""Newton's steps: where a function does not change its sign they halve the distance only."""
 
 _CONVERGED = 1e-14
 
-_DRAWN, _DRAWN_LESS = 16, 1e-6
-"""Rounds in which a state is drawn nearer, and by what share of the distance it must be."""
+_RETRACTIONS, _GAIN = 16, 1e-6
+"""Most rounds in which a state is brought nearer, and the least gain, over the distance."""
 
 _RESTARTS = 4
-"""Of quadratic programs, each from where the last one led to."""
+"""Quadratic programs, each from the result of the last one."""
 
 _CLOSE = 5e-3
 """Share of the distance to which it is searched."""
@@ -85,7 +85,7 @@ class Search:
     moving : array of int, shape (k,)
         The coordinates that vary: metres, or one angle.
     box : array, shape (2, k)
-        Where they are sought.
+        The region of the search.
     """
 
     def __init__(
@@ -118,8 +118,8 @@ class Search:
             last = np.concatenate([order[:_LAST], order[:: max(1, len(order) // _LAST)]])
             best, nearest = self._better(boxes[last], best, nearest, _HITS)
             if best is not None and len(self.moving) > 1:
-                best = self._drawn(best)
-                nearest = self._way(best)
+                best = self._retracted(best)
+                nearest = self._length(best)
         bound = float(away.min(initial=nearest)) * (1.0 - _ROUNDING)
         if best is None:
             return Nearest(None, np.nan, bound)
@@ -140,8 +140,8 @@ class Search:
                 break
             k = int(ways.argmin())
             found = self._nearer(hits[k])
-            if self._way(found) < nearest:
-                best, nearest = found, self._way(found)
+            if self._length(found) < nearest:
+                best, nearest = found, self._length(found)
             hits = hits[np.linalg.norm(places - places[k], axis=-1) > _BESIDE * ways[k]]
         return best, nearest
 
@@ -149,7 +149,7 @@ class Search:
 
     @cached_property
     def _sizes(self) -> tuple[float, Array]:
-        """What lengths and roots are counted in: their sizes in the box."""
+        """The units of lengths and roots: their sizes in the box."""
         length = float(np.linalg.norm(self.box[1] - self.box[0]))
         if not self.smooth.roots:
             return length, np.empty(0)
@@ -163,7 +163,7 @@ class Search:
         found[..., self.moving] += self._sizes[0] * state[..., : len(self.moving)]
         return found
 
-    def _way(self, state: Array) -> float:
+    def _length(self, state: Array) -> float:
         return self._sizes[0] * float(np.linalg.norm(state[: len(self.moving)]))
 
     def _values(self, states: Array) -> tuple[Array, Array, Array]:
@@ -223,15 +223,15 @@ class Search:
 
     def _nearer(self, state: Array) -> Array:
         """Return the nearest singular state, sought from one on."""
-        if len(self.moving) == 1 or self._way(state) == 0.0:
+        if len(self.moving) == 1 or self._length(state) == 0.0:
             return state
         with np.errstate(all="ignore"):
             for _ in range(_RESTARTS):
                 found = self._programmed(state)
                 if not (np.isfinite(found).all() and self._singular(found[None])[0]):
-                    return self._drawn(state)
-                before, state = state, min(state, found, key=self._way)
-                if self._way(state) > (1.0 - _EDGE) * self._way(before):
+                    return self._retracted(state)
+                before, state = state, min(state, found, key=self._length)
+                if self._length(state) > (1.0 - _EDGE) * self._length(before):
                     break
         return state
 
@@ -268,21 +268,21 @@ class Search:
         )
         return np.asarray(run.x)
 
-    def _drawn(self, state: Array) -> Array:
+    def _retracted(self, state: Array) -> Array:
         """Return a nearer singular state: by Newton's steps from places that are nearer by less.
 
         Where the function touches zero it has no slope that quadratic programs could use.
         """
         k = len(self.moving)
-        rng, shares = np.random.default_rng(0), 0.5 ** np.arange(1, _DRAWN + 1)
-        for _ in range(_DRAWN):
-            aside = rng.normal(size=(3, _DRAWN, k)) * np.array([0.0, 0.5, 1.0])[:, None, None]
+        rng, shares = np.random.default_rng(0), 0.5 ** np.arange(1, _RETRACTIONS + 1)
+        for _ in range(_RETRACTIONS):
+            aside = rng.normal(size=(3, _RETRACTIONS, k)) * np.array([0.0, 0.5, 1.0])[:, None, None]
             size = float(np.linalg.norm(state[:k]))
             places = state[:k] * (1.0 - shares[:, None]) + aside * (size * shares[:, None])
             places = self.at[self.moving] + self._sizes[0] * places.reshape(-1, k)
             found = self._stepped(places)
-            nearest = min(found, key=self._way, default=state)
-            if self._way(nearest) > (1.0 - _DRAWN_LESS) * self._way(state):
+            nearest = min(found, key=self._length, default=state)
+            if self._length(nearest) > (1.0 - _GAIN) * self._length(state):
                 break
             state = nearest
         return state

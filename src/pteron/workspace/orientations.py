@@ -1,4 +1,4 @@
-"""How the workspace depends on the platform's angle, and on the working mode."""
+"""The volume of the workspace over the platform's angle, in each working mode."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ class VolumesOverAngles:
     Attributes
     ----------
     angles : array, shape (A,)
-        phi, rad.
+        The platform's angle, rad.
     elbows : tuple of tuple of int
         The modes, S of them: each leg's elbow.
     inner, outer : array, shape (S, A)
         The volume is proved to be between them; 0 where nothing is in reach.
     unit : {"m^3", "m^2"}
-        Of both.
+        Unit of both.
     """
 
     angles: Array
@@ -55,7 +55,7 @@ def over_angles(
     pose : array, shape (m,)
         Any pose; its angle does not matter.
     angles : array, shape (A,)
-        phi, rad.
+        The platform's angle, rad.
     tolerance : float
         Greatest gap between the bounds, as a share of the inner one.
     modes : bool
@@ -81,14 +81,17 @@ def over_angles(
     """
     robot = as_manipulator(robot)
     at = checked_one(robot, pose, "pose")
-    if not robot.platform.turns:
+    if len(robot.platform.angles) != 1:
         raise ModelError("the platform does not turn: it has one orientation", subject=robot.name)
     given = np.asarray(angles, dtype=float)
     if given.ndim != 1 or not len(given) or not np.isfinite(given).all():
         raise DataError("angles: a row of finite numbers expected, rad")
     machines = working_modes(robot) if modes else (robot,)
     pavings = [
-        [paving(machine, [*at[:-1], phi], tolerance=tolerance) for phi in given.tolist()]
+        [
+            paving(machine, np.where(robot.platform.angular, angle, at), tolerance=tolerance)
+            for angle in given
+        ]
         for machine in machines
     ]
     inner, outer = (

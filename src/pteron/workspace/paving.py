@@ -16,7 +16,7 @@ from pteron.kinematics.evaluate import checked_one
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike
 from pteron.workspace.boxes import halved
-from pteron.workspace.conditions import Condition, Judge, conditions, judge
+from pteron.workspace.conditions import Condition, IntervalTest, conditions, interval_test
 from pteron.workspace.enclosing import enclosing_box
 
 _SLICE = 1 << 16
@@ -38,9 +38,9 @@ class Paving:
     robot : Manipulator
         The machine, in its working mode.
     conditions : tuple of Condition
-        What a pose must keep.
+        The conditions on a pose.
     box : array, shape (2, m)
-        What is paved: least and greatest pose. Nothing is said of poses outside of it.
+        The region: least and greatest pose. Nothing is said of poses outside of it.
     inner : array, shape (N, 2, k)
         Boxes that are proved to lie inside: their corners, of the k coordinates that vary.
     boundary : array, shape (M, 2, k)
@@ -50,7 +50,7 @@ class Paving:
     inner_volume, outer_volume : float
         The volume is proved to be between them.
     unit : str
-        Of both: "m^3", "m^2", or with "rad" where phi varies.
+        Unit of both: "m^3", "m^2", or with "rad" where an angle varies.
     complete : bool
         Whether the tolerance was met before there were too many boxes.
     """
@@ -68,7 +68,7 @@ class Paving:
 
     @property
     def gap(self) -> float:
-        """What is undecided, as a share of what is proved inside."""
+        """The undecided volume, as a share of that proved inside."""
         undecided = self.outer_volume - self.inner_volume
         if not undecided:
             return 0.0
@@ -76,11 +76,11 @@ class Paving:
 
     @cached_property
     def causes(self) -> NDArray[np.bool_]:
-        """Which conditions (M, C) are undecided in each box of the boundary: they name it."""
-        judging, parts = judge(self.robot, self.conditions), []
+        """Whether a condition (M, C) is undecided in each box of the boundary: they name it."""
+        test, parts = interval_test(self.robot, self.conditions), []
         for start in range(0, len(self.boundary), _SLICE):
             low, high = self.corners(self.boundary[start : start + _SLICE])
-            parts.append(judging.undecided(low, high))
+            parts.append(test.undecided(low, high))
         return np.concatenate([np.empty((0, len(self.conditions)), bool), *parts])
 
     def corners(self, boxes: Array) -> tuple[Array, Array]:
@@ -98,7 +98,7 @@ class Paving:
 
     @cached_property
     def boundary_shares(self) -> dict[str, float]:
-        """What ends the workspace: shares of the boundary's boxes where one condition alone does.
+        """Causes of the boundary: shares of its boxes in which one condition alone is undecided.
 
         Conditions that end it nowhere are left out, the greatest share comes first. What is left of
         1 are boxes in which several are undecided: edges meet there, or boxes are large.
@@ -109,7 +109,7 @@ class Paving:
 
     @cached_property
     def _cells(self) -> list[tuple[int, Array, Array]]:
-        """What boxes of one size say, how often each of their sides was halved, and their keys."""
+        """Boxes of one size: the verdict, how often each side was halved, and their keys."""
         moving = np.flatnonzero(self.box[0] < self.box[1])
         start, size = self.box[0, moving], (self.box[1] - self.box[0])[moving]
         found = []
@@ -177,9 +177,9 @@ def paving(
         Greatest undecided volume, as a share of the inner one.
     within : array, shape (2, k) or (2, m), optional
         Least and greatest position that are looked at; by default a box that is proved to hold the
-        whole workspace. With phi too, the workspace over an interval of orientations.
+        whole workspace. With angles too, the workspace over an interval of orientations.
     given : tuple of Condition, optional
-        What a pose must keep; by default `conditions(robot)`: reach and limits.
+        The conditions on a pose; by default `conditions(robot)`: reach and limits.
     most : int
         Undecided boxes at which it ends, whatever the tolerance.
 
@@ -211,11 +211,11 @@ def paving(
     expect_regular(robot)
     box = region_box(robot, at, within)
     asked = conditions(robot) if given is None else given
-    inner, boundary, complete = _refined(judge(robot, asked), box, tolerance, most)
+    inner, boundary, complete = _refined(interval_test(robot, asked), box, tolerance, most)
     axes = tuple(robot.coordinates[i] for i in np.flatnonzero(box[0] < box[1]))
     volumes = [math.fsum(np.prod(b[:, 1] - b[:, 0], axis=1)) for b in (inner, boundary)]
-    lengths = sum(axis != "phi" for axis in axes)
-    unit = f"m^{lengths}" + (" rad" if "phi" in axes else "")
+    turning = sum(axis in robot.platform.angles for axis in axes)
+    unit = f"m^{len(axes) - turning}" + " rad" * turning
     return Paving(
         robot, asked, box, inner, boundary, axes, volumes[0], sum(volumes), unit, complete
     )
@@ -233,17 +233,19 @@ def region_box(robot: Manipulator, at: Array, within: ArrayLike | None) -> Array
     if given.shape not in shapes or not (np.isfinite(given) & (given[0] <= given[1])).all():
         raise DataError(
             f"within: least and greatest position expected, finite, shape (2, {count}) or, with "
-            f"phi, (2, {len(at)})"
+            f"{' and '.join(robot.platform.angles) or 'all coordinates'}, (2, {len(at)})"
         )
     box[:, : given.shape[1]] = given
     return box
 
 
-def _refined(judging: Judge, box: Array, tolerance: float, most: int) -> tuple[Array, Array, bool]:
+def _refined(
+    test: IntervalTest, box: Array, tolerance: float, most: int
+) -> tuple[Array, Array, bool]:
     """Return inner and undecided boxes, and whether the tolerance is met."""
     moving = np.flatnonzero(box[0] < box[1])
     found: list[Array] = []
-    left, open_ = box[None][:, :, moving], np.array([judging.all])
+    left, open_ = box[None][:, :, moving], np.array([test.all])
     inside, undecided = 0.0, math.inf
     first = True
     while len(left):
@@ -256,7 +258,7 @@ def _refined(judging: Judge, box: Array, tolerance: float, most: int) -> tuple[A
             part, still = left[start : start + _SLICE], open_[start : start + _SLICE]
             if not first:
                 part, still = halved(part), np.repeat(still, 2)
-            outside, still = judging(*_whole(box, moving, part), still)
+            outside, still = test(*_whole(box, moving, part), still)
             sure = (still == 0) & ~outside
             found.append(part[sure])
             kept.append(part[~sure & ~outside])

@@ -13,7 +13,13 @@ from pteron.kinematics.architecture import expect_regular
 from pteron.kinematics.limits import limited_joints
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.workspace.boxes import halved
-from pteron.workspace.conditions import Condition, Judge, condition_margins, conditions, judge
+from pteron.workspace.conditions import (
+    Condition,
+    IntervalTest,
+    condition_margins,
+    conditions,
+    interval_test,
+)
 from pteron.workspace.regions import Cylinder, Region
 
 _TRIED = 4096
@@ -27,7 +33,7 @@ _THINNEST = 1e-9
 
 @dataclass(frozen=True)
 class Proof:
-    """What is proved of a region.
+    """The proof that a region lies in the workspace, or a pose of it that does not.
 
     Attributes
     ----------
@@ -37,17 +43,17 @@ class Proof:
     robot : Manipulator
         The machine.
     region : Box or Cylinder
-        What was asked.
+        The region.
     conditions : tuple of Condition
-        What its poses must keep.
+        The conditions on its poses.
     counterexample : array, shape (m,), or None
         A pose of the region that is proved not to keep all of them.
     undecided : array, shape (2, m), or None
         The smallest box that is not decided.
     causes : tuple of Condition
-        What the counterexample fails, or what is not decided of that box.
+        The conditions that the counterexample fails, or that are undecided in that box.
     boxes : int
-        How many boxes were looked at.
+        Number of boxes that were examined.
     """
 
     holds: bool | None
@@ -74,7 +80,7 @@ class Proof:
 
     @property
     def why(self) -> str:
-        """What the counterexample fails, by ordinary evaluation: which leg, and by how much."""
+        """The conditions that the counterexample fails: the leg, and by how much."""
         if self.counterexample is None:
             return ""
         margins = numeric(self.robot, "reach")(self.counterexample)[0]
@@ -85,7 +91,7 @@ class Proof:
             joint = joints.get((condition.leg, condition.cause.split(" at ")[0]))
             text = str(condition)
             if joint is not None:
-                text += f" ({joint.value:.4g} {joint.unit} of {joint.told_limits('{:g}'.format)})"
+                text += f" ({joint.value:.4g} {joint.unit} of {joint.limits_text('{:g}'.format)})"
             elif condition.floor:
                 text += f" ({room + condition.floor:.4g}, at least {condition.floor:.4g} asked)"
             elif condition.leg and margins[condition.leg - 1] < 0.0:
@@ -113,13 +119,13 @@ def prove(
     robot : Manipulator, name or path
         The machine, in its working mode.
     region : Box or Cylinder
-        Of poses.
+        The region of poses.
     type_i : float
         Least type-I measure of every leg; 0: it need only reach.
     type_ii : float
         Least size of the type-II measure; 0: it does not matter.
     given : tuple of Condition, optional
-        What a pose must keep in place of reach and limits; the floors come on top.
+        Conditions in place of reach and limits; the floors come on top.
     most : int
         Undecided boxes at which it gives up.
 
@@ -155,8 +161,8 @@ def prove(
     asked = conditions(robot, type_i=type_i, type_ii=type_ii)
     if given is not None:
         asked = (*given, *(c for c in asked if c.what != "room"))
-    judging = judge(robot, asked)
-    left, open_, seen = box[None], np.array([judging.all]), 0
+    test = interval_test(robot, asked)
+    left, open_, seen = box[None], np.array([test.all]), 0
     least = _THINNEST * (box[1] - box[0])
     sizes = np.where(box[0] < box[1], box[1] - box[0], 1.0)
     while True:
@@ -166,16 +172,16 @@ def prove(
             meets = ~region.misses(part[:, 0], part[:, 1])
             part, bits = part[meets], bits[meets]
             seen += len(part)
-            outside, bits = judging(part[:, 0], part[:, 1], bits)
+            outside, bits = test(part[:, 0], part[:, 1], bits)
             parts.append(part[outside | (bits != 0)])
             still.append(bits[outside | (bits != 0)])
         left, open_ = np.concatenate(parts), np.concatenate(still)
         if not len(left):
             return Proof(True, robot, region, asked, boxes=seen)
-        found = _counterexample(robot, judging, region, left)
+        found = _counterexample(robot, test, region, left)
         if found is not None:
             left_there = condition_margins(robot, asked, found)
-            # Out of reach limits are undefined: it is the reach that is told.
+            # Out of reach limits are undefined: the cause is the reach.
             fails = left_there < 0.0
             fails = fails if fails.any() else np.isnan(left_there)
             failed = tuple(asked[c] for c in np.flatnonzero(fails))
@@ -191,7 +197,7 @@ def prove(
 
 
 def _counterexample(
-    robot: Manipulator, judging: Judge, region: Region, boxes: Array
+    robot: Manipulator, test: IntervalTest, region: Region, boxes: Array
 ) -> Array | None:
     """Return a pose of the region that is proved to fail: a middle or a corner of boxes."""
     tried = boxes[:: max(len(boxes) // _TRIED, 1)]
@@ -203,6 +209,6 @@ def _counterexample(
         poses.append(pose)
     every = np.concatenate(poses)
     every = every[region.holds(every)]
-    failing = every[~(condition_margins(robot, judging.given, every) >= 0.0).all(axis=-1)]
-    proved: NDArray[np.bool_] = judging(failing, failing, np.full(len(failing), judging.all))[0]
+    failing = every[~(condition_margins(robot, test.given, every) >= 0.0).all(axis=-1)]
+    proved: NDArray[np.bool_] = test(failing, failing, np.full(len(failing), test.all))[0]
     return failing[proved.argmax()] if proved.any() else None

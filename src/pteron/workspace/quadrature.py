@@ -13,7 +13,7 @@ from pteron.kernels import Array
 from pteron.kinematics.evaluate import checked_one
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike
-from pteron.workspace.conditions import Condition, conditions, kept
+from pteron.workspace.conditions import Condition, conditions, keeps
 from pteron.workspace.volume import bounding_box
 
 _SAMPLES = 129
@@ -30,7 +30,7 @@ class Quadrature(NamedTuple):
     volume: float
     """m^3; of a planar machine an area, m^2."""
     error: float
-    """How much it differs from that of half as many lines each way: an estimate, no bound."""
+    """Its difference from that of half as many lines each way: an estimate, no bound."""
 
 
 def quadrature_volume(
@@ -53,9 +53,9 @@ def quadrature_volume(
     pose : array, shape (m,)
         Gives the orientation, m and rad.
     lines : int
-        How many each way, an even number.
+        Number of each way, an even number.
     given : tuple of Condition, optional
-        What a pose must keep; by default `conditions(robot)`: reach and limits.
+        The conditions on a pose; by default `conditions(robot)`: reach and limits.
 
     Returns
     -------
@@ -113,7 +113,7 @@ def _lengths(
     def inside(x: Array, row: NDArray[np.intp]) -> NDArray[np.bool_]:
         poses = np.broadcast_to(at, (*x.shape, len(at))).copy()
         poses[..., 0], poses[..., 1 : 1 + places.shape[1]] = x, places[row]
-        return kept(robot, asked, poses)
+        return keeps(robot, asked, poses)
 
     rows = np.arange(len(places))
     # Beyond the ends all is taken to lie outside, so that lines enter and leave in pairs.

@@ -43,7 +43,8 @@ class ReachSlice:
     status : array of int, shape (B, A)
         `REACHABLE`; `BEYOND_LIMITS`; or the leg, from 1, that misses the pose by most.
     margin : array, shape (B, A)
-        Metres to the nearest end of a leg's reach or of an actuated body's way; negative outside.
+        Metres to the nearest end of a leg's reach or of an actuated body's travel; negative
+        outside.
     leg_margins : array, shape (B, A, n)
         Metres within what each leg reaches: zero on the leg's type-I singularity.
     """
@@ -120,7 +121,7 @@ def reach_slice(
         raise DataError(f"plane: {plane!r} is not one of {valid}")
     if points < 2:
         raise DataError(f"points: {points} given, at least 2 expected")
-    expect_to_fit("points", points, 2.0 * points**2 * (robot.freedom + len(robot.legs)))
+    expect_to_fit("points", points, 2.0 * points**2 * (robot.freedom + robot.joint_count))
     pose = checked_one(robot, center, "center")
     i, j = (robot.coordinates.index(letter) for letter in plane)
     if extent is None:

@@ -131,7 +131,7 @@ class Cylinder:
         return box
 
     def _places(self, poses: Array) -> tuple[Array, Array]:
-        """Return the way of positions (..., 3) from the middle, along the axis and across it."""
+        """Return positions (..., 3) from the middle: their parts along the axis and across it."""
         away, axis = poses[..., :3] - self.center[:3], np.array(self.axis)
         along = away @ axis
         return along, away - along[..., None] * axis
@@ -148,7 +148,7 @@ class Cylinder:
         half, axis = 0.5 * (high - low)[:, :3], np.array(self.axis)
         slack = _WIDER * (1.0 + self.radius + self.height)
         far = np.abs(along) - half @ np.abs(axis) > 0.5 * self.height + slack
-        # What of a box lies across the axis is so near to that of its middle, by components.
+        # Half the extent of a box across the axis, by components.
         shadow = half @ np.abs(np.eye(3) - np.outer(axis, axis))
         nearest = np.maximum(np.abs(across) - shadow, 0.0)
         return np.asarray(far | (np.linalg.norm(nearest, axis=-1) > self.radius + slack))

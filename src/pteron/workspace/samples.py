@@ -20,13 +20,13 @@ class Shape(NamedTuple):
     half: Array
     """Half the sides (k,) of the box that holds it where its edge is 2."""
     gauge: Callable[[Array], Array]
-    """Of vectors from its centre (..., k): half the edge of the shape that they end at, (...)."""
+    """Function of vectors (..., k) from its centre: half the edge (...) of the shape there."""
     rim: Array
     """Points (N, k) of its surface where its edge is 2, beside those of a lattice."""
 
 
 def cube(count: int) -> Shape:
-    """Return a cube in so many coordinates, its edges along them."""
+    """Return a cube in `count` coordinates, its edges along them."""
     return Shape(np.ones(count), lambda way: np.abs(way).max(axis=-1), np.empty((0, count)))
 
 
@@ -39,7 +39,7 @@ class Samples:
     poses : array, shape (N, m)
         The fixed part of each pose; of a point of the shape its orientation.
     units : array, shape (N, k)
-        Where the point is in the shape, over half its edge.
+        The point's place in the shape, over half its edge.
     inside : array, shape (N,)
         1 for a point of the shape, 0 for a fixed one.
     """

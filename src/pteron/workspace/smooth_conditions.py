@@ -26,7 +26,7 @@ class SmoothConditions:
     robot : Manipulator
         One of the machines.
     given : tuple of Condition
-        What a pose must keep.
+        The conditions on a pose.
     """
 
     def __init__(self, robot: Manipulator, given: tuple[Condition, ...]) -> None:
@@ -37,7 +37,7 @@ class SmoothConditions:
         size = next(iter(programs.values())).inputs[0].size
         pose, side = ca.SX.sym("pose", robot.freedom), ca.SX.sym("side")
         self._symbols = pose, side, ca.SX.sym("geometry", size)
-        outputs = {}
+        outputs: dict[tuple[str, str], ca.SX] = {}
         for what, program in programs.items():
             values = program.function.call([self._symbols[2], pose])
             outputs |= {

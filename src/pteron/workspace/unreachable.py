@@ -60,7 +60,7 @@ def beyond_limits(robot: Manipulator, poses: Array) -> ModelError:
     pose = poses[distance_to_limits(robot, poses).min(axis=-1).argmax()]
     told = [
         f"{f'leg {at.leg}: ' if at.leg else ''}{at.noun} at {at.value:.4g} {at.unit} of "
-        f"{at.told_limits('{:g}'.format)}"
+        f"{at.limits_text('{:g}'.format)}"
         for at in limited_joints(robot, pose)
         if not at.least < at.value < at.most
     ]

@@ -35,7 +35,7 @@ class Vanishing:
     robot : Manipulator
         The machine.
     kind : {"I", "II", "constraint"}
-        Of type I the square of a leg's measure, else the measure.
+        The kind: for type I the square of a leg's measure vanishes, else the measure.
     leg : int
         The leg of type I, from 1; else 0.
     """
@@ -72,16 +72,16 @@ class Smooth(NamedTuple):
     """A function of the pose and of the roots in it."""
 
     radicands: Bounded
-    """Of the pose: the squares of the roots."""
+    """The squares of the roots, by pose."""
     dividend: Bounded
-    """Of pose and roots: the zeros of a quotient are those of its dividend."""
+    """The dividend, by pose and roots: a quotient vanishes where its dividend does."""
     function: ca.Function
-    """Of poses (m, K) and roots (R, K) the value, the radicands, the squares of all type-I
+    """From poses (m, K) and roots (R, K) to the value, the radicands, the squares of all type-I
     measures, and their slopes by pose and roots."""
 
     @property
     def roots(self) -> int:
-        """How many roots there are."""
+        """The number of roots."""
         return self.radicands.outputs[0].size
 
     def bounds(self, boxes: Array) -> tuple[Array, Array]:

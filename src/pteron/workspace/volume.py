@@ -1,4 +1,4 @@
-"""How large the reach is at constant orientation: its bounding box and its volume, or area."""
+"""The reach at constant orientation: its bounding box and its volume, or area."""
 
 from __future__ import annotations
 
@@ -26,22 +26,22 @@ about them in each of the rounds, ever nearer."""
 
 _ROUNDS = 24
 _SPREAD = 0.2
-"""How far about them at first, over the size of the machine."""
+"""Their spread at first, over the size of the machine."""
 
 _NEARER = 0.75
 """From round to round."""
 
 _FAR = 1e3
-"""What stands for no limit, m: the optimiser wants finite numbers."""
+"""Stand-in for no limit, m: the optimiser wants finite numbers."""
 
 _ENDLESS = 100.0
-"""A way of so many sizes of the machine that stays in reach has no end."""
+"""A path this many times the machine's size that stays in reach has no end."""
 
 _SLACK = 1e-8
 """Metres by which the optimiser may overstep a bound."""
 
-_WAY = 101
-"""Positions on the way back that are tried where the optimiser has gone too far."""
+_BACK = 101
+"""Positions tried between start and result where the optimiser has gone too far."""
 
 _OPTIONS = {"ftol": 1e-10, "maxiter": 200}
 
@@ -60,9 +60,9 @@ class ReachVolume:
     volume : float
         An estimate; of a planar machine it is an area.
     standard_error : float
-        Of the estimate.
+        Standard error of the estimate.
     unit : {"m^3", "m^2"}
-        Of both.
+        Unit of both.
     box : array, shape (2, k)
         Least and greatest of each of the pose's k lengths in reach, m.
     count : int
@@ -135,7 +135,7 @@ def bounding_box(robot: RobotLike, pose: PoseLike) -> Array:
                 subject=robot.name,
             )
     good = np.vstack([drawn[inside > _TOUCH], starts[depths(starts).min(axis=-1) > _TOUCH]])
-    if any((depths(good + way).min(axis=-1) > _TOUCH).any() for way in _long_ways(robot, radius)):
+    if any((depths(good + way).min(axis=-1) > _TOUCH).any() for way in _far(robot, radius)):
         raise ModelError(
             "the reach has no end: the guides let the platform move along them for ever; give the "
             "legs limits",
@@ -150,8 +150,8 @@ def bounding_box(robot: RobotLike, pose: PoseLike) -> Array:
     return sides
 
 
-def _long_ways(robot: Manipulator, size: float) -> Iterator[Array]:
-    """Yield ways along the guides, far longer than the machine."""
+def _far(robot: Manipulator, size: float) -> Iterator[Array]:
+    """Yield translations along the guides, far longer than the machine."""
     for leg in robot.legs:
         if leg.reach_bound is not None and leg.reach_bound.line is not None:
             way = _ENDLESS * size * (robot.platform.directions @ leg.reach_bound.line)
@@ -198,7 +198,7 @@ def _furthest(depths: Callable[[Array], Array], start: Array, objective: Array) 
         constraints={"type": "ineq", "fun": depths},
         options=_OPTIONS,
     )
-    way = start + np.linspace(1.0, 0.0, _WAY)[:, None] * (found.x - start)
+    way = start + np.linspace(1.0, 0.0, _BACK)[:, None] * (found.x - start)
     inside = depths(way).min(axis=-1) > -_SLACK
     # At the rim of a leg's reach its joint may have no coordinate, and so no limit.
     inside[:-1] &= inside[1:]
@@ -221,7 +221,7 @@ def reach_volume(
     count : int
         Number of random positions.
     seed : int
-        Of the random numbers.
+        Seed of the random numbers.
 
     Returns
     -------

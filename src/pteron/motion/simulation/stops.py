@@ -49,7 +49,7 @@ def told_limit(robot: Manipulator, pose: Array) -> str:
         key=lambda joint: max(joint.least - joint.value, joint.value - joint.most),
     )
     where = f"leg {at.leg}: " if at.leg else ""
-    limits = at.told_limits(lambda value, _: f"{value:g}")
+    limits = at.limits_text(lambda value, _: f"{value:g}")
     return f"{where}the {at.noun} comes to its limit, {at.value:.5g} {at.unit} of {limits}"
 
 
