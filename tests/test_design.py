@@ -195,7 +195,7 @@ def test_a_workspace_that_fails_between_its_points_is_missed():
     task = Task.of(workspace_spec(robot="tripteron", workspace=box, angles=None))
     missed = [evaluated(task, [0.25, 0.25], proofs=p)["misses workspace"] for p in (False, True)]
     assert missed[0] == 0.0 < missed[1]
-    with pytest.raises(ModelError, match=r"leg 1: near type I, at pose \[0.005, 0.23, 0.005\]"):
+    with pytest.raises(ModelError, match=r"leg 1: type-I measure, at pose \[0.005, 0.23, 0.005\]"):
         search(task.spec)
 
 

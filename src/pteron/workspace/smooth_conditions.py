@@ -7,6 +7,7 @@ measure of type II is taken with one sign: a region in which it vanishes nowhere
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property, lru_cache
 
 import casadi as ca
@@ -15,7 +16,7 @@ import numpy as np
 from pteron.kernels import TARGETS, Array, Kernel, Port, bare, general_program
 from pteron.kernels.c import compiler
 from pteron.manipulator import Manipulator
-from pteron.workspace.conditions import Condition
+from pteron.workspace.conditions import Condition, conditions
 
 
 class SmoothConditions:
@@ -30,26 +31,49 @@ class SmoothConditions:
     """
 
     def __init__(self, robot: Manipulator, given: tuple[Condition, ...]) -> None:
-        self.names = tuple(map(str, given))
         self.sides = (1.0, -1.0) if any(condition.sized for condition in given) else (1.0,)
         """Signs that the type-II measure may have."""
-        programs = {what: general_program(robot, what) for what in {c.what for c in given}}
-        size = next(iter(programs.values())).inputs[0].size
         pose, side = ca.SX.sym("pose", robot.freedom), ca.SX.sym("side")
+        size = general_program(robot, "squared_type_i").inputs[0].size
         self._symbols = pose, side, ca.SX.sym("geometry", size)
-        outputs: dict[tuple[str, str], ca.SX] = {}
-        for what, program in programs.items():
-            values = program.function.call([self._symbols[2], pose])
-            outputs |= {
-                (what, port.name): ca.vec(ca.densify(value))
-                for port, value in zip(program.outputs, values, strict=True)
-            }
-        self._rows = ca.vertcat(
-            *(
-                outputs[c.what, c.output][c.element] * (side if c.sized else 1.0) - c.floor
-                for c in given
-            )
-        )
+        rows = {}
+        if set(conditions(robot)) <= set(given):
+            floors = {c.element: c.floor for c in given if c.what == "squared_type_i"}
+            given = tuple(c for c in given if c.what not in ("room", "squared_type_i"))
+            rows = self._scaled(robot, floors)
+        for condition in given:
+            row = self._output(robot, condition.what, condition.output)[condition.element]
+            rows[str(condition)] = row * (side if condition.sized else 1.0) - condition.floor
+        self.names = tuple(rows)
+        self._rows = ca.vertcat(*rows.values())
+
+    def _scaled(self, robot: Manipulator, floors: Mapping[int, float]) -> dict[str, ca.SX]:
+        """Return rows of reach and limits that are all about 1: a search moves better along them.
+
+        Squared type-I measures stand for the edges of reach; limits are shares of half a range.
+        """
+        squares = self._output(robot, "squared_type_i", "squares")
+        joints = self._output(robot, "joint_coordinates", "joints")
+        passive = self._output(robot, "passive_room", "shares")
+        legs = range(1, len(robot.legs) + 1)
+        found = {f"leg {i}: type-I measure": squares[i - 1] - floors.get(i - 1, 0.0) for i in legs}
+        for i, leg in enumerate(robot.legs, start=1):
+            if leg.limits is not None:
+                low, high = leg.limits
+                ends = {"lower": joints[i - 1] - low, "upper": high - joints[i - 1]}
+                for end, distance in ends.items():
+                    name = f"leg {i}: {leg.joint.noun}'s {end} limit"
+                    found[name] = distance / ((high - low) / 2.0)
+        return found | {
+            f"leg {i}: passive joints' limits": share
+            for i, share in enumerate(ca.vertsplit(passive), start=1)
+            if not share.is_constant()
+        }
+
+    def _output(self, robot: Manipulator, what: str, name: str) -> ca.SX:
+        program = general_program(robot, what)
+        values = program.function.call([self._symbols[2], self._symbols[0]])
+        return ca.vec(ca.densify(values[[port.name for port in program.outputs].index(name)]))
 
     def rows(self, geometry: Array, poses: Array, side: float) -> Array:
         """Return the rows (..., R); NaN where a leg does not reach and its joint has no place."""
