@@ -7,9 +7,10 @@ from types import SimpleNamespace
 import pytest
 
 import pteron
-from pteron.design import Design
+from pteron.design import Change, Design
 from pteron.identification import FaultIsolation, Identification, Payload
 from pteron.renamed import RENAMED, UNTIL
+from pteron.workspace import LimitedJoint, PoseMargins
 
 NAMES = [(package, old, new) for package, names in RENAMED.items() for old, new in names.items()]
 
@@ -51,6 +52,10 @@ def test_former_names_are_gone_when_their_release_is_over():
         (FaultIsolation, "suspicions", "faults"),
         (Design, "reserve", "margin"),
         (Design, "start_strokes", "reference_strokes"),
+        (PoseMargins, "clearances", "joints"),
+        (PoseMargins, "smallest", "least"),
+        (LimitedJoint, "told_limits", "limits_text"),
+        (Change, "told", "shown"),
     ],
 )
 def test_a_former_attribute_answers_with_what_to_write(owner, old, new):

@@ -1,5 +1,7 @@
 """The best dimensions: searches over a machine's geometry, with proofs of their results."""
 
+from typing import TYPE_CHECKING
+
 from pteron.arguments import check_arguments
 from pteron.design.design import Design
 from pteron.design.differences import Change
@@ -20,6 +22,7 @@ from pteron.design.spec import Spec, read_spec
 from pteron.design.survey import survey
 from pteron.design.task import Task
 from pteron.design.variables import Variable
+from pteron.renamed import former_names
 
 __all__ = [
     "Change",
@@ -44,6 +47,8 @@ __all__ = [
     "workspace_proofs",
 ]
 check_arguments(__name__)
+if not TYPE_CHECKING:
+    __getattr__ = former_names(__name__)
 
 
 def __dir__() -> list[str]:

@@ -9,6 +9,7 @@ from pteron.design.proofs import start_design
 from pteron.design.task import Task
 from pteron.manipulator import Manipulator
 from pteron.manipulator.manipulator import told_legs
+from pteron.renamed import former_attribute
 
 _NONE = 1e-9
 """Smaller changes, in m or without unit, are left out."""
@@ -47,6 +48,8 @@ class Change:
         return (
             f"{'+' if self.after > self.before else '-'}{self.shown(abs(self.after - self.before))}"
         )
+
+    told = former_attribute("told", "shown")
 
     def shown(self, value: float) -> str:
         """Return a value with its unit; lengths in millimetres."""

@@ -13,6 +13,7 @@ from pteron.kernels import numeric
 from pteron.kinematics.evaluate import checked_one
 from pteron.legs.leg import Passive
 from pteron.manipulator import RobotLike, as_manipulator
+from pteron.renamed import former_attribute
 from pteron.shapes import PoseLike
 
 
@@ -44,6 +45,8 @@ class LimitedJoint:
     least: float
     most: float
     only_most: bool = False
+
+    told_limits = former_attribute("told_limits", "limits_text")
 
     def limits_text(self, text: Callable[..., str]) -> str:
         """Return its limits as words; `text` turns a value and the unit into text."""

@@ -1,7 +1,10 @@
 """The workspace of a machine: margins, home pose, reach, joints' ranges, and proofs of them."""
 
+from typing import TYPE_CHECKING
+
 from pteron.arguments import check_arguments
 from pteron.kinematics.limits import LimitedJoint, limited_joints
+from pteron.renamed import former_names
 from pteron.workspace.clearance import Clearance, clearance, interference
 from pteron.workspace.components import Component, Components, components
 from pteron.workspace.conditions import Condition, conditions
@@ -67,6 +70,8 @@ __all__ = [
     "pose_margins",
 ]
 check_arguments(__name__)
+if not TYPE_CHECKING:
+    __getattr__ = former_names(__name__)
 
 
 def __dir__() -> list[str]:

@@ -14,6 +14,7 @@ from pteron.kinematics import inverse_kinematics
 from pteron.kinematics.singularities import best_type_ii
 from pteron.kinematics.type_ii_sizes import type_ii_sizes
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.renamed import former_attribute
 from pteron.shapes import Numbers, PerJoint, PoseLike
 
 
@@ -40,6 +41,9 @@ class PoseMargins:
     type_ii: Numbers
     joints: PerJoint
     least: Numbers
+
+    clearances = former_attribute("clearances", "joints")
+    smallest = former_attribute("smallest", "least")
 
 
 def pose_margins(robot: RobotLike, pose: PoseLike) -> PoseMargins:
