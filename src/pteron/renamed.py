@@ -16,6 +16,7 @@ from pkgutil import resolve_name
 from typing import Any
 
 RENAMED = {
+    "pteron.design": {"Told": "pteron.design.ReportedDesign"},
     "pteron.export.engines": {"Motor": "pteron.export.engines.TreeMotor"},
     "pteron.identification": {
         "Suspicion": "pteron.identification.IsolatedFault",
@@ -31,6 +32,10 @@ RENAMED = {
         "FourierSeries": "pteron.identification.signals.FittedSeries",
     },
     "pteron.motion.simulation": {"Law": "pteron.motion.simulation.ControlLaw"},
+    "pteron.workspace": {
+        "Reserve": "pteron.workspace.PoseMargins",
+        "reserve": "pteron.workspace.pose_margins",
+    },
 }
 """Names of version 0.1 by package, and where each of them is now."""
 

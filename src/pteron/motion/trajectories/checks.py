@@ -22,7 +22,7 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion, told_pose
 from pteron.motion.trajectories.minima import first_below, least_along
 from pteron.motion.trajectories.path import Path, poses_of
-from pteron.workspace.reserve import clearances
+from pteron.workspace.margins import joint_distances
 
 _SAMPLES = 1001
 """Poses of a path that are looked at before its measures are followed between them."""
@@ -185,7 +185,7 @@ def _failed_limit(curve: _Curve, marks: Array) -> _Failure | None:
     robot = curve.robot
 
     def margin(at: Array) -> Array:
-        return clearances(robot, numeric(robot, "joint_coordinates")(curve.poses(at))[0])
+        return joint_distances(robot, numeric(robot, "joint_coordinates")(curve.poses(at))[0])
 
     found = first_below(margin, marks, -_ROUNDING)
     if found is None:

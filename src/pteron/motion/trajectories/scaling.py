@@ -19,7 +19,7 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.trajectories.cycle import Cycle, moves
 from pteron.shapes import PoseLike
 from pteron.workspace import pose_margins
-from pteron.workspace.margins import clearances
+from pteron.workspace.margins import joint_distances
 
 _LEAST_RESERVE = 0.2
 """Least margin, of type I and of type II, that a cycle keeps."""
@@ -160,6 +160,6 @@ def _keeps(robot: Manipulator, poses: Array, least: float) -> bool:
         type_ii = type_ii_sizes(robot, poses) / best_type_ii(robot)
         if not (type_ii >= least + _DIP).all():
             return False
-    actuated = clearances(robot, numeric(robot, "joint_coordinates")(poses)[0])
+    actuated = joint_distances(robot, numeric(robot, "joint_coordinates")(poses)[0])
     passive = numeric(robot, "passive_room")(poses)[1]
     return bool((actuated >= _DIP).all() and (passive >= _DIP).all())
