@@ -26,12 +26,12 @@ from pteron.identification.fitting import (
     check_recordings,
     estimated,
     fit_observations,
+    in_newtons,
     preprocessing_for,
     too_little_motion,
     with_findings,
 )
 from pteron.identification.logs import Log, LogFile
-from pteron.identification.logs.at_motor import by_rated_torque
 from pteron.identification.logs.recorded import at_limits
 from pteron.identification.model import Model, Terms, identification_model
 from pteron.identification.observation import LinearModel, Observations
@@ -257,7 +257,7 @@ def _sequence(logs: Logs, robot: Manipulator) -> list[Log | LogFile]:
         replace(one, symbols=symbols) if isinstance(one, Log) and one.symbols is None else one
         for one in ([logs] if isinstance(logs, Log | LogFile) else logs)
     ]
-    return [by_rated_torque(one, robot) for one in named]
+    return [in_newtons(one, robot) for one in named]
 
 
 def _reader(report: Stage, task: str) -> Callable[[int], None]:

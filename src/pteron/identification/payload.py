@@ -18,11 +18,11 @@ from pteron.identification.fitting import (
     balanced,
     check_columns,
     check_recordings,
+    in_newtons,
     too_little_motion,
     with_findings,
 )
 from pteron.identification.logs import Finding, Log
-from pteron.identification.logs.at_motor import by_rated_torque
 from pteron.identification.model import Model, Terms, identification_model
 from pteron.identification.observation import Observations, observations_of, stacked
 from pteron.identification.plausibility import CHANCE, left_over, unphysical, unseen
@@ -209,9 +209,9 @@ def identify_payload(
     """
     robot = as_manipulator(robot)
     model = identification_model(robot, replace(terms or Terms(), payload=True), base=base)
-    without = by_rated_torque(without, robot)
+    without = in_newtons(without, robot)
     if with_payload is not None:
-        with_payload = by_rated_torque(with_payload, robot)
+        with_payload = in_newtons(with_payload, robot)
     fit = _phases(without, with_payload, processing)
     check_recordings(robot, fit, (), processing or Processing())
     parts, plans = _observed(model, fit, processing)

@@ -26,7 +26,7 @@ class Recorded(Protocol):
         """Return it with the gains of a description, which a finding tells."""
 
 
-_Recorded = TypeVar("_Recorded", bound=Recorded)
+AnyLog = TypeVar("AnyLog", bound=Recorded)
 
 _NEEDS = {"turns": ("ratio",), "counts": ("ratio", "counts_per_turn")}
 """Values of a drive that are needed, by the unit of the joints."""
@@ -61,13 +61,10 @@ def joint_factors(joints: Group, robot: Manipulator, source: str) -> NDArray[np.
     return 2.0 * np.pi / np.array(each)
 
 
-def by_rated_torque(log: _Recorded, robot: Manipulator) -> _Recorded:
-    """Return a log whose forces are in per cent of rated torque with gains, where drives tell them.
-
-    Other logs are returned as they are.
-    """
+def by_rated_torque(log: AnyLog, robot: Manipulator) -> AnyLog:
+    """Return a log of forces in per cent of rated torque with gains, where drives tell them."""
     about = log.description
-    if about.force_unit != "%" or _lacking(robot, _RATED):
+    if _lacking(robot, _RATED):
         return log
     drives = [leg.drive or Drive() for leg in robot.legs]
     gains = tuple(drive.gear * (drive.rated_torque or 0.0) / 100.0 for drive in drives)
