@@ -79,6 +79,8 @@ class Unknowns:
 
     def speed_intervals(self) -> tuple[Array, Array]:
         """Return the ends (n,) of the speeds' intervals at 95 %, which are as large in ratio."""
+        assert self.speeds is not None
+        assert self.speed_deviations is not None
         factor = np.exp(_TWO_SIDED * self.speed_deviations)
         return self.speeds / factor, self.speeds * factor
 

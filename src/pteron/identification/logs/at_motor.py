@@ -19,8 +19,13 @@ from pteron.manipulator import Manipulator
 class Recorded(Protocol):
     """A log, or a file of one, whose forces may be multiplied by gains."""
 
-    source: str
-    description: Description
+    @property
+    def source(self) -> str:
+        """Its name in messages."""
+
+    @property
+    def description(self) -> Description:
+        """Its description."""
 
     def with_gains(self, description: Description, finding: Finding) -> Self:
         """Return it with the gains of a description, which a finding tells."""
