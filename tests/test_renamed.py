@@ -9,6 +9,7 @@ import pytest
 import pteron
 from pteron.design import Change, Design
 from pteron.identification import FaultIsolation, Identification, Payload
+from pteron.motion import Motor
 from pteron.renamed import RENAMED, UNTIL
 from pteron.workspace import LimitedJoint, PoseMargins
 
@@ -56,6 +57,7 @@ def test_former_names_are_gone_when_their_release_is_over():
         (PoseMargins, "smallest", "least"),
         (LimitedJoint, "told_limits", "limits_text"),
         (Change, "told", "shown"),
+        (Motor, "doubts", "warnings"),
     ],
 )
 def test_a_former_attribute_answers_with_what_to_write(owner, old, new):

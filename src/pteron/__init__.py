@@ -99,7 +99,7 @@ if TYPE_CHECKING:
         cheapest_parameters,
     )
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _LATER = {
     "BaseParameters": "pteron.reduction",

@@ -11,6 +11,7 @@ import polars as pl
 from pydantic import BaseModel, ConfigDict
 
 from pteron.errors import DataError
+from pteron.renamed import former_attribute
 from pteron.tables import read_table
 from pteron.toml import read_toml, told, validated
 
@@ -67,6 +68,8 @@ class Motor:
             )
         if faults:
             raise DataError(told(faults), subject=f"motor {self.name}")
+
+    doubts = former_attribute("doubts", "warnings")
 
     @property
     def warnings(self) -> tuple[str, ...]:
