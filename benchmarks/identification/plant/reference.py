@@ -110,7 +110,7 @@ def fourier_reference(
 
 def _serves(motion: Fourier, time: Array, speed: float, acceleration: float) -> bool:
     pose, _, _ = motion.platform(time)
-    reserve = pteron.workspace.margins(motion.robot, pose)
+    reserve = pteron.workspace.pose_margins(motion.robot, pose)
     if (
         reserve.type_i.min() < _TYPE_I
         or reserve.type_ii.min() < _TYPE_II

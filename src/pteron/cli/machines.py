@@ -161,7 +161,7 @@ def _leg(leg: LegKind) -> dict[str, Any]:
     return {
         "type": leg.type,
         "joint": leg.joint.noun,
-        "axis": list(leg.joint_axis),
+        "axis": leg.joint_axis and list(leg.joint_axis),
         "lengths": {q.name: q.value[0] for q in leg.quantities if q.role == "length"},
         "elbow": leg.elbow,
         "limits": list(leg.limits) if leg.limits else None,
