@@ -174,7 +174,7 @@ def _leg(leg: LegKind) -> dict[str, Any]:
 def _show(robot: Manipulator, found: dict[str, Any]) -> None:
     rows = (
         (
-            *(str(i), leg["type"], _vector(leg["axis"], 2)),
+            *(str(i), leg["type"], _vector(leg["axis"], 2) if leg["axis"] else "along the leg"),
             ", ".join(f"{length:g}" for length in leg["lengths"].values()) or "-",
             "{:g} to {:g} {}".format(*leg["limits"], leg["unit"]) if leg["limits"] else "none",
         )
