@@ -235,6 +235,18 @@ def test_singular_poses_at_the_edge_of_the_reach_are_found(pose, known):
         np.testing.assert_allclose(*sizes, rtol=2e-3)
 
 
+def test_a_sheet_that_is_in_reach_in_a_corner_only_is_found():
+    """Leg 4 folds within the reach of legs 1 and 2 only where both of them fold too."""
+    robot = CATALOG["h4"]
+    pose = [-0.0448, 0.4134, 0.2349, -0.0691]
+    found = nearest_singularities(robot, pose, most=1000)
+    (folded,) = [one for one in found if (one.kind, one.leg) == ("I", 4)]
+    assert folded.distance == pytest.approx(0.41254, abs=1e-5)
+    squares = numeric(robot, "squared_type_i")(folded.pose)[0]
+    np.testing.assert_allclose(squares[[0, 1, 3]], 0.0, atol=1e-12)
+    assert squares[2] > 0.01
+
+
 def test_distances_do_not_depend_on_the_unit_of_length():
     robot, pose = CATALOG["delta"], np.array([0.1, -0.2, -0.8])
     lengths = ("guide_point", "platform_point", "fixed_offset", "upper_length", "lower_length")

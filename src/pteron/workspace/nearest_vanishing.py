@@ -45,6 +45,9 @@ them that lead to quadratic programs."""
 _STEPS = 30
 """Newton's steps: where a function does not change its sign they halve the distance only."""
 
+_BACK = 10
+"""Of them, back into reach."""
+
 _CONVERGED = 1e-14
 
 _RETRACTIONS, _GAIN = 16, 1e-6
@@ -195,7 +198,11 @@ class Search:
         )
 
     def _stepped(self, places: Array) -> Array:
-        """Return singular states that Newton's steps, the shortest, lead to from places (K, k)."""
+        """Return singular states that Newton's steps, the shortest, lead to from places (K, k).
+
+        Those that lead out of reach go on to where it ends: a sheet of singular poses may be in
+        reach in a corner only.
+        """
         k, (length, sizes) = len(self.moving), self._sizes
         states = np.zeros((len(places), k + len(sizes)))
         states[:, :k] = (places - self.at[self.moving]) / length
@@ -204,19 +211,36 @@ class Search:
         roots = np.zeros((len(sizes), len(states)))
         under = np.asarray(self.smooth.function(self._pose(states).T, roots)[0])[1 : 1 + len(sizes)]
         states[:, k:] = np.sqrt(np.maximum(under.T, 0.0)) / sizes
+        states = self._solved(states, _STEPS, within=False)
+        singular = self._singular(states)
+        if singular.all():
+            return states
+        back = self._solved(states[~singular], _BACK, within=True)
+        return np.concatenate([states[singular], back[self._singular(back)]])
+
+    def _solved(self, states: Array, steps: int, *, within: bool) -> Array:
+        """Return where Newton's steps lead to from states (K, k + R); `within`, into reach too."""
         with np.errstate(all="ignore"):
-            for _ in range(_STEPS):
-                missed, _, slopes = self._values(states)
+            for _ in range(steps):
+                missed, kept, slopes = self._values(states)
+                count = missed.shape[1]
+                if within:
+                    missed = np.hstack([missed, np.minimum(kept, 0.0)])
+                    slopes[:, count:][kept >= 0.0] = 0.0
+                    count = missed.shape[1]
+                slopes = slopes[:, :count]
                 good = np.isfinite(missed).all(axis=-1) & np.isfinite(slopes).all(axis=(-2, -1))
                 states, missed, slopes = states[good], missed[good], slopes[good]
                 if (np.abs(missed) <= _CONVERGED).all():
                     break
-                across = np.linalg.pinv(slopes[:, : missed.shape[1]], rcond=1e-12)
+                across = np.linalg.pinv(slopes, rcond=1e-12)
                 states = states - (across @ missed[..., None])[..., 0]
-        return states[self._singular(states)]
+        return states
 
     def _singular(self, states: Array) -> NDArray[np.bool_]:
         """Return which states (K,) are singular poses in reach."""
+        if not len(states):
+            return np.zeros(0, bool)
         missed, kept, _ = self._values(states)
         closed = (np.abs(missed) <= SINGULAR).all(axis=-1)
         return np.asarray(closed & (kept >= -_EDGE).all(axis=-1))
