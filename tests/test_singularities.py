@@ -243,7 +243,7 @@ def test_a_sheet_that_is_in_reach_in_a_corner_only_is_found():
     (folded,) = [one for one in found if (one.kind, one.leg) == ("I", 4)]
     assert folded.distance == pytest.approx(0.41254, abs=1e-5)
     squares = numeric(robot, "squared_type_i")(folded.pose)[0]
-    np.testing.assert_allclose(squares[[0, 1, 3]], 0.0, atol=1e-12)
+    np.testing.assert_allclose(squares[[0, 1, 3]], 0.0, atol=1e-9)  # as near as counts as in reach
     assert squares[2] > 0.01
 
 
