@@ -151,7 +151,7 @@ ALLOWED = {
     ("export/klipper/", "an elbow"): "where Klipper has it, in the message that refuses",
     ("report/", "an elbow"): "the working mode",
     ("viewer/", "an elbow"): "the working mode",
-    ("workspace/doubts.py", "an elbow"): "whether another working mode is meant",
+    ("workspace/machine_warnings.py", "an elbow"): "whether another working mode is meant",
     ("workspace/modes.py", "an elbow"): "the working modes",
     ("workspace/orientations.py", "an elbow"): "the working modes",
     ("kinematics/direct.py", "an elbow"): "the working mode that a pose is in",

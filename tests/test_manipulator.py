@@ -405,7 +405,7 @@ BAD_FILES = {
     "unknown kind": (
         "elbow = 1\n",
         'elbow = 1\ntype = "RPX"\n',
-        "leg 1: type: 'RPX' is not one of PRRR, PSS, RSS, RRR, PRR, RUPU",
+        "leg 1: type: 'RPX' is not one of PRRR, PSS, RSS, RRR, PRR, RPR, RUPU",
     ),
     "elbow": ("elbow = 1", "elbow = 0", "leg 1: elbow: 0 given, 1 or -1 expected"),
     "not a unit vector": (

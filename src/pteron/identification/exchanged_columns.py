@@ -25,8 +25,9 @@ _EXPLAINED = 0.3
 _ALIKE = 1.2
 """Error over the least one up to which faults explain the forces as well."""
 
-_ROUNDING = 1e-9
-"""Error relative to the forces below which all is explained."""
+_ROUNDING = 1e-7
+"""Error relative to the forces below which all is explained: the root of what a difference of
+squares loses, some 1e-15 of them."""
 
 _ROWS = 4000
 
@@ -127,7 +128,7 @@ def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> Column
     faults = [replace(fault, before=before) for fault, _, _ in found]
     least = min(fault.after for fault in faults)
     limit = _ALIKE * max(least, _ROUNDING)
-    if not least * DECISIVE < before:
+    if not max(least, _ROUNDING) * DECISIVE < before:
         # Signs of what is not explained say nothing.
         if before > _EXPLAINED:
             return None

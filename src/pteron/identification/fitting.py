@@ -24,7 +24,7 @@ from pteron.identification.exchanged_columns import DECISIVE, column_fault, exch
 from pteron.identification.logs import Log
 from pteron.identification.logs.at_motor import AnyLog, by_rated_torque, per_cent_advice
 from pteron.identification.logs.recorded import at_limits, check_forces, check_recorded
-from pteron.identification.model import Model
+from pteron.identification.model import Model, identification_model
 from pteron.identification.observation import LinearModel, Observations, observations_of, stacked
 from pteron.identification.plausibility import left_over
 from pteron.identification.recordings import Recording, same
@@ -249,7 +249,12 @@ def too_little_motion(
 
 def check_columns(model: Model, one: Recording, preprocessing: Preprocessing) -> None:
     """Refuse a log whose columns, exchanged or with other signs, would be explained far better."""
-    fault = column_fault(model, one.head().part(0, _LOOK), preprocessing)
+    head = one.head().part(0, _LOOK)
+    if model.terms.payload and (head.payload is None or not head.payload.any()):
+        model = identification_model(
+            model.robot, replace(model.terms, payload=False), base=model.base
+        )
+    fault = column_fault(model, head, preprocessing)
     if fault is None:
         return
     if fault.after < 1e-6 * fault.before:

@@ -83,7 +83,7 @@ def minimised(
 
     def measured(z: Array) -> tuple[float, Array]:
         value, gradient = cost(z.reshape(start.shape))
-        return float(value), np.array(gradient).ravel()
+        return float(value), gradient.full().ravel()
 
     found = sequential_minimum(
         NonlinearProgram(measured, kept.values, kept.slopes),
@@ -109,13 +109,13 @@ class _Kept:
 
     def values(self, z: Array) -> Array:
         """Return the margins (R,)."""
-        found = np.array(self._path(*self._along(z))).T
+        found = self._path(*self._along(z)).full().T
         return self._sides(found - self._low, self._high - found)
 
     def slopes(self, z: Array) -> Array:
         """Return their derivatives by the variables (R, v)."""
         count, limits, n = self._rows.shape[1], len(self._low), len(self._size)
-        blocks = np.array(self._slopes(*self._along(z))).T.reshape(count, 3, n, limits)
+        blocks = self._slopes(*self._along(z)).full().T.reshape(count, 3, n, limits)
         found = np.einsum("tdig,dtk->tgki", blocks * self._size[:, None], self._rows)
         found = found.reshape(count, limits, -1)
         return self._sides(found, -found)
