@@ -1,4 +1,4 @@
-"""From a recorded motion to the parameters of the machine that made it, and how far to trust them.
+"""The parameters of a machine from a motion that it made, and how far to trust them.
 
 `identify` does all of it. Its parts can be used by themselves: `logs` reads, `signals` turns
 samples into states, `observations_of` stacks the regressor, `estimators` solve, `consistency` finds

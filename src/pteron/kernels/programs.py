@@ -1,4 +1,4 @@
-"""From a machine and the name of a function to its CasADi program, with ports and status."""
+"""CasADi programs of a machine's functions by name, with ports and status."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ _ANGLES = 720
 """Samples of phi."""
 
 _HALVINGS = 50
-"""From half a degree to rounding."""
+"""Halvings that lead from half a degree to rounding."""
 
 _ZERO = 1e-9
 """The measure where its sign changes, but for rounding."""

@@ -26,7 +26,7 @@ ENDINGS = (".vtk", ".vtu", ".ply", ".stl")
 """Endings of files that hold surfaces; what a surface's value is, STL does not say."""
 
 _SHARES = (0.25, 0.5, 0.75)
-"""By default surfaces part the poses that serve, by their value, at these shares."""
+"""Shares of the poses that serve, by their value, which surfaces part by default."""
 
 _BEYOND = 1e-9
 """Metres: outside of the grid nothing is in reach, so that the reach's surface is closed."""

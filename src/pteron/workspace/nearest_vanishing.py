@@ -46,7 +46,7 @@ _STEPS = 30
 """Newton's steps: where a function does not change its sign they halve the distance only."""
 
 _BACK = 10
-"""Of them, back into reach."""
+"""Newton's steps back into reach."""
 
 _CONVERGED = 1e-14
 

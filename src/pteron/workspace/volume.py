@@ -29,7 +29,7 @@ _SPREAD = 0.2
 """Their spread at first, over the size of the machine."""
 
 _NEARER = 0.75
-"""From round to round."""
+"""Factor of the spread from round to round."""
 
 _FAR = 1e3
 """Stand-in for no limit, m: the optimiser wants finite numbers."""

@@ -1,4 +1,4 @@
-"""From poses of the platform to the coordinates of all joints of the tree."""
+"""Coordinates of all joints of the tree, of poses of the platform."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ _SAMPLES = 20
 anywhere else a leg could come close to being stretched, which the regressor would reward."""
 
 _BACK_OFF = 1e-3
-"""By what share of its size the program keeps every limit clear at its samples."""
+"""Share of its size by which the program keeps every limit clear at its samples."""
 
 _ITERATIONS = 200
 

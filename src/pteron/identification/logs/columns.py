@@ -22,7 +22,7 @@ _ONCE = ("rho", "theta", "force", "torque")
 
 
 class Columns(NamedTuple):
-    """Where in a file the parts of a log are."""
+    """The columns of a file that hold the parts of a log."""
 
     time: Group
     joints: Group

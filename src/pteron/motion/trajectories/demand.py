@@ -210,7 +210,7 @@ class Peak(NamedTuple):
     name: str
     """ "speed", "acceleration" or "force" of a joint; "tool_speed" or "tool_acceleration"."""
     leg: int
-    """From 1; 0 for the tool."""
+    """Its leg, from 1; 0 for the tool."""
     size: float
     unit: str
     limit: float
