@@ -83,7 +83,7 @@ def minimised(
 
     def measured(z: Array) -> tuple[float, Array]:
         value, gradient = cost(z.reshape(start.shape))
-        return float(value), gradient.full().ravel()
+        return float(value), _numbers(gradient).ravel()
 
     found = sequential_minimum(
         NonlinearProgram(measured, kept.values, kept.slopes),
@@ -94,6 +94,17 @@ def minimised(
         stop=lambda: time.monotonic() > deadline,
     )
     return None if found is None else found.reshape(start.shape) * size
+
+
+def _numbers(matrix: ca.DM) -> Array:
+    """Return the entries of a matrix; in the middle of an interrupt CasADi gives none, or fails."""
+    try:
+        found: Array | None = matrix.full()
+    except SystemError:
+        found = None
+    if found is None:
+        raise KeyboardInterrupt
+    return found
 
 
 class _Kept:
@@ -109,13 +120,13 @@ class _Kept:
 
     def values(self, z: Array) -> Array:
         """Return the margins (R,)."""
-        found = self._path(*self._along(z)).full().T
+        found = _numbers(self._path(*self._along(z))).T
         return self._sides(found - self._low, self._high - found)
 
     def slopes(self, z: Array) -> Array:
         """Return their derivatives by the variables (R, v)."""
         count, limits, n = self._rows.shape[1], len(self._low), len(self._size)
-        blocks = self._slopes(*self._along(z)).full().T.reshape(count, 3, n, limits)
+        blocks = _numbers(self._slopes(*self._along(z))).T.reshape(count, 3, n, limits)
         found = np.einsum("tdig,dtk->tgki", blocks * self._size[:, None], self._rows)
         found = found.reshape(count, limits, -1)
         return self._sides(found, -found)
