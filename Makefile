@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
-QUICK := published kinematics delta family manipulator errors toml passes payload costs
+QUICK := published delta family conformance manipulator errors toml passes costs
 
 # One thread of linear algebra a process, and a file's tests in one process: they share what is made.
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist loadfile
@@ -16,7 +16,7 @@ demo: $(VENV)/.runtime
 	$(BIN)/pteron report quadrupteron --out demo
 	$(BIN)/pteron table1
 
-# The gate: lint and tests side by side, some six minutes on two cores; tests/README.md says what waits
+# The gate: lint and tests side by side, some thirteen minutes on two cores; tests/README.md says what waits
 # for `make nightly`.
 test: $(VENV)/.dev
 	+$(MAKE) --no-print-directory --jobs 2 lint tests

@@ -79,7 +79,7 @@ class LegMotion(NamedTuple):
     division by it: it vanishes where the leg is singular (type I)."""
     divisor: Expression
     bodies: dict[str, BodyMotion]
-    """By letter: "p" (slider), "u" (upper link or crank), "l" (lower link or rod). A lower link's
+    """Letters are "p" (slider), "u" (upper link or crank), "l" (lower link or rod). A lower link's
     reference point is the platform point, and its x points there from the joint."""
     chain: tuple[Joint, ...]
     """The joints from the base to the platform, all of them: their screws times their rates are the

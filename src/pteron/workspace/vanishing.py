@@ -76,8 +76,8 @@ class Smooth(NamedTuple):
     dividend: Bounded
     """The dividend, by pose and roots: a quotient vanishes where its dividend does."""
     function: ca.Function
-    """From poses (m, K) and roots (R, K) to the value, the radicands, the squares of all type-I
-    measures, and their slopes by pose and roots."""
+    """The value, the radicands, the squares of all type-I measures, and their slopes by pose and
+    roots, of poses (m, K) and roots (R, K)."""
 
     @property
     def roots(self) -> int:
