@@ -26,6 +26,7 @@ from pteron.kernels import (
     NoSquareRoot,
     PrimeField,
     RationalField,
+    columns_of,
     count_operations,
     evaluate,
     general_program,
@@ -143,6 +144,20 @@ def test_machines_of_one_geometry_share_a_program_but_not_their_parameters():
     values = values_for(robot, light, (4,))
     np.testing.assert_allclose(heavy(*values), 2 * light(*values), rtol=1e-13)
     assert pteron.compile(robot, "inverse_dynamics", grade="parametric") is light
+
+
+def test_a_program_of_base_parameters_has_its_status_too():
+    base = pteron.base_parameters(ROBOT)
+    asked = program(ROBOT, "inverse_dynamics", columns_of(base), guarded=True)
+    assert [port.name for port in asked.outputs] == ["forces", "status"]
+    pose, velocity, acceleration = states(ROBOT, 1)
+    state = [pose[0], velocity[0], acceleration[0], base.values()]
+    forces, status = asked.function.call(state)
+    expected = pteron.inverse_dynamics(ROBOT, pose[0], velocity[0], acceleration[0])
+    np.testing.assert_allclose(forces.full().ravel(), expected, rtol=1e-9)
+    assert float(status) == 1.0
+    state[0] = pose[0] + 100.0
+    assert float(asked.function.call(state)[1]) == 0.0
 
 
 def test_inputs_of_wrong_number_or_shape_are_refused():

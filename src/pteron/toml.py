@@ -1,4 +1,7 @@
-"""TOML files, read safely and checked against pydantic models; one message has every fault."""
+"""TOML files, read and checked against pydantic models; one message lists a file's faults.
+
+A file that could exhaust memory or time (huge, deeply nested, keys of very many parts) is refused.
+"""
 
 from __future__ import annotations
 
@@ -17,9 +20,13 @@ _Model = TypeVar("_Model")
 _Node = dict[str, Any]
 
 _LARGEST = 1 << 24
+"""Bytes that a file may have: 16 MiB."""
+
 _PARTS = 16
+"""Parts that a dotted key, `a.b.c`, may have."""
+
 _MANY = 20
-"""Most faults of a file in one message."""
+"""Faults that one message lists; of more it tells the number."""
 
 _BOUNDS = {
     "greater_than": "above",
@@ -35,6 +42,7 @@ _WORDS = {
     "object": "a table",
 }
 
+# Strings and comments are blanked before long keys are sought: dots in them are no keys.
 _STRING_OR_COMMENT = re.compile(
     r'"""[^"\\]*(?:(?:\\.|"{1,2}(?!"))[^"\\]*)*"""'
     r"|'''.*?'''"
@@ -49,23 +57,23 @@ _LONG_KEY = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{_PARTS}}}")
 def read_toml(path: str | Path, error: type[PteronError], absent: str) -> dict[str, Any]:
     """Return the content of a TOML file.
 
-    `error` is what is raised, `absent` what its message says if there is no such file.
+    `error` is the class of error to raise, `absent` its message if there is no such file.
 
     Raises
     ------
     PteronError
-        If it cannot be read, or as `parsed_toml`.
+        If the file cannot be read, or as `parsed_toml`.
     """
     return parsed_toml(*toml_bytes(path, error, absent), error)
 
 
 def toml_bytes(path: str | Path, error: type[PteronError], absent: str) -> tuple[bytes, str]:
-    """Return the bytes of a TOML file, no more than one may have, and what messages call it.
+    """Return the bytes of a TOML file, cut off past the most it may have, and its name in messages.
 
     Raises
     ------
     PteronError
-        If it cannot be read; see `read_toml`.
+        If the file cannot be read; see `read_toml`.
     """
     source = shown(str(path), bare=True, longest=1000) or "''"
     try:
@@ -83,8 +91,8 @@ def parsed_toml(data: bytes, source: str, error: type[PteronError]) -> dict[str,
     Raises
     ------
     PteronError
-        If it is not TOML, or is not meant to be read: nested too deeply, keys of very many parts,
-        numbers of thousands of digits.
+        If it is not TOML, or could exhaust memory or time: too large, nested too deeply, with keys
+        of very many parts or numbers of thousands of digits.
     """
     if len(data) > _LARGEST:
         raise error(
@@ -131,7 +139,7 @@ def validated(
 
 
 def told(lines: Sequence[str]) -> str:
-    """Return several faults as the reason of one error."""
+    """Return the faults of a file as the reason of one error: a line each, `_MANY` at most."""
     if len(lines) == 1:
         return lines[0]
     more = [f"and {len(lines) - _MANY} more"] if len(lines) > _MANY else []
@@ -171,7 +179,7 @@ def fault_lines(error: ValidationError, model: Any) -> list[str]:
 
 
 def table_keys(model: Any) -> tuple[str, ...]:
-    """Return the keys of a model; of aliases with a dot, the tables."""
+    """Return the top-level keys that a model's file may have: an alias `time.unit` gives `time`."""
     return _keys(_schema(model), "")
 
 

@@ -14,14 +14,15 @@ from pteron.cli.terminal import note, show, show_json, written
 from pteron.errors import DataError
 
 _TRUSTED = "trustworthy"
+"""The verdict of an identification that needs no warning."""
 
 Output = Literal["force", "torque", "percent"]
-"""The library's own, which is slow to import."""
+"""A copy of `pteron.export.command_units.Output`: importing that would slow the command line."""
 
 _to = partial(option, metavar="DIR")
 
 _TARGETS = ("c", "st", "mjcf", "sdf", "urdf", "pinocchio", "casadi", "fmu", "klipper", "linuxcnc")
-"""The options for what to write; each but the first two calls `pteron.export.export_NAME`."""
+"""The options that name a folder to write to; `pteron.export.export_NAME` writes it."""
 
 
 def export(
@@ -125,7 +126,7 @@ def export(
 
 
 def _check(asked: dict[str, str], options: list[str]) -> None:
-    """Refuse more or less than one thing to write, and options that do not go with it."""
+    """Refuse no target, or several (but C with Structured Text), and options of another target."""
     if not asked:
         names = ", ".join(f"--{name}" for name in _TARGETS)
         raise DataError(f"{names}: none given; say what to write, such as --c controller")

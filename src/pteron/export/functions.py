@@ -1,4 +1,8 @@
-"""The functions to export: their graphs, tables of numbers, meanings and examples."""
+"""The choice of functions to export, and for each all that a writer of code needs.
+
+That is its graph of operations with names, what each argument means, the machine's own values for
+arguments such as `parameters`, and test vectors: states with the results to expect there.
+"""
 
 from __future__ import annotations
 
@@ -54,8 +58,8 @@ FUNCTIONS = (
     "forward_dynamics",
     "regressor",
 )
-"""Functions exported by default; direct kinematics where it has a closed form, and
-those of `FEED` too for a machine with drives."""
+"""Functions exported by default, and those of `FEED` for a machine with drives. Where direct
+kinematics has no closed form, `direct_step` takes its place."""
 
 FEED = ("feed_forward", "joint_feed_forward")
 """Feed-forward for a controller, from the platform's motion or from the joints'."""
@@ -69,7 +73,7 @@ _BASE = "_base"
 
 @dataclass(frozen=True)
 class NumberTable:
-    """Numbers of the machine that functions take as an argument."""
+    """The machine's own values for an argument: code has them as a constant array to pass."""
 
     name: str
     comment: str
@@ -79,7 +83,11 @@ class NumberTable:
 
 @dataclass(frozen=True)
 class Example:
-    """A state, what a function returns for it, and its status: 0, or 1 out of reach."""
+    """A test vector: a state, what a function returns for it, and its status.
+
+    The status is that of exported code: 0 where all is well, 1 where there is no result, as out of
+    reach. (That of `pteron.kernels.programs` is the other way round.)
+    """
 
     inputs: tuple[Array, ...]
     results: tuple[Array, ...]
@@ -88,13 +96,13 @@ class Example:
 
 @dataclass(frozen=True)
 class Exported:
-    """One function: its graph with names, its ports, and states with their results."""
+    """One function: its graph with names, its inputs and outputs, and its test vectors."""
 
     name: str
     summary: str
     graph: Graph
     names: dict[int, str]
-    """Names of the graph's nodes that compute something."""
+    """Names of the graph's nodes that compute something, by their number."""
     inputs: tuple[Port, ...]
     outputs: tuple[Port, ...]
     meanings: dict[str, str]
@@ -104,7 +112,7 @@ class Exported:
 
     @property
     def several(self) -> bool:
-        """Whether it returns a pose a row, of which some may not exist."""
+        """Whether it returns several poses, one a row, of which some may not exist."""
         return self.name == "direct_kinematics"
 
     @property

@@ -1,4 +1,4 @@
-"""The payload's inertia, from the same machine with and without it."""
+"""Identification of a payload's inertia from logs of one machine with and without the payload."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _NAMES = tuple(f"{name}_L" for name in PLATFORM_KINDS)
 
 @dataclass(frozen=True)
 class Payload:
-    """The inertia of a payload, about P and in the platform's frame.
+    """The inertia of a payload, about the platform's point P, the origin of the platform's frame.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class Payload:
     estimate : Estimate
         The fit of everything: base parameters, friction and offsets first, the payload last.
     residual : array, shape (n,)
-        Standard deviation of each actuator's residuals, N or N m, before the filter.
+        Standard deviation of each actuator's residuals, N or N m, as that of unfiltered samples.
     fault_isolation : FaultIsolation
         Faults of the logs or the machine that the residuals show, and what they spoil.
     findings : tuple of Finding
@@ -111,7 +111,7 @@ class Payload:
 
     @property
     def allowed_for(self) -> bool:
-        """Whether no fault that matters shows, so that the values' errors are as stated."""
+        """Whether the stated errors of the values hold: no fault that matters shows."""
         return not self.fault_isolation.matters
 
     def summary(self) -> str:
@@ -145,7 +145,7 @@ class Payload:
         return "No real body has these values: record longer, or faster."
 
     def as_dict(self) -> dict[str, Any]:
-        """Return everything but the other values as plain data."""
+        """Return the payload as plain data, without the other values of the fit."""
         center = self.center_of_mass
         return {
             "mass": self.mass,

@@ -1,7 +1,8 @@
 """The exponential in straight-line arithmetic, the same bits on every float64 target.
 
-libm's keeps a compiler from turning a loop into vector code, as its sine does; see `sincos`. Here
-exp(x) - 1 comes from a polynomial at x / 4096, and twelve doublings by E (2 + E).
+A call of the C library's `exp` keeps a compiler from turning a loop into vector code, as one of its
+`sin` does (see `sincos`). Here a polynomial gives E(r) = exp(r) - 1 at r = x / 4096, and twelve
+doublings, E(2 r) = E(r) (2 + E(r)), lead back to x.
 """
 
 from __future__ import annotations
@@ -15,33 +16,34 @@ from pteron.bodies.motion import Expression
 from pteron.kernels.graph import Node, expression, function_like, graph_of
 
 _DOUBLINGS = 12
+"""2^12 = 4096."""
 
 _DEGREE = 11
-"""At 709 / 4096, about 0.17, what the polynomial leaves out is below 1e-17 of it."""
+"""Of the Taylor polynomial: at 709 / 4096, about 0.17, the terms beyond are below 1e-17 of it."""
 
 _MOST = 709.0
-"""Beyond it floats end: there it counts as this."""
+"""The largest |x|, as exp(710) overflows; an x beyond it is replaced by it."""
 
 
 def exponential(x: Expression) -> Expression:
     """Return exp(x): to 3e-16 absolutely where x is negative, as friction's laws have it.
 
-    Where x is positive the relative error grows, to 1e-12 at 700. NaN counts as the least x: a law
-    of friction has its speed in other terms too, and is NaN by these.
+    Where x is positive the relative error grows, to 1e-12 at 700. NaN counts as x = -709: a law of
+    friction has its speed in other terms too, and these make it NaN.
     """
     r = ca.fmin(ca.fmax(x, -_MOST), _MOST) * 0.5**_DOUBLINGS
     total: Expression = 1.0 / factorial(_DEGREE)
     for k in range(_DEGREE - 1, 0, -1):
         total = 1.0 / factorial(k) + r * total
-    less = r * total
+    minus_one = r * total
     for _ in range(_DOUBLINGS):
-        less = less * (2.0 + less)
-    return 1.0 + less
+        minus_one = minus_one * (2.0 + minus_one)
+    return 1.0 + minus_one
 
 
 @lru_cache(maxsize=256)
 def straight(function: ca.Function) -> ca.Function:
-    """Return a function without calls of libm's exponential."""
+    """Return a function whose exponentials are computed by `exponential`."""
     graph = graph_of(function)
     if not any(node.operation == "exp" for node in graph.nodes):
         return function

@@ -1,4 +1,10 @@
-"""CasADi programs of a machine's functions by name, with ports and status."""
+"""CasADi functions ("programs") of a machine's kinematics and dynamics, each found by its name.
+
+A program depends on the machine's geometry alone: inertial parameters and drives are inputs, so
+that machines of one geometry share it (in a `general_program` the geometry is an input too). On
+request a last output, `status`, is 1 where the result counts and 0 where it does not; in exported
+code it is the other way round, 0 where all is well.
+"""
 
 from __future__ import annotations
 
@@ -25,6 +31,7 @@ _HUGE = 1e75
 """Inputs or outputs beyond this count as not finite: their squares might overflow."""
 
 _TINY = 1e-300
+"""A leg at the very edge of its reach has discriminant 0, which is above minus this: it reaches."""
 
 REDUCIBLE = (
     *("inverse_dynamics", "drive_forces", "feed_forward", "joint_feed_forward"),
@@ -36,7 +43,7 @@ LOADED = (
     *("inverse_dynamics", "forward_dynamics"),
     *("drive_forces", "feed_forward", "joint_feed_forward", "drive_accelerations"),
 )
-"""Functions that may take a wrench on the platform as well."""
+"""Functions that may take a load, a wrench on the platform, as one more input."""
 
 SELECTED = ("base_regressor", "adaptive", "adaptive_drives")
 """Functions that take a choice of base parameters, but not their values."""
@@ -157,6 +164,7 @@ def _built(
             constants={"parameters": given, "carried": carried},
             extra=extra,
             wrench=wrench,
+            guarded=guarded,
             plain=plain,
         )
         for carried in (True, False)

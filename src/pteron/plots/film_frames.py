@@ -1,4 +1,8 @@
-"""The frames of a film: one machine in the poses of a motion, all in one view."""
+"""The frames of a film of a motion, as pixels: the machine in its poses, all at one scale.
+
+Each frame has the tool's path and a text in a corner; on request the eye goes round the machine,
+and the drives' forces are drawn below it, with a line at the time of the frame.
+"""
 
 from __future__ import annotations
 
@@ -37,22 +41,22 @@ from pteron.plots.machine_figures import gravity_of
 from pteron.plots.space_axes import SpaceAxes
 
 _WIDTH = 6.4
-"""Inches, however many pixels: letters grow with the picture."""
+"""Of a frame, inches, whatever its pixels: letters grow with the frame."""
 
 _STRIP = 1.35
-"""Height of the forces' curves, inches."""
+"""Height of the strip with the forces' curves, inches."""
 
 _SIDES = 0.62, 0.15
-"""Inches to the left and right of them."""
+"""Margins left and right of the forces' curves, inches."""
 
 _BELOW, _ABOVE = 0.42, 0.08
-"""Inches below and above them."""
+"""Margins below and above the forces' curves, inches."""
 
 _PROBES = 24
-"""Poses, and views round the machine, that the size of the picture is taken from."""
+"""Frames, spread over the film, that the scale of all is chosen for."""
 
-_WAY = 1000
-"""Points of the tool's path."""
+_PATH_POINTS = 1000
+"""Least number of points that a longer tool's path is thinned to; twice as many at most."""
 
 
 def frames(
@@ -65,15 +69,15 @@ def frames(
     forces: Array | None,
     corner: str,
 ) -> Iterator[Pixels]:
-    """Yield the pictures of a machine at times (K,), s, width and height in pixels.
+    """Yield a frame, an array of pixels, for each of the times (K,), s; `size` is width and height.
 
-    The eye goes round it so many turns from the first to the last. Forces (T, n) at the motion's
-    samples are drawn below it, `corner` is written in a corner.
+    From the first frame to the last the eye goes round the machine `turns` times. Forces (T, n) at
+    the motion's samples are drawn below it; `corner` is the text in a corner.
     """
     poses = motion.at(times)[0]
     points, guides = joint_points(robot, poses), joint_guides(robot, motion.pose)
     scene = scene_of(points, guides, gravity_of(robot))
-    some = motion.pose[:: max(len(motion.pose) // _WAY, 1)]
+    some = motion.pose[:: max(len(motion.pose) // _PATH_POINTS, 1)]
     path = joint_points(robot, np.vstack([some, motion.pose[-1:]])).tool
 
     figure = blank(_WIDTH, _WIDTH * size[1] / size[0])
@@ -134,7 +138,7 @@ def _strip(
 ) -> list[Line2D]:
     """Draw the forces at the foot of a figure; return the lines that mark the time.
 
-    Legs of other units have axes of their own, beside the first.
+    There are axes for each unit of force, side by side.
     """
     groups = groups_of([leg.joint.force_unit for leg in robot.legs])
     wide, tall = (float(side) for side in figure.get_size_inches())

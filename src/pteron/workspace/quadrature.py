@@ -1,4 +1,7 @@
-"""The volume in reach by quadrature: lengths of lines through the workspace, added up."""
+"""The volume of the workspace by quadrature: lengths of lines inside it, added up.
+
+It is an estimate at sampled poses; `paving` gives bounds that are proved.
+"""
 
 from __future__ import annotations
 
@@ -17,11 +20,13 @@ from pteron.workspace.conditions import Condition, conditions, keeps
 from pteron.workspace.volume import bounding_box
 
 _SAMPLES = 129
-"""Positions on a line between which its ends are sought."""
+"""Equally spaced positions on a line, asked whether they are inside."""
 
 _HALVINGS = 24
+"""Bisections that place an end between two samples."""
+
 _CHUNK = 4096
-"""Lines at a time."""
+"""Lines evaluated at a time."""
 
 
 class Quadrature(NamedTuple):
@@ -40,11 +45,11 @@ def quadrature_volume(
     lines: int = 200,
     given: tuple[Condition, ...] | None = None,
 ) -> Quadrature:
-    """Return the volume in reach at the orientation of a pose, by ordinary evaluation.
+    """Return the volume where the conditions hold, at the orientation of a pose: an estimate.
 
     Lines along x fill the workspace's bounding box; where each one enters and leaves is found by
-    halving, and the lengths inside are added up by the midpoint rule. It needs no intervals: it is
-    what the bounds of `paving` are compared with.
+    halving, and the lengths inside are added up by the midpoint rule. Poses are evaluated in
+    floating point, not in intervals: the bounds of `paving` are checked against it.
 
     Parameters
     ----------

@@ -1,4 +1,8 @@
-"""Logs taken at the motors, in turns, counts or per cent, converted by the machine's drives."""
+"""Logs taken at the motors: factors and gains that convert them to the joints.
+
+Positions in turns or encoder counts get factors, forces in per cent of rated torque get gains, both
+from what the robot's file says of its drives: gear ratio, counts a turn, rated torque.
+"""
 
 from __future__ import annotations
 
@@ -17,31 +21,33 @@ from pteron.manipulator import Manipulator
 
 
 class Recorded(Protocol):
-    """A log, or a file of one, whose forces may be multiplied by gains."""
+    """A `Log`, or a log's file yet to be read, whose forces may be multiplied by gains."""
 
     @property
     def source(self) -> str:
-        """Its name in messages."""
+        """The log's name in messages."""
 
     @property
     def description(self) -> Description:
-        """Its description."""
+        """The description of the log: units, gains, what its columns hold."""
 
     def with_gains(self, description: Description, finding: Finding) -> Self:
-        """Return it with the gains of a description, which a finding tells."""
+        """Return the log with the gains of a description; `finding` tells a person of them."""
 
 
 AnyLog = TypeVar("AnyLog", bound=Recorded)
 
 _NEEDS = {"turns": ("ratio",), "counts": ("ratio", "counts_per_turn")}
-"""Values of a drive that are needed, by the unit of the joints."""
+"""Values of a drive that positions need, by their unit."""
 
 _RATED = ("ratio", "rated_torque")
-"""Those that forces in per cent need."""
+"""Values of a drive that forces in per cent need."""
 
 
 def joint_factors(joints: Group, robot: Manipulator, source: str) -> NDArray[np.float64]:
-    """Return factors (n,) from turns, or counts, of the motors to joints; 1 for other units.
+    """Return factors (n,) from the motors' turns or counts to joint coordinates; else 1.
+
+    `joints` are the log's position columns with their units.
 
     Raises
     ------
@@ -67,7 +73,10 @@ def joint_factors(joints: Group, robot: Manipulator, source: str) -> NDArray[np.
 
 
 def by_rated_torque(log: AnyLog, robot: Manipulator) -> AnyLog:
-    """Return a log of forces in per cent of rated torque with gains, where drives tell them."""
+    """Return a log of forces in per cent of rated torque with gains that make N or N m of them.
+
+    Where a drive lacks a value for that, the log is returned as it is.
+    """
     about = log.description
     if _lacking(robot, _RATED):
         return log

@@ -1,4 +1,8 @@
-"""The contents of the page of an identification, computed once."""
+"""The contents of the HTML report on an identification, computed before the page is written.
+
+They are the verdict with its reasons, the recordings with the stretches to draw, parameters and
+bodies, findings about the logs, residuals and their autocorrelations.
+"""
 
 from __future__ import annotations
 
@@ -13,18 +17,24 @@ from pteron.kernels import Array
 from pteron.report.identification.values import Body, Parameter, body_rows, parameter_rows
 
 _MOST_PICTURES = 3
-"""Held-out recordings that are drawn; all of them are in the table."""
+"""Held-out recordings, the worst ones, that are drawn; the page's table has them all."""
 
 _STRETCH = 3.0
+"""Seconds of a recording that are drawn: few enough to tell measured from predicted."""
+
 _FEWEST = 300
-"""Seconds, and samples, of the stretch that is drawn: few enough to tell two lines apart."""
+"""Samples that are drawn at least, though they last longer."""
 
 _LAGS = 40
+"""Samples of delay, at most, to which residuals' autocorrelation is computed."""
 
 
 @dataclass(frozen=True)
-class Shown:
-    """A recording as the page calls it, and the samples among which the model misses most."""
+class PageRecording:
+    """A recording: its name on the page, its forces as predicted, and the stretch to draw.
+
+    The stretch is where the predictions miss the measured forces most.
+    """
 
     name: str
     prediction: Prediction
@@ -39,12 +49,13 @@ class Shown:
 
 @dataclass(frozen=True)
 class Contents:
-    """The contents of the page of an identification.
+    """The contents of the page of an identification; n is the number of actuators.
 
-    Texts call recordings as on the page. `drawn` are the worst of those held out; `repeats` says
-    whether what was held out is the end of what was fitted. A finding is a kind, a row, a column
-    and a message. The residuals (R, n), N, are NaN where an equation is not used; white noise keeps
-    their correlations (L, n) at lags 1 to L below the bound (n,), nineteen times in twenty.
+    `tone` is "good", "care" or "bad", by the verdict. `drawn` are the worst of the held-out
+    recordings; `repeats` says whether these are no logs of their own, but the ends of the fitted
+    ones. A finding is a tuple: kind, row, column and message. The residuals (R, n), N or N m, are
+    NaN where an equation is not used; `correlations` (L, n) are their autocorrelations at lags of 1
+    to L samples, whose size white noise keeps below `bound` (n,) nineteen times in twenty.
     """
 
     result: Identification
@@ -52,9 +63,9 @@ class Contents:
     reasons: tuple[str, ...]
     steps: tuple[str, ...]
     notes: tuple[str, ...]
-    held_out: tuple[Shown, ...]
-    fitted: tuple[Shown, ...]
-    drawn: tuple[Shown, ...]
+    held_out: tuple[PageRecording, ...]
+    fitted: tuple[PageRecording, ...]
+    drawn: tuple[PageRecording, ...]
     repeats: bool
     parameters: tuple[Parameter, ...]
     bodies: tuple[Body, ...]
@@ -71,7 +82,7 @@ class Contents:
 
     @property
     def worst_floor(self) -> float:
-        """The part of it that noise alone makes, percent."""
+        """The part of the largest held-out error that noise alone makes, percent."""
         shown = max(self.held_out, key=lambda one: float(one.prediction.nrms.max()))
         return float(shown.prediction.floor[int(np.argmax(shown.prediction.nrms))])
 
@@ -141,14 +152,14 @@ def contents(result: Identification) -> Contents:
     )
 
 
-def _shown(prediction: Prediction, names: dict[str, str]) -> Shown:
+def _shown(prediction: Prediction, names: dict[str, str]) -> PageRecording:
     time = prediction.time
     step = float(time[-1] - time[0]) / max(len(time) - 1, 1)
     length = min(max(int(_STRETCH / max(step, 1e-9)), _FEWEST), len(time))
     missed = ((prediction.measured - prediction.predicted) / prediction.size) ** 2
     power = np.cumsum(np.r_[0.0, np.where(prediction.used, missed, 0.0).sum(axis=1)])
     start = int(np.argmax(power[length:] - power[:-length])) if length < len(time) else 0
-    return Shown(names[prediction.source], prediction, slice(start, start + length))
+    return PageRecording(names[prediction.source], prediction, slice(start, start + length))
 
 
 def _residuals(result: Identification) -> Array:
@@ -160,7 +171,7 @@ def _residuals(result: Identification) -> Array:
 
 
 def _correlations(residuals: Array) -> tuple[Array, Array]:
-    """Return the autocorrelation at lags 1 to L, over pairs of which both are there."""
+    """Return the autocorrelations at lags 1 to L, over pairs of finite residuals, and the bound."""
     there = np.isfinite(residuals)
     count = np.maximum(there.sum(axis=0), 1)
     mean = np.where(there, residuals, 0.0).sum(axis=0) / count

@@ -25,7 +25,7 @@ from pteron.plots import (
     residual_time_figure,
     svg,
 )
-from pteron.report.identification.contents import Contents, Shown, contents
+from pteron.report.identification.contents import Contents, PageRecording, contents
 from pteron.report.identification.values import measured
 from pteron.report.quantities import force, nouns
 from pteron.report.typeset import resource, significant, template
@@ -112,7 +112,7 @@ def figures(found: Contents) -> dict[str, Any]:
 
 
 def _panels(
-    shown: Shown, name: str, joints: Sequence[ActuatedJoint], *, speed: bool
+    shown: PageRecording, name: str, joints: Sequence[ActuatedJoint], *, speed: bool
 ) -> dict[str, Any]:
     """Return the pictures of one recording; those over speed only where they are asked for."""
     p, part = shown.prediction, shown.stretch
