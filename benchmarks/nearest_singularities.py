@@ -166,7 +166,8 @@ def difference(
             np.array([it.distance for it in told if (it.kind, it.by) == (kind, "translation")])
             for told in (found, again)
         )
-        apart = max([apart, *np.abs(other / one - 1.0)])
+        known = np.isfinite(one) | np.isfinite(other)  # both are beyond all that was looked at
+        apart = max([apart, *np.abs(other[known] / one[known] - 1.0)])
     return apart
 
 

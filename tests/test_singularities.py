@@ -247,6 +247,20 @@ def test_a_sheet_that_is_in_reach_in_a_corner_only_is_found():
     assert squares[2] > 0.01
 
 
+def test_singular_poses_of_a_pose_beyond_its_joints_limits_are_found():
+    """Limits do not count: where the sliders are below theirs the towers' corners are as near."""
+    robot = CATALOG["linear-delta"]
+    pose = np.array([0.11678455657516291, -0.04466611565050454, -0.3739021])
+    low = [leg.limits[0] for leg in robot.legs]
+    assert (pteron.inverse_kinematics(robot, pose) < low).any()
+    for _ in range(3):
+        found = nearest_singularities(robot, pose)
+        (corner,) = [one for one in found if one.kind == "constraint"]
+        assert corner.distance == pytest.approx(0.043808507038, abs=1e-11)
+        assert 0.99 * corner.distance < corner.lower_bound <= corner.distance
+        pose = turned(pose)
+
+
 def test_distances_do_not_depend_on_the_unit_of_length():
     robot, pose = CATALOG["delta"], np.array([0.1, -0.2, -0.8])
     lengths = ("guide_point", "platform_point", "fixed_offset", "upper_length", "lower_length")

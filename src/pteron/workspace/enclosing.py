@@ -15,7 +15,7 @@ _SINGULAR = 1e-9
 """Share of the largest eigenvalue below which nothing bounds a direction."""
 
 
-def enclosing_box(robot: Manipulator, low: Array, high: Array) -> Array:
+def enclosing_box(robot: Manipulator, low: Array, high: Array, *, limits: bool = True) -> Array:
     """Return a box (2, k) of positions P that holds all in reach between two orientations.
 
     Each leg keeps its platform point within R_j of a point, or of its guide's line: |A_j (P - p_j)|
@@ -27,6 +27,8 @@ def enclosing_box(robot: Manipulator, low: Array, high: Array) -> Array:
         The machine.
     low, high : array, shape (m,)
         Two poses, of which the angles count.
+    limits : bool
+        Whether poses beyond the limits of a joint may be left out.
 
     Raises
     ------
@@ -43,7 +45,7 @@ def enclosing_box(robot: Manipulator, low: Array, high: Array) -> Array:
     far = np.linalg.norm(points, axis=1) * half
     normal, right, constant, square = np.zeros((size, size)), np.zeros(size), 0.0, 0.0
     for leg, arm, slack in zip(robot.legs, arms, far, strict=True):
-        bound = leg.held_bound
+        bound = leg.held_bound if limits else leg.reach_bound
         if bound is None:
             continue
         at = directions @ (np.array(bound.point) - np.array(leg.fixed_offset) - arm)

@@ -170,7 +170,7 @@ def _search(vanishing: Vanishing, at: Array, by: By, most: int) -> Nearest:
     robot, moving = vanishing.robot, _moving(vanishing.robot, by)
     if by == "translation":
         try:
-            box, beyond = enclosing_box(robot, at, at), np.inf
+            box, beyond = enclosing_box(robot, at, at, limits=False), np.inf
         except ModelError:  # the reach has no end
             center, radius = search_ball(robot)
             beyond = float(np.linalg.norm(at[moving] - center)) + radius
