@@ -83,17 +83,21 @@ def account(name: str, count: int) -> Account:
             nearest = looked_for(robot, pose, one)
             total.told += 1
             total.broken += nearest < one.lower_bound
-            total.shares.append(one.lower_bound / min(one.distance, 1e3))
-            total.overstated = max(total.overstated, one.distance / nearest - 1.0)
+            if np.isfinite(one.distance):
+                total.shares.append(one.lower_bound / one.distance)
+                total.overstated = max(total.overstated, one.distance / nearest - 1.0)
         total.apart = max(total.apart, difference(robot, pose, found))
     return total
 
 
 def looked_for(robot: pteron.Manipulator, pose: Array, one: NearestSingularity) -> float:
-    """Return the distance of the nearest singular pose in a grid up to the distance told."""
+    """Return the distance of the nearest singular pose in a grid up to the distance told.
+
+    Where none is told, up to the bound within which none is.
+    """
     lengths = len(robot.platform.lengths)
     moving = np.arange(lengths) if one.by == "translation" else np.array([lengths])
-    most = min(one.distance, 1e3)
+    most = min(one.distance, 1e3) if np.isfinite(one.distance) else one.lower_bound
 
     def poses_of(ways: Array) -> Array:
         found = np.broadcast_to(pose, (*ways.shape[:-1], len(pose))).copy()
